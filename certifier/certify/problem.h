@@ -1,0 +1,27 @@
+/** What stays fixed while a robot runs: the nominal model, what is known of its residual, where that knowledge
+holds, and which coordinates safety is judged in. */
+#pragma once
+
+#include <memory>
+
+#include <Eigen/Core>
+
+#include "certifier/dynamics/model.h"
+#include "certifier/reach/domain.h"
+#include "certifier/residual/declaration.h"
+#include "certifier/residual/transitions.h"
+#include "certifier/safety/obstacle.h"
+#include "certifier/sets/box.h"
+
+namespace forereach {
+
+struct Problem {
+  std::shared_ptr<const NominalModel> model;  ///< f0
+  Domain domain;                              ///< Z_cert
+  Declaration declaration;                    ///< L and sigma
+  Transitions transitions;                    ///< D_N, all inside the domain
+  Eigen::MatrixXd projection;                 ///< P, p-by-n
+  int zonotope_order = 5;                     ///< rho: at most rho * n generators after reduction
+};
+
+}  // namespace forereach

@@ -1,0 +1,54 @@
+/** Unsafe sets in the safety coordinates y = P x, in metres. All closed and convex.
+
+Each is a core, the convex hull of points or a half-space, grown by a radius:
+    O = core + {y : |y|_2 <= radius}. */
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/numerics/limits.h"
+
+namespace forereach {
+
+class Obstacle final {
+ public:
+  enum class Kind { kCircle = 1, kBox = 2, kPolygon = 3, kHalfSpace = 4 };  // as in lcmtypes/obstacle_t.lcm
+
+  /** Each throws std::invalid_argument naming value and bound: sizes, finite entries, radius >= 0, lower <= upper. */
+  /** {y : |y - center|_2 <= radius} in the plane. */
+  [[nodiscard]] static Obstacle Circle(const Eigen::VectorXd& center, double radius);
+  /** {y : lower <= y <= upper}, p = 1, 2 or 3. */
+  [[nodiscard]] static Obstacle AxisBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
+  /** The convex hull of 3 to 16 points in the plane, in any order. */
+  [[nodiscard]] static Obstacle Polygon(const std::vector<Eigen::VectorXd>& vertices);
+  /** {y : normal . y >= offset}, p = 1, 2 or 3: the normal points into the unsafe side and is not zero. */
+  [[nodiscard]] static Obstacle HalfSpace(const Eigen::VectorXd& normal, double offset);
+
+  [[nodiscard]] Kind kind() const { return kind_; }
+  [[nodiscard]] int dim() const { return dim_; }
+  [[nodiscard]] double radius() const { return radius_; }
+  [[nodiscard]] double offset() const { return offset_; }
+  /** The points of the core: a circle's center, a box's lower and upper corner, a polygon's vertices in the order
+  given, a half-space's normal. */
+  [[nodiscard]] const std::vector<Eigen::VectorXd>& points() const { return points_; }
+  /** The points whose hull the core is; empty for a half-space. A box gives its 2^p corners. */
+  [[nodiscard]] const std::vector<Eigen::Vector3d>& hull() const { return hull_; }
+
+ private:
+  Obstacle(Kind kind, int dim) : kind_(kind), dim_(dim) {}
+
+  Kind kind_;
+  int dim_;
+  double radius_ = 0, offset_ = 0;
+  std::vector<Eigen::VectorXd> points_;
+  std::vector<Eigen::Vector3d> hull_;
+};
+
+/** Distance from a point y to the obstacle, negative inside, by plain arithmetic: for planning, simulation and
+display, not for bounds. */
+[[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y);
+
+}  // namespace forereach

@@ -1,0 +1,101 @@
+/** A task file, read whole: all a robot needs. What each key means, its unit, range and default stand in schema.cpp
+and, made from it, in config/README.md. */
+#pragma once
+
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "certifier/certify/problem.h"
+#include "lcmtypes/codec.h"
+
+namespace forereach {
+
+/** Bad input: the text names file, line, key, value and bound. A process that gets it exits with 2. */
+class ConfigError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct GateOptions {
+  double max_age_ms = 500;
+  double max_ahead_ms = 50;
+  double certificate_lifetime_ms = 2000;
+  int queue = 64;
+};
+
+struct BusOptions {
+  std::string url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string candidate = "PLAN_CANDIDATE";
+  std::string decision = "PLAN_DECISION";
+  std::string certified = "PLAN_CERTIFIED";
+  std::string robot_state = "ROBOT_STATE";
+  std::string obstacles = "OBSTACLES";
+  std::string transition = "TRANSITION";
+  std::string status = "CERTIFIER_STATUS";
+  std::string event = "EXECUTION_EVENT";
+};
+
+struct PlannerOptions {
+  std::string algorithm = "kpiece";
+  std::vector<double> goal;            ///< In the safety coordinates, metres.
+  double goal_radius = 1.0;            ///< Metres.
+  double clearance = 0.3;              ///< Obstacles are inflated by this for planning, metres.
+  double clearance_step = 0.1;         ///< Added after each abstention S of one planning round, metres.
+  int progress_steps = 8;              ///< Controls before the braking tail.
+  int tail_steps = 40;                 ///< Longest braking tail.
+  int lead_steps = 2;                  ///< A candidate starts this many steps after the state it was planned from.
+  int candidates = 12;                 ///< Candidates for one start at most.
+  double cruise_speed = 8;             ///< m/s
+  double braking = 2.5;                ///< m/s^2
+  double time_limit_ms = 15;           ///< For one OMPL query.
+  int seed = 1;
+  std::vector<double> initial_half_width;  ///< X0 of each candidate, per state.
+};
+
+struct RobotOptions {
+  std::vector<double> start;           ///< State, model units.
+  double step_period_ms = 40;          ///< Wall-clock time of one model step.
+  double time_limit_s = 40;            ///< The run ends then, goal or not.
+  std::string residual = "none";       ///< How the real robot differs: none, heading_saturation, velocity_knee.
+  std::map<std::string, double> residual_parameters;
+};
+
+struct LoggerOptions {
+  std::string directory = "log";
+  int queue = 4096;                    ///< Messages held for writing at most.
+  double flush_ms = 200;               ///< A killed logger loses at most this much.
+};
+
+struct Config {
+  std::string path;
+  Digest digest{};                     ///< Of the file's bytes.
+  Digest model_digest{}, declaration_digest{}, observations_digest{};
+  std::shared_ptr<const Problem> problem;
+  std::vector<Obstacle> obstacles;
+  Digest obstacles_digest{};
+  Box initial_set;
+  GateOptions gate;
+  BusOptions bus;
+  PlannerOptions planner;
+  RobotOptions robot;
+  LoggerOptions logger;
+};
+
+/** Reads a task file and the transitions it names.
+@throws ConfigError for a missing file, an unknown or missing key, a wrong size, a non-finite or out-of-range number. */
+[[nodiscard]] Config LoadConfig(const std::string& path);
+
+/** The digest decisions carry for a set of obstacles. */
+[[nodiscard]] Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles);
+
+/** Reads a plan: CSV with a header that names the inputs in any order, one row a step.
+@return one column a step, inputs in the model's order. @throws ConfigError. */
+[[nodiscard]] Eigen::MatrixXd LoadPlan(const std::string& path, const NominalModel& model);
+
+/** Writes a plan so that LoadPlan gives it back to the last bit. */
+void SavePlan(const std::string& path, const NominalModel& model, const Eigen::MatrixXd& controls);
+
+}  // namespace forereach

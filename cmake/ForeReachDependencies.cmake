@@ -1,0 +1,22 @@
+# Debian 12's packages, each in docs/dependencies.md. LCM, libsodium, SQLite and cairo have no CMake package.
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(yaml-cpp REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(spdlog REQUIRED)
+pkg_check_modules(LCM REQUIRED IMPORTED_TARGET GLOBAL lcm)
+pkg_check_modules(SODIUM REQUIRED IMPORTED_TARGET GLOBAL libsodium)
+pkg_check_modules(SQLITE REQUIRED IMPORTED_TARGET GLOBAL sqlite3)
+pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET GLOBAL cairo cairo-svg cairo-png)
+pkg_check_modules(OMPL REQUIRED IMPORTED_TARGET GLOBAL ompl)
+find_program(LCM_GEN lcm-gen REQUIRED)
+
+# Headers of others are not ours to warn about.
+foreach(target PkgConfig::LCM PkgConfig::SODIUM PkgConfig::SQLITE PkgConfig::CAIRO PkgConfig::OMPL)
+  get_target_property(directories ${target} INTERFACE_INCLUDE_DIRECTORIES)
+  if(directories)
+    set_target_properties(${target} PROPERTIES INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${directories}")
+  endif()
+endforeach()

@@ -1,0 +1,118 @@
+#include "lcmtypes/bus.h"
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include <lcm/lcm-cpp.hpp>
+
+#include "lcmtypes/node.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::size_t kQueueMessages = 4096;
+constexpr int kLcmQueueMessages = 1024;
+constexpr int kReceivePollMs = 50;
+
+class LcmBus final : public Bus {
+ public:
+  explicit LcmBus(const std::string& url) : in_memory_(url.starts_with("memq://")), lcm_(url) {
+    if (!lcm_.good())
+      throw BusError("bus: cannot open " + url +
+                     ". Is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` as root; "
+                     "`forereach doctor` checks it");
+  }
+
+  ~LcmBus() override {
+    stopping_ = true;
+    if (receiver_.joinable()) receiver_.join();
+  }
+
+  void Subscribe(const std::string& channel, Handler handler) override {
+    std::lock_guard lock(mutex_);
+    subscriptions_.push_back(std::make_unique<Subscription>(Subscription{this, std::move(handler)}));
+    lcm_.subscribeFunction(channel, &LcmBus::CopyOut, subscriptions_.back().get())
+        ->setQueueCapacity(kLcmQueueMessages);
+    if (!in_memory_ && !receiver_.joinable()) receiver_ = std::thread([this] { Receive(); });
+  }
+
+  bool Publish(const std::string& channel, Bytes bytes) override {
+    return lcm_.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size())) == 0;
+  }
+
+  int Dispatch(int timeout_ms) override {
+    if (in_memory_) while (lcm_.handleTimeout(0) > 0) {}
+    std::deque<Stored> batch;
+    {
+      std::unique_lock lock(mutex_);
+      if (!in_memory_) arrived_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !queue_.empty(); });
+      batch.swap(queue_);
+    }
+    std::exception_ptr failure;
+    for (const Stored& stored : batch) {
+      try {
+        (*stored.handler)(Received{stored.channel, stored.bytes, stored.utime});
+      } catch (...) {
+        failure = std::current_exception();
+      }
+    }
+    if (failure) std::rethrow_exception(failure);
+    return static_cast<int>(batch.size());
+  }
+
+  std::int64_t dropped() const override { return dropped_; }
+
+ private:
+  struct Subscription {
+    LcmBus* bus;
+    Handler handler;
+  };
+  struct Stored {
+    std::string channel;
+    std::vector<std::uint8_t> bytes;
+    std::int64_t utime;
+    const Handler* handler;
+  };
+
+  // Runs inside LCM's C code: nothing may be thrown through it.
+  static void CopyOut(const lcm::ReceiveBuffer* buffer, const std::string& channel, Subscription* subscription) {
+    LcmBus& bus = *subscription->bus;
+    try {
+      std::lock_guard lock(bus.mutex_);
+      if (bus.queue_.size() >= kQueueMessages) {
+        bus.queue_.pop_front();
+        ++bus.dropped_;
+      }
+      const auto* data = static_cast<const std::uint8_t*>(buffer->data);
+      bus.queue_.push_back({channel, {data, data + buffer->data_size}, buffer->recv_utime, &subscription->handler});
+    } catch (...) {
+      ++bus.dropped_;
+    }
+    bus.arrived_.notify_one();
+  }
+
+  void Receive() {
+    while (!stopping_) lcm_.handleTimeout(kReceivePollMs);
+  }
+
+  const bool in_memory_;
+  lcm::LCM lcm_;
+  std::mutex mutex_;  // guards queue_ and subscriptions_
+  std::condition_variable arrived_;
+  std::deque<Stored> queue_;
+  std::vector<std::unique_ptr<Subscription>> subscriptions_;
+  std::atomic<std::int64_t> dropped_ = 0;
+  std::atomic<bool> stopping_ = false;
+  std::thread receiver_;
+};
+
+}  // namespace
+
+std::unique_ptr<Bus> OpenBus(const std::string& url) { return std::make_unique<LcmBus>(url); }
+
+}  // namespace forereach

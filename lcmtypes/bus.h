@@ -1,0 +1,58 @@
+/** A publish-subscribe bus as the nodes see it. Only the implementation of OpenBus knows LCM.
+
+Handlers run in the thread that calls Dispatch, never in a receive thread, so a node needs no locks. */
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "lcmtypes/codec.h"
+
+namespace forereach {
+
+/** The bus cannot be opened; the text says what to do about it. */
+class BusError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct Received {
+  const std::string& channel;
+  Bytes bytes;
+  std::int64_t utime;  ///< Microseconds since the Unix epoch at which it arrived here.
+};
+
+class Bus {
+ public:
+  using Handler = std::function<void(const Received&)>;
+
+  virtual ~Bus() = default;
+
+  /** Calls `handler` for each message on a channel that matches the regular expression as a whole. */
+  virtual void Subscribe(const std::string& channel, Handler handler) = 0;
+
+  /** Sends; returns false if the bus refused. May be called from any thread. */
+  virtual bool Publish(const std::string& channel, Bytes bytes) = 0;
+
+  /** Hands out what has arrived; waits up to `timeout_ms` for the first message. Returns how many it handed out.
+  A handler that throws loses that message only: the exception reaches the caller, the bus stays usable. */
+  virtual int Dispatch(int timeout_ms) = 0;
+
+  /** Messages discarded here because more than the bounded queue holds had arrived undispatched. */
+  [[nodiscard]] virtual std::int64_t dropped() const = 0;
+
+  template <class Message>
+  bool Publish(const std::string& channel, const Message& message) {
+    return Publish(channel, Bytes(Encode(message)));
+  }
+};
+
+/** Opens an LCM bus: `udpm://239.255.76.67:7667?ttl=0`, or `memq://`, which lives inside this object alone.
+A udpm bus receives on a thread that only copies messages out; memq delivers within Dispatch, in order.
+@throws BusError if LCM cannot open it, for example without a multicast route; never falls back to another bus. */
+[[nodiscard]] std::unique_ptr<Bus> OpenBus(const std::string& url);
+
+}  // namespace forereach

@@ -1,0 +1,31 @@
+#include "lcmtypes/node.h"
+
+#include <chrono>
+#include <csignal>
+
+namespace forereach {
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+void RequestStop(int) { stop_requested = 1; }
+
+}  // namespace
+
+std::int64_t WallClockUs() {
+  using namespace std::chrono;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+void RunNode(Node& node, Bus& bus) {
+  std::signal(SIGTERM, RequestStop);
+  std::signal(SIGINT, RequestStop);
+  while (!stop_requested && !node.done()) {
+    bus.Dispatch(kTickMs);
+    node.Tick(WallClockUs());
+  }
+  bus.Dispatch(0);
+  node.Stop();
+}
+
+}  // namespace forereach

@@ -1,0 +1,36 @@
+/** A process's inside: something that listens on a bus and acts as time passes. Each process runs one node on the
+wall clock; a test or a one-process run drives several on a clock of its own. */
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "lcmtypes/bus.h"
+
+namespace forereach {
+
+class Node {
+ public:
+  virtual ~Node() = default;
+
+  /** Called at least every `kTickMs` milliseconds. `now_us`: microseconds since the Unix epoch, or a simulated clock. */
+  virtual void Tick(std::int64_t now_us) = 0;
+
+  /** True once the node has nothing left to do; its process then ends. */
+  [[nodiscard]] virtual bool done() const { return false; }
+
+  /** Called once before the process ends: flush, close, print a summary. */
+  virtual void Stop() {}
+};
+
+inline constexpr int kTickMs = 2;
+
+/** Microseconds since the Unix epoch, by the wall clock. */
+[[nodiscard]] std::int64_t WallClockUs();
+
+/** Runs `node` on `bus` until it is done or the process gets SIGTERM or SIGINT, then stops it. */
+void RunNode(Node& node, Bus& bus);
+
+}  // namespace forereach
