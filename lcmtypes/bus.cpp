@@ -1,6 +1,7 @@
 #include "lcmtypes/bus.h"
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -9,8 +10,6 @@
 #include <vector>
 
 #include <lcm/lcm-cpp.hpp>
-
-#include "lcmtypes/node.h"
 
 namespace forereach {
 namespace {
@@ -21,7 +20,8 @@ constexpr int kReceivePollMs = 50;
 
 class LcmBus final : public Bus {
  public:
-  explicit LcmBus(const std::string& url) : in_memory_(url.starts_with("memq://")), lcm_(url) {
+  LcmBus(const std::string& url, Clock clock)
+      : in_memory_(url.starts_with("memq://")), clock_(std::move(clock)), lcm_(url) {
     if (!lcm_.good())
       throw BusError("bus: cannot open " + url +
                      ". Is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` as root; "
@@ -88,8 +88,9 @@ class LcmBus final : public Bus {
         bus.queue_.pop_front();
         ++bus.dropped_;
       }
+      const std::int64_t utime = bus.in_memory_ ? bus.clock_() : buffer->recv_utime;
       const auto* data = static_cast<const std::uint8_t*>(buffer->data);
-      bus.queue_.push_back({channel, {data, data + buffer->data_size}, buffer->recv_utime, &subscription->handler});
+      bus.queue_.push_back({channel, {data, data + buffer->data_size}, utime, &subscription->handler});
     } catch (...) {
       ++bus.dropped_;
     }
@@ -101,6 +102,7 @@ class LcmBus final : public Bus {
   }
 
   const bool in_memory_;
+  const Clock clock_;
   lcm::LCM lcm_;
   std::mutex mutex_;  // guards queue_ and subscriptions_
   std::condition_variable arrived_;
@@ -113,6 +115,13 @@ class LcmBus final : public Bus {
 
 }  // namespace
 
-std::unique_ptr<Bus> OpenBus(const std::string& url) { return std::make_unique<LcmBus>(url); }
+std::int64_t WallClockUs() {
+  using namespace std::chrono;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock) {
+  return std::make_unique<LcmBus>(url, std::move(clock));
+}
 
 }  // namespace forereach

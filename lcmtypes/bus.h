@@ -13,6 +13,10 @@ Handlers run in the thread that calls Dispatch, never in a receive thread, so a 
 
 namespace forereach {
 
+/** Microseconds since the Unix epoch. */
+using Clock = std::function<std::int64_t()>;
+[[nodiscard]] std::int64_t WallClockUs();
+
 /** The bus cannot be opened; the text says what to do about it. */
 class BusError : public std::runtime_error {
  public:
@@ -51,8 +55,9 @@ class Bus {
 };
 
 /** Opens an LCM bus: `udpm://239.255.76.67:7667?ttl=0`, or `memq://`, which lives inside this object alone.
-A udpm bus receives on a thread that only copies messages out; memq delivers within Dispatch, in order.
+A udpm bus receives on a thread that only copies messages out; memq delivers within Dispatch, in order, stamped by
+`clock`, so that several nodes in one process can run on a simulated one.
 @throws BusError if LCM cannot open it, for example without a multicast route; never falls back to another bus. */
-[[nodiscard]] std::unique_ptr<Bus> OpenBus(const std::string& url);
+[[nodiscard]] std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock = WallClockUs);
 
 }  // namespace forereach

@@ -1,6 +1,5 @@
 #include "lcmtypes/node.h"
 
-#include <chrono>
 #include <csignal>
 
 namespace forereach {
@@ -11,11 +10,6 @@ volatile std::sig_atomic_t stop_requested = 0;
 void RequestStop(int) { stop_requested = 1; }
 
 }  // namespace
-
-std::int64_t WallClockUs() {
-  using namespace std::chrono;
-  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
-}
 
 void RunNode(Node& node, Bus& bus) {
   std::signal(SIGTERM, RequestStop);

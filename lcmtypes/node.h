@@ -27,9 +27,6 @@ class Node {
 
 inline constexpr int kTickMs = 2;
 
-/** Microseconds since the Unix epoch, by the wall clock. */
-[[nodiscard]] std::int64_t WallClockUs();
-
 /** Runs `node` on `bus` until it is done or the process gets SIGTERM or SIGINT, then stops it. */
 void RunNode(Node& node, Bus& bus);
 

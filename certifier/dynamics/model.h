@@ -4,6 +4,7 @@ Every implementation comes from one definition of its equations (equations_model
 d_z = states + inputs entries. */
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <string>
@@ -11,18 +12,17 @@ d_z = states + inputs entries. */
 
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/sets/linear_map.h"
 
 namespace forereach {
 
 /** Encloses f0(z) and its Jacobian at one point. Entries of the Jacobian that are not listed are exactly zero. */
 struct Linearization {
-  struct Entry {
-    int row, column;
-    Interval derivative;
-  };
   std::array<Interval, kMaxStates> value;
-  std::array<Entry, kMaxStates * kMaxVariables> jacobian;
-  int jacobian_entries = 0;
+  std::array<MatrixEntry, kMaxStates * kMaxVariables> entries;
+  int count = 0;
+
+  [[nodiscard]] std::span<const MatrixEntry> jacobian() const { return {entries.data(), static_cast<std::size_t>(count)}; }
 };
 
 /** Encloses the Hessians of all f0_k over a box. Entries with row <= column that are not listed are exactly zero;

@@ -1,0 +1,162 @@
+#include "certifier/certify/certifier.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "certifier/safety/separation.h"
+
+namespace forereach {
+namespace {
+
+void RequireThat(bool good, const std::string& what) {
+  if (!good) throw std::invalid_argument(what);
+}
+
+const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
+  RequireThat(problem && problem->model, "problem: no model");
+  const int n = problem->model->num_states(), variables = problem->model->num_variables();
+  problem->domain.Validate(n, problem->model->num_inputs());
+  problem->declaration.Validate(n, variables);
+  const int highest_order = (kMaxGenerators - 2 * n) / n;
+  RequireThat(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
+              "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
+                  std::to_string(highest_order) + "] for " + std::to_string(n) + " states");
+  RequireThat(problem->transitions.z.cols() == variables || problem->transitions.size() == 0,
+              "transitions: " + std::to_string(problem->transitions.z.cols()) + " columns, must be " +
+                  std::to_string(variables));
+  for (int i = 0; i < problem->transitions.size(); ++i) {
+    const Eigen::VectorXd z = problem->transitions.z.row(i);
+    RequireThat(problem->domain.Contains({z.data(), static_cast<std::size_t>(z.size())}),
+                "transition " + std::to_string(i) + ": lies outside the certification domain");
+  }
+  return *problem;
+}
+
+Decision Falsified(int step, int coordinate) {
+  Decision decision;
+  decision.outcome = Outcome::kFalsified;
+  decision.cause = Cause::kPairwise;
+  decision.step = step;
+  decision.coordinate = coordinate;
+  return decision;
+}
+
+Decision Falsified(const Violation& violation) {
+  Decision decision = Falsified(-1, violation.coordinate);
+  decision.first_observation = violation.first;
+  decision.second_observation = violation.second;
+  decision.margin = violation.difference;
+  decision.threshold = violation.bound;
+  return decision;
+}
+
+Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
+  Decision decision;
+  decision.outcome = Outcome::kDomain;
+  decision.step = step;
+  switch (result.status) {
+    case StepResult::Status::kDomainExit:
+      decision.cause = Cause::kDomainExit;
+      decision.exit = result.exit;
+      decision.coordinate = result.exit.index;
+      decision.margin = result.exit.value;
+      decision.threshold = result.exit.bound;
+      return decision;
+    case StepResult::Status::kInconsistent: {
+      const auto k = static_cast<std::size_t>(result.coordinate);
+      decision = Falsified(step, result.coordinate);
+      decision.margin = record.envelope.lower[k];
+      decision.threshold = record.envelope.upper[k];
+      return decision;
+    }
+    default:
+      decision.cause = Cause::kNoFiniteEnclosure;
+      decision.coordinate = result.coordinate;
+      decision.margin = decision.threshold = kInfinity;
+      return decision;
+  }
+}
+
+}  // namespace
+
+Certifier::Certifier(std::shared_ptr<const Problem> problem)
+    : problem_((Validated(problem), std::move(problem))),
+      projection_(problem_->projection, problem_->model->num_states()),
+      observations_(Observe(*problem_->model, problem_->transitions)),
+      violation_(FindViolation(problem_->declaration, observations_)),
+      envelope_(problem_->declaration, observations_),
+      propagator_(*problem_->model, problem_->domain, envelope_, problem_->zonotope_order) {}
+
+void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+  const NominalModel& model = *problem_->model;
+  RequireThat(plan.num_inputs == model.num_inputs() && plan.stride >= plan.num_inputs,
+              "plan: " + std::to_string(plan.num_inputs) + " inputs, the model has " +
+                  std::to_string(model.num_inputs()));
+  RequireThat(1 <= plan.num_steps && plan.num_steps <= kMaxSteps,
+              "plan: " + std::to_string(plan.num_steps) + " steps, must be 1 to " + std::to_string(kMaxSteps));
+  for (int t = 0; t < plan.num_steps; ++t)
+    for (const double u : plan.input(t))
+      RequireThat(std::isfinite(u), "plan: step " + std::to_string(t) + " is not finite");
+  RequireThat(initial_set.dim() == model.num_states(),
+              "initial set: dimension " + std::to_string(initial_set.dim()) + ", the model has " +
+                  std::to_string(model.num_states()) + " states");
+  RequireThat(initial_set.num_generators() <= problem_->zonotope_order * model.num_states(),
+              "initial set: more generators than the zonotope order allows");
+  for (std::size_t o = 0; o < obstacles.size(); ++o)
+    RequireThat(obstacles[o].dim() == projection_.dim(),
+                "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +
+                    ", the projection has " + std::to_string(projection_.dim()));
+}
+
+Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
+                            Tube& tube) const noexcept {
+  tube.length_ = 0;
+  tube.slices_[0] = initial_set;
+  if (violation_) return Falsified(*violation_);
+  const Decision stopped = Propagate(plan, tube);
+  return stopped.outcome == Outcome::kNone ? JudgeSafety(obstacles, tube) : stopped;
+}
+
+Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
+  for (int t = 0; t < plan.num_steps; ++t) {
+    const auto i = static_cast<std::size_t>(t);
+    StepRecord& record = tube.steps_[i];
+    const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), tube.slices_[i + 1], record);
+    if (result.status != StepResult::Status::kDone) return Stopped(result, t, record);
+    tube.length_ = t + 1;
+  }
+  return {};
+}
+
+Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept {
+  Decision decision;
+  decision.margin = kInfinity;
+  double smallest_clearance = kInfinity;
+  Zonotope projected;
+  for (int t = 0; t <= tube.length(); ++t) {
+    projection_.Enclose(tube.slice(t), projected);
+    for (std::size_t o = 0; o < obstacles.size(); ++o) {
+      // A cheap bound settles all that stays farther away than what was found already.
+      Separation separation = SeparateQuickly(projected, obstacles[o]);
+      if (separation.IsProven() && separation.clearance() >= smallest_clearance) continue;
+      if (const Separation best = Separate(projected, obstacles[o]); best.distance > separation.distance)
+        separation = best;
+      if (separation.IsProven() && separation.clearance() >= smallest_clearance) continue;
+      smallest_clearance = separation.clearance();
+      decision.obstacle = static_cast<int>(o);
+      decision.closest_step = t;
+      decision.margin = separation.distance;
+      decision.threshold = separation.threshold;
+      if (separation.IsProven()) continue;
+      decision.outcome = Outcome::kSafety;
+      decision.cause = Cause::kObstacle;
+      decision.step = t;
+      return decision;
+    }
+  }
+  decision.outcome = Outcome::kCertified;
+  return decision;
+}
+
+}  // namespace forereach

@@ -1,0 +1,68 @@
+/** The answer to one plan: a certificate, or an abstention with its cause and a witness. */
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "certifier/numerics/limits.h"
+#include "certifier/reach/propagator.h"
+#include "certifier/residual/consistency.h"
+#include "certifier/sets/zonotope.h"
+
+namespace forereach {
+
+/** Numbers as in lcmtypes/decision_t.lcm. Zero is not a certificate. */
+enum class Outcome { kNone = 0, kCertified = 1, kFalsified = 2, kDomain = 3, kSafety = 4 };
+enum class Cause { kNone = 0, kPairwise = 1, kDomainExit = 2, kNoFiniteEnclosure = 3, kObstacle = 4 };
+
+struct Decision {
+  Outcome outcome = Outcome::kNone;
+  Cause cause = Cause::kNone;
+  /** The first step that fails: t of X_t. -1 for a certificate, and for F found before any step. */
+  int step = -1;
+
+  /** @name Witness: what the outcome rests on; -1 or kNone where it does not apply. */
+  ///@{
+  DomainExit exit{};       ///< D by domain exit.
+  int coordinate = -1;     ///< F: residual coordinate. D: coordinate of z, or state without a finite enclosure.
+  int first_observation = -1, second_observation = -1;  ///< F: the violating pair.
+  int obstacle = -1;       ///< S: the obstacle. Certificate: the one that the tube comes closest to.
+  int closest_step = -1;   ///< Certificate: where it does.
+  ///@}
+
+  /** The value that decided and what it was held to. Certificate and S: proven distance from slice to the obstacle's
+  core, and its radius (m). D: what the hull reaches, and the domain's bound. F: difference, and what L allows. */
+  double margin = 0, threshold = 0;
+};
+
+/** A fixed open-loop control sequence u_0 .. u_{T-1}, step by step in memory. Refers to numbers it does not own. */
+struct Plan {
+  const double* controls = nullptr;
+  int num_inputs = 0, num_steps = 0;
+  int stride = 0;  ///< Doubles from one step to the next, at least num_inputs.
+
+  [[nodiscard]] std::span<const double> input(int t) const {
+    return {controls + static_cast<std::ptrdiff_t>(t) * stride, static_cast<std::size_t>(num_inputs)};
+  }
+};
+
+/** The reachable tube as far as it was computed: slices X_0 .. X_length and a record of each completed step.
+Made once, reused for every plan: it holds the longest horizon and is some 2 MB large. */
+class Tube final {
+ public:
+  Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps) {}
+
+  /** Completed steps; X_0 .. X_length() are valid. */
+  [[nodiscard]] int length() const { return length_; }
+  [[nodiscard]] const Zonotope& slice(int t) const { return slices_[static_cast<std::size_t>(t)]; }
+  [[nodiscard]] const StepRecord& step(int t) const { return steps_[static_cast<std::size_t>(t)]; }
+
+ private:
+  friend class Certifier;
+  std::vector<Zonotope> slices_;
+  std::vector<StepRecord> steps_;
+  int length_ = 0;
+};
+
+}  // namespace forereach

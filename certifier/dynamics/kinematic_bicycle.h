@@ -1,0 +1,35 @@
+/** Kinematic bicycle with jerk and steering rate as inputs, one explicit Euler step. */
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <span>
+
+namespace forereach {
+
+struct KinematicBicycle {
+  static constexpr int kStates = 6, kInputs = 2;
+  static constexpr const char* kName = "kinematic_bicycle";
+  // m, m, rad, m/s, m/s^2, rad
+  static constexpr std::array<const char*, kStates> kStateNames{"x", "y", "theta", "v", "a", "delta"};
+  static constexpr std::array<const char*, kInputs> kInputNames{"jerk", "steer_rate"};  // m/s^3, rad/s
+
+  double dt;         ///< s
+  double wheelbase;  ///< m
+
+  /** The equations, once, for every scalar: z = (x, y, theta, v, a, delta, jerk, steer_rate). */
+  template <class T>
+  void operator()(std::span<const T> z, std::span<T> next) const {
+    using std::cos, std::sin, std::tan;
+    const T step(dt);
+    const T &theta = z[2], &v = z[3], &a = z[4], &delta = z[5], &jerk = z[6], &steer_rate = z[7];
+    next[0] = z[0] + step * (v * cos(theta));
+    next[1] = z[1] + step * (v * sin(theta));
+    next[2] = theta + step / T(wheelbase) * (v * tan(delta));
+    next[3] = v + step * a;
+    next[4] = a + step * jerk;
+    next[5] = delta + step * steer_rate;
+  }
+};
+
+}  // namespace forereach

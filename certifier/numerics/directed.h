@@ -1,0 +1,114 @@
+/** Directed rounding: the one module that turns floating-point results into bounds in real arithmetic.
+
+Everything runs in round-to-nearest. The rounding error of a sum or product is itself a double (TwoSum, fused
+multiply-add), so its sign says whether the rounded result lies above or below the exact one. An exact result is
+returned as it is: bounds do not widen where nothing was rounded. NaN stays NaN, and every comparison in the library is
+written so that NaN fails it. */
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#ifdef __FAST_MATH__
+#error "bounds need IEEE arithmetic: compile without -ffast-math"
+#endif
+
+namespace forereach {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+inline constexpr double kMaxDouble = std::numeric_limits<double>::max();
+inline constexpr double kUnitRoundoff = 0x1p-53;
+
+/** The smallest double above x; infinity and NaN stay. */
+[[nodiscard]] inline double NextUp(double x) noexcept {
+  if (!(x < kInfinity)) return x;
+  if (x == 0) return std::numeric_limits<double>::denorm_min();
+  const auto bits = std::bit_cast<std::int64_t>(x);
+  return std::bit_cast<double>(x > 0 ? bits + 1 : bits - 1);
+}
+
+/** The largest double below x; minus infinity and NaN stay. */
+[[nodiscard]] inline double NextDown(double x) noexcept { return -NextUp(-x); }
+
+namespace internal {
+
+// Below this a product's error may not be a double, and its sign not be seen.
+inline constexpr double kSafeProduct = 0x1p-960;
+
+[[nodiscard]] inline double UpIfBelow(double rounded, double error) noexcept {
+  return error > 0 ? NextUp(rounded) : rounded;
+}
+
+// An overflow to minus infinity is no upper bound of the finite number it stands for.
+[[nodiscard]] inline double UpperOfOverflow(double rounded, bool operands_finite) noexcept {
+  return rounded < 0 && operands_finite ? -kMaxDouble : rounded;
+}
+
+}  // namespace internal
+
+/** The least double >= a + b. */
+[[nodiscard]] inline double AddUp(double a, double b) noexcept {
+  const double sum = a + b;
+  if (!std::isfinite(sum)) return internal::UpperOfOverflow(sum, std::isfinite(a) && std::isfinite(b));
+  const double b_part = sum - a;
+  return internal::UpIfBelow(sum, (a - (sum - b_part)) + (b - b_part));
+}
+
+/** A double >= a * b: the least one, or one above it for results below 2^-960. */
+[[nodiscard]] inline double MulUp(double a, double b) noexcept {
+  const double product = a * b;
+  if (!std::isfinite(product)) return internal::UpperOfOverflow(product, std::isfinite(a) && std::isfinite(b));
+  if (std::abs(product) < internal::kSafeProduct) return a == 0 || b == 0 ? 0 : NextUp(product);
+  return internal::UpIfBelow(product, std::fma(a, b, -product));
+}
+
+/** A double >= a / b, b not zero: the least one, or one above it where a or the quotient is below 2^-960. */
+[[nodiscard]] inline double DivUp(double a, double b) noexcept {
+  const double quotient = a / b;
+  if (!std::isfinite(quotient)) return internal::UpperOfOverflow(quotient, std::isfinite(a) && b != 0);
+  if (a == 0) return 0;
+  if (std::abs(quotient) < internal::kSafeProduct || std::abs(a) < internal::kSafeProduct) return NextUp(quotient);
+  const double remainder = std::fma(-quotient, b, a);
+  return internal::UpIfBelow(quotient, b > 0 ? remainder : -remainder);
+}
+
+/** A double >= sqrt(x), x >= 0. */
+[[nodiscard]] inline double SqrtUp(double x) noexcept {
+  const double root = std::sqrt(x);
+  if (x == 0 || !std::isfinite(root)) return root;
+  if (x < internal::kSafeProduct) return NextUp(root);
+  return internal::UpIfBelow(root, std::fma(-root, root, x));
+}
+
+[[nodiscard]] inline double SubUp(double a, double b) noexcept { return AddUp(a, -b); }
+[[nodiscard]] inline double AddDown(double a, double b) noexcept { return -AddUp(-a, -b); }
+[[nodiscard]] inline double SubDown(double a, double b) noexcept { return -AddUp(-a, b); }
+[[nodiscard]] inline double MulDown(double a, double b) noexcept { return -MulUp(-a, b); }
+[[nodiscard]] inline double DivDown(double a, double b) noexcept { return -DivUp(-a, b); }
+
+/** A double <= sqrt(x), x >= 0. */
+[[nodiscard]] inline double SqrtDown(double x) noexcept {
+  const double root = std::sqrt(x);
+  if (x == 0 || !std::isfinite(root)) return root;
+  if (x < internal::kSafeProduct) return NextDown(root);
+  return std::fma(-root, root, x) < 0 ? NextDown(root) : root;
+}
+
+/** Bounds the exact sum of `terms` non-negative doubles from above, given their plain floating-point sum taken in any
+order: the relative error of such a sum is below terms * u / (1 - terms * u), and additions do not underflow. */
+[[nodiscard]] inline double SumUpper(double plain_sum, int terms) noexcept {
+  if (terms <= 1 || plain_sum == 0) return plain_sum;
+  return NextUp(MulUp(plain_sum, 1 + (2.0 * terms) * kUnitRoundoff));
+}
+
+/** Bounds from above the error |fl(sum_l a_l b_l) - sum_l a_l b_l| of a plain dot product of `terms` products, in any
+order, given an upper bound on sum_l |a_l b_l|. Twice the textbook bound gamma_terms, and a smallest double for each
+product that may have underflowed. */
+[[nodiscard]] inline double DotErrorUpper(double magnitude, int terms) noexcept {
+  if (magnitude == 0) return 0;
+  return AddUp(MulUp(magnitude, (2.0 * terms) * kUnitRoundoff), terms * std::numeric_limits<double>::denorm_min());
+}
+
+}  // namespace forereach

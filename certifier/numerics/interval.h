@@ -1,0 +1,85 @@
+/** Closed intervals of reals, rounded outward: every result contains all values the operation takes on its operands.
+
+An operation whose result has no finite bound gives [-inf, inf], and non-finite operands do too, so a caller checks
+IsFinite once at the end. `lower <= upper` always holds; there is no empty interval. */
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "certifier/numerics/directed.h"
+
+namespace forereach {
+
+struct Interval {
+  double lower, upper;
+
+  Interval() = default;
+  constexpr Interval(double value) : lower(value), upper(value) {}  // NOLINT: a number is an interval
+  constexpr Interval(double lower_bound, double upper_bound) : lower(lower_bound), upper(upper_bound) {}
+
+  [[nodiscard]] static constexpr Interval Entire() { return {-kInfinity, kInfinity}; }
+
+  [[nodiscard]] bool IsFinite() const { return lower > -kInfinity && upper < kInfinity; }
+  [[nodiscard]] bool Contains(double x) const { return lower <= x && x <= upper; }
+
+  /** A double inside, the midpoint up to rounding. */
+  [[nodiscard]] double Middle() const {
+    const double middle = lower / 2 + upper / 2;
+    return std::clamp(middle, lower, upper);
+  }
+  /** An upper bound on |x - y| over x inside, for a given double y. */
+  [[nodiscard]] double DistanceUpper(double y) const { return std::max(SubUp(upper, y), SubUp(y, lower)); }
+  /** The largest |x| over x inside. */
+  [[nodiscard]] double Magnitude() const { return std::max(std::abs(lower), std::abs(upper)); }
+
+  Interval operator-() const { return {-upper, -lower}; }
+  Interval& operator+=(const Interval& b) { return *this = *this + b; }
+
+  friend Interval operator+(const Interval& a, const Interval& b) {
+    return Checked(AddDown(a.lower, b.lower), AddUp(a.upper, b.upper));
+  }
+  friend Interval operator-(const Interval& a, const Interval& b) { return a + -b; }
+
+  friend Interval operator*(const Interval& a, const Interval& b) {
+    if (!a.IsFinite() || !b.IsFinite()) return Entire();
+    if (a.upper <= 0) return -(-a * b);
+    if (a.lower >= 0) {
+      return Checked(MulDown(b.lower >= 0 ? a.lower : a.upper, b.lower), MulUp(b.upper >= 0 ? a.upper : a.lower, b.upper));
+    }
+    if (b.lower >= 0 || b.upper <= 0) return b * a;
+    return Checked(std::min(MulDown(a.lower, b.upper), MulDown(a.upper, b.lower)),
+                   std::max(MulUp(a.lower, b.lower), MulUp(a.upper, b.upper)));
+  }
+
+  friend Interval operator/(const Interval& a, const Interval& b) {
+    if (!a.IsFinite() || !b.IsFinite() || b.Contains(0)) return Entire();
+    if (b.upper < 0) return -(a / -b);
+    return Checked(DivDown(a.lower, a.lower >= 0 ? b.upper : b.lower), DivUp(a.upper, a.upper >= 0 ? b.lower : b.upper));
+  }
+
+  friend bool operator==(const Interval&, const Interval&) = default;
+
+ private:
+  // Overflow and NaN end here.
+  static Interval Checked(double lower_bound, double upper_bound) {
+    const Interval result(lower_bound, upper_bound);
+    return lower_bound <= upper_bound ? result : Entire();
+  }
+};
+
+/** {x^2}. */
+[[nodiscard]] inline Interval sqr(const Interval& x) {
+  if (!x.IsFinite()) return Interval::Entire();
+  const double far = x.Magnitude();
+  const double near = x.Contains(0) ? 0 : std::min(std::abs(x.lower), std::abs(x.upper));
+  return {MulDown(near, near), MulUp(far, far)};
+}
+
+/** The true ranges, widened by the error bound of the C library's functions (elementary.cpp). [-1, 1] where the
+argument is too large to reduce; tan over an interval that may meet a pole gives [-inf, inf]. */
+[[nodiscard]] Interval sin(const Interval& x);
+[[nodiscard]] Interval cos(const Interval& x);
+[[nodiscard]] Interval tan(const Interval& x);
+
+}  // namespace forereach

@@ -1,0 +1,14 @@
+#include "certifier/numerics/text.h"
+
+#include <array>
+#include <charconv>
+
+namespace forereach {
+
+std::string ToText(double value) {
+  std::array<char, 32> buffer;
+  const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  return {buffer.data(), result.ptr};
+}
+
+}  // namespace forereach

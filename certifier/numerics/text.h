@@ -1,0 +1,11 @@
+/** Numbers as text. */
+#pragma once
+
+#include <string>
+
+namespace forereach {
+
+/** The shortest decimal that reads back as the same double. */
+[[nodiscard]] std::string ToText(double value);
+
+}  // namespace forereach

@@ -1,0 +1,12 @@
+#include "certifier/process/certifier_node.h"
+#include "certifier/task/process.h"
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  return RunProcess(argc, argv,
+                    {"forereach-certifier",
+                     "Certifies candidate plans on the bus, or abstains and says why. Each candidate gets exactly one "
+                     "decision; only certified plans are passed on.",
+                     "forereach-certifier --config config/demo.yaml"},
+                    [](const Config& config, Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
+}

@@ -1,0 +1,96 @@
+#include "certifier/reach/domain.h"
+
+#include <array>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+
+#include "certifier/numerics/limits.h"
+#include "certifier/numerics/text.h"
+
+namespace forereach {
+namespace {
+
+double BoxLower(const Domain& domain, int l) {
+  const int n = domain.state.dim();
+  return l < n ? domain.state.lower()[l] : domain.input.lower()[l - n];
+}
+
+double BoxUpper(const Domain& domain, int l) {
+  const int n = domain.state.dim();
+  return l < n ? domain.state.upper()[l] : domain.input.upper()[l - n];
+}
+
+double LargestValue(const Domain::Inequality& inequality, std::span<const Interval> box) {
+  double largest = 0;
+  for (std::size_t l = 0; l < box.size(); ++l) {
+    const double c = inequality.coefficients[static_cast<Eigen::Index>(l)];
+    if (c != 0) largest = AddUp(largest, MulUp(c, c > 0 ? box[l].upper : box[l].lower));
+  }
+  return largest;
+}
+
+double LargestSquaredDistance(const Domain::Ball& ball, std::span<const Interval> box) {
+  double largest = 0;
+  for (std::size_t i = 0; i < ball.coordinates.size(); ++i) {
+    const double away =
+        box[static_cast<std::size_t>(ball.coordinates[i])].DistanceUpper(ball.center[static_cast<Eigen::Index>(i)]);
+    largest = AddUp(largest, MulUp(away, away));
+  }
+  return largest;
+}
+
+}  // namespace
+
+void Domain::Validate(int num_states, int num_inputs) const {
+  const auto require = [](bool good, const std::string& what) {
+    if (!good) throw std::invalid_argument("domain: " + what);
+  };
+  const int variables = num_states + num_inputs;
+  require(state.dim() == num_states, "state box has " + std::to_string(state.dim()) + " entries, the model " +
+                                         std::to_string(num_states) + " states");
+  require(input.dim() == num_inputs, "input box has " + std::to_string(input.dim()) + " entries, the model " +
+                                         std::to_string(num_inputs) + " inputs");
+  for (std::size_t i = 0; i < inequalities.size(); ++i) {
+    const auto& [coefficients, bound] = inequalities[i];
+    require(coefficients.size() == variables && coefficients.allFinite() && std::isfinite(bound),
+            "inequality " + std::to_string(i) + " needs " + std::to_string(variables) +
+                " finite coefficients and a finite bound");
+  }
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const auto& [coordinates, center, radius] = balls[i];
+    const std::string which = "ball " + std::to_string(i);
+    require(!coordinates.empty() && static_cast<Eigen::Index>(coordinates.size()) == center.size() && center.allFinite(),
+            which + " needs as many finite center entries as coordinates");
+    for (const int l : coordinates)
+      require(0 <= l && l < variables, which + ": coordinate " + std::to_string(l) + " does not exist");
+    require(radius >= 0 && radius < kInfinity, which + ": radius " + ToText(radius) + " is negative or not finite");
+  }
+}
+
+bool Domain::Contains(std::span<const double> z) const noexcept {
+  std::array<Interval, kMaxVariables> point;
+  for (std::size_t l = 0; l < z.size(); ++l) point[l] = Interval(z[l]);
+  return FindExit(*this, {point.data(), z.size()}).kind == DomainExit::Kind::kNone;
+}
+
+DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept {
+  using Kind = DomainExit::Kind;
+  for (int l = 0; l < static_cast<int>(box.size()); ++l) {
+    const Interval& z = box[static_cast<std::size_t>(l)];
+    const double lower = BoxLower(domain, l), upper = BoxUpper(domain, l);
+    if (!(lower <= z.lower)) return {Kind::kLower, l, z.lower, lower};
+    if (!(z.upper <= upper)) return {Kind::kUpper, l, z.upper, upper};
+  }
+  for (std::size_t i = 0; i < domain.inequalities.size(); ++i) {
+    const double value = LargestValue(domain.inequalities[i], box), bound = domain.inequalities[i].bound;
+    if (!(value <= bound)) return {Kind::kInequality, static_cast<int>(i), value, bound};
+  }
+  for (std::size_t i = 0; i < domain.balls.size(); ++i) {
+    const double square = LargestSquaredDistance(domain.balls[i], box), radius = domain.balls[i].radius;
+    if (!(square <= MulDown(radius, radius))) return {Kind::kBall, static_cast<int>(i), SqrtUp(square), radius};
+  }
+  return {};
+}
+
+}  // namespace forereach

@@ -1,0 +1,51 @@
+/** The certification domain Z_cert: where the declaration and the nominal enclosure hold. Closed and convex. */
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/numerics/interval.h"
+#include "certifier/sets/box.h"
+
+namespace forereach {
+
+/** {z = (x, u) : x in state, u in input, all inequalities, all balls}. */
+struct Domain {
+  /** {z : coefficients . z <= bound}, d_z coefficients. */
+  struct Inequality {
+    Eigen::VectorXd coefficients;
+    double bound;
+  };
+  /** {z : |z_S - center|_2 <= radius} over the named coordinates S of z. */
+  struct Ball {
+    std::vector<int> coordinates;
+    Eigen::VectorXd center;
+    double radius;
+  };
+
+  Box state, input;
+  std::vector<Inequality> inequalities;
+  std::vector<Ball> balls;
+
+  /** @throws std::invalid_argument naming the constraint if a size does not fit d_z or a number is not finite. */
+  void Validate(int num_states, int num_inputs) const;
+
+  /** True only if z provably lies inside. */
+  [[nodiscard]] bool Contains(std::span<const double> z) const noexcept;
+};
+
+/** Where a box was not proven to stay inside: `value` is what it reaches, `bound` what it may reach. */
+struct DomainExit {
+  enum class Kind { kNone, kLower, kUpper, kInequality, kBall };
+  Kind kind = Kind::kNone;
+  int index = -1;  ///< Coordinate of z for kLower and kUpper, else the inequality or ball.
+  double value = 0, bound = 0;
+};
+
+/** The first constraint that the box of d_z intervals does not provably satisfy; kind kNone if it lies inside. A bound
+that is met exactly is inside. NaN is outside. Cost O(d_z) a constraint. */
+[[nodiscard]] DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept;
+
+}  // namespace forereach

@@ -1,0 +1,32 @@
+#include "certifier/residual/declaration.h"
+
+#include <stdexcept>
+#include <string>
+
+#include "certifier/numerics/directed.h"
+#include "certifier/numerics/text.h"
+
+namespace forereach {
+namespace {
+
+void RequireBound(const std::string& name, double value) {
+  if (!(value >= 0 && value < kInfinity))
+    throw std::invalid_argument(name + ": " + ToText(value) + " must be finite and not negative");
+}
+
+}  // namespace
+
+void Declaration::Validate(int num_states, int num_variables) const {
+  if (lipschitz.rows() != num_states || lipschitz.cols() != num_variables || noise_bound.size() != num_states)
+    throw std::invalid_argument("declaration: lipschitz is " + std::to_string(lipschitz.rows()) + "-by-" +
+                                std::to_string(lipschitz.cols()) + " with " + std::to_string(noise_bound.size()) +
+                                " noise bounds, must be " + std::to_string(num_states) + "-by-" +
+                                std::to_string(num_variables) + " with " + std::to_string(num_states));
+  for (Eigen::Index k = 0; k < lipschitz.rows(); ++k) {
+    RequireBound("noise_bound " + std::to_string(k), noise_bound[k]);
+    for (Eigen::Index l = 0; l < lipschitz.cols(); ++l)
+      RequireBound("lipschitz " + std::to_string(k) + ", " + std::to_string(l), lipschitz(k, l));
+  }
+}
+
+}  // namespace forereach

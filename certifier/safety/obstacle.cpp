@@ -1,0 +1,119 @@
+#include "certifier/safety/obstacle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "certifier/numerics/directed.h"
+#include "certifier/numerics/text.h"
+
+namespace forereach {
+namespace {
+
+void Require(bool good, const std::string& what) {
+  if (!good) throw std::invalid_argument(what);
+}
+
+Eigen::Vector3d Padded(const Eigen::VectorXd& point) {
+  Eigen::Vector3d padded = Eigen::Vector3d::Zero();
+  padded.head(point.size()) = point;
+  return padded;
+}
+
+int SafetyDim(const char* what, const Eigen::VectorXd& point) {
+  Require(1 <= point.size() && point.size() <= kMaxSafetyDim,
+          std::string(what) + ": dimension " + std::to_string(point.size()) + " is not 1, 2 or 3");
+  Require(point.allFinite(), std::string(what) + ": not finite");
+  return static_cast<int>(point.size());
+}
+
+// Distance from the origin to the hull of planar points given as offsets, negative inside, by plain arithmetic: the
+// largest value over unit directions of the smallest support.
+double HullDistance(const std::vector<Eigen::Vector2d>& offsets) {
+  const auto lowest = [&](const Eigen::Vector2d& direction) {
+    double value = kInfinity;
+    for (const Eigen::Vector2d& point : offsets) value = std::min(value, direction.dot(point));
+    return value;
+  };
+  double best = -kInfinity;
+  const auto consider = [&](const Eigen::Vector2d& direction) {
+    if (direction.norm() > 0) best = std::max(best, lowest(direction.normalized()));
+  };
+  for (const Eigen::Vector2d& a : offsets) {
+    consider(a);
+    for (const Eigen::Vector2d& b : offsets) consider({a.y() - b.y(), b.x() - a.x()});
+  }
+  return best;
+}
+
+}  // namespace
+
+Obstacle Obstacle::Circle(const Eigen::VectorXd& center, double radius) {
+  Require(center.size() == 2, "circle: center has " + std::to_string(center.size()) + " entries, must have 2");
+  Require(radius >= 0 && radius < kInfinity, "circle: radius " + ToText(radius) + " is negative or not finite");
+  Obstacle circle(Kind::kCircle, SafetyDim("circle: center", center));
+  circle.radius_ = radius;
+  circle.points_ = {center};
+  circle.hull_ = {Padded(center)};
+  return circle;
+}
+
+Obstacle Obstacle::AxisBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
+  Obstacle box(Kind::kBox, SafetyDim("box: lower", lower));
+  Require(SafetyDim("box: upper", upper) == box.dim_, "box: lower and upper have different sizes");
+  for (Eigen::Index k = 0; k < lower.size(); ++k)
+    Require(lower[k] <= upper[k], "box: lower " + ToText(lower[k]) + " is above upper " + ToText(upper[k]));
+  box.points_ = {lower, upper};
+  for (int corner = 0; corner < 1 << box.dim_; ++corner) {
+    Eigen::Vector3d point = Eigen::Vector3d::Zero();
+    for (int k = 0; k < box.dim_; ++k) point[k] = corner >> k & 1 ? upper[k] : lower[k];
+    box.hull_.push_back(point);
+  }
+  return box;
+}
+
+Obstacle Obstacle::Polygon(const std::vector<Eigen::VectorXd>& vertices) {
+  Require(3 <= vertices.size() && vertices.size() <= kMaxObstaclePoints,
+          "polygon: " + std::to_string(vertices.size()) + " vertices, must be 3 to " +
+              std::to_string(kMaxObstaclePoints));
+  Obstacle polygon(Kind::kPolygon, 2);
+  polygon.points_ = vertices;
+  for (const Eigen::VectorXd& vertex : vertices) {
+    Require(SafetyDim("polygon: vertex", vertex) == 2, "polygon: a vertex must have 2 entries");
+    polygon.hull_.push_back(Padded(vertex));
+  }
+  return polygon;
+}
+
+Obstacle Obstacle::HalfSpace(const Eigen::VectorXd& normal, double offset) {
+  Obstacle half_space(Kind::kHalfSpace, SafetyDim("half_plane: normal", normal));
+  Require(!normal.isZero(0), "half_plane: normal is zero");
+  Require(std::isfinite(offset), "half_plane: offset is not finite");
+  half_space.points_ = {normal};
+  half_space.offset_ = offset;
+  return half_space;
+}
+
+double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
+  switch (obstacle.kind()) {
+    case Obstacle::Kind::kCircle:
+      return (y - obstacle.points()[0]).norm() - obstacle.radius();
+    case Obstacle::Kind::kHalfSpace: {
+      const Eigen::VectorXd& normal = obstacle.points()[0];
+      return (obstacle.offset() - normal.dot(y)) / normal.norm();
+    }
+    case Obstacle::Kind::kBox: {
+      const Eigen::ArrayXd outside = (obstacle.points()[0] - y).array().max((y - obstacle.points()[1]).array());
+      const double inside = outside.maxCoeff();
+      return inside < 0 ? inside : outside.max(0).matrix().norm();
+    }
+    case Obstacle::Kind::kPolygon:
+      break;
+  }
+  std::vector<Eigen::Vector2d> offsets;
+  for (const Eigen::VectorXd& vertex : obstacle.points()) offsets.emplace_back(vertex - y);
+  return HullDistance(offsets);
+}
+
+}  // namespace forereach

@@ -1,0 +1,163 @@
+#include "certifier/safety/separation.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace forereach {
+namespace {
+
+using Vector = Eigen::Vector3d;  // unused coordinates are zero
+
+// The dual bound along d, rounded against us.
+double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
+  const auto p = static_cast<std::size_t>(slice.dim());
+  double core = kInfinity;
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+    core = obstacle.offset();
+  } else {
+    for (const Vector& point : obstacle.hull()) {
+      double along = 0;
+      for (std::size_t k = 0; k < p; ++k) {
+        const auto i = static_cast<Eigen::Index>(k);
+        along = AddDown(along, MulDown(d[i], point[i]));
+      }
+      core = std::min(core, along);
+    }
+  }
+  Interval square(0);
+  for (std::size_t k = 0; k < p; ++k) square += sqr(Interval(d[static_cast<Eigen::Index>(k)]));
+  const double gap = SubDown(core, slice.SupportUpper({d.data(), p}));
+  const double distance = DivDown(gap, gap > 0 ? SqrtUp(square.upper) : SqrtDown(square.lower));
+  return square.lower > 0 && distance < kInfinity ? distance : -kInfinity;  // NaN fails
+}
+
+// Directions are compared by plain arithmetic on unit vectors.
+class Search {
+ public:
+  Search(const Zonotope& slice, const Obstacle& obstacle) noexcept : slice_(slice), hull_(obstacle.hull()) {
+    center_.setZero();
+    for (int k = 0; k < slice.dim(); ++k) center_[k] = slice.center(k);
+  }
+
+  [[nodiscard]] Vector generator(int j) const {
+    Vector g = Vector::Zero();
+    for (int k = 0; k < slice_.dim(); ++k) g[k] = slice_.generator(k, j);
+    return g;
+  }
+
+  void Consider(const Vector& direction) noexcept {
+    const double length = direction.norm();
+    if (!(length > 0 && length < kInfinity)) return;
+    ConsiderUnit(direction / length);
+    ConsiderUnit(-direction / length);
+  }
+
+  [[nodiscard]] const Vector& best() const { return best_; }
+
+  // The corner of {core - slice} that direction d + tilt (tilt infinitely small) supports, seen from the origin.
+  [[nodiscard]] Vector Corner(const Vector& d, const Vector& tilt) const noexcept {
+    const auto side = [&](const Vector& x) {
+      const double along = d.dot(x);
+      return std::abs(along) > 1e-9 * x.norm() ? along : tilt.dot(x);
+    };
+    Vector corner = hull_.front() - center_;
+    for (std::size_t i = 1; i < hull_.size(); ++i) {
+      const Vector other = hull_[i] - center_;
+      if (side(other - corner) < 0) corner = other;
+    }
+    for (int j = 0; j < slice_.num_generators(); ++j) {
+      const Vector g = generator(j);
+      corner -= side(g) > 0 ? g : Vector(-g);
+    }
+    return corner;
+  }
+
+ private:
+  void ConsiderUnit(const Vector& d) noexcept {
+    double value = kInfinity;
+    for (const Vector& point : hull_) value = std::min(value, d.dot(point - center_));
+    std::array<double, kMaxGenerators> along{};
+    for (int k = 0; k < slice_.dim(); ++k) {
+      const std::span<const double> row = slice_.row(k);
+      for (std::size_t j = 0; j < row.size(); ++j) along[j] += d[k] * row[j];
+    }
+    for (std::size_t j = 0; j < static_cast<std::size_t>(slice_.num_generators()); ++j) value -= std::abs(along[j]);
+    if (value > value_) {
+      value_ = value;
+      best_ = d;
+    }
+  }
+
+  const Zonotope& slice_;
+  const std::vector<Vector>& hull_;
+  Vector center_;
+  Vector best_ = Vector::UnitX();
+  double value_ = -kInfinity;
+};
+
+Vector Turned(const Vector& edge) { return {-edge.y(), edge.x(), 0}; }
+
+// In the plane the distance is attained along the normal of an edge of {core - slice}, or towards a corner next to the
+// best such edge: the dual bound is concave in d, so it rises to its maximum and falls after it.
+Vector BestPlanar(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  Search search(slice, obstacle);
+  const auto& hull = obstacle.hull();
+  for (int j = 0; j < slice.num_generators(); ++j) search.Consider(Turned(search.generator(j)));
+  for (std::size_t a = 0; a < hull.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) search.Consider(Turned(hull[a] - hull[b]));
+  const Vector normal = search.best();
+  search.Consider(search.Corner(normal, Turned(normal)));
+  search.Consider(search.Corner(normal, -Turned(normal)));
+  return search.best();
+}
+
+// In space disjoint polytopes are separated by a face normal of one, or the cross product of an edge of each. The edges
+// of a box are the axes; the faces of a zonotope lie along pairs of generators.
+Vector BestSpatial(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  Search search(slice, obstacle);
+  for (int k = 0; k < 3; ++k) search.Consider(Vector::Unit(k));
+  for (int j = 0; j < slice.num_generators(); ++j) {
+    const Vector g = search.generator(j);
+    for (int k = 0; k < 3; ++k) search.Consider(g.cross(Vector::Unit(k)));
+    for (int i = 0; i < j; ++i) search.Consider(g.cross(search.generator(i)));
+  }
+  return search.best();
+}
+
+Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+    Vector normal = Vector::Zero();
+    normal.head(obstacle.dim()) = obstacle.points()[0];
+    return normal;
+  }
+  switch (obstacle.dim()) {
+    case 1: {
+      Search search(slice, obstacle);
+      search.Consider(Vector::UnitX());
+      return search.best();
+    }
+    case 2:
+      return BestPlanar(slice, obstacle);
+    default:
+      return BestSpatial(slice, obstacle);
+  }
+}
+
+}  // namespace
+
+Separation SeparateQuickly(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return Separate(slice, obstacle);
+  Vector center = Vector::Zero();
+  for (int k = 0; k < slice.dim(); ++k) center[k] = slice.center(k);
+  Vector nearest = obstacle.hull().front() - center;
+  for (const Vector& point : obstacle.hull())
+    if ((point - center).squaredNorm() < nearest.squaredNorm()) nearest = point - center;
+  return {DistanceLower(slice, obstacle, nearest), obstacle.radius()};
+}
+
+Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  return {DistanceLower(slice, obstacle, BestDirection(slice, obstacle)), obstacle.radius()};
+}
+
+}  // namespace forereach

@@ -1,0 +1,75 @@
+/** A zonotope <c, G> = {c + G b : |b|_inf <= 1} in up to 16 dimensions, with up to 112 generators.
+
+A value of fixed capacity: no heap, trivially copyable, so the certify step can work on it in place. Row k of G, the
+part of every generator in coordinate k, is contiguous: a sum over generators runs along memory. */
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "certifier/numerics/interval.h"
+#include "certifier/numerics/limits.h"
+
+namespace forereach {
+
+class Zonotope final {
+ public:
+  /** The point of dimension 0. */
+  Zonotope() = default;
+
+  /** @param center n entries. @param generators n-by-m, any m up to kMaxGenerators; m = 0 is the point `center`.
+  @throws std::invalid_argument if sizes disagree or exceed the capacity, or an entry is not finite. */
+  Zonotope(const Eigen::VectorXd& center, const Eigen::MatrixXd& generators);
+
+  /** {x : |x - center| <= half_width}, exactly; zero half-widths give no generator.
+  @throws std::invalid_argument if sizes disagree or exceed the capacity, or a half-width is negative or not finite. */
+  [[nodiscard]] static Zonotope FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd& half_width);
+
+  [[nodiscard]] int dim() const { return dim_; }
+  [[nodiscard]] int num_generators() const { return num_generators_; }
+  [[nodiscard]] double center(int k) const { return center_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] std::span<const double> center() const { return {center_.data(), static_cast<std::size_t>(dim_)}; }
+  [[nodiscard]] double generator(int k, int j) const { return row(k)[static_cast<std::size_t>(j)]; }
+  /** Coordinate k of every generator. */
+  [[nodiscard]] std::span<const double> row(int k) const {
+    return {rows_[static_cast<std::size_t>(k)].data(), static_cast<std::size_t>(num_generators_)};
+  }
+  [[nodiscard]] Eigen::VectorXd CenterVector() const;
+  [[nodiscard]] Eigen::MatrixXd GeneratorMatrix() const;
+
+  /** An upper bound on sum_j |G_kj|, the half-width of the interval hull in coordinate k. Cost O(m). */
+  [[nodiscard]] double HalfWidthUpper(int k) const noexcept;
+  /** An interval that contains coordinate k of the set: Box(Z)_k. Cost O(m). */
+  [[nodiscard]] Interval Hull(int k) const noexcept;
+  /** An upper bound on the support function max {d . z : z in Z}, Eq. (zonotope-support). Cost O(n m). */
+  [[nodiscard]] double SupportUpper(std::span<const double> direction) const noexcept;
+
+  /** @name In-place construction, for the kernels that own the set. No checks. */
+  ///@{
+  void Reset(int dim, int num_generators) {
+    dim_ = dim;
+    num_generators_ = num_generators;
+  }
+  [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] std::span<double> mutable_row(int k) {
+    return {rows_[static_cast<std::size_t>(k)].data(), static_cast<std::size_t>(num_generators_)};
+  }
+  /** Appends length * e_k unless length is zero. */
+  void AppendAxis(int k, double length) noexcept;
+  ///@}
+
+ private:
+  int dim_ = 0, num_generators_ = 0;
+  std::array<double, kMaxStates> center_;
+  std::array<std::array<double, kMaxGenerators>, kMaxStates> rows_;
+};
+
+/** Girard's order reduction, Eq. (order-reduction). A set with more than order * n generators keeps the
+(order - 1) * n columns of largest |g|_1 - |g|_inf (ties: the earlier) and encloses the rest in a box, rounded outward;
+any other set stays as it is. Contains the original. Cost O(n m + m log m), m generators. */
+void ReduceOrder(Zonotope& set, int order) noexcept;
+
+}  // namespace forereach

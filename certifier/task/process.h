@@ -1,0 +1,37 @@
+/** What every ForeReach process does around its node: arguments, config, bus, clean end. */
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "certifier/task/config.h"
+#include "lcmtypes/node.h"
+
+namespace CLI {
+class App;
+}
+
+namespace forereach {
+
+inline constexpr int kExitBadInput = 2;
+
+struct ProcessDescription {
+  std::string name;     ///< "forereach-certifier"
+  std::string purpose;  ///< What it does, in a sentence or two.
+  std::string example;  ///< A command line one can type.
+};
+
+using MakeNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& bus)>;
+
+/** Runs a node as a process with `--config FILE` and `--lcm-url URL` until it is done or gets SIGTERM or SIGINT.
+@param add_options adds a process's own options, if it has any.
+@return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other
+error. */
+int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
+               const std::function<void(CLI::App&)>& add_options = {});
+
+/** Runs `body` and turns its exceptions into exit codes: 2 after one line for ConfigError and BusError, 1 for others. */
+int Guarded(const std::string& name, const std::function<int()>& body);
+
+}  // namespace forereach

@@ -1,0 +1,57 @@
+#include "lcmtypes/names.h"
+
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+
+namespace forereach {
+
+std::string_view OutcomeName(std::int16_t outcome) {
+  switch (outcome) {
+    case decision_t::CERTIFIED: return "certified";
+    case decision_t::ABSTAIN_FALSIFIED: return "abstain_falsified";
+    case decision_t::ABSTAIN_DOMAIN: return "abstain_domain";
+    case decision_t::ABSTAIN_SAFETY: return "abstain_safety";
+    case decision_t::REJECTED: return "rejected";
+    default: return "unknown";
+  }
+}
+
+std::string_view CauseName(std::int16_t cause) {
+  switch (cause) {
+    case decision_t::CAUSE_NONE: return "none";
+    case decision_t::CAUSE_PAIRWISE: return "pairwise";
+    case decision_t::CAUSE_DOMAIN_EXIT: return "domain_exit";
+    case decision_t::CAUSE_NO_FINITE_ENCLOSURE: return "no_finite_enclosure";
+    case decision_t::CAUSE_OBSTACLE: return "obstacle";
+    case decision_t::CAUSE_STALE: return "stale";
+    case decision_t::CAUSE_FUTURE: return "future";
+    case decision_t::CAUSE_DUPLICATE: return "duplicate";
+    case decision_t::CAUSE_WRONG_LENGTH: return "wrong_length";
+    case decision_t::CAUSE_TRAILING_BYTES: return "trailing_bytes";
+    case decision_t::CAUSE_UNKNOWN_FINGERPRINT: return "unknown_fingerprint";
+    case decision_t::CAUSE_WRONG_DIMENSION: return "wrong_dimension";
+    case decision_t::CAUSE_NON_FINITE: return "non_finite";
+    case decision_t::CAUSE_TOO_MANY_SOURCES: return "too_many_sources";
+    case decision_t::CAUSE_TOO_LATE: return "too_late";
+    case decision_t::CAUSE_QUEUE_FULL: return "queue_full";
+    case decision_t::CAUSE_INTERNAL_ERROR: return "internal_error";
+    default: return "unknown";
+  }
+}
+
+std::string_view EventName(std::int16_t kind) {
+  switch (kind) {
+    case execution_event_t::ACCEPTED: return "accepted";
+    case execution_event_t::REFUSED: return "refused";
+    case execution_event_t::STARTED: return "started";
+    case execution_event_t::STEP_INSIDE: return "step_inside";
+    case execution_event_t::STEP_OUTSIDE: return "step_outside";
+    case execution_event_t::TAIL_BEGUN: return "tail_begun";
+    case execution_event_t::STANDING: return "standing";
+    case execution_event_t::GOAL_REACHED: return "goal_reached";
+    case execution_event_t::CONTACT: return "contact";
+    default: return "unknown";
+  }
+}
+
+}  // namespace forereach

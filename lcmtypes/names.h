@@ -1,0 +1,18 @@
+/** The words for the numbers in decisions and events: one place for the command, the database and the reports. */
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace forereach {
+
+/** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected"; "unknown" for any other number. */
+[[nodiscard]] std::string_view OutcomeName(std::int16_t outcome);
+
+/** "none", "pairwise", "domain_exit", ... as decision_t's CAUSE_ constants; "unknown" for any other number. */
+[[nodiscard]] std::string_view CauseName(std::int16_t cause);
+
+/** "accepted", "refused", "started", ... as execution_event_t's constants; "unknown" for any other number. */
+[[nodiscard]] std::string_view EventName(std::int16_t kind);
+
+}  // namespace forereach
