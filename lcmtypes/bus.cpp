@@ -22,7 +22,8 @@ class LcmBus final : public Bus {
  public:
   LcmBus(const std::string& url, Clock clock)
       : in_memory_(url.starts_with("memq://")), clock_(std::move(clock)), lcm_(url) {
-    if (!lcm_.good())
+    // Asking for the file descriptor joins the multicast group, which a subscription would do without telling of failure.
+    if (!lcm_.good() || (!in_memory_ && lcm_.getFileno() < 0))
       throw BusError("bus: cannot open " + url +
                      ". Is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` as root; "
                      "`forereach doctor` checks it");
@@ -121,7 +122,14 @@ std::int64_t WallClockUs() {
 }
 
 std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock) {
+  if (!url.starts_with("udpm://") && !url.starts_with("memq://"))
+    throw BusError("bus: " + url + " has to begin with udpm:// or memq://, as in udpm://239.255.76.67:7667?ttl=0");
   return std::make_unique<LcmBus>(url, std::move(clock));
+}
+
+std::string BusVersion() {
+  return std::to_string(LCM_MAJOR_VERSION) + "." + std::to_string(LCM_MINOR_VERSION) + "." +
+         std::to_string(LCM_MICRO_VERSION);
 }
 
 }  // namespace forereach

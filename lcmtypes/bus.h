@@ -57,7 +57,11 @@ class Bus {
 /** Opens an LCM bus: `udpm://239.255.76.67:7667?ttl=0`, or `memq://`, which lives inside this object alone.
 A udpm bus receives on a thread that only copies messages out; memq delivers within Dispatch, in order, stamped by
 `clock`, so that several nodes in one process can run on a simulated one.
-@throws BusError if LCM cannot open it, for example without a multicast route; never falls back to another bus. */
+@throws BusError for any other kind of URL, or if LCM cannot open it, for example without a multicast route; never falls
+back to another bus. */
 [[nodiscard]] std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock = WallClockUs);
+
+/** The version of LCM in use, as "1.3.1". */
+[[nodiscard]] std::string BusVersion();
 
 }  // namespace forereach

@@ -11,9 +11,13 @@ void RequestStop(int) { stop_requested = 1; }
 
 }  // namespace
 
-void RunNode(Node& node, Bus& bus) {
+void CatchStopSignals() {
   std::signal(SIGTERM, RequestStop);
   std::signal(SIGINT, RequestStop);
+}
+
+void RunNode(Node& node, Bus& bus) {
+  CatchStopSignals();
   while (!stop_requested && !node.done()) {
     bus.Dispatch(kTickMs);
     node.Tick(WallClockUs());

@@ -27,6 +27,10 @@ class Node {
 
 inline constexpr int kTickMs = 2;
 
+/** From here on SIGTERM and SIGINT end RunNode instead of the process. RunNode does it too; a process that calls it
+first also ends cleanly if the signal comes while it starts. */
+void CatchStopSignals();
+
 /** Runs `node` on `bus` until it is done or the process gets SIGTERM or SIGINT, then stops it. */
 void RunNode(Node& node, Bus& bus);
 

@@ -15,7 +15,7 @@ namespace {
 static_assert(static_cast<int>(Outcome::kCertified) == 1 && static_cast<int>(Outcome::kSafety) == 4);
 static_assert(static_cast<int>(Cause::kPairwise) == 1 && static_cast<int>(Cause::kObstacle) == 4);
 
-std::int64_t Microseconds(double milliseconds) { return static_cast<std::int64_t>(milliseconds * 1e3); }
+std::int64_t Microseconds(double milliseconds) { return std::llround(milliseconds * 1e3); }
 
 std::string Milliseconds(std::int64_t later, std::int64_t earlier) {
   return ToText(std::round((static_cast<double>(later) - static_cast<double>(earlier)) / 1e3)) + " ms";

@@ -10,6 +10,11 @@ Eigen::VectorXd Point(const obstacle_t& message, int index) {
   return Eigen::Map<const Eigen::VectorXd>(message.point[index], message.dimension);
 }
 
+void RequirePoints(const obstacle_t& message, int count) {
+  if (message.num_points != count)
+    throw std::invalid_argument(std::to_string(message.num_points) + " points, must be " + std::to_string(count));
+}
+
 Obstacle FromMessage(const obstacle_t& message) {
   if (message.dimension < 1 || message.dimension > kMaxSafetyDim || message.num_points < 1 ||
       message.num_points > kMaxObstaclePoints)
@@ -17,9 +22,10 @@ Obstacle FromMessage(const obstacle_t& message) {
                                 std::to_string(message.dimension));
   switch (message.kind) {
     case obstacle_t::CIRCLE:
+      RequirePoints(message, 1);
       return Obstacle::Circle(Point(message, 0), message.value);
     case obstacle_t::BOX:
-      if (message.num_points != 2) throw std::invalid_argument("a box needs 2 points");
+      RequirePoints(message, 2);
       return Obstacle::AxisBox(Point(message, 0), Point(message, 1));
     case obstacle_t::POLYGON: {
       std::vector<Eigen::VectorXd> vertices;
@@ -27,6 +33,7 @@ Obstacle FromMessage(const obstacle_t& message) {
       return Obstacle::Polygon(vertices);
     }
     case obstacle_t::HALF_SPACE:
+      RequirePoints(message, 1);
       return Obstacle::HalfSpace(Point(message, 0), message.value);
     default:
       throw std::invalid_argument("unknown kind " + std::to_string(message.kind));

@@ -43,10 +43,10 @@ struct Interval {
 
   friend Interval operator*(const Interval& a, const Interval& b) {
     if (!a.IsFinite() || !b.IsFinite()) return Entire();
-    if (a.upper <= 0) return -(-a * b);
     if (a.lower >= 0) {
       return Checked(MulDown(b.lower >= 0 ? a.lower : a.upper, b.lower), MulUp(b.upper >= 0 ? a.upper : a.lower, b.upper));
     }
+    if (a.upper <= 0) return -(-a * b);
     if (b.lower >= 0 || b.upper <= 0) return b * a;
     return Checked(std::min(MulDown(a.lower, b.upper), MulDown(a.upper, b.lower)),
                    std::max(MulUp(a.lower, b.lower), MulUp(a.upper, b.upper)));

@@ -50,6 +50,16 @@ Zonotope Zonotope::FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd&
   return box;
 }
 
+Zonotope Zonotope::Enclose(const Box& box) {
+  Eigen::VectorXd center(box.dim()), half_width(box.dim());
+  for (int k = 0; k < box.dim(); ++k) {
+    const Interval side(box.lower()[k], box.upper()[k]);
+    center[k] = side.Middle();
+    half_width[k] = side.DistanceUpper(center[k]);
+  }
+  return FromBox(center, half_width);
+}
+
 Eigen::VectorXd Zonotope::CenterVector() const { return Eigen::Map<const Eigen::VectorXd>(center_.data(), dim_); }
 
 Eigen::MatrixXd Zonotope::GeneratorMatrix() const {

@@ -12,6 +12,7 @@ part of every generator in coordinate k, is contiguous: a sum over generators ru
 
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/sets/box.h"
 
 namespace forereach {
 
@@ -27,6 +28,9 @@ class Zonotope final {
   /** {x : |x - center| <= half_width}, exactly; zero half-widths give no generator.
   @throws std::invalid_argument if sizes disagree or exceed the capacity, or a half-width is negative or not finite. */
   [[nodiscard]] static Zonotope FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd& half_width);
+
+  /** An axis-aligned zonotope that contains the box, rounded outward. */
+  [[nodiscard]] static Zonotope Enclose(const Box& box);
 
   [[nodiscard]] int dim() const { return dim_; }
   [[nodiscard]] int num_generators() const { return num_generators_; }

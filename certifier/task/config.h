@@ -9,6 +9,7 @@ and, made from it, in config/README.md. */
 #include <vector>
 
 #include "certifier/certify/problem.h"
+#include "certifier/task/canonical.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -40,43 +41,43 @@ struct BusOptions {
 
 struct PlannerOptions {
   std::string algorithm = "kpiece";
-  std::vector<double> goal;            ///< In the safety coordinates, metres.
-  double goal_radius = 1.0;            ///< Metres.
-  double clearance = 0.3;              ///< Obstacles are inflated by this for planning, metres.
-  double clearance_step = 0.1;         ///< Added after each abstention S of one planning round, metres.
-  int progress_steps = 8;              ///< Controls before the braking tail.
-  int tail_steps = 40;                 ///< Longest braking tail.
-  int lead_steps = 2;                  ///< A candidate starts this many steps after the state it was planned from.
-  int candidates = 12;                 ///< Candidates for one start at most.
-  double cruise_speed = 8;             ///< m/s
-  double braking = 2.5;                ///< m/s^2
-  double time_limit_ms = 15;           ///< For one OMPL query.
+  std::vector<double> goal;     ///< In the safety coordinates, metres.
+  double goal_radius = 1.0;     ///< Metres.
+  double clearance = 0.3;       ///< Obstacles are inflated by this for planning, metres.
+  double clearance_step = 0.1;  ///< Added after each abstention S of one planning round, metres.
+  int progress_steps = 8;       ///< Controls before the braking tail.
+  int tail_steps = 40;          ///< Longest braking tail.
+  int lead_steps = 2;           ///< A candidate starts this many steps after the state it was planned from.
+  int candidates = 12;          ///< Candidates for one start at most.
+  double cruise_speed = 8;      ///< m/s
+  double braking = 2.5;         ///< m/s^2
+  double time_limit_ms = 15;    ///< For one OMPL query.
   int seed = 1;
-  std::vector<double> initial_half_width;  ///< X0 of each candidate, per state.
+  std::vector<double> initial_half_width;  ///< X0 of each candidate, per state; from a file always as many.
 };
 
 struct RobotOptions {
-  std::vector<double> start;           ///< State, model units.
-  double step_period_ms = 40;          ///< Wall-clock time of one model step.
-  double time_limit_s = 40;            ///< The run ends then, goal or not.
-  std::string residual = "none";       ///< How the real robot differs: none, heading_saturation, velocity_knee.
-  std::map<std::string, double> residual_parameters;
+  std::vector<double> start;      ///< State, model units; from a file always as many as states.
+  double step_period_ms = 40;     ///< Wall-clock time of one model step.
+  double time_limit_s = 40;       ///< The run ends then, goal or not.
+  std::string residual = "none";  ///< How the real robot differs: none, heading_saturation, velocity_knee.
+  std::map<std::string, double> residual_parameters;  ///< From a file all of them, with the model's dt and wheelbase.
 };
 
 struct LoggerOptions {
   std::string directory = "log";
-  int queue = 4096;                    ///< Messages held for writing at most.
-  double flush_ms = 200;               ///< A killed logger loses at most this much.
+  int queue = 4096;       ///< Messages held for writing at most.
+  double flush_ms = 200;  ///< A killed logger loses at most this much.
 };
 
 struct Config {
   std::string path;
-  Digest digest{};                     ///< Of the file's bytes.
+  Digest digest{};  ///< Of the file's bytes.
   Digest model_digest{}, declaration_digest{}, observations_digest{};
   std::shared_ptr<const Problem> problem;
   std::vector<Obstacle> obstacles;
   Digest obstacles_digest{};
-  Box initial_set;
+  Box initial_set;  ///< X0, rounded outward.
   GateOptions gate;
   BusOptions bus;
   PlannerOptions planner;
@@ -84,18 +85,25 @@ struct Config {
   LoggerOptions logger;
 };
 
+/** Whether the transitions a task file names are read; not, where they are still to be made. */
+enum class TransitionsFile { kRead, kIgnore };
+
 /** Reads a task file and the transitions it names.
 @throws ConfigError for a missing file, an unknown or missing key, a wrong size, a non-finite or out-of-range number. */
-[[nodiscard]] Config LoadConfig(const std::string& path);
+[[nodiscard]] Config LoadConfig(const std::string& path, TransitionsFile transitions = TransitionsFile::kRead);
 
-/** The digest decisions carry for a set of obstacles. */
-[[nodiscard]] Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles);
+/** Reads transitions: CSV with a column for each state, each input and each state's successor `<state>_next`, in any
+order, one row a transition. @throws ConfigError, also if there is none. */
+[[nodiscard]] Transitions LoadTransitions(const std::string& path, const NominalModel& model);
+
+/** Writes transitions so that LoadTransitions gives them back to the last bit. @throws ConfigError. */
+void SaveTransitions(const std::string& path, const NominalModel& model, const Transitions& transitions);
 
 /** Reads a plan: CSV with a header that names the inputs in any order, one row a step.
 @return one column a step, inputs in the model's order. @throws ConfigError. */
 [[nodiscard]] Eigen::MatrixXd LoadPlan(const std::string& path, const NominalModel& model);
 
-/** Writes a plan so that LoadPlan gives it back to the last bit. */
+/** Writes a plan so that LoadPlan gives it back to the last bit. @throws ConfigError. */
 void SavePlan(const std::string& path, const NominalModel& model, const Eigen::MatrixXd& controls);
 
 }  // namespace forereach

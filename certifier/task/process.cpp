@@ -38,6 +38,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   }
   spdlog::set_default_logger(spdlog::stderr_color_mt(description.name));
   spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$: %v");
+  CatchStopSignals();
   return Guarded(description.name, [&] {
     const Config config = LoadConfig(config_path);
     const std::unique_ptr<Bus> bus = OpenBus(url.empty() ? config.bus.url : url);

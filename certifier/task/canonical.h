@@ -1,0 +1,49 @@
+/** What the digests in a decision are taken of: a byte string of exactly what matters, so that the same data in
+another order of columns, with other white space or spelled differently has the same digest.
+
+The string is a sequence of items: a text is its length and its bytes, a count or length is 8 bytes, a number the 8
+bytes of the double, all little-endian; -0 is written as 0. Each string begins with a text that names its kind. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/certify/problem.h"
+#include "lcmtypes/codec.h"
+
+namespace forereach {
+
+class CanonicalBytes final {
+ public:
+  explicit CanonicalBytes(std::string_view kind) { Text(kind); }
+
+  void Text(std::string_view text);
+  void Texts(const std::vector<std::string>& texts);
+  void Count(std::int64_t count);
+  void Number(double value);
+  /** Rows, columns, and the entries row by row. */
+  void Numbers(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
+
+  [[nodiscard]] Digest digest() const { return DigestOf(std::string_view(bytes_)); }
+
+ private:
+  std::string bytes_;
+};
+
+/** Of the model's description and its coordinates' names. */
+[[nodiscard]] Digest ModelDigest(const NominalModel& model);
+
+/** Of the coordinates' names, L and sigma. */
+[[nodiscard]] Digest DeclarationDigest(const NominalModel& model, const Declaration& declaration);
+
+/** Of the coordinates' names and the transitions in their order, which a decision's witness refers to. */
+[[nodiscard]] Digest ObservationsDigest(const NominalModel& model, const Transitions& transitions);
+
+/** Of the obstacles in their order, which a decision's witness refers to. */
+[[nodiscard]] Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles);
+
+}  // namespace forereach

@@ -1,0 +1,125 @@
+#include "certifier/task/csv.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include "certifier/numerics/text.h"
+#include "certifier/task/config.h"
+#include "certifier/task/files.h"
+#include "certifier/task/number.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+
+[[noreturn]] void FailAt(const std::string& path, int line, const std::string& what) {
+  throw ConfigError(path + ":" + std::to_string(line) + ": " + what);
+}
+
+std::string_view Trim(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+void Split(std::string_view line, std::vector<std::string_view>& fields) {
+  fields.clear();
+  for (std::size_t comma; (comma = line.find(',')) != std::string_view::npos; line.remove_prefix(comma + 1))
+    fields.push_back(Trim(line.substr(0, comma)));
+  fields.push_back(Trim(line));
+}
+
+std::string Joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+// For each field of the header, the column it is of.
+std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<std::string_view>& fields,
+                                     const std::vector<std::string>& columns) {
+  std::vector<Eigen::Index> order;
+  for (const std::string_view field : fields) {
+    const auto column = std::find(columns.begin(), columns.end(), field);
+    if (column == columns.end())
+      FailAt(path, 1, "unknown column '" + std::string(field) + "'; the columns are " + Joined(columns));
+    const Eigen::Index index = column - columns.begin();
+    if (std::find(order.begin(), order.end(), index) != order.end()) FailAt(path, 1, *column + ": stands twice");
+    order.push_back(index);
+  }
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    if (std::find(order.begin(), order.end(), static_cast<Eigen::Index>(j)) == order.end())
+      FailAt(path, 1, columns[j] + ": the column is missing");
+  return order;
+}
+
+class Reader {
+ public:
+  Reader(const std::string& path, const std::vector<std::string>& columns) : path_(path), columns_(columns) {}
+
+  Eigen::MatrixXd Read(std::ifstream in) {
+    std::vector<Eigen::Index> order;
+    std::vector<std::string_view> fields;
+    int line = 0;
+    for (std::string text; std::getline(in, text);) {
+      std::string_view content = text;
+      if (++line == 1 && content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
+      Split(content, fields);
+      if (line == 1) {
+        order = ReadHeader(path_, fields, columns_);
+      } else {
+        AddRow(line, fields, order);
+      }
+    }
+    if (in.bad()) throw ConfigError(path_ + ": reading failed after line " + std::to_string(line));
+    if (line == 0)
+      throw ConfigError(path_ + ":1: the file is empty; it has to begin with the header " + Joined(columns_));
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    return Eigen::Map<const RowMajor>(numbers_.data(), line - 1, static_cast<Eigen::Index>(columns_.size()));
+  }
+
+ private:
+  void AddRow(int line, const std::vector<std::string_view>& fields, const std::vector<Eigen::Index>& order) {
+    if (fields.size() != order.size())
+      FailAt(path_, line, std::to_string(fields.size()) + " fields, the header has " + std::to_string(order.size()));
+    const std::size_t row = numbers_.size();
+    numbers_.resize(row + fields.size());
+    for (std::size_t j = 0; j < fields.size(); ++j) {
+      const auto column = static_cast<std::size_t>(order[j]);
+      const auto [value, problem] = ParseNumber(fields[j]);
+      if (!problem.empty())
+        FailAt(path_, line,
+               columns_[column] + ": '" + std::string(fields[j].substr(0, 40)) + "' " + std::string(problem));
+      numbers_[row + column] = value;
+    }
+  }
+
+  const std::string& path_;
+  const std::vector<std::string>& columns_;
+  std::vector<double> numbers_;  // row by row
+};
+
+}  // namespace
+
+Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns, const std::string& named_by) {
+  return Reader(path, columns).Read(OpenForReading(path, named_by));
+}
+
+void WriteCsv(const std::string& path, const std::vector<std::string>& columns, const Eigen::MatrixXd& rows) {
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  const auto write_row = [&](const auto& field) {
+    for (std::size_t j = 0; j < columns.size(); ++j) out << (j == 0 ? "" : ",") << field(j);
+    out << '\n';
+  };
+  write_row([&](std::size_t j) { return columns[j]; });
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    write_row([&](std::size_t j) { return ToText(rows(i, static_cast<Eigen::Index>(j))); });
+  out.close();
+  if (!out) throw ConfigError(path + ": cannot be written: " + std::generic_category().message(errno));
+}
+
+}  // namespace forereach

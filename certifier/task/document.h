@@ -1,0 +1,71 @@
+/** A YAML file and the places in it: checked against the schema as a whole, then read by key. */
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/task/schema.h"
+
+namespace forereach {
+
+/** What names and sizes in the schema stand for. Where it is not known yet, everything fits. */
+struct SchemaScope {
+  std::vector<std::string> states, inputs;
+  int safety_dim = 0;
+
+  [[nodiscard]] std::vector<std::string> variables() const;
+};
+
+class Document final {
+ public:
+  /** Reads and parses. @throws ConfigError if it cannot, also for anything but one YAML document. */
+  explicit Document(const std::string& path);
+  ~Document();
+
+  /** Checks everything against the schema. Keys may be read afterwards.
+  @throws ConfigError naming file, line, key, value and bound of the first thing that is wrong. */
+  void Check(const SchemaScope& scope);
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /** The file's bytes. */
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+  [[nodiscard]] bool Has(std::string_view key) const;
+  /** True if the value is a list (a map, a single value otherwise). */
+  [[nodiscard]] bool IsList(std::string_view key) const;
+  /** How many entries a list has, 0 if it is absent. */
+  [[nodiscard]] int Count(std::string_view key) const;
+  /** The keys of a map in the file's order, none if it is absent. */
+  [[nodiscard]] std::vector<std::string> KeysOf(std::string_view key) const;
+
+  // The value at a key that is present and has this type in the schema.
+  [[nodiscard]] double Number(std::string_view key) const;
+  [[nodiscard]] int Integer(std::string_view key) const;
+  [[nodiscard]] std::string Text(std::string_view key) const;
+  [[nodiscard]] Eigen::VectorXd Vector(std::string_view key) const;
+  [[nodiscard]] std::vector<Eigen::VectorXd> Vectors(std::string_view key) const;
+  [[nodiscard]] std::vector<std::string> Names(std::string_view key) const;
+
+  // The same, but `value` keeps what it has if the key is absent.
+  void Read(std::string_view key, double& value) const;
+  void Read(std::string_view key, int& value) const;
+  void Read(std::string_view key, std::string& value) const;
+  void Read(std::string_view key, std::vector<double>& value) const;
+
+  /** "file:line: key: ": the place of a key, or of the map it is missing from. */
+  [[nodiscard]] std::string Place(std::string_view key) const;
+  /** @throws ConfigError Place(key) + what. */
+  [[noreturn]] void Fail(std::string_view key, const std::string& what) const;
+
+ private:
+  struct Tree;
+
+  std::string path_, text_;
+  std::unique_ptr<Tree> tree_;
+};
+
+}  // namespace forereach

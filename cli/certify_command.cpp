@@ -1,0 +1,76 @@
+#include <chrono>
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include "certifier/certify/explain.h"
+#include "certifier/task/canonical.h"
+#include "cli/commands.h"
+#include "cli/decision_json.h"
+
+namespace forereach {
+namespace {
+
+struct Options {
+  std::string config, plan;
+  bool json = false;
+};
+
+Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set) {
+  CanonicalBytes bytes("plan");
+  bytes.Numbers(controls);
+  bytes.Numbers(initial_set.lower());
+  bytes.Numbers(initial_set.upper());
+  return bytes.digest();
+}
+
+void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifier& certifier) {
+  std::cout << Explain(result.decision, certifier.problem()) << "\n";
+  const auto& names = certifier.problem().model->state_names();
+  std::cout << "  tube: " << tube.length() << " steps; half-width of its last slice:";
+  for (std::size_t k = 0; k < names.size(); ++k)
+    std::cout << " " << names[k] << " " << tube.slice(tube.length()).HalfWidthUpper(static_cast<int>(k));
+  std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
+}
+
+int Certify(const Options& options) {
+  const Config config = LoadConfig(options.config);
+  const Certifier certifier(config.problem);
+  const Eigen::MatrixXd controls = LoadPlan(options.plan, *config.problem->model);
+  const Plan plan{controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
+                  static_cast<int>(controls.rows())};
+  const Zonotope initial_set = Zonotope::Enclose(config.initial_set);
+  try {
+    certifier.Require(plan, initial_set, config.obstacles);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(options.plan + ": " + error.what());
+  }
+
+  Tube tube;
+  CertifyResult result;
+  const auto begin = std::chrono::steady_clock::now();
+  result.decision = certifier.Certify(plan, initial_set, config.obstacles, tube);
+  result.elapsed_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
+  result.plan_digest = PlanDigest(controls, config.initial_set);
+
+  if (options.json)
+    std::cout << ToJson(result, tube, certifier, config).dump() << std::endl;
+  else
+    PrintForPeople(result, tube, certifier);
+  return result.decision.outcome == Outcome::kCertified ? 0 : 1;
+}
+
+}  // namespace
+
+void AddCertifyCommand(CLI::App& app, Action& action) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("certify", "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input");
+  command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
+  command->add_option("--plan", options->plan, "Controls, one row a step (CSV with a header)")
+      ->required()->type_name("FILE.csv");
+  command->add_flag("--json", options->json, "One JSON document on standard output, and nothing else there");
+  command->footer("Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv");
+  command->callback([options, &action] { action = [options] { return Certify(*options); }; });
+}
+
+}  // namespace forereach

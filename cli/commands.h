@@ -1,0 +1,23 @@
+/** The subcommands of `forereach`. Each adds its options to the command line and, if it is the one called, leaves in
+`action` what to do; the action's result is the exit code: 0 as hoped, 1 not, 2 bad input. */
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace forereach {
+
+using Action = std::function<int()>;
+
+void AddCertifyCommand(CLI::App& app, Action& action);
+void AddPlanCommand(CLI::App& app, Action& action);
+void AddReplayCommand(CLI::App& app, Action& action);
+void AddReportCommand(CLI::App& app, Action& action);
+void AddRunCommand(CLI::App& app, Action& action);
+void AddDoctorCommand(CLI::App& app, Action& action);
+void AddKeysCommand(CLI::App& app, Action& action);
+
+}  // namespace forereach

@@ -1,0 +1,73 @@
+#include "cli/decision_json.h"
+
+#include <algorithm>
+
+#include "certifier/certify/explain.h"
+#include "certifier/safety/separation.h"
+#include "certifier/sets/zonogon.h"
+#include "lcmtypes/names.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+Json SliceJson(const Zonotope& slice, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+  Json half_width = Json::array(), generators = Json::array(), clearance = Json::array();
+  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
+  for (int j = 0; j < slice.num_generators(); ++j) {
+    Json column = Json::array();
+    for (int k = 0; k < slice.dim(); ++k) column.push_back(slice.generator(k, j));
+    generators.push_back(std::move(column));
+  }
+  Zonotope projected;
+  certifier.projection().Enclose(slice, projected);
+  for (const Obstacle& obstacle : obstacles)
+    clearance.push_back(std::max(Separate(projected, obstacle).clearance(), -kMaxDouble));
+  return {{"center", slice.center()},
+          {"half_width", half_width},
+          {"generators", generators},
+          {"clearance", clearance},
+          {"radius", RadiusUpper(projected)}};
+}
+
+Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+  Json slices = Json::array();
+  const auto n = static_cast<std::size_t>(certifier.problem().model->num_states());
+  for (int t = 0; t <= tube.length(); ++t) {
+    Json slice = SliceJson(tube.slice(t), certifier, obstacles);
+    if (t < tube.length()) {
+      const StepRecord& step = tube.step(t);
+      slice["envelope"] = {{"lower", std::span(step.envelope.lower.data(), n)},
+                           {"upper", std::span(step.envelope.upper.data(), n)}};
+      slice["remainder"] = std::span(step.remainder.data(), n);
+    }
+    slices.push_back(std::move(slice));
+  }
+  return slices;
+}
+
+}  // namespace
+
+nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certifier& certifier,
+                      const Config& config) {
+  const Decision& decision = result.decision;
+  const bool before_any_step = decision.outcome == Outcome::kFalsified && decision.step < 0;
+  Json document;
+  document["outcome"] = OutcomeName(static_cast<std::int16_t>(decision.outcome));
+  document["step"] = decision.step < 0 ? Json(nullptr) : Json(decision.step);
+  document["cause"] =
+      decision.cause == Cause::kNone ? Json(nullptr) : Json(CauseName(static_cast<std::int16_t>(decision.cause)));
+  document["message"] = Explain(decision, certifier.problem());
+  document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles);
+  document["digests"] = {{"plan", ToHex(result.plan_digest)},
+                         {"config", ToHex(config.digest)},
+                         {"model", ToHex(config.model_digest)},
+                         {"declaration", ToHex(config.declaration_digest)},
+                         {"observations", ToHex(config.observations_digest)},
+                         {"obstacles", ToHex(config.obstacles_digest)}};
+  document["elapsed_us"] = result.elapsed_us;
+  return document;
+}
+
+}  // namespace forereach

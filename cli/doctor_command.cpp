@@ -1,0 +1,162 @@
+#include <algorithm>
+#include <chrono>
+#include <arpa/inet.h>
+#include <fstream>
+#include <iostream>
+#include <cmath>
+#include <map>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <thread>
+#include <unistd.h>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/config.h"
+#include "cli/commands.h"
+#include "lcmtypes/bus.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kRoundTrips = 500;
+constexpr std::size_t kRoundTripBytes = 2048;
+constexpr long kWantedBufferBytes = 2 * 1024 * 1024;
+constexpr const char* kReadyCommand = "scripts/ready-bus";
+
+struct Check {
+  std::string name;
+  bool good;
+  std::string found;
+  std::string advice;  // what to do if it is not good
+};
+
+class Socket {
+ public:
+  Socket() : handle_(socket(AF_INET, SOCK_DGRAM, 0)) {}
+  ~Socket() { close(handle_); }
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  [[nodiscard]] int handle() const { return handle_; }
+
+ private:
+  int handle_;
+};
+
+Check CheckLoopback() {
+  const Socket socket;
+  ifreq request{};
+  std::copy_n("lo", 3, request.ifr_name);
+  const bool up = ioctl(socket.handle(), SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_UP);
+  return {"loopback interface", up, up ? "up" : "down", std::string(kReadyCommand) + ", or: ip link set lo up"};
+}
+
+// Connecting a datagram socket sends nothing; it fails where there is no route and tells the address it would send from.
+Check CheckRoute(const std::string& group) {
+  const Socket socket;
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(7667);
+  inet_pton(AF_INET, group.c_str(), &to.sin_addr);
+  sockaddr_in from{};
+  socklen_t size = sizeof from;
+  const bool routed = connect(socket.handle(), reinterpret_cast<sockaddr*>(&to), sizeof to) == 0 &&
+                      getsockname(socket.handle(), reinterpret_cast<sockaddr*>(&from), &size) == 0;
+  char address[INET_ADDRSTRLEN] = "";
+  inet_ntop(AF_INET, &from.sin_addr, address, sizeof address);
+  const bool loopback = routed && (ntohl(from.sin_addr.s_addr) >> 24) == 127;
+  return {"multicast route to " + group, loopback,
+          !routed ? "none" : (loopback ? "by loopback, from " : "by a network, from ") + std::string(address),
+          std::string(kReadyCommand) + ", or: ip route add 224.0.0.0/4 dev lo"};
+}
+
+long ReadNumber(const std::string& path) {
+  long number = -1;
+  std::ifstream(path) >> number;
+  return number;
+}
+
+Check CheckBuffer() {
+  const long bytes = ReadNumber("/proc/sys/net/core/rmem_max");
+  return {"receive buffer limit", bytes >= kWantedBufferBytes, std::to_string(bytes) + " bytes",
+          "a burst of plans may be lost; as root: sysctl -w net.core.rmem_max=" + std::to_string(kWantedBufferBytes)};
+}
+
+Check CheckRoundTrip(const std::string& url) {
+  const std::string channel = "FOREREACH_DOCTOR_" + std::to_string(getpid());
+  std::vector<double> times_us;
+  try {
+    const auto sender = OpenBus(url), receiver = OpenBus(url);
+    bool arrived = false;
+    receiver->Subscribe(channel, [&](const Received&) { arrived = true; });
+    const std::vector<std::uint8_t> bytes(kRoundTripBytes);
+    for (int i = 0; i < kRoundTrips; ++i) {
+      arrived = false;
+      const auto begin = std::chrono::steady_clock::now();
+      sender->Publish(channel, Bytes(bytes));
+      for (int waits = 0; waits < 20 && !arrived; ++waits) receiver->Dispatch(5);
+      if (arrived)
+        times_us.push_back(
+            std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
+    }
+  } catch (const BusError& error) {
+    return {"round trip on " + url, false, "no bus", error.what()};
+  }
+  std::ranges::sort(times_us);
+  const auto at = [&](double fraction) {
+    return std::to_string(std::lround(times_us[static_cast<std::size_t>(fraction * static_cast<double>(times_us.size() - 1))]));
+  };
+  const std::string count = std::to_string(times_us.size()) + " of " + std::to_string(kRoundTrips) + " arrived";
+  if (times_us.empty()) return {"round trip on " + url, false, count, "is multicast filtered by a firewall?"};
+  return {"round trip on " + url, times_us.size() == kRoundTrips, count + ", p50 " + at(0.5) + " us, p99 " + at(0.99) + " us",
+          "messages are lost: raise the receive buffer limit, see above"};
+}
+
+std::string GroupOf(const std::string& url) {
+  const std::size_t begin = url.find("//"), end = url.find(':', begin);
+  return begin == std::string::npos || end == std::string::npos ? "239.255.76.67" : url.substr(begin + 2, end - begin - 2);
+}
+
+int Diagnose(const std::string& url, bool json) {
+  const std::map<std::string, std::string> versions{
+      {"forereach", FOREREACH_VERSION}, {"lcm", BusVersion()}, {"compiler", __VERSION__},
+      {"eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
+                    std::to_string(EIGEN_MINOR_VERSION)}};
+  const std::vector<Check> checks{CheckLoopback(), CheckRoute(GroupOf(url)), CheckBuffer(), CheckRoundTrip(url)};
+  const bool good = std::ranges::all_of(checks, &Check::good);
+  if (json) {
+    nlohmann::json document{{"good", good}, {"versions", versions}, {"checks", nlohmann::json::array()}};
+    for (const Check& check : checks)
+      document["checks"].push_back({{"name", check.name}, {"good", check.good}, {"found", check.found},
+                                    {"advice", check.good ? nlohmann::json(nullptr) : nlohmann::json(check.advice)}});
+    std::cout << document << std::endl;
+  } else {
+    for (const auto& [name, version] : versions) std::cout << "      " << name << " " << version << "\n";
+    for (const Check& check : checks) {
+      std::cout << (check.good ? "good  " : "BAD   ") << check.name << ": " << check.found << "\n";
+      if (!check.good) std::cout << "      -> " << check.advice << "\n";
+    }
+    std::cout << (good ? "The bus is ready." : "The bus is not ready: do what the arrows say.") << std::endl;
+  }
+  return good ? 0 : 1;
+}
+
+}  // namespace
+
+void AddDoctorCommand(CLI::App& app, Action& action) {
+  struct Options {
+    std::string url = BusOptions().url;
+    bool json = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("doctor", "Check the bus: route, buffers, a round trip; and say what to do");
+  command->add_option("--lcm-url", options->url, "The bus")->capture_default_str()->type_name("URL");
+  command->add_flag("--json", options->json, "One JSON document on standard output");
+  command->callback([options, &action] { action = [options] { return Diagnose(options->url, options->json); }; });
+}
+
+}  // namespace forereach

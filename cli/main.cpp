@@ -1,0 +1,30 @@
+#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "certifier/task/process.h"
+#include "cli/commands.h"
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  CLI::App app("ForeReach certifies planned control sequences before a robot executes them.", "forereach");
+  app.footer("Try:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv\n"
+             "  forereach doctor\n  forereach certify --help");
+  app.set_version_flag("--version", "forereach " FOREREACH_VERSION);
+  app.require_subcommand(1);
+  Action action;
+  AddCertifyCommand(app, action);
+  AddPlanCommand(app, action);
+  AddReplayCommand(app, action);
+  AddReportCommand(app, action);
+  AddRunCommand(app, action);
+  AddDoctorCommand(app, action);
+  AddKeysCommand(app, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitBadInput;
+  }
+  spdlog::set_default_logger(spdlog::stderr_color_mt("forereach"));
+  return Guarded("forereach", action);
+}

@@ -1,0 +1,128 @@
+#include "cli/replay.h"
+
+#include <deque>
+#include <map>
+#include <optional>
+
+#include "certifier/gate/gate.h"
+#include "forereach/decision_t.hpp"
+#include "lcmtypes/names.h"
+#include "logger/event_log.h"
+
+namespace forereach {
+namespace {
+
+struct Recorded {
+  decision_t decision;
+  std::int64_t event;
+};
+
+std::string InWords(const decision_t& decision) {
+  std::string text(OutcomeName(decision.outcome));
+  text += ", cause " + std::string(CauseName(decision.cause));
+  return text + ", step " + std::to_string(decision.step);
+}
+
+// Empty if they agree.
+std::string Difference(const decision_t& recorded, const decision_t& replayed) {
+  if (recorded.outcome != replayed.outcome || recorded.cause != replayed.cause || recorded.step != replayed.step)
+    return "recorded " + InWords(recorded) + "; replayed " + InWords(replayed);
+  const auto differs = [](const auto& a, const auto& b) { return GetDigest(a) != GetDigest(b); };
+  if (differs(recorded.config_digest, replayed.config_digest)) return "another config";
+  if (differs(recorded.model_digest, replayed.model_digest)) return "another model";
+  if (differs(recorded.declaration_digest, replayed.declaration_digest)) return "another declaration";
+  if (differs(recorded.observations_digest, replayed.observations_digest)) return "other observations";
+  if (differs(recorded.obstacles_digest, replayed.obstacles_digest)) return "other obstacles";
+  return {};
+}
+
+class Replayer {
+ public:
+  explicit Replayer(const Config& config) : config_(config) { gate_.emplace(config); }
+
+  // A first pass: which decision each candidate's bytes were given, in order.
+  void Collect(const LogEvent& event) {
+    if (event.channel != config_.bus.decision) return;
+    if (const auto decision = Decoded<decision_t>(event.data))
+      recorded_[GetDigest(decision->plan_digest)].push_back({*decision, event.number});
+  }
+
+  void Feed(const LogEvent& event) {
+    if (event.channel == config_.bus.obstacles) {
+      static_cast<void>(gate_->UpdateObstacles(event.data, event.utime));
+    } else if (event.channel == config_.bus.candidate) {
+      FeedCandidate(event);
+    }
+  }
+
+  ReplayResult Finish() {
+    for (const auto& [digest, decisions] : recorded_)
+      for (const Recorded& recorded : decisions)
+        Differ(recorded.event, recorded.decision.plan_id, "decided, but its candidate is not in the log");
+    return std::move(result_);
+  }
+
+  void AddCorruptions(std::int64_t count) { result_.corruptions = count; }
+
+ private:
+  void FeedCandidate(const LogEvent& event) {
+    ++result_.candidates;
+    auto& waiting = recorded_[DigestOf(event.data)];
+    std::optional<Recorded> recorded;
+    if (!waiting.empty()) {
+      recorded = waiting.front();
+      waiting.pop_front();
+      if (recorded->decision.sequence < last_sequence_) gate_.emplace(config_);  // the certifier was started again
+      last_sequence_ = recorded->decision.sequence;
+    }
+    const decision_t replayed = gate_->Decide(event.data, event.utime).decision;
+    if (!recorded) return Differ(event.number, replayed.plan_id, "no decision recorded; replayed " + InWords(replayed));
+    if (recorded->decision.cause == decision_t::CAUSE_QUEUE_FULL) {
+      ++result_.displaced;
+      return;
+    }
+    const std::string difference = Difference(recorded->decision, replayed);
+    if (difference.empty())
+      ++result_.agreed;
+    else
+      Differ(event.number, replayed.plan_id, difference);
+  }
+
+  void Differ(std::int64_t event, std::int64_t plan_id, const std::string& what) {
+    result_.differences.push_back("event " + std::to_string(event) + ", plan " + std::to_string(plan_id) + ": " + what);
+  }
+
+  const Config& config_;
+  std::optional<Gate> gate_;
+  std::map<Digest, std::deque<Recorded>> recorded_;
+  std::int64_t last_sequence_ = -1;
+  ReplayResult result_;
+};
+
+template <class Visit>
+std::int64_t ForEachEvent(const std::string& path, Visit visit) {
+  EventLogReader reader(path);
+  LogEvent event;
+  for (;;) {
+    switch (reader.Next(event)) {
+      case LogStatus::kEvent:
+        visit(event);
+        break;
+      case LogStatus::kCorrupt:
+        break;
+      default:
+        return reader.corruptions();
+    }
+  }
+}
+
+}  // namespace
+
+ReplayResult Replay(const std::string& log_path, const Config& config) {
+  Replayer replayer(config);
+  ForEachEvent(log_path, [&](const LogEvent& event) { replayer.Collect(event); });
+  replayer.AddCorruptions(ForEachEvent(log_path, [&](const LogEvent& event) { replayer.Feed(event); }));
+  return replayer.Finish();
+}
+
+}  // namespace forereach

@@ -1,0 +1,58 @@
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/process.h"
+#include "cli/commands.h"
+#include "cli/replay.h"
+#include "logger/event_log.h"
+
+namespace forereach {
+namespace {
+
+struct Options {
+  std::string log, config;
+  bool json = false;
+};
+
+int RunReplay(const Options& options) {
+  const Config config = LoadConfig(options.config);
+  ReplayResult result;
+  try {
+    result = Replay(options.log, config);
+  } catch (const LogError& error) {
+    throw ConfigError(error.what());
+  }
+  if (options.json) {
+    std::cout << nlohmann::json{{"candidates", result.candidates},
+                                {"agreed", result.agreed},
+                                {"displaced", result.displaced},
+                                {"corruptions", result.corruptions},
+                                {"differences", result.differences}}
+              << std::endl;
+  } else {
+    for (const std::string& difference : result.differences) std::cout << difference << "\n";
+    std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
+              << result.differences.size() << " differ";
+    if (result.displaced > 0) std::cout << ", " << result.displaced << " were displaced from a full queue";
+    if (result.corruptions > 0) std::cout << "; the log is damaged in " << result.corruptions << " places";
+    std::cout << std::endl;
+  }
+  return result.differences.empty() && result.corruptions == 0 && result.candidates > 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void AddReplayCommand(CLI::App& app, Action& action) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "replay", "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1");
+  command->add_option("log", options->log, "LCM event log")->required()->type_name("LOG");
+  command->add_option("--config", options->config, "The task file it was recorded with")->required()->type_name("FILE");
+  command->add_flag("--json", options->json, "One JSON document on standard output");
+  command->footer("Example:\n  forereach replay run/log/events-20260101-120000.lcmlog --config config/demo.yaml");
+  command->callback([options, &action] { action = [options] { return RunReplay(*options); }; });
+}
+
+}  // namespace forereach

@@ -1,0 +1,23 @@
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.h"
+#include "logger/report.h"
+
+namespace forereach {
+
+void AddReportCommand(CLI::App& app, Action& action) {
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* command = app.add_subcommand("report", "Sum up a recorded log, and draw it");
+  command->add_option("log", options->log, "LCM event log")->required()->type_name("LOG");
+  command->add_option("--config", options->config, "The task file it was recorded with")->required()->type_name("FILE");
+  command->add_option("--picture", options->picture, "Obstacles, tubes and driven path: .svg or .png, both without ending")
+      ->type_name("FILE");
+  command->add_flag("--json", options->json, "One JSON document on standard output");
+  command->footer("Example:\n  forereach report run/log/events-20260101-120000.lcmlog --config config/demo.yaml "
+                  "--picture run/demo");
+  command->callback([options, &action] { action = [options] { return ReportCommand(*options, std::cout, std::cerr); }; });
+}
+
+}  // namespace forereach

@@ -1,0 +1,59 @@
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include "certifier/process/certifier_node.h"
+#include "cli/commands.h"
+#include "logger/logger_node.h"
+#include "planner_bridge/planner_node.h"
+#include "robot/sim_node.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kClockStepUs = 1000;
+
+struct Options {
+  std::string config, directory;
+};
+
+void Deliver(Bus& bus) {
+  while (bus.Dispatch(0) > 0) {
+  }
+}
+
+// All four nodes in this thread. Time is simulated: it stands still while somebody computes, so the run is the same on
+// every machine.
+int Run(const Options& options) {
+  Config config = LoadConfig(options.config);
+  if (!options.directory.empty()) config.logger.directory = options.directory;
+  std::int64_t now = WallClockUs();
+  const auto bus = OpenBus("memq://", [&now] { return now; });
+  LoggerNode logger(config, *bus, std::cout);
+  CertifierNode certifier(config, *bus);
+  PlannerNode planner(config, *bus);
+  RobotSimNode robot(config, *bus);
+  const auto last = now + static_cast<std::int64_t>((config.robot.time_limit_s + 60) * 1e6);
+  for (; !robot.done() && now < last; now += kClockStepUs) {
+    for (Node* node : std::initializer_list<Node*>{&robot, &planner, &certifier, &logger}) {
+      node->Tick(now);
+      Deliver(*bus);
+    }
+  }
+  for (Node* node : std::initializer_list<Node*>{&planner, &certifier, &robot, &logger}) node->Stop();
+  return 0;
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App& app, Action& action) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "run", "Planner, certifier, robot and logger in this one process, on LCM's in-memory bus and a simulated clock");
+  command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
+  command->add_option("--directory", options->directory, "Where the logger writes")->type_name("DIR");
+  command->footer("Example:\n  forereach run --config config/demo.yaml --directory run/log");
+  command->callback([options, &action] { action = [options] { return Run(*options); }; });
+}
+
+}  // namespace forereach

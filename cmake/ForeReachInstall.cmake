@@ -1,0 +1,27 @@
+# `cmake --install`: programs, headers, task files, and a CMake package: find_package(ForeReach), then link
+# ForeReach::certifier, and ForeReach::guard on the robot.
+include(CMakePackageConfigHelpers)
+
+install(TARGETS forereach forereach-certifier forereach-planner forereach-logger forereach-robot-sim)
+
+set_target_properties(forereach_certifier PROPERTIES EXPORT_NAME certifier)
+set_target_properties(forereach_guard PROPERTIES EXPORT_NAME guard)
+set_target_properties(forereach_lcmtypes PROPERTIES EXPORT_NAME lcmtypes)
+install(TARGETS forereach_options forereach_certifier forereach_lcmtypes forereach_guard EXPORT ForeReachTargets)
+install(EXPORT ForeReachTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
+
+set(headers ${CMAKE_INSTALL_INCLUDEDIR}/forereach)
+foreach(floor numerics sets dynamics residual safety reach certify)
+  install(DIRECTORY certifier/${floor} DESTINATION ${headers}/certifier FILES_MATCHING PATTERN "*.h")
+endforeach()
+install(FILES lcmtypes/codec.h lcmtypes/names.h DESTINATION ${headers}/lcmtypes)
+install(FILES robot/guard.h DESTINATION ${headers}/robot)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/generated/forereach DESTINATION ${headers}/messages)
+install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach/lcmtypes FILES_MATCHING PATTERN "*.lcm")
+install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach)
+
+configure_package_config_file(cmake/ForeReachConfig.cmake.in ForeReachConfig.cmake
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
+write_basic_package_version_file(ForeReachConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/ForeReachConfig.cmake ${CMAKE_BINARY_DIR}/ForeReachConfigVersion.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)

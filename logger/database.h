@@ -1,0 +1,78 @@
+/** The decision database: SQLite, one file for all runs of a directory. Only its source file sees SQL.
+
+Tables: `decisions`, `execution_events`, `gaps` as in rows.h, and `runs`. The journal is a write-ahead log with
+synchronous=NORMAL: a transaction is there whole or not at all after a kill, and after a power cut too; the event log is
+always written first, so rows that a cut took are made again from it. */
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "logger/rows.h"
+
+struct sqlite3;
+
+namespace forereach {
+
+/** The database cannot be opened, or is not ours to write; the text names the file and the reason. */
+class DatabaseError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/** One run of the logger. */
+struct RunRow {
+  std::string log_file;
+  std::int64_t start_utime = 0;
+  std::optional<std::int64_t> end_utime;  ///< Nothing while it runs, or if it was killed.
+  std::int64_t events = 0;                ///< Rows of events with lower numbers than this are all here.
+  int schema = 0;                         ///< Of the database when the run began.
+  std::string recovered;                  ///< What a later start had to mend, empty after a clean end.
+};
+
+class Database final {
+ public:
+  static constexpr int kSchemaVersion = 1;  ///< PRAGMA user_version
+
+  /** Creates the file, or opens it and brings an older schema up to date.
+  @throws DatabaseError if it cannot be opened, belongs to another program or has a newer schema. */
+  explicit Database(const std::string& path);
+  ~Database();
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+
+  /** Writes all rows in one transaction, or none, and with them that all rows of the first `events` events of the log
+  file are here now. A row whose log event has one already is left out.
+  @return the number of rows that are new, or nothing on failure; `problem` then says why. */
+  [[nodiscard]] std::optional<int> Write(const Rows& rows, const std::string& log_file, std::int64_t events);
+
+  /** Each is a transaction of its own. @throws DatabaseError. */
+  void BeginRun(const std::string& log_file, std::int64_t start_utime);
+  void EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered = "");
+  [[nodiscard]] std::vector<RunRow> Runs();
+
+  /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
+  [[nodiscard]] Rows Read(const std::string& log_file = "");
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] const std::string& problem() const { return problem_; }
+
+ private:
+  class Statement;
+
+  void Execute(const char* sql);
+  void Migrate();
+  int Insert(const DecisionRow& row);
+  int Insert(const EventRow& row);
+  int Insert(const GapRow& row);
+
+  std::string path_, problem_;
+  std::unique_ptr<sqlite3, int (*)(sqlite3*)> handle_;
+  std::unique_ptr<Statement> insert_decision_, insert_event_, insert_gap_, set_events_;
+};
+
+}  // namespace forereach

@@ -1,0 +1,186 @@
+#include "logger/event_log.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace forereach {
+namespace {
+
+constexpr std::array<std::uint8_t, 4> kSync{0xED, 0xA1, 0xDA, 0x01};
+constexpr std::int64_t kHeaderBytes = 28;
+constexpr std::int64_t kMaxNumber = std::int64_t{1} << 62;
+
+template <class Integer>
+void PutBigEndian(std::vector<std::uint8_t>& out, Integer value) {
+  for (int shift = 8 * (static_cast<int>(sizeof value) - 1); shift >= 0; shift -= 8)
+    out.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> shift));
+}
+
+std::uint64_t GetBigEndian(const std::uint8_t* bytes, int count) {
+  std::uint64_t value = 0;
+  for (int i = 0; i < count; ++i) value = value << 8 | bytes[i];
+  return value;
+}
+
+std::string Reason(const std::string& what, const std::string& path) { return what + path + ": " + std::strerror(errno); }
+
+}  // namespace
+
+EventLogReader::EventLogReader(const std::string& path) : file_(std::fopen(path.c_str(), "rb"), &std::fclose) {
+  struct stat status {};
+  if (!file_ || ::fstat(::fileno(file_.get()), &status) != 0) throw LogError(Reason("log: cannot read ", path));
+  if (!S_ISREG(status.st_mode)) throw LogError("log: cannot read " + path + ": not a regular file");
+  size_ = status.st_size;
+}
+
+bool EventLogReader::ReadAt(std::int64_t offset, void* out, std::int64_t bytes) {
+  if (position_ != offset && ::fseeko(file_.get(), offset, SEEK_SET) != 0) return false;
+  const std::size_t read = std::fread(out, 1, static_cast<std::size_t>(bytes), file_.get());
+  position_ = offset + static_cast<std::int64_t>(read);
+  return read == static_cast<std::size_t>(bytes);
+}
+
+// A record begins at `offset` if its sync word and the plausible header behind it do; kCut if the file ends first.
+EventLogReader::Found EventLogReader::Examine(std::int64_t offset, Header& header) {
+  const std::int64_t left = std::min(size_ - offset, kHeaderBytes);
+  std::array<std::uint8_t, kHeaderBytes> bytes;
+  if (!ReadAt(offset, bytes.data(), left)) return Found::kNothing;
+  if (!std::equal(kSync.begin(), kSync.begin() + std::min<std::int64_t>(left, 4), bytes.begin())) return Found::kNothing;
+  if (left < kHeaderBytes) return Found::kCut;
+  header.number = static_cast<std::int64_t>(GetBigEndian(&bytes[4], 8));
+  header.utime = static_cast<std::int64_t>(GetBigEndian(&bytes[12], 8));
+  header.channel_bytes = static_cast<std::int32_t>(GetBigEndian(&bytes[20], 4));
+  header.data_bytes = static_cast<std::int32_t>(GetBigEndian(&bytes[24], 4));
+  const bool plausible = header.number >= 0 && header.number < kMaxNumber && header.utime >= 0 &&
+                         header.channel_bytes > 0 && header.channel_bytes <= kMaxLogChannelBytes &&
+                         header.data_bytes >= 0 && header.data_bytes <= kMaxLogDataBytes;
+  if (!plausible) return Found::kNothing;
+  return size_ - offset - kHeaderBytes >= header.channel_bytes + header.data_bytes ? Found::kWhole : Found::kCut;
+}
+
+// True at the end of the file, and where a sync word or the beginning of one that was cut stands.
+bool EventLogReader::SyncAt(std::int64_t offset) {
+  std::array<std::uint8_t, 4> bytes{};
+  const std::int64_t left = std::min<std::int64_t>(size_ - offset, 4);
+  return ReadAt(offset, bytes.data(), left) && std::equal(bytes.begin(), bytes.begin() + left, kSync.begin());
+}
+
+// The offset of the first whole record that begins in [from, end), or end.
+std::int64_t EventLogReader::FindRecord(std::int64_t from, std::int64_t end) {
+  std::array<std::uint8_t, 1 << 16> block;
+  while (end - from >= static_cast<std::int64_t>(kSync.size())) {
+    const std::int64_t bytes = std::min<std::int64_t>(end - from, static_cast<std::int64_t>(block.size()));
+    if (!ReadAt(from, block.data(), bytes)) break;
+    const auto block_end = block.begin() + bytes;
+    for (auto at = block.begin(); (at = std::search(at, block_end, kSync.begin(), kSync.end())) != block_end; ++at) {
+      Header header{};
+      if (Examine(from + (at - block.begin()), header) == Found::kWhole) return from + (at - block.begin());
+    }
+    from += bytes - 3;  // a sync word may lie across two blocks
+  }
+  return end;
+}
+
+LogStatus EventLogReader::Next(LogEvent& event) {
+  if (offset_ >= size_) return LogStatus::kEnd;
+  Header header{};
+  const Found found = Examine(offset_, header);
+  std::int64_t next = size_;
+  if (found == Found::kWhole) {
+    const std::int64_t channel = offset_ + kHeaderBytes, data = channel + header.channel_bytes;
+    const std::int64_t end = data + header.data_bytes;
+    next = SyncAt(end) ? end : FindRecord(offset_ + 1, end);
+    event.number = header.number;
+    event.utime = header.utime;
+    event.channel.resize(static_cast<std::size_t>(header.channel_bytes));
+    event.data.resize(static_cast<std::size_t>(header.data_bytes));
+    if (next == end && ReadAt(channel, event.channel.data(), header.channel_bytes) &&
+        ReadAt(data, event.data.data(), header.data_bytes)) {
+      offset_ = end;
+      return LogStatus::kEvent;
+    }
+  } else {
+    next = FindRecord(offset_ + 1, size_);
+    if (found == Found::kCut && next == size_) return LogStatus::kCutTail;
+  }
+  ++corruptions_;
+  skipped_bytes_ += next - offset_;
+  offset_ = next;
+  return LogStatus::kCorrupt;
+}
+
+EventLogWriter::EventLogWriter(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+  if (file_ < 0) throw LogError(Reason("log: cannot write ", path));
+  try {
+    if (::flock(file_, LOCK_EX | LOCK_NB) != 0) throw LogError("log: " + path + " is being written by another process");
+    Recover(path);
+  } catch (...) {
+    ::close(file_);
+    throw;
+  }
+}
+
+EventLogWriter::~EventLogWriter() { ::close(file_); }
+
+void EventLogWriter::Recover(const std::string& path) {
+  EventLogReader reader(path);
+  LogEvent event;
+  LogStatus status;
+  while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt) {
+    if (status == LogStatus::kCorrupt) continue;
+    ++recovery_.events;
+    recovery_.last_utime = event.utime;
+    next_number_ = std::max(next_number_, event.number + 1);
+  }
+  offset_ = reader.offset();
+  recovery_.cut_bytes = reader.size() - offset_;
+  recovery_.corruptions = reader.corruptions();
+  recovery_.skipped_bytes = reader.skipped_bytes();
+  if ((recovery_.cut_bytes > 0 && ::ftruncate(file_, offset_) != 0) || ::lseek(file_, offset_, SEEK_SET) < 0)
+    throw LogError(Reason("log: cannot recover ", path));
+}
+
+std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& channel, Bytes data) {
+  if (channel.empty() || channel.size() > kMaxLogChannelBytes || data.size() > kMaxLogDataBytes)
+    throw std::invalid_argument("log: a channel has 1 to 63 bytes and a message at most 16777216, not " +
+                                std::to_string(channel.size()) + " and " + std::to_string(data.size()));
+  buffer_.insert(buffer_.end(), kSync.begin(), kSync.end());
+  PutBigEndian(buffer_, next_number_);
+  PutBigEndian(buffer_, std::max<std::int64_t>(utime, 0));
+  PutBigEndian(buffer_, static_cast<std::int32_t>(channel.size()));
+  PutBigEndian(buffer_, static_cast<std::int32_t>(data.size()));
+  buffer_.insert(buffer_.end(), channel.begin(), channel.end());
+  buffer_.insert(buffer_.end(), data.begin(), data.end());
+  return next_number_++;
+}
+
+bool EventLogWriter::Flush() {
+  if (buffer_.empty()) return true;
+  std::size_t written = 0;
+  while (written < buffer_.size()) {
+    const ssize_t count = ::write(file_, buffer_.data() + written, buffer_.size() - written);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) break;
+    written += static_cast<std::size_t>(count);
+  }
+  const bool confirmed = written == buffer_.size() && ::fdatasync(file_) == 0;
+  if (confirmed) {
+    offset_ += static_cast<std::int64_t>(written);
+  } else {
+    problem_ = std::string("log: cannot write: ") + std::strerror(errno);
+    // A torn record in the middle of the file would read as damage.
+    if (::ftruncate(file_, offset_) != 0 || ::lseek(file_, offset_, SEEK_SET) < 0)
+      problem_ += std::string("; cannot put the file back: ") + std::strerror(errno);
+  }
+  buffer_.clear();
+  return confirmed;
+}
+
+}  // namespace forereach

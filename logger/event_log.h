@@ -1,0 +1,124 @@
+/** Writer and reader of the standard LCM event log, the file that lcm-logplayer plays.
+
+A log is a sequence of records, all numbers big-endian:
+
+    uint32 0xEDA1DA01 | int64 event number | int64 utime | int32 channel bytes | int32 data bytes | channel | data
+
+LCM 1.3.1's own reader allocates what a length field claims and returns NULL for the end as for damage. This one bounds
+every length before it allocates, tells the end, a cut tail and damage apart, and goes on behind damage. */
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "lcmtypes/codec.h"
+
+namespace forereach {
+
+/** A log cannot be opened, locked or created; the text names the file and the reason. */
+class LogError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct LogEvent {
+  std::int64_t number = 0;  ///< Counts the events of a file from 0. A number that is missing was lost to a full disk.
+  std::int64_t utime = 0;   ///< Microseconds since the Unix epoch at which it was received.
+  std::string channel;
+  std::vector<std::uint8_t> data;
+};
+
+inline constexpr std::int32_t kMaxLogChannelBytes = 63;  ///< LCM's own limit.
+inline constexpr std::int32_t kMaxLogDataBytes = 1 << 24;
+
+enum class LogStatus {
+  kEvent,    ///< One whole record was read.
+  kEnd,      ///< The file ends behind a whole record.
+  kCutTail,  ///< What is left is the beginning of one record: its writer was killed, or writes still.
+  kCorrupt,  ///< Some bytes were no record and have been skipped; the next call goes on behind them.
+};
+
+class EventLogReader final {
+ public:
+  /** @throws LogError if the file cannot be read. */
+  explicit EventLogReader(const std::string& path);
+
+  /** Reads the next record; `event` is meaningful for kEvent only. kEnd and kCutTail repeat.
+  Length fields are not believed blindly: one that points behind the end of the file is a cut tail only if no whole
+  record follows, and one behind whose record no sync word stands is damaged if it hides another whole record.
+  Cost: linear in the bytes passed; allocates at most kMaxLogDataBytes. */
+  [[nodiscard]] LogStatus Next(LogEvent& event);
+
+  /** Bytes from the beginning of the file to behind the last record or damage passed. */
+  [[nodiscard]] std::int64_t offset() const { return offset_; }
+  [[nodiscard]] std::int64_t size() const { return size_; }
+  /** Damaged places met so far, and the bytes skipped in them. */
+  [[nodiscard]] std::int64_t corruptions() const { return corruptions_; }
+  [[nodiscard]] std::int64_t skipped_bytes() const { return skipped_bytes_; }
+
+ private:
+  enum class Found { kWhole, kCut, kNothing };
+  struct Header {
+    std::int64_t number, utime;
+    std::int32_t channel_bytes, data_bytes;
+  };
+
+  bool ReadAt(std::int64_t offset, void* out, std::int64_t bytes);
+  Found Examine(std::int64_t offset, Header& header);
+  bool SyncAt(std::int64_t offset);
+  std::int64_t FindRecord(std::int64_t from, std::int64_t end);
+
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  std::int64_t position_ = 0;  // of file_, so that reading on needs no seek
+  std::int64_t offset_ = 0, size_ = 0, corruptions_ = 0, skipped_bytes_ = 0;
+};
+
+/** What a writer found in a file that existed already. */
+struct LogRecovery {
+  std::int64_t events = 0;           ///< Whole records kept.
+  std::int64_t cut_bytes = 0;        ///< Of a cut tail, removed.
+  std::int64_t corruptions = 0;      ///< Damaged places, left as they are.
+  std::int64_t skipped_bytes = 0;    ///< In them.
+  std::int64_t last_utime = 0;       ///< Of the last whole record, 0 without one.
+};
+
+class EventLogWriter final {
+ public:
+  /** Creates the file, or recovers an existing one: keeps all whole records, removes a cut tail and nothing else, and
+  continues the event numbers. Holds a lock on the file while it lives.
+  @throws LogError if the file cannot be opened or another writer holds it. */
+  explicit EventLogWriter(const std::string& path);
+  ~EventLogWriter();
+  EventLogWriter(const EventLogWriter&) = delete;
+  EventLogWriter& operator=(const EventLogWriter&) = delete;
+
+  /** Takes one event into memory and returns its number; Flush brings it to the file.
+  @throws std::invalid_argument for a channel or data above the limits of this format. */
+  std::int64_t Append(std::int64_t utime, const std::string& channel, Bytes data);
+
+  /** Writes everything appended so far and has the disk confirm it. On failure the file is put back to its last
+  whole record, the events since are lost and false is returned; `problem` then says why. */
+  [[nodiscard]] bool Flush();
+
+  [[nodiscard]] const LogRecovery& recovery() const { return recovery_; }
+  [[nodiscard]] const std::string& problem() const { return problem_; }
+  /** Bytes of the file after the last successful Flush, and those that wait in memory. */
+  [[nodiscard]] std::int64_t offset() const { return offset_; }
+  [[nodiscard]] std::int64_t pending_bytes() const { return static_cast<std::int64_t>(buffer_.size()); }
+  [[nodiscard]] std::int64_t next_number() const { return next_number_; }
+
+ private:
+  void Recover(const std::string& path);
+
+  int file_ = -1;
+  std::vector<std::uint8_t> buffer_;
+  std::int64_t offset_ = 0, next_number_ = 0;
+  LogRecovery recovery_;
+  std::string problem_;
+};
+
+}  // namespace forereach

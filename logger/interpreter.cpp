@@ -1,0 +1,135 @@
+#include "logger/interpreter.h"
+
+#include <algorithm>
+
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "lcmtypes/names.h"
+
+namespace forereach {
+namespace {
+
+template <class Message>
+std::optional<std::int64_t> SequenceOf(Bytes bytes) {
+  const auto message = Decoded<Message>(bytes);
+  return message ? std::optional(message->sequence) : std::nullopt;
+}
+
+DecisionRow MakeRow(const decision_t& decision, LogReference event) {
+  DecisionRow row;
+  row.event = std::move(event);
+  row.utime = decision.utime;
+  row.candidate_utime = decision.candidate_utime;
+  row.sequence = decision.sequence;
+  row.plan_id = decision.plan_id;
+  row.source = GetText(decision.source);
+  row.outcome = OutcomeName(decision.outcome);
+  row.cause = CauseName(decision.cause);
+  row.message = GetText(decision.message);
+  row.step = decision.step;
+  row.coordinate = decision.coordinate;
+  row.obstacle = decision.obstacle;
+  row.first_observation = decision.first_observation;
+  row.second_observation = decision.second_observation;
+  row.margin = decision.margin;
+  row.threshold = decision.threshold;
+  row.elapsed_us = decision.elapsed_us;
+  row.plan_digest = ToHex(GetDigest(decision.plan_digest));
+  row.config_digest = ToHex(GetDigest(decision.config_digest));
+  row.model_digest = ToHex(GetDigest(decision.model_digest));
+  row.declaration_digest = ToHex(GetDigest(decision.declaration_digest));
+  row.observations_digest = ToHex(GetDigest(decision.observations_digest));
+  row.obstacles_digest = ToHex(GetDigest(decision.obstacles_digest));
+  return row;
+}
+
+EventRow MakeRow(const execution_event_t& event, LogReference reference) {
+  EventRow row;
+  row.event = std::move(reference);
+  row.utime = event.utime;
+  row.sequence = event.sequence;
+  row.plan_id = event.plan_id;
+  row.kind = EventName(event.kind);
+  row.message = GetText(event.message);
+  row.step = event.step;
+  row.coordinate = event.coordinate;
+  row.state.assign(event.state, event.state + std::clamp<int>(event.num_states, 0, 16));
+  row.value = event.value;
+  return row;
+}
+
+}  // namespace
+
+Interpreter::Interpreter(BusOptions channels, std::string log_file)
+    : channels_(std::move(channels)), log_file_(std::move(log_file)) {}
+
+std::pair<Stream, std::optional<std::int64_t>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
+  const Stream plain{channel, ""};
+  if (channel == channels_.candidate) {
+    const auto candidate = Decoded<candidate_plan_t>(bytes);
+    if (!candidate) return {plain, std::nullopt};
+    return {{channel, GetText(candidate->source)}, candidate->sequence};
+  }
+  if (channel == channels_.decision) return {plain, SequenceOf<decision_t>(bytes)};
+  if (channel == channels_.certified) return {plain, SequenceOf<certified_plan_t>(bytes)};
+  if (channel == channels_.robot_state) return {plain, SequenceOf<robot_state_t>(bytes)};
+  if (channel == channels_.transition) return {plain, SequenceOf<transition_t>(bytes)};
+  if (channel == channels_.status) return {plain, SequenceOf<certifier_status_t>(bytes)};
+  if (channel == channels_.event) return {plain, SequenceOf<execution_event_t>(bytes)};
+  return {plain, std::nullopt};  // obstacles_t's sequence only has to grow
+}
+
+void Interpreter::Observe(const LogEvent& event, Rows& rows) {
+  CheckSequence(event, rows);
+  if (event.channel == channels_.candidate) {
+    candidates_.emplace_back(DigestOf(event.data), event.utime);
+    if (candidates_.size() > kMaxCandidates) candidates_.pop_front();
+  } else if (event.channel == channels_.decision) {
+    if (const auto decision = Decoded<decision_t>(event.data)) {
+      DecisionRow row = MakeRow(*decision, {log_file_, event.number});
+      row.latency_us = LatencyUs(GetDigest(decision->plan_digest), event.utime);
+      rows.decisions.push_back(std::move(row));
+    }
+  } else if (event.channel == channels_.event) {
+    if (const auto execution = Decoded<execution_event_t>(event.data))
+      rows.events.push_back(MakeRow(*execution, {log_file_, event.number}));
+  }
+}
+
+void Interpreter::Forgive(const Stream& stream, std::int64_t lost) {
+  const auto found = streams_.find(stream);
+  if (found != streams_.end()) found->second.forgiven += lost;
+}
+
+void Interpreter::CheckSequence(const LogEvent& event, Rows& rows) {
+  const auto [stream, sequence] = Identify(event.channel, event.data);
+  if (!sequence || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return;
+  Count& count = streams_[stream];
+  const std::int64_t got = *sequence, expected = count.next.value_or(got), forgiven = count.forgiven;
+  count = {got < INT64_MAX ? got + 1 : got, 0};
+  if (got == expected) return;
+  GapRow gap{{log_file_, event.number}, stream.channel, stream.source, expected, got, 0, event.utime, "restart"};
+  if (got > expected) {
+    gap.lost = expected < 0 ? 0 : std::max<std::int64_t>(got - expected - forgiven, 0);
+    gap.reason = "bus";
+    if (gap.lost == 0) return;
+  } else if (got > 0) {
+    gap.lost = std::max<std::int64_t>(got - forgiven, 0);  // it began anew, and its first messages are missing
+  }
+  rows.gaps.push_back(std::move(gap));
+}
+
+double Interpreter::LatencyUs(const Digest& plan, std::int64_t utime) {
+  const auto found = std::ranges::find(candidates_, plan, &std::pair<Digest, std::int64_t>::first);
+  if (found == candidates_.end()) return kUnknown;
+  const auto latency = static_cast<double>(utime - found->second);
+  candidates_.erase(found);
+  return latency;
+}
+
+}  // namespace forereach

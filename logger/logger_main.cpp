@@ -1,0 +1,32 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "certifier/task/process.h"
+#include "logger/logger_node.h"
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  std::string directory;
+  const ProcessDescription description{
+      "forereach-logger",
+      "Records everything on the bus: an LCM event log (lcm-logplayer plays it) and a database of decisions, execution "
+      "events and gaps. Ends on SIGTERM or Ctrl-C with a summary on standard output.",
+      "forereach-logger --config config/bicycle.yaml --directory /var/log/forereach"};
+  const auto make_node = [&directory](const Config& config, Bus& bus) -> std::unique_ptr<Node> {
+    Config chosen = config;
+    if (!directory.empty()) chosen.logger.directory = directory;
+    try {
+      return std::make_unique<LoggerNode>(chosen, bus, std::cout);
+    } catch (const LogError& error) {
+      throw ConfigError(std::string("logger.directory: ") + error.what());
+    } catch (const DatabaseError& error) {
+      throw ConfigError(std::string("logger.directory: ") + error.what());
+    }
+  };
+  return RunProcess(argc, argv, description, make_node, [&directory](CLI::App& app) {
+    app.add_option("--directory", directory, "Where to write; by default the task file's logger.directory")->type_name("DIR");
+  });
+}

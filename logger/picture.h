@@ -1,0 +1,55 @@
+/** Draws a run seen from above: obstacles, certified tubes, the driven path. Knows shapes only, nothing of logs. */
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace forereach {
+
+/** A picture cannot be written; the text names the file and the reason. */
+class PictureError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/** Everything in metres, x to the right and y up, to one scale. A polygon is convex, its corners in order. */
+struct Picture {
+  using Polygon = std::vector<Eigen::Vector2d>;
+
+  struct Circle {
+    Eigen::Vector2d center = Eigen::Vector2d::Zero();
+    double radius = 0;
+  };
+  /** {y : normal . y >= offset} */
+  struct HalfPlane {
+    Eigen::Vector2d normal = Eigen::Vector2d::Zero();
+    double offset = 0;
+  };
+
+  std::string title;
+  std::vector<std::string> key_numbers;  ///< Shown in one line below the title.
+
+  std::vector<Circle> circles;           ///< Obstacles.
+  std::vector<Polygon> polygons;         ///< Obstacles.
+  std::vector<HalfPlane> half_planes;    ///< Obstacles.
+
+  std::vector<Polygon> executed;         ///< Certified slices that the robot went through.
+  std::vector<Polygon> certified;        ///< Certified slices that newer plans replaced.
+  std::vector<std::vector<Polygon>> abstained;  ///< Tubes refused for an obstacle (S), each up to
+                                                ///< the slice that may touch it.
+
+  std::vector<Eigen::Vector2d> path;     ///< Measured positions, from the start on.
+  std::vector<Eigen::Vector2d> stops;    ///< Where the robot stood on the way.
+  std::optional<Circle> goal;
+};
+
+/** Writes `picture` to a .svg or .png file, by the same drawing code.
+@param width, height pixels, 200 to 10000 each.
+@throws PictureError for another ending or size, or if the file cannot be written. */
+void DrawPicture(const Picture& picture, const std::string& path, int width = 1200, int height = 800);
+
+}  // namespace forereach

@@ -1,0 +1,272 @@
+#include "logger/report.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/gate/obstacle_message.h"
+#include "certifier/sets/zonogon.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/obstacles_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "logger/event_log.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::size_t kMaxUndecided = 1024;
+
+class PictureMaker final {
+ public:
+  explicit PictureMaker(const Config& config)
+      : channels_(config.bus), certifier_(config.problem), obstacles_(config.obstacles) {
+    if (certifier_.projection().dim() != 2)
+      throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}",
+                                     certifier_.projection().dim()));
+    const std::vector<double>& goal = config.planner.goal;
+    if (goal.size() == 2) result_.picture.goal = Picture::Circle{{goal[0], goal[1]}, config.planner.goal_radius};
+  }
+
+  void Add(const LogEvent& event) {
+    if (event.channel == channels_.candidate) {
+      candidates_.emplace_back(DigestOf(event.data), event.data);
+      if (candidates_.size() > kMaxUndecided) candidates_.pop_front();
+    } else if (event.channel == channels_.decision) {
+      if (const auto decision = Decoded<decision_t>(event.data)) AddDecision(*decision);
+    } else if (event.channel == channels_.obstacles) {
+      if (const auto obstacles = Decoded<obstacles_t>(event.data)) SetObstacles(*obstacles);
+    } else if (event.channel == channels_.robot_state) {
+      if (const auto state = Decoded<robot_state_t>(event.data)) AddState(*state);
+    } else if (event.channel == channels_.event) {
+      if (const auto execution = Decoded<execution_event_t>(event.data)) AddExecution(*execution);
+    }
+  }
+
+  LogPicture Finish() {
+    Picture& picture = result_.picture;
+    for (auto& [plan_id, tube] : tubes_)
+      for (std::size_t t = 0; t < tube.size(); ++t)
+        (executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed : picture.certified)
+            .push_back(std::move(tube[t]));
+    for (const Obstacle& obstacle : obstacles_) AddObstacle(obstacle);
+    return std::move(result_);
+  }
+
+ private:
+  void SetObstacles(const obstacles_t& message) {
+    try {
+      obstacles_ = FromMessage(message, certifier_.projection().dim());
+    } catch (const std::invalid_argument&) {
+      // The gate kept its obstacles too.
+    }
+  }
+
+  void AddDecision(const decision_t& decision) {
+    const auto found = std::ranges::find(candidates_, GetDigest(decision.plan_digest),
+                                         &std::pair<Digest, std::vector<std::uint8_t>>::first);
+    if (found == candidates_.end()) return;
+    const auto candidate = Decoded<candidate_plan_t>(found->second);
+    candidates_.erase(found);
+    const bool certified = decision.outcome == decision_t::CERTIFIED;
+    if (!candidate || (!certified && decision.outcome != decision_t::ABSTAIN_SAFETY)) return;
+    if (!CertifyAgain(*candidate, decision)) {
+      ++result_.disagreements;
+    } else if (certified) {
+      tubes_[candidate->plan_id] = Outlines(tube_.length());
+    } else {
+      result_.picture.abstained.push_back(Outlines(decision.step));
+    }
+  }
+
+  // Fills tube_; false if the answer is not the recorded one.
+  bool CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision) {
+    const int n = candidate.num_states;
+    if (n != certifier_.problem().model->num_states()) return false;
+    try {
+      const auto initial_set = Zonotope::FromBox(Eigen::Map<const Eigen::VectorXd>(candidate.initial_center, n),
+                                                 Eigen::Map<const Eigen::VectorXd>(candidate.initial_half_width, n));
+      const Plan plan{candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs};
+      certifier_.Require(plan, initial_set, obstacles_);
+      const Decision again = certifier_.Certify(plan, initial_set, obstacles_, tube_);
+      return static_cast<int>(again.outcome) == decision.outcome && again.step == decision.step;
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
+  }
+
+  std::vector<Picture::Polygon> Outlines(int last_step) const {
+    std::vector<Picture::Polygon> outlines;
+    Zonotope projected;
+    for (int t = 0; t <= std::min(last_step, tube_.length()); ++t) {
+      certifier_.projection().Enclose(tube_.slice(t), projected);
+      outlines.push_back(Outline(projected));
+    }
+    return outlines;
+  }
+
+  std::optional<Eigen::Vector2d> PositionOf(const double* state, int num_states) const {
+    if (num_states != certifier_.problem().model->num_states()) return std::nullopt;
+    return certifier_.problem().projection * Eigen::Map<const Eigen::VectorXd>(state, num_states);
+  }
+
+  void AddState(const robot_state_t& message) {
+    if (const auto position = PositionOf(message.state, message.num_states)) result_.picture.path.push_back(*position);
+  }
+
+  void AddExecution(const execution_event_t& event) {
+    if (event.kind == execution_event_t::STARTED || event.kind == execution_event_t::STEP_INSIDE)
+      executed_.insert({event.plan_id, event.step});
+    if (event.kind == execution_event_t::GOAL_REACHED) arrived_ = true;
+    const bool stops = event.kind == execution_event_t::STANDING || event.kind == execution_event_t::STEP_OUTSIDE;
+    const auto position = PositionOf(event.state, event.num_states);
+    if (stops && !arrived_ && position) result_.picture.stops.push_back(*position);
+  }
+
+  void AddObstacle(const Obstacle& obstacle) {
+    Picture& picture = result_.picture;
+    const auto& points = obstacle.points();
+    switch (obstacle.kind()) {
+      case Obstacle::Kind::kCircle:
+        picture.circles.push_back({points[0], obstacle.radius()});
+        break;
+      case Obstacle::Kind::kBox:
+        picture.polygons.push_back(
+            {points[0], {points[1].x(), points[0].y()}, points[1], {points[0].x(), points[1].y()}});
+        break;
+      case Obstacle::Kind::kPolygon:
+        picture.polygons.push_back(InOrder({points.begin(), points.end()}));
+        break;
+      case Obstacle::Kind::kHalfSpace:
+        picture.half_planes.push_back({points[0], obstacle.offset()});
+        break;
+    }
+  }
+
+  // The hull's corners counter-clockwise (Andrew's chain): a polygon obstacle may list its points in any order.
+  static Picture::Polygon InOrder(Picture::Polygon points) {
+    std::ranges::sort(points, [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
+    Picture::Polygon hull;
+    for (int pass = 0; pass < 2; ++pass) {
+      const std::size_t base = hull.size();
+      for (const Eigen::Vector2d& point : points) {
+        while (hull.size() >= base + 2) {
+          const Eigen::Vector2d edge = hull.back() - hull[hull.size() - 2], next = point - hull.back();
+          if (edge.x() * next.y() - edge.y() * next.x() > 0) break;
+          hull.pop_back();
+        }
+        hull.push_back(point);
+      }
+      hull.pop_back();
+      std::ranges::reverse(points);
+    }
+    return hull;
+  }
+
+  BusOptions channels_;
+  Certifier certifier_;
+  Tube tube_;
+  std::vector<Obstacle> obstacles_;
+  std::deque<std::pair<Digest, std::vector<std::uint8_t>>> candidates_;  // received and not yet decided
+  std::map<std::int64_t, std::vector<Picture::Polygon>> tubes_;          // of certified plans, by plan_id
+  std::set<std::pair<std::int64_t, int>> executed_;                      // plan_id and step
+  bool arrived_ = false;
+  LogPicture result_;
+};
+
+std::string TitleOf(const Config& config) {
+  std::string name = config.problem->model->name();
+  std::ranges::replace(name, '_', ' ');
+  if (!name.empty()) name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
+  return name + ": certified tubes and the driven path";
+}
+
+std::string InWords(double microseconds) {
+  return microseconds < 1000 ? fmt::format("{:.0f} \u00b5s", microseconds) : fmt::format("{:.1f} ms", microseconds / 1000);
+}
+
+std::vector<std::string> KeyNumbers(const Summary& summary) {
+  const auto abstained = [&summary](const char* cause) {
+    const auto found = summary.abstained.find(cause);
+    return found == summary.abstained.end() ? std::int64_t{0} : found->second;
+  };
+  std::vector<std::string> numbers{fmt::format("{} plans proposed", summary.proposed),
+                                   fmt::format("{} certified", summary.certified)};
+  const auto add = [&numbers](std::int64_t count, const char* name) {
+    if (count > 0) numbers.push_back(fmt::format("{} {}", count, name));
+  };
+  add(abstained("pairwise"), "abstained F");
+  add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
+  add(abstained("obstacle"), "abstained S");
+  if (!std::isnan(summary.latency_us.p50))
+    numbers.push_back(fmt::format("decided in {} (p50), {} (p99)", InWords(summary.latency_us.p50), InWords(summary.latency_us.p99)));
+  numbers.push_back(fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
+  numbers.push_back(fmt::format("{} contacts", summary.contacts));
+  return numbers;
+}
+
+std::vector<std::string> PictureFiles(const std::string& name) {
+  if (name.empty()) return {};
+  if (name.ends_with(".svg") || name.ends_with(".png")) return {name};
+  return {name + ".svg", name + ".png"};
+}
+
+}  // namespace
+
+LogPicture PictureFromLog(const std::string& log_path, const Config& config) {
+  EventLogReader reader(log_path);
+  PictureMaker maker(config);
+  LogEvent event;
+  LogStatus status;
+  while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt)
+    if (status == LogStatus::kEvent) maker.Add(event);
+  return maker.Finish();
+}
+
+void Report(const ReportOptions& options, std::ostream& out) {
+  const Config config = LoadConfig(options.config);
+  const Summary summary = SummarizeLog(options.log, config);
+  const std::vector<std::string> files = PictureFiles(options.picture);
+  LogPicture drawn;
+  if (!files.empty()) {
+    drawn = PictureFromLog(options.log, config);
+    drawn.picture.title = TitleOf(config);
+    drawn.picture.key_numbers = KeyNumbers(summary);
+  }
+  for (const std::string& file : files) DrawPicture(drawn.picture, file, options.width, options.height);
+
+  if (options.json) {
+    nlohmann::json json = ToJson(summary);
+    json["log"] = options.log;
+    json["pictures"] = files;
+    json["tubes_left_out"] = drawn.disagreements;
+    out << json.dump(2) << "\n";
+    return;
+  }
+  out << ToText(summary);
+  for (const std::string& file : files) out << fmt::format("{:<26}{}\n", "picture", file);
+  if (drawn.disagreements > 0)
+    out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out", drawn.disagreements);
+}
+
+int ReportCommand(const ReportOptions& options, std::ostream& out, std::ostream& err) {
+  try {
+    Report(options, out);
+    return 0;
+  } catch (const std::exception& error) {
+    err << "forereach report: " << error.what() << "\n";
+    return 2;
+  }
+}
+
+}  // namespace forereach

@@ -1,0 +1,41 @@
+/** What `forereach report` says of a recorded run: its numbers, and a picture with the tubes computed again. */
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "certifier/task/config.h"
+#include "logger/picture.h"
+#include "logger/summary.h"
+
+namespace forereach {
+
+/** A picture of a log, and how far the tubes in it can be trusted. */
+struct LogPicture {
+  Picture picture;
+  /** Plans whose outcome or step under `config` is not the recorded one; their tubes are left out. */
+  int disagreements = 0;
+};
+
+/** Certifies the candidates of a log again, under the obstacles in force when each was decided, and collects what there
+is to draw: the tubes of certified plans and of abstentions S, the measured path, stops, goal, obstacles at the end.
+Without title and key numbers. Cost: one certify call a plan.
+@throws LogError if the log cannot be read, PictureError if the task's safety coordinates are not planar. */
+[[nodiscard]] LogPicture PictureFromLog(const std::string& log_path, const Config& config);
+
+struct ReportOptions {
+  std::string log, config;
+  std::string picture;  ///< .svg or .png; without such an ending both are written; none if empty.
+  bool json = false;
+  int width = 1200, height = 800;  ///< Pixels.
+};
+
+/** Prints the summary of a log to `out`, as text or as one JSON document, and writes its picture.
+@throws ConfigError, LogError, PictureError; nothing has been printed then. */
+void Report(const ReportOptions& options, std::ostream& out);
+
+/** The same as a command: prints one line to `err` for an error. @return 0, or 2 for bad input. */
+int ReportCommand(const ReportOptions& options, std::ostream& out, std::ostream& err);
+
+}  // namespace forereach

@@ -1,0 +1,250 @@
+#include "planner_bridge/planner_node.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ostream>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/obstacle_message.h"
+#include "forereach/obstacles_t.hpp"
+#include "lcmtypes/names.h"
+
+namespace forereach {
+namespace {
+
+Eigen::VectorXd HalfWidth(const Config& config) {
+  const std::vector<double>& given = config.planner.initial_half_width;
+  const int n = config.problem->model->num_states();
+  if (std::ssize(given) != n)
+    throw ConfigError(config.path + ": planner.initial_half_width: " + std::to_string(given.size()) +
+                      " entries, it has to have " + std::to_string(n));
+  return Eigen::Map<const Eigen::VectorXd>(given.data(), n);
+}
+
+Planner MakePlanner(const Config& config) try {
+  return Planner(config.problem, config.planner, config.obstacles);
+} catch (const std::invalid_argument& error) {
+  throw ConfigError(config.path + ": " + error.what());
+}
+
+template <class Map>
+nlohmann::ordered_json ByName(const Map& counts) {
+  nlohmann::ordered_json object = nlohmann::ordered_json::object();
+  for (const auto& [name, count] : counts) object[name] = count;
+  return object;
+}
+
+}  // namespace
+
+PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
+    : config_(config),
+      bus_(bus),
+      out_(out),
+      period_us_(std::llround(config.robot.step_period_ms * 1e3)),
+      half_width_(HalfWidth(config)),
+      residual_(config.problem),
+      planner_(MakePlanner(config)) {
+  bus_.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
+  bus_.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
+  bus_.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
+}
+
+void PlannerNode::Tick(std::int64_t now_us) {
+  if (next_plan_id_ == 0) next_plan_id_ = now_us;
+  if (round_ && round_->awaited_plan < 0) SearchOnce(now_us);
+}
+
+void PlannerNode::OnRobotState(const Received& received) {
+  robot_state_t state;
+  if (Decode(received.bytes, state) != DecodeStatus::kOk || !IsUsable(state)) {
+    ++ignored_;
+    return;
+  }
+  if (finished_) return;
+  last_state_utime_ = state.utime;
+  Follow(state);
+  if (!finished_ && !round_ && !waiting_start_ && NextPlanIsDue(state)) BeginRound(state);
+}
+
+bool PlannerNode::IsUsable(const robot_state_t& state) const {
+  return state.num_states == config_.problem->model->num_states() && state.utime > last_state_utime_ &&
+         robot_state_t::STANDING <= state.mode && state.mode <= robot_state_t::FINISHED &&
+         std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });
+}
+
+// What the state says of earlier plans: which of them is executing, and which start has passed.
+void PlannerNode::Follow(const robot_state_t& state) {
+  finished_ = state.mode == robot_state_t::FINISHED;
+  if (round_ && (finished_ || round_->start_utime <= state.utime)) EndRound(false);
+  if (waiting_start_ && *waiting_start_ <= state.utime) waiting_start_.reset();
+  if (state.mode == robot_state_t::EXECUTING)
+    plans_.erase(plans_.begin(), plans_.lower_bound(state.executing_plan_id));
+  else if (!round_ && !waiting_start_)
+    plans_.clear();
+}
+
+bool PlannerNode::NextPlanIsDue(const robot_state_t& state) const {
+  if (state.mode == robot_state_t::STANDING) return true;
+  const auto plan = plans_.find(state.executing_plan_id);
+  return plan != plans_.end() && 0 <= state.executing_step && state.executing_step < plan->second.num_steps &&
+         state.executing_step + config_.planner.lead_steps >= plan->second.progress_steps;
+}
+
+// From the measured state through the controls that are still to be applied before the start.
+std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& state) const {
+  const std::size_t n = static_cast<std::size_t>(state.num_states);
+  Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
+  const bool executing = state.mode == robot_state_t::EXECUTING;
+  const candidate_plan_t* plan = executing ? &plans_.at(state.executing_plan_id) : nullptr;
+  const int first = state.executing_step, start = first + config_.planner.lead_steps;
+  for (int step = first; executing && step < std::min<int>(start, plan->num_steps); ++step) {
+    std::array<double, kMaxVariables> z;
+    std::copy_n(plan->control[step], plan->num_inputs, std::copy_n(x.data(), n, z.begin()));
+    residual_.Predict({z.data(), n + static_cast<std::size_t>(plan->num_inputs)}, {x.data(), n});
+  }
+  if (!executing || start >= plan->num_steps) planner_.motion().Hold({x.data(), n});
+  if (!x.allFinite()) return std::nullopt;
+  return x;
+}
+
+void PlannerNode::BeginRound(const robot_state_t& state) {
+  const std::optional<Eigen::VectorXd> center = PredictStart(state);
+  if (!center) return;
+  ++rounds_;
+  round_ = Round{state.utime + config_.planner.lead_steps * period_us_, *center, config_.planner.clearance};
+}
+
+void PlannerNode::EndRound(bool certified) {
+  if (round_->awaited_plan >= 0) ++unanswered_;
+  if (certified)
+    waiting_start_ = round_->start_utime;
+  else
+    ++fruitless_rounds_;
+  round_.reset();
+}
+
+void PlannerNode::SearchOnce(std::int64_t now_us) {
+  const auto search_us = static_cast<std::int64_t>(config_.planner.time_limit_ms * 1e3);
+  if (round_->searches == config_.planner.candidates || now_us + search_us >= round_->start_utime)
+    return EndRound(false);
+  ++round_->searches;
+  ++searches_;
+  const std::optional<Proposal> proposal = planner_.Propose(RequestOf(*round_));
+  if (!proposal) {
+    ++fruitless_searches_;
+    return;
+  }
+  const candidate_plan_t candidate = MakeCandidate(*proposal, *round_, now_us);
+  if (!bus_.Publish(config_.bus.candidate, candidate)) {
+    ++not_sent_;
+    return;
+  }
+  ++proposed_;
+  round_->awaited_plan = candidate.plan_id;
+  plans_[candidate.plan_id] = candidate;
+}
+
+// After each D the margin grows by as much as the tube is certain to reach beyond its center, or, for a position, by
+// what an S would add.
+PlanRequest PlannerNode::RequestOf(const Round& round) const {
+  const Eigen::MatrixXd& projection = config_.problem->projection;
+  Eigen::VectorXd margin = round.domain_exits * 2 * half_width_;
+  for (Eigen::Index k = 0; k < margin.size(); ++k)
+    if (projection.col(k).any()) margin(k) = round.domain_exits * config_.planner.clearance_step;
+  constexpr std::uint32_t kSpread = 1'000'003;
+  return {round.center, round.clearance, margin,
+          static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_)};
+}
+
+candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us) {
+  candidate_plan_t candidate{};
+  candidate.utime = now_us;
+  candidate.sequence = proposed_;
+  candidate.plan_id = next_plan_id_++;
+  SetText(candidate.source, kSource);
+  candidate.start_utime = round.start_utime;
+  candidate.step_us = period_us_;
+  candidate.num_states = static_cast<std::int16_t>(half_width_.size());
+  candidate.num_inputs = static_cast<std::int16_t>(proposal.controls.rows());
+  candidate.num_steps = static_cast<std::int16_t>(proposal.controls.cols());
+  candidate.progress_steps = static_cast<std::int16_t>(proposal.progress_steps);
+  std::copy(round.center.begin(), round.center.end(), candidate.initial_center);
+  std::copy(half_width_.begin(), half_width_.end(), candidate.initial_half_width);
+  for (int t = 0; t < candidate.num_steps; ++t)
+    for (int k = 0; k < candidate.num_inputs; ++k) candidate.control[t][k] = proposal.controls(k, t);
+  return candidate;
+}
+
+void PlannerNode::OnDecision(const Received& received) {
+  decision_t decision;
+  if (Decode(received.bytes, decision) != DecodeStatus::kOk) {
+    ++ignored_;
+    return;
+  }
+  if (GetText(decision.source) != kSource || !round_ || round_->awaited_plan < 0 ||
+      decision.plan_id != round_->awaited_plan) {
+    ++ignored_;
+    return;
+  }
+  round_->awaited_plan = -1;
+  Learn(decision);
+}
+
+void PlannerNode::Learn(const decision_t& decision) {
+  if (decision.outcome == decision_t::CERTIFIED) {
+    ++certified_;
+    return EndRound(true);
+  }
+  plans_.erase(decision.plan_id);
+  auto& counts = decision.outcome == decision_t::REJECTED ? rejected_ : abstained_;
+  ++counts[std::string(CauseName(decision.cause))];
+  switch (decision.outcome) {
+    case decision_t::ABSTAIN_SAFETY:
+      round_->clearance += config_.planner.clearance_step;
+      break;
+    case decision_t::ABSTAIN_DOMAIN:
+      ++round_->domain_exits;
+      break;
+    case decision_t::ABSTAIN_FALSIFIED:
+      EndRound(false);
+      break;
+    default:
+      break;
+  }
+}
+
+void PlannerNode::OnObstacles(const Received& received) {
+  obstacles_t message;
+  if (Decode(received.bytes, message) != DecodeStatus::kOk || message.sequence <= last_obstacles_) {
+    ++ignored_;
+    return;
+  }
+  try {
+    planner_.SetObstacles(FromMessage(message, static_cast<int>(config_.problem->projection.rows())));
+    last_obstacles_ = message.sequence;
+  } catch (const std::invalid_argument&) {
+    ++ignored_;
+  }
+}
+
+void PlannerNode::Stop() { out_ << Summary() << std::endl; }
+
+std::string PlannerNode::Summary() const {
+  nlohmann::ordered_json summary;
+  summary["proposed"] = proposed_;
+  summary["certified"] = certified_;
+  summary["abstained"] = ByName(abstained_);
+  summary["rejected"] = ByName(rejected_);
+  summary["unanswered"] = unanswered_;
+  summary["rounds"] = rounds_;
+  summary["rounds_without_certificate"] = fruitless_rounds_;
+  summary["searches_without_result"] = fruitless_searches_;
+  summary["messages_ignored"] = ignored_;
+  summary["messages_not_sent"] = not_sent_;
+  return summary.dump();
+}
+
+}  // namespace forereach

@@ -1,0 +1,96 @@
+/** The planner on a bus: robot states and decisions in, candidates out.
+
+A round answers one robot state: it looks for a certificate of a plan that starts lead_steps boundaries later, from where
+the executing plan will have taken the robot by then. Rounds are started while the robot stands, and from the moment on
+at which its plan's progress part ends before that start; not while a certified plan waits for its own. A round sends one
+candidate at a time and waits for its decision:
+    certified          -> the round ends, the plan waits for its start
+    abstention S       -> the next candidate keeps clearance_step more from obstacles
+    abstention D       -> the next candidate keeps further inside the domain's bounds
+    abstention F       -> the round ends: no candidate can pass
+    rejected           -> the next candidate
+It ends without a certificate after `candidates` of them, or when too little time is left until its start; the next state
+starts another. All planning is done in Tick, one search at a time. After FINISHED nothing is sent any more.
+
+Messages that do not decode, contain what is not finite, or concern somebody else's candidates are counted and ignored. */
+#pragma once
+
+#include <iostream>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "certifier/task/config.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "lcmtypes/node.h"
+#include "planner_bridge/proposal.h"
+#include "planner_bridge/residual_estimate.h"
+
+namespace forereach {
+
+class PlannerNode final : public Node {
+ public:
+  static constexpr const char* kSource = "forereach-planner";
+
+  /** @param bus has to outlive the node. @param out gets the summary at Stop.
+  @throws ConfigError if the planner's part of the task does not fit the model. */
+  PlannerNode(const Config& config, Bus& bus, std::ostream& out = std::cout);
+
+  void Tick(std::int64_t now_us) override;
+  /** True once the robot has said FINISHED. */
+  [[nodiscard]] bool done() const override { return finished_; }
+  /** Prints Summary() on a line of its own. */
+  void Stop() override;
+
+  /** One JSON object: proposed, certified, abstained and rejected (counts by cause), unanswered, rounds,
+  rounds_without_certificate, searches_without_result, messages_ignored, messages_not_sent. */
+  [[nodiscard]] std::string Summary() const;
+
+ private:
+  struct Round {
+    std::int64_t start_utime;
+    Eigen::VectorXd center;  // of X_0
+    double clearance;
+    int domain_exits = 0, searches = 0;
+    std::int64_t awaited_plan = -1;  // whose decision is to come, -1 if none
+  };
+
+  void OnRobotState(const Received& received);
+  void OnDecision(const Received& received);
+  void OnObstacles(const Received& received);
+
+  [[nodiscard]] bool IsUsable(const robot_state_t& state) const;
+  [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
+  [[nodiscard]] std::optional<Eigen::VectorXd> PredictStart(const robot_state_t& state) const;
+  void Follow(const robot_state_t& state);
+  void BeginRound(const robot_state_t& state);
+  void EndRound(bool certified);
+  void SearchOnce(std::int64_t now_us);
+  [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
+  [[nodiscard]] candidate_plan_t MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us);
+  void Learn(const decision_t& decision);
+
+  const Config config_;
+  Bus& bus_;
+  std::ostream& out_;
+  const std::int64_t period_us_;
+  const Eigen::VectorXd half_width_;  // of X_0
+  const ResidualEstimate residual_;
+  Planner planner_;
+
+  std::optional<Round> round_;
+  std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
+  std::optional<std::int64_t> waiting_start_;       // of a certified plan that is still to begin
+  std::int64_t last_state_utime_ = 0, last_obstacles_ = -1;
+  std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
+  bool finished_ = false;
+
+  std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
+               fruitless_rounds_ = 0, ignored_ = 0, not_sent_ = 0;
+  std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
+};
+
+}  // namespace forereach

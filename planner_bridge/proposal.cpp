@@ -1,0 +1,486 @@
+#include "planner_bridge/proposal.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <ompl/base/Goal.h>
+#include <ompl/base/ProjectionEvaluator.h>
+#include <ompl/base/spaces/RealVectorStateSpace.h>
+#include <ompl/control/PathControl.h>
+#include <ompl/control/SimpleSetup.h>
+#include <ompl/control/planners/est/EST.h>
+#include <ompl/control/planners/kpiece/KPIECE1.h>
+#include <ompl/control/planners/pdst/PDST.h>
+#include <ompl/control/planners/rrt/RRT.h>
+#include <ompl/control/planners/sst/SST.h>
+#include <ompl/control/spaces/RealVectorControlSpace.h>
+#include <ompl/util/Console.h>
+#include <ompl/util/RandomNumbers.h>
+
+#include "planner_bridge/navigation.h"
+
+namespace forereach {
+namespace {
+
+namespace ob = ompl::base;
+namespace oc = ompl::control;
+
+constexpr double kTouch = 1e-6;         // m, kept where the start is nearer to an obstacle than the clearance
+constexpr double kOverspeed = 1.05;     // times the cruise speed
+constexpr double kShareOfRadius = 0.7;  // the goal counts as reached this far inside its radius
+constexpr unsigned kLongestHold = 4;    // steps one control is held at most
+constexpr double kLargestTurn = 1.2;    // rad, off the way down the navigation field
+constexpr double kReverse = 1e-3;       // m/s, what counts as standing still
+constexpr double kRoomAhead = 6;        // m, kept free beyond the end of a braking tail
+
+/** What a progress part has to achieve. Tried in turn, the later ones are easier; the last lets the robot turn round. */
+struct Ambition {
+  double share;    // of the distance that cruising straight at the goal would gain
+  double heading;  // least cosine between the motion at the end and the way to the goal
+};
+constexpr std::array<Ambition, 4> kAmbitions{{{0.85, 0.94}, {0.6, 0.8}, {0.2, 0.4}, {-0.5, -1}}};
+
+const double* Values(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
+double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
+const double* Values(const oc::Control* control) { return control->as<oc::RealVectorControlSpace::ControlType>()->values; }
+double* Values(oc::Control* control) { return control->as<oc::RealVectorControlSpace::ControlType>()->values; }
+
+Box ProjectedRegion(const Problem& problem) {
+  const Box& box = problem.domain.state;
+  const Eigen::MatrixXd positive = problem.projection.cwiseMax(0), negative = problem.projection.cwiseMin(0);
+  return Box(positive * box.lower() + negative * box.upper(), positive * box.upper() + negative * box.lower());
+}
+
+template <class Algorithm>
+std::shared_ptr<ob::Planner> Make(const oc::SpaceInformationPtr& space) {
+  return std::make_shared<Algorithm>(space);
+}
+
+using MakeAlgorithm = std::shared_ptr<ob::Planner> (*)(const oc::SpaceInformationPtr&);
+
+MakeAlgorithm AlgorithmNamed(const std::string& name) {
+  static const std::map<std::string, MakeAlgorithm> algorithms{
+      {"kpiece", Make<oc::KPIECE1>}, {"est", Make<oc::EST>}, {"pdst", Make<oc::PDST>}, {"rrt", Make<oc::RRT>},
+      {"sst", Make<oc::SST>}};
+  const auto found = algorithms.find(name);
+  if (found == algorithms.end())
+    throw std::invalid_argument("planner.algorithm: " + name + " is not kpiece, est, pdst, rrt or sst");
+  return found->second;
+}
+
+/** Mostly follows a hint, for a step at a time and with some error; sometimes any control, held for longer. */
+class HintedSampler final : public oc::ControlSampler {
+ public:
+  /** Fills a control for the given state; two random numbers from [-1, 1] say how to err. */
+  using Hint = std::function<void(const double* s, double turn, double speed, double* u)>;
+
+  HintedSampler(const oc::ControlSpace* space, Hint hint) : ControlSampler(space), hint_(std::move(hint)) {}
+
+  void sample(oc::Control* control) override {
+    hinted_ = false;
+    const ob::RealVectorBounds& bounds = space_->as<oc::RealVectorControlSpace>()->getBounds();
+    double* u = Values(control);
+    for (std::size_t k = 0; k < bounds.low.size(); ++k) u[k] = rng_.uniformReal(bounds.low[k], bounds.high[k]);
+  }
+  void sample(oc::Control* control, const ob::State* state) override {
+    if (rng_.uniform01() > kHinted) return sample(control);
+    hinted_ = true;
+    const double turn = std::clamp(rng_.gaussian(0, 0.4), -1.0, 1.0), speed = rng_.uniformReal(-1, 1);
+    hint_(Values(state), turn, speed, Values(control));
+  }
+  void sampleNext(oc::Control* control, const oc::Control*) override { sample(control); }
+  void sampleNext(oc::Control* control, const oc::Control*, const ob::State* state) override { sample(control, state); }
+  unsigned int sampleStepCount(unsigned int least, unsigned int most) override {
+    return hinted_ ? least : ControlSampler::sampleStepCount(least, most);
+  }
+
+ private:
+  static constexpr double kHinted = 0.9;
+  const Hint hint_;
+  bool hinted_ = false;
+};
+
+/** Position in the safety coordinates, for the planners that keep a grid. */
+class PositionProjection final : public ob::ProjectionEvaluator {
+ public:
+  PositionProjection(const ob::StateSpacePtr& space, const Eigen::MatrixXd& projection, double cell)
+      : ProjectionEvaluator(space), projection_(projection), cell_(cell) {}
+
+  unsigned int getDimension() const override { return static_cast<unsigned>(projection_.rows()); }
+  void defaultCellSizes() override { cellSizes_.assign(static_cast<std::size_t>(projection_.rows()), cell_); }
+  void project(const ob::State* state, Eigen::Ref<Eigen::VectorXd> position) const override {
+    position = projection_ * Eigen::Map<const Eigen::VectorXd>(Values(state), projection_.cols());
+  }
+
+ private:
+  const Eigen::MatrixXd projection_;
+  const double cell_;
+};
+
+}  // namespace
+
+class Planner::Impl {
+ public:
+  Impl(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles)
+      : problem_(std::move(problem)),
+        options_(std::move(options)),
+        make_algorithm_(AlgorithmNamed(options_.algorithm)),
+        motion_(MakeMotion(*problem_, options_.braking)),
+        region_(ProjectedRegion(*problem_)),
+        goal_(Eigen::Map<const Eigen::VectorXd>(options_.goal.data(), std::ssize(options_.goal))),
+        obstacles_(std::move(obstacles)) {
+    if (goal_.size() != problem_->projection.rows())
+      throw std::invalid_argument("planner.goal: " + std::to_string(goal_.size()) + " entries, it has to have " +
+                                  std::to_string(problem_->projection.rows()));
+    if (options_.progress_steps < 1 || options_.tail_steps < 0 ||
+        options_.progress_steps + options_.tail_steps > kMaxSteps)
+      throw std::invalid_argument("planner.progress_steps + planner.tail_steps: more than " +
+                                  std::to_string(kMaxSteps) + " steps, or none");
+    ompl::msg::noOutputHandler();
+  }
+
+  void SetObstacles(std::vector<Obstacle> obstacles) {
+    obstacles_ = std::move(obstacles);
+    fields_.clear();
+  }
+
+  const NavigationField& Field(double clearance) {
+    constexpr std::size_t kKept = 64;
+    if (fields_.size() > kKept) fields_.clear();
+    return fields_.try_emplace(clearance, region_, obstacles_, clearance, goal_).first->second;
+  }
+
+  std::optional<Proposal> Propose(const PlanRequest& request);
+  std::optional<Proposal> ProposeToGoal(const PlanRequest& request);
+
+  std::shared_ptr<const Problem> problem_;
+  PlannerOptions options_;
+  MakeAlgorithm make_algorithm_;
+  std::unique_ptr<Motion> motion_;
+  Box region_;
+  Eigen::VectorXd goal_;
+  std::vector<Obstacle> obstacles_;
+  std::map<double, NavigationField> fields_;  // by clearance
+};
+
+/** One request: what is allowed, what counts as progress, and the work done so far. */
+class Planner::Search {
+ public:
+  Search(const Impl& planner, const PlanRequest& request, const NavigationField& field);
+
+  /** False if the start itself is not allowed. */
+  [[nodiscard]] bool StartIsValid() const { return start_valid_; }
+  [[nodiscard]] std::optional<Proposal> Run(const Ambition& ambition, std::int64_t allowance);
+
+ private:
+  class ProgressGoal;
+
+  // A search state is x, the steps taken, and the shortest distance to go on the way.
+  [[nodiscard]] double StepsOf(const double* s) const { return s[n_]; }
+  [[nodiscard]] double BestOf(const double* s) const { return s[n_ + 1]; }
+  [[nodiscard]] std::span<const double> StateOf(const double* s) const { return {s, n_}; }
+
+  [[nodiscard]] Eigen::VectorXd Position(std::span<const double> x) const {
+    return planner_.problem_->projection * Eigen::Map<const Eigen::VectorXd>(x.data(), std::ssize(x));
+  }
+  void Step(std::span<const double> x, const double* u, std::span<double> next) const;
+  [[nodiscard]] bool Allowed(std::span<const double> x) const;
+  [[nodiscard]] bool Clear(const Eigen::VectorXd& position) const;
+  [[nodiscard]] bool HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const;
+  [[nodiscard]] bool Propagate(const double* from, const double* u, double* to) const;
+  void Hint(const double* s, double turn, double speed, double* u) const;
+  [[nodiscard]] double IdealGain() const;
+  [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const;
+  [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const;
+  [[nodiscard]] bool FindTail(std::span<const double> x, Eigen::MatrixXd& tail) const;
+  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Eigen::MatrixXd& tail) const;
+  [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition);
+  [[nodiscard]] std::optional<Proposal> Assemble(oc::PathControl& path) const;
+
+  const Impl& planner_;
+  const NavigationField& field_;
+  const NominalModel& model_;
+  const std::size_t n_, m_;
+  const Eigen::VectorXd start_;
+  Eigen::VectorXd lower_, upper_;
+  std::vector<double> clearances_;  // to each obstacle
+  double start_distance_, gain_, top_speed_, least_speed_;
+  bool from_motion_, start_valid_;
+  mutable std::int64_t work_ = 0;  // model steps
+};
+
+class Planner::Search::ProgressGoal final : public ob::Goal {
+ public:
+  ProgressGoal(const ob::SpaceInformationPtr& space, const Search& search, const Ambition& ambition)
+      : Goal(space), search_(search), ambition_(ambition) {}
+
+  bool isSatisfied(const ob::State* state) const override { return isSatisfied(state, nullptr); }
+
+  bool isSatisfied(const ob::State* state, double* distance) const override {
+    const double* s = Values(state);
+    const double missing = search_.Shortfall(s, ambition_);
+    if (distance != nullptr) *distance = std::max(missing, 0.0);
+    if (missing > 0 || search_.StepsOf(s) != search_.planner_.options_.progress_steps) return false;
+    const bool arrives = search_.BestOf(s) <= kShareOfRadius * search_.planner_.options_.goal_radius;
+    Eigen::MatrixXd tail;
+    return (arrives || search_.HeadsWell(search_.StateOf(s), ambition_.heading)) &&
+           search_.FindTail(search_.StateOf(s), tail);
+  }
+
+ private:
+  const Search& search_;
+  const Ambition ambition_;
+};
+
+Planner::Search::Search(const Impl& planner, const PlanRequest& request, const NavigationField& field)
+    : planner_(planner),
+      field_(field),
+      model_(*planner.problem_->model),
+      n_(static_cast<std::size_t>(model_.num_states())),
+      m_(static_cast<std::size_t>(model_.num_inputs())),
+      start_(request.state) {
+  const Box& box = planner.problem_->domain.state;
+  const Eigen::VectorXd margin =
+      request.domain_margin.size() == 0 ? Eigen::VectorXd::Zero(start_.size()) : request.domain_margin;
+  lower_ = (box.lower() + margin).cwiseMin(start_).cwiseMax(box.lower());
+  upper_ = (box.upper() - margin).cwiseMax(start_).cwiseMin(box.upper());
+  const std::span<const double> x(start_.data(), n_);
+  const Eigen::VectorXd position = Position(x);
+  for (const Obstacle& obstacle : planner.obstacles_)
+    clearances_.push_back(std::clamp(ApproximateDistance(obstacle, position) - kTouch, 0.0, request.clearance));
+  start_distance_ = field.DistanceToGo(position);
+  gain_ = IdealGain();
+  top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
+  least_speed_ = std::min(-kReverse, planner.motion_->Speed(x));
+  from_motion_ = std::abs(planner.motion_->Speed(x)) > kReverse;
+  start_valid_ = Allowed(x);
+}
+
+void Planner::Search::Step(std::span<const double> x, const double* u, std::span<double> next) const {
+  std::array<double, kMaxVariables> z;
+  std::copy_n(u, m_, std::copy(x.begin(), x.end(), z.begin()));
+  model_.Evaluate({z.data(), n_ + m_}, next);
+  ++work_;
+}
+
+bool Planner::Search::Allowed(std::span<const double> x) const {
+  for (std::size_t k = 0; k < n_; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    if (!(lower_(i) <= x[k] && x[k] <= upper_(i))) return false;
+  }
+  const double speed = planner_.motion_->Speed(x);
+  if (!(least_speed_ <= speed && speed <= top_speed_)) return false;
+  return Clear(Position(x));
+}
+
+bool Planner::Search::Clear(const Eigen::VectorXd& position) const {
+  for (std::size_t o = 0; o < clearances_.size(); ++o)
+    if (!(ApproximateDistance(planner_.obstacles_[o], position) > clearances_[o])) return false;
+  return true;
+}
+
+// False outside the certification domain or past the progress part; then `to` is not a state of the search.
+bool Planner::Search::Propagate(const double* from, const double* u, double* to) const {
+  std::array<double, kMaxVariables> z;
+  std::copy_n(u, m_, std::copy_n(from, n_, z.begin()));
+  const double steps = StepsOf(from) + 1, best = BestOf(from);  // `to` may be `from`
+  const bool inside = steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
+  Step({z.data(), n_}, z.data() + n_, {to, n_});
+  to[n_] = inside ? steps : planner_.options_.progress_steps + 1;
+  to[n_ + 1] = std::min(best, field_.DistanceToGo(Position({to, n_})));
+  return inside;
+}
+
+// Down the navigation field at a speed between half and all of the cruise speed, give or take a turn.
+void Planner::Search::Hint(const double* s, double turn, double speed, double* u) const {
+  const Eigen::VectorXd descent = field_.Descent(Position(StateOf(s)));
+  const double heading = std::atan2(descent.size() > 1 ? descent(1) : 0.0, descent(0)) + kLargestTurn * turn;
+  planner_.motion_->Pursue(StateOf(s), heading, planner_.options_.cruise_speed * (0.75 + 0.25 * speed), {u, m_});
+}
+
+// What driving straight at the goal would gain, accelerating up to the cruise speed.
+double Planner::Search::IdealGain() const {
+  const PlannerOptions& options = planner_.options_;
+  const double dt = planner_.motion_->dt();
+  double speed = planner_.motion_->Speed({start_.data(), n_}), gain = 0;
+  for (int t = 0; t < options.progress_steps; ++t) {
+    gain += dt * std::min(speed, options.cruise_speed);
+    speed += dt * options.braking;
+  }
+  return gain;
+}
+
+// Metres that the state is short of the ambition, not positive if it is met.
+double Planner::Search::Shortfall(const double* s, const Ambition& ambition) const {
+  const double near_enough = kShareOfRadius * planner_.options_.goal_radius;
+  return BestOf(s) - std::max(start_distance_ - ambition.share * gain_, near_enough);
+}
+
+// A robot that stands still heads nowhere, which is well.
+bool Planner::Search::HeadsWell(std::span<const double> x, double cosine) const {
+  const std::array<double, kMaxInputs> rest{};
+  std::array<double, kMaxStates> next;
+  Step(x, rest.data(), {next.data(), n_});
+  const Eigen::VectorXd position = Position(x), motion = Position({next.data(), n_}) - position;
+  return motion.dot(field_.Descent(position)) >= cosine * motion.norm();
+}
+
+bool Planner::Search::FindTail(std::span<const double> x, Eigen::MatrixXd& tail) const {
+  for (int shape = 0; shape < planner_.motion_->num_tails(); ++shape)
+    if (planner_.motion_->Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, tail)) return true;
+  return false;
+}
+
+bool Planner::Search::TailIsAllowed(std::span<const double> x, const Eigen::MatrixXd& tail) const {
+  std::array<double, kMaxVariables> z;
+  std::copy(x.begin(), x.end(), z.begin());
+  Eigen::VectorXd position = Position(x), direction = Eigen::VectorXd::Zero(position.size());
+  for (int t = 0; t < tail.cols(); ++t) {
+    std::copy_n(tail.col(t).data(), m_, z.begin() + static_cast<std::ptrdiff_t>(n_));
+    if (!planner_.problem_->domain.Contains({z.data(), n_ + m_})) return false;
+    std::array<double, kMaxStates> next;
+    Step({z.data(), n_}, z.data() + n_, {next.data(), n_});
+    if (!Allowed({next.data(), n_})) return false;
+    std::copy_n(next.begin(), n_, z.begin());
+    const Eigen::VectorXd moved = Position({z.data(), n_}) - position;
+    position += moved;
+    if (moved.norm() > kReverse) direction = moved.normalized();
+  }
+  return !from_motion_ || HasRoom(position, direction);
+}
+
+// Whether a robot that came to rest here may still drive on: one that cannot reverse would be there to stay.
+bool Planner::Search::HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const {
+  for (double ahead = 1; ahead <= kRoomAhead; ++ahead)
+    if (!Clear(position + ahead * direction)) return false;
+  const Eigen::VectorXd end = position + kRoomAhead * direction;
+  return (planner_.region_.lower().array() <= end.array()).all() && (end.array() <= planner_.region_.upper().array()).all();
+}
+
+std::unique_ptr<oc::SimpleSetup> Planner::Search::SetUp(const Ambition& ambition) {
+  auto states = std::make_shared<ob::RealVectorStateSpace>(static_cast<unsigned>(n_ + 2));
+  ob::RealVectorBounds bounds(static_cast<unsigned>(n_ + 2));
+  for (std::size_t k = 0; k < n_; ++k) {
+    bounds.setLow(static_cast<unsigned>(k), lower_(static_cast<Eigen::Index>(k)));
+    bounds.setHigh(static_cast<unsigned>(k), upper_(static_cast<Eigen::Index>(k)));
+  }
+  bounds.setLow(static_cast<unsigned>(n_), 0);
+  bounds.setHigh(static_cast<unsigned>(n_), planner_.options_.progress_steps);
+  bounds.setLow(static_cast<unsigned>(n_ + 1), 0);
+  bounds.setHigh(static_cast<unsigned>(n_ + 1), start_distance_);
+  states->setBounds(bounds);
+  const double cell = std::max(gain_ / planner_.options_.progress_steps, 0.1);
+  states->registerDefaultProjection(
+      std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
+
+  auto controls = std::make_shared<oc::RealVectorControlSpace>(states, static_cast<unsigned>(m_));
+  const Box& input = planner_.problem_->domain.input;
+  ob::RealVectorBounds control_bounds(static_cast<unsigned>(m_));
+  control_bounds.low.assign(input.lower().begin(), input.lower().end());
+  control_bounds.high.assign(input.upper().begin(), input.upper().end());
+  controls->setBounds(control_bounds);
+  controls->setControlSamplerAllocator([this](const oc::ControlSpace* space) {
+    return std::make_shared<HintedSampler>(
+        space, [this](const double* s, double turn, double speed, double* u) { Hint(s, turn, speed, u); });
+  });
+
+  auto setup = std::make_unique<oc::SimpleSetup>(controls);
+  const auto& space = setup->getSpaceInformation();
+  space->setPropagationStepSize(planner_.motion_->dt());
+  space->setMinMaxControlDuration(1, kLongestHold);
+  setup->setStatePropagator([this](const ob::State* from, const oc::Control* u, double, ob::State* to) {
+    static_cast<void>(Propagate(Values(from), Values(u), Values(to)));
+  });
+  setup->setStateValidityChecker([this](const ob::State* state) {
+    const double* s = Values(state);
+    return StepsOf(s) <= planner_.options_.progress_steps && Allowed(StateOf(s));
+  });
+  ob::ScopedState<ob::RealVectorStateSpace> start(states);
+  std::copy_n(start_.data(), n_, start->values);
+  start->values[n_] = 0;
+  start->values[n_ + 1] = start_distance_;
+  setup->setStartState(start);
+  setup->setGoal(std::make_shared<ProgressGoal>(space, *this, ambition));
+  setup->setPlanner(planner_.make_algorithm_(space));
+  return setup;
+}
+
+std::optional<Proposal> Planner::Search::Run(const Ambition& ambition, std::int64_t allowance) {
+  const auto setup = SetUp(ambition);
+  const std::int64_t most = work_ + allowance;
+  std::int64_t rounds = 0;  // bounds a search that propagates nothing
+  setup->solve(ob::PlannerTerminationCondition([&] { return work_ >= most || ++rounds > allowance; }));
+  if (!setup->haveExactSolutionPath()) return std::nullopt;
+  return Assemble(setup->getSolutionPath());
+}
+
+std::optional<Proposal> Planner::Search::Assemble(oc::PathControl& path) const {
+  path.interpolate();
+  const auto progress = static_cast<Eigen::Index>(path.getControlCount());
+  Eigen::MatrixXd tail;
+  if (!FindTail(StateOf(Values(path.getStates().back())), tail)) return std::nullopt;
+  Proposal proposal{Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()),
+                    static_cast<int>(progress),
+                    Eigen::MatrixXd(start_.size(), progress + tail.cols() + 1)};
+  for (Eigen::Index t = 0; t < progress; ++t)
+    std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, proposal.controls.col(t).data());
+  proposal.controls.rightCols(tail.cols()) = tail;
+  proposal.states.col(0) = start_;
+  for (Eigen::Index t = 0; t < proposal.controls.cols(); ++t)
+    Step({proposal.states.col(t).data(), n_}, proposal.controls.col(t).data(), {proposal.states.col(t + 1).data(), n_});
+  return proposal;
+}
+
+std::optional<Proposal> Planner::Impl::Propose(const PlanRequest& request) {
+  if (request.state.size() != problem_->model->num_states() || !request.state.allFinite()) return std::nullopt;
+  Search search(*this, request, Field(request.clearance));
+  if (!search.StartIsValid()) return std::nullopt;
+  // OMPL calls a second seed an error because generators that exist keep theirs. None does: each search makes its own.
+  ompl::RNG::setSeed(std::max<std::uint32_t>(request.seed, 1));
+  const auto allowance = static_cast<std::int64_t>(options_.time_limit_ms * kStepsPerMs / kAmbitions.size());
+  for (const Ambition& ambition : kAmbitions)
+    if (std::optional<Proposal> proposal = search.Run(ambition, allowance)) return proposal;
+  return std::nullopt;
+}
+
+std::optional<Proposal> Planner::Impl::ProposeToGoal(const PlanRequest& request) {
+  const double reached = kShareOfRadius * options_.goal_radius;
+  std::optional<Proposal> whole;
+  PlanRequest next = request;
+  while (!whole || whole->progress_steps + options_.progress_steps + options_.tail_steps <= kMaxSteps) {
+    std::optional<Proposal> part = Propose(next);
+    ++next.seed;
+    if (!part) break;
+    if (!whole) {
+      whole = std::move(part);
+    } else {
+      const int before = whole->progress_steps;
+      whole->controls.conservativeResize(Eigen::NoChange, before + part->controls.cols());
+      whole->states.conservativeResize(Eigen::NoChange, before + part->states.cols());
+      whole->controls.rightCols(part->controls.cols()) = part->controls;
+      whole->states.rightCols(part->states.cols()) = part->states;
+      whole->progress_steps += part->progress_steps;
+    }
+    const Eigen::MatrixXd positions = problem_->projection * whole->states.leftCols(whole->progress_steps + 1);
+    if ((positions.colwise() - goal_).colwise().norm().minCoeff() <= reached) break;
+    next.state = whole->states.col(whole->progress_steps);
+  }
+  return whole;
+}
+
+Planner::Planner(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles)
+    : impl_(std::make_unique<Impl>(std::move(problem), std::move(options), std::move(obstacles))) {}
+Planner::~Planner() = default;
+
+void Planner::SetObstacles(std::vector<Obstacle> obstacles) { impl_->SetObstacles(std::move(obstacles)); }
+const Motion& Planner::motion() const { return *impl_->motion_; }
+std::optional<Proposal> Planner::Propose(const PlanRequest& request) { return impl_->Propose(request); }
+std::optional<Proposal> Planner::ProposeToGoal(const PlanRequest& request) { return impl_->ProposeToGoal(request); }
+
+}  // namespace forereach

@@ -1,0 +1,28 @@
+/** A best guess of the residual from the recorded transitions, to predict where the robot will be. Proves nothing. */
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "certifier/certify/problem.h"
+
+namespace forereach {
+
+class ResidualEstimate final {
+ public:
+  explicit ResidualEstimate(std::shared_ptr<const Problem> problem);
+
+  /** Predicts the successor f0(z) + r(z), r(z)_k being the mean of the nearest observed residuals in the distance
+  sum_l L_kl |z_l - z_il|, weighted by the inverse square of that distance. A coordinate whose row of L is zero takes
+  the mean of all. Cost O(N) a coordinate. @param z d_z entries. @param next n entries. */
+  void Predict(std::span<const double> z, std::span<double> next) const;
+
+ private:
+  [[nodiscard]] double Estimate(int k, std::span<const double> z) const;
+
+  std::shared_ptr<const Problem> problem_;
+  Eigen::MatrixXd residuals_;  // N-by-n
+};
+
+}  // namespace forereach

@@ -1,0 +1,285 @@
+#include "robot/guard.h"
+
+#include <cinttypes>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <stdexcept>
+
+namespace forereach {
+namespace {
+
+constexpr int kMaxPlanStates = 16, kMaxPlanInputs = 8, kMaxPlanSteps = 128;
+
+[[gnu::format(printf, 1, 2)]] std::string Sentence(const char* format, ...) {
+  char text[256];
+  std::va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  return text;
+}
+
+GuardVerdict Refuse(GuardCause cause, std::string message) {
+  GuardVerdict verdict;
+  verdict.cause = cause;
+  verdict.message = std::move(message);
+  return verdict;
+}
+
+GuardVerdict RefuseAt(GuardCause cause, int step, int coordinate, double value, double bound, std::string message) {
+  GuardVerdict verdict = Refuse(cause, std::move(message));
+  verdict.step = step;
+  verdict.coordinate = coordinate;
+  verdict.value = value;
+  verdict.bound = bound;
+  return verdict;
+}
+
+GuardVerdict RefuseDecode(DecodeStatus status, std::size_t received) {
+  const std::size_t expected = EncodedSize<certified_plan_t>();
+  switch (status) {
+    case DecodeStatus::kUnknownFingerprint:
+      return Refuse(GuardCause::kUnknownFingerprint, Sentence("the %zu bytes are not a certified_plan_t", received));
+    case DecodeStatus::kTrailingBytes:
+      return Refuse(GuardCause::kTrailingBytes, Sentence("%zu bytes, a certified_plan_t has %zu", received, expected));
+    default:
+      return Refuse(GuardCause::kWrongLength, Sentence("%zu bytes, a certified_plan_t has %zu", received, expected));
+  }
+}
+
+// x <= a + b in real arithmetic. Where x differs from the rounded sum, the exact sum lies on the same side of x; where
+// it is equal, the rounding error (Knuth's TwoSum, exact) decides.
+bool AtMostSum(double x, double a, double b) {
+  const double sum = a + b;
+  if (x != sum) return x < sum;
+  const double b_part = sum - a, a_part = sum - b_part;
+  return (a - a_part) + (b - b_part) >= 0;
+}
+
+GuardVerdict CheckInitialSet(const candidate_plan_t& plan, std::span<const double> state) {
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    const double x = state[k], center = plan.initial_center[k], half_width = plan.initial_half_width[k];
+    if (AtMostSum(x, center, half_width) && AtMostSum(-x, -center, half_width)) continue;
+    const double bound = x < center ? center - half_width : center + half_width;
+    return RefuseAt(GuardCause::kOutsideInitialSet, 0, static_cast<int>(k), x, bound,
+                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g, outside X0 = %.17g +- %.17g",
+                             plan.plan_id, k, x, center, half_width));
+  }
+  return {};
+}
+
+GuardVerdict CheckSlice(const certified_plan_t& certified, int step, std::span<const double> state) {
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    const double x = state[k], lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
+    if (lower <= x && x <= upper) continue;
+    return RefuseAt(GuardCause::kOutsideSlice, step, static_cast<int>(k), x, x < lower ? lower : upper,
+                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g at step %d, outside [%.17g, %.17g]",
+                             certified.plan.plan_id, k, x, step, lower, upper));
+  }
+  return {};
+}
+
+GuardVerdict CheckExpiry(const certified_plan_t& certified, std::int64_t now_us) {
+  if (now_us <= certified.expires_utime) return {};
+  return Refuse(GuardCause::kExpired,
+                Sentence("plan %" PRId64 " expired at %" PRId64 " us, now it is %" PRId64 " us", certified.plan.plan_id,
+                         certified.expires_utime, now_us));
+}
+
+GuardVerdict CheckDigest(GuardCause cause, const char* name, const Digest& carried, const Digest& expected) {
+  if (carried == expected) return {};
+  return Refuse(cause, Sentence("%s is %.16s.., it has to be %.16s..", name, ToHex(carried).c_str(),
+                                ToHex(expected).c_str()));
+}
+
+std::uint64_t Apart(std::int64_t a, std::int64_t b) {
+  const auto x = static_cast<std::uint64_t>(a), y = static_cast<std::uint64_t>(b);
+  return a > b ? x - y : y - x;
+}
+
+}  // namespace
+
+std::string_view GuardCauseName(GuardCause cause) {
+  switch (cause) {
+    case GuardCause::kNone: return "none";
+    case GuardCause::kWrongLength: return "wrong_length";
+    case GuardCause::kTrailingBytes: return "trailing_bytes";
+    case GuardCause::kUnknownFingerprint: return "unknown_fingerprint";
+    case GuardCause::kWrongDimension: return "wrong_dimension";
+    case GuardCause::kWrongStepPeriod: return "wrong_step_period";
+    case GuardCause::kPlanDigest: return "plan_digest";
+    case GuardCause::kCertificateDigest: return "certificate_digest";
+    case GuardCause::kNonFinite: return "non_finite";
+    case GuardCause::kEmptySlice: return "empty_slice";
+    case GuardCause::kExpired: return "expired";
+    case GuardCause::kConfigDigest: return "config_digest";
+    case GuardCause::kModelDigest: return "model_digest";
+    case GuardCause::kReplayed: return "replayed";
+    case GuardCause::kNothingPending: return "nothing_pending";
+    case GuardCause::kTooEarly: return "too_early";
+    case GuardCause::kTooLate: return "too_late";
+    case GuardCause::kOutsideInitialSet: return "outside_initial_set";
+    case GuardCause::kWrongStateSize: return "wrong_state_size";
+    case GuardCause::kOutsideSlice: return "outside_slice";
+    case GuardCause::kNotExecuting: return "not_executing";
+    case GuardCause::kStepOutOfOrder: return "step_out_of_order";
+    case GuardCause::kInternalError: return "internal_error";
+  }
+  return "unknown";
+}
+
+Guard::Guard(GuardOptions options) : options_(options) {
+  const auto require = [](const char* name, std::int64_t value, std::int64_t most) {
+    if (value < 1 || value > most)
+      throw std::invalid_argument(std::string("GuardOptions: ") + name + " is " + std::to_string(value) +
+                                  ", it has to be 1 to " + std::to_string(most));
+  };
+  require("num_states", options_.num_states, kMaxPlanStates);
+  require("num_inputs", options_.num_inputs, kMaxPlanInputs);
+  require("step_us", options_.step_us, INT64_MAX);
+}
+
+GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept {
+  GuardVerdict verdict;
+  try {
+    auto certified = std::make_unique<certified_plan_t>();
+    const DecodeStatus status = Decode(certified_plan_bytes, *certified);
+    if (status != DecodeStatus::kOk) return RefuseDecode(status, certified_plan_bytes.size());
+    verdict = Examine(*certified, now_us);
+    verdict.plan_id = certified->plan.plan_id;
+    if (!verdict.ok()) return verdict;
+    last_accepted_ = certified->plan.plan_id;
+    pending_ = std::move(certified);
+  } catch (...) {
+    verdict.cause = GuardCause::kInternalError;
+  }
+  return verdict;
+}
+
+GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
+  if (plan.num_states != options_.num_states || plan.num_inputs != options_.num_inputs)
+    return Refuse(GuardCause::kWrongDimension,
+                  Sentence("%d states and %d inputs, this robot has %d and %d", plan.num_states, plan.num_inputs,
+                           options_.num_states, options_.num_inputs));
+  if (plan.num_steps < 1 || plan.num_steps > kMaxPlanSteps)
+    return Refuse(GuardCause::kWrongDimension,
+                  Sentence("%d steps, it has to be 1 to %d", plan.num_steps, kMaxPlanSteps));
+  if (plan.progress_steps < 0 || plan.progress_steps > plan.num_steps)
+    return Refuse(GuardCause::kWrongDimension,
+                  Sentence("%d progress steps of %d steps", plan.progress_steps, plan.num_steps));
+  if (plan.step_us != options_.step_us)
+    return Refuse(GuardCause::kWrongStepPeriod,
+                  Sentence("a step of %" PRId64 " us, this robot's is %" PRId64 " us", plan.step_us, options_.step_us));
+  return {};
+}
+
+GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_us) const {
+  const candidate_plan_t& plan = certified.plan;
+  GuardVerdict verdict = ExamineSizes(plan);
+  if (verdict.ok())
+    verdict = CheckDigest(GuardCause::kPlanDigest, "plan_digest", GetDigest(certified.plan_digest),
+                          DigestOf(Encode(plan)));
+  if (verdict.ok())
+    verdict = CheckDigest(GuardCause::kCertificateDigest, "certificate_digest", GetDigest(certified.certificate_digest),
+                          CertificateDigest(certified));
+  if (verdict.ok()) verdict = ExamineNumbers(certified);
+  if (verdict.ok()) verdict = CheckExpiry(certified, now_us);
+  if (verdict.ok() && options_.config_digest)
+    verdict = CheckDigest(GuardCause::kConfigDigest, "config_digest", GetDigest(certified.config_digest),
+                          *options_.config_digest);
+  if (verdict.ok() && options_.model_digest)
+    verdict = CheckDigest(GuardCause::kModelDigest, "model_digest", GetDigest(certified.model_digest),
+                          *options_.model_digest);
+  if (verdict.ok() && last_accepted_ && plan.plan_id <= *last_accepted_)
+    verdict = Refuse(GuardCause::kReplayed,
+                     Sentence("plan %" PRId64 " is not newer than plan %" PRId64, plan.plan_id, *last_accepted_));
+  return verdict;
+}
+
+GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
+  const candidate_plan_t& plan = certified.plan;
+  for (int k = 0; k < options_.num_states; ++k) {
+    const double center = plan.initial_center[k], half_width = plan.initial_half_width[k];
+    if (!std::isfinite(center) || !(std::isfinite(half_width) && half_width >= 0))
+      return RefuseAt(GuardCause::kNonFinite, 0, k, std::isfinite(center) ? half_width : center, 0,
+                      Sentence("X0 in coordinate %d is %.17g +- %.17g", k, center, half_width));
+  }
+  for (int t = 0; t < plan.num_steps; ++t)
+    for (int i = 0; i < options_.num_inputs; ++i)
+      if (const double control = plan.control[t][i]; !std::isfinite(control))
+        return RefuseAt(GuardCause::kNonFinite, t, i, control, 0,
+                        Sentence("control %d of step %d is %.17g", i, t, control));
+  for (int t = 0; t <= plan.num_steps; ++t)
+    for (int k = 0; k < options_.num_states; ++k) {
+      const double lower = certified.slice_lower[t][k], upper = certified.slice_upper[t][k];
+      const bool finite = std::isfinite(lower) && std::isfinite(upper);
+      if (finite && lower <= upper) continue;
+      return RefuseAt(finite ? GuardCause::kEmptySlice : GuardCause::kNonFinite, t, k, lower, upper,
+                      Sentence("slice %d in coordinate %d is [%.17g, %.17g]", t, k, lower, upper));
+    }
+  return {};
+}
+
+GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::span<const double> measured_state) noexcept {
+  GuardVerdict verdict;
+  try {
+    verdict = ExamineStart(boundary_utime, measured_state);
+  } catch (...) {
+    verdict.cause = GuardCause::kInternalError;
+  }
+  if (pending_) verdict.plan_id = pending_->plan.plan_id;
+  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kTooEarly) return verdict;
+  if (verdict.ok()) {
+    executing_ = std::move(pending_);
+    last_step_ = 0;
+  }
+  pending_.reset();
+  return verdict;
+}
+
+GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::span<const double> state) const {
+  if (!pending_) return Refuse(GuardCause::kNothingPending, {});
+  const candidate_plan_t& plan = pending_->plan;
+  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(options_.step_us / 2)) {
+    const bool early = boundary_utime < plan.start_utime;
+    return Refuse(early ? GuardCause::kTooEarly : GuardCause::kTooLate,
+                  Sentence("plan %" PRId64 " starts at %" PRId64 " us, this boundary is %" PRId64 " us", plan.plan_id,
+                           plan.start_utime, boundary_utime));
+  }
+  GuardVerdict verdict = CheckExpiry(*pending_, boundary_utime);
+  if (!verdict.ok()) return verdict;
+  verdict = ExamineStateSize(state);
+  if (verdict.ok()) verdict = CheckInitialSet(plan, state);
+  return verdict.ok() ? CheckSlice(*pending_, 0, state) : verdict;
+}
+
+GuardVerdict Guard::ExamineStateSize(std::span<const double> state) const {
+  if (state.size() == static_cast<std::size_t>(options_.num_states)) return {};
+  return Refuse(GuardCause::kWrongStateSize,
+                Sentence("a state of %zu entries, this robot has %d", state.size(), options_.num_states));
+}
+
+GuardVerdict Guard::ExamineStep(int step, std::span<const double> state) const {
+  if (!executing_) return Refuse(GuardCause::kNotExecuting, "no plan is executing");
+  const int num_steps = executing_->plan.num_steps;
+  if (step != last_step_ + 1 || step > num_steps)
+    return Refuse(GuardCause::kStepOutOfOrder, Sentence("step %d of %d after step %d", step, num_steps, last_step_));
+  const GuardVerdict verdict = ExamineStateSize(state);
+  return verdict.ok() ? CheckSlice(*executing_, step, state) : verdict;
+}
+
+GuardVerdict Guard::Check(int step, std::span<const double> measured_state) noexcept {
+  GuardVerdict verdict;
+  try {
+    verdict = ExamineStep(step, measured_state);
+  } catch (...) {
+    verdict.cause = GuardCause::kInternalError;
+  }
+  if (executing_) verdict.plan_id = executing_->plan.plan_id;
+  last_step_ = step;
+  if (!verdict.ok()) executing_.reset();
+  return verdict;
+}
+
+}  // namespace forereach

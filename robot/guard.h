@@ -1,0 +1,132 @@
+/** The execution guard: what a robot links so that it executes certified plans only.
+
+It trusts nothing but a certified plan it has checked itself, and needs nothing of the certifier. The robot hands it
+every message of PLAN_CERTIFIED and, at every step boundary, its measured state:
+
+    Accept    -> the plan is pending, its start awaited; a newer one replaces it
+    TryStart  -> at the boundary its start names, with the state inside X_0: the plan is executing, at step 0,
+                 in place of the one before
+    Check     -> after each control: the state is inside X_t, so the next control may be applied
+    Finish    -> nothing is executing
+
+Every refusal is final: a plan refused by TryStart for anything but being early is forgotten, and a plan whose Check
+failed is executing no more. Only the plan that `executing` returns may be applied, control t after its step t passed.
+
+What Check compares with: a certified_plan_t carries, for t = 0..T, the interval hull of the certified slice X_t,
+rounded outward. X_t lies in its hull, so a state outside the hull has left X_t and the certificate says nothing of it
+any more. Hulls are compared in place of zonotopes because 2n comparisons need no arithmetic that could go wrong.
+
+Plan ids are compared whatever their source: a robot follows one planner. Single-threaded. */
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "forereach/certified_plan_t.hpp"
+#include "lcmtypes/codec.h"
+
+namespace forereach {
+
+/** Why the guard refused. Numbers are not stored anywhere; names are (GuardCauseName). */
+enum class GuardCause {
+  kNone,
+  // Accept
+  kWrongLength,
+  kTrailingBytes,
+  kUnknownFingerprint,
+  kWrongDimension,     ///< Not this robot's states or inputs, or steps outside what the type holds.
+  kWrongStepPeriod,    ///< step_us is not this robot's.
+  kPlanDigest,         ///< plan_digest is not that of the embedded candidate.
+  kCertificateDigest,  ///< certificate_digest is not that of the message.
+  kNonFinite,          ///< NaN or infinity in a control, X_0 or a slice, or a negative half-width.
+  kEmptySlice,         ///< lower <= upper fails.
+  kExpired,            ///< Also from TryStart.
+  kConfigDigest,       ///< Certified under another configuration.
+  kModelDigest,        ///< Certified for another model.
+  kReplayed,           ///< plan_id is not newer than the last accepted one.
+  // TryStart
+  kNothingPending,
+  kTooEarly,           ///< The plan stays pending.
+  kTooLate,
+  kOutsideInitialSet,
+  // TryStart and Check
+  kWrongStateSize,
+  kOutsideSlice,
+  // Check
+  kNotExecuting,
+  kStepOutOfOrder,     ///< Not the step after the last one checked, or past the horizon.
+  kInternalError,      ///< Out of memory.
+};
+
+/** "wrong_length", "trailing_bytes", ... "none" if there is no cause. */
+[[nodiscard]] std::string_view GuardCauseName(GuardCause cause);
+
+/** What the guard says. Default: yes. */
+struct GuardVerdict {
+  GuardCause cause = GuardCause::kNone;
+  std::int64_t plan_id = -1;  ///< The plan concerned, -1 if none or not decoded.
+  int step = -1;              ///< Witness of kOutsideSlice, kNonFinite and kEmptySlice in a slice or control.
+  int coordinate = -1;        ///< Witness: the coordinate of state, X_0, slice or control, ...
+  double value = 0;           ///< ... the value found there, ...
+  double bound = 0;           ///< ... and the bound it broke, rounded to double.
+  std::string message;        ///< One sentence with the values; empty if there is no cause.
+
+  [[nodiscard]] bool ok() const { return cause == GuardCause::kNone; }
+};
+
+struct GuardOptions {
+  int num_states = 0;                   ///< 1..16
+  int num_inputs = 0;                   ///< 1..8
+  std::int64_t step_us = 0;             ///< Time between two step boundaries, positive.
+  std::optional<Digest> config_digest;  ///< If set, plans certified under another configuration are refused.
+  std::optional<Digest> model_digest;   ///< If set, plans certified for another model are refused.
+};
+
+class Guard final {
+ public:
+  /** @throws std::invalid_argument if an option is outside its range. */
+  explicit Guard(GuardOptions options);
+
+  /** Checks one message of PLAN_CERTIFIED; if it passes, it becomes the pending plan.
+  In this order: decoded whole and nothing left over, dimensions, step period, plan digest, certificate digest, finite
+  numbers, lower <= upper in every slice, not expired (now_us <= expires_utime), expected config and model digest,
+  plan_id newer than the last accepted. Cost: two digests of the message, under 0.1 ms. @param now_us robot's clock. */
+  [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
+
+  /** Starts the pending plan at a step boundary if |start_utime - boundary_utime| <= step_us / 2, it has not expired
+  (boundary_utime <= expires_utime), and the measured state lies in X_0 = {x : |x - initial_center| <=
+  initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN lies in nothing.
+  kNothingPending and kTooEarly change nothing; after any other refusal nothing is pending. Whatever the verdict, a plan
+  that was executing goes on unless the new one started. No allocation if it passes. */
+  [[nodiscard]] GuardVerdict TryStart(std::int64_t boundary_utime, std::span<const double> measured_state) noexcept;
+
+  /** Checks the state measured after control step - 1 against the hull of slice `step`. To be called for step = 1, 2,
+  .. T in turn. After any refusal nothing is executing. Cost O(n), no allocation if it passes. */
+  [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state) noexcept;
+
+  /** The executing plan ends here. */
+  void Finish() noexcept { executing_.reset(); }
+
+  /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check or Finish. */
+  [[nodiscard]] const certified_plan_t* executing() const { return executing_.get(); }
+  [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
+
+ private:
+  [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
+  [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
+  [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
+  [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::span<const double> state) const;
+  [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state) const;
+  [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
+
+  GuardOptions options_;
+  std::optional<std::int64_t> last_accepted_;
+  std::unique_ptr<certified_plan_t> pending_, executing_;
+  int last_step_ = 0;  // of the executing plan, the last one checked
+};
+
+}  // namespace forereach

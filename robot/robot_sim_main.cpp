@@ -1,0 +1,110 @@
+/** forereach-robot-sim: the simulated robot on the bus, or a transitions file made with its target. */
+#include <algorithm>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "certifier/task/config.h"
+#include "certifier/task/process.h"
+#include "robot/sim_node.h"
+#include "robot/target.h"
+
+namespace forereach {
+namespace {
+
+constexpr const char* kName = "forereach-robot-sim";
+
+struct SampleOptions {
+  std::string output;
+  std::uint64_t seed = 1;
+  int count = 400;
+  std::vector<std::string> ranges;
+};
+
+void AddSampleOptions(CLI::App& app, SampleOptions& options) {
+  auto* make = app.add_option("--make-transitions", options.output,
+                              "Instead of driving: write transitions of the target to this CSV file, and end")
+                   ->type_name("FILE");
+  app.add_option("--seed", options.seed, "Seed of the samples")->needs(make)->capture_default_str();
+  app.add_option("--count", options.count, "How many transitions")
+      ->needs(make)->check(CLI::Range(1, 10'000'000))->capture_default_str();
+  app.add_option("--range", options.ranges,
+                 "Narrows one coordinate of the domain, as in v=7.25:15.75; once for each coordinate")
+      ->needs(make)->type_name("NAME=LOWER:UPPER");
+}
+
+// All of `text` as a number.
+double ParseNumber(const std::string& text) {
+  std::size_t read = 0;
+  const double number = std::stod(text, &read);
+  if (read != text.size()) throw std::invalid_argument(text);
+  return number;
+}
+
+SampleRange ParseRange(const std::string& text) {
+  const std::size_t equals = text.find('='), colon = text.find(':', equals + 1);
+  try {
+    if (equals == std::string::npos || colon == std::string::npos) throw std::invalid_argument(text);
+    return {text.substr(0, equals), ParseNumber(text.substr(equals + 1, colon - equals - 1)),
+            ParseNumber(text.substr(colon + 1))};
+  } catch (const std::logic_error&) {  // what stod throws
+    throw ConfigError("--range " + text + ": has to be NAME=LOWER:UPPER, as in v=7.25:15.75");
+  }
+}
+
+void WriteTransitions(const std::string& config_path, const SampleOptions& options) {
+  std::vector<SampleRange> ranges;
+  for (const std::string& text : options.ranges) ranges.push_back(ParseRange(text));
+  const Config config = LoadConfig(config_path, TransitionsFile::kIgnore);
+  try {
+    const Transitions made = MakeTransitions(*MakeTarget(config), *config.problem, options.seed, options.count, ranges);
+    SaveTransitions(options.output, *config.problem->model, made);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(config_path + ": " + error.what());
+  }
+}
+
+int RunWriteTransitions(int argc, char** argv) {
+  CLI::App app("Writes transitions of the task file's target, uniform over its domain.", kName);
+  std::string config_path;
+  SampleOptions options;
+  app.add_option("--config", config_path, "The task file (YAML)")->required()->type_name("FILE");
+  AddSampleOptions(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitBadInput;
+  }
+  return Guarded(kName, [&] {
+    WriteTransitions(config_path, options);
+    return 0;
+  });
+}
+
+bool IsMakeTransitions(std::string_view argument) {
+  return argument == "--make-transitions" || argument.starts_with("--make-transitions=");
+}
+
+}  // namespace
+}  // namespace forereach
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  if (std::any_of(argv, argv + argc, IsMakeTransitions)) return RunWriteTransitions(argc, argv);
+  SampleOptions for_help;
+  return RunProcess(
+      argc, argv,
+      {kName,
+       "The simulated robot: executes certified plans only, one step at a time, on a target that differs from the "
+       "nominal model by the task file's robot.residual. Ends at the goal or at robot.time_limit_s, and prints one "
+       "line of JSON about the run.",
+       "forereach-robot-sim --config config/demo.yaml\n"
+       "  forereach-robot-sim --config config/demo.yaml --make-transitions made.csv --seed 1 --count 400 "
+       "--range v=7.25:15.75"},
+      [](const Config& config, Bus& bus) { return std::make_unique<RobotSimNode>(config, bus); },
+      [&](CLI::App& app) { AddSampleOptions(app, for_help); });
+}

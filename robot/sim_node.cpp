@@ -1,0 +1,230 @@
+#include "robot/sim_node.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/numerics/text.h"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+
+namespace forereach {
+namespace {
+
+std::int64_t PeriodUs(const Config& config) { return std::llround(config.robot.step_period_ms * 1e3); }
+
+GuardOptions OptionsOf(const Config& config) {
+  return {config.problem->model->num_states(), config.problem->model->num_inputs(), PeriodUs(config), config.digest,
+          config.model_digest};
+}
+
+std::vector<int> RestCoordinates(const NominalModel& model) {
+  constexpr std::array<std::string_view, 4> kMotion{"v", "a", "vx", "vy"};
+  std::vector<int> rest;
+  for (int k = 0; k < model.num_states(); ++k) {
+    const std::string& name = model.state_names()[static_cast<std::size_t>(k)];
+    if (std::find(kMotion.begin(), kMotion.end(), name) != kMotion.end()) rest.push_back(k);
+  }
+  return rest;
+}
+
+void RequireSize(const Config& config, const char* key, std::size_t size, std::int64_t expected) {
+  if (static_cast<std::int64_t>(size) != expected)
+    throw ConfigError(config.path + ": " + key + ": " + std::to_string(size) + " entries, it has to have " +
+                      std::to_string(expected));
+}
+
+}  // namespace
+
+RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
+    : config_(config),
+      bus_(bus),
+      out_(out),
+      target_(MakeTarget(config)),
+      period_us_(PeriodUs(config)),
+      guard_(OptionsOf(config)),
+      rest_coordinates_(RestCoordinates(*config.problem->model)),
+      state_(config.robot.start) {
+  RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
+  if (!config.planner.goal.empty())
+    RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
+  bus_.Subscribe(config_.bus.certified, [this](const Received& received) { OnCertified(received); });
+}
+
+void RobotSimNode::Tick(std::int64_t now_us) {
+  if (!start_utime_) start_utime_ = now_us;
+  while (!done() && *start_utime_ + boundaries_ * period_us_ <= now_us)
+    Boundary(*start_utime_ + boundaries_ * period_us_);
+}
+
+void RobotSimNode::OnCertified(const Received& received) {
+  const GuardVerdict verdict = guard_.Accept(received.bytes, received.utime);
+  if (!verdict.ok()) return PublishRefusal(received.utime, verdict);
+  ++accepted_;
+  PublishEvent(received.utime, execution_event_t::ACCEPTED, verdict.plan_id, -1, 0, "the plan waits for its start");
+}
+
+void RobotSimNode::Boundary(std::int64_t utime) {
+  if (executing()) FinishStep(utime);
+  ReportContacts(utime);
+  ReportGoal(utime);
+  ending_ = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
+  if (!ending_) StartPending(utime);
+  if (executing()) ContinuePlan(utime);
+  PublishState(utime);
+  ++boundaries_;
+}
+
+void RobotSimNode::FinishStep(std::int64_t utime) {
+  const candidate_plan_t& plan = guard_.executing()->plan;
+  const std::int64_t plan_id = plan.plan_id;
+  const std::span<const double> control(plan.control[step_], static_cast<std::size_t>(plan.num_inputs));
+  std::vector<double> next(state_.size());
+  target_->Step(state_, control, next);
+  PublishTransition(utime - period_us_, control, next);
+  state_ = std::move(next);
+  ++step_;
+
+  const GuardVerdict verdict = guard_.Check(step_, state_);
+  if (verdict.ok()) {
+    ++steps_inside_;
+    PublishEvent(utime, execution_event_t::STEP_INSIDE, plan_id, step_, 0, "inside the certified slice");
+    return;
+  }
+  PublishEvent(utime, execution_event_t::STEP_OUTSIDE, plan_id, step_, verdict.value,
+               "emergency stop: " + verdict.message, verdict.coordinate);
+  Stand();
+}
+
+void RobotSimNode::ReportContacts(std::int64_t utime) {
+  for (std::size_t o = 0; o < config_.obstacles.size(); ++o) {
+    const double clearance = ApproximateDistance(config_.obstacles[o], Position());
+    if (!(clearance <= 0)) continue;
+    ++contacts_;
+    PublishEvent(utime, execution_event_t::CONTACT, executing_plan_id(), executing_step(), clearance,
+                 "inside obstacle " + std::to_string(o));
+  }
+}
+
+void RobotSimNode::ReportGoal(std::int64_t utime) {
+  const double distance = DistanceToGoal();
+  if (goal_reached_ || !(distance <= config_.planner.goal_radius)) return;
+  goal_reached_ = true;
+  PublishEvent(utime, execution_event_t::GOAL_REACHED, executing_plan_id(), executing_step(), distance,
+               ToText(distance) + " m from the goal, it counts within " + ToText(config_.planner.goal_radius) + " m");
+}
+
+void RobotSimNode::StartPending(std::int64_t utime) {
+  const GuardVerdict verdict = guard_.TryStart(utime, state_);
+  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kTooEarly) return;
+  if (!verdict.ok()) return PublishRefusal(utime, verdict);
+  step_ = 0;
+  ++started_;
+  PublishEvent(utime, execution_event_t::STARTED, verdict.plan_id, 0, 0,
+               std::to_string(guard_.executing()->plan.num_steps) + " steps");
+}
+
+void RobotSimNode::ContinuePlan(std::int64_t utime) {
+  const candidate_plan_t& plan = guard_.executing()->plan;
+  if (step_ == plan.num_steps) {
+    PublishEvent(utime, execution_event_t::STANDING, plan.plan_id, step_, 0, "the plan is finished: holding still");
+    Stand();
+  } else if (step_ == plan.progress_steps) {
+    PublishEvent(utime, execution_event_t::TAIL_BEGUN, plan.plan_id, step_, 0, "no newer certificate: braking");
+  }
+}
+
+void RobotSimNode::Stand() {
+  guard_.Finish();
+  for (const int k : rest_coordinates_) state_[static_cast<std::size_t>(k)] = 0;
+  if (!goal_reached_) ++stops_;
+}
+
+void RobotSimNode::PublishState(std::int64_t utime) {
+  robot_state_t message{};
+  message.utime = utime;
+  message.sequence = boundaries_;
+  message.executing_plan_id = executing_plan_id();
+  message.executing_step = static_cast<std::int16_t>(executing_step());
+  message.mode = executing() ? robot_state_t::EXECUTING : ending_ ? robot_state_t::FINISHED : robot_state_t::STANDING;
+  message.num_states = static_cast<std::int16_t>(state_.size());
+  std::copy(state_.begin(), state_.end(), message.state);
+  Send(config_.bus.robot_state, message);
+  if (message.mode == robot_state_t::FINISHED) ++finished_boundaries_;
+}
+
+void RobotSimNode::PublishTransition(std::int64_t utime, std::span<const double> control,
+                                     std::span<const double> next) {
+  transition_t message{};
+  message.utime = utime;
+  message.sequence = transitions_++;
+  message.num_states = static_cast<std::int16_t>(state_.size());
+  message.num_inputs = static_cast<std::int16_t>(control.size());
+  std::copy(state_.begin(), state_.end(), message.state);
+  std::copy(control.begin(), control.end(), message.input);
+  std::copy(next.begin(), next.end(), message.next_state);
+  Send(config_.bus.transition, message);
+}
+
+void RobotSimNode::PublishRefusal(std::int64_t utime, const GuardVerdict& verdict) {
+  const std::string cause(GuardCauseName(verdict.cause));
+  ++refused_[cause];
+  PublishEvent(utime, execution_event_t::REFUSED, verdict.plan_id, verdict.step, verdict.value,
+               cause + ": " + verdict.message, verdict.coordinate);
+}
+
+void RobotSimNode::PublishEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
+                                std::string_view text, int coordinate) {
+  execution_event_t message{};
+  message.utime = utime;
+  message.sequence = events_++;
+  message.plan_id = plan_id;
+  message.kind = kind;
+  message.step = static_cast<std::int16_t>(step);
+  message.coordinate = static_cast<std::int16_t>(coordinate);
+  message.num_states = static_cast<std::int16_t>(state_.size());
+  std::copy(state_.begin(), state_.end(), message.state);
+  message.value = value;
+  SetText(message.message, text);
+  Send(config_.bus.event, message);
+}
+
+template <class Message>
+void RobotSimNode::Send(const std::string& channel, const Message& message) {
+  if (!bus_.Publish(channel, message)) ++not_sent_;
+}
+
+Eigen::VectorXd RobotSimNode::Position() const {
+  return config_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state_.data(), std::ssize(state_));
+}
+
+double RobotSimNode::DistanceToGoal() const {
+  const std::vector<double>& goal = config_.planner.goal;
+  if (goal.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return (Position() - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm();
+}
+
+std::int64_t RobotSimNode::executing_plan_id() const { return executing() ? guard_.executing()->plan.plan_id : -1; }
+
+void RobotSimNode::Stop() { out_ << Summary() << std::endl; }
+
+std::string RobotSimNode::Summary() const {
+  nlohmann::ordered_json summary;
+  summary["boundaries"] = boundaries_;
+  summary["steps_executed"] = transitions_;
+  summary["steps_inside_slice"] = steps_inside_;
+  summary["contacts"] = contacts_;
+  summary["goal_reached"] = goal_reached_;
+  summary["distance_to_goal"] = DistanceToGoal();  // NaN becomes null
+  summary["stops"] = stops_;
+  summary["plans_accepted"] = accepted_;
+  summary["plans_started"] = started_;
+  summary["plans_refused"] = refused_;
+  summary["messages_not_sent"] = not_sent_;
+  return summary.dump();
+}
+
+}  // namespace forereach

@@ -1,0 +1,190 @@
+#include "robot/target.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "certifier/dynamics/kinematic_bicycle.h"
+#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/point_mass.h"
+#include "certifier/numerics/limits.h"
+#include "certifier/numerics/text.h"
+#include "robot/residuals.h"
+
+namespace forereach {
+namespace {
+
+class NominalTarget final : public Target {
+ public:
+  explicit NominalTarget(std::shared_ptr<const NominalModel> model) : model_(std::move(model)) {}
+
+  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const override {
+    std::array<double, kMaxVariables> z;
+    std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), z.begin()));
+    model_->Evaluate(std::span<const double>(z.data(), x.size() + u.size()), next);
+  }
+
+ private:
+  std::shared_ptr<const NominalModel> model_;
+};
+
+template <class Equations, class Residual>
+class ResidualTarget final : public Target {
+ public:
+  ResidualTarget(Equations equations, Residual residual) : equations_(equations), residual_(residual) {}
+
+  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const override {
+    using Wide = long double;
+    std::array<Wide, Equations::kStates + Equations::kInputs> z;
+    std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), z.begin()));
+    std::array<Wide, Equations::kStates> nominal, residual;
+    equations_(std::span<const Wide>(z), std::span<Wide>(nominal));
+    residual_(std::span<const Wide>(z), std::span<Wide>(residual));
+    for (std::size_t k = 0; k < nominal.size(); ++k) next[k] = static_cast<double>(nominal[k] + residual[k]);
+  }
+
+ private:
+  Equations equations_;
+  Residual residual_;
+};
+
+struct Parameter {
+  const char* name;
+  double* value;
+};
+
+[[noreturn]] void Fail(const Config& config, const std::string& what) {
+  throw ConfigError(config.path + ": robot." + what);
+}
+
+// The first `required` parameters have no default.
+void ReadParameters(const Config& config, const std::vector<Parameter>& parameters, std::size_t required) {
+  const auto& given = config.robot.residual_parameters;
+  for (const auto& [name, value] : given) {
+    const auto same_name = [&name = name](const Parameter& parameter) { return name == parameter.name; };
+    const auto parameter = std::find_if(parameters.begin(), parameters.end(), same_name);
+    if (parameter == parameters.end()) Fail(config, "residual: " + config.robot.residual + " has no parameter " + name);
+    if (!std::isfinite(value)) Fail(config, "residual: parameter " + name + " is not finite");
+    *parameter->value = value;
+  }
+  for (std::size_t i = 0; i < required; ++i)
+    if (!given.contains(parameters[i].name))
+      Fail(config, "residual: " + config.robot.residual + " needs the parameter " + parameters[i].name);
+}
+
+// A target of another step or wheelbase would differ from the nominal model by more than the residual it names.
+void RequireSameModel(const Config& config, const NominalModel& expected) {
+  const NominalModel& model = *config.problem->model;
+  if (model.description() != expected.description())
+    Fail(config, "residual: " + config.robot.residual + " is for " + expected.description() + ", the model is " +
+                     model.description());
+}
+
+std::unique_ptr<Target> MakeHeadingSaturation(const Config& config) {
+  HeadingSaturation r{};
+  ReadParameters(config,
+                 {{"dt", &r.dt},
+                  {"wheelbase", &r.wheelbase},
+                  {"understeer", &r.understeer},
+                  {"friction", &r.friction},
+                  {"gravity", &r.gravity},
+                  {"gate_temperature", &r.gate_temperature}},
+                 2);
+  RequireSameModel(config, *MakeKinematicBicycle(r.dt, r.wheelbase));
+  return std::make_unique<ResidualTarget<KinematicBicycle, HeadingSaturation>>(KinematicBicycle{r.dt, r.wheelbase}, r);
+}
+
+std::unique_ptr<Target> MakeVelocityKnee(const Config& config) {
+  VelocityKnee r{};
+  ReadParameters(config,
+                 {{"dt", &r.dt},
+                  {"damping", &r.damping},
+                  {"cross", &r.cross},
+                  {"knee", &r.knee},
+                  {"softplus_temperature", &r.softplus_temperature},
+                  {"regularizer", &r.regularizer},
+                  {"smoothing", &r.smoothing}},
+                 1);
+  RequireSameModel(config, *MakePointMass(r.dt));
+  return std::make_unique<ResidualTarget<PointMass, VelocityKnee>>(PointMass{r.dt}, r);
+}
+
+// std::uniform_real_distribution differs between libraries; this does not.
+double Uniform(std::mt19937_64& random, double lower, double upper) {
+  const double fraction = static_cast<double>(random() >> 11) * 0x1p-53;
+  return std::min(lower + (upper - lower) * fraction, upper);
+}
+
+struct Bounds {
+  std::vector<double> lower, upper;
+};
+
+Bounds SampleBounds(const Problem& problem, const std::vector<SampleRange>& ranges) {
+  std::vector<std::string> names = problem.model->state_names();
+  const auto& inputs = problem.model->input_names();
+  names.insert(names.end(), inputs.begin(), inputs.end());
+
+  Bounds bounds;
+  for (const Box* box : {&problem.domain.state, &problem.domain.input}) {
+    bounds.lower.insert(bounds.lower.end(), box->lower().begin(), box->lower().end());
+    bounds.upper.insert(bounds.upper.end(), box->upper().begin(), box->upper().end());
+  }
+  for (const SampleRange& range : ranges) {
+    const auto name = std::find(names.begin(), names.end(), range.name);
+    if (name == names.end()) throw std::invalid_argument("range: the model has no coordinate " + range.name);
+    const auto l = static_cast<std::size_t>(name - names.begin());
+    if (!(bounds.lower[l] <= range.lower && range.lower <= range.upper && range.upper <= bounds.upper[l]))
+      throw std::invalid_argument("range: " + range.name + " in [" + ToText(range.lower) + ", " + ToText(range.upper) +
+                                  "] is empty or not inside the domain's [" + ToText(bounds.lower[l]) + ", " +
+                                  ToText(bounds.upper[l]) + "]");
+    bounds.lower[l] = range.lower;
+    bounds.upper[l] = range.upper;
+  }
+  return bounds;
+}
+
+std::vector<double> SampleInside(const Domain& domain, const Bounds& bounds, std::mt19937_64& random) {
+  std::vector<double> z(bounds.lower.size());
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    for (std::size_t l = 0; l < z.size(); ++l) z[l] = Uniform(random, bounds.lower[l], bounds.upper[l]);
+    if (domain.Contains(z)) return z;
+  }
+  throw std::invalid_argument("ranges: no point inside the domain in 1000 samples");
+}
+
+}  // namespace
+
+std::unique_ptr<Target> MakeTarget(const Config& config) {
+  const std::string& residual = config.robot.residual;
+  if (residual == HeadingSaturation::kName) return MakeHeadingSaturation(config);
+  if (residual == VelocityKnee::kName) return MakeVelocityKnee(config);
+  if (residual == "none") return std::make_unique<NominalTarget>(config.problem->model);
+  Fail(config, "residual: " + residual + " is not none, heading_saturation or velocity_knee");
+}
+
+Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,
+                            const std::vector<SampleRange>& ranges, const Eigen::VectorXd& noise_bound) {
+  const int n = problem.model->num_states(), d = problem.model->num_variables();
+  if (count < 0) throw std::invalid_argument("count: " + std::to_string(count) + " is negative");
+  if (noise_bound.size() != 0 && noise_bound.size() != n)
+    throw std::invalid_argument("noise_bound: " + std::to_string(noise_bound.size()) + " entries for " +
+                                std::to_string(n) + " states");
+  const Bounds bounds = SampleBounds(problem, ranges);
+  std::mt19937_64 random(seed);
+  Transitions transitions{Eigen::MatrixXd(count, d), Eigen::MatrixXd(count, n)};
+  std::vector<double> next(static_cast<std::size_t>(n));
+  for (int i = 0; i < count; ++i) {
+    const std::vector<double> z = SampleInside(problem.domain, bounds, random);
+    const std::span<const double> point(z);
+    target.Step(point.first(next.size()), point.subspan(next.size()), next);
+    transitions.z.row(i) = Eigen::Map<const Eigen::RowVectorXd>(z.data(), d);
+    transitions.x_next.row(i) = Eigen::Map<const Eigen::RowVectorXd>(next.data(), n);
+    for (int k = 0; k < noise_bound.size(); ++k)
+      transitions.x_next(i, k) += Uniform(random, -noise_bound(k), noise_bound(k));
+  }
+  return transitions;
+}
+
+}  // namespace forereach

@@ -1,0 +1,200 @@
+// What a good task file means.
+#include "certifier/task/config.h"
+
+#include <gtest/gtest.h>
+
+#include "certifier/task/schema.h"
+#include "robot/residuals.h"
+#include "scratch.h"
+
+namespace forereach {
+namespace {
+
+Eigen::VectorXd Numbers(std::initializer_list<double> entries) {
+  Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
+  std::copy(entries.begin(), entries.end(), vector.begin());
+  return vector;
+}
+
+TEST(LoadConfig, ReadsWhatIsRequired) {
+  const TaskFiles files;
+  const Config config = files.Load();
+  const Problem& problem = *config.problem;
+  EXPECT_EQ(config.path, files.directory().Path("task.yaml"));
+  EXPECT_EQ(problem.model->description(), "point_mass dt=0.15");
+  EXPECT_EQ(problem.domain.state.lower(), Numbers({-20, -20, -5.4, -5.4}));
+  EXPECT_EQ(problem.domain.input.upper(), Numbers({3, 3}));
+  EXPECT_TRUE(problem.domain.balls.empty());
+  EXPECT_TRUE(problem.domain.inequalities.empty());
+  Eigen::MatrixXd lipschitz = Eigen::MatrixXd::Zero(4, 6);
+  lipschitz.block(2, 2, 2, 2) << 0.1, 0.05, 0.05, 0.1;
+  EXPECT_EQ(problem.declaration.lipschitz, lipschitz);
+  EXPECT_EQ(problem.declaration.noise_bound, Numbers({0, 0, 0.01, 0.01}));
+  ASSERT_EQ(problem.transitions.size(), 2);
+  EXPECT_EQ(Eigen::VectorXd(problem.transitions.z.row(1)), Numbers({1, 2, 2, 0.5, 0, -0.5}));
+  EXPECT_EQ(Eigen::VectorXd(problem.transitions.x_next.row(1)), Numbers({1.3, 2.07, 2, 0.42}));
+  EXPECT_EQ(problem.projection, Eigen::MatrixXd::Identity(2, 4));
+  ASSERT_EQ(config.obstacles.size(), 1u);
+  EXPECT_EQ(config.obstacles[0].kind(), Obstacle::Kind::kCircle);
+  EXPECT_EQ(config.obstacles[0].radius(), 0.8);
+  EXPECT_LE(config.initial_set.lower()[2], 0.9);
+  EXPECT_GE(config.initial_set.upper()[2], 1.1);
+  EXPECT_NEAR(config.initial_set.upper()[2], 1.1, 1e-15);
+}
+
+TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
+  const Config config = TaskFiles().Load();
+  EXPECT_EQ(config.problem->zonotope_order, 5);
+  EXPECT_EQ(config.gate.max_age_ms, 500);
+  EXPECT_EQ(config.gate.max_ahead_ms, 50);
+  EXPECT_EQ(config.gate.certificate_lifetime_ms, 2000);
+  EXPECT_EQ(config.gate.queue, 64);
+  EXPECT_EQ(config.bus.url, "udpm://239.255.76.67:7667?ttl=0");
+  EXPECT_EQ(config.bus.candidate, "PLAN_CANDIDATE");
+  EXPECT_EQ(config.bus.event, "EXECUTION_EVENT");
+  EXPECT_EQ(config.planner.algorithm, PlannerOptions{}.algorithm);
+  EXPECT_TRUE(config.planner.goal.empty());
+  EXPECT_EQ(config.planner.initial_half_width, (std::vector<double>{0.1, 0.1, 0.1, 0.1}));
+  EXPECT_EQ(config.robot.start, (std::vector<double>{0, 0, 1, 0}));
+  EXPECT_EQ(config.robot.step_period_ms, RobotOptions{}.step_period_ms);
+  EXPECT_EQ(config.robot.residual, "none");
+  EXPECT_TRUE(config.robot.residual_parameters.empty());
+  EXPECT_EQ(config.logger.directory, "log");
+  EXPECT_EQ(config.logger.queue, LoggerOptions{}.queue);
+}
+
+TEST(LoadConfig, ReadsEveryOption) {
+  const TaskFiles files;
+  const Config config = files.Load(
+      std::string(kTask) +
+      "certifier: {method: paper, zonotope_order: 7}\n"
+      "gate: {max_age_ms: 1, max_ahead_ms: 0, certificate_lifetime_ms: 3, queue: 4}\n"
+      "bus:\n"
+      "  url: memq://\n"
+      "  channels: {candidate: A, decision: B, certified: C, robot_state: D, obstacles: E, transition: F, status: G, "
+      "event: H}\n"
+      "planner: {algorithm: rrt, goal: [1, 2], goal_radius: 3, clearance: 4, clearance_step: 5, progress_steps: 6,\n"
+      "  tail_steps: 7, lead_steps: 8, candidates: 9, cruise_speed: 10, braking: 11, time_limit_ms: 12, seed: 13,\n"
+      "  initial_half_width: [1, 2, 3, 4]}\n"
+      "robot: {start: [4, 3, 2, 1], step_period_ms: 14, time_limit_s: 15, residual: {name: velocity_knee, knee: 2}}\n"
+      "logger: {directory: here, queue: 16, flush_ms: 17}\n");
+  EXPECT_EQ(config.problem->zonotope_order, 7);
+  const GateOptions& gate = config.gate;
+  EXPECT_EQ(std::tie(gate.max_age_ms, gate.max_ahead_ms, gate.certificate_lifetime_ms, gate.queue),
+            std::make_tuple(1.0, 0.0, 3.0, 4));
+  const BusOptions& bus = config.bus;
+  EXPECT_EQ(bus.url, "memq://");
+  EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
+                bus.status + bus.event,
+            "ABCDEFGH");
+  const PlannerOptions& planner = config.planner;
+  EXPECT_EQ(planner.algorithm, "rrt");
+  EXPECT_EQ(planner.goal, (std::vector<double>{1, 2}));
+  EXPECT_EQ(std::tie(planner.goal_radius, planner.clearance, planner.clearance_step, planner.progress_steps,
+                     planner.tail_steps, planner.lead_steps, planner.candidates),
+            std::make_tuple(3.0, 4.0, 5.0, 6, 7, 8, 9));
+  EXPECT_EQ(std::tie(planner.cruise_speed, planner.braking, planner.time_limit_ms, planner.seed),
+            std::make_tuple(10.0, 11.0, 12.0, 13));
+  EXPECT_EQ(planner.initial_half_width, (std::vector<double>{1, 2, 3, 4}));
+  EXPECT_EQ(config.robot.start, (std::vector<double>{4, 3, 2, 1}));
+  EXPECT_EQ(std::tie(config.robot.step_period_ms, config.robot.time_limit_s), std::make_tuple(14.0, 15.0));
+  EXPECT_EQ(config.robot.residual, "velocity_knee");
+  EXPECT_EQ(config.logger.directory, files.directory().Path("here"));
+  EXPECT_EQ(std::tie(config.logger.queue, config.logger.flush_ms), std::make_tuple(16, 17.0));
+}
+
+TEST(LoadConfig, ResidualsHaveTheModelsStepAndTheResidualsOwnDefaults) {
+  const TaskFiles files;
+  const auto given = files.Load(std::string(kTask) + "robot: {residual: {name: velocity_knee, knee: 2}}\n");
+  const VelocityKnee knee{.dt = 0.15};
+  const std::map<std::string, double> expected{{"dt", 0.15},
+                                               {"damping", knee.damping},
+                                               {"cross", knee.cross},
+                                               {"knee", 2},
+                                               {"softplus_temperature", knee.softplus_temperature},
+                                               {"regularizer", knee.regularizer},
+                                               {"smoothing", knee.smoothing}};
+  EXPECT_EQ(given.robot.residual_parameters, expected);
+  EXPECT_EQ(files.Load(std::string(kTask) + "robot: {residual: none}\n").robot.residual, "none");
+  EXPECT_EQ(files.Load(std::string(kTask) + "robot: {residual: {name: none}}\n").robot.residual, "none");
+
+  const HeadingSaturation saturation{.dt = 0.1, .wheelbase = 2.5};
+  const std::map<std::string, double> heading{{"dt", 0.1},
+                                              {"wheelbase", 2.5},
+                                              {"understeer", saturation.understeer},
+                                              {"friction", saturation.friction},
+                                              {"gravity", saturation.gravity},
+                                              {"gate_temperature", saturation.gate_temperature}};
+  EXPECT_EQ(LoadConfig(FOREREACH_SOURCE_DIR "/config/bicycle.yaml").robot.residual_parameters, heading);
+}
+
+TEST(LoadConfig, ReadsBallsAndInequalities) {
+  const Config config = TaskFiles().Load(Replaced(kTask, "  input: {lower",
+                                                  "  balls: [{coordinates: [vy, ax], center: [0.5, 0], radius: 2}]\n"
+                                                  "  inequalities:\n"
+                                                  "    - {coefficients: {ay: 2, vx: 1}, bound: 3}\n"
+                                                  "  input: {lower"));
+  const Domain& domain = config.problem->domain;
+  ASSERT_EQ(domain.balls.size(), 1u);
+  EXPECT_EQ(domain.balls[0].coordinates, (std::vector<int>{3, 4}));
+  EXPECT_EQ(domain.balls[0].center, Numbers({0.5, 0}));
+  EXPECT_EQ(domain.balls[0].radius, 2);
+  ASSERT_EQ(domain.inequalities.size(), 1u);
+  EXPECT_EQ(domain.inequalities[0].coefficients, Numbers({0, 0, 1, 0, 0, 2}));
+  EXPECT_EQ(domain.inequalities[0].bound, 3);
+}
+
+TEST(LoadConfig, ReadsEveryObstacle) {
+  const Config config = TaskFiles().Load(Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
+                                                  "\n    - box: {lower: [1, 2], upper: [1, 4]}\n"
+                                                  "    - polygon: {vertices: [[0, 0], [1, 0], [0, 1]]}\n"
+                                                  "    - half_plane: {normal: [0, 1], offset: 5}"));
+  ASSERT_EQ(config.obstacles.size(), 3u);
+  EXPECT_EQ(config.obstacles[0].kind(), Obstacle::Kind::kBox);
+  EXPECT_EQ(config.obstacles[0].points()[1], Numbers({1, 4}));
+  EXPECT_EQ(config.obstacles[1].points().size(), 3u);
+  EXPECT_EQ(config.obstacles[2].kind(), Obstacle::Kind::kHalfSpace);
+  EXPECT_EQ(config.obstacles[2].offset(), 5);
+}
+
+TEST(LoadConfig, ProjectionsHaveOneToThreeRows) {
+  const TaskFiles files;
+  const auto projection = [&](const std::string& rows, const std::string& obstacles) {
+    return files
+        .Load(Replaced(Replaced(kTask, "[px, py]", rows), "[{circle: {center: [3, 2], radius: 0.8}}]", obstacles))
+        .problem->projection;
+  };
+  EXPECT_EQ(projection("[py]", "[{half_plane: {normal: [1], offset: 3}}]"), Numbers({0, 1, 0, 0}).transpose());
+  EXPECT_EQ(projection("[[1, 0, 0.5, 0]]", "[{box: {lower: [1], upper: [2]}}]"), Numbers({1, 0, 0.5, 0}).transpose());
+  EXPECT_EQ(projection("[vx, px, py]", "[{box: {lower: [1, 1, 1], upper: [2, 2, 2]}}]").rows(), 3);
+}
+
+TEST(LoadConfig, TransitionsNeedNotExistWhereTheyAreStillToBeMade) {
+  const ScratchDirectory directory;
+  const Config config = LoadConfig(directory.Write("task.yaml", kTask), TransitionsFile::kIgnore);
+  EXPECT_EQ(config.problem->transitions.size(), 0);
+  EXPECT_EQ(config.problem->domain.state.dim(), 4);
+}
+
+TEST(Schema, DefaultsStandInsideTheirRanges) {
+  for (const Key& key : Schema()) {
+    if (key.fallback.empty() || (key.type != Key::Type::kNumber && key.type != Key::Type::kInteger)) continue;
+    EXPECT_TRUE(key.range.Contains(std::stod(key.fallback))) << key.path;
+  }
+}
+
+TEST(Schema, EveryKeyStandsInAMapOrList) {
+  for (const Key& key : Schema()) {
+    if (key.path.empty()) continue;
+    const std::size_t end = key.path.ends_with("[]") ? key.path.size() - 2 : key.path.rfind('.');
+    const std::string outer = key.path.substr(0, end == std::string::npos ? 0 : end);
+    const auto holds = [&](const Key& row) {
+      return row.path == outer && (row.type == Key::Type::kMap || row.type == Key::Type::kList);
+    };
+    EXPECT_TRUE(std::any_of(Schema().begin(), Schema().end(), holds)) << key.path;
+    EXPECT_FALSE(key.meaning.empty()) << key.path;
+  }
+}
+
+}  // namespace
+}  // namespace forereach

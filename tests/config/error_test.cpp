@@ -1,0 +1,228 @@
+// What is wrong with a task file: one error that names file, line, key, value and bound.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class ErrorTest : public testing::Test {
+ protected:
+  // The error after `line` is added to the good task file.
+  std::string ErrorAfter(const std::string& line) { return files_.Error(kTask + line); }
+
+  TaskFiles files_;
+};
+
+TEST_F(ErrorTest, TheGoodTaskIsGood) { EXPECT_EQ(files_.Error(kTask), ""); }
+
+TEST_F(ErrorTest, UnknownKeys) {
+  EXPECT_EQ(files_.ErrorWith("  noise_bound:", "  noise_bounds:"),
+            "task.yaml:11: declaration.noise_bounds: unknown key; did you mean noise_bound?");
+  EXPECT_EQ(ErrorAfter("planer: {}\n"), "task.yaml:19: planer: unknown key; did you mean planner?");
+  EXPECT_EQ(
+      ErrorAfter("gate: {colour: 3}\n"),
+      "task.yaml:19: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, queue");
+  EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
+            "task.yaml:9: declaration.lipschitz.theta: unknown key; known here: px, py, vx, vy");
+  EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: 0.1, v_y"),
+            "task.yaml:9: declaration.lipschitz.vx.v_y: unknown key; did you mean vy?");
+  EXPECT_EQ(files_.ErrorWith("radius: 0.8", "radius: 0.8, color: red"),
+            "task.yaml:18: task.obstacles[0].circle.color: unknown key; known here: center, radius");
+  EXPECT_THAT(ErrorAfter("<<: {gate: {}}\n"), StartsWith("task.yaml:19: <<: unknown key"));
+}
+
+TEST_F(ErrorTest, KeysOfAnotherModel) {
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15}", "dt: 0.15, wheelbase: 2.5}"),
+            "task.yaml:1: model.wheelbase: is for kinematic_bicycle, not for point_mass");
+  EXPECT_EQ(files_.ErrorWith("point_mass", "kinematic_bicycle"),
+            "task.yaml:1: model.wheelbase: missing: Distance between the axles.");
+  EXPECT_EQ(ErrorAfter("robot: {residual: {name: velocity_knee, friction: 1}}\n"),
+            "task.yaml:19: robot.residual.friction: is for heading_saturation, not for velocity_knee");
+  EXPECT_EQ(ErrorAfter("robot: {residual: {name: heading_saturation}}\n"),
+            "task.yaml:19: robot.residual.name: heading_saturation is for kinematic_bicycle, the model is point_mass");
+}
+
+TEST_F(ErrorTest, MissingKeys) {
+  EXPECT_THAT(files_.ErrorWith("transitions: steps.csv\n", ""), StartsWith("task.yaml:1: transitions: missing: "));
+  EXPECT_THAT(files_.ErrorWith(", dt: 0.15", ""), StartsWith("task.yaml:1: model.dt: missing: "));
+  EXPECT_THAT(files_.ErrorWith("  noise_bound: [0, 0, 0.01, 0.01]\n", ""),
+              StartsWith("task.yaml:8: declaration.noise_bound: missing: "));
+  EXPECT_THAT(files_.ErrorWith(", radius: 0.8", ""),
+              StartsWith("task.yaml:18: task.obstacles[0].circle.radius: missing: "));
+  EXPECT_THAT(ErrorAfter("robot: {residual: {}}\n"), StartsWith("task.yaml:19: robot.residual.name: missing: "));
+}
+
+TEST_F(ErrorTest, DoubleKeys) {
+  EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"), "task.yaml:9: declaration.lipschitz.vx.vx: stands twice");
+  EXPECT_EQ(ErrorAfter("transitions: other.csv\n"), "task.yaml:19: transitions: stands twice");
+}
+
+TEST_F(ErrorTest, SizesThatDoNotFit) {
+  EXPECT_EQ(files_.ErrorWith("lower: [-20, -20, -5.4, -5.4]", "lower: [-20, -20, -5.4]"),
+            "task.yaml:4: domain.state.lower: has 3 entries, has to have 4: px, py, vx, vy");
+  EXPECT_EQ(files_.ErrorWith("{lower: [-3, -3]", "{lower: [-3]"),
+            "task.yaml:6: domain.input.lower: has 1 entries, has to have 2: ax, ay");
+  EXPECT_EQ(files_.ErrorWith("center: [3, 2]", "center: [3, 2, 1]"),
+            "task.yaml:18: task.obstacles[0].circle.center: has 3 entries, has to have 2, as many as task.projection "
+            "has rows");
+  EXPECT_EQ(files_.ErrorWith("[px, py]", "[[1, 0, 0]]"),
+            "task.yaml:17: task.projection[0]: has 3 entries, has to have 4: px, py, vx, vy");
+  EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, py, vx, vy]"),
+            "task.yaml:17: task.projection: has 4 entries, which is outside [1, 3]");
+  EXPECT_EQ(files_.ErrorWith("  input: {", "  balls: [{coordinates: [vx, vy], center: [0], radius: 1}]\n  input: {"),
+            "task.yaml:6: domain.balls[0].center: has 1 entries, has to have 2, as many as coordinates");
+  EXPECT_EQ(ErrorAfter("planner: {goal: [1, 2, 3]}\n"),
+            "task.yaml:19: planner.goal: has 3 entries, has to have 2, as many as task.projection has rows");
+}
+
+TEST_F(ErrorTest, MatricesThatDoNotFit) {
+  const std::string names = "\n    vx: {vx: 0.1, vy: 0.05}\n    vy: {vx: 0.05, vy: 0.1}\n";
+  EXPECT_EQ(files_.ErrorWith(names, " [[0, 0, 0, 0, 0, 0]]\n"),
+            "task.yaml:8: declaration.lipschitz: has 1 rows, has to have 4, one a state");
+  EXPECT_EQ(files_.ErrorWith(names, "\n    - [0, 0, 0, 0, 0, 0]\n    - [0, 0, 0, 0, 0]\n"),
+            "task.yaml:10: declaration.lipschitz[1]: has 5 entries, has to have 6: px, py, vx, vy, ax, ay");
+  EXPECT_EQ(files_.ErrorWith(names, "\n    - [0, 0, 0, 0, 0, 0]\n    - [0, 0, -1, 0, 0, 0]\n"),
+            "task.yaml:10: declaration.lipschitz[1][2]: -1 is outside [0, inf)");
+  EXPECT_EQ(files_.ErrorWith(names, " 3\n"),
+            "task.yaml:8: declaration.lipschitz: 3 is not a map or a list of lists of numbers");
+}
+
+TEST_F(ErrorTest, NumbersThatAreNotFinite) {
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: .nan"), "task.yaml:1: model.dt: .nan is not a finite number");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: inf"), "task.yaml:1: model.dt: inf is not a finite number");
+  EXPECT_EQ(files_.ErrorWith("upper: [20, 20, 5.4, 5.4]", "upper: [20, .inf, 5.4, 5.4]"),
+            "task.yaml:5: domain.state.upper[1]: .inf is not a finite number");
+  EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: NaN, vy"),
+            "task.yaml:9: declaration.lipschitz.vx.vx: NaN is not a finite number");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 1e999"),
+            "task.yaml:1: model.dt: 1e999 is too large or too small to represent");
+}
+
+TEST_F(ErrorTest, NumbersOutsideTheirRange) {
+  EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: -0.1, vy"),
+            "task.yaml:9: declaration.lipschitz.vx.vx: -0.1 is outside [0, inf)");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0"), "task.yaml:1: model.dt: 0 is outside (0, 60]");
+  EXPECT_EQ(files_.ErrorWith("upper: [20, 20, 5.4, 5.4]", "upper: [20, -21, 5.4, 5.4]"),
+            "task.yaml:5: domain.state.upper[1]: -21 is outside [-20, inf), below domain.state.lower[1]");
+  EXPECT_EQ(files_.ErrorWith("half_width: [0.1, 0.1, 0.1, 0.1]", "half_width: [0.1, 0.1, 0.1, -0.1]"),
+            "task.yaml:16: task.initial_set.half_width[3]: -0.1 is outside [0, inf)");
+  EXPECT_EQ(files_.ErrorWith("radius: 0.8", "radius: -0.8"),
+            "task.yaml:18: task.obstacles[0].circle.radius: -0.8 is outside [0, inf)");
+  EXPECT_EQ(ErrorAfter("gate: {max_age_ms: 0}\n"), "task.yaml:19: gate.max_age_ms: 0 is outside (0, 3600000]");
+  EXPECT_EQ(ErrorAfter("gate: {queue: 0}\n"), "task.yaml:19: gate.queue: 0 is outside [1, 65536]");
+  EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 0}\n"),
+            "task.yaml:19: certifier.zonotope_order: 0 is outside [1, 112]");
+  EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 27}\n"),
+            "task.yaml:19: certifier.zonotope_order: 27 is outside [1, 26] for 4 states");
+  EXPECT_EQ(
+      ErrorAfter("planner: {progress_steps: 100, tail_steps: 29}\n"),
+      "task.yaml:19: planner.tail_steps: 29 is outside [0, 28]: with progress_steps 129 steps, a plan has at most 128");
+}
+
+TEST_F(ErrorTest, TheLargestOrderIsAccepted) { EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 26}\n"), ""); }
+
+TEST_F(ErrorTest, ValuesOfAnotherType) {
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: '0.15'"), "task.yaml:1: model.dt: 0.15 is not a number");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0x10"), "task.yaml:1: model.dt: 0x10 is not a number");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 010"), "task.yaml:1: model.dt: 010 has a leading zero");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: [0.15]"), "task.yaml:1: model.dt: a list is not a number");
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: "), "task.yaml:1: model.dt: nothing is not a number");
+  EXPECT_EQ(ErrorAfter("gate: {queue: 1.5}\n"), "task.yaml:19: gate.queue: 1.5 is not an integer");
+  EXPECT_EQ(ErrorAfter("gate: 3\n"), "task.yaml:19: gate: 3 is not a map");
+  EXPECT_EQ(ErrorAfter("gate: {queue: {a: 1}}\n"), "task.yaml:19: gate.queue: a map is not an integer");
+  EXPECT_EQ(files_.ErrorWith("center: [0, 0, 1, 0]", "center: [0, 0, fast, 0]"),
+            "task.yaml:15: task.initial_set.center[2]: fast is not a number");
+  EXPECT_EQ(files_.ErrorWith("center: [0, 0, 1, 0]", "center: 1"),
+            "task.yaml:15: task.initial_set.center: 1 is not a list of numbers");
+}
+
+TEST_F(ErrorTest, WordsThatAreNotKnown) {
+  EXPECT_EQ(files_.ErrorWith("point_mass", "pointmass"),
+            "task.yaml:1: model.name: pointmass is not known; did you mean point_mass?");
+  EXPECT_EQ(ErrorAfter("certifier: {method: magic}\n"),
+            "task.yaml:19: certifier.method: magic is not known; known here: paper");
+  EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, pz]"),
+            "task.yaml:17: task.projection[1]: pz is not a coordinate; did you mean px?");
+  EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, ax]"),
+            "task.yaml:17: task.projection[1]: ax is not a coordinate; did you mean px?");
+  EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, px]"), "task.yaml:17: task.projection[1]: px stands twice");
+  EXPECT_EQ(ErrorAfter("bus: {channels: {status: 'A.*'}}\n"),
+            "task.yaml:19: bus.channels.status: A.* is not 1 to 63 letters, digits and underscores");
+  EXPECT_EQ(ErrorAfter("bus: {channels: {status: PLAN_DECISION}}\n"),
+            "task.yaml:19: bus.channels.status: PLAN_DECISION is the name of another channel too");
+}
+
+TEST_F(ErrorTest, ObstaclesThatMakeNoSense) {
+  const auto with = [&](const std::string& obstacle) {
+    return files_.ErrorWith("{circle: {center: [3, 2], radius: 0.8}}", obstacle);
+  };
+  EXPECT_EQ(with("{}"),
+            "task.yaml:18: task.obstacles[0]: has 0 keys, has to have one of circle, box, polygon, half_plane");
+  EXPECT_THAT(with("{half_plane: {normal: [0, 0], offset: 1}}"),
+              StartsWith("task.yaml:18: task.obstacles[0].half_plane: "));
+  EXPECT_EQ(
+      with("{box: {lower: [1, 2], upper: [2, 1]}}"),
+      "task.yaml:18: task.obstacles[0].box.upper[1]: 1 is outside [2, inf), below task.obstacles[0].box.lower[1]");
+  EXPECT_EQ(with("{polygon: {vertices: [[0, 0], [1, 0]]}}"),
+            "task.yaml:18: task.obstacles[0].polygon.vertices: has 2 entries, which is outside [3, 16]");
+  std::string many = "{circle: {center: [3, 2], radius: 0.8}}";
+  for (int i = 0; i < 64; ++i) many += ", {circle: {center: [3, 2], radius: 0.8}}";
+  EXPECT_EQ(with(many), "task.yaml:18: task.obstacles: has 65 entries, which is outside [0, 64]");
+}
+
+TEST_F(ErrorTest, TransitionsOutsideTheDomain) {
+  const std::string good(kTransitions);
+  EXPECT_EQ(files_.Error(kTask, good + "0,0,5.5,0,0,0,0,0,0,0\n"),
+            "steps.csv:4: vx: 5.5 is outside [-5.4, 5.4] of domain.state");
+  EXPECT_EQ(files_.Error(kTask, good + "0,0,5.4,0,0,-3.5,0,0,0,0\n"),
+            "steps.csv:4: ay: -3.5 is outside [-3, 3] of domain.input");
+  EXPECT_EQ(files_.Error(kTask, good + "0,0,5.4,0,0,-3,0,0,0,0\n"), "");
+  const std::string ball =
+      Replaced(kTask, "  input: {", "  balls: [{coordinates: [vx, vy], center: [0, 0], radius: 5}]\n  input: {");
+  EXPECT_EQ(files_.Error(ball, good + "0,0,3,4,0,0,0,0,0,0\n"), "");
+  EXPECT_EQ(files_.Error(ball, good + "0,0,6e-1,-5.1,0,0,0,0,0,0\n").substr(0, 31), "steps.csv:4: vx, vy: distance 5");
+  EXPECT_THAT(files_.Error(ball, good + "0,0,3,5,0,0,0,0,0,0\n"),
+              testing::EndsWith(" is outside (-inf, 5] of domain.balls[0]"));
+  const std::string inequality =
+      Replaced(kTask, "  input: {", "  inequalities: [{coefficients: {vx: 1, ax: 2}, bound: 3}]\n  input: {");
+  EXPECT_EQ(files_.Error(inequality, good + "0,0,2,0,1,0,0,0,0,0\n"),
+            "steps.csv:4: vx, ax: sum 4 is outside (-inf, 3] of domain.inequalities[0]");
+}
+
+TEST_F(ErrorTest, TransitionsThatCannotBeRead) {
+  EXPECT_EQ(files_.ErrorWith("steps.csv", "none.csv"),
+            "task.yaml:12: transitions: none.csv: cannot be read: No such file or directory");
+  EXPECT_EQ(files_.Error(kTask, "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n"),
+            "steps.csv:2: no transitions; at least one is needed");
+  EXPECT_EQ(files_.Error(kTask, "px,py,vx,vy,ax,ay,px_next,py_next,vx_next\n"),
+            "steps.csv:1: vy_next: the column is missing");
+  EXPECT_EQ(files_.Error(kTask, std::string(kTransitions) + "0,0,0,0,0,0,0,0,nan,0\n"),
+            "steps.csv:4: vx_next: 'nan' is not a finite number");
+}
+
+TEST_F(ErrorTest, FilesThatAreNotTasks) {
+  EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML: "));
+  EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML: "));
+  EXPECT_EQ(files_.Error(""), "task.yaml:1: has 0 YAML documents, has to have 1");
+  EXPECT_EQ(files_.Error(std::string(kTask) + "---\nmore: 1\n"), "task.yaml:1: has 2 YAML documents, has to have 1");
+  EXPECT_EQ(files_.Error("just words\n"), "task.yaml:1: just words is not a map");
+  EXPECT_EQ(files_.Error("? [a, b]\n: 1\n"), "task.yaml:1: a list is not a key");
+  EXPECT_THAT(files_.Error(std::string(100000, '[')), HasSubstr("task.yaml:1: not valid YAML: "));
+  EXPECT_THAT(files_.Error(std::string((1 << 24) + 1, ' ')), HasSubstr("task.yaml: larger than 16777216 bytes"));
+}
+
+TEST_F(ErrorTest, FilesThatAreNotThere) {
+  EXPECT_THAT([&] { (void)LoadConfig(files_.directory().Path("none.yaml")); },
+              testing::ThrowsMessage<ConfigError>(
+                  files_.directory().Path("none.yaml: cannot be read: No such file or directory")));
+  EXPECT_THAT([&] { (void)LoadConfig(files_.directory().Path("")); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory, not a file")));
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,101 @@
+/** Task files to try: a good one, and the same with one thing changed. */
+#pragma once
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+#include "certifier/task/config.h"
+
+namespace forereach {
+
+/** A directory that goes with the object. */
+class ScratchDirectory {
+ public:
+  ScratchDirectory() {
+    std::string name = (std::filesystem::temp_directory_path() / "forereach-XXXXXX").string();
+    if (!mkdtemp(name.data())) throw std::runtime_error("no scratch directory");
+    path_ = name;
+  }
+  ~ScratchDirectory() { std::filesystem::remove_all(path_); }
+  ScratchDirectory(const ScratchDirectory&) = delete;
+  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
+
+  std::string Path(const std::string& name) const { return path_ + "/" + name; }
+  std::string Write(const std::string& name, const std::string& text) const {
+    std::ofstream(Path(name), std::ios::binary) << text;
+    return Path(name);
+  }
+
+ private:
+  std::string path_;
+};
+
+inline constexpr const char* kTransitions =
+    "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n"
+    "0,0,1,0,0.5,0,0.155,0,1.07,0\n"
+    "1,2,2,0.5,0,-0.5,1.3,2.07,2,0.42\n";
+
+// Only what is required. Errors are asserted by line, so keep one key a line.
+inline constexpr const char* kTask =
+    "model: {name: point_mass, dt: 0.15}\n"                      // 1
+    "domain:\n"                                                  // 2
+    "  state:\n"                                                 // 3
+    "    lower: [-20, -20, -5.4, -5.4]\n"                        // 4
+    "    upper: [20, 20, 5.4, 5.4]\n"                            // 5
+    "  input: {lower: [-3, -3], upper: [3, 3]}\n"                // 6
+    "declaration:\n"                                             // 7
+    "  lipschitz:\n"                                             // 8
+    "    vx: {vx: 0.1, vy: 0.05}\n"                              // 9
+    "    vy: {vx: 0.05, vy: 0.1}\n"                              // 10
+    "  noise_bound: [0, 0, 0.01, 0.01]\n"                        // 11
+    "transitions: steps.csv\n"                                   // 12
+    "task:\n"                                                    // 13
+    "  initial_set:\n"                                           // 14
+    "    center: [0, 0, 1, 0]\n"                                 // 15
+    "    half_width: [0.1, 0.1, 0.1, 0.1]\n"                     // 16
+    "  projection: [px, py]\n"                                   // 17
+    "  obstacles: [{circle: {center: [3, 2], radius: 0.8}}]\n";  // 18
+
+inline std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  if (at == std::string::npos || text.find(from, at + 1) != std::string::npos)
+    throw std::logic_error("not exactly once in the text: " + from);
+  return text.replace(at, from.size(), to);
+}
+
+/** Writes task and transitions into a scratch directory and loads them. */
+class TaskFiles {
+ public:
+  Config Load(const std::string& task = kTask, const std::string& transitions = kTransitions) const {
+    directory_.Write("steps.csv", transitions);
+    return LoadConfig(directory_.Write("task.yaml", task));
+  }
+  /** What LoadConfig says, with the directory cut off; empty if it accepts the file. */
+  std::string Error(const std::string& task, const std::string& transitions = kTransitions) const {
+    try {
+      (void)Load(task, transitions);
+      return {};
+    } catch (const ConfigError& error) {
+      return Cut(error.what());
+    }
+  }
+  /** The error of the good task file with `to` in the place of `from`. */
+  std::string ErrorWith(const std::string& from, const std::string& to) const {
+    return Error(Replaced(kTask, from, to));
+  }
+  std::string Cut(std::string text) const {
+    const std::string prefix = directory_.Path("");
+    for (std::size_t at; (at = text.find(prefix)) != std::string::npos;) text.erase(at, prefix.size());
+    return text;
+  }
+  const ScratchDirectory& directory() const { return directory_; }
+
+ private:
+  ScratchDirectory directory_;
+};
+
+}  // namespace forereach

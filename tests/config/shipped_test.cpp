@@ -1,0 +1,89 @@
+// The tasks in config/ do what they say, and its README says what the code does.
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/task/config.h"
+#include "certifier/task/schema.h"
+#include "robot/target.h"
+
+namespace forereach {
+namespace {
+
+const std::string kDirectory = FOREREACH_SOURCE_DIR "/config/";
+
+std::string Contents(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+TEST(Shipped, ReadmeListsTheKeysOfTheSchema) {
+  const std::string readme = Contents(kDirectory + "README.md");
+  const std::size_t keys = readme.find("## Keys\n");
+  ASSERT_NE(keys, std::string::npos);
+  EXPECT_EQ(readme.substr(keys), SchemaMarkdown()) << "everything from '## Keys' on is what `forereach keys` prints";
+}
+
+TEST(Shipped, EveryTaskLoads) {
+  int tasks = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(kDirectory)) {
+    if (entry.path().extension() != ".yaml") continue;
+    EXPECT_NO_THROW((void)LoadConfig(entry.path().string())) << entry.path();
+    ++tasks;
+  }
+  EXPECT_GE(tasks, 4);
+}
+
+TEST(Shipped, DeclarationsAreThePapers) {
+  const Declaration bicycle = LoadConfig(kDirectory + "bicycle.yaml").problem->declaration;
+  EXPECT_EQ(bicycle.lipschitz(2, 3), 0.017926410);
+  EXPECT_EQ(bicycle.lipschitz(2, 5), 0.609638820);
+  EXPECT_EQ((bicycle.lipschitz.array() != 0).count(), 2);
+  const Declaration point_mass = LoadConfig(kDirectory + "point_mass.yaml").problem->declaration;
+  EXPECT_EQ(point_mass.lipschitz(0, 2), 0.006914008);
+  EXPECT_EQ(point_mass.lipschitz(1, 2), 0.005689541);
+  EXPECT_EQ(point_mass.lipschitz(2, 2), 0.092186775);
+  EXPECT_EQ(point_mass.lipschitz(3, 2), 0.075860540);
+  EXPECT_EQ((point_mass.lipschitz.array() != 0).count(), 8);
+}
+
+// The commands that the task files quote.
+TEST(Shipped, TransitionsAreThoseOfTheirCommands) {
+  const auto made = [](const Config& config, int count, const std::vector<SampleRange>& ranges) {
+    return ObservationsDigest(*config.problem->model,
+                              MakeTransitions(*MakeTarget(config), *config.problem, 1, count, ranges));
+  };
+  const Config bicycle = LoadConfig(kDirectory + "bicycle.yaml");
+  EXPECT_EQ(bicycle.observations_digest, made(bicycle, 400, {{"v", 7.25, 15.75}, {"delta", 0, 0.45}}));
+  const Config point_mass = LoadConfig(kDirectory + "point_mass.yaml");
+  EXPECT_EQ(point_mass.observations_digest, made(point_mass, 100, {{"vx", -0.5, 3.5}, {"vy", -0.8, 0.8}}));
+}
+
+Outcome Certify(const std::string& task, const std::string& plan_name) {
+  const Config config = LoadConfig(kDirectory + task + ".yaml");
+  const Certifier certifier(config.problem);
+  const Eigen::MatrixXd controls = LoadPlan(kDirectory + "plans/" + plan_name + ".csv", *config.problem->model);
+  const auto inputs = static_cast<int>(controls.rows());
+  const Plan plan{controls.data(), inputs, static_cast<int>(controls.cols()), inputs};
+  const Zonotope initial_set = Zonotope::Enclose(config.initial_set);
+  certifier.Require(plan, initial_set, config.obstacles);
+  Tube tube;
+  return certifier.Certify(plan, initial_set, config.obstacles, tube).outcome;
+}
+
+TEST(Shipped, EachPlanGetsTheAnswerItIsNamedAfter) {
+  for (const std::string task : {"bicycle", "point_mass"}) {
+    EXPECT_EQ(Certify(task, task + "_certified"), Outcome::kCertified) << task;
+    EXPECT_EQ(Certify(task, task + "_domain"), Outcome::kDomain) << task;
+    EXPECT_EQ(Certify(task, task + "_safety"), Outcome::kSafety) << task;
+    EXPECT_EQ(Certify(task + "_falsified", task + "_certified"), Outcome::kFalsified) << task;
+  }
+}
+
+}  // namespace
+}  // namespace forereach

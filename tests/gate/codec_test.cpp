@@ -1,0 +1,151 @@
+#include "lcmtypes/codec.h"
+
+#include <map>
+#include <random>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/obstacle_t.hpp"
+#include "forereach/obstacles_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+
+namespace forereach {
+namespace {
+
+// The contract with everything that has ever been recorded or built against these messages. A changed type is a new
+// type with a new name, and a new line here; no line ever changes.
+struct Contract {
+  std::uint64_t fingerprint;
+  std::size_t bytes;
+};
+const std::map<std::string, Contract> kContracts = {
+    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}},  {"certified_plan_t", {0x7bf4494f969b9eeb, 41808}},
+    {"certifier_status_t", {0x553e2b8fcb2c6ae3, 248}}, {"decision_t", {0x6c785a9e0911c4e6, 466}},
+    {"execution_event_t", {0x4742c25e0eefd377, 336}},  {"obstacle_t", {0x29158dc0270b76d4, 406}},
+    {"obstacles_t", {0x9c72b610dc35fea7, 25498}},      {"robot_state_t", {0xe3677d78a66b57da, 166}},
+    {"transition_t", {0xa599cda800864690, 348}},
+};
+
+template <class Message>
+class MessageTest : public testing::Test {
+ protected:
+  // A message of random bits: every field differs from zero, doubles may be NaN with any payload.
+  std::vector<std::uint8_t> RandomBytes() {
+    std::vector<std::uint8_t> bytes = Encode(Message{});
+    for (std::size_t i = 8; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(random_());
+    return bytes;
+  }
+
+  const unsigned seed_ = std::random_device{}();
+  const testing::ScopedTrace trace_{__FILE__, __LINE__, "seed " + std::to_string(seed_)};
+  std::mt19937 random_{seed_};
+};
+
+using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_t, decision_t, execution_event_t,
+                                obstacle_t, obstacles_t, robot_state_t, transition_t>;
+TYPED_TEST_SUITE(MessageTest, Messages);
+
+TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {
+  const Contract contract = kContracts.at(TypeParam::getTypeName());
+  EXPECT_EQ(static_cast<std::uint64_t>(TypeParam::getHash()), contract.fingerprint) << "a changed type is a new type";
+  EXPECT_EQ(EncodedSize<TypeParam>(), contract.bytes);
+}
+
+TYPED_TEST(MessageTest, RoundTripKeepsEveryBit) {
+  for (int trial = 0; trial < 20; ++trial) {
+    const std::vector<std::uint8_t> bytes = this->RandomBytes();
+    TypeParam message{};
+    ASSERT_EQ(Decode(bytes, message), DecodeStatus::kOk);
+    EXPECT_EQ(Encode(message), bytes);
+  }
+}
+
+TYPED_TEST(MessageTest, EveryShorterLengthIsRefusedAndLeavesZero) {
+  const std::vector<std::uint8_t> bytes = this->RandomBytes(), zero = Encode(TypeParam{});
+  TypeParam message{};
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    ASSERT_EQ(Decode(Bytes(bytes).first(size), message), DecodeStatus::kWrongLength) << size;
+    if (size % 97 == 0) {
+      ASSERT_EQ(Encode(message), zero) << size;
+    }
+  }
+}
+
+TYPED_TEST(MessageTest, OneByteMoreIsRefused) {
+  std::vector<std::uint8_t> bytes = this->RandomBytes();
+  bytes.push_back(0);
+  TypeParam message{};
+  EXPECT_EQ(Decode(bytes, message), DecodeStatus::kTrailingBytes);
+  EXPECT_EQ(Encode(message), Encode(TypeParam{}));
+}
+
+TYPED_TEST(MessageTest, EveryBitOfTheFingerprintCounts) {
+  for (int bit = 0; bit < 64; ++bit) {
+    std::vector<std::uint8_t> bytes = this->RandomBytes();
+    bytes[static_cast<std::size_t>(bit / 8)] ^= static_cast<std::uint8_t>(1 << bit % 8);
+    TypeParam message{};
+    ASSERT_EQ(Decode(bytes, message), DecodeStatus::kUnknownFingerprint) << bit;
+    ASSERT_FALSE(Decoded<TypeParam>(bytes)) << bit;
+  }
+}
+
+TEST(CodecTest, NoMessageIsTakenForAnother) {
+  EXPECT_FALSE(Decoded<candidate_plan_t>(Encode(certified_plan_t{})));
+  EXPECT_FALSE(Decoded<certified_plan_t>(Encode(candidate_plan_t{})));
+  EXPECT_FALSE(Decoded<decision_t>(Encode(transition_t{})));
+}
+
+TEST(TextTest, FitsUpToOneByteLessThanTheField) {
+  std::uint8_t field[8];
+  for (const auto& [text, kept] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"", ""}, {"a", "a"}, {"1234567", "1234567"}, {"12345678", "1234567"}, {"123456789", "1234567"}}) {
+    std::fill(std::begin(field), std::end(field), std::uint8_t{0xff});
+    SetText(field, text);
+    EXPECT_EQ(GetText(field), kept);
+    for (std::size_t i = kept.size(); i < sizeof field; ++i) EXPECT_EQ(field[i], 0) << text << " " << i;
+  }
+}
+
+TEST(TextTest, ReadsAFieldWithoutZeroAndEndsAtTheFirst) {
+  const std::uint8_t full[4] = {'a', 'b', 'c', 'd'}, ended[4] = {'a', 0, 'c', 'd'};
+  EXPECT_EQ(GetText(full), "abcd");
+  EXPECT_EQ(GetText(ended), "a");
+}
+
+TEST(TextTest, ShowsOnlyPrintableAscii) {
+  const std::uint8_t field[6] = {0x1f, 0x20, 0x7e, 0x7f, 0x80, 0xff};
+  EXPECT_EQ(GetText(field), "? ~???");
+}
+
+TEST(DigestTest, IsBlake2bWith256Bits) {
+  // RFC 7693's algorithm with 32 bytes of output, no key.
+  EXPECT_EQ(ToHex(DigestOf(std::string_view(""))), "0e5751c026e543b2e8ab2eb06099daa1d1e5df47778f7787faab45cdf12fe3a8");
+  EXPECT_EQ(ToHex(DigestOf(std::string_view("abc"))),
+            "bddd813c634239723171ef3fee98579b94964e3bb1cb3e427262c8c068d52319");
+}
+
+TEST(DigestTest, GoesIntoAFieldAndBack) {
+  decision_t decision{};
+  const Digest digest = DigestOf(std::string_view("x"));
+  SetDigest(decision.plan_digest, digest);
+  EXPECT_EQ(GetDigest(decision.plan_digest), digest);
+}
+
+TEST(CertificateDigestTest, IsOfTheMessageWithThatFieldZero) {
+  certified_plan_t certified{};
+  certified.sequence = 7;
+  const Digest digest = DigestOf(Encode(certified));
+  SetDigest(certified.certificate_digest, DigestOf(std::string_view("anything")));
+  EXPECT_EQ(CertificateDigest(certified), digest);
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,215 @@
+// What the gate says of a candidate it has admitted: outcomes, witnesses, digests, slices, counts.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/gate/gate.h"
+#include "tests/gate/small_task.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+
+class GateAnswerTest : public testing::Test {
+ protected:
+  GateAnswer Decide(const candidate_plan_t& candidate) { return gate_.Decide(Encode(candidate), kNow); }
+
+  Config config_ = SmallTask();
+  Gate gate_{config_};
+};
+
+template <class Message>
+void ExpectDigestsOf(const Config& config, const Message& message) {
+  EXPECT_EQ(GetDigest(message.config_digest), config.digest);
+  EXPECT_EQ(GetDigest(message.model_digest), config.model_digest);
+  EXPECT_EQ(GetDigest(message.declaration_digest), config.declaration_digest);
+  EXPECT_EQ(GetDigest(message.observations_digest), config.observations_digest);
+  EXPECT_EQ(GetDigest(message.obstacles_digest), config.obstacles_digest);
+}
+
+TEST_F(GateAnswerTest, Certificate) {
+  const candidate_plan_t candidate = Candidate(7);
+  const GateAnswer answer = Decide(candidate);
+  const decision_t& decision = answer.decision;
+  EXPECT_EQ(decision.outcome, decision_t::CERTIFIED);
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_NONE);
+  EXPECT_EQ(decision.step, -1);
+  EXPECT_EQ(decision.coordinate, -1);
+  EXPECT_EQ(decision.obstacle, 0) << "the closest";
+  EXPECT_GT(decision.margin, decision.threshold);
+  EXPECT_EQ(decision.threshold, 0.5) << "the circle's radius";
+  EXPECT_EQ(decision.utime, kNow);
+  EXPECT_EQ(decision.plan_id, 7);
+  EXPECT_EQ(decision.candidate_utime, candidate.utime);
+  EXPECT_EQ(GetText(decision.source), "test");
+  EXPECT_THAT(GetText(decision.message), HasSubstr("certified"));
+  EXPECT_EQ(GetDigest(decision.plan_digest), DigestOf(Encode(candidate)));
+  ExpectDigestsOf(config_, decision);
+
+  ASSERT_TRUE(answer.certified);
+  const certified_plan_t& certified = *answer.certified;
+  EXPECT_EQ(certified.utime, kNow);
+  EXPECT_EQ(certified.expires_utime, kNow + 2'000'000);
+  EXPECT_EQ(Encode(certified.plan), Encode(candidate));
+  EXPECT_EQ(GetDigest(certified.plan_digest), DigestOf(Encode(candidate)));
+  EXPECT_EQ(GetDigest(certified.certificate_digest), CertificateDigest(certified));
+  ExpectDigestsOf(config_, certified);
+}
+
+TEST_F(GateAnswerTest, AbstentionForAnObstacle) {
+  const GateAnswer answer = Decide(Candidate(1, kAccelerationIntoTheCircle));
+  const decision_t& decision = answer.decision;
+  EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_SAFETY);
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_OBSTACLE);
+  EXPECT_EQ(decision.obstacle, 0);
+  EXPECT_GT(decision.step, 0);
+  EXPECT_LE(decision.step, 10);
+  EXPECT_LE(decision.margin, decision.threshold);
+  EXPECT_FALSE(answer.certified);
+  ExpectDigestsOf(config_, decision);
+}
+
+TEST_F(GateAnswerTest, AControlOutsideTheInputDomainIsAnAbstentionNotARejection) {
+  candidate_plan_t candidate = Candidate(1);
+  candidate.control[3][1] = 3;  // the bound is inside
+  EXPECT_EQ(Decide(candidate).decision.cause, decision_t::CAUSE_NONE);
+  candidate.plan_id = 2;
+  candidate.control[3][1] = std::nextafter(3.0, 4.0);
+  const GateAnswer answer = Decide(candidate);
+  EXPECT_EQ(answer.decision.outcome, decision_t::ABSTAIN_DOMAIN);
+  EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_DOMAIN_EXIT);
+  EXPECT_EQ(answer.decision.step, 3);
+  EXPECT_EQ(answer.decision.coordinate, 5) << "inputs follow the four states";
+  EXPECT_EQ(answer.decision.margin, std::nextafter(3.0, 4.0));
+  EXPECT_EQ(answer.decision.threshold, 3);
+  EXPECT_FALSE(answer.certified);
+}
+
+TEST_F(GateAnswerTest, DomainPrecedesSafety) {
+  EXPECT_EQ(Decide(Candidate(1, kAccelerationOutsideDomain)).decision.outcome, decision_t::ABSTAIN_DOMAIN);
+}
+
+TEST_F(GateAnswerTest, ContradictingDataGiveFWithThePair) {
+  Gate gate(FalsifiedTask());
+  for (const double acceleration :
+       {kAccelerationThatCertifies, kAccelerationIntoTheCircle, kAccelerationOutsideDomain}) {
+    const GateAnswer answer = gate.Decide(Encode(Candidate(static_cast<int>(acceleration) + 1, acceleration)), kNow);
+    EXPECT_EQ(answer.decision.outcome, decision_t::ABSTAIN_FALSIFIED);
+    EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_PAIRWISE);
+    EXPECT_EQ(answer.decision.first_observation, 0);
+    EXPECT_EQ(answer.decision.second_observation, 1);
+    EXPECT_EQ(answer.decision.coordinate, 2);
+    EXPECT_NEAR(answer.decision.margin, 0.01, 1e-12);
+    EXPECT_FALSE(answer.certified);
+  }
+}
+
+TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
+  std::vector<std::vector<std::uint8_t>> sent;
+  for (int round = 0; round < 10; ++round) {
+    sent.push_back(Encode(Candidate(3 * round)));
+    sent.push_back(Encode(Candidate(3 * round)));  // duplicate
+    sent.push_back({1, 2, 3});
+    sent.push_back(Encode(Candidate(3 * round + 1, kAccelerationIntoTheCircle)));
+    sent.push_back(Encode(Candidate(3 * round + 2, kAccelerationOutsideDomain)));
+  }
+  std::int64_t sequence = 0, certificates = 0;
+  for (const auto& bytes : sent) {
+    const GateAnswer answer = gate_.Decide(bytes, kNow);
+    EXPECT_EQ(answer.decision.sequence, sequence++);
+    EXPECT_EQ(GetDigest(answer.decision.plan_digest), DigestOf(Bytes(bytes)));
+    if (answer.certified) {
+      EXPECT_EQ(answer.certified->sequence, certificates++);
+    }
+  }
+  const certifier_status_t status = gate_.Status(kNow + 5);
+  EXPECT_EQ(status.utime, kNow + 5);
+  EXPECT_EQ(status.candidates, 50);
+  EXPECT_EQ(status.certified, 10);
+  EXPECT_EQ(status.abstained_falsified, 0);
+  EXPECT_EQ(status.abstained_domain, 10);
+  EXPECT_EQ(status.abstained_safety, 10);
+  EXPECT_EQ(status.rejected, 20);
+  EXPECT_EQ(certificates, 10);
+  ExpectDigestsOf(config_, status);
+}
+
+TEST_F(GateAnswerTest, FirstSliceContainsTheInitialSetAndAllAreTheTubesHulls) {
+  const candidate_plan_t candidate = Candidate(1);
+  const GateAnswer answer = Decide(candidate);
+  ASSERT_TRUE(answer.certified);
+  for (int k = 0; k < 4; ++k) {
+    // Exact: centers and half-widths differ by few binary orders, a long double has 11 bits to spare.
+    const long double center = candidate.initial_center[k], half_width = candidate.initial_half_width[k];
+    EXPECT_LE(answer.certified->slice_lower[0][k], center - half_width);
+    EXPECT_GE(answer.certified->slice_upper[0][k], center + half_width);
+    EXPECT_NEAR(answer.certified->slice_upper[0][k], static_cast<double>(center + half_width), 1e-15);
+    for (int t = 0; t <= 10; ++t) {
+      EXPECT_EQ(answer.certified->slice_lower[t][k], gate_.tube().slice(t).Hull(k).lower);
+      EXPECT_EQ(answer.certified->slice_upper[t][k], gate_.tube().slice(t).Hull(k).upper);
+    }
+  }
+}
+
+TEST_F(GateAnswerTest, SlicesContainRolloutsFromTheCornersOfTheInitialSet) {
+  const candidate_plan_t candidate = Candidate(1, 1);
+  const GateAnswer answer = Decide(candidate);
+  ASSERT_TRUE(answer.certified) << GetText(answer.decision.message);
+  for (unsigned corner = 0; corner < 16; ++corner) {
+    std::array<double, 6> z{};
+    for (unsigned k = 0; k < 4; ++k)  // just inside, by more than the rounding of the rollout
+      z[k] = candidate.initial_center[k] + (corner >> k & 1 ? 1 : -1) * (1 - 1e-12) * candidate.initial_half_width[k];
+    for (int t = 0; t <= 10; ++t) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        EXPECT_LE(answer.certified->slice_lower[t][k], z[k]) << t << " " << k;
+        EXPECT_GE(answer.certified->slice_upper[t][k], z[k]) << t << " " << k;
+      }
+      z[4] = candidate.control[t][0], z[5] = candidate.control[t][1];
+      std::array<double, 4> next;
+      config_.problem->model->Evaluate(z, next);
+      std::ranges::copy(next, z.begin());
+    }
+  }
+}
+
+TEST_F(GateAnswerTest, UnusedSliceEntriesAreZeroEvenAfterALongerPlan) {
+  candidate_plan_t longer = Candidate(1);
+  longer.num_steps = 14;
+  ASSERT_TRUE(Decide(longer).certified);
+  const GateAnswer answer = Decide(Candidate(2));
+  ASSERT_TRUE(answer.certified);
+  for (int t = 0; t <= 128; ++t) {
+    for (int k = 0; k < 16; ++k) {
+      if (t <= 10 && k < 4) continue;
+      ASSERT_EQ(answer.certified->slice_lower[t][k], 0) << t << " " << k;
+      ASSERT_EQ(answer.certified->slice_upper[t][k], 0) << t << " " << k;
+    }
+  }
+}
+
+TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheCertificate) {
+  const GateAnswer answer = Decide(Candidate(1));
+  ASSERT_TRUE(answer.certified);
+  const std::vector<std::uint8_t> good = Encode(*answer.certified);
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  for (std::size_t i = random() % 7; i < good.size(); i += 7) {
+    std::vector<std::uint8_t> bytes = good;
+    bytes[i] ^= static_cast<std::uint8_t>(1u << random() % 8);
+    const auto tampered = Decoded<certified_plan_t>(bytes);
+    ASSERT_EQ(tampered.has_value(), i >= 8) << i;
+    if (tampered) {
+      ASSERT_NE(CertificateDigest(*tampered), GetDigest(tampered->certificate_digest)) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace forereach

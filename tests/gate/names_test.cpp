@@ -1,0 +1,112 @@
+#include "lcmtypes/names.h"
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace forereach {
+namespace {
+
+using Constants = std::map<std::string, int>;
+
+// NAME = NUMBER of every `const` line of an .lcm file.
+Constants ConstantsOf(const std::string& type) {
+  std::ifstream file(std::string(FOREREACH_SOURCE_DIR "/lcmtypes/") + type + ".lcm");
+  std::stringstream text;
+  text << std::regex_replace(std::string(std::istreambuf_iterator<char>(file), {}), std::regex("//[^\n]*"), "");
+  Constants constants;
+  static const std::regex statement("const\\s+int16_t\\s+([^;]*);"), assignment("(\\w+)\\s*=\\s*(-?\\d+)");
+  const std::string all = text.str();
+  for (std::sregex_iterator s(all.begin(), all.end(), statement), end; s != end; ++s) {
+    const std::string list = (*s)[1];
+    for (std::sregex_iterator a(list.begin(), list.end(), assignment); a != end; ++a)
+      constants[(*a)[1]] = std::stoi((*a)[2]);
+  }
+  return constants;
+}
+
+std::string LowerCase(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+std::pair<Constants, Constants> OutcomesAndCauses() {
+  std::pair<Constants, Constants> parts;
+  for (const auto& [name, number] : ConstantsOf("decision_t")) {
+    if (name.starts_with("CAUSE_"))
+      parts.second[name.substr(6)] = number;
+    else
+      parts.first[name] = number;
+  }
+  return parts;
+}
+
+// Each constant is named as in the .lcm file, no two share a number, and no other number has a name.
+void ExpectNamed(const Constants& constants, std::string_view (*name_of)(std::int16_t)) {
+  std::set<int> numbers;
+  for (const auto& [name, number] : constants) {
+    EXPECT_EQ(name_of(static_cast<std::int16_t>(number)), LowerCase(name));
+    EXPECT_TRUE(numbers.insert(number).second) << name << ": " << number << " is taken";
+  }
+  for (int number = std::numeric_limits<std::int16_t>::min(); number <= std::numeric_limits<std::int16_t>::max();
+       ++number)
+    if (!numbers.contains(number)) {
+      ASSERT_EQ(name_of(static_cast<std::int16_t>(number)), "unknown") << number;
+    }
+}
+
+TEST(NamesTest, EveryOutcomeHasItsName) { ExpectNamed(OutcomesAndCauses().first, OutcomeName); }
+
+TEST(NamesTest, EveryCauseHasItsName) { ExpectNamed(OutcomesAndCauses().second, CauseName); }
+
+TEST(NamesTest, EveryEventHasItsName) { ExpectNamed(ConstantsOf("execution_event_t"), EventName); }
+
+// Recorded logs carry the numbers, and the fingerprint does not cover them: a new constant gets a new line, no line
+// ever changes.
+TEST(NamesTest, NumbersAreNeverReused) {
+  const auto [outcomes, causes] = OutcomesAndCauses();
+  EXPECT_EQ(
+      outcomes,
+      (Constants{
+          {"CERTIFIED", 1}, {"ABSTAIN_FALSIFIED", 2}, {"ABSTAIN_DOMAIN", 3}, {"ABSTAIN_SAFETY", 4}, {"REJECTED", 5}}));
+  EXPECT_EQ(causes, (Constants{{"NONE", 0},
+                               {"PAIRWISE", 1},
+                               {"DOMAIN_EXIT", 2},
+                               {"NO_FINITE_ENCLOSURE", 3},
+                               {"OBSTACLE", 4},
+                               {"STALE", 10},
+                               {"FUTURE", 11},
+                               {"DUPLICATE", 12},
+                               {"WRONG_LENGTH", 13},
+                               {"TRAILING_BYTES", 14},
+                               {"UNKNOWN_FINGERPRINT", 15},
+                               {"WRONG_DIMENSION", 16},
+                               {"NON_FINITE", 17},
+                               {"TOO_MANY_SOURCES", 18},
+                               {"TOO_LATE", 19},
+                               {"QUEUE_FULL", 20},
+                               {"INTERNAL_ERROR", 21}}));
+  EXPECT_EQ(ConstantsOf("execution_event_t"), (Constants{{"ACCEPTED", 1},
+                                                         {"REFUSED", 2},
+                                                         {"STARTED", 3},
+                                                         {"STEP_INSIDE", 4},
+                                                         {"STEP_OUTSIDE", 5},
+                                                         {"TAIL_BEGUN", 6},
+                                                         {"STANDING", 7},
+                                                         {"GOAL_REACHED", 8},
+                                                         {"CONTACT", 9}}));
+  EXPECT_EQ(ConstantsOf("robot_state_t"), (Constants{{"STANDING", 1}, {"EXECUTING", 2}, {"FINISHED", 3}}));
+  EXPECT_EQ(ConstantsOf("obstacle_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
+}
+
+}  // namespace
+}  // namespace forereach

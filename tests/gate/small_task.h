@@ -1,0 +1,80 @@
+/** A small task made in code, and candidates that get each outcome from it.
+
+A point mass with dt = 0.15 s that is exactly its nominal model, and a circle of 0.5 m at (3.5, 0). From X_0 around the
+origin at 1 m/s along px, ten steps without control stay clear of the circle, 2 m/s^2 drive into it, and 4 m/s^2 lie
+outside the input domain. */
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "certifier/dynamics/models.h"
+#include "certifier/task/config.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "lcmtypes/codec.h"
+
+namespace forereach {
+
+inline constexpr std::int64_t kNow = 1'700'000'000'000'000;
+
+inline Config SmallTask() {
+  Problem problem;
+  problem.model = MakePointMass(0.15);
+  problem.domain.state = Box(Eigen::Vector4d(-20, -20, -5, -5), Eigen::Vector4d(20, 20, 5, 5));
+  problem.domain.input = Box(Eigen::Vector2d(-3, -3), Eigen::Vector2d(3, 3));
+  problem.declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
+  problem.transitions.z = Eigen::MatrixXd{{0, 0, 1, 0, 0, 0}, {1, 2, -1, 0.5, 0.25, -0.5}};
+  problem.transitions.x_next.resize(2, 4);
+  for (int i = 0; i < 2; ++i) {
+    const Eigen::VectorXd z = problem.transitions.z.row(i);
+    Eigen::VectorXd next(4);
+    problem.model->Evaluate({z.data(), 6}, {next.data(), 4});
+    problem.transitions.x_next.row(i) = next;
+  }
+  problem.projection = Eigen::MatrixXd::Identity(2, 4);
+
+  Config config;
+  config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)};
+  config.digest = DigestOf(std::string_view("small task"));
+  config.model_digest = ModelDigest(*problem.model);
+  config.declaration_digest = DeclarationDigest(*problem.model, problem.declaration);
+  config.observations_digest = ObservationsDigest(*problem.model, problem.transitions);
+  config.obstacles_digest = ObstaclesDigest(config.obstacles);
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  return config;
+}
+
+/** The same with a second observation that a constant residual cannot explain: F. */
+inline Config FalsifiedTask() {
+  Config config = SmallTask();
+  Problem problem = *config.problem;
+  problem.transitions.x_next(1, 2) += 0.01;
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  return config;
+}
+
+inline constexpr double kAccelerationThatCertifies = 0, kAccelerationIntoTheCircle = 2, kAccelerationOutsideDomain = 4;
+
+/** Ten steps with a constant acceleration along px, sent now, to start in half a second. */
+inline candidate_plan_t Candidate(std::int64_t plan_id, double acceleration = kAccelerationThatCertifies,
+                                  std::int64_t now_us = kNow) {
+  candidate_plan_t candidate{};
+  candidate.utime = now_us;
+  candidate.plan_id = plan_id;
+  SetText(candidate.source, "test");
+  candidate.start_utime = now_us + 500'000;
+  candidate.step_us = 150'000;
+  candidate.num_states = 4;
+  candidate.num_inputs = 2;
+  candidate.num_steps = 10;
+  candidate.progress_steps = 6;
+  candidate.initial_center[2] = 1;
+  candidate.initial_center[3] = 0.1;
+  for (int k = 0; k < 4; ++k) candidate.initial_half_width[k] = 0.05;
+  for (int t = 0; t < 10; ++t) candidate.control[t][0] = acceleration;
+  return candidate;
+}
+
+}  // namespace forereach

@@ -1,0 +1,160 @@
+#include "logger/database.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "tests/logger/scratch.h"
+
+namespace forereach {
+namespace {
+
+void Sql(const std::string& path, const char* sql) {
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &handle), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(handle, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(handle);
+  sqlite3_close(handle);
+}
+
+Rows SampleRows() {
+  Rows rows;
+  DecisionRow& decision = rows.decisions.emplace_back();
+  decision.event = {"a.lcmlog", 7};
+  decision.utime = 11;
+  decision.candidate_utime = 12;
+  decision.sequence = 13;
+  decision.plan_id = 14;
+  decision.source = "planner";
+  decision.outcome = "abstain_safety";
+  decision.cause = "obstacle";
+  decision.message = "it's \"near\"; DROP TABLE decisions";
+  decision.step = 3;
+  decision.coordinate = 4;
+  decision.obstacle = 5;
+  decision.first_observation = 6;
+  decision.second_observation = 8;
+  decision.margin = 0.1;
+  decision.threshold = -INFINITY;
+  decision.elapsed_us = 1.5;
+  decision.plan_digest = "00ff";
+  EventRow& event = rows.events.emplace_back();
+  event.event = {"a.lcmlog", 8};
+  event.kind = "goal_reached";
+  event.state = {0.1, -2, 1e300};
+  event.value = 0.7;
+  GapRow& gap = rows.gaps.emplace_back();
+  gap.event = {"a.lcmlog", 9};
+  gap.channel = "C";
+  gap.source = "s";
+  gap.expected = 4;
+  gap.got = 6;
+  gap.lost = 2;
+  gap.utime = 15;
+  gap.reason = "bus";
+  return rows;
+}
+
+TEST(Database, RoundTrip) {
+  const Scratch scratch;
+  Database database(scratch / "d.sqlite");
+  database.BeginRun("a.lcmlog", 10);
+  EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
+  const Rows rows = database.Read("a.lcmlog");
+  ASSERT_EQ(rows.decisions.size(), 1u);
+  const DecisionRow& decision = rows.decisions[0];
+  EXPECT_EQ(decision.event.event_number, 7);
+  EXPECT_EQ(decision.utime, 11);
+  EXPECT_EQ(decision.candidate_utime, 12);
+  EXPECT_EQ(decision.sequence, 13);
+  EXPECT_EQ(decision.plan_id, 14);
+  EXPECT_EQ(decision.source, "planner");
+  EXPECT_EQ(decision.outcome, "abstain_safety");
+  EXPECT_EQ(decision.cause, "obstacle");
+  EXPECT_EQ(decision.message, SampleRows().decisions[0].message);
+  EXPECT_EQ(decision.step, 3);
+  EXPECT_EQ(decision.coordinate, 4);
+  EXPECT_EQ(decision.obstacle, 5);
+  EXPECT_EQ(decision.first_observation, 6);
+  EXPECT_EQ(decision.second_observation, 8);
+  EXPECT_EQ(decision.margin, 0.1);
+  EXPECT_EQ(decision.threshold, -INFINITY);
+  EXPECT_EQ(decision.elapsed_us, 1.5);
+  EXPECT_TRUE(std::isnan(decision.latency_us));
+  EXPECT_EQ(decision.plan_digest, "00ff");
+  ASSERT_EQ(rows.events.size(), 1u);
+  EXPECT_EQ(rows.events[0].kind, "goal_reached");
+  EXPECT_EQ(rows.events[0].state, (std::vector<double>{0.1, -2, 1e300}));
+  EXPECT_EQ(rows.events[0].value, 0.7);
+  ASSERT_EQ(rows.gaps.size(), 1u);
+  EXPECT_EQ(rows.gaps[0].expected, 4);
+  EXPECT_EQ(rows.gaps[0].got, 6);
+  EXPECT_EQ(rows.gaps[0].lost, 2);
+  EXPECT_EQ(rows.gaps[0].reason, "bus");
+  EXPECT_TRUE(database.Read("b.lcmlog").empty());
+}
+
+TEST(Database, WritesARowOnce) {
+  const Scratch scratch;
+  Database database(scratch / "d.sqlite");
+  EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
+  EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 0);
+  EXPECT_EQ(database.Read().decisions.size(), 1u);
+}
+
+TEST(Database, KeepsRunsOverReopening) {
+  const Scratch scratch;
+  {
+    Database database(scratch / "d.sqlite");
+    database.BeginRun("a.lcmlog", 10);
+    database.BeginRun("b.lcmlog", 20);
+    ASSERT_TRUE(database.Write({}, "a.lcmlog", 5));
+    database.EndRun("a.lcmlog", 15, "mended");
+  }
+  Database database(scratch / "d.sqlite");
+  const std::vector<RunRow> runs = database.Runs();
+  ASSERT_EQ(runs.size(), 2u);
+  EXPECT_EQ(runs[0].log_file, "a.lcmlog");
+  EXPECT_EQ(runs[0].end_utime, 15);
+  EXPECT_EQ(runs[0].events, 5);
+  EXPECT_EQ(runs[0].schema, Database::kSchemaVersion);
+  EXPECT_EQ(runs[0].recovered, "mended");
+  EXPECT_EQ(runs[1].end_utime, std::nullopt);
+}
+
+TEST(Database, RefusesANewerSchema) {
+  const Scratch scratch;
+  { const Database database(scratch / "d.sqlite"); }
+  Sql(scratch / "d.sqlite", "PRAGMA user_version = 99");
+  try {
+    const Database database(scratch / "d.sqlite");
+    FAIL() << "accepted";
+  } catch (const DatabaseError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("99"), testing::HasSubstr("d.sqlite")));
+  }
+}
+
+TEST(Database, RefusesAnotherProgramsFile) {
+  const Scratch scratch;
+  Sql(scratch / "d.sqlite", "CREATE TABLE other (x)");
+  EXPECT_THROW(Database(scratch / "d.sqlite"), DatabaseError);
+  WriteBytes(scratch / "text", std::vector<std::uint8_t>(5000, 'x'));
+  EXPECT_THROW(Database(scratch / "text"), DatabaseError);
+  EXPECT_THROW(Database(scratch / "no/such/directory"), DatabaseError);
+}
+
+TEST(Database, WritesAllOrNothing) {
+  const Scratch scratch;
+  Database database(scratch / "d.sqlite");
+  Sql(scratch / "d.sqlite",
+      "CREATE TRIGGER full BEFORE INSERT ON gaps BEGIN SELECT RAISE(ABORT, 'database or disk is full'); END");
+  EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), std::nullopt);
+  EXPECT_THAT(database.problem(), testing::HasSubstr("disk is full"));
+  EXPECT_TRUE(database.Read().empty());
+  Sql(scratch / "d.sqlite", "DROP TRIGGER full");
+  EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
+}
+
+}  // namespace
+}  // namespace forereach

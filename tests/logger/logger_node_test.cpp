@@ -1,0 +1,364 @@
+#include "logger/logger_node.h"
+
+#include <csignal>
+#include <random>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "forereach/obstacles_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "tests/logger/scratch.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kStart = 1'700'000'000'000'000;  // 2023-11-14 22:13:20 UTC
+
+/** Hands every message to the subscribers at once. */
+class DirectBus final : public Bus {
+ public:
+  explicit DirectBus(std::int64_t start = kStart) : now_us(start) {}
+
+  using Bus::Publish;
+  void Subscribe(const std::string& channel, Handler handler) override { handlers_.emplace_back(channel, std::move(handler)); }
+  bool Publish(const std::string& channel, Bytes bytes) override {
+    for (const auto& [pattern, handler] : handlers_)
+      if (pattern == ".*" || pattern == channel) handler({channel, bytes, now_us});
+    return true;
+  }
+  int Dispatch(int) override { return 0; }
+  std::int64_t dropped() const override { return dropped_count; }
+
+  std::int64_t now_us;
+  std::int64_t dropped_count = 0;
+
+ private:
+  std::vector<std::pair<std::string, Handler>> handlers_;
+};
+
+class LoggerNodeTest : public testing::Test {
+ protected:
+  LoggerNodeTest() { config_.logger.directory = scratch_ / "log"; }
+
+  Rows ReadRows() { return Database(scratch_ / "log/decisions.sqlite").Read(); }
+  std::vector<RunRow> Runs() { return Database(scratch_ / "log/decisions.sqlite").Runs(); }
+
+  Scratch scratch_;
+  Config config_;
+  DirectBus bus_;
+  std::ostringstream out_;
+};
+
+TEST_F(LoggerNodeTest, RecordsEverythingAndSummarises) {
+  std::string log_path;
+  {
+    LoggerNode node(config_, bus_, out_);
+    EXPECT_TRUE(node.recovered().empty());
+    node.Tick(bus_.now_us);
+    log_path = node.log_path();
+    EXPECT_THAT(log_path, testing::EndsWith("/events-20231114-221320.lcmlog"));
+    const candidate_plan_t first = MakeCandidate(0, 100), second = MakeCandidate(1, 101);
+    bus_.Publish("PLAN_CANDIDATE", first);
+    bus_.now_us += 150;
+    bus_.Publish("PLAN_DECISION", MakeDecision(first, 0, decision_t::CERTIFIED, decision_t::CAUSE_NONE));
+    bus_.Publish("PLAN_CANDIDATE", second);
+    bus_.now_us += 350;
+    bus_.Publish("PLAN_DECISION", MakeDecision(second, 1, decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT));
+    bus_.Publish("EXECUTION_EVENT", MakeEvent(0, execution_event_t::STEP_INSIDE));
+    const std::vector<std::uint8_t> junk{1, 2, 3};
+    bus_.Publish("PLAN_DECISION", Bytes(junk));
+    bus_.Publish("ANYTHING_ELSE", Bytes(junk));
+    node.Tick(bus_.now_us);
+    node.Stop();
+  }
+  const LogContents log = ReadLog(log_path);
+  EXPECT_EQ(log.end, LogStatus::kEnd);
+  ASSERT_EQ(log.events.size(), 7u);
+  EXPECT_EQ(log.events[0].utime, kStart);
+  EXPECT_EQ(log.events[6].channel, "ANYTHING_ELSE");
+
+  const Rows rows = ReadRows();
+  ASSERT_EQ(rows.decisions.size(), 2u);
+  EXPECT_EQ(rows.decisions[0].event.log_file, "events-20231114-221320.lcmlog");
+  EXPECT_EQ(rows.decisions[0].event.event_number, 1);
+  EXPECT_EQ(rows.decisions[0].latency_us, 150);
+  EXPECT_EQ(rows.decisions[0].outcome, "certified");
+  EXPECT_EQ(rows.decisions[1].latency_us, 350);
+  EXPECT_EQ(rows.decisions[1].cause, "domain_exit");
+  EXPECT_EQ(rows.decisions[1].source, "test");
+  ASSERT_EQ(rows.events.size(), 1u);
+  EXPECT_EQ(rows.events[0].kind, "step_inside");
+  EXPECT_TRUE(rows.gaps.empty());
+  EXPECT_EQ(Runs()[0].end_utime, bus_.now_us);
+  EXPECT_THAT(out_.str(), testing::AllOf(testing::HasSubstr(log_path), testing::HasSubstr("domain_exit 1"),
+                                         testing::HasSubstr("PLAN_CANDIDATE 2"),
+                                         testing::HasSubstr("p50 150.0 us, p99 350.0 us")));
+}
+
+TEST_F(LoggerNodeTest, FlushesOnTimeOnly) {
+  config_.logger.flush_ms = 100;
+  LoggerNode node(config_, bus_, out_);
+  node.Tick(kStart);
+  bus_.Publish("PLAN_DECISION", MakeDecision({}, 0, 1, 0));
+  node.Tick(kStart + 99'999);
+  EXPECT_EQ(std::filesystem::file_size(node.log_path()), 0u);
+  node.Tick(kStart + 100'000);
+  EXPECT_EQ(ReadLog(node.log_path()).events.size(), 1u);
+  EXPECT_EQ(ReadRows().decisions.size(), 1u);
+}
+
+TEST_F(LoggerNodeTest, ARunNeverWritesIntoAnOlderFile) {
+  for (int run = 0; run < 3; ++run) {
+    DirectBus bus;
+    LoggerNode node(config_, bus, out_);
+    node.Tick(kStart);
+    bus.Publish("C", MakeEvent(0, 1));
+    node.Stop();
+    EXPECT_EQ(ReadLog(node.log_path()).events.size(), 1u);
+  }
+  EXPECT_EQ(Runs().size(), 3u);
+  EXPECT_EQ(Runs()[2].log_file, "events-20231114-221320-3.lcmlog");
+}
+
+TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
+  LoggerNode node(config_, bus_, out_);
+  node.Tick(kStart);
+  const auto candidate = [this](std::int64_t sequence, const std::string& source) {
+    bus_.Publish("PLAN_CANDIDATE", MakeCandidate(sequence, sequence, source));
+  };
+  candidate(7, "a");  // joined midway: what came before is not known to be lost
+  candidate(0, "b");
+  candidate(8, "a");
+  candidate(11, "a");
+  candidate(1, "b");
+  candidate(0, "a");
+  candidate(1, "a");
+  bus_.Publish("OBSTACLES", [] {
+    obstacles_t obstacles{};
+    obstacles.sequence = 5;  // only has to grow
+    return obstacles;
+  }());
+  bus_.Publish("OBSTACLES", [] {
+    obstacles_t obstacles{};
+    obstacles.sequence = 9;
+    return obstacles;
+  }());
+  node.Tick(kStart);
+  node.Stop();
+  const Rows rows = ReadRows();
+  ASSERT_EQ(rows.gaps.size(), 2u);
+  EXPECT_EQ(rows.gaps[0].channel, "PLAN_CANDIDATE");
+  EXPECT_EQ(rows.gaps[0].source, "a");
+  EXPECT_EQ(rows.gaps[0].expected, 9);
+  EXPECT_EQ(rows.gaps[0].got, 11);
+  EXPECT_EQ(rows.gaps[0].lost, 2);
+  EXPECT_EQ(rows.gaps[0].reason, "bus");
+  EXPECT_EQ(rows.gaps[0].event.event_number, 3);
+  EXPECT_EQ(rows.gaps[1].reason, "restart");
+  EXPECT_EQ(rows.gaps[1].lost, 0);
+}
+
+TEST_F(LoggerNodeTest, RecordsOverflowOnce) {
+  config_.logger.queue = 4;
+  LoggerNode node(config_, bus_, out_);
+  node.Tick(kStart);
+  for (int i = 0; i < 10; ++i) bus_.Publish("EXECUTION_EVENT", MakeEvent(i, execution_event_t::STARTED));
+  node.Tick(kStart);
+  for (int i = 11; i < 13; ++i) bus_.Publish("EXECUTION_EVENT", MakeEvent(i, execution_event_t::STARTED));
+  node.Tick(kStart);
+  bus_.dropped_count = 5;
+  node.Tick(kStart);
+  node.Stop();
+  const Rows rows = ReadRows();
+  EXPECT_EQ(rows.events.size(), 6u);
+  ASSERT_EQ(rows.gaps.size(), 3u);
+  EXPECT_EQ(rows.gaps[0].reason, "queue");
+  EXPECT_EQ(rows.gaps[0].channel, "EXECUTION_EVENT");
+  EXPECT_EQ(rows.gaps[0].lost, 6);
+  EXPECT_EQ(rows.gaps[1].reason, "bus");
+  EXPECT_EQ(rows.gaps[1].lost, 1) << "the six dropped here must not be counted again";
+  EXPECT_EQ(rows.gaps[2].reason, "backlog");
+  EXPECT_EQ(rows.gaps[2].lost, 5);
+  EXPECT_THAT(out_.str(), testing::HasSubstr("7 (bus 1, queue 6)"));
+}
+
+TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
+  LoggerNode node(config_, bus_, out_);
+  node.Tick(kStart);
+  bus_.Publish("EXECUTION_EVENT", MakeEvent(0, execution_event_t::STARTED));
+  node.Tick(kStart + 1'000'000);
+  const auto size = std::filesystem::file_size(node.log_path());
+
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit full{size + 10, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
+  for (int i = 1; i < 4; ++i) bus_.Publish("EXECUTION_EVENT", MakeEvent(i, execution_event_t::STARTED));
+  node.Tick(kStart + 2'000'000);
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_EQ(std::filesystem::file_size(node.log_path()), size) << "no torn record stays";
+
+  bus_.Publish("EXECUTION_EVENT", MakeEvent(4, execution_event_t::STANDING));
+  node.Tick(kStart + 3'000'000);
+  node.Stop();
+  const LogContents log = ReadLog(node.log_path());
+  ASSERT_EQ(log.events.size(), 2u);
+  EXPECT_EQ(log.events[1].number, 4);
+  EXPECT_EQ(log.corruptions, 0);
+  const Rows rows = ReadRows();
+  EXPECT_EQ(rows.events.size(), 2u);
+  ASSERT_EQ(rows.gaps.size(), 1u);
+  EXPECT_EQ(rows.gaps[0].reason, "disk");
+  EXPECT_EQ(rows.gaps[0].channel, "EXECUTION_EVENT");
+  EXPECT_EQ(rows.gaps[0].lost, 3);
+}
+
+TEST_F(LoggerNodeTest, SaysSoIfItCannotWrite) {
+  WriteBytes(scratch_ / "file", {1});
+  config_.logger.directory = scratch_ / "file/below";
+  EXPECT_THROW(LoggerNode(config_, bus_, out_), LogError);
+}
+
+TEST_F(LoggerNodeTest, MakesMissingRowsAgainFromTheLog) {
+  std::filesystem::create_directories(config_.logger.directory);
+  const std::string log = scratch_ / "log/a.lcmlog";
+  {
+    Database database(scratch_ / "log/decisions.sqlite");
+    database.BeginRun("a.lcmlog", kStart);
+    database.BeginRun("never-written.lcmlog", kStart);
+    EventLogWriter writer(log);
+    const candidate_plan_t candidate = MakeCandidate(0, 1);
+    writer.Append(kStart, "PLAN_CANDIDATE", Encode(candidate));
+    writer.Append(kStart + 70, "PLAN_DECISION", Encode(MakeDecision(candidate, 0, decision_t::CERTIFIED, 0)));
+    writer.Append(kStart + 90, "PLAN_DECISION", Encode(MakeDecision({}, 3, decision_t::REJECTED, 11)));
+    ASSERT_TRUE(writer.Flush());
+  }
+  std::vector<std::uint8_t> bytes = ReadBytes(log);
+  const std::size_t size = bytes.size();
+  bytes.insert(bytes.end(), bytes.begin(), bytes.begin() + 50);  // the beginning of one more record
+  WriteBytes(log, bytes);
+  for (int start = 0; start < 2; ++start) {
+    DirectBus bus;
+    const LoggerNode node(config_, bus, out_);
+    ASSERT_EQ(node.recovered().size(), start == 0 ? 2u : 0u) << "a mended run is mended once";
+    if (start > 0) break;
+    EXPECT_THAT(node.recovered()[0], testing::AllOf(testing::HasSubstr("3 events kept"), testing::HasSubstr("50 bytes"),
+                                                    testing::HasSubstr("3 rows written")));
+    EXPECT_THAT(node.recovered()[1], testing::HasSubstr("no log file was written"));
+  }
+  EXPECT_EQ(std::filesystem::file_size(log), size);
+  const Rows rows = ReadRows();
+  ASSERT_EQ(rows.decisions.size(), 2u);
+  EXPECT_EQ(rows.decisions[0].latency_us, 70);
+  EXPECT_EQ(rows.decisions[1].cause, "future");
+  ASSERT_EQ(rows.gaps.size(), 1u);
+  EXPECT_EQ(rows.gaps[0].lost, 2);
+  EXPECT_EQ(Runs()[0].end_utime, kStart + 90);
+  EXPECT_THAT(Runs()[0].recovered, testing::HasSubstr("cut tail of 50 bytes"));
+}
+
+TEST_F(LoggerNodeTest, LeavesARunningLoggersFileAlone) {
+  LoggerNode running(config_, bus_, out_);
+  running.Tick(kStart);
+  DirectBus other;
+  const LoggerNode second(config_, other, out_);
+  EXPECT_TRUE(second.recovered().empty());
+  EXPECT_EQ(Runs()[0].end_utime, std::nullopt);
+}
+
+/** Runs a logger that is fed without end; reports to `report` how many messages had been fed at each flush. */
+[[noreturn]] void RunUntilKilled(const Config& config, int report) {
+  DirectBus bus;
+  std::ostringstream out;
+  LoggerNode node(config, bus, out);
+  node.Tick(bus.now_us);
+  for (std::int64_t fed = 0;; fed += 2) {
+    const candidate_plan_t candidate = MakeCandidate(fed / 2, fed / 2);
+    bus.Publish("PLAN_CANDIDATE", candidate);
+    bus.Publish("PLAN_DECISION", MakeDecision(candidate, fed / 2, decision_t::CERTIFIED, 0));
+    bus.now_us += 1000;
+    const bool flushes = fed / 2 % 5 == 4;  // flush_ms is 5
+    node.Tick(bus.now_us);
+    const std::int64_t safe = fed + 2;
+    if (flushes && ::write(report, &safe, sizeof safe) != sizeof safe) std::_Exit(1);
+  }
+}
+
+TEST_F(LoggerNodeTest, SurvivesAKill) {
+  config_.logger.flush_ms = 5;
+  const unsigned seed = std::random_device{}();
+  RecordProperty("seed", std::to_string(seed));
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  std::mt19937 random(seed);
+  constexpr int kRounds = 8;
+  std::vector<std::int64_t> reported;
+  for (int round = 0; round < kRounds; ++round) {
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      close(ends[0]);
+      RunUntilKilled(config_, ends[1]);
+    }
+    close(ends[1]);
+    std::int64_t safe = 0;
+    for (int flushes = std::uniform_int_distribution<int>(1, 40)(random); flushes > 0; --flushes)
+      ASSERT_EQ(read(ends[0], &safe, sizeof safe), static_cast<ssize_t>(sizeof safe));
+    usleep(std::uniform_int_distribution<useconds_t>(0, 3000)(random));
+    ASSERT_EQ(kill(child, SIGKILL), 0);
+    ASSERT_EQ(waitpid(child, nullptr, 0), child);
+    while (read(ends[0], &safe, sizeof safe) == static_cast<ssize_t>(sizeof safe)) {}
+    close(ends[0]);
+    reported.push_back(safe);
+  }
+  { const LoggerNode recovery(config_, bus_, out_); }
+
+  Database database(scratch_ / "log/decisions.sqlite");
+  const std::vector<RunRow> runs = database.Runs();
+  ASSERT_EQ(runs.size(), static_cast<std::size_t>(kRounds));
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    SCOPED_TRACE(runs[i].log_file + ": " + runs[i].recovered);
+    EXPECT_TRUE(runs[i].end_utime.has_value());
+    const LogContents log = ReadLog(scratch_ / ("log/" + runs[i].log_file));
+    EXPECT_EQ(log.end, LogStatus::kEnd);
+    EXPECT_EQ(log.corruptions, 0);
+    EXPECT_GE(std::ssize(log.events), reported[i]) << "flushed events must stay";
+    std::vector<std::int64_t> decisions;
+    for (std::size_t k = 0; k < log.events.size(); ++k) {
+      EXPECT_EQ(log.events[k].number, static_cast<std::int64_t>(k));
+      if (log.events[k].channel == "PLAN_DECISION") decisions.push_back(log.events[k].number);
+    }
+    const Rows rows = database.Read(runs[i].log_file);
+    ASSERT_EQ(rows.decisions.size(), decisions.size());
+    for (std::size_t k = 0; k < decisions.size(); ++k) {
+      EXPECT_EQ(rows.decisions[k].event.event_number, decisions[k]);
+      EXPECT_EQ(rows.decisions[k].sequence, static_cast<std::int64_t>(k));
+      EXPECT_EQ(rows.decisions[k].latency_us, 0);
+    }
+    EXPECT_TRUE(rows.gaps.empty());
+  }
+}
+
+TEST_F(LoggerNodeTest, TakesWhatTheMemoryBusCarries) {
+  const auto bus = OpenBus("memq://", [] { return kStart + 5; });
+  LoggerNode node(config_, *bus, out_);
+  node.Tick(kStart);
+  bus->Publish("EXECUTION_EVENT", MakeEvent(0, execution_event_t::CONTACT));
+  bus->Dispatch(0);
+  node.Tick(kStart + 10);
+  node.Stop();
+  const LogContents log = ReadLog(node.log_path());
+  ASSERT_EQ(log.events.size(), 1u);
+  EXPECT_EQ(log.events[0].utime, kStart + 5);
+  EXPECT_EQ(node.summary().contacts, 1);
+}
+
+}  // namespace
+}  // namespace forereach

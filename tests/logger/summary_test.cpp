@@ -1,0 +1,120 @@
+#include "logger/summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forereach/robot_state_t.hpp"
+#include "tests/logger/scratch.h"
+
+namespace forereach {
+namespace {
+
+Config GoalConfig() {
+  Config config;
+  auto problem = std::make_shared<Problem>();
+  problem->projection = Eigen::MatrixXd::Identity(2, 4);
+  config.problem = problem;
+  config.planner.goal = {3, 4};
+  return config;
+}
+
+/** A hundred candidates, decided after 1 .. 100 microseconds, and some driving. */
+void WriteRun(const std::string& path) {
+  EventLogWriter writer(path);
+  std::int64_t now = 1'000'000;
+  for (int i = 0; i < 100; ++i) {
+    const candidate_plan_t candidate = MakeCandidate(i, i);
+    writer.Append(now, "PLAN_CANDIDATE", Encode(candidate));
+    now += i + 1;
+    decision_t decision = MakeDecision(candidate, i, decision_t::CERTIFIED, decision_t::CAUSE_NONE);
+    if (i < 30) decision = MakeDecision(candidate, i, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE);
+    if (i < 10) decision = MakeDecision(candidate, i, decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT);
+    if (i < 2) decision = MakeDecision(candidate, i, decision_t::REJECTED, decision_t::CAUSE_STALE);
+    decision.elapsed_us = i;
+    writer.Append(now, "PLAN_DECISION", Encode(decision));
+  }
+  int sequence = 0;
+  using E = execution_event_t;
+  for (const std::int16_t kind : {E::ACCEPTED, E::REFUSED, E::STARTED, E::STEP_INSIDE, E::STEP_INSIDE, E::STEP_INSIDE,
+                                  E::TAIL_BEGUN, E::STANDING, E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::GOAL_REACHED})
+    writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence++, kind)));
+  writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence + 4, E::STANDING)));
+  robot_state_t state{};
+  state.num_states = 4;
+  state.state[0] = 3;
+  state.state[1] = 3.5;
+  writer.Append(3'000'000, "ROBOT_STATE", Encode(state));
+  ASSERT_TRUE(writer.Flush());
+}
+
+TEST(Summary, CountsAHandMadeLog) {
+  const Scratch scratch;
+  WriteRun(scratch / "log");
+  const Summary summary = SummarizeLog(scratch / "log", GoalConfig());
+  EXPECT_EQ(summary.proposed, 100);
+  EXPECT_EQ(summary.decided, 100);
+  EXPECT_EQ(summary.certified, 70);
+  EXPECT_EQ(summary.abstained, (std::map<std::string, std::int64_t>{{"domain_exit", 8}, {"obstacle", 20}}));
+  EXPECT_EQ(summary.rejected, (std::map<std::string, std::int64_t>{{"stale", 2}}));
+  EXPECT_EQ(summary.latency_us.p50, 50);
+  EXPECT_EQ(summary.latency_us.p99, 99);
+  EXPECT_EQ(summary.certify_us.p50, 50) << "rejected ones, 0 and 1, are not certify steps";
+  EXPECT_EQ(summary.distance_to_goal_m, 0.5);
+  EXPECT_TRUE(summary.goal_reached);
+  EXPECT_EQ(summary.contacts, 1);
+  EXPECT_EQ(summary.steps_inside, 3);
+  EXPECT_EQ(summary.steps_outside, 1);
+  EXPECT_EQ(summary.tails, 1);
+  EXPECT_EQ(summary.stops, 3);
+  EXPECT_EQ(summary.refused, 1);
+  EXPECT_EQ(summary.lost, (std::map<std::string, std::int64_t>{{"bus", 4}}));
+  EXPECT_EQ(summary.restarts, 0);
+  EXPECT_DOUBLE_EQ(summary.duration_s, 2.0);
+  EXPECT_EQ(summary.messages.at("PLAN_CANDIDATE"), 100);
+}
+
+TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
+  const Scratch scratch;
+  WriteRun(scratch / "log");
+  Database database(scratch / "d.sqlite");
+  EventLogReader reader(scratch / "log");
+  Interpreter interpreter({}, "log");
+  LogEvent event;
+  Rows rows;
+  while (reader.Next(event) == LogStatus::kEvent) interpreter.Observe(event, rows);
+  ASSERT_TRUE(database.Write(rows, "log", event.number + 1));
+  nlohmann::json of_log = ToJson(SummarizeLog(scratch / "log", GoalConfig()));
+  nlohmann::json of_database = ToJson(SummarizeDatabase(database, "log", GoalConfig()));
+  for (const char* log_only : {"messages", "duration_s", "distance_to_goal_m"}) {
+    of_log.erase(log_only);
+    of_database.erase(log_only);
+  }
+  EXPECT_EQ(of_log, of_database);
+}
+
+TEST(Summary, OfNothingIsUnknownNotZero) {
+  const Scratch scratch;
+  WriteBytes(scratch / "log", {});
+  const Summary summary = SummarizeLog(scratch / "log", GoalConfig());
+  EXPECT_EQ(summary.proposed, 0);
+  EXPECT_EQ(summary.distance_to_goal_m, std::nullopt);
+  const nlohmann::json json = ToJson(summary);
+  EXPECT_TRUE(json["decision_latency_us"]["p50"].is_null());
+  EXPECT_TRUE(json["distance_to_goal_m"].is_null());
+  EXPECT_THAT(ToText(summary), testing::HasSubstr("unknown"));
+}
+
+TEST(Summary, PassesDamageAndCountsIt) {
+  const Scratch scratch;
+  WriteRun(scratch / "log");
+  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+  bytes[0] = 0;
+  WriteBytes(scratch / "log", bytes);
+  const Summary summary = SummarizeLog(scratch / "log", GoalConfig());
+  EXPECT_EQ(summary.proposed, 99);
+  EXPECT_EQ(summary.corruptions, 1);
+  EXPECT_GT(summary.skipped_bytes, 0);
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,350 @@
+// Values, Jacobians and Hessians of the nominal models against closed formulas in 256 bits.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <map>
+#include <tuple>
+#include <vector>
+
+#include "certifier/dynamics/dual.h"
+#include "certifier/dynamics/models.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+using exact::Inside;
+using exact::Rational;
+using exact::Real;
+
+constexpr double kDt = 0.1, kWheelbase = 2.5, kPointMassDt = 0.15;
+
+enum Variable { kX, kY, kTheta, kV, kA, kDelta, kJerk, kSteerRate };
+
+// What a model's equations say, worked out by hand. Entries not in the maps are zero.
+struct Formulas {
+  std::vector<Real> value;
+  std::map<std::pair<int, int>, Real> jacobian;
+  std::map<std::tuple<int, int, int>, Real> hessian;  // output, row <= column
+};
+
+Formulas Bicycle(const std::vector<Real>& z) {
+  const Real dt(kDt), per_wheelbase = dt / Real(kWheelbase);
+  const Real s = sin(z[kTheta]), c = cos(z[kTheta]), t = tan(z[kDelta]), secant = Real(1) + t * t, &v = z[kV];
+  return {{z[kX] + dt * (v * c), z[kY] + dt * (v * s), z[kTheta] + per_wheelbase * (v * t), v + dt * z[kA],
+           z[kA] + dt * z[kJerk], z[kDelta] + dt * z[kSteerRate]},
+          {{{0, kX}, 1}, {{0, kTheta}, -dt * v * s}, {{0, kV}, dt * c},
+           {{1, kY}, 1}, {{1, kTheta}, dt * v * c}, {{1, kV}, dt * s},
+           {{2, kTheta}, 1}, {{2, kV}, per_wheelbase * t}, {{2, kDelta}, per_wheelbase * v * secant},
+           {{3, kV}, 1}, {{3, kA}, dt}, {{4, kA}, 1}, {{4, kJerk}, dt}, {{5, kDelta}, 1}, {{5, kSteerRate}, dt}},
+          {{{0, kTheta, kTheta}, -dt * v * c}, {{0, kTheta, kV}, -dt * s},
+           {{1, kTheta, kTheta}, -dt * v * s}, {{1, kTheta, kV}, dt * c},
+           {{2, kV, kDelta}, per_wheelbase * secant}, {{2, kDelta, kDelta}, per_wheelbase * v * Real(2) * t * secant}}};
+}
+
+Formulas PointMassFormulas(const std::vector<Real>& z) {
+  const Real dt(kPointMassDt), half_square = dt * dt / Real(2);
+  Formulas f{{}, {}, {}};
+  for (std::size_t axis = 0; axis < 2; ++axis) f.value.push_back(z[axis] + dt * z[axis + 2] + half_square * z[axis + 4]);
+  for (std::size_t axis = 0; axis < 2; ++axis) f.value.push_back(z[axis + 2] + dt * z[axis + 4]);
+  for (int axis = 0; axis < 2; ++axis) {
+    f.jacobian[{axis, axis}] = 1;
+    f.jacobian[{axis, axis + 2}] = dt;
+    f.jacobian[{axis, axis + 4}] = half_square;
+    f.jacobian[{axis + 2, axis + 2}] = 1;
+    f.jacobian[{axis + 2, axis + 4}] = dt;
+  }
+  return f;
+}
+
+struct ModelCase {
+  const char* name;
+  std::shared_ptr<const NominalModel> model;
+  Formulas (*formulas)(const std::vector<Real>&);
+  friend void PrintTo(const ModelCase& model, std::ostream* out) { *out << model.name; }
+};
+
+class Model : public testing::TestWithParam<ModelCase> {
+ protected:
+  const NominalModel& model() const { return *GetParam().model; }
+
+  // Typical, extreme and special values of every variable; angles within what can be reduced.
+  Eigen::VectorXd AnyPoint(Random& random) const {
+    Eigen::VectorXd z = random.Vector(model().num_variables(), std::ldexp(1, random.Integer(-30, 12)));
+    for (double& entry : z)
+      if (random.Coin(0.1)) entry = random.Coin() ? 0 : random.Coin() ? 1e-300 : 1.5707963267948966;
+    return z;
+  }
+};
+
+Formulas At(const ModelCase& model, const Eigen::VectorXd& z) { return model.formulas({z.begin(), z.end()}); }
+
+void ExpectJacobian(const Linearization& linearization, const Formulas& f) {
+  std::map<std::pair<int, int>, Interval> listed;
+  for (const auto& [row, column, value] : linearization.jacobian()) {
+    ASSERT_TRUE(listed.emplace(std::pair(row, column), value).second) << "an entry listed twice";
+    const auto entry = f.jacobian.find({row, column});
+    ASSERT_TRUE(Inside(entry == f.jacobian.end() ? Real(0) : entry->second, value)) << row << ", " << column;
+  }
+  for (const auto& [place, value] : f.jacobian) ASSERT_TRUE(listed.count(place)) << place.first << ", " << place.second;
+}
+
+TEST_P(Model, LinearizationContainsValueAndJacobian) {
+  Random random(501);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 4000; ++trial) {
+    const Eigen::VectorXd z = AnyPoint(random);
+    const Formulas f = At(GetParam(), z);
+    Linearization linearization;
+    model().Linearize(View(z), linearization);
+    for (std::size_t k = 0; k < f.value.size(); ++k) {
+      ASSERT_TRUE(Inside(f.value[k], linearization.value[k]) || linearization.value[k] == Interval::Entire()) << "value " << k;
+    }
+    ExpectJacobian(linearization, f);
+    if (HasFatalFailure()) return;
+  }
+}
+
+TEST_P(Model, LinearizationIsTight) {
+  Random random(502);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Eigen::VectorXd z = random.Vector(model().num_variables(), 1.2);
+    Linearization linearization;
+    model().Linearize(View(z), linearization);
+    for (int k = 0; k < model().num_states(); ++k) {
+      const Interval& value = linearization.value[static_cast<std::size_t>(k)];
+      ASSERT_LE(value.upper - value.lower, 5e-15);
+    }
+    for (const auto& entry : linearization.jacobian()) ASSERT_LE(entry.value.upper - entry.value.lower, 1e-14);
+  }
+}
+
+// Rounded once from extended precision: the nearest double except where extended precision meets a tie.
+TEST_P(Model, EvaluateIsRoundedOnce) {
+  Random random(503);
+  SCOPED_TRACE(random.trace());
+  int nearest = 0, total = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    Eigen::VectorXd z = random.Vector(model().num_variables(), 1.2), next(model().num_states());
+    z = z.cwiseAbs();  // no cancellation, so relative accuracy is due
+    model().Evaluate(View(z), {next.data(), static_cast<std::size_t>(next.size())});
+    const Formulas f = At(GetParam(), z);
+    for (std::size_t k = 0; k < f.value.size(); ++k) {
+      const double computed = next[static_cast<Eigen::Index>(k)], rounded = f.value[k].ToDouble();
+      ASSERT_TRUE(computed == rounded || computed == NextUp(rounded) || computed == NextDown(rounded));
+      nearest += computed == rounded;
+      ++total;
+    }
+  }
+  RecordProperty("correctly_rounded_percent", std::to_string(100.0 * nearest / total));
+  EXPECT_GE(nearest, total * 99 / 100);
+}
+
+std::vector<Interval> AnyBox(Random& random, int size) {
+  std::vector<Interval> box;
+  for (int l = 0; l < size; ++l) {
+    const double center = random.Uniform(-1.2, 1.2) * (l == kV ? 20 : 1);
+    const double half = random.Coin(0.2) ? 0 : std::ldexp(random.Uniform(0, 1), -random.Integer(1, 40));
+    box.emplace_back(center - half, center + half);
+  }
+  return box;
+}
+
+std::vector<Real> PointIn(Random& random, const std::vector<Interval>& box) {
+  std::vector<Real> z;
+  for (const Interval& side : box)
+    z.push_back(random.Coin() ? Real(random.Coin() ? side.lower : side.upper)
+                              : Real(side.lower) + Real(random.Uniform(0, 1)) * (Real(side.upper) - Real(side.lower)));
+  return z;
+}
+
+TEST_P(Model, HessianContainsAllSecondDerivativesOverTheBox) {
+  Random random(504);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 2000; ++trial) {
+    const std::vector<Interval> box = AnyBox(random, model().num_variables());
+    HessianEnclosure hessian;
+    model().EncloseHessian(box, hessian);
+    std::map<std::tuple<int, int, int>, Interval> listed;
+    for (int e = 0; e < hessian.count; ++e) {
+      const auto& [output, row, column, value] = hessian.entries[static_cast<std::size_t>(e)];
+      ASSERT_LE(row, column);
+      ASSERT_TRUE(listed.emplace(std::tuple(output, row, column), value).second) << "an entry listed twice";
+    }
+    for (int sample = 0; sample < 6; ++sample) {
+      const Formulas f = GetParam().formulas(PointIn(random, box));
+      for (const auto& [place, value] : f.hessian) {
+        ASSERT_TRUE(listed.count(place));
+        ASSERT_TRUE(Inside(value, listed[place])) << std::get<0>(place) << ": " << std::get<1>(place) << ", " << std::get<2>(place);
+      }
+      for (const auto& [place, value] : listed)
+        if (!f.hessian.count(place)) ASSERT_TRUE(value.Contains(0));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Model,
+                         testing::Values(ModelCase{"point_mass", MakePointMass(kPointMassDt), PointMassFormulas},
+                                         ModelCase{"kinematic_bicycle", MakeKinematicBicycle(kDt, kWheelbase), Bicycle}));
+
+TEST(PointMassModel, HasNoSecondDerivativesAtAll) {
+  Random random(505);
+  SCOPED_TRACE(random.trace());
+  HessianEnclosure hessian;
+  hessian.count = 7;
+  MakePointMass(kPointMassDt)->EncloseHessian(AnyBox(random, 6), hessian);
+  EXPECT_EQ(hessian.count, 0);
+}
+
+// Each second derivative uses every variable once, so its enclosure is its range: dense samples reach almost all of it.
+TEST(BicycleModel, HessianIsTheTrueRange) {
+  Random random(506);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(kDt, kWheelbase);
+  for (int trial = 0; trial < 60; ++trial) {
+    std::vector<Interval> box(8, Interval(0));
+    const double theta = random.Uniform(-3, 3), v = random.Uniform(-5, 20), delta = random.Uniform(-1, 1);
+    box[kTheta] = {theta - random.Uniform(0, 1), theta + random.Uniform(0, 1)};
+    box[kV] = {v - random.Uniform(0, 3), v + random.Uniform(0, 3)};
+    box[kDelta] = {delta - random.Uniform(0, 0.3), delta + random.Uniform(0, 0.3)};
+    HessianEnclosure hessian;
+    model->EncloseHessian(box, hessian);
+    for (int e = 0; e < hessian.count; ++e) {
+      const auto& [output, row, column, value] = hessian.entries[static_cast<std::size_t>(e)];
+      double lowest = kInfinity, highest = -kInfinity;
+      const int samples = 400;
+      for (int i = 0; i <= samples; ++i)
+        for (const double speed : {box[kV].lower, box[kV].upper}) {
+          const double angle = box[kTheta].lower + (box[kTheta].upper - box[kTheta].lower) * i / samples;
+          const double steer = box[kDelta].lower + (box[kDelta].upper - box[kDelta].lower) * i / samples;
+          const double t = std::tan(steer), per_wheelbase = kDt / kWheelbase;
+          const std::map<std::tuple<int, int, int>, double> values{
+              {{0, kTheta, kTheta}, -kDt * speed * std::cos(angle)}, {{0, kTheta, kV}, -kDt * std::sin(angle)},
+              {{1, kTheta, kTheta}, -kDt * speed * std::sin(angle)}, {{1, kTheta, kV}, kDt * std::cos(angle)},
+              {{2, kV, kDelta}, per_wheelbase * (1 + t * t)}, {{2, kDelta, kDelta}, per_wheelbase * speed * 2 * t * (1 + t * t)}};
+          const double at = values.at({output, row, column});
+          lowest = std::min(lowest, at);
+          highest = std::max(highest, at);
+        }
+      EXPECT_LE(value.upper - value.lower, (highest - lowest) * 1.0001 + 1e-14) << output << ": " << row << ", " << column;
+    }
+  }
+}
+
+TEST(BicycleModel, SteeringAcrossThePoleHasNoFiniteEnclosure) {
+  const auto model = MakeKinematicBicycle(kDt, kWheelbase);
+  for (const Interval& steering : {Interval(1.5, 1.6), Interval(-1.6, -1.5), Interval(-2, 2), Interval(1.5, 100)}) {
+    std::vector<Interval> box(8, Interval(1));
+    box[kDelta] = steering;
+    HessianEnclosure hessian;
+    model->EncloseHessian(box, hessian);
+    int infinite = 0;
+    for (int e = 0; e < hessian.count; ++e) {
+      const auto& entry = hessian.entries[static_cast<std::size_t>(e)];
+      infinite += !entry.second_derivative.IsFinite();
+      EXPECT_EQ(entry.second_derivative.IsFinite(), entry.output != 2);
+    }
+    EXPECT_GT(infinite, 0);
+  }
+}
+
+TEST(Models, RefuseStepsThatAreNotPositive) {
+  for (const double bad : {0.0, -1.0, kInfinity, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW((void)MakePointMass(bad), std::invalid_argument);
+    EXPECT_THROW((void)MakeKinematicBicycle(bad, 1), std::invalid_argument);
+    EXPECT_THROW((void)MakeKinematicBicycle(1, bad), std::invalid_argument);
+  }
+  EXPECT_NE(MakePointMass(0.1)->description(), MakePointMass(NextUp(0.1))->description());
+}
+
+// Expressions with hand-made derivatives, over doubles and over intervals at a point.
+template <class T>
+struct Expression {
+  const char* name;
+  Dual<T, 3> (*f)(const Dual<T, 3>&, const Dual<T, 3>&, const Dual<T, 3>&);
+};
+
+template <class T>
+const std::array<Expression<T>, 7> kExpressions{{
+    {"x y / w", [](const auto& x, const auto& y, const auto& w) { return x * y / w; }},
+    {"sin x cos y", [](const auto& x, const auto& y, const auto&) { return sin(x) * cos(y); }},
+    {"tan(x y)", [](const auto& x, const auto& y, const auto&) { return tan(x * y); }},
+    {"-x (y - w) + 3", [](const auto& x, const auto& y, const auto& w) { return -x * (y - w) + Dual<T, 3>(3); }},
+    {"x x x", [](const auto& x, const auto&, const auto&) { return x * x * x; }},
+    {"1 / (x + 2)", [](const auto& x, const auto&, const auto&) { return Dual<T, 3>(1) / (x + Dual<T, 3>(2)); }},
+    {"cos(sin(x) y)", [](const auto& x, const auto& y, const auto&) { return cos(sin(x) * y); }},
+}};
+
+struct Derivatives {
+  double gradient[3], hessian[3][3];
+};
+
+Derivatives ByHand(std::size_t expression, double x, double y, double w) {
+  const double sx = std::sin(x), cx = std::cos(x), sy = std::sin(y), cy = std::cos(y);
+  switch (expression) {
+    case 0: return {{y / w, x / w, -x * y / (w * w)},
+                    {{0, 1 / w, -y / (w * w)}, {1 / w, 0, -x / (w * w)}, {-y / (w * w), -x / (w * w), 2 * x * y / (w * w * w)}}};
+    case 1: return {{cx * cy, -sx * sy, 0}, {{-sx * cy, -cx * sy, 0}, {-cx * sy, -sx * cy, 0}, {0, 0, 0}}};
+    case 2: {
+      const double t = std::tan(x * y), d = 1 + t * t, dd = 2 * t * d;
+      return {{d * y, d * x, 0}, {{dd * y * y, d + dd * x * y, 0}, {d + dd * x * y, dd * x * x, 0}, {0, 0, 0}}};
+    }
+    case 3: return {{w - y, -x, x}, {{0, -1, 1}, {-1, 0, 0}, {1, 0, 0}}};
+    case 4: return {{3 * x * x, 0, 0}, {{6 * x, 0, 0}, {0, 0, 0}, {0, 0, 0}}};
+    case 5: return {{-1 / ((x + 2) * (x + 2)), 0, 0}, {{2 / ((x + 2) * (x + 2) * (x + 2)), 0, 0}, {0, 0, 0}, {0, 0, 0}}};
+    default: {
+      const double s = std::sin(sx * y), c = std::cos(sx * y);
+      return {{-s * cx * y, -s * sx, 0},
+              {{-c * cx * cx * y * y + s * sx * y, -c * sx * cx * y - s * cx, 0}, {-c * sx * cx * y - s * cx, -c * sx * sx, 0},
+               {0, 0, 0}}};
+    }
+  }
+}
+
+template <class T>
+Dual<T, 3> Evaluate(const Expression<T>& expression, const double (&z)[3]) {
+  return expression.f(Dual<T, 3>::Variable(T(z[0]), 0), Dual<T, 3>::Variable(T(z[1]), 1), Dual<T, 3>::Variable(T(z[2]), 2));
+}
+
+TEST(DualNumbers, AgreeWithDerivativesMadeByHand) {
+  Random random(507);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 300; ++trial) {
+    const double z[3] = {random.Uniform(-1, 1), random.Uniform(-1, 1), random.Sign() * random.Uniform(0.5, 2)};
+    for (std::size_t e = 0; e < kExpressions<double>.size(); ++e) {
+      SCOPED_TRACE(kExpressions<double>[e].name);
+      const auto f = Evaluate(kExpressions<double>[e], z);
+      const auto enclosed = Evaluate(kExpressions<Interval>[e], z);
+      const Derivatives expected = ByHand(e, z[0], z[1], z[2]);
+      for (int i = 0; i < 3; ++i) {
+        ASSERT_NEAR(f.HasGradient(i) ? f.gradient(i) : 0, expected.gradient[i], 1e-13);
+        ASSERT_EQ(f.HasGradient(i), enclosed.HasGradient(i));
+        if (f.HasGradient(i)) {
+          ASSERT_NEAR(enclosed.gradient(i).Middle(), expected.gradient[i], 1e-13);
+        }
+        for (int j = 0; j < 3; ++j) {
+          ASSERT_NEAR(f.HasHessian(i, j) ? f.hessian(i, j) : 0, expected.hessian[i][j], 1e-12) << i << ", " << j;
+          if (enclosed.HasHessian(i, j)) {
+            ASSERT_NEAR(enclosed.hessian(i, j).Middle(), expected.hessian[i][j], 1e-12);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(DualNumbers, AffineExpressionsHaveNoSecondDerivatives) {
+  using D = Dual<double, 3>;
+  const D x = D::Variable(1, 0), y = D::Variable(2, 1);
+  const D affine = D(2) * x - y / D(3) + x * D(0.5) - D(7);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) EXPECT_FALSE(affine.HasHessian(i, j));
+  EXPECT_TRUE(affine.HasGradient(0) && affine.HasGradient(1));
+  EXPECT_FALSE(affine.HasGradient(2));
+  EXPECT_TRUE((x * y).HasHessian(0, 1));
+}
+
+}  // namespace
+}  // namespace forereach

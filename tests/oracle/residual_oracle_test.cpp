@@ -1,0 +1,356 @@
+// Observations, the pairwise test and the envelope against exact rationals.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "certifier/dynamics/models.h"
+#include "certifier/residual/consistency.h"
+#include "certifier/residual/lipschitz_envelope.h"
+#include "certifier/residual/observations.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+using exact::AtLeast;
+using exact::AtMost;
+using exact::Rational;
+using exact::Real;
+
+constexpr double kDt = 0.15;
+
+Rational Ulp(double x) { return Rational(NextUp(std::abs(x))) - abs(Rational(x)); }
+
+// f0_k of the point mass, exactly.
+Rational PointMassNominal(const Eigen::VectorXd& z, int k) {
+  const Rational dt(kDt);
+  if (k >= 2) return Rational(z[k]) + dt * Rational(z[k + 2]);
+  return Rational(z[k]) + dt * Rational(z[k + 2]) + dt * dt / 2 * Rational(z[k + 4]);
+}
+
+TEST(Observe, EnclosesTheExactResidualAndOneUnitOfTheSuccessor) {
+  Random random(601);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakePointMass(kDt);
+  for (int trial = 0; trial < 300; ++trial) {
+    const double scale = std::ldexp(1, random.Integer(-1000, 900));
+    Transitions data{random.Matrix(10, 6, scale), random.Matrix(10, 4, scale)};
+    data.x_next(0, 0) = 0;
+    data.x_next(1, 0) = scale;  // a power of two
+    data.x_next(2, 0) = -0x1p-1074;
+    const Observations observations = Observe(*model, data);
+    for (int i = 0; i < 10; ++i)
+      for (int k = 0; k < 4; ++k) {
+        const double x_next = data.x_next(i, k);
+        const Rational residual = Rational(x_next) - PointMassNominal(data.z.row(i), k);
+        ASSERT_LE(Rational(observations.lower(i, k)), residual - Ulp(x_next));
+        ASSERT_GE(Rational(observations.upper(i, k)), residual + Ulp(x_next));
+        ASSERT_LE(Rational(observations.upper(i, k)) - Rational(observations.lower(i, k)),
+                  2 * Ulp(x_next) + Rational(scale) * Rational(1e-14) + Rational(0x1p-1060));
+      }
+  }
+}
+
+TEST(Observe, OfTheBicycleEnclosesTheResidual) {
+  Random random(602);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  const Transitions data{random.Matrix(300, 8, 1.2), random.Matrix(300, 6, 2)};
+  const Observations observations = Observe(*model, data);
+  for (int i = 0; i < data.size(); ++i) {
+    const Real theta = Real(data.z(i, 2)) + Real(0.1) / Real(2.5) * (Real(data.z(i, 3)) * tan(Real(data.z(i, 5))));
+    const Real residual = Real(data.x_next(i, 2)) - theta, ulp(Ulp(data.x_next(i, 2)));
+    ASSERT_LE(Real(observations.lower(i, 2)), residual - ulp);
+    ASSERT_GE(Real(observations.upper(i, 2)), residual + ulp);
+    ASSERT_LE(observations.upper(i, 2) - observations.lower(i, 2), 1e-14);
+  }
+}
+
+// One coordinate, columns of L as given, exactly known residuals.
+struct Sample {
+  Declaration declaration;
+  Observations observations;
+};
+
+Sample Exactly(const Eigen::MatrixXd& lipschitz, const Eigen::MatrixXd& z, const Eigen::MatrixXd& residual, double noise = 0) {
+  return {{lipschitz, Eigen::VectorXd::Constant(lipschitz.rows(), noise)}, {z, residual, residual}};
+}
+
+Sample TwoPoints(double slope, double distance, double difference, double noise) {
+  return Exactly(Eigen::MatrixXd::Constant(1, 1, slope), Eigen::Vector2d(1, 1 + distance), Eigen::Vector2d(3, 3 + difference), noise);
+}
+
+TEST(FindViolation, DecidesAtTheLastBit) {
+  for (const double sign : {1.0, -1.0}) {
+    const double bound = 0.5 * 4 + 2 * 0.25;
+    const auto at = [&](double difference) {
+      const Sample s = TwoPoints(0.5, sign * 4, difference, 0.25);
+      return FindViolation(s.declaration, s.observations);
+    };
+    EXPECT_FALSE(at(sign * bound)) << "the bound itself is allowed";
+    EXPECT_FALSE(at(sign * (bound - 0x1p-50)));
+    const auto violation = at(sign * (bound + 0x1p-50));
+    ASSERT_TRUE(violation);
+    EXPECT_EQ(violation->first, 0);
+    EXPECT_EQ(violation->second, 1);
+    EXPECT_EQ(violation->coordinate, 0);
+    EXPECT_EQ(violation->difference, bound + 0x1p-50);
+    EXPECT_EQ(violation->bound, bound);
+  }
+}
+
+TEST(FindViolation, ConstantCoordinatesDecideAtTheLastBit) {
+  EXPECT_FALSE([] { const Sample s = TwoPoints(0, 5, 0.5, 0.25); return FindViolation(s.declaration, s.observations); }());
+  const Sample s = TwoPoints(0, 5, 0.5 + 0x1p-50, 0.25);
+  const auto violation = FindViolation(s.declaration, s.observations);
+  ASSERT_TRUE(violation);
+  EXPECT_EQ(violation->bound, 0.5);
+  EXPECT_EQ(violation->difference, 0.5 + 0x1p-50);
+}
+
+// The first pair in the order of k, then i < j, that violates by exact arithmetic.
+std::optional<Violation> BruteForce(const Sample& s) {
+  const Observations& o = s.observations;
+  for (int k = 0; k < o.num_states(); ++k)
+    for (int i = 0; i < o.size(); ++i)
+      for (int j = i + 1; j < o.size(); ++j) {
+        Rational bound = 2 * Rational(s.declaration.noise_bound[k]);
+        for (Eigen::Index l = 0; l < o.z.cols(); ++l)
+          bound += Rational(s.declaration.lipschitz(k, l)) * abs(Rational(o.z(i, l)) - Rational(o.z(j, l)));
+        const Rational up = Rational(o.lower(i, k)) - Rational(o.upper(j, k)), down = Rational(o.lower(j, k)) - Rational(o.upper(i, k));
+        if (std::max(up, down) > bound) return Violation{i, j, k, 0, 0};
+      }
+  return std::nullopt;
+}
+
+// Small binary fractions: nothing rounds, so the test has to agree with exact arithmetic, ties and all.
+TEST(FindViolation, FindsTheFirstPairOfRowsWithColumns) {
+  Random random(603);
+  SCOPED_TRACE(random.trace());
+  int found = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const int count = random.Integer(1, 12), columns = random.Integer(1, 3);
+    const auto fraction = [&] { return random.Integer(-16, 16) / 4.0; };
+    Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(2, columns, [&] { return random.Integer(1, 8) / 4.0; }),
+                       Eigen::MatrixXd::NullaryExpr(count, columns, fraction),
+                       Eigen::MatrixXd::NullaryExpr(count, 2, fraction) / 4, random.Integer(0, 2) / 4.0);
+    s.observations.upper.array() += random.Integer(0, 1) / 8.0;
+    const auto expected = BruteForce(s), violation = FindViolation(s.declaration, s.observations);
+    ASSERT_EQ(violation.has_value(), expected.has_value());
+    if (!expected) continue;
+    ++found;
+    ASSERT_EQ(violation->coordinate, expected->coordinate);
+    ASSERT_EQ(violation->first, expected->first);
+    ASSERT_EQ(violation->second, expected->second);
+    ASSERT_GT(violation->difference, violation->bound);
+  }
+  EXPECT_GT(found, 200);
+  EXPECT_LT(found, 1800);
+}
+
+TEST(FindViolation, OfConstantRowsAgreesWithExactArithmetic) {
+  Random random(604);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 2000; ++trial) {
+    const int count = random.Integer(1, 12);
+    const Sample s = Exactly(Eigen::MatrixXd::Zero(1, 2), random.Matrix(count, 2),
+                             Eigen::MatrixXd::NullaryExpr(count, 1, [&] { return random.Integer(-3, 3) / 8.0; }), 0.25);
+    const auto violation = FindViolation(s.declaration, s.observations);
+    ASSERT_EQ(violation.has_value(), BruteForce(s).has_value());
+    if (!violation) continue;
+    ASSERT_LT(violation->first, violation->second);
+    ASSERT_GT(violation->difference, violation->bound);
+    ASSERT_EQ(std::abs(s.observations.lower(violation->first, 0) - s.observations.lower(violation->second, 0)),
+              violation->difference);
+  }
+}
+
+TEST(FindViolation, WithoutProofByRationalsNeverFalsifies) {
+  Random random(605);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 1500; ++trial) {
+    const int count = random.Integer(2, 6), columns = random.Integer(1, 3);
+    // Residuals on the edge of what L allows, each off by the last bits.
+    const Eigen::MatrixXd slopes = random.Matrix(1, columns).cwiseAbs();
+    const Eigen::MatrixXd z = random.Matrix(count, columns, std::ldexp(1, random.Integer(-20, 20)));
+    Eigen::MatrixXd residual(count, 1);
+    for (int i = 0; i < count; ++i) {
+      residual(i, 0) = slopes.row(0).dot(z.row(i));
+      if (random.Coin()) residual(i, 0) = std::nextafter(residual(i, 0), random.Sign() * kMaxDouble);
+    }
+    const Sample s = Exactly(slopes, z, residual);
+    if (FindViolation(s.declaration, s.observations)) {
+      ASSERT_TRUE(BruteForce(s));
+    }
+  }
+}
+
+// A residual that uses up its whole declaration, observed through rounded successors, with sigma = 0.
+TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
+  Random random(606);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  for (int trial = 0; trial < 60; ++trial) {
+    const double slope_v = random.Uniform(0, 0.1), slope_delta = random.Uniform(0, 1);
+    Transitions data{random.Matrix(60, 8), Eigen::MatrixXd(60, 6)};
+    if (random.Coin()) data.z.col(5).setConstant(0.25);
+    for (int i = 0; i < data.size(); ++i) {
+      std::array<long double, 6> next;
+      const Eigen::VectorXd z = data.z.row(i);
+      const long double dt = 0.1, per_wheelbase = dt / 2.5L, v = z[3], delta = z[5];
+      next = {z[0] + dt * (v * std::cos(static_cast<long double>(z[2]))), z[1] + dt * (v * std::sin(static_cast<long double>(z[2]))),
+              z[2] + per_wheelbase * (v * std::tan(delta)) - slope_v * std::abs(v - 0.25L) + slope_delta * delta,
+              v + dt * z[4], z[4] + dt * z[6], delta + dt * z[7]};
+      for (int k = 0; k < 6; ++k) data.x_next(i, k) = static_cast<double>(next[static_cast<std::size_t>(k)]);
+    }
+    Declaration declaration{Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+    declaration.lipschitz(2, 3) = slope_v;
+    declaration.lipschitz(2, 5) = slope_delta;
+    const Observations observations = Observe(*model, data);
+    ASSERT_FALSE(FindViolation(declaration, observations));
+    // Nor does it invert an envelope.
+    const LipschitzEnvelope envelope(declaration, observations);
+    ResidualBounds bounds;
+    for (int query = 0; query < 5; ++query) {
+      const Eigen::VectorXd z = data.z.row(random.Below(60));
+      envelope.Enclose(Zonotope(z.head(6), Eigen::MatrixXd(6, 0)), {z.data() + 6, 2}, bounds);
+      for (std::size_t k = 0; k < 6; ++k) ASSERT_LE(bounds.lower[k], bounds.upper[k]);
+    }
+  }
+}
+
+// D_i = max over signs s of |sum_l s_l L_l (c_l - z_il)| + |G^T W s|_1, or the bound over the interval hull.
+Rational Distance(const Sample& s, int k, int i, const Zonotope& slice, const Eigen::VectorXd& input) {
+  std::vector<int> active;
+  for (Eigen::Index l = 0; l < s.observations.z.cols(); ++l)
+    if (s.declaration.lipschitz(k, l) != 0) active.push_back(static_cast<int>(l));
+  const auto center = [&](int l) { return Rational(l < slice.dim() ? slice.center(l) : input[l - slice.dim()]); };
+  const auto slope = [&](int l) { return Rational(s.declaration.lipschitz(k, l)); };
+  if (active.size() > static_cast<std::size_t>(LipschitzEnvelope::kMaxExactColumns)) {
+    Rational distance = 0;
+    for (const int l : active) {
+      distance += slope(l) * abs(center(l) - Rational(s.observations.z(i, l)));
+      if (l < slice.dim()) distance += slope(l) * exact::HalfWidth(slice, l);
+    }
+    return distance;
+  }
+  Rational farthest = 0;
+  for (std::uint32_t signs = 0; signs < 1u << active.size(); ++signs) {
+    const auto weight = [&](std::size_t a) { return (signs >> a & 1u ? -1 : 1) * slope(active[a]); };
+    Rational offset = 0;
+    for (std::size_t a = 0; a < active.size(); ++a)
+      offset += weight(a) * (center(active[a]) - Rational(s.observations.z(i, active[a])));
+    Rational distance = abs(offset);
+    for (int j = 0; j < slice.num_generators(); ++j) {
+      Rational along = 0;
+      for (std::size_t a = 0; a < active.size(); ++a)
+        if (active[a] < slice.dim()) along += weight(a) * Rational(slice.generator(active[a], j));
+      distance += abs(along);
+    }
+    farthest = std::max(farthest, distance);
+  }
+  return farthest;
+}
+
+void ExpectEnvelope(const Sample& s, const Zonotope& slice, const Eigen::VectorXd& input, double tolerance) {
+  const LipschitzEnvelope envelope(s.declaration, s.observations);
+  ResidualBounds bounds;
+  envelope.Enclose(slice, View(input), bounds);
+  for (int k = 0; k < s.observations.num_states(); ++k) {
+    const Rational sigma(s.declaration.noise_bound[k]);
+    std::vector<Rational> lower, upper;
+    for (int i = 0; i < s.observations.size(); ++i) {
+      const Rational distance = Distance(s, k, i, slice, input);
+      lower.push_back(Rational(s.observations.lower(i, k)) - sigma - distance);
+      upper.push_back(Rational(s.observations.upper(i, k)) + sigma + distance);
+    }
+    const Rational highest = *std::max_element(lower.begin(), lower.end()), lowest = *std::min_element(upper.begin(), upper.end());
+    const auto row = static_cast<std::size_t>(k);
+    ASSERT_TRUE(AtLeast(highest, bounds.lower[row])) << "coordinate " << k;
+    ASSERT_TRUE(AtMost(lowest, bounds.upper[row])) << "coordinate " << k;
+    ASSERT_NEAR(bounds.lower[row], highest.get_d(), tolerance);
+    ASSERT_NEAR(bounds.upper[row], lowest.get_d(), tolerance);
+  }
+}
+
+class Envelope : public testing::TestWithParam<int> {};
+
+TEST_P(Envelope, IsTheExactOneRoundedOutward) {
+  const int active = GetParam(), states = std::max(2, std::min(active, 9)), inputs = std::max(1, active - states + 1);
+  Random random(607 + static_cast<std::uint64_t>(active));
+  SCOPED_TRACE(random.trace());
+  const int trials = active <= 3 ? 200 : active <= 8 ? 15 : active <= 12 ? 1 : 30;
+  for (int trial = 0; trial < trials; ++trial) {
+    const int count = active <= 3 ? random.Integer(1, 140) : 4, variables = states + inputs;
+    Sample s = Exactly(Eigen::MatrixXd::Zero(1, variables), random.Matrix(count, variables), random.Matrix(count, 1, 0.1),
+                       random.Coin() ? 0 : 0.01);
+    s.observations.upper.array() += 1e-6;
+    std::vector<int> columns(static_cast<std::size_t>(variables));
+    for (int l = 0; l < variables; ++l) columns[static_cast<std::size_t>(l)] = l;
+    for (int a = 0; a < active; ++a) {
+      std::swap(columns[static_cast<std::size_t>(a)], columns[static_cast<std::size_t>(random.Integer(a, variables - 1))]);
+      s.declaration.lipschitz(0, columns[static_cast<std::size_t>(a)]) = random.Uniform(0, 1);
+    }
+    const Zonotope slice = random.AnyZonotope(states, random.Integer(0, active <= 8 ? 20 : 5), 0.3);
+    ExpectEnvelope(s, slice, random.Vector(inputs), 1e-12);
+    EXPECT_EQ(LipschitzEnvelope(s.declaration, s.observations).uses_hull_distance(), active > 12);
+    if (HasFatalFailure()) return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ActiveColumns, Envelope, testing::Values(0, 1, 2, 3, 8, 12, 13));
+
+TEST(EnvelopeOracle, HoldsForWildScales) {
+  Random random(630);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 500; ++trial) {
+    const double scale = std::ldexp(1, random.Integer(-500, 480));
+    Sample s = Exactly(random.Matrix(2, 4).cwiseAbs() * std::ldexp(1, random.Integer(-500, 480)), random.Matrix(9, 4, scale),
+                       random.Matrix(9, 2, scale));
+    s.declaration.lipschitz.col(random.Below(4)).setZero();
+    const Zonotope slice = random.AnyZonotope(3, random.Integer(0, 9), scale);
+    ExpectEnvelope(s, slice, random.Vector(1, scale), kInfinity);
+    if (HasFatalFailure()) return;
+  }
+}
+
+// Sums that overflow make infinities of both signs, and their NaN must not be mistaken for a small distance.
+TEST(EnvelopeOracle, OverflowNeverNarrows) {
+  const double huge = 1e300;
+  const Sample s = Exactly(Eigen::MatrixXd::Constant(1, 3, huge), Eigen::MatrixXd::Zero(1, 3), Eigen::MatrixXd::Zero(1, 1));
+  Eigen::MatrixXd generators(2, 2);
+  generators << 1e10, 1e10, 1e10, -1e10;
+  const LipschitzEnvelope envelope(s.declaration, s.observations);
+  const double input = 0;
+  ResidualBounds bounds;
+  envelope.Enclose(Zonotope(Eigen::Vector2d::Zero(), generators), {&input, 1}, bounds);
+  EXPECT_FALSE(bounds.lower[0] > -1e310L && bounds.lower[0] > -kMaxDouble) << bounds.lower[0];
+  EXPECT_FALSE(bounds.upper[0] < kMaxDouble) << bounds.upper[0];
+}
+
+TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
+  Random random(631);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 3000; ++trial) {
+    const auto any = [&] { return random.Double(); };
+    const Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(1, 3, any).cwiseAbs(), Eigen::MatrixXd::NullaryExpr(3, 3, any),
+                             Eigen::MatrixXd::NullaryExpr(3, 1, any));
+    const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any), Eigen::MatrixXd::NullaryExpr(2, 4, any));
+    const Eigen::VectorXd input = Eigen::VectorXd::NullaryExpr(1, any);
+    ResidualBounds bounds;
+    LipschitzEnvelope(s.declaration, s.observations).Enclose(slice, View(input), bounds);
+    Rational highest, lowest;
+    for (int i = 0; i < 3; ++i) {
+      const Rational distance = Distance(s, 0, i, slice, input), value(s.observations.lower(i, 0));
+      if (i == 0 || value - distance > highest) highest = value - distance;
+      if (i == 0 || value + distance < lowest) lowest = value + distance;
+    }
+    ASSERT_TRUE(std::isnan(bounds.lower[0]) || AtLeast(highest, bounds.lower[0]));
+    ASSERT_TRUE(std::isnan(bounds.upper[0]) || AtMost(lowest, bounds.upper[0]));
+  }
+}
+
+}  // namespace
+}  // namespace forereach

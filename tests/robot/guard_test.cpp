@@ -1,0 +1,391 @@
+#include "robot/guard.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gmpxx.h>
+#include <gtest/gtest.h>
+
+#include "tests/robot/sealed_plan.h"
+
+namespace forereach {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr std::int64_t kStart = 1'000'000'000'000, kStep = 40'000, kNow = kStart - 3 * kStep;
+using State = std::array<double, 2>;
+
+double Above(double x) { return std::nextafter(x, kInf); }
+double Below(double x) { return std::nextafter(x, -kInf); }
+
+GuardOptions TwoStates() {
+  GuardOptions options{2, 1, kStep, {}, {}};
+  options.config_digest = DigestOf("config");
+  options.model_digest = DigestOf("model");
+  return options;
+}
+
+// Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5].
+certified_plan_t Plan(std::int64_t id = 7) {
+  certified_plan_t certified{};
+  candidate_plan_t& plan = certified.plan;
+  plan.plan_id = id;
+  plan.start_utime = kStart;
+  plan.step_us = kStep;
+  plan.num_states = 2;
+  plan.num_inputs = 1;
+  plan.num_steps = 3;
+  plan.progress_steps = 1;
+  plan.initial_center[0] = 1;
+  plan.initial_center[1] = -2;
+  plan.initial_half_width[0] = 0.5;
+  plan.initial_half_width[1] = 0.25;
+  certified.expires_utime = kStart + kStep;
+  for (int t = 0; t <= 3; ++t) {
+    certified.slice_lower[t][0] = -10 - t;
+    certified.slice_upper[t][0] = 10 + t;
+    certified.slice_lower[t][1] = -5;
+    certified.slice_upper[t][1] = 5;
+  }
+  SetDigest(certified.config_digest, DigestOf("config"));
+  SetDigest(certified.model_digest, DigestOf("model"));
+  return certified;
+}
+
+GuardCause AcceptedBy(const certified_plan_t& certified, std::int64_t now = kNow) {
+  Guard guard(TwoStates());
+  return guard.Accept(Sealed(certified), now).cause;
+}
+
+// What a fresh guard says to starting `certified` at `boundary` in `state`.
+GuardVerdict Start(const certified_plan_t& certified, const State& state, std::int64_t boundary = kStart) {
+  Guard guard(TwoStates());
+  EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kNone);
+  return guard.TryStart(boundary, state);
+}
+
+Guard Executing(const certified_plan_t& certified = Plan()) {
+  Guard guard(TwoStates());
+  EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
+  EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
+  return guard;
+}
+
+TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
+  Guard guard(TwoStates());
+  const GuardVerdict verdict = guard.Accept(Sealed(Plan()), kNow);
+  EXPECT_EQ(verdict.cause, GuardCause::kNone) << verdict.message;
+  EXPECT_EQ(verdict.plan_id, 7);
+  ASSERT_NE(guard.pending(), nullptr);
+  EXPECT_EQ(guard.pending()->plan.plan_id, 7);
+  EXPECT_EQ(guard.executing(), nullptr);
+}
+
+TEST(GuardAccept, RefusesAFlippedBitAnywhere) {
+  const std::vector<std::uint8_t> good = Sealed(Plan());
+  Guard guard(TwoStates());
+  for (std::size_t i = 0; i < good.size(); i += i < 1024 || i + 512 > good.size() ? 1 : 37) {
+    std::vector<std::uint8_t> bad = good;
+    bad[i] ^= static_cast<std::uint8_t>(1u << i % 8);
+    const GuardVerdict verdict = guard.Accept(bad, kNow);
+    ASSERT_FALSE(verdict.ok()) << "byte " << i;
+    ASSERT_FALSE(verdict.message.empty()) << "byte " << i;
+    ASSERT_EQ(guard.pending(), nullptr);
+  }
+  EXPECT_TRUE(guard.Accept(good, kNow).ok());
+}
+
+TEST(GuardAccept, RefusesEveryWrongLengthAndEveryOtherType) {
+  const std::vector<std::uint8_t> good = Sealed(Plan());
+  Guard guard(TwoStates());
+  for (std::size_t size : {0ul, 7ul, 8ul, 9ul, good.size() / 2, good.size() - 1})
+    EXPECT_EQ(guard.Accept(Bytes(good).first(size), kNow).cause, GuardCause::kWrongLength) << size;
+  std::vector<std::uint8_t> longer = good;
+  longer.push_back(0);
+  EXPECT_EQ(guard.Accept(longer, kNow).cause, GuardCause::kTrailingBytes);
+  EXPECT_EQ(guard.Accept(Encode(Plan().plan), kNow).cause, GuardCause::kUnknownFingerprint);
+}
+
+TEST(GuardAccept, RefusesAPlanForAnotherRobot) {
+  const auto with = [](auto change) {
+    certified_plan_t certified = Plan();
+    change(certified.plan);
+    return AcceptedBy(certified);
+  };
+  EXPECT_EQ(with([](auto& plan) { plan.num_states = 1; }), GuardCause::kWrongDimension);
+  EXPECT_EQ(with([](auto& plan) { plan.num_states = -1; }), GuardCause::kWrongDimension);
+  EXPECT_EQ(with([](auto& plan) { plan.num_inputs = 2; }), GuardCause::kWrongDimension);
+  EXPECT_EQ(with([](auto& plan) { plan.num_steps = 0; }), GuardCause::kWrongDimension);
+  EXPECT_EQ(with([](auto& plan) { plan.num_steps = 129; }), GuardCause::kWrongDimension);
+  EXPECT_EQ(with([](auto& plan) { plan.num_steps = 128; }), GuardCause::kNone);
+  EXPECT_EQ(with([](auto& plan) { plan.progress_steps = 3; }), GuardCause::kNone);
+  EXPECT_EQ(with([](auto& plan) { plan.progress_steps = 4; }), GuardCause::kWrongDimension);
+  EXPECT_EQ(with([](auto& plan) { plan.progress_steps = -1; }), GuardCause::kWrongDimension);
+  EXPECT_EQ(with([](auto& plan) { plan.step_us = kStep + 1; }), GuardCause::kWrongStepPeriod);
+}
+
+TEST(GuardAccept, RefusesWrongDigests) {
+  certified_plan_t certified = Plan();
+  Seal(certified);
+  certified.plan_digest[31] ^= 1;
+  SetDigest(certified.certificate_digest, CertificateDigest(certified));
+  Guard guard(TwoStates());
+  EXPECT_EQ(guard.Accept(Encode(certified), kNow).cause, GuardCause::kPlanDigest);
+
+  Seal(certified);
+  certified.slice_upper[2][0] += 1;
+  EXPECT_EQ(guard.Accept(Encode(certified), kNow).cause, GuardCause::kCertificateDigest);
+
+  // Resealing what was changed does not help where an expected digest is known.
+  certified = Plan();
+  SetDigest(certified.config_digest, DigestOf("another config"));
+  EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kConfigDigest);
+  certified = Plan();
+  SetDigest(certified.model_digest, DigestOf("another model"));
+  EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kModelDigest);
+
+  GuardOptions anything = TwoStates();
+  anything.config_digest.reset();
+  anything.model_digest.reset();
+  SetDigest(certified.config_digest, DigestOf("another config"));
+  EXPECT_TRUE(Guard(anything).Accept(Sealed(certified), kNow).ok());
+}
+
+TEST(GuardAccept, RefusesNumbersThatBoundNothing) {
+  for (const double bad : {kNaN, kInf, -kInf}) {
+    for (const auto change : {+[](certified_plan_t& c, double x) { c.plan.initial_center[1] = x; },
+                              +[](certified_plan_t& c, double x) { c.plan.initial_half_width[0] = x; },
+                              +[](certified_plan_t& c, double x) { c.plan.control[2][0] = x; },
+                              +[](certified_plan_t& c, double x) { c.slice_lower[3][1] = x; },
+                              +[](certified_plan_t& c, double x) { c.slice_upper[0][0] = x; }}) {
+      certified_plan_t certified = Plan();
+      change(certified, bad);
+      EXPECT_EQ(AcceptedBy(certified), GuardCause::kNonFinite) << bad;
+    }
+  }
+  certified_plan_t certified = Plan();
+  certified.plan.initial_half_width[1] = -1e-300;
+  EXPECT_EQ(AcceptedBy(certified), GuardCause::kNonFinite);
+  certified.plan.initial_half_width[1] = 0;
+  EXPECT_EQ(AcceptedBy(certified), GuardCause::kNone);
+}
+
+TEST(GuardAccept, RefusesAnEmptySliceWithItsWitness) {
+  certified_plan_t certified = Plan();
+  certified.slice_lower[3][1] = certified.slice_upper[3][1] = 0.5;
+  EXPECT_EQ(AcceptedBy(certified), GuardCause::kNone);
+  certified.slice_lower[3][1] = Above(0.5);
+  Guard guard(TwoStates());
+  const GuardVerdict verdict = guard.Accept(Sealed(certified), kNow);
+  EXPECT_EQ(verdict.cause, GuardCause::kEmptySlice);
+  EXPECT_EQ(verdict.step, 3);
+  EXPECT_EQ(verdict.coordinate, 1);
+  EXPECT_EQ(verdict.value, Above(0.5));
+  EXPECT_EQ(verdict.bound, 0.5);
+  EXPECT_EQ(verdict.plan_id, 7);
+}
+
+TEST(GuardAccept, ExpiryItselfIsStillInTime) {
+  const std::int64_t expires = Plan().expires_utime;
+  EXPECT_EQ(AcceptedBy(Plan(), expires), GuardCause::kNone);
+  EXPECT_EQ(AcceptedBy(Plan(), expires + 1), GuardCause::kExpired);
+}
+
+TEST(GuardAccept, APlanIdIsAcceptedOnceAndOnlyUpwards) {
+  Guard guard(TwoStates());
+  EXPECT_TRUE(guard.Accept(Sealed(Plan(7)), kNow).ok());
+  EXPECT_EQ(guard.Accept(Sealed(Plan(7)), kNow).cause, GuardCause::kReplayed);
+  EXPECT_EQ(guard.Accept(Sealed(Plan(6)), kNow).cause, GuardCause::kReplayed);
+  EXPECT_EQ(guard.pending()->plan.plan_id, 7);
+  EXPECT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+  EXPECT_EQ(guard.pending()->plan.plan_id, 8) << "the newest wins";
+  EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
+  EXPECT_EQ(guard.Accept(Sealed(Plan(8)), kNow).cause, GuardCause::kReplayed) << "also once it has started";
+}
+
+TEST(GuardAccept, ARefusedPlanLeavesPendingAndLastIdAlone) {
+  Guard guard(TwoStates());
+  EXPECT_TRUE(guard.Accept(Sealed(Plan(7)), kNow).ok());
+  certified_plan_t expired = Plan(100);
+  expired.expires_utime = kNow - 1;
+  EXPECT_EQ(guard.Accept(Sealed(expired), kNow).cause, GuardCause::kExpired);
+  EXPECT_EQ(guard.pending()->plan.plan_id, 7);
+  EXPECT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+}
+
+TEST(GuardStart, TheBoundsOfX0AreInside) {
+  for (const double x : {0.5, 1.5}) EXPECT_TRUE(Start(Plan(), {x, -2}).ok()) << x;
+  for (const double y : {-2.25, -1.75}) EXPECT_TRUE(Start(Plan(), {1, y}).ok()) << y;
+  for (const State outside : {State{Below(0.5), -2}, {Above(1.5), -2}, {1, Below(-2.25)}, {1, Above(-1.75)}})
+    EXPECT_EQ(Start(Plan(), outside).cause, GuardCause::kOutsideInitialSet) << outside[0] << ' ' << outside[1];
+
+  const GuardVerdict verdict = Start(Plan(), {1, Above(-1.75)});
+  EXPECT_EQ(verdict.coordinate, 1);
+  EXPECT_EQ(verdict.value, Above(-1.75));
+  EXPECT_EQ(verdict.bound, -1.75);
+  EXPECT_EQ(verdict.plan_id, 7);
+}
+
+// center +- half_width is rarely a double: the comparison has to be that of real numbers.
+TEST(GuardStart, X0IsComparedExactly) {
+  const std::uint64_t seed = 20240611;
+  SCOPED_TRACE(seed);
+  std::mt19937_64 random(seed);
+  const auto draw = [&random](int exponents) {
+    const double mantissa = static_cast<double>(random() >> 11) * 0x1p-52 - 1;
+    return std::ldexp(mantissa, static_cast<int>(random() % static_cast<unsigned>(exponents)) - exponents / 2);
+  };
+  int on_the_edge = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    certified_plan_t certified = Plan();
+    const double center = certified.plan.initial_center[0] = draw(60);
+    const double half_width = certified.plan.initial_half_width[0] = std::abs(draw(60));
+    for (int t = 0; t <= 3; ++t) {
+      certified.slice_lower[t][0] = -1e30;
+      certified.slice_upper[t][0] = 1e30;
+    }
+    for (const double edge : {center + half_width, center - half_width}) {
+      for (const double x : {Below(edge), edge, Above(edge)}) {
+        const bool inside = abs(mpq_class(x) - mpq_class(center)) <= mpq_class(half_width);
+        EXPECT_EQ(Start(certified, {x, -2}).ok(), inside) << x << ": " << center << " +- " << half_width;
+        on_the_edge += x == edge && !inside;
+      }
+    }
+  }
+  EXPECT_GT(on_the_edge, 100) << "some rounded sums lie outside, or the exact comparison is not tested";
+}
+
+TEST(GuardStart, AFlatX0HasOneState) {
+  certified_plan_t certified = Plan();
+  certified.plan.initial_half_width[0] = certified.plan.initial_half_width[1] = 0;
+  EXPECT_TRUE(Start(certified, {1, -2}).ok());
+  EXPECT_EQ(Start(certified, {Above(1), -2}).cause, GuardCause::kOutsideInitialSet);
+}
+
+TEST(GuardStart, RefusesStatesThatAreNoNumbersOrTooFew) {
+  for (const double bad : {kNaN, kInf, -kInf}) {
+    EXPECT_EQ(Start(Plan(), {bad, -2}).cause, GuardCause::kOutsideInitialSet) << bad;
+    EXPECT_EQ(Start(Plan(), {1, bad}).cause, GuardCause::kOutsideInitialSet) << bad;
+  }
+  Guard guard(TwoStates());
+  EXPECT_TRUE(guard.Accept(Sealed(Plan()), kNow).ok());
+  EXPECT_EQ(guard.TryStart(kStart, std::array{1.0}).cause, GuardCause::kWrongStateSize);
+}
+
+TEST(GuardStart, TheStateHasToLieInSliceZeroToo) {
+  certified_plan_t certified = Plan();
+  certified.slice_upper[0][0] = 1.25;
+  EXPECT_TRUE(Start(certified, {1.25, -2}).ok());
+  const GuardVerdict verdict = Start(certified, {Above(1.25), -2});
+  EXPECT_EQ(verdict.cause, GuardCause::kOutsideSlice);
+  EXPECT_EQ(verdict.step, 0);
+  EXPECT_EQ(verdict.bound, 1.25);
+}
+
+TEST(GuardStart, HalfAStepOffIsOnTime) {
+  EXPECT_TRUE(Start(Plan(), {1, -2}, kStart - kStep / 2).ok());
+  EXPECT_TRUE(Start(Plan(), {1, -2}, kStart + kStep / 2).ok());
+  EXPECT_EQ(Start(Plan(), {1, -2}, kStart - kStep / 2 - 1).cause, GuardCause::kTooEarly);
+  EXPECT_EQ(Start(Plan(), {1, -2}, kStart + kStep / 2 + 1).cause, GuardCause::kTooLate);
+  certified_plan_t certified = Plan();
+  certified.plan.start_utime = std::numeric_limits<std::int64_t>::min();
+  EXPECT_EQ(Start(certified, {1, -2}).cause, GuardCause::kTooLate);
+  certified.plan.start_utime = std::numeric_limits<std::int64_t>::max();
+  EXPECT_EQ(Start(certified, {1, -2}).cause, GuardCause::kTooEarly);
+}
+
+TEST(GuardStart, ExpiryCountsAtTheBoundary) {
+  certified_plan_t certified = Plan();
+  certified.expires_utime = kStart;
+  EXPECT_TRUE(Start(certified, {1, -2}, kStart).ok());
+  EXPECT_EQ(Start(certified, {1, -2}, kStart + 1).cause, GuardCause::kExpired);
+}
+
+TEST(GuardStart, OnlyAnEarlyPlanIsKept) {
+  Guard guard(TwoStates());
+  EXPECT_EQ(guard.TryStart(kStart, State{1, -2}).cause, GuardCause::kNothingPending);
+  EXPECT_TRUE(guard.Accept(Sealed(Plan()), kNow).ok());
+  EXPECT_EQ(guard.TryStart(kStart - kStep, State{1, -2}).cause, GuardCause::kTooEarly);
+  EXPECT_EQ(guard.TryStart(kStart, State{2, -2}).cause, GuardCause::kOutsideInitialSet);
+  EXPECT_EQ(guard.TryStart(kStart, State{1, -2}).cause, GuardCause::kNothingPending);
+}
+
+TEST(GuardStart, ANewPlanTakesOverAndARefusedOneDoesNot) {
+  Guard guard = Executing(Plan(7));
+  EXPECT_TRUE(guard.Check(1, State{1, -2}).ok());
+  EXPECT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+  EXPECT_FALSE(guard.TryStart(kStart, State{9, -2}).ok());
+  ASSERT_NE(guard.executing(), nullptr);
+  EXPECT_EQ(guard.executing()->plan.plan_id, 7);
+  EXPECT_TRUE(guard.Check(2, State{1, -2}).ok()) << "the plan before goes on";
+
+  EXPECT_TRUE(guard.Accept(Sealed(Plan(9)), kNow).ok());
+  EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
+  EXPECT_EQ(guard.executing()->plan.plan_id, 9);
+  EXPECT_TRUE(guard.Check(1, State{1, -2}).ok()) << "the new plan begins at its own step 1";
+}
+
+TEST(GuardCheck, BoundsAreInsideAndTheNextNumberIsNot) {
+  for (int step = 1; step <= 3; ++step) {
+    for (const State inside : {State{-10.0 - step, -5}, {10.0 + step, 5}}) {
+      Guard guard = Executing();
+      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}).ok());
+      EXPECT_TRUE(guard.Check(step, inside).ok()) << step;
+    }
+    const double reach = 10.0 + step;
+    for (const State outside : {State{Below(-reach), 0}, {Above(reach), 0}, {0, Below(-5)}, {0, Above(5)}}) {
+      Guard guard = Executing();
+      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}).ok());
+      const GuardVerdict verdict = guard.Check(step, outside);
+      const int k = outside[0] != 0 ? 0 : 1;
+      EXPECT_EQ(verdict.cause, GuardCause::kOutsideSlice);
+      EXPECT_EQ(verdict.step, step);
+      EXPECT_EQ(verdict.coordinate, k);
+      EXPECT_EQ(verdict.value, outside[static_cast<std::size_t>(k)]);
+      EXPECT_EQ(std::abs(verdict.bound), k == 0 ? reach : 5);
+      EXPECT_EQ(verdict.plan_id, 7);
+    }
+  }
+}
+
+TEST(GuardCheck, AfterARefusalNothingIsExecuting) {
+  for (const State bad : {State{kNaN, 0}, {0, kNaN}, {kInf, 0}, {0, -kInf}, {11.5, 0}}) {
+    Guard guard = Executing();
+    EXPECT_EQ(guard.Check(1, bad).cause, GuardCause::kOutsideSlice);
+    EXPECT_EQ(guard.executing(), nullptr);
+    EXPECT_EQ(guard.Check(2, State{0, 0}).cause, GuardCause::kNotExecuting);
+  }
+}
+
+TEST(GuardCheck, StepsComeInOrderAndEndAtTheHorizon) {
+  Guard guard = Executing();
+  EXPECT_EQ(guard.Check(2, State{0, 0}).cause, GuardCause::kStepOutOfOrder) << "step 1 was not checked";
+  guard = Executing();
+  for (int t = 1; t <= 3; ++t) EXPECT_TRUE(guard.Check(t, State{0, 0}).ok());
+  EXPECT_EQ(guard.Check(4, State{0, 0}).cause, GuardCause::kStepOutOfOrder);
+  guard = Executing();
+  EXPECT_TRUE(guard.Check(1, State{0, 0}).ok());
+  EXPECT_EQ(guard.Check(1, State{0, 0}).cause, GuardCause::kStepOutOfOrder);
+  guard = Executing();
+  EXPECT_EQ(guard.Check(1, std::array{0.0, 0.0, 0.0}).cause, GuardCause::kWrongStateSize);
+  guard = Executing();
+  guard.Finish();
+  EXPECT_EQ(guard.executing(), nullptr);
+  EXPECT_EQ(guard.Check(1, State{0, 0}).cause, GuardCause::kNotExecuting);
+}
+
+TEST(GuardOptionsTest, ImpossibleOptionsThrow) {
+  EXPECT_THROW(Guard({0, 1, kStep, {}, {}}), std::invalid_argument);
+  EXPECT_THROW(Guard({17, 1, kStep, {}, {}}), std::invalid_argument);
+  EXPECT_THROW(Guard({1, 0, kStep, {}, {}}), std::invalid_argument);
+  EXPECT_THROW(Guard({1, 9, kStep, {}, {}}), std::invalid_argument);
+  EXPECT_THROW(Guard({1, 1, 0, {}, {}}), std::invalid_argument);
+  EXPECT_NO_THROW(Guard({16, 8, 1, {}, {}}));
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,477 @@
+#include "robot/sim_node.h"
+
+#include <cmath>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/dynamics/models.h"
+#include "forereach/decision_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "tests/robot/sealed_plan.h"
+
+namespace forereach {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+constexpr std::int64_t kT0 = 1'700'000'000'000'000, kPeriod = 40'000;
+
+enum : std::int16_t {
+  kAccepted = execution_event_t::ACCEPTED,
+  kRefused = execution_event_t::REFUSED,
+  kStarted = execution_event_t::STARTED,
+  kInside = execution_event_t::STEP_INSIDE,
+  kOutside = execution_event_t::STEP_OUTSIDE,
+  kTailBegun = execution_event_t::TAIL_BEGUN,
+  kStanding = execution_event_t::STANDING,
+  kGoalReached = execution_event_t::GOAL_REACHED,
+  kContact = execution_event_t::CONTACT
+};
+
+std::int64_t BoundaryTime(int j) { return kT0 + j * kPeriod; }
+
+// A point mass with dt = 0.15 s at the origin, safety in its position, a goal far away.
+Config PointMassTask() {
+  Config config;
+  config.path = "task.yaml";
+  Problem problem;
+  problem.model = MakePointMass(0.15);
+  problem.projection = Eigen::MatrixXd::Identity(2, 4);
+  config.problem = std::make_shared<const Problem>(problem);
+  config.digest = DigestOf("config");
+  config.model_digest = DigestOf("model");
+  config.planner.goal = {100, 0};
+  config.robot.start = {0, 0, 0, 0};
+  config.robot.step_period_ms = 40;
+  return config;
+}
+
+// Forward for half of the steps, then back to rest: the second half is the tail. X0 = `state` +- 0.1, slices anything.
+certified_plan_t Plan(const Config& config, std::int64_t id, int start, const std::vector<double>& state,
+                      int steps = 4) {
+  certified_plan_t certified{};
+  certified.utime = certified.plan.utime = BoundaryTime(0);
+  certified.expires_utime = BoundaryTime(start) + kPeriod;
+  candidate_plan_t& plan = certified.plan;
+  plan.plan_id = id;
+  plan.start_utime = BoundaryTime(start);
+  plan.step_us = kPeriod;
+  plan.num_states = static_cast<std::int16_t>(state.size());
+  plan.num_inputs = 2;
+  plan.num_steps = static_cast<std::int16_t>(steps);
+  plan.progress_steps = static_cast<std::int16_t>(steps / 2);
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    plan.initial_center[k] = state[k];
+    plan.initial_half_width[k] = 0.1;
+  }
+  for (int t = 0; t < steps; ++t) plan.control[t][0] = t < steps / 2 ? 1 : -1;
+  for (int t = 0; t <= steps; ++t) {
+    for (std::size_t k = 0; k < state.size(); ++k) {
+      certified.slice_lower[t][k] = -1e3;
+      certified.slice_upper[t][k] = 1e3;
+    }
+  }
+  SetDigest(certified.config_digest, config.digest);
+  SetDigest(certified.model_digest, config.model_digest);
+  return certified;
+}
+
+// The node on a bus and a clock of its own, and everything it says.
+class Rig {
+ public:
+  explicit Rig(Config config) : config_(std::move(config)), node_(config_, *bus_, summary_) {
+    Record(config_.bus.robot_state, states);
+    Record(config_.bus.event, events);
+    Record(config_.bus.transition, transitions);
+  }
+
+  void Send(const certified_plan_t& certified) { bus_->Publish(config_.bus.certified, Bytes(Sealed(certified))); }
+  void SendRaw(const std::string& channel, Bytes bytes) { bus_->Publish(channel, bytes); }
+
+  /** Runs the process's loop until boundary j has been handled. */
+  void RunTo(int j, std::int64_t tick = 2000) {
+    for (; now_ <= BoundaryTime(j); now_ += tick) {
+      bus_->Dispatch(0);
+      node_.Tick(now_);
+    }
+    bus_->Dispatch(0);
+  }
+
+  [[nodiscard]] std::vector<double> StateAt(int j) const {
+    const robot_state_t& message = states.at(static_cast<std::size_t>(j));
+    return {message.state, message.state + message.num_states};
+  }
+  [[nodiscard]] std::vector<std::int16_t> EventKinds() const {
+    std::vector<std::int16_t> kinds;
+    for (const auto& event : events) kinds.push_back(event.kind);
+    return kinds;
+  }
+  [[nodiscard]] int Count(std::int16_t kind) const {
+    int count = 0;
+    for (const auto& event : events) count += event.kind == kind;
+    return count;
+  }
+  [[nodiscard]] const execution_event_t& First(std::int16_t kind) const {
+    for (const auto& event : events)
+      if (event.kind == kind) return event;
+    throw std::runtime_error("no event of kind " + std::to_string(kind));
+  }
+  [[nodiscard]] nlohmann::json Summary() const { return nlohmann::json::parse(node_.Summary()); }
+  RobotSimNode& node() { return node_; }
+  [[nodiscard]] std::string printed() const { return summary_.str(); }
+
+  std::vector<robot_state_t> states;
+  std::vector<execution_event_t> events;
+  std::vector<transition_t> transitions;
+
+ private:
+  template <class Message>
+  void Record(const std::string& channel, std::vector<Message>& into) {
+    bus_->Subscribe(channel, [&into](const Received& received) {
+      const std::optional<Message> message = Decoded<Message>(received.bytes);
+      ASSERT_TRUE(message);
+      ASSERT_EQ(message->sequence, std::ssize(into));
+      into.push_back(*message);
+    });
+  }
+
+  std::int64_t now_ = kT0;
+  const Config config_;
+  std::ostringstream summary_;
+  std::unique_ptr<Bus> bus_ = OpenBus("memq://", [this] { return now_; });
+  RobotSimNode node_;
+};
+
+const std::vector<double> kOrigin{0, 0, 0, 0};
+
+TEST(RobotSim, StandsAndReportsAtEveryBoundary) {
+  Rig rig(PointMassTask());
+  rig.RunTo(5);
+  ASSERT_EQ(rig.states.size(), 6u);
+  for (int j = 0; j <= 5; ++j) {
+    const robot_state_t& state = rig.states[static_cast<std::size_t>(j)];
+    EXPECT_EQ(state.utime, BoundaryTime(j));
+    EXPECT_EQ(state.mode, robot_state_t::STANDING);
+    EXPECT_EQ(state.executing_plan_id, -1);
+    EXPECT_EQ(state.executing_step, -1);
+    EXPECT_EQ(rig.StateAt(j), kOrigin);
+  }
+  EXPECT_THAT(rig.events, IsEmpty());
+  EXPECT_THAT(rig.transitions, IsEmpty());
+}
+
+TEST(RobotSim, ObeysNothingButACertifiedPlan) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  const certified_plan_t good = Plan(config, 1, 3, kOrigin);
+
+  decision_t decision{};
+  decision.outcome = decision_t::CERTIFIED;
+  decision.plan_id = 1;
+  rig.SendRaw(config.bus.candidate, Encode(good.plan));
+  rig.SendRaw(config.bus.decision, Encode(decision));
+  rig.RunTo(1);
+  EXPECT_THAT(rig.events, IsEmpty());
+
+  rig.SendRaw(config.bus.certified, Encode(good.plan));
+  rig.SendRaw(config.bus.certified, Encode(decision));
+  certified_plan_t tampered = good;
+  Seal(tampered);
+  tampered.plan.control[0][0] = 2;
+  rig.SendRaw(config.bus.certified, Encode(tampered));
+  certified_plan_t elsewhere = good;
+  SetDigest(elsewhere.model_digest, DigestOf("another model"));
+  rig.Send(elsewhere);
+  rig.RunTo(8);
+  EXPECT_THAT(rig.EventKinds(), ElementsAre(kRefused, kRefused, kRefused, kRefused));
+  EXPECT_EQ(GetText(rig.events[2].message).substr(0, 13), "plan_digest: ");
+  EXPECT_EQ(rig.events[2].plan_id, 1);
+  EXPECT_EQ(rig.events[0].plan_id, -1);
+  for (int j = 0; j <= 8; ++j) EXPECT_EQ(rig.StateAt(j), kOrigin);
+  EXPECT_THAT(rig.transitions, IsEmpty());
+  const auto refused = rig.Summary()["plans_refused"];
+  EXPECT_EQ(refused["unknown_fingerprint"], 2);
+  EXPECT_EQ(refused["plan_digest"], 1);
+  EXPECT_EQ(refused["model_digest"], 1);
+
+  rig.Send(Plan(config, 1, 10, kOrigin));
+  rig.RunTo(10);
+  EXPECT_EQ(rig.Count(kStarted), 1) << "what was refused does not stand in the way of the real one";
+}
+
+TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 5, 3, {0.05, 0, 0, 0}));
+  rig.RunTo(6);
+
+  EXPECT_EQ(rig.First(kAccepted).utime, kT0 + 2000) << "when it arrived";
+  EXPECT_EQ(rig.First(kStarted).utime, BoundaryTime(3));
+  EXPECT_EQ(rig.First(kStarted).plan_id, 5);
+  EXPECT_EQ(rig.states[2].mode, robot_state_t::STANDING);
+  std::vector<double> x = kOrigin;
+  for (int j = 3; j <= 6; ++j) {
+    const robot_state_t& state = rig.states[static_cast<std::size_t>(j)];
+    EXPECT_EQ(state.mode, robot_state_t::EXECUTING);
+    EXPECT_EQ(state.executing_plan_id, 5);
+    EXPECT_EQ(state.executing_step, j - 3);
+    EXPECT_EQ(rig.StateAt(j), x);
+    std::vector<double> z = x;
+    z.insert(z.end(), {j - 3 < 2 ? 1.0 : -1.0, 0.0});
+    config.problem->model->Evaluate(z, x);
+  }
+  ASSERT_EQ(rig.transitions.size(), 3u);
+  for (int i = 0; i < 3; ++i) {
+    const transition_t& transition = rig.transitions[static_cast<std::size_t>(i)];
+    EXPECT_EQ(transition.utime, BoundaryTime(3 + i)) << "when the step began";
+    EXPECT_EQ(std::vector<double>(transition.state, transition.state + 4), rig.StateAt(3 + i));
+    EXPECT_EQ(std::vector<double>(transition.next_state, transition.next_state + 4), rig.StateAt(4 + i));
+    EXPECT_EQ(transition.input[0], i < 2 ? 1 : -1);
+  }
+}
+
+TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t first = Plan(config, 1, 1, kOrigin);
+  first.plan.control[3][0] = -0.75;  // it ends near rest, not at it
+  rig.Send(first);
+  rig.RunTo(8);
+  EXPECT_THAT(rig.EventKinds(),
+              ElementsAre(kAccepted, kStarted, kInside, kInside, kTailBegun, kInside, kInside, kStanding));
+  EXPECT_EQ(rig.First(kTailBegun).utime, BoundaryTime(3));
+  EXPECT_EQ(rig.First(kStanding).utime, BoundaryTime(5));
+  EXPECT_NEAR(rig.First(kStanding).state[2], 0.15 * 0.25, 1e-12) << "measured, before the hold mode";
+  EXPECT_EQ(rig.StateAt(5)[2], 0) << "the hold mode";
+  EXPECT_EQ(rig.StateAt(5)[0], rig.First(kStanding).state[0]);
+  EXPECT_EQ(rig.StateAt(8), rig.StateAt(5));
+  EXPECT_EQ(rig.states[5].mode, robot_state_t::STANDING);
+
+  rig.Send(Plan(config, 2, 10, rig.StateAt(8)));
+  rig.RunTo(14);
+  EXPECT_EQ(rig.states[9].mode, robot_state_t::STANDING);
+  EXPECT_EQ(rig.states[10].executing_plan_id, 2);
+  EXPECT_EQ(rig.Count(kStanding), 2);
+  EXPECT_EQ(rig.Summary()["stops"], 2);
+  EXPECT_GT(rig.StateAt(14)[0], rig.StateAt(8)[0]);
+}
+
+TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(2);
+  const std::vector<double> at_two = rig.StateAt(2);
+  std::vector<double> at_three(4);
+  std::vector<double> z = at_two;
+  z.insert(z.end(), {1.0, 0.0});
+  config.problem->model->Evaluate(z, at_three);
+  rig.Send(Plan(config, 2, 3, at_three));
+  rig.RunTo(4);
+  EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kAccepted, kInside, kStarted, kInside))
+      << "the last step of the old plan is checked before the new one starts, and no tail has begun";
+  EXPECT_EQ(rig.events[4].plan_id, 1);
+  EXPECT_EQ(rig.events[4].step, 2);
+  EXPECT_EQ(rig.events[5].plan_id, 2);
+  EXPECT_EQ(rig.states[3].executing_plan_id, 2);
+  EXPECT_EQ(rig.states[3].executing_step, 0);
+  EXPECT_EQ(rig.events[6].step, 1);
+}
+
+TEST(RobotSim, APlanForAnotherStateIsRefusedAndTheOldOneGoesOn) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(2);
+  rig.Send(Plan(config, 2, 3, {5, 0, 0, 0}));
+  rig.RunTo(3);
+  EXPECT_EQ(rig.First(kRefused).plan_id, 2);
+  EXPECT_EQ(rig.First(kRefused).coordinate, 0);
+  EXPECT_EQ(rig.First(kRefused).utime, BoundaryTime(3));
+  EXPECT_EQ(rig.states[3].executing_plan_id, 1);
+  EXPECT_EQ(rig.states[3].executing_step, 2);
+  EXPECT_EQ(rig.Count(kTailBegun), 1);
+  EXPECT_EQ(rig.Summary()["plans_refused"]["outside_initial_set"], 1);
+}
+
+TEST(RobotSim, APlanThatArrivesAfterItsStartIsNotStarted) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(5);
+  rig.Send(Plan(config, 1, 5, kOrigin));
+  rig.RunTo(6);
+  EXPECT_EQ(rig.Count(kStarted), 0);
+  EXPECT_EQ(rig.Summary()["plans_refused"]["too_late"], 1);
+}
+
+TEST(RobotSim, LeavingTheSliceStopsItAtOnce) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
+  certified.slice_upper[2][2] = 0.2;  // its speed is 0.3 then
+  rig.Send(certified);
+  rig.RunTo(6);
+  EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kOutside));
+  const execution_event_t& outside = rig.First(kOutside);
+  EXPECT_EQ(outside.step, 2);
+  EXPECT_EQ(outside.coordinate, 2);
+  EXPECT_EQ(outside.value, outside.state[2]);
+  EXPECT_NEAR(outside.value, 0.3, 1e-12);
+  EXPECT_EQ(GetText(outside.message).substr(0, 16), "emergency stop: ");
+  EXPECT_EQ(rig.states[3].mode, robot_state_t::STANDING);
+  EXPECT_EQ(rig.StateAt(3)[2], 0);
+  EXPECT_EQ(rig.StateAt(6), rig.StateAt(3));
+  const auto summary = rig.Summary();
+  EXPECT_EQ(summary["steps_executed"], 2);
+  EXPECT_EQ(summary["steps_inside_slice"], 1);
+  EXPECT_EQ(summary["stops"], 1);
+}
+
+TEST(RobotSim, AtTheGoalItFinishesItsTailAndStartsNothingMore) {
+  Config config = PointMassTask();
+  config.planner.goal = {0.1, 0};
+  config.planner.goal_radius = 0.09;
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(3);
+  rig.Send(Plan(config, 2, 4, kOrigin));
+  rig.RunTo(30);
+  EXPECT_EQ(rig.Count(kGoalReached), 1);
+  const execution_event_t& reached = rig.First(kGoalReached);
+  EXPECT_EQ(reached.utime, BoundaryTime(2)) << "the position is 0.01125 after a step";
+  EXPECT_NEAR(reached.value, 0.1 - 0.01125, 1e-12);
+  EXPECT_EQ(reached.plan_id, 1);
+  EXPECT_EQ(rig.Count(kStarted), 1);
+  EXPECT_EQ(rig.First(kStanding).utime, BoundaryTime(5));
+  ASSERT_EQ(rig.states.size(), 5u + RobotSimNode::kFinishedBoundaries);
+  for (std::size_t j = 0; j < rig.states.size(); ++j)
+    EXPECT_EQ(rig.states[j].mode == robot_state_t::FINISHED, j >= 5) << j;
+  EXPECT_TRUE(rig.node().done());
+  const auto summary = rig.Summary();
+  EXPECT_EQ(summary["goal_reached"], true);
+  EXPECT_EQ(summary["stops"], 0);
+  EXPECT_NEAR(summary["distance_to_goal"].get<double>(), 0.01, 1e-9);
+}
+
+TEST(RobotSim, TheGoalRadiusItselfCounts) {
+  for (const bool inside : {true, false}) {
+    Config config = PointMassTask();
+    config.planner.goal = {3, 4};
+    config.planner.goal_radius = inside ? 5 : std::nextafter(5, 0);
+    Rig rig(config);
+    rig.RunTo(20);
+    EXPECT_EQ(rig.Count(kGoalReached), inside ? 1 : 0);
+    EXPECT_EQ(rig.node().done(), inside);
+  }
+}
+
+TEST(RobotSim, AfterTheTimeLimitItStandsAndIsDone) {
+  Config config = PointMassTask();
+  config.robot.time_limit_s = 0.12;  // boundary 3
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 2, kOrigin));
+  rig.RunTo(2);
+  EXPECT_FALSE(rig.node().done());
+  rig.RunTo(40);
+  EXPECT_EQ(rig.First(kStanding).utime, BoundaryTime(6)) << "the certified tail is run to its end";
+  EXPECT_EQ(rig.states.size(), 6u + RobotSimNode::kFinishedBoundaries);
+  EXPECT_EQ(rig.states[5].mode, robot_state_t::EXECUTING);
+  EXPECT_EQ(rig.states[6].mode, robot_state_t::FINISHED);
+  EXPECT_TRUE(rig.node().done());
+  EXPECT_EQ(rig.Summary()["goal_reached"], false);
+}
+
+TEST(RobotSim, ReportsContactAtEveryBoundaryInsideAnObstacle) {
+  Config config = PointMassTask();
+  config.obstacles = {Obstacle::Circle(Eigen::Vector2d(50, 0), 1), Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)};
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(4);
+  ASSERT_EQ(rig.Count(kContact), 2) << "positions 0, 0, 0.011, 0.045, 0.079";
+  EXPECT_EQ(rig.First(kContact).utime, BoundaryTime(3));
+  EXPECT_NEAR(rig.First(kContact).value, 1 - 0.045 - 0.96, 1e-12);
+  EXPECT_EQ(GetText(rig.First(kContact).message), "inside obstacle 1");
+  EXPECT_EQ(rig.Summary()["contacts"], 2);
+}
+
+TEST(RobotSim, ALateTickGivesTheSameRun) {
+  const Config config = PointMassTask();
+  Rig prompt(config), late(config);
+  for (Rig* rig : {&prompt, &late}) {
+    rig->RunTo(0);
+    rig->Send(Plan(config, 1, 1, kOrigin));
+    rig->RunTo(12, rig == &prompt ? 500 : 13 * kPeriod / 4);
+  }
+  ASSERT_EQ(late.states.size(), 10u) << "the fourth late tick is at boundary 9.8";
+  for (int j = 0; j < 10; ++j) {
+    EXPECT_EQ(prompt.StateAt(j), late.StateAt(j)) << j;
+    EXPECT_EQ(late.states[static_cast<std::size_t>(j)].utime, BoundaryTime(j));
+  }
+}
+
+TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
+  Config config = PointMassTask();
+  Problem problem;
+  problem.model = MakeKinematicBicycle(0.1, 2.5);
+  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  config.problem = std::make_shared<const Problem>(problem);
+  config.robot.start = {0, 0, 0, 20, 1, 0.3};
+  config.robot.residual = "heading_saturation";
+  config.robot.residual_parameters = {{"dt", 0.1}, {"wheelbase", 2.5}};
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, config.robot.start, 2));
+  rig.RunTo(4);
+  std::vector<double> expected = config.robot.start;
+  const std::unique_ptr<Target> target = MakeTarget(config);
+  for (const double jerk : {1.0, -1.0}) target->Step(expected, std::array{jerk, 0.0}, expected);
+  const execution_event_t& standing = rig.First(kStanding);
+  EXPECT_EQ(std::vector<double>(standing.state, standing.state + 6), expected);
+  expected[3] = expected[4] = 0;
+  EXPECT_EQ(rig.StateAt(4), expected) << "at rest: v = a = 0, heading and steering kept";
+}
+
+TEST(RobotSim, StopPrintsOneLineOfJson) {
+  Rig rig(PointMassTask());
+  rig.RunTo(2);
+  rig.node().Stop();
+  const std::string text = rig.printed();
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
+  const auto summary = nlohmann::json::parse(text);
+  for (const char* key : {"boundaries", "steps_executed", "steps_inside_slice", "contacts", "goal_reached",
+                          "distance_to_goal", "stops", "plans_accepted", "plans_started", "plans_refused",
+                          "messages_not_sent"})
+    EXPECT_TRUE(summary.contains(key)) << key;
+  EXPECT_EQ(summary["boundaries"], 3);
+  EXPECT_EQ(summary["distance_to_goal"], 100);
+}
+
+TEST(RobotSim, AConfigThatDoesNotFitTheModelIsAnError) {
+  const std::unique_ptr<Bus> bus = OpenBus("memq://");
+  Config config = PointMassTask();
+  config.robot.start.pop_back();
+  EXPECT_THROW(RobotSimNode(config, *bus), ConfigError);
+  config = PointMassTask();
+  config.planner.goal.push_back(0);
+  EXPECT_THROW(RobotSimNode(config, *bus), ConfigError);
+  config = PointMassTask();
+  config.robot.residual = "ice";
+  EXPECT_THROW(RobotSimNode(config, *bus), ConfigError);
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,223 @@
+// Boxes, zonotopes and zonogons at their boundaries: refused arguments, degenerate cases, small cases worked by hand.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <type_traits>
+
+#include "certifier/sets/box.h"
+#include "certifier/sets/linear_map.h"
+#include "certifier/sets/zonogon.h"
+#include "certifier/sets/zonotope.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Eigen::VectorXd Vec(std::initializer_list<double> entries) {
+  Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
+  std::copy(entries.begin(), entries.end(), vector.begin());
+  return vector;
+}
+
+TEST(Box, IsClosed) {
+  const Box box(Vec({-1, 2}), Vec({1, 2}));
+  EXPECT_TRUE(box.Contains(Vec({-1, 2})));
+  EXPECT_TRUE(box.Contains(Vec({1, 2})));
+  EXPECT_FALSE(box.Contains(Vec({NextUp(1), 2})));
+  EXPECT_FALSE(box.Contains(Vec({NextDown(-1), 2})));
+  EXPECT_FALSE(box.Contains(Vec({0, NextUp(2)})));
+  EXPECT_FALSE(box.Contains(Vec({0, kNan})));
+  EXPECT_FALSE(box.Contains(Vec({0})));
+  EXPECT_TRUE(Box().Contains(Vec({})));
+}
+
+TEST(Box, RefusesWhatIsNoBox) {
+  EXPECT_THAT([] { Box(Vec({0}), Vec({1, 2})); }, ThrowsMessage<std::invalid_argument>(HasSubstr("lower has 1")));
+  EXPECT_THAT([] { Box(Vec({0, 2}), Vec({1, 1})); }, ThrowsMessage<std::invalid_argument>(HasSubstr("entry 1: [2, 1]")));
+  EXPECT_THROW(Box(Vec({kNan}), Vec({1})), std::invalid_argument);
+  EXPECT_THROW(Box(Vec({0}), Vec({kInfinity})), std::invalid_argument);
+  EXPECT_THROW(Box(Vec({-kInfinity}), Vec({0})), std::invalid_argument);
+  EXPECT_THROW(Box::FromCenter(Vec({0}), Vec({-1})), std::invalid_argument);
+  EXPECT_THROW(Box::FromCenter(Vec({0}), Vec({1, 1})), std::invalid_argument);
+  EXPECT_THROW(Box::FromCenter(Vec({kMaxDouble}), Vec({kMaxDouble})), std::invalid_argument);
+}
+
+TEST(Zonotope, RefusesWhatIsNoZonotope) {
+  EXPECT_THROW(Zonotope(Vec({0, 0}), Eigen::MatrixXd::Zero(3, 1)), std::invalid_argument);
+  EXPECT_THROW(Zonotope(Vec({kNan}), Eigen::MatrixXd::Zero(1, 1)), std::invalid_argument);
+  EXPECT_THROW(Zonotope(Vec({0}), Eigen::MatrixXd::Constant(1, 1, kInfinity)), std::invalid_argument);
+  EXPECT_THROW(Zonotope(Eigen::VectorXd::Zero(kMaxStates + 1), Eigen::MatrixXd(kMaxStates + 1, 0)), std::invalid_argument);
+  EXPECT_THROW(Zonotope(Vec({0}), Eigen::MatrixXd::Zero(1, kMaxGenerators + 1)), std::invalid_argument);
+  EXPECT_NO_THROW(Zonotope(Eigen::VectorXd::Zero(kMaxStates), Eigen::MatrixXd::Zero(kMaxStates, kMaxGenerators)));
+  EXPECT_THROW((void)Zonotope::FromBox(Vec({0}), Vec({-1e-300})), std::invalid_argument);
+  EXPECT_THROW((void)Zonotope::FromBox(Vec({0}), Vec({kNan})), std::invalid_argument);
+  EXPECT_THROW((void)Zonotope::FromBox(Vec({0}), Vec({kInfinity})), std::invalid_argument);
+  EXPECT_THROW((void)Zonotope::FromBox(Vec({0}), Vec({1, 1})), std::invalid_argument);
+}
+
+TEST(Zonotope, IsAValueThatNeedsNoHeap) {
+  static_assert(std::is_trivially_copyable_v<Zonotope>);
+  static_assert(noexcept(std::declval<const Zonotope&>().SupportUpper({})));
+  static_assert(noexcept(std::declval<const Zonotope&>().Hull(0)));
+  static_assert(noexcept(ReduceOrder(std::declval<Zonotope&>(), 1)));
+  EXPECT_EQ(Zonotope().dim(), 0);
+  EXPECT_EQ(Zonotope().SupportUpper({}), 0);
+}
+
+TEST(Zonotope, FromBoxDropsZeroHalfWidths) {
+  const Zonotope set = Zonotope::FromBox(Vec({1, 2, 3}), Vec({0.5, 0, 0.25}));
+  EXPECT_EQ(set.CenterVector(), Vec({1, 2, 3}));
+  Eigen::MatrixXd expected(3, 2);
+  expected << 0.5, 0, 0, 0, 0, 0.25;
+  EXPECT_EQ(set.GeneratorMatrix(), expected);
+  EXPECT_NEAR(set.Hull(0).lower, 0.5, 1e-15);
+  EXPECT_NEAR(set.Hull(0).upper, 1.5, 1e-15);
+  EXPECT_EQ(set.Hull(1), Interval(2));
+}
+
+TEST(Zonotope, EnclosesBoxesWhoseMiddleIsNoDouble) {
+  Random random(311);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Interval side = random.AnyInterval();
+    if (!std::isfinite(side.upper - side.lower)) continue;
+    const Zonotope set = Zonotope::Enclose(Box(Vec({side.lower}), Vec({side.upper})));
+    ASSERT_LE(set.Hull(0).lower, side.lower);
+    ASSERT_GE(set.Hull(0).upper, side.upper);
+  }
+}
+
+// The columns that reduction keeps and boxes, by their definition; small integers, so nothing rounds.
+Eigen::MatrixXd Reduced(const Eigen::MatrixXd& generators, int order) {
+  const Eigen::Index n = generators.rows(), m = generators.cols(), kept = (order - 1) * n;
+  if (m <= order * n) return generators;
+  std::vector<Eigen::Index> columns(static_cast<std::size_t>(m));
+  for (Eigen::Index j = 0; j < m; ++j) columns[static_cast<std::size_t>(j)] = j;
+  const auto score = [&](Eigen::Index j) {
+    return generators.col(j).lpNorm<1>() - generators.col(j).lpNorm<Eigen::Infinity>();
+  };
+  std::stable_sort(columns.begin(), columns.end(), [&](auto a, auto b) { return score(a) > score(b); });
+  std::sort(columns.begin(), columns.begin() + kept);
+  Eigen::MatrixXd reduced(n, kept);
+  for (Eigen::Index j = 0; j < kept; ++j) reduced.col(j) = generators.col(columns[static_cast<std::size_t>(j)]);
+  Eigen::VectorXd boxed = Eigen::VectorXd::Zero(n);
+  for (auto column = columns.begin() + kept; column != columns.end(); ++column) boxed += generators.col(*column).cwiseAbs();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (boxed[k] == 0) continue;
+    reduced.conservativeResize(n, reduced.cols() + 1);
+    reduced.rightCols(1) = boxed[k] * Eigen::VectorXd::Unit(n, k);
+  }
+  return reduced;
+}
+
+TEST(ReduceOrder, KeepsTheBestColumnsAndTheEarlierOfEquals) {
+  Random random(312);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 3000; ++trial) {
+    const int n = random.Integer(1, 6), order = random.Integer(1, 5);
+    const int m = random.Integer(0, std::min(kMaxGenerators, (order + 3) * n));
+    const Eigen::MatrixXd generators = Eigen::MatrixXd::NullaryExpr(n, m, [&] { return random.Integer(-2, 2); });
+    Zonotope set(Eigen::VectorXd::Zero(n), generators);
+    ReduceOrder(set, order);
+    const Eigen::MatrixXd expected = Reduced(generators, order), result = set.GeneratorMatrix();
+    ASSERT_EQ(result.cols(), expected.cols());
+    ASSERT_LE(result.cols(), std::max(order * n, 0));
+    ASSERT_TRUE(result.isApprox(expected, 1e-13) || (result - expected).isZero(0)) << result << "\n\n" << expected;
+    if (m > order * n) {
+      ASSERT_EQ(result.leftCols((order - 1) * n), expected.leftCols((order - 1) * n));
+    }
+  }
+}
+
+TEST(ReduceOrder, ChangesNothingUpToOrderTimesDimension) {
+  Random random(313);
+  SCOPED_TRACE(random.trace());
+  for (int order = 1; order <= 5; ++order) {
+    const Eigen::MatrixXd generators = random.Matrix(4, order * 4 + 1);
+    Zonotope full(Eigen::VectorXd::Zero(4), generators.leftCols(order * 4)), over(Eigen::VectorXd::Zero(4), generators);
+    ReduceOrder(full, order);
+    EXPECT_EQ(full.GeneratorMatrix(), generators.leftCols(order * 4));
+    ReduceOrder(over, order);
+    EXPECT_EQ(over.num_generators(), order * 4);
+    EXPECT_NE(over.GeneratorMatrix(), generators.leftCols(order * 4));
+  }
+}
+
+TEST(LinearMap, RowsThatCopyACoordinateAreExact) {
+  Random random(314);
+  SCOPED_TRACE(random.trace());
+  const Zonotope set = random.AnyZonotope(4, 9);
+  const MatrixEntry entries[] = {{0, 2, Interval(1)}, {1, 0, Interval(-1)}};
+  Zonotope image;
+  EncloseLinearImage(entries, set, 2, image);
+  ASSERT_EQ(image.num_generators(), 9) << "no error, so no generator for it";
+  EXPECT_EQ(image.center(0), set.center(2));
+  EXPECT_EQ(image.center(1), -set.center(0));
+  EXPECT_EQ(image.GeneratorMatrix().row(0), set.GeneratorMatrix().row(2));
+  EXPECT_EQ(image.GeneratorMatrix().row(1), -set.GeneratorMatrix().row(0));
+}
+
+TEST(LinearMap, OfAPointIsAPoint) {
+  const Zonotope point(Vec({2, 3}), Eigen::MatrixXd(2, 0));
+  const MatrixEntry entries[] = {{0, 0, Interval(0.5)}, {0, 1, Interval(2)}};
+  Zonotope image;
+  EncloseLinearImage(entries, point, 1, image);
+  EXPECT_EQ(image.center(0), 7);
+  EXPECT_EQ(image.num_generators(), 0);
+}
+
+TEST(Outline, OfAPointASegmentAndASquare) {
+  EXPECT_EQ(Outline(Zonotope(Vec({1, 2}), Eigen::MatrixXd(2, 0))).size(), 1u);
+  Eigen::MatrixXd segment(2, 2);
+  segment << 1, 0, 1, 0;
+  EXPECT_THAT(Outline(Zonotope(Vec({0, 0}), segment)),
+              testing::UnorderedElementsAre(Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, -1)));
+  EXPECT_THAT(Outline(Zonotope(Vec({0, 0}), Eigen::MatrixXd::Identity(2, 2))),
+              testing::UnorderedElementsAre(Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, 1), Eigen::Vector2d(-1, -1),
+                                            Eigen::Vector2d(1, -1)));
+}
+
+double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Integers, so the brute force over all sign vectors is exact.
+TEST(Outline, IsTheHullOfAllSignVectors) {
+  Random random(315);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 500; ++trial) {
+    const int m = random.Integer(1, 7);
+    const Eigen::MatrixXd generators = Eigen::MatrixXd::NullaryExpr(2, m, [&] { return random.Integer(-4, 4); });
+    const Eigen::Vector2d center(random.Integer(-9, 9), random.Integer(-9, 9));
+    const auto outline = Outline(Zonotope(center, generators));
+    if (generators.isZero(0)) {
+      ASSERT_EQ(outline.size(), 1u);
+      continue;
+    }
+    ASSERT_GE(outline.size(), 2u);
+    double area = 0;
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+      const Eigen::Vector2d &a = outline[i], &b = outline[(i + 1) % outline.size()];
+      area += Cross(a, b) / 2;
+      for (int signs = 0; signs < 1 << m; ++signs) {
+        Eigen::Vector2d point = center;
+        for (int j = 0; j < m; ++j) point += (signs >> j & 1 ? 1 : -1) * generators.col(j);
+        ASSERT_GE(Cross(b - a, point - a), -1e-9) << "a point outside, or corners clockwise";
+      }
+    }
+    // The area of a zonogon: 4 sum |g_i x g_j|. No smaller polygon contains all points and no larger one has this area.
+    double expected = 0;
+    for (int i = 0; i < m; ++i)
+      for (int j = 0; j < i; ++j) expected += 4 * std::abs(Cross(generators.col(i), generators.col(j)));
+    ASSERT_NEAR(area, expected, 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace forereach
