@@ -27,9 +27,13 @@ Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set) {
 void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifier& certifier) {
   std::cout << Explain(result.decision, certifier.problem()) << "\n";
   const auto& names = certifier.problem().model->state_names();
-  std::cout << "  tube: " << tube.length() << " steps; half-width of its last slice:";
-  for (std::size_t k = 0; k < names.size(); ++k)
-    std::cout << " " << names[k] << " " << tube.slice(tube.length()).HalfWidthUpper(static_cast<int>(k));
+  if (result.decision.outcome == Outcome::kFalsified && result.decision.step < 0) {
+    std::cout << "  no tube";
+  } else {
+    std::cout << "  tube: " << tube.length() << " steps; half-width of its last slice:";
+    for (std::size_t k = 0; k < names.size(); ++k)
+      std::cout << " " << names[k] << " " << tube.slice(tube.length()).HalfWidthUpper(static_cast<int>(k));
+  }
   std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
 }
 

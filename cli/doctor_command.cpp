@@ -7,6 +7,7 @@
 #include <map>
 #include <net/if.h>
 #include <netinet/in.h>
+#include <sstream>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <thread>
@@ -55,22 +56,31 @@ Check CheckLoopback() {
   return {"loopback interface", up, up ? "up" : "down", std::string(kReadyCommand) + ", or: ip link set lo up"};
 }
 
-// Connecting a datagram socket sends nothing; it fails where there is no route and tells the address it would send from.
+// The interface of the most specific route to `group`, empty if there is none. The kernel's table has addresses and masks
+// in hexadecimal, in network order as this machine reads it.
+std::string InterfaceOfRoute(const std::string& group) {
+  in_addr address{};
+  inet_pton(AF_INET, group.c_str(), &address);
+  std::ifstream table("/proc/net/route");
+  std::string line, interface;
+  std::getline(table, line);  // the header
+  std::uint32_t longest_mask = 0;
+  while (std::getline(table, line)) {
+    std::istringstream row(line);
+    std::string name, gateway;
+    std::uint32_t destination = 0, mask = 0;
+    int flags = 0, references = 0, use = 0, metric = 0;
+    row >> name >> std::hex >> destination >> gateway >> flags >> std::dec >> references >> use >> metric >> std::hex >> mask;
+    if (!row || (address.s_addr & mask) != destination || ntohl(mask) < longest_mask) continue;
+    interface = name;
+    longest_mask = ntohl(mask);
+  }
+  return interface;
+}
+
 Check CheckRoute(const std::string& group) {
-  const Socket socket;
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(7667);
-  inet_pton(AF_INET, group.c_str(), &to.sin_addr);
-  sockaddr_in from{};
-  socklen_t size = sizeof from;
-  const bool routed = connect(socket.handle(), reinterpret_cast<sockaddr*>(&to), sizeof to) == 0 &&
-                      getsockname(socket.handle(), reinterpret_cast<sockaddr*>(&from), &size) == 0;
-  char address[INET_ADDRSTRLEN] = "";
-  inet_ntop(AF_INET, &from.sin_addr, address, sizeof address);
-  const bool loopback = routed && (ntohl(from.sin_addr.s_addr) >> 24) == 127;
-  return {"multicast route to " + group, loopback,
-          !routed ? "none" : (loopback ? "by loopback, from " : "by a network, from ") + std::string(address),
+  const std::string interface = InterfaceOfRoute(group);
+  return {"multicast route to " + group, interface == "lo", interface.empty() ? "none" : "by " + interface,
           std::string(kReadyCommand) + ", or: ip route add 224.0.0.0/4 dev lo"};
 }
 

@@ -66,7 +66,7 @@ void PlannerNode::OnRobotState(const Received& received) {
   if (finished_) return;
   last_state_utime_ = state.utime;
   Follow(state);
-  if (!finished_ && !round_ && !waiting_start_ && NextPlanIsDue(state)) BeginRound(state);
+  if (!arrived_ && !finished_ && !round_ && !waiting_start_ && NextPlanIsDue(state)) BeginRound(state);
 }
 
 bool PlannerNode::IsUsable(const robot_state_t& state) const {
@@ -75,10 +75,19 @@ bool PlannerNode::IsUsable(const robot_state_t& state) const {
          std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });
 }
 
+bool PlannerNode::IsAtGoal(const robot_state_t& state) const {
+  const std::vector<double>& goal = config_.planner.goal;
+  const Eigen::VectorXd position =
+      config_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
+  return (position - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm() <=
+         config_.planner.goal_radius;
+}
+
 // What the state says of earlier plans: which of them is executing, and which start has passed.
 void PlannerNode::Follow(const robot_state_t& state) {
   finished_ = state.mode == robot_state_t::FINISHED;
-  if (round_ && (finished_ || round_->start_utime <= state.utime)) EndRound(false);
+  arrived_ = arrived_ || IsAtGoal(state);
+  if (round_ && (arrived_ || finished_ || round_->start_utime <= state.utime)) EndRound(false);
   if (waiting_start_ && *waiting_start_ <= state.utime) waiting_start_.reset();
   if (state.mode == robot_state_t::EXECUTING)
     plans_.erase(plans_.begin(), plans_.lower_bound(state.executing_plan_id));

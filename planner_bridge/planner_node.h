@@ -10,7 +10,8 @@ candidate at a time and waits for its decision:
     abstention F       -> the round ends: no candidate can pass
     rejected           -> the next candidate
 It ends without a certificate after `candidates` of them, or when too little time is left until its start; the next state
-starts another. All planning is done in Tick, one search at a time. After FINISHED nothing is sent any more.
+starts another. All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has said FINISHED,
+no round begins any more.
 
 Messages that do not decode, contain what is not finite, or concern somebody else's candidates are counted and ignored. */
 #pragma once
@@ -63,6 +64,7 @@ class PlannerNode final : public Node {
   void OnObstacles(const Received& received);
 
   [[nodiscard]] bool IsUsable(const robot_state_t& state) const;
+  [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
   [[nodiscard]] std::optional<Eigen::VectorXd> PredictStart(const robot_state_t& state) const;
   void Follow(const robot_state_t& state);
@@ -86,7 +88,7 @@ class PlannerNode final : public Node {
   std::optional<std::int64_t> waiting_start_;       // of a certified plan that is still to begin
   std::int64_t last_state_utime_ = 0, last_obstacles_ = -1;
   std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
-  bool finished_ = false;
+  bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
                fruitless_rounds_ = 0, ignored_ = 0, not_sent_ = 0;

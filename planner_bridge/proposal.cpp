@@ -39,12 +39,14 @@ constexpr double kLargestTurn = 1.2;    // rad, off the way down the navigation 
 constexpr double kReverse = 1e-3;       // m/s, what counts as standing still
 constexpr double kRoomAhead = 6;        // m, kept free beyond the end of a braking tail
 
-/** What a progress part has to achieve. Tried in turn, the later ones are easier; the last lets the robot turn round. */
+/** What a progress part has to achieve. Tried in turn, the later ones are easier; the last but one lets the robot turn round. */
 struct Ambition {
   double share;    // of the distance that cruising straight at the goal would gain
   double heading;  // least cosine between the motion at the end and the way to the goal
+  bool room;       // to drive on from where the tail ends; a robot that stands has to take what it gets
 };
-constexpr std::array<Ambition, 4> kAmbitions{{{0.85, 0.94}, {0.6, 0.8}, {0.2, 0.4}, {-0.5, -1}}};
+constexpr std::array<Ambition, 5> kAmbitions{
+    {{0.85, 0.94, true}, {0.6, 0.8, true}, {0.2, 0.4, true}, {-0.5, -1, true}, {0, -1, false}}};
 
 const double* Values(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
 double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
@@ -176,6 +178,7 @@ class Planner::Search {
 
   /** False if the start itself is not allowed. */
   [[nodiscard]] bool StartIsValid() const { return start_valid_; }
+  [[nodiscard]] bool StartsAtRest() const { return at_rest_; }
   [[nodiscard]] std::optional<Proposal> Run(const Ambition& ambition, std::int64_t allowance);
 
  private:
@@ -198,10 +201,10 @@ class Planner::Search {
   [[nodiscard]] double IdealGain() const;
   [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const;
   [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const;
-  [[nodiscard]] bool FindTail(std::span<const double> x, Eigen::MatrixXd& tail) const;
-  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Eigen::MatrixXd& tail) const;
+  [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const;
+  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Ambition& ambition, const Eigen::MatrixXd& tail) const;
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition);
-  [[nodiscard]] std::optional<Proposal> Assemble(oc::PathControl& path) const;
+  [[nodiscard]] std::optional<Proposal> Assemble(oc::PathControl& path, const Ambition& ambition) const;
 
   const Impl& planner_;
   const NavigationField& field_;
@@ -211,7 +214,7 @@ class Planner::Search {
   Eigen::VectorXd lower_, upper_;
   std::vector<double> clearances_;  // to each obstacle
   double start_distance_, gain_, top_speed_, least_speed_;
-  bool from_motion_, start_valid_;
+  bool at_rest_, start_valid_;
   mutable std::int64_t work_ = 0;  // model steps
 };
 
@@ -230,7 +233,7 @@ class Planner::Search::ProgressGoal final : public ob::Goal {
     const bool arrives = search_.BestOf(s) <= kShareOfRadius * search_.planner_.options_.goal_radius;
     Eigen::MatrixXd tail;
     return (arrives || search_.HeadsWell(search_.StateOf(s), ambition_.heading)) &&
-           search_.FindTail(search_.StateOf(s), tail);
+           search_.FindTail(search_.StateOf(s), ambition_, tail);
   }
 
  private:
@@ -258,7 +261,7 @@ Planner::Search::Search(const Impl& planner, const PlanRequest& request, const N
   gain_ = IdealGain();
   top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
   least_speed_ = std::min(-kReverse, planner.motion_->Speed(x));
-  from_motion_ = std::abs(planner.motion_->Speed(x)) > kReverse;
+  at_rest_ = std::abs(planner.motion_->Speed(x)) <= kReverse;
   start_valid_ = Allowed(x);
 }
 
@@ -331,13 +334,13 @@ bool Planner::Search::HeadsWell(std::span<const double> x, double cosine) const 
   return motion.dot(field_.Descent(position)) >= cosine * motion.norm();
 }
 
-bool Planner::Search::FindTail(std::span<const double> x, Eigen::MatrixXd& tail) const {
+bool Planner::Search::FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
   for (int shape = 0; shape < planner_.motion_->num_tails(); ++shape)
-    if (planner_.motion_->Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, tail)) return true;
+    if (planner_.motion_->Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
   return false;
 }
 
-bool Planner::Search::TailIsAllowed(std::span<const double> x, const Eigen::MatrixXd& tail) const {
+bool Planner::Search::TailIsAllowed(std::span<const double> x, const Ambition& ambition, const Eigen::MatrixXd& tail) const {
   std::array<double, kMaxVariables> z;
   std::copy(x.begin(), x.end(), z.begin());
   Eigen::VectorXd position = Position(x), direction = Eigen::VectorXd::Zero(position.size());
@@ -352,7 +355,7 @@ bool Planner::Search::TailIsAllowed(std::span<const double> x, const Eigen::Matr
     position += moved;
     if (moved.norm() > kReverse) direction = moved.normalized();
   }
-  return !from_motion_ || HasRoom(position, direction);
+  return !ambition.room || HasRoom(position, direction);
 }
 
 // Whether a robot that came to rest here may still drive on: one that cannot reverse would be there to stay.
@@ -417,14 +420,14 @@ std::optional<Proposal> Planner::Search::Run(const Ambition& ambition, std::int6
   std::int64_t rounds = 0;  // bounds a search that propagates nothing
   setup->solve(ob::PlannerTerminationCondition([&] { return work_ >= most || ++rounds > allowance; }));
   if (!setup->haveExactSolutionPath()) return std::nullopt;
-  return Assemble(setup->getSolutionPath());
+  return Assemble(setup->getSolutionPath(), ambition);
 }
 
-std::optional<Proposal> Planner::Search::Assemble(oc::PathControl& path) const {
+std::optional<Proposal> Planner::Search::Assemble(oc::PathControl& path, const Ambition& ambition) const {
   path.interpolate();
   const auto progress = static_cast<Eigen::Index>(path.getControlCount());
   Eigen::MatrixXd tail;
-  if (!FindTail(StateOf(Values(path.getStates().back())), tail)) return std::nullopt;
+  if (!FindTail(StateOf(Values(path.getStates().back())), ambition, tail)) return std::nullopt;
   Proposal proposal{Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()),
                     static_cast<int>(progress),
                     Eigen::MatrixXd(start_.size(), progress + tail.cols() + 1)};
@@ -444,8 +447,10 @@ std::optional<Proposal> Planner::Impl::Propose(const PlanRequest& request) {
   // OMPL calls a second seed an error because generators that exist keep theirs. None does: each search makes its own.
   ompl::RNG::setSeed(std::max<std::uint32_t>(request.seed, 1));
   const auto allowance = static_cast<std::int64_t>(options_.time_limit_ms * kStepsPerMs / kAmbitions.size());
-  for (const Ambition& ambition : kAmbitions)
+  for (const Ambition& ambition : kAmbitions) {
+    if (!ambition.room && !search.StartsAtRest()) continue;
     if (std::optional<Proposal> proposal = search.Run(ambition, allowance)) return proposal;
+  }
   return std::nullopt;
 }
 

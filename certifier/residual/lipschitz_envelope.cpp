@@ -114,7 +114,9 @@ double LipschitzEnvelope::DistanceUpper(const Row& row, const Query& query, std:
       else
         sum += weighted[l].Magnitude();
     }
-    distance = std::max(distance, AddUp(sum.Magnitude(), query.spread[s]));
+    const double candidate = AddUp(sum.Magnitude(), query.spread[s]);
+    if (!(candidate <= distance)) distance = candidate;  // NaN, from sums that overflow, has to stay
+    if (std::isnan(distance)) return kInfinity;
   }
   return distance;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <numeric>
+#include <stdexcept>
 #include <utility>
 
 #include <yaml-cpp/yaml.h>
@@ -64,17 +65,26 @@ std::string_view Parent(std::string_view path) {
   const std::size_t end = path.rfind('.');
   return path.substr(0, end == std::string_view::npos ? 0 : end);
 }
+
 // The path of what a path stands in: a list for an index.
 std::string_view Enclosing(std::string_view path) {
   const std::size_t end = path.find_last_of(".[");
   return path.substr(0, end == std::string_view::npos ? 0 : end);
 }
+
 bool IsChild(const Key& row, std::string_view map) {
   return !row.path.empty() && Parent(row.path) == map && !row.path.ends_with("[]");
 }
 
 std::string Below(const std::string& map, std::string_view key) {
   return map.empty() ? std::string(key) : map + "." + std::string(key);
+}
+
+// What stands in a file may not break the line of a message, nor drive a terminal.
+std::string OneLine(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  return text;
 }
 
 std::string Shown(const YAML::Node& node) {
@@ -149,7 +159,7 @@ class Checker {
   static std::string Index(std::size_t i) { return std::string("[") + std::to_string(i) + "]"; }
 
   [[noreturn]] void Fail(const YAML::Node& node, const std::string& key, const std::string& what) const {
-    throw ConfigError(At(path_, LineOf(node.Mark())) + key + (key.empty() ? "" : ": ") + what);
+    throw ConfigError(At(path_, LineOf(node.Mark())) + OneLine(key + (key.empty() ? "" : ": ") + what));
   }
 
   const Key& RowFor(const YAML::Node& node, const std::string& pattern, const std::string& key) const {
@@ -316,6 +326,10 @@ struct Document::Tree {
     const auto found = values.find(key);
     return found == values.end() ? nullptr : &found->second;
   }
+  const YAML::Node& Get(std::string_view key) const {
+    if (const YAML::Node* node = Find(key)) return *node;
+    throw std::logic_error("read without a check that it is there: " + std::string(key));
+  }
 };
 
 std::vector<std::string> SchemaScope::variables() const {
@@ -336,7 +350,7 @@ void Document::Check(const SchemaScope& scope) {
 
 bool Document::Has(std::string_view key) const { return tree_->Find(key) != nullptr; }
 
-bool Document::IsList(std::string_view key) const { return tree_->values.find(key)->second.IsSequence(); }
+bool Document::IsList(std::string_view key) const { return tree_->Get(key).IsSequence(); }
 
 int Document::Count(std::string_view key) const {
   const YAML::Node* node = tree_->Find(key);
@@ -350,27 +364,25 @@ std::vector<std::string> Document::KeysOf(std::string_view key) const {
   return keys;
 }
 
-double Document::Number(std::string_view key) const {
-  return ParseNumber(tree_->values.find(key)->second.Scalar()).value;
-}
+double Document::Number(std::string_view key) const { return ParseNumber(tree_->Get(key).Scalar()).value; }
 
 int Document::Integer(std::string_view key) const {
-  return static_cast<int>(ParseInteger(tree_->values.find(key)->second.Scalar()).value);
+  return static_cast<int>(ParseInteger(tree_->Get(key).Scalar()).value);
 }
 
-std::string Document::Text(std::string_view key) const { return tree_->values.find(key)->second.Scalar(); }
+std::string Document::Text(std::string_view key) const { return tree_->Get(key).Scalar(); }
 
-Eigen::VectorXd Document::Vector(std::string_view key) const { return VectorOf(tree_->values.find(key)->second); }
+Eigen::VectorXd Document::Vector(std::string_view key) const { return VectorOf(tree_->Get(key)); }
 
 std::vector<Eigen::VectorXd> Document::Vectors(std::string_view key) const {
   std::vector<Eigen::VectorXd> vectors;
-  for (const auto& entry : tree_->values.find(key)->second) vectors.push_back(VectorOf(entry));
+  for (const auto& entry : tree_->Get(key)) vectors.push_back(VectorOf(entry));
   return vectors;
 }
 
 std::vector<std::string> Document::Names(std::string_view key) const {
   std::vector<std::string> names;
-  for (const auto& entry : tree_->values.find(key)->second) names.push_back(entry.Scalar());
+  for (const auto& entry : tree_->Get(key)) names.push_back(entry.Scalar());
   return names;
 }
 

@@ -36,6 +36,13 @@ TEST_F(ErrorTest, UnknownKeys) {
   EXPECT_THAT(ErrorAfter("<<: {gate: {}}\n"), StartsWith("task.yaml:19: <<: unknown key"));
 }
 
+TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0.15, \"a\\nb\\e[2J\": 1"),
+            "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase");
+  EXPECT_EQ(files_.ErrorWith("name: point_mass", "name: \"point\\nmass\""),
+            "task.yaml:1: model.name: point?mass is not known; did you mean point_mass?");
+}
+
 TEST_F(ErrorTest, KeysOfAnotherModel) {
   EXPECT_EQ(files_.ErrorWith("dt: 0.15}", "dt: 0.15, wheelbase: 2.5}"),
             "task.yaml:1: model.wheelbase: is for kinematic_bicycle, not for point_mass");

@@ -1,15 +1,17 @@
 // The tasks in config/ do what they say, and its README says what the code does.
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "certifier/certify/certifier.h"
+#include "certifier/certify/explain.h"
 #include "certifier/task/config.h"
 #include "certifier/task/schema.h"
 #include "robot/target.h"
+#include "scratch.h"
 
 namespace forereach {
 namespace {
@@ -64,16 +66,19 @@ TEST(Shipped, TransitionsAreThoseOfTheirCommands) {
   EXPECT_EQ(point_mass.observations_digest, made(point_mass, 100, {{"vx", -0.5, 3.5}, {"vy", -0.8, 0.8}}));
 }
 
-Outcome Certify(const std::string& task, const std::string& plan_name) {
-  const Config config = LoadConfig(kDirectory + task + ".yaml");
+Decision Decide(const Config& config, const Eigen::MatrixXd& controls) {
   const Certifier certifier(config.problem);
-  const Eigen::MatrixXd controls = LoadPlan(kDirectory + "plans/" + plan_name + ".csv", *config.problem->model);
   const auto inputs = static_cast<int>(controls.rows());
   const Plan plan{controls.data(), inputs, static_cast<int>(controls.cols()), inputs};
   const Zonotope initial_set = Zonotope::Enclose(config.initial_set);
   certifier.Require(plan, initial_set, config.obstacles);
   Tube tube;
-  return certifier.Certify(plan, initial_set, config.obstacles, tube).outcome;
+  return certifier.Certify(plan, initial_set, config.obstacles, tube);
+}
+
+Outcome Certify(const std::string& task, const std::string& plan_name) {
+  const Config config = LoadConfig(kDirectory + task + ".yaml");
+  return Decide(config, LoadPlan(kDirectory + "plans/" + plan_name + ".csv", *config.problem->model)).outcome;
 }
 
 TEST(Shipped, EachPlanGetsTheAnswerItIsNamedAfter) {
@@ -83,6 +88,31 @@ TEST(Shipped, EachPlanGetsTheAnswerItIsNamedAfter) {
     EXPECT_EQ(Certify(task, task + "_safety"), Outcome::kSafety) << task;
     EXPECT_EQ(Certify(task + "_falsified", task + "_certified"), Outcome::kFalsified) << task;
   }
+}
+
+// The first block of this kind in the README.
+std::string Block(const std::string& kind) {
+  const std::string readme = Contents(kDirectory + "README.md"), fence = "```" + kind + "\n";
+  const std::size_t begin = readme.find(fence) + fence.size();
+  return readme.substr(begin, readme.find("```", begin) - begin);
+}
+
+TEST(Shipped, TheReadmesExampleGetsTheAnswerItQuotes) {
+  const TaskFiles files;
+  const Config config = files.Load(Block("yaml"), Block("csv"));
+  const Decision decision = Decide(config, Eigen::MatrixXd::Zero(2, 6));
+  EXPECT_EQ(decision.outcome, Outcome::kCertified);
+  EXPECT_EQ(decision.closest_step, 6);
+  EXPECT_THAT(Contents(kDirectory + "README.md"), testing::HasSubstr(Explain(decision, *config.problem)));
+}
+
+TEST(Shipped, TheReadmesErrorsAreThoseItQuotes) {
+  const TaskFiles files;
+  const std::string task = Block("yaml"), steps = Block("csv"), readme = Contents(kDirectory + "README.md");
+  for (const std::string& error : {files.Error(Replaced(task, "vx: {vx: 0.02", "vx: {vx: -0.02"), steps),
+                                   files.Error(Replaced(task, "{lower: [-1, -1]", "{lower: [-1]"), steps),
+                                   files.Error(task, Replaced(steps, "1,2,2.0,", "1,2,3.5,"))})
+    EXPECT_THAT(readme, testing::HasSubstr("\n" + error + "\n"));
 }
 
 }  // namespace

@@ -238,7 +238,7 @@ Rational Distance(const Sample& s, int k, int i, const Zonotope& slice, const Ei
   }
   Rational farthest = 0;
   for (std::uint32_t signs = 0; signs < 1u << active.size(); ++signs) {
-    const auto weight = [&](std::size_t a) { return (signs >> a & 1u ? -1 : 1) * slope(active[a]); };
+    const auto weight = [&](std::size_t a) -> Rational { return (signs >> a & 1u ? -1 : 1) * slope(active[a]); };
     Rational offset = 0;
     for (std::size_t a = 0; a < active.size(); ++a)
       offset += weight(a) * (center(active[a]) - Rational(s.observations.z(i, active[a])));

@@ -1,0 +1,95 @@
+// A recorded log through the same gate gives the same decisions, and a changed one does not.
+#include <cstdio>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "cli/replay.h"
+#include "forereach/decision_t.hpp"
+#include "forereach/candidate_plan_t.hpp"
+#include "logger/event_log.h"
+
+namespace forereach {
+namespace {
+
+const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+// Copies the log, each event changed by `edit`.
+template <class Edit>
+std::string Edited(Edit edit) {
+  const std::string path =
+      testing::TempDir() + "forereach_replay_" + std::to_string(getpid()) + ".lcmlog";
+  std::filesystem::remove(path);
+  EventLogReader reader(kLog);
+  EventLogWriter writer(path);
+  LogEvent event;
+  while (reader.Next(event) == LogStatus::kEvent)
+    if (edit(event)) writer.Append(event.utime, event.channel, event.data);
+  EXPECT_TRUE(writer.Flush());
+  return path;
+}
+
+TEST(Replay, RecordedLogAgreesOnEveryDecision) {
+  const Config config = LoadConfig(kConfig);
+  const ReplayResult result = Replay(kLog, config);
+  EXPECT_TRUE(result.differences.empty()) << result.differences.front();
+  EXPECT_EQ(result.agreed, result.candidates);
+  EXPECT_GE(result.candidates, 10);
+  EXPECT_EQ(result.corruptions, 0);
+}
+
+TEST(Replay, RecordedLogHasCertificatesAndBothAbstentions) {
+  int certified = 0, domain = 0, safety = 0;
+  EventLogReader reader(kLog);
+  LogEvent event;
+  while (reader.Next(event) == LogStatus::kEvent) {
+    const auto decision = Decoded<decision_t>(event.data);
+    if (!decision) continue;
+    certified += decision->outcome == decision_t::CERTIFIED;
+    domain += decision->outcome == decision_t::ABSTAIN_DOMAIN;
+    safety += decision->outcome == decision_t::ABSTAIN_SAFETY;
+  }
+  EXPECT_GT(certified, 0);
+  EXPECT_GT(domain, 0);
+  EXPECT_GT(safety, 0);
+}
+
+TEST(Replay, ChangedOutcomeIsListed) {
+  bool changed = false;
+  const std::string path = Edited([&](LogEvent& event) {
+    if (auto decision = Decoded<decision_t>(event.data); decision && !changed) {
+      changed = true;
+      decision->outcome = decision->outcome == decision_t::CERTIFIED ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED;
+      event.data = Encode(*decision);
+    }
+    return true;
+  });
+  EXPECT_EQ(Replay(path, LoadConfig(kConfig)).differences.size(), 1u);
+  std::filesystem::remove(path);
+}
+
+TEST(Replay, MissingDecisionAndMissingCandidateAreListed) {
+  for (const bool drop_decision : {true, false}) {
+    bool dropped = false;
+    const std::string path = Edited([&](LogEvent& event) {
+      const bool wanted = drop_decision ? Decoded<decision_t>(event.data).has_value()
+                                        : Decoded<candidate_plan_t>(event.data).has_value();
+      if (dropped || !wanted) return true;
+      dropped = true;
+      return false;
+    });
+    EXPECT_EQ(Replay(path, LoadConfig(kConfig)).differences.size(), 1u) << drop_decision;
+    std::filesystem::remove(path);
+  }
+}
+
+TEST(Replay, AnotherTaskIsNoticed) {
+  Config config = LoadConfig(kConfig);
+  config.declaration_digest[0] ^= 1;
+  const ReplayResult result = Replay(kLog, config);
+  EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
+}
+
+}  // namespace
+}  // namespace forereach

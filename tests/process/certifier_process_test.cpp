@@ -1,0 +1,171 @@
+// forereach-certifier as a process, fed good and bad messages over a real bus.
+#include <limits>
+#include <map>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/obstacle_message.h"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "tests/process/process_fixture.h"
+
+namespace forereach {
+namespace {
+
+const Eigen::Vector2d kGentle(0.2, 0), kIntoTheCircle(0, 2.5), kOutsideDomain(0, 3.5);
+
+class CertifierProcessTest : public testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(certifier_.WaitForLog("ready on")) << certifier_.error(); }
+
+  void Send(const std::vector<std::uint8_t>& bytes, int expected_cause) {
+    expected_[DigestOf(Bytes(bytes))] = expected_cause;
+    ASSERT_TRUE(probe_.bus().Publish("PLAN_CANDIDATE", Bytes(bytes)));
+  }
+  void Send(const candidate_plan_t& candidate, int expected_cause) { Send(Encode(candidate), expected_cause); }
+  candidate_plan_t New(const Eigen::Vector2d& control, int steps = 12) {
+    return CandidateFor(config_, next_plan_id_++, control, steps);
+  }
+
+  [[nodiscard]] bool WaitForDecisions(std::size_t count) {
+    return probe_.WaitUntil([&] { return probe_.heard("PLAN_DECISION").size() >= count; });
+  }
+
+  const ScratchDirectory scratch_;
+  const std::string path_ = scratch_.Write("task.yaml", PatientTask());
+  const Config config_ = LoadConfig(path_);
+  BusProbe probe_{PrivateBusUrl(), {"PLAN_DECISION", "PLAN_CERTIFIED", "CERTIFIER_STATUS"}};
+  ChildProcess certifier_{{FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", PrivateBusUrl()}};
+  std::int64_t next_plan_id_ = 1;
+  std::map<Digest, int> expected_;  // cause by plan digest
+};
+
+TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCertified) {
+  Send(New(kGentle), decision_t::CAUSE_NONE);
+  const candidate_plan_t good = New(kGentle);
+  Send(good, decision_t::CAUSE_NONE);
+  Send(New(kIntoTheCircle), decision_t::CAUSE_OBSTACLE);
+  Send(New(kOutsideDomain), decision_t::CAUSE_DOMAIN_EXIT);
+
+  candidate_plan_t bad = New(kGentle);
+  bad.plan_id = 1;
+  Send(bad, decision_t::CAUSE_DUPLICATE);
+  bad = New(kGentle);
+  bad.utime -= 60'000'000;
+  Send(bad, decision_t::CAUSE_STALE);
+  bad = New(kGentle);
+  bad.utime += 60'000'000;
+  Send(bad, decision_t::CAUSE_FUTURE);
+  bad = New(kGentle);
+  bad.start_utime = bad.utime - 1'000'000;
+  Send(bad, decision_t::CAUSE_TOO_LATE);
+  bad = New(kGentle);
+  bad.num_states = 6;
+  Send(bad, decision_t::CAUSE_WRONG_DIMENSION);
+  bad = New(kGentle);
+  bad.control[11][1] = std::numeric_limits<double>::quiet_NaN();
+  Send(bad, decision_t::CAUSE_NON_FINITE);
+
+  std::vector<std::uint8_t> bytes = Encode(New(kGentle));
+  bytes.pop_back();
+  Send(bytes, decision_t::CAUSE_WRONG_LENGTH);
+  bytes.resize(bytes.size() + 2);
+  Send(bytes, decision_t::CAUSE_TRAILING_BYTES);
+  Send(Encode(transition_t{}), decision_t::CAUSE_UNKNOWN_FINGERPRINT);
+  Send(std::vector<std::uint8_t>{}, decision_t::CAUSE_WRONG_LENGTH);
+  Send(New(kGentle), decision_t::CAUSE_NONE);  // good again
+
+  ASSERT_TRUE(WaitForDecisions(expected_.size()));
+  probe_.ListenFor(std::chrono::milliseconds(700));  // a second answer would come, and a heartbeat does
+  const auto decisions = probe_.Heard<decision_t>("PLAN_DECISION");
+  std::map<Digest, int> causes;
+  for (std::size_t i = 0; i < decisions.size(); ++i) {
+    EXPECT_EQ(decisions[i].sequence, static_cast<std::int64_t>(i));
+    causes[GetDigest(decisions[i].plan_digest)] = decisions[i].cause;
+  }
+  EXPECT_EQ(decisions.size(), expected_.size());
+  EXPECT_EQ(causes, expected_);
+
+  const auto certified = probe_.Heard<certified_plan_t>("PLAN_CERTIFIED");
+  ASSERT_EQ(certified.size(), 3u);
+  for (const certified_plan_t& plan : certified) {
+    EXPECT_EQ(expected_.at(DigestOf(Encode(plan.plan))), decision_t::CAUSE_NONE);
+    EXPECT_EQ(GetDigest(plan.certificate_digest), CertificateDigest(plan));
+    EXPECT_EQ(GetDigest(plan.config_digest), config_.digest);
+  }
+  EXPECT_EQ(Encode(certified[1].plan), Encode(good));
+
+  const auto status = probe_.Heard<certifier_status_t>("CERTIFIER_STATUS");
+  ASSERT_FALSE(status.empty());
+  EXPECT_EQ(status.back().candidates, 15);
+  EXPECT_EQ(status.back().certified, 3);
+  EXPECT_EQ(status.back().abstained_safety, 1);
+  EXPECT_EQ(status.back().abstained_domain, 1);
+  EXPECT_EQ(status.back().rejected, 10);
+
+  EXPECT_EQ(certifier_.Terminate(), 0) << certifier_.error();
+  const auto summary = nlohmann::json::parse(certifier_.output());
+  EXPECT_EQ(summary["candidates"], 15);
+  EXPECT_EQ(summary["certified"], 3);
+}
+
+TEST_F(CertifierProcessTest, ObstaclesFromTheBusReplaceThoseOfTheFile) {
+  Send(New(kIntoTheCircle), decision_t::CAUSE_OBSTACLE);
+  ASSERT_TRUE(WaitForDecisions(1));
+
+  obstacles_t none{};
+  none.utime = WallClockUs();
+  probe_.bus().Publish("OBSTACLES", none);
+  Send(New(kIntoTheCircle), decision_t::CAUSE_NONE);
+  ASSERT_TRUE(WaitForDecisions(2));
+
+  obstacles_t wall = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.5)});
+  wall.utime = WallClockUs();
+  wall.sequence = 1;
+  probe_.bus().Publish("OBSTACLES", wall);
+  wall.sequence = 2;
+  wall.obstacle[0].kind = 99;  // refused: the wall stays
+  probe_.bus().Publish("OBSTACLES", wall);
+  Send(New(kGentle), decision_t::CAUSE_OBSTACLE);
+  ASSERT_TRUE(WaitForDecisions(3));
+
+  const auto decisions = probe_.Heard<decision_t>("PLAN_DECISION");
+  for (const decision_t& decision : decisions)
+    EXPECT_EQ(decision.cause, expected_.at(GetDigest(decision.plan_digest))) << GetText(decision.message);
+  EXPECT_EQ(GetDigest(decisions[0].obstacles_digest), config_.obstacles_digest);
+  EXPECT_EQ(GetDigest(decisions[1].obstacles_digest), ObstaclesDigest({}));
+  EXPECT_EQ(certifier_.Terminate(), 0);
+  EXPECT_THAT(certifier_.error(), testing::HasSubstr("OBSTACLES: refused"));
+}
+
+// As fast as it can, with no more under way than the kernel's smallest buffer holds: UDP may drop what a buffer cannot
+// take, and this test is about the certifier.
+TEST_F(CertifierProcessTest, FiveHundredCandidatesInABurstAreAnsweredExactlyOnce) {
+  constexpr std::size_t kCandidates = 500, kUnderWay = 8;
+  std::map<std::int64_t, int> answers;
+  for (std::size_t sent = 0; sent < kCandidates; ++sent) {
+    ASSERT_TRUE(WaitForDecisions(sent < kUnderWay ? 0 : sent - kUnderWay + 1)) << sent;
+    Send(New(sent % 2 == 0 ? kGentle : kIntoTheCircle), 0);
+  }
+  ASSERT_TRUE(WaitForDecisions(kCandidates));
+  probe_.ListenFor(std::chrono::milliseconds(600));
+  for (const decision_t& decision : probe_.Heard<decision_t>("PLAN_DECISION")) ++answers[decision.plan_id];
+  EXPECT_EQ(answers.size(), kCandidates);
+  for (const auto& [plan_id, count] : answers) EXPECT_EQ(count, 1) << plan_id;
+  EXPECT_EQ(probe_.heard("PLAN_CERTIFIED").size(), kCandidates / 2);
+  EXPECT_EQ(probe_.Heard<certifier_status_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
+}
+
+TEST_F(CertifierProcessTest, StopsInTheMiddleOfAFlood) {
+  for (int i = 0; i < 200; ++i) Send(New(kGentle), 0);
+  EXPECT_EQ(certifier_.Terminate(), 0) << certifier_.error();
+  EXPECT_TRUE(nlohmann::json::accept(certifier_.output())) << certifier_.output();
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,42 @@
+// forereach-logger as a process: what is on the bus is in its files when it ends.
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forereach/decision_t.hpp"
+#include "tests/process/process_fixture.h"
+
+namespace forereach {
+namespace {
+
+TEST(LoggerProcessTest, RecordsAndEndsWithASummary) {
+  const ScratchDirectory scratch;
+  const std::string path = scratch.Write("task.yaml", PatientTask()), directory = scratch.path() / "recorded";
+  const Config config = LoadConfig(path);
+  BusProbe probe(PrivateBusUrl(), {"PLAN_CANDIDATE"});
+  ChildProcess logger({FOREREACH_LOGGER, "--config", path, "--lcm-url", PrivateBusUrl(), "--directory", directory});
+  ASSERT_TRUE(logger.WaitForLog("ready on")) << logger.error();
+
+  constexpr int kCandidates = 20;
+  for (int i = 0; i < kCandidates; ++i) {
+    candidate_plan_t candidate = CandidateFor(config, i + 1, Eigen::Vector2d(0, 0));
+    candidate.sequence = i;
+    probe.bus().Publish("PLAN_CANDIDATE", candidate);
+    // One after the other: all hear the same datagrams.
+    ASSERT_TRUE(probe.WaitUntil([&] { return std::ssize(probe.heard("PLAN_CANDIDATE")) == i + 1; }));
+  }
+  probe.bus().Publish("SOMETHING_ELSE", decision_t{});
+  probe.ListenFor(std::chrono::milliseconds(300));
+  EXPECT_EQ(logger.Terminate(), 0) << logger.error();
+  EXPECT_NE(logger.output(), "");
+
+  std::uintmax_t log_bytes = 0;
+  for (const auto& file : std::filesystem::directory_iterator(directory))
+    if (file.path().extension() == ".lcmlog") log_bytes += file.file_size();
+  EXPECT_GE(log_bytes, kCandidates * EncodedSize<candidate_plan_t>());
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,79 @@
+/** What tests of processes share: a bus of their own, a task file, candidates for it, and an ear on the bus. */
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "certifier/task/config.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "lcmtypes/bus.h"
+#include "tests/process/child_process.h"
+
+namespace forereach {
+
+/** A multicast port that no other running test has: it is made of this process's number. */
+[[nodiscard]] std::string PrivateBusUrl();
+
+/** A directory that goes with this object. */
+class ScratchDirectory final {
+ public:
+  ScratchDirectory();
+  ~ScratchDirectory();
+  ScratchDirectory(const ScratchDirectory&) = delete;
+  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
+
+  [[nodiscard]] std::filesystem::path path() const { return path_; }
+  /** Writes a file in it and returns its path. */
+  std::string Write(const std::string& name, const std::string& text) const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+/** The shipped point mass with a goal, a robot that steps every 100 ms from rest at the origin, and a gate that bears
+with a slow machine: candidates may be 20 s old. */
+[[nodiscard]] std::string PatientTask();
+
+/** Hears channels and keeps what comes. Fails with the advice of BusError if the bus cannot be opened. */
+class BusProbe final {
+ public:
+  BusProbe(const std::string& url, const std::vector<std::string>& channels);
+
+  [[nodiscard]] Bus& bus() { return *bus_; }
+
+  /** Listens until `done`, which is asked after every few messages; false once kPatience has passed. */
+  [[nodiscard]] bool WaitUntil(const std::function<bool()>& done);
+  void ListenFor(std::chrono::milliseconds time);
+
+  [[nodiscard]] const std::vector<std::vector<std::uint8_t>>& heard(const std::string& channel) const {
+    return heard_.at(channel);
+  }
+  /** Everything heard on a channel so far; fails the test if something is not a Message. */
+  template <class Message>
+  [[nodiscard]] std::vector<Message> Heard(const std::string& channel) const;
+
+ private:
+  std::map<std::string, std::vector<std::vector<std::uint8_t>>> heard_;
+  std::unique_ptr<Bus> bus_;
+};
+
+/** A candidate of the task, of `steps` times the same control, stamped now and starting in `lead`. */
+[[nodiscard]] candidate_plan_t CandidateFor(const Config& config, std::int64_t plan_id, const Eigen::VectorXd& control,
+                                            int steps = 6, std::chrono::milliseconds lead = std::chrono::seconds(20));
+
+void AddFailureNotA(const char* type, const std::string& channel);
+
+template <class Message>
+std::vector<Message> BusProbe::Heard(const std::string& channel) const {
+  std::vector<Message> messages;
+  for (const auto& bytes : heard(channel)) {
+    if (Decode(bytes, messages.emplace_back()) != DecodeStatus::kOk) AddFailureNotA(Message::getTypeName(), channel);
+  }
+  return messages;
+}
+
+}  // namespace forereach

@@ -1,0 +1,90 @@
+// How every process starts, refuses to, and ends.
+#include <algorithm>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/process/process_fixture.h"
+
+namespace forereach {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+class UsageTest : public testing::TestWithParam<std::pair<const char*, const char*>> {
+ protected:
+  std::string program() const { return GetParam().second; }
+
+  // The last line on standard error, without its end; LCM itself may have written lines before it.
+  static std::string LastLine(const ChildProcess& process) {
+    std::string text = process.error();
+    while (text.ends_with('\n')) text.pop_back();
+    return text.substr(text.rfind('\n') + 1);
+  }
+
+  const ScratchDirectory scratch_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Processes, UsageTest,
+                         testing::Values(std::pair{"certifier", FOREREACH_CERTIFIER},
+                                         std::pair{"planner", FOREREACH_PLANNER}, std::pair{"logger", FOREREACH_LOGGER},
+                                         std::pair{"robot_sim", FOREREACH_ROBOT_SIM}),
+                         [](const auto& instance) { return std::string(instance.param.first); });
+
+TEST_P(UsageTest, HelpTeachesWithAnExample) {
+  ChildProcess process({program(), "--help"});
+  EXPECT_EQ(process.WaitForExit(), 0);
+  EXPECT_THAT(process.output(),
+              AllOf(HasSubstr("--config"), HasSubstr("--lcm-url"), HasSubstr("Example:\n  forereach-")));
+}
+
+TEST_P(UsageTest, WithoutConfigItSaysSo) {
+  ChildProcess process({program()});
+  EXPECT_EQ(process.WaitForExit(), 2);
+  EXPECT_THAT(process.error(), HasSubstr("--config is required"));
+}
+
+TEST_P(UsageTest, AnUnknownOptionIsNamed) {
+  ChildProcess process({program(), "--config", "x", "--nonsense"});
+  EXPECT_EQ(process.WaitForExit(), 2);
+  EXPECT_THAT(process.error(), HasSubstr("--nonsense"));
+}
+
+TEST_P(UsageTest, AMissingFileIsNamedInOneLine) {
+  ChildProcess process({program(), "--config", scratch_.path() / "none.yaml"});
+  EXPECT_EQ(process.WaitForExit(), 2);
+  EXPECT_THAT(process.error(), HasSubstr("none.yaml"));
+  EXPECT_EQ(LastLine(process) + "\n", process.error());
+}
+
+TEST_P(UsageTest, AnUnknownKeyIsNamedWithItsFileAndLineInOneLine) {
+  const std::string text = PatientTask(), path = scratch_.Write("task.yaml", text + "speeed: 3\n");
+  ChildProcess process({program(), "--config", path, "--lcm-url", PrivateBusUrl()});
+  EXPECT_EQ(process.WaitForExit(), 2);
+  const std::string line = std::to_string(std::ranges::count(text, '\n') + 1);
+  EXPECT_THAT(process.error(), AllOf(HasSubstr("task.yaml:" + line), HasSubstr("speeed")));
+  EXPECT_EQ(LastLine(process) + "\n", process.error());
+}
+
+TEST_P(UsageTest, AnUnroutableBusBringsTheAdvice) {
+  ChildProcess process(
+      {program(), "--config", scratch_.Write("task.yaml", PatientTask()), "--lcm-url", "udpm://1.2.3.4:7667?ttl=0"});
+  EXPECT_EQ(process.WaitForExit(), 2);
+  EXPECT_THAT(LastLine(process), AllOf(HasSubstr("udpm://1.2.3.4:7667"), HasSubstr("ip route add 224.0.0.0/4 dev lo")));
+  EXPECT_THAT(process.error(), Not(HasSubstr("ready on")));
+}
+
+TEST_P(UsageTest, EndsCleanlyOnSigterm) {
+  ChildProcess process({program(), "--config",
+                        scratch_.Write("task.yaml", PatientTask() + "logger: {directory: log}\n"), "--lcm-url",
+                        PrivateBusUrl()});
+  ASSERT_TRUE(process.WaitForLog("ready on udpm://")) << process.error();
+  EXPECT_EQ(process.Terminate(), 0) << process.error();
+  EXPECT_NE(process.output(), "") << "a summary";
+}
+
+}  // namespace
+}  // namespace forereach
