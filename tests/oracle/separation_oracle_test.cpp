@@ -278,12 +278,12 @@ TEST(SpatialSeparation, OfBoxesIsDecidedExactly) {
   Random random(705);
   SCOPED_TRACE(random.trace());
   int proven = 0, met = 0;
-  for (int trial = 0; trial < 400; ++trial) {
+  for (int trial = 0; trial < 800; ++trial) {
     const int m = random.Integer(0, 6);
     const bool whole = random.Coin();
     const auto entry = [&] { return whole ? random.Integer(-3, 3) : random.Uniform(-3, 3); };
-    Zonotope slice(Eigen::VectorXd::NullaryExpr(3, entry) * 2, Eigen::MatrixXd::NullaryExpr(3, m, entry) / 2);
-    const Eigen::VectorXd lower = Eigen::VectorXd::NullaryExpr(3, entry) * 3;
+    const Zonotope slice(Eigen::VectorXd::NullaryExpr(3, entry), Eigen::MatrixXd::NullaryExpr(3, m, entry) / 2);
+    const Eigen::VectorXd lower = Eigen::VectorXd::NullaryExpr(3, entry) * 2;
     const Eigen::VectorXd size = Eigen::VectorXd::NullaryExpr(3, entry).cwiseAbs();
     const Obstacle box = Obstacle::AxisBox(lower, lower + size);
     const double gap = WidestSpatialGap(slice, box);

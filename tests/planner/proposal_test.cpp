@@ -99,11 +99,11 @@ TEST(Planner, KeepsTheMarginFromTheDomain) {
   const Config config = Bicycle();
   Planner planner = PlannerOf(config);
   PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 4);
-  request.domain_margin = Vec({0, 12, 0, 0, 2, 0.4});
+  request.domain_margin = Vec({0, 10, 0, 0, 0.2, 0.2});
   const auto proposal = planner.Propose(request);
   ASSERT_TRUE(proposal);
-  EXPECT_LE(proposal->states.row(1).cwiseAbs().maxCoeff(), 3);
-  EXPECT_LE(proposal->states.row(5).cwiseAbs().maxCoeff(), 0.08 + 1e-12);
+  EXPECT_LE(proposal->states.row(1).cwiseAbs().maxCoeff(), 5);
+  EXPECT_LE(proposal->states.row(5).cwiseAbs().maxCoeff(), 0.28 + 1e-12);
 }
 
 TEST(Planner, AnObstacleNearerThanTheClearanceAtTheStartDoesNotStopIt) {

@@ -2,6 +2,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <string_view>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,19 +13,20 @@
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/names.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
 namespace {
 
-const Eigen::Vector2d kGentle(0.2, 0), kIntoTheCircle(0, 2.5), kOutsideDomain(0, 3.5);
+const Eigen::Vector2d kGentle(0.2, 0), kIntoTheCircle(0, 1.2), kOutsideDomain(0, 3.5);
 
 class CertifierProcessTest : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(certifier_.WaitForLog("ready on")) << certifier_.error(); }
 
   void Send(const std::vector<std::uint8_t>& bytes, int expected_cause) {
-    expected_[DigestOf(Bytes(bytes))] = expected_cause;
+    expected_[ToHex(DigestOf(Bytes(bytes)))] = CauseName(static_cast<std::int16_t>(expected_cause));
     ASSERT_TRUE(probe_.bus().Publish("PLAN_CANDIDATE", Bytes(bytes)));
   }
   void Send(const candidate_plan_t& candidate, int expected_cause) { Send(Encode(candidate), expected_cause); }
@@ -42,7 +44,7 @@ class CertifierProcessTest : public testing::Test {
   BusProbe probe_{PrivateBusUrl(), {"PLAN_DECISION", "PLAN_CERTIFIED", "CERTIFIER_STATUS"}};
   ChildProcess certifier_{{FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", PrivateBusUrl()}};
   std::int64_t next_plan_id_ = 1;
-  std::map<Digest, int> expected_;  // cause by plan digest
+  std::map<std::string, std::string_view> expected_;  // cause by plan digest
 };
 
 TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCertified) {
@@ -83,10 +85,10 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   ASSERT_TRUE(WaitForDecisions(expected_.size()));
   probe_.ListenFor(std::chrono::milliseconds(700));  // a second answer would come, and a heartbeat does
   const auto decisions = probe_.Heard<decision_t>("PLAN_DECISION");
-  std::map<Digest, int> causes;
+  std::map<std::string, std::string_view> causes;
   for (std::size_t i = 0; i < decisions.size(); ++i) {
     EXPECT_EQ(decisions[i].sequence, static_cast<std::int64_t>(i));
-    causes[GetDigest(decisions[i].plan_digest)] = decisions[i].cause;
+    causes[ToHex(GetDigest(decisions[i].plan_digest))] = CauseName(decisions[i].cause);
   }
   EXPECT_EQ(decisions.size(), expected_.size());
   EXPECT_EQ(causes, expected_);
@@ -94,7 +96,7 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   const auto certified = probe_.Heard<certified_plan_t>("PLAN_CERTIFIED");
   ASSERT_EQ(certified.size(), 3u);
   for (const certified_plan_t& plan : certified) {
-    EXPECT_EQ(expected_.at(DigestOf(Encode(plan.plan))), decision_t::CAUSE_NONE);
+    EXPECT_EQ(expected_.at(ToHex(DigestOf(Encode(plan.plan)))), "none");
     EXPECT_EQ(GetDigest(plan.certificate_digest), CertificateDigest(plan));
     EXPECT_EQ(GetDigest(plan.config_digest), config_.digest);
   }
@@ -136,7 +138,8 @@ TEST_F(CertifierProcessTest, ObstaclesFromTheBusReplaceThoseOfTheFile) {
 
   const auto decisions = probe_.Heard<decision_t>("PLAN_DECISION");
   for (const decision_t& decision : decisions)
-    EXPECT_EQ(decision.cause, expected_.at(GetDigest(decision.plan_digest))) << GetText(decision.message);
+    EXPECT_EQ(CauseName(decision.cause), expected_.at(ToHex(GetDigest(decision.plan_digest))))
+        << GetText(decision.message);
   EXPECT_EQ(GetDigest(decisions[0].obstacles_digest), config_.obstacles_digest);
   EXPECT_EQ(GetDigest(decisions[1].obstacles_digest), ObstaclesDigest({}));
   EXPECT_EQ(certifier_.Terminate(), 0);

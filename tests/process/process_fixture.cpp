@@ -33,7 +33,7 @@ std::string ScratchDirectory::Write(const std::string& name, const std::string& 
   return file.string();
 }
 
-std::string PatientTask() {
+std::string PatientTask(int time_limit_s) {
   return R"(model: {name: point_mass, dt: 0.15}
 domain:
   state: {lower: [-20, -20, -5.4, -5.4], upper: [20, 20, 5.4, 5.4]}
@@ -65,9 +65,9 @@ planner:
 robot:
   start: [0, 0, 0, 0]
   step_period_ms: 100
-  time_limit_s: 6
   residual: {name: velocity_knee}
-)";
+  time_limit_s: )" +
+         std::to_string(time_limit_s) + "\n";
 }
 
 BusProbe::BusProbe(const std::string& url, const std::vector<std::string>& channels) {

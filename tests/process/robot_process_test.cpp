@@ -53,7 +53,7 @@ class RobotProcessTest : public testing::Test {
 TEST_F(RobotProcessTest, StandsUntilACertifiedPlanComesThenDrivesItToItsEnd) {
   EXPECT_EQ(Last().mode, robot_state_t::STANDING);
   EXPECT_EQ(Last().executing_plan_id, -1);
-  probe_.bus().Publish("PLAN_CERTIFIED", Certified(1, 10));
+  probe_.bus().Publish("PLAN_CERTIFIED", Certified(1, 20));
   ASSERT_TRUE(WaitForEvents(execution_event_t::STANDING));
   ASSERT_TRUE(probe_.WaitUntil([&] { return Last().mode == robot_state_t::STANDING; }));
   EXPECT_EQ(Count(execution_event_t::ACCEPTED), 1);
@@ -69,7 +69,7 @@ TEST_F(RobotProcessTest, StandsUntilACertifiedPlanComesThenDrivesItToItsEnd) {
 }
 
 TEST_F(RobotProcessTest, DoesNotMoveForAnythingElse) {
-  const certified_plan_t good = Certified(1, 12);
+  const certified_plan_t good = Certified(1, 20);
   probe_.bus().Publish("PLAN_CANDIDATE", good.plan);
   probe_.bus().Publish("PLAN_CERTIFIED", good.plan);  // a candidate where only certified plans belong
 
@@ -97,7 +97,7 @@ TEST_F(RobotProcessTest, DoesNotMoveForAnythingElse) {
   for (const robot_state_t& state : probe_.Heard<robot_state_t>("ROBOT_STATE"))
     EXPECT_EQ(state.mode, robot_state_t::STANDING);
 
-  probe_.bus().Publish("PLAN_CERTIFIED", Certified(2, 10));
+  probe_.bus().Publish("PLAN_CERTIFIED", Certified(2, 20));
   EXPECT_TRUE(WaitForEvents(execution_event_t::STARTED)) << "good again";
   EXPECT_EQ(robot_.Terminate(), 0) << robot_.error();
 }

@@ -1,0 +1,93 @@
+// docs/bus.md says something of every message, field, constant and channel.
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace {
+
+std::string TextOf(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  EXPECT_TRUE(file) << path;
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Type {
+  std::vector<std::string> fields, constants;
+};
+
+// By name, from lcmtypes/*.lcm.
+std::map<std::string, Type> Types() {
+  std::map<std::string, Type> types;
+  for (const auto& file : std::filesystem::directory_iterator(FOREREACH_SOURCE_DIR "/lcmtypes")) {
+    if (file.path().extension() != ".lcm") continue;
+    Type& type = types[file.path().stem()];
+    std::string text = std::regex_replace(TextOf(file.path()), std::regex("//[^\n]*"), "");
+    text = text.substr(text.find('{') + 1);
+    static const std::regex statement("([^;]*);"), constant("(\\w+)\\s*=\\s*-?\\d+"), field("^\\s*\\w+\\s+(\\w+)");
+    for (std::sregex_iterator s(text.begin(), text.end(), statement), end; s != end; ++s) {
+      const std::string words = (*s)[1];
+      std::smatch match;
+      if (words.find("const") != std::string::npos) {
+        for (std::sregex_iterator c(words.begin(), words.end(), constant); c != end; ++c)
+          type.constants.push_back((*c)[1]);
+      } else if (std::regex_search(words, match, field)) {
+        type.fields.push_back(match[1]);
+      }
+    }
+  }
+  return types;
+}
+
+// The part of docs/bus.md that is about a type: from its heading to the next heading of the same kind.
+std::string SectionOn(const std::string& type) {
+  static const std::string document = TextOf(FOREREACH_SOURCE_DIR "/docs/bus.md");
+  const std::size_t begin = document.find("\n### `" + type + "`");
+  if (begin == std::string::npos) return "";
+  return document.substr(begin, document.find("\n## ", begin) - begin)
+      .substr(0, document.find("\n### ", begin + 1) - begin);
+}
+
+TEST(BusDocumentTest, ReadsTheMessagesItIsHeldAgainst) {
+  const auto types = Types();
+  EXPECT_EQ(types.size(), 9u);
+  EXPECT_THAT(types.at("candidate_plan_t").fields,
+              testing::ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states",
+                                   "num_inputs", "num_steps", "progress_steps", "initial_center", "initial_half_width",
+                                   "control"));
+  EXPECT_EQ(types.at("decision_t").constants.size(), 22u);
+}
+
+TEST(BusDocumentTest, EveryFieldHasItsRow) {
+  for (const auto& [name, type] : Types()) {
+    const std::string section = SectionOn(name);
+    ASSERT_NE(section, "") << name << " has no section";
+    for (const std::string& field : type.fields) {
+      const std::regex row("\n\\|[^|\n]*`" + field + "(\\[[^`]*)?`[^|\n]*\\|");
+      EXPECT_TRUE(std::regex_search(section, row)) << name << "." << field;
+    }
+  }
+}
+
+TEST(BusDocumentTest, EveryConstantIsExplained) {
+  for (const auto& [name, type] : Types()) {
+    const std::string section = SectionOn(name);
+    for (const std::string& constant : type.constants)
+      EXPECT_TRUE(std::regex_search(section, std::regex("`" + constant + "`"))) << name << "::" << constant;
+  }
+}
+
+TEST(BusDocumentTest, EveryChannelIsListed) {
+  const std::string document = TextOf(FOREREACH_SOURCE_DIR "/docs/bus.md");
+  for (const char* channel : {"PLAN_CANDIDATE", "PLAN_DECISION", "PLAN_CERTIFIED", "ROBOT_STATE", "OBSTACLES",
+                              "TRANSITION", "CERTIFIER_STATUS", "EXECUTION_EVENT"})
+    EXPECT_TRUE(std::regex_search(document, std::regex("\n\\| `" + std::string(channel) + "` \\|"))) << channel;
+}
+
+}  // namespace

@@ -1,0 +1,150 @@
+// scripts/check-includes: the sources keep to the arrows, and the script sees when they do not.
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+namespace {
+
+using testing::HasSubstr;
+
+struct Result {
+  int exit_code;
+  std::string output;  // standard output and error
+};
+
+Result CheckIncludes(const std::string& root) {
+  std::FILE* pipe = popen(("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' '" + root + "' 2>&1").c_str(), "r");
+  if (!pipe) return {-1, "cannot run the script"};
+  std::string output;
+  std::array<char, 4096> buffer;
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), size);
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
+}
+
+// A small house that keeps to the arrows, to which a test adds one thing.
+class IncludesTest : public testing::Test {
+ protected:
+  IncludesTest() {
+    std::string path = testing::TempDir() + "/forereach-house-XXXXXX";
+    root_ = mkdtemp(path.data());
+    Write("certifier/numerics/interval.h", "#include <cmath>\n");
+    Write("certifier/sets/box.h", "#include <Eigen/Core>\n#include \"certifier/numerics/interval.h\"\n");
+    Write("certifier/gate/gate.h", "#include \"certifier/sets/box.h\"\n#include \"lcmtypes/codec.h\"\n");
+    Write("certifier/process/node.h", "#include \"certifier/gate/gate.h\"\n#include <spdlog/spdlog.h>\n");
+    Write("lcmtypes/codec.h", "#include <cstdint>\n");
+    Write("lcmtypes/bus.cpp", "#include \"forereach/decision_t.hpp\"\n#include <lcm/lcm-cpp.hpp>\n");
+    Write("robot/guard.h", "#include \"forereach/certified_plan_t.hpp\"\n#include \"lcmtypes/codec.h\"\n");
+    Write("robot/guard.cpp", "#include \"robot/guard.h\"\n");
+    Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"certifier/sets/box.h\"\n");
+    Write("logger/database.cpp", "#include <sqlite3.h>\n#include <cairo-svg.h>\n");
+    Write("tests/logger/log_test.cpp", "#include <lcm/lcm-cpp.hpp>\n");
+  }
+  ~IncludesTest() override { std::filesystem::remove_all(root_); }
+
+  void Write(const std::string& file, const std::string& text) {
+    std::filesystem::create_directories((root_ / file).parent_path());
+    std::ofstream(root_ / file) << text;
+  }
+
+  // Adds an include to a file, after which the script has to give `message` for that line.
+  void Refuse(const std::string& file, const std::string& include, const std::string& message) {
+    if (++lines_[file] == 1) Write(file, "");
+    std::ofstream(root_ / file, std::ios::app) << "#include " << include << "\n";
+    expected_.push_back(file + ":" + std::to_string(lines_[file]) + ": " + message);
+  }
+  void ExpectRefused() {
+    const Result result = CheckIncludes(root_.string());
+    EXPECT_EQ(result.exit_code, 1);
+    for (const std::string& message : expected_) EXPECT_THAT(result.output, HasSubstr(message));
+  }
+
+  std::filesystem::path root_;
+  std::map<std::string, int> lines_;
+  std::vector<std::string> expected_;
+};
+
+TEST_F(IncludesTest, TheSourcesKeepToTheArrows) {
+  const Result result = CheckIncludes(FOREREACH_SOURCE_DIR);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr(" 0 against the arrows"));
+}
+
+TEST_F(IncludesTest, AHouseInOrderPasses) {
+  const Result result = CheckIncludes(root_.string());
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("11 files, 18 includes, 0 against the arrows"));
+}
+
+TEST_F(IncludesTest, AnEmptyHouseIsAnErrorNotAPass) {
+  std::filesystem::remove_all(root_);
+  std::filesystem::create_directories(root_);
+  EXPECT_EQ(CheckIncludes(root_.string()).exit_code, 2);
+}
+
+TEST_F(IncludesTest, FloorsGoDownOnly) {
+  Refuse("certifier/numerics/bad.h", "\"certifier/sets/box.h\"", "numerics may not include sets");
+  Refuse("certifier/sets/bad.cpp", "<certifier/gate/gate.h>", "sets may not include gate");
+  Refuse("certifier/certify/bad.cpp", "\"certifier/gate/gate.h\"", "certify may not include gate");
+  Refuse("certifier/task/bad.cpp", "\"certifier/gate/gate.h\"", "task may not include gate");
+  Refuse("certifier/gate/bad.cpp", "\"certifier/process/node.h\"", "gate may not include process");
+  Refuse("certifier/attic/bad.cpp", "\"certifier/sets/box.h\"", "certifier has no floor attic");
+  ExpectRefused();
+}
+
+TEST_F(IncludesTest, TheLibraryNeedsEigenOnly) {
+  for (const char* floor : {"numerics", "sets", "dynamics", "residual", "safety", "reach", "certify"}) {
+    const std::string file = std::string("certifier/") + floor + "/bad.cpp";
+    for (const char* include :
+         {"\"lcmtypes/codec.h\"", "\"forereach/decision_t.hpp\"", "<spdlog/spdlog.h>", "<unistd.h>"})
+      Refuse(file, include, std::string("certifier/") + floor + " may include Eigen");
+  }
+  ExpectRefused();
+}
+
+TEST_F(IncludesTest, ThePartsOfTheHouse) {
+  Refuse("lcmtypes/bad.h", "\"certifier/sets/box.h\"", "lcmtypes may not include certifier");
+  Refuse("certifier/process/bad.cpp", "\"logger/database.h\"", "certifier may not include logger");
+  for (const char* other : {"planner_bridge", "logger", "robot", "cli"})
+    Refuse("certifier/gate/bad.cpp", std::string("\"") + other + "/x.h\"",
+           std::string("certifier may not include ") + other);
+  Refuse("robot/bad.cpp", "\"planner_bridge/x.h\"", "robot may not include planner_bridge");
+  Refuse("logger/bad.cpp", "\"tests/logger/scratch.h\"", "logger may not include tests");
+  ExpectRefused();
+}
+
+TEST_F(IncludesTest, TheGuardIncludesLcmtypesOnly) {
+  for (const char* include : {"\"certifier/sets/box.h\"", "\"robot/target.h\"", "<Eigen/Core>", "<spdlog/spdlog.h>"})
+    Refuse("robot/guard.cpp", include, "the guard may include lcmtypes only");
+  ExpectRefused();
+}
+
+TEST_F(IncludesTest, OtherPeoplesHeadersHaveOneOwner) {
+  for (const char* file :
+       {"certifier/process/bad.cpp", "robot/bad.cpp", "logger/bad.cpp", "cli/bad.cpp", "lcmtypes/node.cpp"})
+    Refuse(file, "<lcm/lcm-cpp.hpp>", "LCM belongs to lcmtypes/bus.cpp alone");
+  Refuse("robot/bad.cpp", "<ompl/util/Console.h>", "OMPL belongs to planner_bridge/ alone");
+  Refuse("cli/bad.cpp", "<sqlite3.h>", "SQLite belongs to logger/ alone");
+  Refuse("robot/bad.cpp", "<cairo.h>", "cairo belongs to logger/ alone");
+  Refuse("cli/bad.cpp", "<yaml-cpp/yaml.h>", "yaml-cpp belongs to certifier/task/document.cpp alone");
+  Refuse("robot/bad.cpp", "<sodium.h>", "libsodium belongs to lcmtypes/codec.cpp alone");
+  ExpectRefused();
+}
+
+TEST_F(IncludesTest, PathsAreThoseFromTheRoot) {
+  Refuse("robot/bad.cpp", "\"guard.h\"", "our headers are included by their path from the root");
+  Refuse("robot/bad.cpp", "\"../certifier/sets/box.h\"", "our headers are included by their path from the root");
+  Refuse("robot/bad.cpp", "\"certifier/sets/none.h\"", "certifier/sets/none.h does not exist");
+  ExpectRefused();
+}
+
+}  // namespace

@@ -1,0 +1,253 @@
+// What a certificate claims, tried: rollouts of many residuals that satisfy data and declaration, in 256 bits, never leave
+// a slice of the tube, and under a certified plan never meet an obstacle.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "certifier/certify/certifier.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/problems.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+using exact::Rational;
+using exact::Real;
+
+// 113 bits: far beyond the tube's rounding, and fast enough for thousands of directions a slice.
+__extension__ typedef __float128 Quad;
+
+Quad ToQuad(const Real& x) {
+  const long double high = x.ToLongDouble();
+  const Real rest = x - Real(static_cast<double>(high)) - Real(static_cast<double>(high - static_cast<double>(high)));
+  return static_cast<Quad>(high) + static_cast<Quad>(rest.ToLongDouble());
+}
+
+// An admissible residual is any function between the McShane extensions of the data from below and above that satisfies
+// the declaration; so are a mixture of both, and a third function cut off by them.
+class AdmissibleResidual {
+ public:
+  AdmissibleResidual(Random& random, const Problem& problem)
+      : declaration_(problem.declaration), z_(problem.transitions.z), own_(random, problem.declaration.lipschitz) {
+    const bool bicycle = problem.model->num_states() == 6;
+    for (int i = 0; i < problem.transitions.size(); ++i) {
+      const Eigen::VectorXd z = z_.row(i);
+      const auto nominal = NominalSuccessor(bicycle, {z.begin(), z.end()});
+      std::vector<Real> lower, upper;
+      for (std::size_t k = 0; k < nominal.size(); ++k) {
+        const auto coordinate = static_cast<Eigen::Index>(k);
+        const double next = problem.transitions.x_next(i, coordinate);
+        const Real slack = Real(NextUp(std::abs(next))) - Real(std::abs(next)) + Real(declaration_.noise_bound[coordinate]);
+        lower.push_back(Real(next) - nominal[k] - slack);
+        upper.push_back(Real(next) - nominal[k] + slack);
+      }
+      lower_.push_back(lower);
+      upper_.push_back(upper);
+    }
+    for (Eigen::Index k = 0; k < declaration_.lipschitz.rows(); ++k) kind_.push_back(random.Below(4));
+    mix_ = random.Uniform(0, 1);
+  }
+
+  Real operator()(const std::vector<Real>& z, int k) const {
+    Real from_below, from_above;
+    for (std::size_t i = 0; i < lower_.size(); ++i) {
+      Real distance = 0;
+      for (Eigen::Index l = 0; l < z_.cols(); ++l)
+        if (declaration_.lipschitz(k, l) != 0)
+          distance += Real(declaration_.lipschitz(k, l)) * abs(z[static_cast<std::size_t>(l)] - z_(static_cast<Eigen::Index>(i), l));
+      const auto row = static_cast<std::size_t>(k);
+      const Real low = lower_[i][row] - distance, high = upper_[i][row] + distance;
+      if (i == 0 || low > from_below) from_below = low;
+      if (i == 0 || high < from_above) from_above = high;
+    }
+    switch (kind_[static_cast<std::size_t>(k)]) {
+      case 0: return from_below;
+      case 1: return from_above;
+      case 2: return from_below + Real(mix_) * (from_above - from_below);
+      default: {
+        const Real own = own_(z, k);
+        return own < from_below ? from_below : own > from_above ? from_above : own;
+      }
+    }
+  }
+
+ private:
+  Declaration declaration_;
+  Eigen::MatrixXd z_;
+  Ramps own_;
+  std::vector<std::vector<Real>> lower_, upper_;
+  std::vector<int> kind_;
+  double mix_;
+};
+
+// Half-spaces whose intersection is the slice or contains it: the hull, the normals of every generator in each pair of
+// coordinates (together exactly the slice's projection on that pair), and random directions.
+class Membership {
+ public:
+  Membership(Random& random, const Zonotope& slice) {
+    const int n = slice.dim();
+    for (int a = 0; a < n; ++a) {
+      AddBoth(slice, Eigen::VectorXd::Unit(n, a));
+      for (int b = 0; b < a; ++b)
+        for (int j = 0; j < slice.num_generators(); ++j) {
+          Eigen::VectorXd normal = Eigen::VectorXd::Zero(n);
+          normal[a] = slice.generator(b, j);
+          normal[b] = -slice.generator(a, j);
+          if (!normal.isZero(0)) AddBoth(slice, normal);
+        }
+    }
+    for (int i = 0; i < 25; ++i) AddBoth(slice, random.Vector(n));
+  }
+
+  bool Contains(const std::vector<Real>& x) const {
+    std::vector<Quad> point;
+    for (const Real& entry : x) point.push_back(ToQuad(entry));
+    for (const HalfSpace& half_space : half_spaces_) {
+      Quad along = 0;
+      for (std::size_t k = 0; k < point.size(); ++k)
+        along += static_cast<Quad>(half_space.normal[static_cast<Eigen::Index>(k)]) * point[k];
+      if (!(along <= half_space.bound)) return false;
+    }
+    return true;
+  }
+
+ private:
+  struct HalfSpace {
+    Eigen::VectorXd normal;
+    Quad bound;
+  };
+
+  void AddBoth(const Zonotope& slice, const Eigen::VectorXd& normal) {
+    Quad middle = 0, spread = 0;
+    for (int k = 0; k < slice.dim(); ++k) middle += static_cast<Quad>(normal[k]) * static_cast<Quad>(slice.center(k));
+    for (int j = 0; j < slice.num_generators(); ++j) {
+      Quad along = 0;
+      for (int k = 0; k < slice.dim(); ++k) along += static_cast<Quad>(normal[k]) * static_cast<Quad>(slice.generator(k, j));
+      spread += along < 0 ? -along : along;
+    }
+    half_spaces_.push_back({normal, middle + spread});
+    half_spaces_.push_back({-normal, spread - middle});
+  }
+
+  std::vector<HalfSpace> half_spaces_;
+};
+
+std::vector<Real> PointOf(Random& random, const Zonotope& set) {
+  std::vector<Real> x(set.center().begin(), set.center().end());
+  const bool corner = random.Coin(0.7);
+  for (int j = 0; j < set.num_generators(); ++j) {
+    const Real weight(corner ? random.Sign() : random.Uniform(-1, 1));
+    for (int k = 0; k < set.dim(); ++k) x[static_cast<std::size_t>(k)] += weight * Real(set.generator(k, j));
+  }
+  return x;
+}
+
+// The distance from P x to the obstacle's core is at least what its dual bound in 256 bits says; the obstacles are
+// convex, so being outside is being beyond one of their sides, or away from the centre.
+bool Collides(const Obstacle& obstacle, const Eigen::MatrixXd& projection, const std::vector<Real>& x) {
+  std::vector<Real> y;
+  for (Eigen::Index k = 0; k < projection.rows(); ++k) {
+    y.emplace_back(0.0);
+    for (std::size_t l = 0; l < x.size(); ++l) y.back() += Real(projection(k, static_cast<Eigen::Index>(l))) * x[l];
+  }
+  const auto& points = obstacle.points();
+  switch (obstacle.kind()) {
+    case Obstacle::Kind::kCircle: {
+      const Real dx = y[0] - points[0][0], dy = y[1] - points[0][1];
+      return dx * dx + dy * dy <= Real(obstacle.radius()) * Real(obstacle.radius());
+    }
+    case Obstacle::Kind::kBox:
+      return Real(points[0][0]) <= y[0] && y[0] <= Real(points[1][0]) && Real(points[0][1]) <= y[1] && y[1] <= Real(points[1][1]);
+    case Obstacle::Kind::kHalfSpace:
+      return Real(points[0][0]) * y[0] + Real(points[0][1]) * y[1] >= Real(obstacle.offset());
+    case Obstacle::Kind::kPolygon:
+      break;
+  }
+  bool left = true, right = true;  // of every side of the triangle
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::VectorXd &a = points[i], &b = points[(i + 1) % 3];
+    const Real cross = (Real(b[0]) - a[0]) * (y[1] - a[1]) - (Real(b[1]) - a[1]) * (y[0] - a[0]);
+    left = left && cross >= Real(0);
+    right = right && cross <= Real(0);
+  }
+  return left || right;
+}
+
+class Containment : public testing::TestWithParam<bool> {};
+
+TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
+  const bool bicycle = GetParam();
+  Random random(801 + bicycle);
+  SCOPED_TRACE(random.trace());
+  int certified = 0, rollouts = 0, slices = 0;
+  for (int trial = 0; trial < 70; ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    const auto problem = AnyProblem(random, bicycle, random.Integer(1, 12));
+    const Certifier certifier(problem);
+    ASSERT_FALSE(certifier.violation()) << "the data come from a residual that satisfies the declaration";
+    Tube tube;
+    for (int q = 0; q < 2; ++q) {
+      const Query query = AnyQuery(random, *problem);
+      const Decision decision = certifier.Certify(query.plan(), query.initial_set, query.obstacles, tube);
+      ASSERT_NE(decision.outcome, Outcome::kFalsified);
+      certified += decision.outcome == Outcome::kCertified;
+      ASSERT_EQ(tube.slice(0).GeneratorMatrix(), query.initial_set.GeneratorMatrix());
+      ASSERT_EQ(tube.slice(0).CenterVector(), query.initial_set.CenterVector());
+      std::vector<Membership> members;
+      for (int t = 0; t <= tube.length(); ++t) members.emplace_back(random, tube.slice(t));
+      for (int r = 0; r < 6; ++r) {
+        const AdmissibleResidual residual(random, *problem);
+        std::vector<Real> x = PointOf(random, query.initial_set);
+        ++rollouts;
+        for (int t = 0;; ++t) {
+          // X_0 is the set the state was drawn from, with nothing to spare for the judge's own rounding.
+          ASSERT_TRUE(t == 0 || members[static_cast<std::size_t>(t)].Contains(x)) << "slice " << t;
+          ++slices;
+          for (const Obstacle& obstacle : query.obstacles) {
+            ASSERT_FALSE(decision.outcome == Outcome::kCertified && Collides(obstacle, problem->projection, x)) << "step " << t;
+          }
+          if (t == tube.length()) break;
+          std::vector<Real> z = x;
+          for (const double u : query.plan().input(t)) z.emplace_back(u);
+          std::vector<Real> next = NominalSuccessor(bicycle, z);
+          for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k));
+          x = next;
+        }
+      }
+    }
+  }
+  RecordProperty("rollouts", rollouts);
+  RecordProperty("slices", slices);
+  RecordProperty("certified", certified);
+  EXPECT_GT(certified, 20);
+  EXPECT_GT(slices, 2000);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, Containment, testing::Bool());
+
+// The judge itself: it has to notice a state just outside.
+TEST(ContainmentJudge, NoticesAStateJustOutside) {
+  Random random(803);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 50; ++trial) {
+    const Zonotope slice = random.AnyZonotope(6, 20);
+    const Membership member(random, slice);
+    const int k = random.Below(6);
+    std::vector<Real> x(slice.center().begin(), slice.center().end());
+    for (int j = 0; j < 20; ++j) {
+      const double sign = slice.generator(k, j) < 0 ? -1 : 1;
+      for (int l = 0; l < 6; ++l) x[static_cast<std::size_t>(l)] += Real(sign) * Real(slice.generator(l, j));
+    }
+    std::vector<Real> inside = x, outside = x;
+    inside[static_cast<std::size_t>(k)] = inside[static_cast<std::size_t>(k)] - Real(1e-25);
+    for (std::size_t l = 0; l < 6; ++l) inside[l] = Real(slice.center(static_cast<int>(l))) + (inside[l] - slice.center(static_cast<int>(l))) * Real(1 - 1e-10);
+    outside[static_cast<std::size_t>(k)] += Real(1e-25);
+    EXPECT_TRUE(member.Contains(inside));
+    EXPECT_FALSE(member.Contains(outside));
+  }
+}
+
+}  // namespace
+}  // namespace forereach

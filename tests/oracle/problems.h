@@ -1,0 +1,147 @@
+/** Random problems whose data come from a residual that satisfies the declaration, and random queries of them. */
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/dynamics/kinematic_bicycle.h"
+#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/point_mass.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+
+/** A residual that may use up all of its declaration: coordinate k is a mean of ramps a |sum_l w_l L_kl (z_l - knee_l)|
+with |a|, |w_l| <= 1, some of them exactly 1. */
+class Ramps {
+ public:
+  Ramps(Random& random, const Eigen::MatrixXd& lipschitz) : lipschitz_(lipschitz), ramps_(random.Coin() ? 1 : 2) {
+    const int n = static_cast<int>(lipschitz.rows()), variables = static_cast<int>(lipschitz.cols());
+    const bool extremal = random.Coin();
+    const auto weight = [&] { return extremal ? random.Sign() : random.Uniform(-1, 1); };
+    for (Ramp& ramp : ramps_) {
+      ramp.weight = Eigen::MatrixXd::NullaryExpr(n, variables, weight);
+      ramp.height = Eigen::VectorXd::NullaryExpr(n, weight);
+      ramp.knee = random.Vector(variables);
+    }
+  }
+
+  /** Coordinate k at z. */
+  [[nodiscard]] exact::Real operator()(const std::vector<exact::Real>& z, int k) const {
+    exact::Real sum = 0;
+    for (const Ramp& ramp : ramps_) {
+      exact::Real along = 0;
+      for (Eigen::Index l = 0; l < lipschitz_.cols(); ++l) {
+        if (lipschitz_(k, l) == 0) continue;
+        along += exact::Real(ramp.weight(k, l)) * exact::Real(lipschitz_(k, l)) * (z[static_cast<std::size_t>(l)] - ramp.knee[l]);
+      }
+      sum += exact::Real(ramp.height[k]) * abs(along) / static_cast<double>(ramps_.size());
+    }
+    return sum;
+  }
+
+ private:
+  struct Ramp {
+    Eigen::MatrixXd weight;
+    Eigen::VectorXd knee, height;
+  };
+  Eigen::MatrixXd lipschitz_;
+  std::vector<Ramp> ramps_;
+};
+
+/** f0(z) in high precision, from the models' own equations. */
+[[nodiscard]] inline std::vector<exact::Real> NominalSuccessor(bool bicycle, const std::vector<exact::Real>& z) {
+  std::vector<exact::Real> next(bicycle ? 6 : 4);
+  if (bicycle)
+    KinematicBicycle{0.1, 2.5}(std::span<const exact::Real>(z), std::span<exact::Real>(next));
+  else
+    PointMass{0.15}(std::span<const exact::Real>(z), std::span<exact::Real>(next));
+  return next;
+}
+
+/** One certify call's arguments. */
+struct Query {
+  Zonotope initial_set;
+  Eigen::MatrixXd controls;  // a column a step
+  std::vector<Obstacle> obstacles;
+
+  [[nodiscard]] Plan plan() const {
+    return {controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()), static_cast<int>(controls.rows())};
+  }
+};
+
+inline Eigen::VectorXd StateReach(bool bicycle) {
+  return bicycle ? (Eigen::VectorXd(6) << 40, 40, 3.14, 25, 3, 0.48).finished() : (Eigen::VectorXd(4) << 20, 20, 6, 6).finished();
+}
+
+/** The bicycle or the point mass with `count` transitions. Few entries of L are not zero; a third of the coordinates have
+noise, up to its bound. */
+inline std::shared_ptr<Problem> AnyProblem(Random& random, bool bicycle, int count) {
+  auto problem = std::make_shared<Problem>();
+  problem->model = bicycle ? MakeKinematicBicycle(0.1, 2.5) : MakePointMass(0.15);
+  const int n = problem->model->num_states(), inputs = problem->model->num_inputs(), variables = n + inputs;
+  const Eigen::VectorXd reach = StateReach(bicycle), input = bicycle ? Eigen::Vector2d(20, 2) : Eigen::Vector2d(3, 3);
+  problem->domain.state = Box(-reach, reach);
+  problem->domain.input = Box(-input, input);
+  if (!bicycle && random.Coin()) problem->domain.balls.push_back({{2, 3}, Eigen::Vector2d::Zero(), 5.4});
+  problem->zonotope_order = random.Integer(1, 6);
+  problem->projection = Eigen::MatrixXd::Identity(2, n);
+  if (random.Coin(0.2)) problem->projection += random.Matrix(2, n, 0.1);
+
+  Declaration& declaration = problem->declaration;
+  declaration = {Eigen::MatrixXd::Zero(n, variables), Eigen::VectorXd::Zero(n)};
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < variables; ++l)
+      if (random.Coin(0.12)) declaration.lipschitz(k, l) = random.Uniform(0, 0.05);
+    if (random.Coin(0.3)) declaration.noise_bound[k] = random.Uniform(0, 1e-3);
+  }
+  const Ramps residual(random, declaration.lipschitz);
+  problem->transitions = {Eigen::MatrixXd(count, variables), Eigen::MatrixXd(count, n)};
+  for (int i = 0; i < count; ++i) {
+    Eigen::VectorXd z(variables);
+    do {
+      for (int l = 0; l < variables; ++l)
+        z[l] = (l < n ? reach[l] : input[l - n]) * random.Uniform(-0.8, 0.8) * (random.Coin() ? 0.3 : 1);
+    } while (!problem->domain.Contains(View(z)));
+    const std::vector<exact::Real> exact_z(z.begin(), z.end()), nominal = NominalSuccessor(bicycle, exact_z);
+    for (int k = 0; k < n; ++k) {
+      const double noise = declaration.noise_bound[k] * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1));
+      problem->transitions.x_next(i, k) = (nominal[static_cast<std::size_t>(k)] + residual(exact_z, k) + noise).ToDouble();
+    }
+    problem->transitions.z.row(i) = z;
+  }
+  return problem;
+}
+
+inline Query AnyQuery(Random& random, const Problem& problem) {
+  const bool bicycle = problem.model->num_states() == 6;
+  const int n = problem.model->num_states();
+  const Eigen::VectorXd reach = StateReach(bicycle);
+  Eigen::VectorXd center = 0.3 * reach.cwiseProduct(random.Vector(n)), half = reach.cwiseProduct(random.Vector(n)).cwiseAbs();
+  half *= random.Coin(0.1) ? 0 : std::ldexp(1, -random.Integer(5, 12));
+  Query query;
+  query.initial_set = Zonotope::FromBox(center, half);
+  const int steps = random.Integer(1, 12);
+  const Eigen::VectorXd input = (bicycle ? Eigen::Vector2d(2, 0.5) : Eigen::Vector2d(1, 1)).cwiseProduct(random.Vector(2));
+  query.controls = input.replicate(1, steps);
+  if (random.Coin()) query.controls += random.Matrix(2, steps, 0.2);
+  for (int o = random.Integer(0, 4); o > 0; --o) {
+    const Eigen::VectorXd place = problem.projection * center + random.Vector(2, 12);
+    switch (random.Below(4)) {
+      case 0: query.obstacles.push_back(Obstacle::Circle(place, random.Uniform(0, 2))); break;
+      case 1: query.obstacles.push_back(Obstacle::AxisBox(place, place + random.Vector(2).cwiseAbs())); break;
+      case 2: query.obstacles.push_back(Obstacle::Polygon({place, place + random.Vector(2), place + random.Vector(2)})); break;
+      default: {
+        const Eigen::VectorXd normal = random.Vector(2);
+        query.obstacles.push_back(Obstacle::HalfSpace(normal, normal.dot(place) + random.Uniform(0, 8)));
+      }
+    }
+  }
+  return query;
+}
+
+}  // namespace forereach

@@ -1,0 +1,456 @@
+#include "planner_bridge/planner_node.h"
+
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/obstacle_message.h"
+#include "tests/planner/tasks.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kNow = 1'700'000'000'000'000, kPeriod = 40'000;
+
+/** A planner node with the test as its robot and certifier. */
+class PlannerNodeTest : public testing::Test {
+ protected:
+  void SetUp() override { Start(Bicycle()); }
+
+  void Start(const Config& config) {
+    config_ = config;
+    bus_ = OpenBus("memq://", [this] { return now_; });
+    node_ = std::make_unique<PlannerNode>(config_, *bus_, out_);
+    bus_->Subscribe(config_.bus.candidate, [this](const Received& received) {
+      candidate_plan_t candidate;
+      ASSERT_EQ(Decode(received.bytes, candidate), DecodeStatus::kOk);
+      candidates_.push_back(candidate);
+    });
+    Run(1);
+  }
+
+  void Deliver() {
+    while (bus_->Dispatch(0) > 0) {
+    }
+  }
+
+  // Ticks once a millisecond.
+  void Run(int milliseconds) {
+    for (int i = 0; i < milliseconds; ++i) {
+      now_ += 1000;
+      node_->Tick(now_);
+      Deliver();
+    }
+  }
+
+  robot_state_t Standing() {
+    robot_state_t state{};
+    state.utime = now_;
+    state.executing_plan_id = state.executing_step = -1;
+    state.mode = robot_state_t::STANDING;
+    state.num_states = 6;
+    return state;
+  }
+
+  robot_state_t Executing(const candidate_plan_t& plan, int step) {
+    robot_state_t state = Standing();
+    state.mode = robot_state_t::EXECUTING;
+    state.executing_plan_id = plan.plan_id;
+    state.executing_step = static_cast<std::int16_t>(step);
+    std::copy_n(plan.initial_center, 6, state.state);
+    std::array<double, 8> z;
+    for (int t = 0; t < step; ++t) {
+      std::copy_n(plan.control[t], 2, std::copy_n(state.state, 6, z.begin()));
+      config_.problem->model->Evaluate(z, {state.state, 6});
+    }
+    return state;
+  }
+
+  decision_t Decision(const candidate_plan_t& candidate, std::int16_t outcome, std::int16_t cause) {
+    decision_t decision{};
+    decision.utime = now_;
+    decision.plan_id = candidate.plan_id;
+    decision.candidate_utime = candidate.utime;
+    std::copy(std::begin(candidate.source), std::end(candidate.source), decision.source);
+    decision.outcome = outcome;
+    decision.cause = cause;
+    return decision;
+  }
+
+  void Say(const robot_state_t& state) {
+    ASSERT_TRUE(bus_->Publish(config_.bus.robot_state, state));
+    Deliver();
+  }
+  void Say(const decision_t& decision) {
+    ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
+    Deliver();
+  }
+  void Certify() { Say(Decision(candidates_.back(), decision_t::CERTIFIED, decision_t::CAUSE_NONE)); }
+  void AbstainS() { Say(Decision(candidates_.back(), decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE)); }
+
+  nlohmann::json Summary() const { return nlohmann::json::parse(node_->Summary()); }
+
+  // The nominal rollout's smallest distance to the obstacles.
+  double Clearance(const candidate_plan_t& plan) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int t = 0; t <= plan.num_steps; ++t) {
+      const robot_state_t state = Executing(plan, t);
+      for (const Obstacle& obstacle : config_.obstacles)
+        least = std::min(least, ApproximateDistance(obstacle, Vec({state.state[0], state.state[1]})));
+    }
+    return least;
+  }
+
+  Config config_;
+  std::int64_t now_ = kNow;
+  std::ostringstream out_;
+  std::unique_ptr<Bus> bus_;
+  std::unique_ptr<PlannerNode> node_;
+  std::vector<candidate_plan_t> candidates_;
+};
+
+TEST_F(PlannerNodeTest, SaysNothingBeforeItHearsOfTheRobot) {
+  Run(100);
+  EXPECT_TRUE(candidates_.empty());
+}
+
+TEST_F(PlannerNodeTest, ACandidateSaysWhatItIs) {
+  const robot_state_t state = Standing();
+  Say(state);
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 1u);
+  const candidate_plan_t& plan = candidates_[0];
+  EXPECT_EQ(plan.utime, now_ - 2000);
+  EXPECT_EQ(plan.sequence, 0);
+  EXPECT_EQ(plan.plan_id, kNow + 1000);  // of the first tick: it grows over restarts
+  EXPECT_EQ(GetText(plan.source), PlannerNode::kSource);
+  EXPECT_EQ(plan.start_utime, state.utime + config_.planner.lead_steps * kPeriod);
+  EXPECT_EQ(plan.step_us, kPeriod);
+  EXPECT_EQ(plan.num_states, 6);
+  EXPECT_EQ(plan.num_inputs, 2);
+  EXPECT_EQ(plan.progress_steps, config_.planner.progress_steps);
+  EXPECT_LE(plan.num_steps, plan.progress_steps + config_.planner.tail_steps);
+  for (int k = 0; k < 6; ++k) {
+    EXPECT_EQ(plan.initial_center[k], state.state[k]);
+    EXPECT_EQ(plan.initial_half_width[k], config_.planner.initial_half_width[static_cast<std::size_t>(k)]);
+  }
+  for (int t = plan.num_steps; t < 128; ++t) EXPECT_EQ(plan.control[t][0], 0);
+  EXPECT_NEAR(Executing(plan, plan.num_steps).state[3], 0, 1e-9);
+}
+
+TEST_F(PlannerNodeTest, SendsOneCandidateAndWaitsForItsDecision) {
+  Say(Standing());
+  Run(60);
+  EXPECT_EQ(candidates_.size(), 1u);
+  AbstainS();
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_[1].sequence, 1);
+  EXPECT_GT(candidates_[1].plan_id, candidates_[0].plan_id);
+  EXPECT_EQ(candidates_[1].start_utime, candidates_[0].start_utime);
+}
+
+TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
+  config_.planner.lead_steps = 20;  // time for all of them
+  config_.planner.clearance_step = 0.5;
+  Start(config_);
+  robot_state_t state = Standing();
+  state.state[0] = 8;
+  state.state[3] = 5;  // a robot that reports a speed while standing is held, so this starts at rest
+  state.state[1] = 3.5;
+  Say(state);
+  for (int i = 1; i <= 6; ++i) {
+    Run(3);
+    ASSERT_EQ(candidates_.size(), static_cast<std::size_t>(i));
+    EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance + (i - 1) * config_.planner.clearance_step);
+    EXPECT_EQ(candidates_.back().initial_center[3], 0);
+    AbstainS();
+  }
+}
+
+TEST_F(PlannerNodeTest, GoesOnAfterARejectionAndAfterD) {
+  Say(Standing());
+  Run(3);
+  Say(Decision(candidates_.back(), decision_t::REJECTED, decision_t::CAUSE_QUEUE_FULL));
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  Say(Decision(candidates_.back(), decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT));
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 3u);
+  EXPECT_EQ(Summary()["rejected"]["queue_full"], 1);
+  EXPECT_EQ(Summary()["abstained"]["domain_exit"], 1);
+}
+
+TEST_F(PlannerNodeTest, GivesUpARoundWhoseDataAreFalsified) {
+  Say(Standing());
+  Run(3);
+  Say(Decision(candidates_.back(), decision_t::ABSTAIN_FALSIFIED, decision_t::CAUSE_PAIRWISE));
+  Run(20);
+  EXPECT_EQ(candidates_.size(), 1u);
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+}
+
+TEST_F(PlannerNodeTest, StopsAfterSoManyCandidatesAndBeginsAnewWithTheNextState) {
+  config_.planner.candidates = 3;
+  Start(config_);
+  Say(Standing());
+  for (int i = 0; i < 5; ++i) {
+    Run(3);
+    if (i < 3) AbstainS();
+  }
+  EXPECT_EQ(candidates_.size(), 3u);
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+  now_ = kNow + kPeriod;
+  Say(Standing());
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 4u);
+}
+
+TEST_F(PlannerNodeTest, SendsNothingThatWouldComeTooLate) {
+  robot_state_t state = Standing();
+  Say(state);
+  now_ = state.utime + config_.planner.lead_steps * kPeriod - static_cast<std::int64_t>(config_.planner.time_limit_ms * 1e3);
+  Run(3);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_EQ(Summary()["rounds_without_certificate"], 1);
+}
+
+TEST_F(PlannerNodeTest, WaitsForTheStartOfACertifiedPlan) {
+  const robot_state_t state = Standing();
+  Say(state);
+  Run(3);
+  Certify();
+  Run(37);
+  Say(Standing());  // the boundary before the start
+  Run(20);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+TEST_F(PlannerNodeTest, PlansTheHandoverInTimeForTheTail) {
+  Say(Standing());
+  Run(3);
+  Certify();
+  const candidate_plan_t first = candidates_[0];
+  for (int step = 0; step < first.progress_steps - config_.planner.lead_steps; ++step) {
+    now_ = first.start_utime + step * kPeriod;
+    Say(Executing(first, step));
+    Run(3);
+    ASSERT_EQ(candidates_.size(), 1u) << "step " << step;
+  }
+  const int due = first.progress_steps - config_.planner.lead_steps;
+  now_ = first.start_utime + due * kPeriod;
+  Say(Executing(first, due));
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_[1].start_utime, first.start_utime + first.progress_steps * kPeriod);
+  const robot_state_t expected = Executing(first, first.progress_steps);  // the residual of this task is zero
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(candidates_[1].initial_center[k], expected.state[k], 1e-12);
+}
+
+TEST_F(PlannerNodeTest, PredictsThatARobotStandsAfterItsTail) {
+  Say(Standing());
+  Run(3);
+  Certify();
+  const candidate_plan_t first = candidates_[0];
+  const int last = first.num_steps - 1;
+  now_ = first.start_utime + last * kPeriod;
+  Say(Executing(first, last));
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(candidates_[1].initial_center[3], 0);
+  EXPECT_EQ(candidates_[1].initial_center[4], 0);
+  EXPECT_NEAR(candidates_[1].initial_center[0], Executing(first, first.num_steps).state[0], 1e-9);
+}
+
+TEST_F(PlannerNodeTest, PlansAgainIfTheRobotDidNotStartACertifiedPlan) {
+  Say(Standing());
+  Run(3);
+  Certify();
+  now_ = candidates_[0].start_utime;
+  Say(Standing());
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(PlannerNodeTest, GivesUpWaitingForADecisionAtTheStart) {
+  const robot_state_t state = Standing();
+  Say(state);
+  Run(3);
+  now_ = candidates_[0].start_utime;
+  Say(Standing());
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["unanswered"], 1);
+}
+
+TEST_F(PlannerNodeTest, LeavesAPlanThatItDidNotSendAlone) {
+  candidate_plan_t foreign{};
+  foreign.plan_id = 5;
+  foreign.num_steps = 20;
+  Say(Executing(foreign, 10));
+  Run(10);
+  EXPECT_TRUE(candidates_.empty());
+}
+
+TEST_F(PlannerNodeTest, IgnoresDecisionsThatConcernSomebodyElse) {
+  Say(Standing());
+  Run(3);
+  decision_t decision = Decision(candidates_[0], decision_t::CERTIFIED, decision_t::CAUSE_NONE);
+  SetText(decision.source, "another planner");
+  Say(decision);
+  decision = Decision(candidates_[0], decision_t::CERTIFIED, decision_t::CAUSE_NONE);
+  ++decision.plan_id;
+  Say(decision);
+  EXPECT_EQ(Summary()["certified"], 0);
+  EXPECT_EQ(Summary()["messages_ignored"], 2);
+  AbstainS();
+  AbstainS();  // twice: the second concerns nothing that is awaited
+  EXPECT_EQ(Summary()["abstained"]["obstacle"], 1);
+  EXPECT_EQ(Summary()["messages_ignored"], 3);
+}
+
+TEST_F(PlannerNodeTest, SurvivesBadMessagesAndThenWorks) {
+  const std::vector<std::uint8_t> good = Encode(Standing());
+  std::vector<std::uint8_t> shorter(good.begin(), good.end() - 1), longer = good, other = good;
+  longer.push_back(0);
+  other[0] ^= 1;
+  for (const auto& bytes : {std::vector<std::uint8_t>{}, shorter, longer, other})
+    for (const std::string& channel : {config_.bus.robot_state, config_.bus.decision, config_.bus.obstacles})
+      ASSERT_TRUE(bus_->Publish(channel, Bytes(bytes)));
+  Deliver();
+  Run(10);
+  for (const double value : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    robot_state_t state = Standing();
+    state.state[3] = value;
+    Say(state);
+  }
+  robot_state_t state = Standing();
+  state.num_states = 4;
+  Say(state);
+  state = Standing();
+  state.mode = 7;
+  Say(state);
+  Run(10);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_EQ(Summary()["messages_ignored"], 16);
+  Say(Standing());
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+TEST_F(PlannerNodeTest, AStateIsUsedOnce) {
+  const robot_state_t state = Standing();
+  Say(state);
+  Run(3);
+  Certify();
+  Say(state);
+  EXPECT_EQ(Summary()["messages_ignored"], 1);
+}
+
+TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
+  config_.obstacles = {Obstacle::Circle(Vec({12, 0}), 2)};
+  obstacles_t message = ToMessage(config_.obstacles);
+  message.sequence = 1;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  message.num_obstacles = 65;
+  message.sequence = 2;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // cannot be: ignored
+  Deliver();
+  EXPECT_EQ(Summary()["messages_ignored"], 1);
+  robot_state_t state = Standing();
+  for (int plan = 0; plan < 8; ++plan) {
+    Say(state);
+    Run(3);
+    ASSERT_EQ(candidates_.size(), static_cast<std::size_t>(plan + 1));
+    EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance);
+    Certify();
+    now_ = candidates_.back().start_utime + (candidates_.back().progress_steps - config_.planner.lead_steps) * kPeriod;
+    state = Executing(candidates_.back(), candidates_.back().progress_steps - config_.planner.lead_steps);
+  }
+}
+
+TEST_F(PlannerNodeTest, SendsNothingOnceTheRobotHasFinished) {
+  Say(Standing());
+  Run(3);
+  now_ += 1000;
+  robot_state_t finished = Standing();
+  finished.mode = robot_state_t::FINISHED;
+  Say(finished);
+  EXPECT_TRUE(node_->done());
+  AbstainS();
+  now_ += kPeriod;
+  Say(Standing());
+  Run(100);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
+TEST_F(PlannerNodeTest, SendsNothingAtTheGoal) {
+  robot_state_t state = Standing();
+  state.state[0] = 64;
+  Say(state);
+  Run(20);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_FALSE(node_->done());
+}
+
+TEST_F(PlannerNodeTest, TheSameMessagesGetTheSameCandidates) {
+  const auto run = [this] {
+    now_ = kNow;
+    candidates_.clear();
+    Start(Bicycle());
+    Say(Standing());
+    for (int i = 0; i < 4; ++i) {
+      Run(3);
+      AbstainS();
+    }
+    std::vector<std::vector<std::uint8_t>> bytes;
+    for (const candidate_plan_t& candidate : candidates_) bytes.push_back(Encode(candidate));
+    return bytes;
+  };
+  const auto first = run();
+  EXPECT_EQ(first.size(), 4u);
+  EXPECT_EQ(first, run());
+}
+
+TEST_F(PlannerNodeTest, WorksForThePointMassToo) {
+  Start(PointMass());
+  robot_state_t state = Standing();
+  state.num_states = 4;
+  Say(state);
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 1u);
+  EXPECT_EQ(candidates_[0].num_states, 4);
+}
+
+TEST_F(PlannerNodeTest, StopPrintsTheCounts) {
+  Say(Standing());
+  Run(3);
+  AbstainS();
+  Run(3);
+  Certify();
+  node_->Stop();
+  const auto summary = nlohmann::json::parse(out_.str());
+  EXPECT_EQ(summary["proposed"], 2);
+  EXPECT_EQ(summary["certified"], 1);
+  EXPECT_EQ(summary["abstained"], nlohmann::json({{"obstacle", 1}}));
+  EXPECT_EQ(summary["rejected"], nlohmann::json::object());
+  EXPECT_EQ(summary["rounds"], 1);
+  EXPECT_EQ(summary["rounds_without_certificate"], 0);
+}
+
+TEST(PlannerNode, RefusesATaskThatDoesNotFit) {
+  const auto bus = OpenBus("memq://");
+  Config config = Bicycle();
+  config.planner.initial_half_width = {1, 2};
+  EXPECT_THROW(PlannerNode(config, *bus), ConfigError);
+  config = Bicycle();
+  config.planner.goal = {};
+  EXPECT_THROW(PlannerNode(config, *bus), ConfigError);
+}
+
+}  // namespace
+}  // namespace forereach

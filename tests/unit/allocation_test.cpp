@@ -1,0 +1,115 @@
+// The certify step uses no heap. This program counts every malloc by putting its own in front of the C library's.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstddef>
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/dynamics/models.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define FOREREACH_SANITIZED 1  // the sanitizers own malloc
+#else
+#define FOREREACH_SANITIZED 0
+#endif
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+#if !FOREREACH_SANITIZED
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* block, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* block, std::size_t size) {
+  ++allocations;
+  return __libc_realloc(block, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+}
+#endif
+
+namespace forereach {
+namespace {
+
+Problem BicycleProblem() {
+  Problem problem;
+  problem.model = MakeKinematicBicycle(0.1, 2.5);
+  const Eigen::VectorXd reach = (Eigen::VectorXd(6) << 40, 40, 3, 25, 3, 0.48).finished();
+  problem.domain.state = Box(-reach, reach);
+  problem.domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
+  problem.domain.balls.push_back({{0, 1}, Eigen::Vector2d::Zero(), 39});
+  problem.domain.inequalities.push_back({Eigen::VectorXd::Unit(8, 3), 20});
+  problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+  problem.declaration.lipschitz(2, 3) = 0.02;
+  problem.declaration.lipschitz(2, 5) = 0.6;
+  problem.transitions.z = Eigen::MatrixXd::Zero(200, 8);
+  problem.transitions.z.col(3) = Eigen::VectorXd::LinSpaced(200, 5, 15);
+  problem.transitions.x_next = problem.transitions.z.leftCols(6);
+  problem.transitions.x_next.col(0) += 0.1 * problem.transitions.z.col(3);
+  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  return problem;
+}
+
+class Allocation : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (FOREREACH_SANITIZED) GTEST_SKIP() << "the sanitizers own malloc";
+  }
+
+  // Certifies from (0, 0, 0, v, 0, delta) and returns what that allocated.
+  long Count(double v, double delta, const std::vector<Obstacle>& obstacles, Outcome expected) {
+    const Eigen::VectorXd center = (Eigen::VectorXd(6) << 0, 0, 0, v, 0, delta).finished();
+    const Zonotope start = Zonotope::FromBox(center, Eigen::VectorXd::Constant(6, 0.01));
+    const long before = allocations;
+    const Decision decision = certifier_.Certify({controls_.data(), 2, 12, 2}, start, obstacles, tube_);
+    const long counted = allocations - before;
+    EXPECT_EQ(decision.outcome, expected);
+    return counted;
+  }
+
+  Certifier certifier_{std::make_shared<Problem>(BicycleProblem())};
+  Eigen::MatrixXd controls_ = Eigen::MatrixXd::Zero(2, 12);
+  Tube tube_;
+};
+
+TEST_F(Allocation, IsCounted) {
+  const long before = allocations;
+  std::vector<double> block(100);
+  Eigen::VectorXd vector(static_cast<Eigen::Index>(block.size()));
+  vector.setZero();
+  volatile double sink = vector.sum() + block[7];
+  (void)sink;
+  EXPECT_GE(allocations - before, 2) << "a counter that counts nothing proves nothing";
+}
+
+TEST_F(Allocation, CertifyDoesNone) {
+  std::vector<Obstacle> obstacles{Obstacle::Circle(Eigen::Vector2d(10, 8), 1),
+                                  Obstacle::AxisBox(Eigen::Vector2d(5, 6), Eigen::Vector2d(7, 9)),
+                                  Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 9),
+                                  Obstacle::Polygon({Eigen::Vector2d(5, -9), Eigen::Vector2d(7, -9), Eigen::Vector2d(6, -7)})};
+  EXPECT_EQ(Count(10, 0, obstacles, Outcome::kCertified), 0);
+  EXPECT_EQ(Count(30, 0, obstacles, Outcome::kDomain), 0);
+  obstacles.push_back(Obstacle::Circle(Eigen::Vector2d(6, 0), 1));
+  EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
+}
+
+}  // namespace
+}  // namespace forereach

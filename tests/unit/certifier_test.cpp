@@ -1,0 +1,415 @@
+// Algorithm 1: each outcome with every field of its witness, the order of the tests, closed boundaries, and what a
+// certifier refuses to be made of.
+#include "certifier/certify/certifier.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "certifier/certify/explain.h"
+#include "certifier/dynamics/models.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr int kPx = 0, kVx = 2, kVy = 3, kAx = 4;
+constexpr int kTheta = 2, kV = 3, kDelta = 5, kJerk = 6;
+
+static_assert(noexcept(std::declval<const Certifier&>().Certify({}, std::declval<const Zonotope&>(), {}, std::declval<Tube&>())));
+static_assert(noexcept(std::declval<const Propagator&>().Step(std::declval<const Zonotope&>(), {}, std::declval<Zonotope&>(),
+                                                              std::declval<StepRecord&>())));
+
+Eigen::VectorXd Vec(std::initializer_list<double> entries) {
+  Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
+  std::copy(entries.begin(), entries.end(), vector.begin());
+  return vector;
+}
+
+// A successor as the nominal model gives it: the residual is zero.
+void AddNominalTransition(Problem& problem, const Eigen::VectorXd& z) {
+  Transitions& data = problem.transitions;
+  const int n = problem.model->num_states();
+  data.z.conservativeResize(data.z.rows() + 1, z.size());
+  data.x_next.conservativeResize(data.x_next.rows() + 1, n);
+  data.z.bottomRows(1) = z.transpose();
+  Eigen::VectorXd next(n);
+  problem.model->Evaluate(View(z), {next.data(), static_cast<std::size_t>(n)});
+  data.x_next.bottomRows(1) = next.transpose();
+}
+
+Problem Bare(std::shared_ptr<const NominalModel> model, Eigen::VectorXd state, Eigen::VectorXd input) {
+  Problem problem;
+  const int n = model->num_states();
+  problem.model = std::move(model);
+  problem.domain.state = Box(-state, state);
+  problem.domain.input = Box(-input, input);
+  problem.declaration = {Eigen::MatrixXd::Zero(n, problem.model->num_variables()), Eigen::VectorXd::Zero(n)};
+  problem.projection = Eigen::MatrixXd::Identity(2, n);
+  AddNominalTransition(problem, Eigen::VectorXd::Zero(problem.model->num_variables()));
+  return problem;
+}
+
+// One step of 0.5 s: whole numbers stay exact. The residual is declared zero.
+Problem PointMassProblem() { return Bare(MakePointMass(0.5), Vec({100, 100, 4, 4}), Vec({2, 2})); }
+Problem BicycleProblem() { return Bare(MakeKinematicBicycle(0.1, 2.5), Vec({40, 40, 3.2, 25, 3, 2}), Vec({20, 2})); }
+
+Zonotope PointSet(const Eigen::VectorXd& x) { return Zonotope(x, Eigen::MatrixXd(x.size(), 0)); }
+
+class Judge {
+ public:
+  explicit Judge(const Problem& problem) : certifier_(std::make_shared<Problem>(problem)) {}
+
+  Decision operator()(const Zonotope& initial_set, const Eigen::MatrixXd& controls, const std::vector<Obstacle>& obstacles) {
+    const Plan plan{controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
+                    static_cast<int>(controls.rows())};
+    certifier_.Require(plan, initial_set, obstacles);
+    return certifier_.Certify(plan, initial_set, obstacles, tube_);
+  }
+
+  const Certifier& certifier() const { return certifier_; }
+  const Tube& tube() const { return tube_; }
+
+ private:
+  Certifier certifier_;
+  Tube tube_;
+};
+
+Eigen::MatrixXd Coast(int steps) { return Eigen::MatrixXd::Zero(2, steps); }
+
+void ExpectNoWitness(const Decision& d, bool coordinate, bool pair, bool obstacle) {
+  EXPECT_TRUE(coordinate || d.coordinate == -1);
+  EXPECT_TRUE(pair || (d.first_observation == -1 && d.second_observation == -1));
+  EXPECT_TRUE(obstacle || d.obstacle == -1);
+}
+
+TEST(Certificate, NamesTheClosestObstacleAndStep) {
+  Judge judge(PointMassProblem());
+  const std::vector<Obstacle> obstacles{Obstacle::Circle(Vec({0, 9}), 1), Obstacle::Circle(Vec({2, 3}), 1),
+                                        Obstacle::HalfSpace(Vec({1, 0}), 50)};
+  const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(4), obstacles);  // 1 m a step along x
+  EXPECT_EQ(d.outcome, Outcome::kCertified);
+  EXPECT_EQ(d.cause, Cause::kNone);
+  EXPECT_EQ(d.step, -1);
+  EXPECT_EQ(d.obstacle, 1);
+  EXPECT_EQ(d.closest_step, 2);
+  EXPECT_NEAR(d.margin, 3, 1e-12);
+  EXPECT_EQ(d.threshold, 1);
+  ExpectNoWitness(d, false, false, true);
+  EXPECT_EQ(judge.tube().length(), 4);
+  EXPECT_EQ(judge.certifier().problem().zonotope_order, 5);
+  EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("closest at step 2, 2 m from obstacle 1"));
+}
+
+TEST(Certificate, WithoutObstaclesHasNoMargin) {
+  Judge judge(PointMassProblem());
+  const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(1), {});
+  EXPECT_EQ(d.outcome, Outcome::kCertified);
+  EXPECT_EQ(d.obstacle, -1);
+  EXPECT_EQ(d.margin, kInfinity);
+}
+
+TEST(AbstainSafety, AtTheStartTheMiddleAndTheEnd) {
+  for (const int step : {0, 3, 6}) {
+    Judge judge(PointMassProblem());
+    const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(6),
+                           {Obstacle::Circle(Vec({0, 50}), 1), Obstacle::Circle(Vec({1.0 * step, 1}), 1.25)});
+    EXPECT_EQ(d.outcome, Outcome::kSafety);
+    EXPECT_EQ(d.cause, Cause::kObstacle);
+    // Within 0.75 m along x the circle is met; one step is 1 m.
+    EXPECT_EQ(d.step, step);
+    EXPECT_EQ(d.obstacle, 1);
+    EXPECT_EQ(d.threshold, 1.25);
+    EXPECT_NEAR(d.margin, 1, 1e-12);
+    ExpectNoWitness(d, false, false, true);
+    EXPECT_EQ(judge.tube().length(), 6) << "safety is judged after the horizon";
+    EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("abstain S: at step " + std::to_string(step)));
+  }
+}
+
+TEST(AbstainSafety, WhereTheStartTouchesAnObstacle) {
+  Judge judge(PointMassProblem());
+  const Zonotope start = Zonotope::FromBox(Vec({0, 0, 2, 0}), Vec({1, 1, 0, 0}));
+  const auto at = [&](double left) { return judge(start, Coast(1), {Obstacle::AxisBox(Vec({-9, left}), Vec({9, 9}))}); };
+  EXPECT_EQ(at(1).outcome, Outcome::kSafety);
+  EXPECT_EQ(at(1).step, 0);
+  EXPECT_EQ(at(1 + 1e-12).outcome, Outcome::kCertified);
+  EXPECT_EQ(judge(PointSet(Vec({0, 0, 2, 0})), Coast(1), {Obstacle::Circle(Vec({0, 1}), 1)}).outcome, Outcome::kSafety);
+}
+
+TEST(AbstainDomain, NamesTheBoundOfEveryKind) {
+  using Kind = DomainExit::Kind;
+  Problem problem = PointMassProblem();
+  problem.domain.inequalities.push_back({Vec({1, 1, 0, 0, 0, 0}), 50});
+  problem.domain.balls.push_back({{kVx, kVy}, Vec({0, 0}), 5});
+  Judge judge(problem);
+  const auto expect = [&](const Decision& d, int step, Kind kind, int index, double value, double bound) {
+    EXPECT_EQ(d.outcome, Outcome::kDomain);
+    EXPECT_EQ(d.cause, Cause::kDomainExit);
+    EXPECT_EQ(d.step, step);
+    EXPECT_EQ(d.exit.kind, kind);
+    EXPECT_EQ(d.exit.index, index);
+    EXPECT_EQ(d.coordinate, index);
+    EXPECT_NEAR(d.exit.value, value, 1e-12);
+    EXPECT_EQ(d.exit.bound, bound);
+    EXPECT_EQ(d.margin, d.exit.value);
+    EXPECT_EQ(d.threshold, bound);
+    ExpectNoWitness(d, true, false, false);
+    EXPECT_EQ(judge.tube().length(), step);
+    EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("abstain D: at step " + std::to_string(step)));
+  };
+  const Eigen::MatrixXd push = Eigen::Vector2d(2, 0).replicate(1, 4), pull = Eigen::Vector2d(-2, 0).replicate(1, 4);
+  expect(judge(PointSet(Vec({0, 0, 2.5, 0})), push, {}), 2, Kind::kUpper, kVx, 4.5, 4);
+  expect(judge(PointSet(Vec({0, 0, -2.5, 0})), pull, {}), 2, Kind::kLower, kVx, -4.5, -4);
+  expect(judge(PointSet(Vec({-100.5, 0, 0, 0})), push, {}), 0, Kind::kLower, kPx, -100.5, -100);
+  expect(judge(PointSet(Vec({30, 19, 3, 0})), Coast(3), {}), 1, Kind::kInequality, 0, 50.5, 50);
+  expect(judge(PointSet(Vec({0, 0, 4, 3.5})), Coast(3), {}), 0, Kind::kBall, 0, std::sqrt(28.25), 5);
+  Eigen::MatrixXd late = Coast(3);
+  late(0, 2) = 2.5;
+  expect(judge(PointSet(Vec({0, 0, 0, 0})), late, {}), 2, Kind::kUpper, kAx, 2.5, 2);
+  late(0, 2) = -2.5;
+  expect(judge(PointSet(Vec({0, 0, 0, 0})), late, {}), 2, Kind::kLower, kAx, -2.5, -2);
+}
+
+TEST(AbstainDomain, BoundsAreClosed) {
+  Problem problem = PointMassProblem();
+  problem.domain.inequalities.push_back({Vec({1, 0, 1, 0, 0, 0}), 8});
+  problem.domain.balls.push_back({{kVx, kVy}, Vec({0, 0}), 5});
+  Judge judge(problem);
+  const auto outcome = [&](double px, double vx, double vy, double ax) {
+    Eigen::MatrixXd controls = Coast(1);
+    controls(0, 0) = ax;
+    return judge(PointSet(Vec({px, 0, vx, vy})), controls, {}).outcome;
+  };
+  EXPECT_EQ(outcome(0, 0, 0, 2), Outcome::kCertified) << "an input on its bound";
+  EXPECT_EQ(outcome(0, 0, 0, NextUp(2)), Outcome::kDomain);
+  EXPECT_EQ(outcome(0, 0, 0, NextDown(-2)), Outcome::kDomain);
+  EXPECT_EQ(outcome(-100, 0, 4, 0), Outcome::kCertified) << "a state on its bounds";
+  EXPECT_EQ(outcome(NextDown(-100), 0, 0, 0), Outcome::kDomain);
+  EXPECT_EQ(outcome(0, 0, NextUp(4), 0), Outcome::kDomain);
+  EXPECT_EQ(outcome(5, 3, 4, 0), Outcome::kCertified) << "on the inequality and on the ball";
+  EXPECT_EQ(outcome(NextUp(5), 3, 4, 0), Outcome::kDomain);
+  EXPECT_EQ(outcome(0, NextUp(3), 4, 0), Outcome::kDomain);
+}
+
+TEST(AbstainDomain, TheLastSliceMayLieOutside) {
+  Judge judge(PointMassProblem());
+  EXPECT_EQ(judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(1), {}).outcome, Outcome::kCertified);
+  const Decision d = judge(PointSet(Vec({99.5, 0, 2, 0})), Coast(2), {});
+  EXPECT_EQ(d.outcome, Outcome::kDomain);
+  EXPECT_EQ(d.step, 1);
+}
+
+TEST(AbstainDomain, ComesBeforeSafety) {
+  Judge judge(PointMassProblem());
+  const Decision d = judge(PointSet(Vec({98, 0, 3.5, 0})), Coast(3), {Obstacle::Circle(Vec({98, 0}), 1)});
+  EXPECT_EQ(d.outcome, Outcome::kDomain) << "although the obstacle is touched at step 0";
+  EXPECT_EQ(d.step, 2);
+  EXPECT_EQ(d.obstacle, -1);
+}
+
+TEST(AbstainDomain, ThePoleOfTheSteeringHasItsOwnCause) {
+  Judge judge(BicycleProblem());
+  const Decision d = judge(Zonotope::FromBox(Vec({0, 0, 0, 5, 0, 1.5}), Vec({0, 0, 0, 0, 0, 0.1})), Coast(2), {});
+  EXPECT_EQ(d.outcome, Outcome::kDomain);
+  EXPECT_EQ(d.cause, Cause::kNoFiniteEnclosure);
+  EXPECT_EQ(d.step, 0);
+  EXPECT_EQ(d.coordinate, kTheta);
+  EXPECT_EQ(d.exit.kind, DomainExit::Kind::kNone);
+  ExpectNoWitness(d, true, false, false);
+  EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("theta has no finite enclosure"));
+
+  Eigen::MatrixXd turn = Coast(3);
+  turn.row(1).setConstant(2);  // 0.2 rad a step, from 1.2 over the pole at 1.57
+  const Decision later = judge(Zonotope::FromBox(Vec({0, 0, 0, 0.5, 0, 1.2}), Vec({0, 0, 0, 0, 0, 0.1})), turn, {});
+  EXPECT_EQ(later.cause, Cause::kNoFiniteEnclosure);
+  EXPECT_EQ(later.step, 2);
+}
+
+TEST(AbstainFalsified, NamesThePairBeforeAnythingElse) {
+  Problem problem = PointMassProblem();
+  for (const double px : {1.0, 2.0}) AddNominalTransition(problem, Vec({px, 0, 0, 0, 0, 0}));
+  problem.declaration.lipschitz(kVy, kPx) = 0.25;
+  problem.transitions.x_next(1, kVy) += 0.125;
+  problem.transitions.x_next(2, kVy) += 0.5;
+  Judge judge(problem);
+  const Decision d = judge(PointSet(Vec({1e6, 0, 0, 0})), Coast(2), {Obstacle::Circle(Vec({1e6, 0}), 1)});
+  EXPECT_EQ(d.outcome, Outcome::kFalsified);
+  EXPECT_EQ(d.cause, Cause::kPairwise);
+  EXPECT_EQ(d.step, -1);
+  EXPECT_EQ(d.coordinate, kVy);
+  EXPECT_EQ(d.first_observation, 1);
+  EXPECT_EQ(d.second_observation, 2);
+  EXPECT_NEAR(d.margin, 0.375, 1e-12);
+  EXPECT_EQ(d.threshold, 0.25);
+  EXPECT_EQ(d.obstacle, -1);
+  EXPECT_EQ(judge.tube().length(), 0);
+  ASSERT_TRUE(judge.certifier().violation());
+  EXPECT_EQ(judge.certifier().violation()->first, 1);
+  EXPECT_THAT(Explain(d, judge.certifier().problem()), HasSubstr("abstain F: observations 1 and 2 differ in vy by 0.375"));
+}
+
+TEST(Certifier, ConstantResidualMovesTheTube) {
+  Problem problem = PointMassProblem();
+  problem.transitions.x_next(0, kVx) += 0.25;
+  problem.declaration.noise_bound[kVx] = 0.125;
+  Judge judge(problem);
+  EXPECT_EQ(judge(PointSet(Vec({0, 0, 1, 0})), Coast(1), {}).outcome, Outcome::kCertified);
+  EXPECT_NEAR(judge.tube().slice(1).Hull(kVx).lower, 1.125, 1e-15);
+  EXPECT_NEAR(judge.tube().slice(1).Hull(kVx).upper, 1.375, 1e-15);
+  EXPECT_LE(judge.tube().slice(1).Hull(kVx).lower, 1.125);
+  EXPECT_GE(judge.tube().slice(1).Hull(kVx).upper, 1.375);
+  EXPECT_EQ(judge.tube().step(0).remainder[0], 0) << "an affine model has no remainder";
+}
+
+TEST(Certifier, UsesTheHullDistanceOnlyAboveTwelveColumns) {
+  EXPECT_FALSE(Judge(BicycleProblem()).certifier().uses_hull_distance());
+}
+
+// The nominal tube of the design: 12 steps of the bicycle with a residual declared zero, against its known widths.
+TEST(ReferenceTube, HasTheKnownWidths) {
+  Problem problem = BicycleProblem();
+  problem.domain.state = Box(Vec({-40, -40, -3.15, 0, -3, -0.48}), Vec({40, 40, 3.15, 25, 3, 0.48}));
+  Judge judge(problem);
+  const Zonotope start = Zonotope::FromBox(Vec({0, 0, 0, 10, 0, 0.05}), Vec({0.1, 0.1, 0.02, 0.2, 0.02, 0.005}));
+  ASSERT_EQ(judge(start, Eigen::Vector2d(0.5, 0.1).replicate(1, 12), {}).outcome, Outcome::kCertified);
+  const auto width = [&](int k) { return judge.tube().slice(12).Hull(k).upper - judge.tube().slice(12).Hull(k).lower; };
+  EXPECT_NEAR(width(0), 0.8492, 5e-5);
+  EXPECT_NEAR(width(1), 1.1410, 5e-5);
+  EXPECT_NEAR(width(2), 0.1117, 5e-5);
+}
+
+TEST(Certifier, AnswersBitForBitTheSameOnEveryThread) {
+  Problem problem = BicycleProblem();
+  problem.declaration.lipschitz(kTheta, kV) = 0.01;
+  problem.declaration.lipschitz(kTheta, kDelta) = 0.5;
+  for (const double delta : {-0.3, -0.1, 0.1, 0.3}) AddNominalTransition(problem, Vec({0, 0, 0, 8, 0, delta, 0, 0}));
+  const Certifier certifier(std::make_shared<Problem>(problem));
+  const Zonotope start = Zonotope::FromBox(Vec({0, 0, 0, 8, 0, 0.05}), Vec({0.1, 0.1, 0.02, 0.2, 0.02, 0.005}));
+  const Eigen::MatrixXd controls = Eigen::Vector2d(0.5, 0.1).replicate(1, 12);
+  const Plan plan{controls.data(), 2, 12, 2};
+  const std::vector<Obstacle> obstacles{Obstacle::Circle(Vec({6, 6}), 1)};
+  std::vector<Tube> tubes(4);
+  std::vector<Decision> decisions(4);
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < 4; ++i)
+    threads.emplace_back([&, i] {
+      for (int repeat = 0; repeat < 50; ++repeat) decisions[i] = certifier.Certify(plan, start, obstacles, tubes[i]);
+    });
+  for (std::thread& thread : threads) thread.join();
+  for (std::size_t i = 1; i < 4; ++i) {
+    EXPECT_EQ(decisions[i].outcome, decisions[0].outcome);
+    EXPECT_EQ(decisions[i].margin, decisions[0].margin);
+    EXPECT_EQ(decisions[i].closest_step, decisions[0].closest_step);
+    for (int t = 0; t <= 12; ++t) {
+      EXPECT_EQ(tubes[i].slice(t).CenterVector(), tubes[0].slice(t).CenterVector());
+      EXPECT_EQ(tubes[i].slice(t).GeneratorMatrix(), tubes[0].slice(t).GeneratorMatrix());
+    }
+  }
+}
+
+void ExpectRefused(const Problem& problem, const std::string& part) {
+  EXPECT_THAT([&] { Certifier certifier(std::make_shared<Problem>(problem)); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr(part)));
+}
+
+template <class Spoil>
+void ExpectRefused(Spoil spoil, const std::string& part) {
+  Problem problem = PointMassProblem();
+  spoil(problem);
+  ExpectRefused(problem, part);
+}
+
+TEST(Certifier, NamesThePartThatDoesNotFit) {
+  EXPECT_THROW(Certifier(nullptr), std::invalid_argument);
+  ExpectRefused([](Problem& p) { p.model = nullptr; }, "model");
+  ExpectRefused([](Problem& p) { p.domain.state = Box(); }, "domain: state box");
+  ExpectRefused([](Problem& p) { p.domain.input = Box(); }, "domain: input box");
+  ExpectRefused([](Problem& p) { p.domain.inequalities.push_back({Vec({1}), 0}); }, "domain: inequality 0");
+  ExpectRefused([](Problem& p) { p.domain.inequalities.push_back({Eigen::VectorXd::Ones(6), kNan}); }, "domain: inequality 0");
+  ExpectRefused([](Problem& p) { p.domain.balls.push_back({{}, Vec({}), 1}); }, "domain: ball 0");
+  ExpectRefused([](Problem& p) { p.domain.balls.push_back({{6}, Vec({0}), 1}); }, "coordinate 6");
+  ExpectRefused([](Problem& p) { p.domain.balls.push_back({{0}, Vec({0}), -1}); }, "radius -1");
+  ExpectRefused([](Problem& p) { p.declaration.lipschitz.resize(4, 5); }, "declaration: lipschitz");
+  ExpectRefused([](Problem& p) { p.declaration.lipschitz(1, 2) = -1; }, "lipschitz 1, 2");
+  ExpectRefused([](Problem& p) { p.declaration.noise_bound[3] = kNan; }, "noise_bound 3");
+  ExpectRefused([](Problem& p) { p.transitions = {}; }, "transitions: none given");
+  ExpectRefused([](Problem& p) { p.transitions.z.conservativeResize(1, 5); }, "transitions: 5 columns");
+  ExpectRefused([](Problem& p) { p.transitions.x_next.conservativeResize(1, 3); }, "transitions");
+  ExpectRefused([](Problem& p) { p.transitions.z(0, 0) = 101; }, "transition 0: lies outside");
+  ExpectRefused([](Problem& p) { p.transitions.z(0, 0) = kNan; }, "transition 0");
+  ExpectRefused([](Problem& p) { p.transitions.x_next(0, 0) = kInfinity; }, "transition 0: not finite");
+  ExpectRefused([](Problem& p) { p.projection = Eigen::MatrixXd::Identity(2, 3); }, "projection");
+  ExpectRefused([](Problem& p) { p.projection.setZero(); }, "projection");
+  ExpectRefused([](Problem& p) { p.zonotope_order = 0; }, "zonotope_order: 0");
+  ExpectRefused([](Problem& p) { p.zonotope_order = 27; }, "zonotope_order: 27");
+  Problem largest = PointMassProblem();
+  largest.zonotope_order = 26;
+  EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(largest)));
+}
+
+TEST(Certifier, RequireNamesWhatItCannotJudge) {
+  const Certifier certifier(std::make_shared<Problem>(PointMassProblem()));
+  const std::vector<double> controls(2 * (kMaxSteps + 1), 0.0);
+  const Zonotope start = PointSet(Eigen::VectorXd::Zero(4));
+  const auto refuses = [&](const Plan& plan, const Zonotope& set, const std::vector<Obstacle>& obstacles, const char* part) {
+    EXPECT_THAT([&] { certifier.Require(plan, set, obstacles); }, ThrowsMessage<std::invalid_argument>(HasSubstr(part)));
+  };
+  const Plan good{controls.data(), 2, kMaxSteps, 2};
+  EXPECT_NO_THROW(certifier.Require(good, start, {}));
+  refuses({controls.data(), 2, kMaxSteps + 1, 2}, start, {}, "129 steps");
+  refuses({controls.data(), 2, 0, 2}, start, {}, "0 steps");
+  refuses({controls.data(), 1, 1, 1}, start, {}, "1 inputs");
+  refuses({controls.data(), 2, 1, 1}, start, {}, "plan");
+  const std::vector<double> nan{0, 0, 0, kNan};
+  refuses({nan.data(), 2, 2, 2}, start, {}, "step 1 is not finite");
+  refuses(good, PointSet(Vec({0, 0})), {}, "initial set: dimension 2");
+  refuses(good, Zonotope(Eigen::VectorXd::Zero(4), Eigen::MatrixXd::Ones(4, 21)), {}, "initial set: more generators");
+  refuses(good, start, {Obstacle::Circle(Vec({0, 0}), 1), Obstacle::HalfSpace(Eigen::VectorXd::Ones(3), 1)}, "obstacle 1: dimension 3");
+}
+
+TEST(Certifier, WorksAtTheLargestOrderAndHorizon) {
+  Problem problem = PointMassProblem();
+  problem.zonotope_order = 26;
+  problem.declaration.noise_bound.setConstant(1e-9);
+  Judge judge(problem);
+  const Decision d = judge(Zonotope::FromBox(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Constant(4, 1e-6)), Coast(kMaxSteps),
+                         {Obstacle::Circle(Vec({50, 0}), 1)});
+  EXPECT_EQ(d.outcome, Outcome::kCertified);
+  EXPECT_EQ(judge.tube().length(), kMaxSteps);
+  EXPECT_LE(judge.tube().slice(kMaxSteps).num_generators(), kMaxGenerators);
+}
+
+TEST(Certifier, SpatialAndLinearProjectionsAreJudged) {
+  Problem problem = PointMassProblem();
+  problem.projection = Eigen::MatrixXd::Identity(3, 4);  // px, py, vx
+  Judge spatial(problem);
+  const auto box = [](double vx) { return Obstacle::AxisBox(Vec({-9, -9, vx}), Vec({9, 9, vx + 1})); };
+  EXPECT_EQ(spatial(PointSet(Vec({0, 0, 1, 0})), Coast(3), {box(1.5)}).outcome, Outcome::kCertified);
+  EXPECT_EQ(spatial(PointSet(Vec({0, 0, 1, 0})), Coast(3), {box(0.5)}).outcome, Outcome::kSafety);
+  problem.projection = Eigen::MatrixXd::Identity(1, 4);
+  Judge line(problem);
+  const auto wall = [](double x) { return Obstacle::HalfSpace(Eigen::VectorXd::Ones(1), x); };
+  EXPECT_EQ(line(PointSet(Vec({0, 0, 2, 0})), Coast(3), {wall(3.5)}).outcome, Outcome::kCertified);
+  const Decision d = line(PointSet(Vec({0, 0, 2, 0})), Coast(3), {wall(3)});
+  EXPECT_EQ(d.outcome, Outcome::kSafety);
+  EXPECT_EQ(d.step, 3);
+}
+
+TEST(Decision, WithoutAnswerIsNoCertificate) {
+  EXPECT_EQ(Decision{}.outcome, Outcome::kNone);
+  EXPECT_NE(Outcome{}, Outcome::kCertified);
+  EXPECT_EQ(Explain(Decision{}, PointMassProblem()), "no decision");
+}
+
+}  // namespace
+}  // namespace forereach
