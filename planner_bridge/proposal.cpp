@@ -37,16 +37,19 @@ constexpr double kShareOfRadius = 0.7;  // the goal counts as reached this far i
 constexpr unsigned kLongestHold = 4;    // steps one control is held at most
 constexpr double kLargestTurn = 1.2;    // rad, off the way down the navigation field
 constexpr double kReverse = 1e-3;       // m/s, what counts as standing still
-constexpr double kRoomAhead = 6;        // m, kept free beyond the end of a braking tail
+constexpr double kRoomAhead = 9;        // m, kept free beyond the end of a braking tail: enough to turn away in
+constexpr double kArrivalTime = 2.5;    // s: a robot that is nearer to the goal than this takes its speed back ...
+constexpr double kArrivalSpeed = 0.35;  // ... down to this share of the cruise speed
 
-/** What a progress part has to achieve. Tried in turn, the later ones are easier; the last but one lets the robot turn round. */
+/** What a progress part has to achieve. Tried in turn, the later ones are easier. */
 struct Ambition {
   double share;    // of the distance that cruising straight at the goal would gain
   double heading;  // least cosine between the motion at the end and the way to the goal
-  bool room;       // to drive on from where the tail ends; a robot that stands has to take what it gets
+  bool room;       // to drive on from where the tail ends
+  bool at_rest;    // only for a robot that stands: it may have to turn round, and has to take what it gets
 };
 constexpr std::array<Ambition, 5> kAmbitions{
-    {{0.85, 0.94, true}, {0.6, 0.8, true}, {0.2, 0.4, true}, {-0.5, -1, true}, {0, -1, false}}};
+    {{0.85, 0.94, true, false}, {0.6, 0.8, true, false}, {0.2, 0.4, true, false}, {-0.5, -1, true, true}, {0, -1, false, true}}};
 
 const double* Values(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
 double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
@@ -227,16 +230,22 @@ class Planner::Search::ProgressGoal final : public ob::Goal {
 
   bool isSatisfied(const ob::State* state, double* distance) const override {
     const double* s = Values(state);
-    const double missing = search_.Shortfall(s, ambition_);
-    if (distance != nullptr) *distance = std::max(missing, 0.0);
-    if (missing > 0 || search_.StepsOf(s) != search_.planner_.options_.progress_steps) return false;
+    const double missing = std::max(search_.Shortfall(s, ambition_), 0.0);
+    const double steps = search_.planner_.options_.progress_steps - search_.StepsOf(s);
+    const bool satisfied = missing == 0 && steps == 0 && EndsWell(s);
+    // Metres and steps alike: only their order matters. OMPL takes a state at distance zero for a solution.
+    if (distance != nullptr) *distance = satisfied ? 0 : missing + steps + 1;
+    return satisfied;
+  }
+
+ private:
+  bool EndsWell(const double* s) const {
     const bool arrives = search_.BestOf(s) <= kShareOfRadius * search_.planner_.options_.goal_radius;
     Eigen::MatrixXd tail;
     return (arrives || search_.HeadsWell(search_.StateOf(s), ambition_.heading)) &&
            search_.FindTail(search_.StateOf(s), ambition_, tail);
   }
 
- private:
   const Search& search_;
   const Ambition ambition_;
 };
@@ -300,11 +309,13 @@ bool Planner::Search::Propagate(const double* from, const double* u, double* to)
   return inside;
 }
 
-// Down the navigation field at a speed between half and all of the cruise speed, give or take a turn.
+// Down the navigation field at half to all of the cruise speed, less near the goal, give or take a turn.
 void Planner::Search::Hint(const double* s, double turn, double speed, double* u) const {
-  const Eigen::VectorXd descent = field_.Descent(Position(StateOf(s)));
+  const Eigen::VectorXd position = Position(StateOf(s)), descent = field_.Descent(position);
+  const double cruise = planner_.options_.cruise_speed;
+  const double most = std::clamp(field_.DistanceToGo(position) / kArrivalTime, kArrivalSpeed * cruise, cruise);
   const double heading = std::atan2(descent.size() > 1 ? descent(1) : 0.0, descent(0)) + kLargestTurn * turn;
-  planner_.motion_->Pursue(StateOf(s), heading, planner_.options_.cruise_speed * (0.75 + 0.25 * speed), {u, m_});
+  planner_.motion_->Pursue(StateOf(s), heading, most * (0.75 + 0.25 * speed), {u, m_});
 }
 
 // What driving straight at the goal would gain, accelerating up to the cruise speed.
@@ -419,7 +430,7 @@ std::optional<Proposal> Planner::Search::Run(const Ambition& ambition, std::int6
   const std::int64_t most = work_ + allowance;
   std::int64_t rounds = 0;  // bounds a search that propagates nothing
   setup->solve(ob::PlannerTerminationCondition([&] { return work_ >= most || ++rounds > allowance; }));
-  if (!setup->haveExactSolutionPath()) return std::nullopt;
+  if (!setup->getProblemDefinition()->hasExactSolution()) return std::nullopt;
   return Assemble(setup->getSolutionPath(), ambition);
 }
 
@@ -448,7 +459,7 @@ std::optional<Proposal> Planner::Impl::Propose(const PlanRequest& request) {
   ompl::RNG::setSeed(std::max<std::uint32_t>(request.seed, 1));
   const auto allowance = static_cast<std::int64_t>(options_.time_limit_ms * kStepsPerMs / kAmbitions.size());
   for (const Ambition& ambition : kAmbitions) {
-    if (!ambition.room && !search.StartsAtRest()) continue;
+    if (ambition.at_rest && !search.StartsAtRest()) continue;
     if (std::optional<Proposal> proposal = search.Run(ambition, allowance)) return proposal;
   }
   return std::nullopt;

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
 
 #include "certifier/numerics/text.h"
 #include "forereach/robot_state_t.hpp"
@@ -13,6 +14,8 @@
 
 namespace forereach {
 namespace {
+
+constexpr std::int64_t kProgressUs = 1'000'000;
 
 std::int64_t PeriodUs(const Config& config) { return std::llround(config.robot.step_period_ms * 1e3); }
 
@@ -76,6 +79,14 @@ void RobotSimNode::Boundary(std::int64_t utime) {
   if (executing()) ContinuePlan(utime);
   PublishState(utime);
   ++boundaries_;
+  LogProgress(utime);
+}
+
+void RobotSimNode::LogProgress(std::int64_t utime) {
+  if (utime < next_progress_utime_) return;
+  next_progress_utime_ = utime + kProgressUs;
+  spdlog::info("{} steps driven, {} inside their slices, {:.1f} m to the goal{}", transitions_, steps_inside_,
+               DistanceToGoal(), executing() ? "" : ", standing");
 }
 
 void RobotSimNode::FinishStep(std::int64_t utime) {

@@ -68,6 +68,7 @@ class RobotSimNode final : public Node {
   void ContinuePlan(std::int64_t utime);
   void Stand();
   void PublishState(std::int64_t utime);
+  void LogProgress(std::int64_t utime);
   void PublishTransition(std::int64_t utime, std::span<const double> control, std::span<const double> next);
   void PublishRefusal(std::int64_t utime, const GuardVerdict& verdict);
   void PublishEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
@@ -93,6 +94,7 @@ class RobotSimNode final : public Node {
   int step_ = 0;  // of the executing plan: the control applied from the last boundary on
   std::optional<std::int64_t> start_utime_;
   std::int64_t boundaries_ = 0, transitions_ = 0, events_ = 0;
+  std::int64_t next_progress_utime_ = 0;
   bool goal_reached_ = false, ending_ = false;
   int finished_boundaries_ = 0;
 

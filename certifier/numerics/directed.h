@@ -37,8 +37,9 @@ namespace internal {
 // Below this a product's error may not be a double, and its sign not be seen.
 inline constexpr double kSafeProduct = 0x1p-960;
 
+// NaN, from an error whose computation overflowed, counts as below.
 [[nodiscard]] inline double UpIfBelow(double rounded, double error) noexcept {
-  return error > 0 ? NextUp(rounded) : rounded;
+  return error <= 0 ? rounded : NextUp(rounded);
 }
 
 // An overflow to minus infinity is no upper bound of the finite number it stands for.
@@ -48,7 +49,7 @@ inline constexpr double kSafeProduct = 0x1p-960;
 
 }  // namespace internal
 
-/** The least double >= a + b. */
+/** The least double >= a + b, or the one above it where b is the largest double or its negative. */
 [[nodiscard]] inline double AddUp(double a, double b) noexcept {
   const double sum = a + b;
   if (!std::isfinite(sum)) return internal::UpperOfOverflow(sum, std::isfinite(a) && std::isfinite(b));

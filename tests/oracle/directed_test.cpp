@@ -39,10 +39,12 @@ const Operation kOperations[] = {
     {"/", DivUp, DivDown, [](const Rational& a, const Rational& b) { return Rational(a / b); }, true},
 };
 
-// Products and quotients may be one double wider where the error of the rounded result is no double.
-bool MayBeOneWider(const Operation& operation, double a, const Rational& result) {
+// Products and quotients may be one double wider where the error of the rounded result is no double, sums where its
+// computation overflows.
+bool MayBeOneWider(const Operation& operation, double a, double b, const Rational& result) {
   const bool scales = operation.up == MulUp || operation.divides;
-  return scales && (abs(result) <= kSmall || (operation.divides && abs(Rational(a)) < kSmall));
+  if (!scales) return std::abs(b) == kMaxDouble;
+  return abs(result) <= kSmall || (operation.divides && abs(Rational(a)) < kSmall);
 }
 
 void ExpectBounds(const Operation& operation, double a, double b) {
@@ -51,7 +53,7 @@ void ExpectBounds(const Operation& operation, double a, double b) {
   const double least = Ceiling(result), largest = Floor(result);
   ASSERT_TRUE(AtMost(result, up)) << a << " " << operation.name << " " << b << " <= " << up;
   ASSERT_TRUE(AtLeast(result, down)) << a << " " << operation.name << " " << b << " >= " << down;
-  if (MayBeOneWider(operation, a, result)) {
+  if (MayBeOneWider(operation, a, b, result)) {
     ASSERT_LE(up, NextUp(least)) << a << " " << operation.name << " " << b;
     ASSERT_GE(down, NextDown(largest)) << a << " " << operation.name << " " << b;
   } else {
@@ -84,6 +86,19 @@ TEST_P(DirectedOperation, HoldsAtTheEndsOfTheDoubles) {
       ExpectBounds(GetParam(), a, b);
       if (HasFatalFailure()) return;
     }
+}
+
+// The textbook error of a sum overflows on its way where one operand is the largest double.
+TEST_P(DirectedOperation, HoldsNextToTheLargestDouble) {
+  Random random(107);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 4000; ++trial) {
+    const double large = random.Sign() * (random.Coin() ? kMaxDouble : NextDown(kMaxDouble));
+    const double other = random.Sign() * std::ldexp(random.Uniform(1, 2), random.Integer(960, 1023));
+    ExpectBounds(GetParam(), large, other);
+    ExpectBounds(GetParam(), other, large);
+    if (HasFatalFailure()) return;
+  }
 }
 
 TEST_P(DirectedOperation, LeavesExactResultsAlone) {

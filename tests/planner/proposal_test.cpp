@@ -53,6 +53,24 @@ TEST(Planner, BicycleProposalsAreAllowedEndAtStandstillAndComeNearer) {
   }
 }
 
+// Where little can be achieved, the search must not take the nearest miss for an answer.
+TEST(Planner, EveryProposalHasAllItsProgressSteps) {
+  const Config config = Bicycle();
+  Planner planner = PlannerOf(config);
+  int found = 0;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    for (const Eigen::VectorXd& state : {Vec({18, 1, 0, 2, 0, 0}), Vec({20, 1, 0, 0, 0, 0}), Vec({70, 0, 0.5, 4, 0, 0})}) {
+      const PlanRequest request = From(state, seed);
+      const auto proposal = planner.Propose(request);
+      if (!proposal) continue;
+      ++found;
+      EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps) << state.transpose() << ", seed " << seed;
+      ExpectSound(config, request, *proposal, {3, 4, 5});
+    }
+  }
+  EXPECT_GT(found, 10);
+}
+
 TEST(Planner, PointMassProposalsAreAllowedEndAtStandstillAndComeNearer) {
   const Config config = PointMass();
   Planner planner = PlannerOf(config);
