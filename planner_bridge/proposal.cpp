@@ -35,7 +35,8 @@ constexpr double kTouch = 1e-6;         // m, kept where the start is nearer to 
 constexpr double kOverspeed = 1.05;     // times the cruise speed
 constexpr double kShareOfRadius = 0.7;  // the goal counts as reached this far inside its radius
 constexpr unsigned kLongestHold = 4;    // steps one control is held at most
-constexpr double kLargestTurn = 1.2;    // rad, off the way down the navigation field
+constexpr double kLargestTurn = 0.8;    // rad, off the way down the navigation field
+constexpr double kLookAhead = 4;        // steps
 constexpr double kReverse = 1e-3;       // m/s, what counts as standing still
 constexpr double kRoomAhead = 9;        // m, kept free beyond the end of a braking tail: enough to turn away in
 constexpr double kArrivalTime = 2.5;    // s: a robot that is nearer to the goal than this takes its speed back ...
@@ -48,8 +49,8 @@ struct Ambition {
   bool room;       // to drive on from where the tail ends
   bool at_rest;    // only for a robot that stands: it may have to turn round, and has to take what it gets
 };
-constexpr std::array<Ambition, 5> kAmbitions{
-    {{0.85, 0.94, true, false}, {0.6, 0.8, true, false}, {0.2, 0.4, true, false}, {-0.5, -1, true, true}, {0, -1, false, true}}};
+constexpr std::array<Ambition, 6> kAmbitions{
+    {{0.9, 0.98, true, false}, {0.8, 0.92, true, false}, {0.6, 0.8, true, false}, {0.2, 0.4, true, false}, {-0.5, -1, true, true}, {0, -1, false, true}}};
 
 const double* Values(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
 double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
@@ -200,6 +201,7 @@ class Planner::Search {
   [[nodiscard]] bool Clear(const Eigen::VectorXd& position) const;
   [[nodiscard]] bool HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const;
   [[nodiscard]] bool Propagate(const double* from, const double* u, double* to) const;
+  [[nodiscard]] Eigen::VectorXd Drift(std::span<const double> x) const;
   void Hint(const double* s, double turn, double speed, double* u) const;
   [[nodiscard]] double IdealGain() const;
   [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const;
@@ -309,13 +311,22 @@ bool Planner::Search::Propagate(const double* from, const double* u, double* to)
   return inside;
 }
 
-// Down the navigation field at half to all of the cruise speed, less near the goal, give or take a turn.
+// Down the navigation field a little ahead, at half to all of the cruise speed, less near the goal, give or take a turn.
 void Planner::Search::Hint(const double* s, double turn, double speed, double* u) const {
-  const Eigen::VectorXd position = Position(StateOf(s)), descent = field_.Descent(position);
+  const Eigen::VectorXd position = Position(StateOf(s));
+  const Eigen::VectorXd descent = field_.Descent(position + kLookAhead * Drift(StateOf(s)));
   const double cruise = planner_.options_.cruise_speed;
   const double most = std::clamp(field_.DistanceToGo(position) / kArrivalTime, kArrivalSpeed * cruise, cruise);
   const double heading = std::atan2(descent.size() > 1 ? descent(1) : 0.0, descent(0)) + kLargestTurn * turn;
   planner_.motion_->Pursue(StateOf(s), heading, most * (0.75 + 0.25 * speed), {u, m_});
+}
+
+// How far the robot moves in one step without control.
+Eigen::VectorXd Planner::Search::Drift(std::span<const double> x) const {
+  const std::array<double, kMaxInputs> rest{};
+  std::array<double, kMaxStates> next;
+  Step(x, rest.data(), {next.data(), n_});
+  return Position({next.data(), n_}) - Position(x);
 }
 
 // What driving straight at the goal would gain, accelerating up to the cruise speed.
@@ -338,11 +349,8 @@ double Planner::Search::Shortfall(const double* s, const Ambition& ambition) con
 
 // A robot that stands still heads nowhere, which is well.
 bool Planner::Search::HeadsWell(std::span<const double> x, double cosine) const {
-  const std::array<double, kMaxInputs> rest{};
-  std::array<double, kMaxStates> next;
-  Step(x, rest.data(), {next.data(), n_});
-  const Eigen::VectorXd position = Position(x), motion = Position({next.data(), n_}) - position;
-  return motion.dot(field_.Descent(position)) >= cosine * motion.norm();
+  const Eigen::VectorXd drift = Drift(x);
+  return drift.dot(field_.Descent(Position(x))) >= cosine * drift.norm();
 }
 
 bool Planner::Search::FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
