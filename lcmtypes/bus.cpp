@@ -47,7 +47,7 @@ class LcmBus final : public Bus {
   }
 
   int Dispatch(int timeout_ms) override {
-    if (in_memory_) while (lcm_.handleTimeout(0) > 0) {}
+    if (in_memory_ && lcm_.handleTimeout(timeout_ms) > 0) while (lcm_.handleTimeout(0) > 0) {}
     std::deque<Stored> batch;
     {
       std::unique_lock lock(mutex_);

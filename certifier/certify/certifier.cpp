@@ -1,5 +1,6 @@
 #include "certifier/certify/certifier.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -18,7 +19,8 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   const int n = problem->model->num_states(), variables = problem->model->num_variables();
   problem->domain.Validate(n, problem->model->num_inputs());
   problem->declaration.Validate(n, variables);
-  const int highest_order = (kMaxGenerators - 2 * n) / n;
+  // A successor adds up to 2 n columns before it is reduced, a projection up to p.
+  const int highest_order = (kMaxGenerators - std::max(2 * n, kMaxSafetyDim)) / n;
   RequireThat(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
               "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
                   std::to_string(highest_order) + "] for " + std::to_string(n) + " states");

@@ -1,7 +1,7 @@
 /** Closed intervals of reals, rounded outward: every result contains all values the operation takes on its operands.
 
-An operation whose result has no finite bound gives [-inf, inf], and non-finite operands do too, so a caller checks
-IsFinite once at the end. `lower <= upper` always holds; there is no empty interval. */
+Where a bound is not finite the result is not either, whatever is computed from it, so a caller checks IsFinite once at
+the end. `lower <= upper` always holds; there is no empty interval. */
 #pragma once
 
 #include <algorithm>

@@ -45,7 +45,8 @@ struct DomainExit {
 };
 
 /** The first constraint that the box of d_z intervals does not provably satisfy; kind kNone if it lies inside. A bound
-that is met exactly is inside. NaN is outside. Cost O(d_z) a constraint. */
+that is met exactly is inside, for a ball where the squares of radius and distance are doubles; otherwise it may be a
+rounding error short of that. NaN is outside. Cost O(d_z) a constraint. */
 [[nodiscard]] DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept;
 
 }  // namespace forereach

@@ -15,8 +15,8 @@ struct Violation {
   double difference, bound;
 };
 
-/** The first provable violation of Eq. (falsification) in the order of k, then i < j; none if no pair provably violates
-it. Proof is in real arithmetic, so rounding alone never falsifies a declaration. Cost O(N^2) for each row of L with a
+/** A provable violation of Eq. (falsification), in the lowest coordinate k that has one: its first pair in the order
+i < j, or its worst where row k of L is zero. None if no pair provably violates it. Proof is in real arithmetic, so rounding alone never falsifies a declaration. Cost O(N^2) for each row of L with a
 nonzero entry, O(N) for the others. */
 [[nodiscard]] std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations);
 

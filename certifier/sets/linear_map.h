@@ -22,7 +22,8 @@ The center of `image` is left alone. Cost O(nonzeros of M times generators). */
 void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
                    int rows, Zonotope& image, std::span<double> error) noexcept;
 
-/** A zonotope that contains {M x : x in set}, M given by its nonzero entries. */
+/** A zonotope that contains {M x : x in set}, M given by its nonzero entries. Adds at most `rows` generators.
+@pre set.num_generators() + rows <= kMaxGenerators */
 void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set, int rows, Zonotope& image) noexcept;
 
 }  // namespace forereach

@@ -13,8 +13,8 @@ namespace forereach {
 One corner for a point, two for a segment. Cost O(m log m). @pre set.dim() == 2 */
 [[nodiscard]] std::vector<Eigen::Vector2d> Outline(const Zonotope& set);
 
-/** An upper bound on R = max {|y - c|_2 : y in <c, G>}, Eq. (safety-radius-margin). Within 1e-12 of exact, relatively,
-in the plane and on the line; the half-diagonal of the interval hull in other dimensions. Cost O(m log m). */
+/** An upper bound on R = max {|y - c|_2 : y in <c, G>}, Eq. (safety-radius-margin). Within 1e-11 of exact, relatively,
+in the plane; the half-diagonal of the interval hull in other dimensions. Cost O(m log m). */
 [[nodiscard]] double RadiusUpper(const Zonotope& set);
 
 }  // namespace forereach

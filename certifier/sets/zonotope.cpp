@@ -19,10 +19,15 @@ void RequireShape(Eigen::Index center, Eigen::Index rows, Eigen::Index columns) 
                                 std::to_string(kMaxGenerators) + " columns");
 }
 
-double AbsoluteSum(std::span<const double> row) {
+// An upper bound on sum |g|. Zeros add no rounding error, so a single entry is summed exactly.
+double AbsoluteSumUpper(std::span<const double> row) {
   double sum = 0;
-  for (const double g : row) sum += std::abs(g);
-  return sum;
+  int terms = 0;
+  for (const double g : row) {
+    sum += std::abs(g);
+    terms += g != 0;
+  }
+  return SumUpper(sum, terms);
 }
 
 }  // namespace
@@ -69,7 +74,7 @@ Eigen::MatrixXd Zonotope::GeneratorMatrix() const {
   return generators;
 }
 
-double Zonotope::HalfWidthUpper(int k) const noexcept { return SumUpper(AbsoluteSum(row(k)), num_generators_); }
+double Zonotope::HalfWidthUpper(int k) const noexcept { return AbsoluteSumUpper(row(k)); }
 
 Interval Zonotope::Hull(int k) const noexcept {
   const double half_width = HalfWidthUpper(k);
@@ -88,11 +93,11 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
     const std::span<const double> entries = row(k);
     for (std::size_t j = 0; j < entries.size(); ++j) along[j] += d * entries[j];
   }
-  const double spread = AbsoluteSum({along.data(), static_cast<std::size_t>(num_generators_)});
+  const double spread = AbsoluteSumUpper({along.data(), static_cast<std::size_t>(num_generators_)});
   // Every |d . g_j| is off by a rounding error whose sum over j the magnitude bounds.
   const double underflow = num_generators_ * dim_ * std::numeric_limits<double>::denorm_min();
   const double error = AddUp(DotErrorUpper(magnitude, dim_), underflow);
-  return AddUp(value.upper, AddUp(SumUpper(spread, num_generators_), error));
+  return AddUp(value.upper, AddUp(spread, error));
 }
 
 void Zonotope::AppendAxis(int k, double length) noexcept {
