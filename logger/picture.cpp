@@ -10,11 +10,6 @@
 #include <cairo.h>
 #include <fmt/format.h>
 
-#ifdef __SANITIZE_ADDRESS__
-// Cairo and fontconfig keep what they learned of the fonts until the process ends.
-extern "C" const char* __lsan_default_suppressions() { return "leak:libfontconfig\nleak:libcairo\n"; }
-#endif
-
 namespace forereach {
 namespace {
 

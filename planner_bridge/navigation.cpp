@@ -10,7 +10,7 @@
 namespace forereach {
 namespace {
 
-constexpr double kFinestCell = 0.25, kCellsAlong = 240;
+constexpr double kFinestCell = 0.25, kCellsAlong = 240, kStartCells = 4;
 // A metre inside a grown obstacle counts as many; one at its edge as kNear, which falls to 1 over kMargin metres.
 constexpr double kInside = 20, kNear = 2, kMargin = 2;
 
@@ -34,9 +34,7 @@ NavigationField::NavigationField(const Box& region, const std::vector<Obstacle>&
   std::vector<double> slowness(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
   for (std::size_t k = 0; k < slowness.size(); ++k)
     slowness[k] = Slowness(region, obstacles, clearance, NodeAt(static_cast<int>(k)));
-  const Eigen::Vector2d at = (goal - origin_) / cell_;
-  March(slowness, Index(std::clamp(static_cast<int>(std::lround(at(0))), 0, columns_ - 1),
-                        std::clamp(static_cast<int>(std::lround(at(1))), 0, rows_ - 1)));
+  March(slowness);
 }
 
 Eigen::Vector2d NavigationField::NodeAt(int index) const {
@@ -44,13 +42,20 @@ Eigen::Vector2d NavigationField::NodeAt(int index) const {
 }
 
 // Dijkstra's order with the eikonal equation's update, so that distances are Euclidean and not along grid lines.
-void NavigationField::March(const std::vector<double>& slowness, int goal) {
+// Around the goal, where that equation is least exact on a grid, the straight distance is the start.
+void NavigationField::March(const std::vector<double>& slowness) {
   using Entry = std::pair<double, int>;
   distance_.assign(slowness.size(), std::numeric_limits<double>::infinity());
   std::vector<bool> settled(slowness.size());
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front;
-  distance_[static_cast<std::size_t>(goal)] = 0;
-  front.emplace(0, goal);
+  const Eigen::Vector2d end = origin_ + cell_ * Eigen::Vector2d(columns_ - 1, rows_ - 1);
+  const Eigen::Vector2d source = goal_.head<2>().cwiseMax(origin_).cwiseMin(end);
+  for (int k = 0; k < columns_ * rows_; ++k) {
+    const double distance = (NodeAt(k) - source).norm();
+    if (!(distance <= kStartCells * cell_)) continue;
+    distance_[static_cast<std::size_t>(k)] = distance * slowness[static_cast<std::size_t>(k)];
+    front.emplace(distance_[static_cast<std::size_t>(k)], k);
+  }
   while (!front.empty()) {
     const int index = front.top().second;
     front.pop();

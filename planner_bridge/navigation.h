@@ -29,7 +29,7 @@ class NavigationField final {
  private:
   [[nodiscard]] int Index(int i, int j) const { return j * columns_ + i; }
   [[nodiscard]] Eigen::Vector2d NodeAt(int index) const;
-  void March(const std::vector<double>& slowness, int goal);
+  void March(const std::vector<double>& slowness);
   [[nodiscard]] double Solve(int index, double slowness) const;
 
   Eigen::VectorXd goal_;

@@ -36,7 +36,8 @@ constexpr double kOverspeed = 1.05;     // times the cruise speed
 constexpr double kShareOfRadius = 0.7;  // the goal counts as reached this far inside its radius
 constexpr unsigned kLongestHold = 4;    // steps one control is held at most
 constexpr double kLargestTurn = 0.8;    // rad, off the way down the navigation field
-constexpr double kLookAhead = 4;        // steps
+constexpr double kLargestSlowdown = 0.5;
+constexpr int kLookAhead = 4;           // steps
 constexpr double kReverse = 1e-3;       // m/s, what counts as standing still
 constexpr double kRoomAhead = 9;        // m, kept free beyond the end of a braking tail: enough to turn away in
 constexpr double kArrivalTime = 2.5;    // s: a robot that is nearer to the goal than this takes its speed back ...
@@ -83,8 +84,8 @@ MakeAlgorithm AlgorithmNamed(const std::string& name) {
 /** Mostly follows a hint, for a step at a time and with some error; sometimes any control, held for longer. */
 class HintedSampler final : public oc::ControlSampler {
  public:
-  /** Fills a control for the given state; two random numbers from [-1, 1] say how to err. */
-  using Hint = std::function<void(const double* s, double turn, double speed, double* u)>;
+  /** Fills a control for the given state; `turn` from [-1, 1] and `slower` from [0, 1] say how to err. */
+  using Hint = std::function<void(const double* s, double turn, double slower, double* u)>;
 
   HintedSampler(const oc::ControlSpace* space, Hint hint) : ControlSampler(space), hint_(std::move(hint)) {}
 
@@ -97,8 +98,8 @@ class HintedSampler final : public oc::ControlSampler {
   void sample(oc::Control* control, const ob::State* state) override {
     if (rng_.uniform01() > kHinted) return sample(control);
     hinted_ = true;
-    const double turn = std::clamp(rng_.gaussian(0, 0.4), -1.0, 1.0), speed = rng_.uniformReal(-1, 1);
-    hint_(Values(state), turn, speed, Values(control));
+    const double turn = std::clamp(rng_.gaussian(0, 0.4), -1.0, 1.0), slower = rng_.uniform01() * rng_.uniform01();
+    hint_(Values(state), turn, slower, Values(control));
   }
   void sampleNext(oc::Control* control, const oc::Control*) override { sample(control); }
   void sampleNext(oc::Control* control, const oc::Control*, const ob::State* state) override { sample(control, state); }
@@ -201,8 +202,9 @@ class Planner::Search {
   [[nodiscard]] bool Clear(const Eigen::VectorXd& position) const;
   [[nodiscard]] bool HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const;
   [[nodiscard]] bool Propagate(const double* from, const double* u, double* to) const;
+  [[nodiscard]] double SpeedAt(double distance) const;
   [[nodiscard]] Eigen::VectorXd Drift(std::span<const double> x) const;
-  void Hint(const double* s, double turn, double speed, double* u) const;
+  void Hint(const double* s, double turn, double slower, double* u) const;
   [[nodiscard]] double IdealGain() const;
   [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const;
   [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const;
@@ -311,14 +313,19 @@ bool Planner::Search::Propagate(const double* from, const double* u, double* to)
   return inside;
 }
 
-// Down the navigation field a little ahead, at half to all of the cruise speed, less near the goal, give or take a turn.
-void Planner::Search::Hint(const double* s, double turn, double speed, double* u) const {
+// What the robot should drive at, a distance from the goal: slowly enough there not to miss it.
+double Planner::Search::SpeedAt(double distance) const {
+  const double cruise = planner_.options_.cruise_speed;
+  return std::clamp(distance / kArrivalTime, kArrivalSpeed * cruise, cruise);
+}
+
+// Down the navigation field a little ahead, give or take a turn, and somewhat more slowly than would be best.
+void Planner::Search::Hint(const double* s, double turn, double slower, double* u) const {
   const Eigen::VectorXd position = Position(StateOf(s));
   const Eigen::VectorXd descent = field_.Descent(position + kLookAhead * Drift(StateOf(s)));
-  const double cruise = planner_.options_.cruise_speed;
-  const double most = std::clamp(field_.DistanceToGo(position) / kArrivalTime, kArrivalSpeed * cruise, cruise);
   const double heading = std::atan2(descent.size() > 1 ? descent(1) : 0.0, descent(0)) + kLargestTurn * turn;
-  planner_.motion_->Pursue(StateOf(s), heading, most * (0.75 + 0.25 * speed), {u, m_});
+  const double speed = SpeedAt(field_.DistanceToGo(position)) * (1 - kLargestSlowdown * slower);
+  planner_.motion_->Pursue(StateOf(s), heading, speed, {u, m_});
 }
 
 // How far the robot moves in one step without control.
@@ -329,14 +336,13 @@ Eigen::VectorXd Planner::Search::Drift(std::span<const double> x) const {
   return Position({next.data(), n_}) - Position(x);
 }
 
-// What driving straight at the goal would gain, accelerating up to the cruise speed.
+// What driving straight at the goal would gain, accelerating up to the speed that is right there.
 double Planner::Search::IdealGain() const {
-  const PlannerOptions& options = planner_.options_;
   const double dt = planner_.motion_->dt();
   double speed = planner_.motion_->Speed({start_.data(), n_}), gain = 0;
-  for (int t = 0; t < options.progress_steps; ++t) {
-    gain += dt * std::min(speed, options.cruise_speed);
-    speed += dt * options.braking;
+  for (int t = 0; t < planner_.options_.progress_steps; ++t) {
+    gain += dt * std::min(speed, SpeedAt(start_distance_ - gain));
+    speed += dt * planner_.options_.braking;
   }
   return gain;
 }
@@ -347,10 +353,15 @@ double Planner::Search::Shortfall(const double* s, const Ambition& ambition) con
   return BestOf(s) - std::max(start_distance_ - ambition.share * gain_, near_enough);
 }
 
-// A robot that stands still heads nowhere, which is well.
+// Judged a little ahead, so that wheels that are still turned count. A robot that stands still heads nowhere, which is
+// well.
 bool Planner::Search::HeadsWell(std::span<const double> x, double cosine) const {
-  const Eigen::VectorXd drift = Drift(x);
-  return drift.dot(field_.Descent(Position(x))) >= cosine * drift.norm();
+  const std::array<double, kMaxInputs> rest{};
+  std::array<double, kMaxStates> ahead;
+  std::copy(x.begin(), x.end(), ahead.begin());
+  for (int t = 0; t < kLookAhead; ++t) Step({ahead.data(), n_}, rest.data(), {ahead.data(), n_});
+  const Eigen::VectorXd drift = Drift({ahead.data(), n_});
+  return drift.dot(field_.Descent(Position({ahead.data(), n_}))) >= cosine * drift.norm();
 }
 
 bool Planner::Search::FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
@@ -409,7 +420,7 @@ std::unique_ptr<oc::SimpleSetup> Planner::Search::SetUp(const Ambition& ambition
   controls->setBounds(control_bounds);
   controls->setControlSamplerAllocator([this](const oc::ControlSpace* space) {
     return std::make_shared<HintedSampler>(
-        space, [this](const double* s, double turn, double speed, double* u) { Hint(s, turn, speed, u); });
+        space, [this](const double* s, double turn, double slower, double* u) { Hint(s, turn, slower, u); });
   });
 
   auto setup = std::make_unique<oc::SimpleSetup>(controls);

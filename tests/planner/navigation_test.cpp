@@ -51,6 +51,12 @@ TEST(NavigationField, IsFiniteEvenInsideAnObstacleAndOutsideTheRegion) {
   }
 }
 
+TEST(NavigationField, AGoalOutsideTheRegionIsApproached) {
+  const NavigationField field(kRegion, {}, 1, Vec({100, 0}));
+  EXPECT_TRUE(std::isfinite(field.DistanceToGo(Vec({0, 0}))));
+  EXPECT_GT(field.Descent(Vec({0, 0}))(0), 0.99);
+}
+
 TEST(NavigationField, OnTheLineItIsTheDistance) {
   const NavigationField field(Box(Vec({-5}), Vec({5})), {}, 0.5, Vec({2}));
   EXPECT_DOUBLE_EQ(field.DistanceToGo(Vec({-3})), 5);
