@@ -1,4 +1,5 @@
 #include <iostream>
+#include <stdexcept>
 
 #include <CLI/CLI.hpp>
 
@@ -14,9 +15,18 @@ struct Options {
   std::uint32_t seed = 1;
 };
 
+// A task that certifies need not be one that plans: no goal, or a model that nobody has taught to brake.
+Planner PlannerOf(const Config& config) {
+  try {
+    return {config.problem, config.planner, config.obstacles};
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(config.path + ": " + error.what());
+  }
+}
+
 int MakePlan(const Options& options) {
   const Config config = LoadConfig(options.config);
-  Planner planner(config.problem, config.planner, config.obstacles);
+  Planner planner = PlannerOf(config);
   PlanRequest request;
   request.state = (config.initial_set.lower() + config.initial_set.upper()) / 2;
   request.clearance = config.planner.clearance;

@@ -19,7 +19,8 @@ constexpr double kShareOfBound = 0.95;
 
 // Where a state that is zero but for one coordinate goes to in another.
 double StepResponse(const NominalModel& model, std::size_t from, std::size_t to) {
-  std::vector<double> z(static_cast<std::size_t>(model.num_variables())), next(static_cast<std::size_t>(model.num_states()));
+  std::vector<double> z(static_cast<std::size_t>(model.num_variables()));
+  std::vector<double> next(static_cast<std::size_t>(model.num_states()));
   z[from] = 1;
   model.Evaluate(z, next);
   return next[to];

@@ -30,8 +30,8 @@ class Motion {
   /** Shapes of braking tail to choose from; 0 is the plainest and is to be tried first. */
   [[nodiscard]] virtual int num_tails() const = 0;
 
-  /** Controls, one column a step, that bring the nominal model from x to standstill: speed and its rate end at zero up to
-  rounding. Within the input domain; the states in between are the caller's to check.
+  /** Controls, one column a step, that bring the nominal model from x to standstill: speed and its rate end at zero up
+  to rounding. Within the input domain; the states in between are the caller's to check.
   @param tail 0 .. num_tails() - 1.
   @return false, with `controls` unspecified, if it takes more than max_steps. */
   [[nodiscard]] virtual bool Brake(std::span<const double> x, int tail, int max_steps,

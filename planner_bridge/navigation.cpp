@@ -15,7 +15,8 @@ constexpr double kFinestCell = 0.25, kCellsAlong = 240, kStartCells = 4;
 constexpr double kInside = 20, kNear = 2, kMargin = 2;
 
 double Slowness(const Box& region, const std::vector<Obstacle>& obstacles, double clearance, const Eigen::VectorXd& y) {
-  double room = std::min({kMargin, (y - region.lower()).minCoeff() - clearance, (region.upper() - y).minCoeff() - clearance});
+  const double from_edge = std::min((y - region.lower()).minCoeff(), (region.upper() - y).minCoeff());
+  double room = std::min(kMargin, from_edge - clearance);
   for (const Obstacle& obstacle : obstacles) room = std::min(room, ApproximateDistance(obstacle, y) - clearance);
   return room < 0 ? kInside : kNear - (kNear - 1) * room / kMargin;
 }

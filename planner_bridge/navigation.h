@@ -10,9 +10,9 @@
 
 namespace forereach {
 
-/** In the plane: the travel distance from y to the goal inside a region and among obstacles grown by a clearance, a little
-more where it passes close to either, from a grid solved once by the fast marching method. On the line and in space: the
-straight distance. For planning, not for bounds. Refers to nothing of its arguments. */
+/** In the plane: the travel distance from y to the goal inside a region and among obstacles grown by a clearance, a
+little more where it passes close to either, from a grid solved once by the fast marching method. On the line and in
+space: the straight distance. For planning, not for bounds. Refers to nothing of its arguments. */
 class NavigationField final {
  public:
   /** @param region where the robot may be; outside it answers as at its edge. @param clearance metres.

@@ -1,19 +1,20 @@
 /** The planner on a bus: robot states and decisions in, candidates out.
 
-A round answers one robot state: it looks for a certificate of a plan that starts lead_steps boundaries later, from where
-the executing plan will have taken the robot by then. Rounds are started while the robot stands, and from the moment on
-at which its plan's progress part ends before that start; not while a certified plan waits for its own. A round sends one
+A round answers one robot state: it looks for a certificate of a plan that starts lead_steps boundaries later, from
+where the executing plan will have taken the robot by then. Rounds begin while the robot stands, and once that start is
+not before the end of its plan's progress part; not while a certified plan waits for its own start. A round sends one
 candidate at a time and waits for its decision:
     certified          -> the round ends, the plan waits for its start
     abstention S       -> the next candidate keeps clearance_step more from obstacles
     abstention D       -> the next candidate keeps further inside the domain's bounds
     abstention F       -> the round ends: no candidate can pass
     rejected           -> the next candidate
-It ends without a certificate after `candidates` of them, or when too little time is left until its start; the next state
-starts another. All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has said FINISHED,
-no round begins any more.
+It ends without a certificate after `candidates` searches, or when too little time is left until its start; the next
+state begins another. All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has
+said FINISHED, no round begins any more.
 
-Messages that do not decode, contain what is not finite, or concern somebody else's candidates are counted and ignored. */
+Messages that do not decode, contain what is not finite, or concern somebody else's candidates are counted and
+ignored. */
 #pragma once
 
 #include <iostream>

@@ -50,13 +50,18 @@ struct Ambition {
   bool room;       // to drive on from where the tail ends
   bool at_rest;    // only for a robot that stands: it may have to turn round, and has to take what it gets
 };
-constexpr std::array<Ambition, 6> kAmbitions{
-    {{0.9, 0.98, true, false}, {0.8, 0.92, true, false}, {0.6, 0.8, true, false}, {0.2, 0.4, true, false}, {-0.5, -1, true, true}, {0, -1, false, true}}};
+constexpr std::array<Ambition, 6> kAmbitions{{{0.9, 0.98, true, false},
+                                              {0.8, 0.92, true, false},
+                                              {0.6, 0.8, true, false},
+                                              {0.2, 0.4, true, false},
+                                              {-0.5, -1, true, true},
+                                              {0, -1, false, true}}};
 
 const double* Values(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
 double* Values(ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
-const double* Values(const oc::Control* control) { return control->as<oc::RealVectorControlSpace::ControlType>()->values; }
-double* Values(oc::Control* control) { return control->as<oc::RealVectorControlSpace::ControlType>()->values; }
+using RealVectorControl = oc::RealVectorControlSpace::ControlType;
+const double* Values(const oc::Control* control) { return control->as<RealVectorControl>()->values; }
+double* Values(oc::Control* control) { return control->as<RealVectorControl>()->values; }
 
 Box ProjectedRegion(const Problem& problem) {
   const Box& box = problem.domain.state;
@@ -209,7 +214,8 @@ class Planner::Search {
   [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const;
   [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const;
   [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const;
-  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Ambition& ambition, const Eigen::MatrixXd& tail) const;
+  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Ambition& ambition,
+                                   const Eigen::MatrixXd& tail) const;
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition);
   [[nodiscard]] std::optional<Proposal> Assemble(oc::PathControl& path, const Ambition& ambition) const;
 
@@ -306,7 +312,8 @@ bool Planner::Search::Propagate(const double* from, const double* u, double* to)
   std::array<double, kMaxVariables> z;
   std::copy_n(u, m_, std::copy_n(from, n_, z.begin()));
   const double steps = StepsOf(from) + 1, best = BestOf(from);  // `to` may be `from`
-  const bool inside = steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
+  const bool inside =
+      steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
   Step({z.data(), n_}, z.data() + n_, {to, n_});
   to[n_] = inside ? steps : planner_.options_.progress_steps + 1;
   to[n_ + 1] = std::min(best, field_.DistanceToGo(Position({to, n_})));
@@ -365,12 +372,14 @@ bool Planner::Search::HeadsWell(std::span<const double> x, double cosine) const 
 }
 
 bool Planner::Search::FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
-  for (int shape = 0; shape < planner_.motion_->num_tails(); ++shape)
-    if (planner_.motion_->Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
+  const Motion& motion = *planner_.motion_;
+  for (int shape = 0; shape < motion.num_tails(); ++shape)
+    if (motion.Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
   return false;
 }
 
-bool Planner::Search::TailIsAllowed(std::span<const double> x, const Ambition& ambition, const Eigen::MatrixXd& tail) const {
+bool Planner::Search::TailIsAllowed(std::span<const double> x, const Ambition& ambition,
+                                    const Eigen::MatrixXd& tail) const {
   std::array<double, kMaxVariables> z;
   std::copy(x.begin(), x.end(), z.begin());
   Eigen::VectorXd position = Position(x), direction = Eigen::VectorXd::Zero(position.size());
@@ -392,8 +401,7 @@ bool Planner::Search::TailIsAllowed(std::span<const double> x, const Ambition& a
 bool Planner::Search::HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const {
   for (double ahead = 1; ahead <= kRoomAhead; ++ahead)
     if (!Clear(position + ahead * direction)) return false;
-  const Eigen::VectorXd end = position + kRoomAhead * direction;
-  return (planner_.region_.lower().array() <= end.array()).all() && (end.array() <= planner_.region_.upper().array()).all();
+  return planner_.region_.Contains(position + kRoomAhead * direction);
 }
 
 std::unique_ptr<oc::SimpleSetup> Planner::Search::SetUp(const Ambition& ambition) {

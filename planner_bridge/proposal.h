@@ -1,9 +1,9 @@
 /** Candidate plans: a progress part found by OMPL and a braking tail that ends at standstill.
 
 The progress part is the answer to a query of bounded length, not a path to the goal: exactly `progress_steps` controls
-that come nearer to it, measured around the obstacles, and from whose end a braking tail fits. All of it is checked along
-the nominal rollout, in the certifier's own discretisation, against obstacles grown by a clearance and against the
-domain. That is no proof: candidates are certified or not by somebody else. */
+that come nearer to it, measured around the obstacles, and from whose end a braking tail fits. All of it is checked
+along the nominal rollout, in the certifier's own discretisation, against obstacles grown by a clearance and against
+the domain. That is no proof: candidates are certified or not by somebody else. */
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,8 @@ struct Proposal {
 
 class Planner final {
  public:
-  /** @throws std::invalid_argument for a model without Motion, an unknown algorithm, or a goal or horizon that does not fit. */
+  /** @throws std::invalid_argument for a model without Motion, an unknown algorithm, or a goal or horizon that does not
+  fit. */
   Planner(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles);
   ~Planner();
 
@@ -47,8 +48,8 @@ class Planner final {
   Single-threaded, for the whole process: OMPL's seed is global. */
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request);
 
-  /** Appends progress parts until the goal is reached or no more fit, then one braking tail: one plan of at most kMaxSteps
-  controls from request.state to the goal, or as far as they take it. */
+  /** Appends progress parts until the goal is reached or no more fit, then one braking tail: one plan of at most
+  kMaxSteps controls from request.state to the goal, or as far as they take it. */
   [[nodiscard]] std::optional<Proposal> ProposeToGoal(const PlanRequest& request);
 
   static constexpr int kStepsPerMs = 400;

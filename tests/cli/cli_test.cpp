@@ -114,6 +114,7 @@ TEST(BadInput, ExitsWithTwoAndOneLine) {
        {"certify --config none.yaml --plan config/plans/bicycle_certified.csv",
         "certify --config config/bicycle.yaml --plan none.csv",
         "certify --config config/bicycle.yaml --plan config/plans/point_mass_certified.csv",
+        "plan --config config/bicycle.yaml --out /tmp/not_written.csv",
         "replay none.lcmlog --config config/bicycle.yaml", "report none.lcmlog --config config/bicycle.yaml"}) {
     const Output output = Forereach(std::string(arguments) + " 2>&1 >/dev/null");
     EXPECT_EQ(output.code, 2) << arguments;

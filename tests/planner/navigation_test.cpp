@@ -37,7 +37,8 @@ TEST(NavigationField, FollowingTheDescentReachesTheGoalAndKeepsOutOfObstacles) {
     const bool inside = ApproximateDistance(obstacles[0], y) < 1 || ApproximateDistance(obstacles[1], y) < 1;
     for (int step = 0; step < 1000 && (y - Vec({30, 20})).norm() > 1; ++step) {
       y += 0.2 * field.Descent(y);
-      for (const Obstacle& obstacle : obstacles) EXPECT_TRUE(inside || ApproximateDistance(obstacle, y) > 0) << y.transpose();
+      for (const Obstacle& obstacle : obstacles)
+        EXPECT_TRUE(inside || ApproximateDistance(obstacle, y) > 0) << y.transpose();
     }
     EXPECT_LE((y - Vec({30, 20})).norm(), 1);
   }

@@ -213,7 +213,8 @@ TEST_F(PlannerNodeTest, StopsAfterSoManyCandidatesAndBeginsAnewWithTheNextState)
 TEST_F(PlannerNodeTest, SendsNothingThatWouldComeTooLate) {
   robot_state_t state = Standing();
   Say(state);
-  now_ = state.utime + config_.planner.lead_steps * kPeriod - static_cast<std::int64_t>(config_.planner.time_limit_ms * 1e3);
+  const auto search_us = static_cast<std::int64_t>(config_.planner.time_limit_ms * 1e3);
+  now_ = state.utime + config_.planner.lead_steps * kPeriod - search_us;
   Run(3);
   EXPECT_TRUE(candidates_.empty());
   EXPECT_EQ(Summary()["rounds_without_certificate"], 1);

@@ -59,7 +59,8 @@ TEST(Planner, EveryProposalHasAllItsProgressSteps) {
   Planner planner = PlannerOf(config);
   int found = 0;
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
-    for (const Eigen::VectorXd& state : {Vec({18, 1, 0, 2, 0, 0}), Vec({20, 1, 0, 0, 0, 0}), Vec({70, 0, 0.5, 4, 0, 0})}) {
+    for (const Eigen::VectorXd& state :
+         {Vec({18, 1, 0, 2, 0, 0}), Vec({20, 1, 0, 0, 0, 0}), Vec({70, 0, 0.5, 4, 0, 0})}) {
       const PlanRequest request = From(state, seed);
       const auto proposal = planner.Propose(request);
       if (!proposal) continue;
@@ -110,7 +111,7 @@ TEST(Planner, TheSameRequestGivesTheSameProposalWhateverWasAskedBefore) {
   EXPECT_EQ(first->controls, second->controls);
   const auto different = planner.Propose(From(request.state, 12));
   ASSERT_TRUE(different);
-  EXPECT_NE(first->controls, different->controls);
+  EXPECT_TRUE(first->controls.cols() != different->controls.cols() || first->controls != different->controls);
 }
 
 TEST(Planner, KeepsTheMarginFromTheDomain) {
@@ -178,7 +179,8 @@ TEST(Planner, ALongWayTakesAsManyStepsAsThereAre) {
 
 TEST(Planner, RefusesOptionsThatDoNotFit) {
   for (const auto& spoil : std::vector<void (*)(PlannerOptions&)>{
-           [](PlannerOptions& options) { options.algorithm = "astar"; }, [](PlannerOptions& options) { options.goal = {}; },
+           [](PlannerOptions& options) { options.algorithm = "astar"; },
+           [](PlannerOptions& options) { options.goal = {}; },
            [](PlannerOptions& options) { options.goal = {1, 2, 3}; },
            [](PlannerOptions& options) { options.progress_steps = 0; },
            [](PlannerOptions& options) { options.tail_steps = kMaxSteps; }}) {
