@@ -15,11 +15,7 @@ using Json = nlohmann::json;
 Json SliceJson(const Zonotope& slice, const Certifier& certifier, std::span<const Obstacle> obstacles) {
   Json half_width = Json::array(), generators = Json::array(), clearance = Json::array();
   for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
-  for (int j = 0; j < slice.num_generators(); ++j) {
-    Json column = Json::array();
-    for (int k = 0; k < slice.dim(); ++k) column.push_back(slice.generator(k, j));
-    generators.push_back(std::move(column));
-  }
+  for (const auto column : slice.GeneratorMatrix().colwise()) generators.push_back(std::vector(column.begin(), column.end()));
   Zonotope projected;
   certifier.projection().Enclose(slice, projected);
   for (const Obstacle& obstacle : obstacles)

@@ -71,7 +71,7 @@ StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input
   const std::span<double> remainder(record.remainder.data(), static_cast<std::size_t>(n));
   if (const int k = Remainder(hessian, query, remainder); k >= 0) return {Status::kNoFiniteEnclosure, {}, k};
 
-  residual_.Enclose(slice, input, record.envelope);
+  residual_.Enclose({slice, input, {query.half_width.data(), static_cast<std::size_t>(n)}}, record.envelope);
 
   Linearization nominal;
   model_.Linearize({query.center.data(), query.size}, nominal);

@@ -16,13 +16,19 @@ struct ResidualBounds {
   std::array<double, kMaxStates> lower, upper;
 };
 
+/** Z_t = X_t x {u_t}, with what the step knows of it already. */
+struct QuerySet {
+  const Zonotope& slice;               ///< X_t
+  std::span<const double> input;       ///< u_t
+  std::span<const double> half_width;  ///< n upper bounds on the half-widths of the hull of X_t, slack included
+};
+
 class ResidualEnclosure {
  public:
   virtual ~ResidualEnclosure() = default;
 
-  /** @param slice X_t. @param input u_t. The query set is slice x {input}, which lies in the certification domain.
-  A coordinate whose lower bound exceeds its upper bound proves that no admissible residual exists. */
-  virtual void Enclose(const Zonotope& slice, std::span<const double> input, ResidualBounds& bounds) const noexcept = 0;
+  /** @pre the hull of the query lies in the certification domain. A coordinate whose lower bound exceeds its upper bound proves that no admissible residual exists. */
+  virtual void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept = 0;
 };
 
 }  // namespace forereach

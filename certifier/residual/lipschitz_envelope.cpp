@@ -47,8 +47,7 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
   }
 }
 
-void LipschitzEnvelope::Enclose(const Zonotope& slice, std::span<const double> input,
-                                ResidualBounds& bounds) const noexcept {
+void LipschitzEnvelope::Enclose(const QuerySet& set, ResidualBounds& bounds) const noexcept {
   Query query;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const Row& row = rows_[k];
@@ -56,23 +55,25 @@ void LipschitzEnvelope::Enclose(const Zonotope& slice, std::span<const double> i
       bounds.lower[k] = row.lower.front();
       bounds.upper[k] = row.upper.front();
     } else {
-      Prepare(row, slice, input, query);
+      Prepare(row, set, query);
       EncloseRow(row, query, bounds.lower[k], bounds.upper[k]);
     }
   }
 }
 
-void LipschitzEnvelope::Prepare(const Row& row, const Zonotope& slice, std::span<const double> input,
-                                Query& query) noexcept {
+void LipschitzEnvelope::Prepare(const Row& row, const QuerySet& set, Query& query) noexcept {
+  const Zonotope& slice = set.slice;
   const std::size_t columns = row.columns.size();
-  double hull_spread = 0;  // sum_l L_kl r_l
+  double hull_spread = 0, slack_spread = 0;  // sum_l L_kl r_l, sum_l L_kl s_l
   for (std::size_t l = 0; l < columns; ++l) {
     const int variable = row.columns[l].variable;
     if (variable < slice.dim()) {
       query.center[l] = slice.center(variable);
-      hull_spread = AddUp(hull_spread, MulUp(row.columns[l].slope, slice.HalfWidthUpper(variable)));
+      const double slope = row.columns[l].slope;
+      hull_spread = AddUp(hull_spread, MulUp(slope, set.half_width[static_cast<std::size_t>(variable)]));
+      slack_spread = AddUp(slack_spread, MulUp(slope, slice.slack(variable)));
     } else {
-      query.center[l] = input[static_cast<std::size_t>(variable - slice.dim())];
+      query.center[l] = set.input[static_cast<std::size_t>(variable - slice.dim())];
     }
   }
   if (!IsExact(columns)) {
@@ -84,7 +85,7 @@ void LipschitzEnvelope::Prepare(const Row& row, const Zonotope& slice, std::span
   query.patterns = std::size_t{1} << (columns - 1);
   const auto m = static_cast<std::size_t>(slice.num_generators());
   const double underflow = static_cast<double>(m * columns) * std::numeric_limits<double>::denorm_min();
-  const double error = AddUp(DotErrorUpper(hull_spread, static_cast<int>(columns)), underflow);
+  const double error = AddUp(AddUp(DotErrorUpper(hull_spread, static_cast<int>(columns)), underflow), slack_spread);
   for (std::size_t s = 0; s < query.patterns; ++s) {
     std::array<double, kMaxGenerators> along{};
     for (std::size_t l = 0; l < columns; ++l) {

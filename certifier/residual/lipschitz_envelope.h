@@ -24,7 +24,7 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   LipschitzEnvelope(const Declaration& declaration, const Observations& observations);
 
   /** Cost O(2^(a-1) a (N + m)) for a row of L with a nonzero columns, N observations, m generators. */
-  void Enclose(const Zonotope& slice, std::span<const double> input, ResidualBounds& bounds) const noexcept override;
+  void Enclose(const QuerySet& set, ResidualBounds& bounds) const noexcept override;
 
   [[nodiscard]] bool uses_hull_distance() const { return uses_hull_distance_; }
 
@@ -41,7 +41,7 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   };
   struct Query;
 
-  static void Prepare(const Row& row, const Zonotope& slice, std::span<const double> input, Query& query) noexcept;
+  static void Prepare(const Row& row, const QuerySet& set, Query& query) noexcept;
   static double DistanceUpper(const Row& row, const Query& query, std::size_t observation) noexcept;
   static void EncloseRow(const Row& row, const Query& query, double& lower, double& upper) noexcept;
 

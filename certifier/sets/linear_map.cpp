@@ -23,6 +23,7 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
     for (std::size_t j = 0; j < m; ++j) to[j] += weight * from[j];
 
     error[k] = AddUp(error[k], MulUp(entry.value.DistanceUpper(weight), half_width));
+    error[k] = AddUp(error[k], MulUp(std::abs(weight), set.slack(entry.column)));
     magnitude[k] = AddUp(magnitude[k], MulUp(std::abs(weight), half_width));
     copies[k] = terms[k]++ == 0 && std::abs(weight) == 1;
   }
@@ -45,7 +46,7 @@ void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set
   for (int k = 0; k < rows; ++k) {
     const Interval& value = center[static_cast<std::size_t>(k)];
     image.mutable_center(k) = value.Middle();
-    image.AppendAxis(k, AddUp(error[static_cast<std::size_t>(k)], value.DistanceUpper(image.center(k))));
+    image.mutable_slack(k) = AddUp(error[static_cast<std::size_t>(k)], value.DistanceUpper(image.center(k)));
   }
 }
 

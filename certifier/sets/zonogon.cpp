@@ -61,8 +61,9 @@ double RadiusUpper(const Zonotope& set) {
   double radius = 0;
   for (const Eigen::Vector2d& corner : HalfOutline(SortedGenerators(set)))
     radius = std::max(radius, SqrtUp(AddUp(MulUp(corner.x(), corner.x()), MulUp(corner.y(), corner.y()))));
-  const double slack = MulUp(diagonal, 1e-13 * (1 + set.num_generators()));
-  return std::min(diagonal, AddUp(radius, slack));
+  const double unsorted = MulUp(diagonal, 1e-13 * (1 + set.num_generators()));
+  const double slack = AddUp(set.slack(0), set.slack(1));
+  return std::min(diagonal, AddUp(radius, AddUp(unsorted, slack)));
 }
 
 }  // namespace forereach

@@ -19,10 +19,10 @@ void RequireShape(Eigen::Index center, Eigen::Index rows, Eigen::Index columns) 
                                 std::to_string(kMaxGenerators) + " columns");
 }
 
-// An upper bound on sum |g|. Zeros add no rounding error, so a single entry is summed exactly.
-double AbsoluteSumUpper(std::span<const double> row) {
-  double sum = 0;
-  int terms = 0;
+// An upper bound on start + sum |g|. Zeros add no rounding error, so a single entry is summed exactly.
+double AbsoluteSumUpper(std::span<const double> row, double start = 0) {
+  double sum = start;
+  int terms = start != 0;
   for (const double g : row) {
     sum += std::abs(g);
     terms += g != 0;
@@ -68,13 +68,16 @@ Zonotope Zonotope::Enclose(const Box& box) {
 Eigen::VectorXd Zonotope::CenterVector() const { return Eigen::Map<const Eigen::VectorXd>(center_.data(), dim_); }
 
 Eigen::MatrixXd Zonotope::GeneratorMatrix() const {
-  Eigen::MatrixXd generators(dim_, num_generators_);
-  for (int k = 0; k < dim_; ++k)
-    generators.row(k) = Eigen::Map<const Eigen::RowVectorXd>(row(k).data(), num_generators_);
-  return generators;
+  Eigen::MatrixXd generators = Eigen::MatrixXd::Zero(dim_, num_generators_ + dim_);
+  int columns = num_generators_;
+  for (int k = 0; k < dim_; ++k) {
+    generators.row(k).head(num_generators_) = Eigen::Map<const Eigen::RowVectorXd>(row(k).data(), num_generators_);
+    if (slack(k) != 0) generators(k, columns++) = slack(k);
+  }
+  return generators.leftCols(columns);
 }
 
-double Zonotope::HalfWidthUpper(int k) const noexcept { return AbsoluteSumUpper(row(k)); }
+double Zonotope::HalfWidthUpper(int k) const noexcept { return AbsoluteSumUpper(row(k), slack(k)); }
 
 Interval Zonotope::Hull(int k) const noexcept {
   const double half_width = HalfWidthUpper(k);
@@ -83,13 +86,14 @@ Interval Zonotope::Hull(int k) const noexcept {
 
 double Zonotope::SupportUpper(std::span<const double> direction) const noexcept {
   Interval value(0);
-  double magnitude = 0;
+  double magnitude = 0, slack_along = 0;
   std::array<double, kMaxGenerators> along{};
   for (int k = 0; k < dim_; ++k) {
     const double d = direction[static_cast<std::size_t>(k)];
     if (d == 0) continue;
     value += Interval(d) * Interval(center(k));
     magnitude = AddUp(magnitude, MulUp(std::abs(d), HalfWidthUpper(k)));
+    slack_along = AddUp(slack_along, MulUp(std::abs(d), slack(k)));
     const std::span<const double> entries = row(k);
     for (std::size_t j = 0; j < entries.size(); ++j) along[j] += d * entries[j];
   }
@@ -97,7 +101,7 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
   // Every |d . g_j| is off by a rounding error whose sum over j the magnitude bounds.
   const double underflow = num_generators_ * dim_ * std::numeric_limits<double>::denorm_min();
   const double error = AddUp(DotErrorUpper(magnitude, dim_), underflow);
-  return AddUp(value.upper, AddUp(spread, error));
+  return AddUp(value.upper, AddUp(AddUp(spread, slack_along), error));
 }
 
 void Zonotope::AppendAxis(int k, double length) noexcept {
@@ -150,7 +154,7 @@ void ReduceOrder(Zonotope& set, int order) noexcept {
     std::size_t j = 0;
     for (auto column = columns.begin(); column != kept_end; ++column) row[j++] = row[static_cast<std::size_t>(*column)];
   }
-  set.Reset(n, (order - 1) * n);
+  set.SetNumGenerators((order - 1) * n);
   for (int k = 0; k < n; ++k) set.AppendAxis(k, boxed[static_cast<std::size_t>(k)]);
 }
 

@@ -1,4 +1,8 @@
-/** A zonotope <c, G> = {c + G b : |b|_inf <= 1} in up to 16 dimensions, with up to 112 generators.
+/** A zonotope <c, G> + [-s, s] = {c + G b + diag(s) b' : |b|_inf <= 1, |b'|_inf <= 1} in up to 16 dimensions, with up
+to 112 generators in G.
+
+The box s, the slack, holds what rounding may have added. It is kept apart so that errors of 1e-15 neither count as
+generators nor push a real one out when the order is reduced; a set that was never rounded has none.
 
 A value of fixed capacity: no heap, trivially copyable, so the certify step can work on it in place. Row k of G, the
 part of every generator in coordinate k, is contiguous: a sum over generators runs along memory. */
@@ -41,10 +45,12 @@ class Zonotope final {
   [[nodiscard]] std::span<const double> row(int k) const {
     return {rows_[static_cast<std::size_t>(k)].data(), static_cast<std::size_t>(num_generators_)};
   }
+  [[nodiscard]] double slack(int k) const { return slack_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] Eigen::VectorXd CenterVector() const;
+  /** All generators as columns: those of G, then s_k e_k for each slack that is not zero. */
   [[nodiscard]] Eigen::MatrixXd GeneratorMatrix() const;
 
-  /** An upper bound on sum_j |G_kj|, the half-width of the interval hull in coordinate k. Cost O(m). */
+  /** An upper bound on sum_j |G_kj| + s_k, the half-width of the interval hull in coordinate k. Cost O(m). */
   [[nodiscard]] double HalfWidthUpper(int k) const noexcept;
   /** An interval that contains coordinate k of the set: Box(Z)_k. Cost O(m). */
   [[nodiscard]] Interval Hull(int k) const noexcept;
@@ -56,7 +62,10 @@ class Zonotope final {
   void Reset(int dim, int num_generators) {
     dim_ = dim;
     num_generators_ = num_generators;
+    slack_.fill(0);
   }
+  void SetNumGenerators(int num_generators) { num_generators_ = num_generators; }
+  [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] std::span<double> mutable_row(int k) {
     return {rows_[static_cast<std::size_t>(k)].data(), static_cast<std::size_t>(num_generators_)};
@@ -67,13 +76,14 @@ class Zonotope final {
 
  private:
   int dim_ = 0, num_generators_ = 0;
-  std::array<double, kMaxStates> center_;
+  std::array<double, kMaxStates> center_, slack_;
   std::array<std::array<double, kMaxGenerators>, kMaxStates> rows_;
 };
 
 /** Girard's order reduction, Eq. (order-reduction). A set with more than order * n generators keeps the
 (order - 1) * n columns of largest |g|_1 - |g|_inf (ties: the earlier) and encloses the rest in a box, rounded outward;
-any other set stays as it is. Contains the original. Cost O(n m + m log m), m generators. */
+any other set stays as it is; the slack stays in any
+case. Contains the original. Cost O(n m + m log m), m generators. */
 void ReduceOrder(Zonotope& set, int order) noexcept;
 
 }  // namespace forereach

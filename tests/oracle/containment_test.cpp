@@ -127,6 +127,7 @@ class Membership {
       for (int k = 0; k < slice.dim(); ++k) along += static_cast<Quad>(normal[k]) * static_cast<Quad>(slice.generator(k, j));
       spread += along < 0 ? -along : along;
     }
+    for (int k = 0; k < slice.dim(); ++k) spread += static_cast<Quad>(std::abs(normal[k])) * static_cast<Quad>(slice.slack(k));
     half_spaces_.push_back({normal, middle + spread});
     half_spaces_.push_back({-normal, spread - middle});
   }

@@ -123,12 +123,13 @@ class Real {
       along += Rational(direction[static_cast<std::size_t>(k)]) * Rational(set.generator(k, j));
     value += abs(along);
   }
+  for (int k = 0; k < set.dim(); ++k) value += abs(Rational(direction[static_cast<std::size_t>(k)])) * Rational(set.slack(k));
   return value;
 }
 
-/** sum_j |G_kj|. */
+/** sum_j |G_kj| + s_k. */
 [[nodiscard]] inline Rational HalfWidth(const Zonotope& set, int k) {
-  Rational sum = 0;
+  Rational sum(set.slack(k));
   for (const double g : set.row(k)) sum += abs(Rational(g));
   return sum;
 }

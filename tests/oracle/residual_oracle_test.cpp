@@ -14,6 +14,13 @@
 namespace forereach {
 namespace {
 
+void Enclose(const ResidualEnclosure& envelope, const Zonotope& slice, std::span<const double> input,
+             ResidualBounds& bounds) {
+  std::vector<double> half_width;
+  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
+  envelope.Enclose({slice, input, half_width}, bounds);
+}
+
 using exact::AtLeast;
 using exact::AtMost;
 using exact::Rational;
@@ -215,7 +222,7 @@ TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
     ResidualBounds bounds;
     for (int query = 0; query < 5; ++query) {
       const Eigen::VectorXd z = data.z.row(random.Below(60));
-      envelope.Enclose(Zonotope(z.head(6), Eigen::MatrixXd(6, 0)), {z.data() + 6, 2}, bounds);
+      Enclose(envelope, Zonotope(z.head(6), Eigen::MatrixXd(6, 0)), {z.data() + 6, 2}, bounds);
       for (std::size_t k = 0; k < 6; ++k) ASSERT_LE(bounds.lower[k], bounds.upper[k]);
     }
   }
@@ -257,7 +264,7 @@ Rational Distance(const Sample& s, int k, int i, const Zonotope& slice, const Ei
 void ExpectEnvelope(const Sample& s, const Zonotope& slice, const Eigen::VectorXd& input, double tolerance) {
   const LipschitzEnvelope envelope(s.declaration, s.observations);
   ResidualBounds bounds;
-  envelope.Enclose(slice, View(input), bounds);
+  Enclose(envelope, slice, View(input), bounds);
   for (int k = 0; k < s.observations.num_states(); ++k) {
     const Rational sigma(s.declaration.noise_bound[k]);
     std::vector<Rational> lower, upper;
@@ -325,7 +332,7 @@ TEST(EnvelopeOracle, OverflowNeverNarrows) {
   const LipschitzEnvelope envelope(s.declaration, s.observations);
   const double input = 0;
   ResidualBounds bounds;
-  envelope.Enclose(Zonotope(Eigen::Vector2d::Zero(), generators), {&input, 1}, bounds);
+  Enclose(envelope, Zonotope(Eigen::Vector2d::Zero(), generators), {&input, 1}, bounds);
   EXPECT_FALSE(bounds.lower[0] > -1e310L && bounds.lower[0] > -kMaxDouble) << bounds.lower[0];
   EXPECT_FALSE(bounds.upper[0] < kMaxDouble) << bounds.upper[0];
 }
@@ -340,7 +347,7 @@ TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
     const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any), Eigen::MatrixXd::NullaryExpr(2, 4, any));
     const Eigen::VectorXd input = Eigen::VectorXd::NullaryExpr(1, any);
     ResidualBounds bounds;
-    LipschitzEnvelope(s.declaration, s.observations).Enclose(slice, View(input), bounds);
+    Enclose(LipschitzEnvelope(s.declaration, s.observations), slice, View(input), bounds);
     Rational highest, lowest;
     for (int i = 0; i < 3; ++i) {
       const Rational distance = Distance(s, 0, i, slice, input), value(s.observations.lower(i, 0));

@@ -161,9 +161,7 @@ TEST(LinearMapOracle, ErrorAxesCoverEveryMatrixInside) {
         Rational beyond = abs(map([&](int l) { return set.center(l); }) - Rational(image.center(k)));
         for (int j = 0; j < m; ++j)
           beyond += abs(map([&](int l) { return set.generator(l, j); }) - Rational(image.generator(k, j)));
-        Rational covered = 0;
-        for (int j = m; j < image.num_generators(); ++j) covered += abs(Rational(image.generator(k, j)));
-        ASSERT_LE(beyond, covered) << "row " << k;
+        ASSERT_LE(beyond, Rational(image.slack(k))) << "row " << k;
       }
     }
   }
@@ -179,8 +177,7 @@ TEST(LinearMapOracle, PointMatricesAddOnlyRounding) {
       for (int l = 0; l < 5; ++l) entries.push_back({k, l, Interval(random.Uniform(-2, 2))});
     Zonotope image;
     EncloseLinearImage(entries, set, 3, image);
-    for (int j = 12; j < image.num_generators(); ++j)
-      for (int k = 0; k < 3; ++k) ASSERT_LE(std::abs(image.generator(k, j)), 1e-12);
+    for (int k = 0; k < 3; ++k) ASSERT_LE(image.slack(k), 1e-12);
   }
 }
 
