@@ -88,7 +88,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       observations_(Observe(*problem_->model, problem_->transitions)),
       violation_(FindViolation(problem_->declaration, observations_)),
       envelope_(problem_->declaration, observations_),
-      propagator_(*problem_->model, problem_->domain, envelope_, problem_->zonotope_order) {}
+      propagator_(*problem_->model, problem_->domain, envelope_, problem_->zonotope_order, problem_->method) {}
 
 void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
   const NominalModel& model = *problem_->model;
@@ -114,7 +114,7 @@ void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span
 Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
                             Tube& tube) const noexcept {
   tube.length_ = 0;
-  tube.slices_[0] = initial_set;
+  tube.slices_[0].Assign(initial_set);
   if (violation_) return Falsified(*violation_);
   const Decision stopped = Propagate(plan, tube);
   return stopped.outcome == Outcome::kNone ? JudgeSafety(obstacles, tube) : stopped;

@@ -19,15 +19,15 @@ void RequireShape(Eigen::Index center, Eigen::Index rows, Eigen::Index columns) 
                                 std::to_string(kMaxGenerators) + " columns");
 }
 
-// An upper bound on start + sum |g|. Zeros add no rounding error, so a single entry is summed exactly.
-double AbsoluteSumUpper(std::span<const double> row, double start = 0) {
-  double sum = start;
-  int terms = start != 0;
-  for (const double g : row) {
-    sum += std::abs(g);
-    terms += g != 0;
+// An upper bound on start + sum |g| of a padded row. Zeros add no rounding error, so a single entry is summed exactly.
+double AbsoluteSumUpper(std::span<const double> padded, double start) {
+  Lanes sum = AllLanes(0), nonzero = AllLanes(0);
+  for (std::size_t j = 0; j < padded.size(); j += kLanes) {
+    const Lanes size = Abs(LoadLanes(&padded[j]));
+    sum += size;
+    nonzero += size > AllLanes(0) ? AllLanes(1) : AllLanes(0);
   }
-  return SumUpper(sum, terms);
+  return SumUpper(Sum(sum) + start, static_cast<int>(Sum(nonzero)) + (start != 0));
 }
 
 }  // namespace
@@ -39,7 +39,8 @@ Zonotope::Zonotope(const Eigen::VectorXd& center, const Eigen::MatrixXd& generat
   Reset(static_cast<int>(center.size()), static_cast<int>(generators.cols()));
   for (int k = 0; k < dim_; ++k) {
     mutable_center(k) = center[k];
-    for (int j = 0; j < num_generators_; ++j) mutable_row(k)[static_cast<std::size_t>(j)] = generators(k, j);
+    std::fill_n(mutable_row(k), padded_size(), 0.0);
+    for (int j = 0; j < num_generators_; ++j) mutable_row(k)[j] = generators(k, j);
   }
 }
 
@@ -77,7 +78,7 @@ Eigen::MatrixXd Zonotope::GeneratorMatrix() const {
   return generators.leftCols(columns);
 }
 
-double Zonotope::HalfWidthUpper(int k) const noexcept { return AbsoluteSumUpper(row(k), slack(k)); }
+double Zonotope::HalfWidthUpper(int k) const noexcept { return AbsoluteSumUpper(padded_row(k), slack(k)); }
 
 Interval Zonotope::Hull(int k) const noexcept {
   const double half_width = HalfWidthUpper(k);
@@ -87,7 +88,7 @@ Interval Zonotope::Hull(int k) const noexcept {
 double Zonotope::SupportUpper(std::span<const double> direction) const noexcept {
   Interval value(0);
   double magnitude = 0, slack_along = 0;
-  std::array<double, kMaxGenerators> along{};
+  alignas(32) std::array<double, kMaxGenerators> along{};
   for (int k = 0; k < dim_; ++k) {
     const double d = direction[static_cast<std::size_t>(k)];
     if (d == 0) continue;
@@ -97,7 +98,7 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
     const std::span<const double> entries = row(k);
     for (std::size_t j = 0; j < entries.size(); ++j) along[j] += d * entries[j];
   }
-  const double spread = AbsoluteSumUpper({along.data(), static_cast<std::size_t>(num_generators_)});
+  const double spread = AbsoluteSumUpper({along.data(), padded_size()}, 0);
   // Every |d . g_j| is off by a rounding error whose sum over j the magnitude bounds.
   const double underflow = num_generators_ * dim_ * std::numeric_limits<double>::denorm_min();
   const double error = AddUp(DotErrorUpper(magnitude, dim_), underflow);
@@ -107,54 +108,110 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
 void Zonotope::AppendAxis(int k, double length) noexcept {
   if (length == 0) return;
   const auto j = static_cast<std::size_t>(num_generators_++);
-  for (int i = 0; i < dim_; ++i) rows_[static_cast<std::size_t>(i)][j] = i == k ? length : 0;
+  for (int i = 0; i < dim_; ++i) {
+    double* row = mutable_row(i);
+    if (j % kLanes == 0) StoreLanes(AllLanes(0), row + j);
+    if (i == k) row[j] = length;
+  }
+}
+
+void Zonotope::Truncate(int num_generators) noexcept {
+  for (int k = 0; k < dim_; ++k)
+    std::fill(mutable_row(k) + num_generators, mutable_row(k) + padded_size(), 0.0);
+  num_generators_ = num_generators;
+}
+
+void Zonotope::Assign(const Zonotope& other) noexcept {
+  dim_ = other.dim_;
+  num_generators_ = other.num_generators_;
+  center_ = other.center_;
+  slack_ = other.slack_;
+  for (int k = 0; k < dim_; ++k) std::ranges::copy(other.padded_row(k), mutable_row(k));
 }
 
 namespace {
 
-// |g|_1 - |g|_inf of every column, by plain arithmetic: it only chooses what to keep.
-void Scores(const Zonotope& set, std::span<double> scores) {
-  std::array<double, kMaxGenerators> largest{};
-  std::fill(scores.begin(), scores.end(), 0.0);
-  for (int k = 0; k < set.dim(); ++k) {
-    const std::span<const double> row = set.row(k);
-    for (std::size_t j = 0; j < row.size(); ++j) {
-      const double size = std::abs(row[j]);
-      scores[j] += size;
-      largest[j] = std::max(largest[j], size);
+using Columns = std::array<double, kMaxGenerators>;
+
+// |g|_1 - |g|_inf of every column, by plain arithmetic: it only chooses what to keep. The index takes the last bits of
+// the score, so that no two are equal and the earlier of equals is the larger. -1 behind the end, and for zero columns.
+void Scores(const Zonotope& set, Columns& scores) {
+  for (std::size_t j = 0; j < set.padded_size(); j += kLanes) {
+    Lanes sum = AllLanes(0), largest = AllLanes(0);
+    for (int k = 0; k < set.dim(); ++k) {
+      const Lanes size = Abs(LoadLanes(&set.padded_row(k)[j]));
+      sum += size;
+      largest = Max(largest, size);
     }
+    const auto index = static_cast<std::int64_t>(kMaxGenerators - j);
+    const LaneMask bits = (std::bit_cast<LaneMask>(sum - largest) & ~LaneMask{127, 127, 127, 127}) |
+                          LaneMask{index, index - 1, index - 2, index - 3};
+    StoreLanes(largest > AllLanes(0) ? std::bit_cast<Lanes>(bits) : AllLanes(-1), &scores[j]);
   }
-  for (std::size_t j = 0; j < scores.size(); ++j) scores[j] -= largest[j];
+}
+
+// How many scores lie above this one.
+int Rank(const Columns& scores, std::size_t padded_size, double score) {
+  LaneMask below{};
+  for (std::size_t j = 0; j < padded_size; j += kLanes) below += LoadLanes(&scores[j]) > AllLanes(score);
+  return -static_cast<int>(below[0] + below[1] + below[2] + below[3]);
+}
+
+// Keeps the columns of the `keep` largest scores in their order and adds the others' sizes to `boxed`.
+void KeepLargest(Zonotope& set, int keep, const Columns& scores, std::span<double> boxed) {
+  Columns dropped{};  // 1 or 0
+  std::array<int, kMaxGenerators> source;
+  int kept = 0;
+  for (int j = 0; j < set.num_generators(); ++j) {
+    const double score = scores[static_cast<std::size_t>(j)];
+    const bool keeps = score >= 0 && Rank(scores, set.padded_size(), score) < keep;
+    dropped[static_cast<std::size_t>(j)] = keeps ? 0 : 1;
+    source[static_cast<std::size_t>(kept)] = j;
+    kept += keeps;
+  }
+  for (int k = 0; k < set.dim(); ++k) {
+    double* row = set.mutable_row(k);
+    Lanes sum = AllLanes(0);
+    for (std::size_t j = 0; j < set.padded_size(); j += kLanes) sum += Abs(LoadLanes(row + j)) * LoadLanes(&dropped[j]);
+    boxed[static_cast<std::size_t>(k)] += Sum(sum);
+    for (int j = 0; j < kept; ++j) row[j] = row[source[static_cast<std::size_t>(j)]];
+  }
+  set.Truncate(kept);
+}
+
+int CountNonzero(std::span<const double> lengths) {
+  return static_cast<int>(std::ranges::count_if(lengths, [](double length) { return length != 0; }));
+}
+
+int CountZeroColumns(const Zonotope& set, const Columns& scores) {
+  return static_cast<int>(std::count(scores.begin(), scores.begin() + set.num_generators(), -1.0));
 }
 
 }  // namespace
 
-void ReduceOrder(Zonotope& set, int order) noexcept {
-  const int n = set.dim(), m = set.num_generators();
-  if (m <= order * n) return;
-  std::array<double, kMaxGenerators> scores;
-  Scores(set, {scores.data(), static_cast<std::size_t>(m)});
-
-  std::array<int, kMaxGenerators> columns;
-  std::iota(columns.begin(), columns.begin() + m, 0);
-  const auto kept_end = columns.begin() + (order - 1) * n;
-  std::nth_element(columns.begin(), kept_end, columns.begin() + m, [&](int a, int b) {
-    const double score_a = scores[static_cast<std::size_t>(a)], score_b = scores[static_cast<std::size_t>(b)];
-    return score_a > score_b || (score_a == score_b && a < b);
-  });
-  std::sort(columns.begin(), kept_end);
-
-  std::array<double, kMaxStates> boxed;
-  for (int k = 0; k < n; ++k) {
-    const std::span<double> row = set.mutable_row(k);
-    double sum = 0;
-    for (auto column = kept_end; column != columns.begin() + m; ++column)
-      sum += std::abs(row[static_cast<std::size_t>(*column)]);
-    boxed[static_cast<std::size_t>(k)] = SumUpper(sum, m);
-    std::size_t j = 0;
-    for (auto column = columns.begin(); column != kept_end; ++column) row[j++] = row[static_cast<std::size_t>(*column)];
+void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept {
+  const int n = set.dim(), axes = CountNonzero(first) + CountNonzero(second), keep = (order - 1) * n;
+  std::array<double, kMaxStates> boxed{};
+  int still_kept = kMaxGenerators;  // axis-aligned generators that remain generators of their own
+  if (set.num_generators() + axes > order * n) {
+    Columns scores;
+    Scores(set, scores);
+    const int columns = set.num_generators() - CountZeroColumns(set, scores);
+    const bool reduces = columns + axes > order * n;
+    if (reduces) still_kept = std::max(0, keep - columns);  // their score is 0, and they come last
+    const int terms = set.num_generators() + 2;
+    KeepLargest(set, reduces ? keep : columns, scores, boxed);
+    if (!reduces) boxed.fill(0);
+    for (double& sum : boxed) sum *= 1 + (2.0 * terms) * kUnitRoundoff;
   }
-  set.SetNumGenerators((order - 1) * n);
+  for (const std::span<const double> lengths : {first, second})
+    for (std::size_t k = 0; k < lengths.size(); ++k) {
+      if (lengths[k] == 0) continue;
+      if (still_kept-- > 0)
+        set.AppendAxis(static_cast<int>(k), lengths[k]);
+      else
+        boxed[k] = AddUp(boxed[k], lengths[k]);
+    }
   for (int k = 0; k < n; ++k) set.AppendAxis(k, boxed[static_cast<std::size_t>(k)]);
 }
 

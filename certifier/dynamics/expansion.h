@@ -1,0 +1,148 @@
+/** The nominal model around a point, in plain arithmetic: what the certify step evaluates. rounding.h bounds, once and
+for the whole domain, how far each number can lie from the exact one. */
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "certifier/dynamics/program.h"
+
+namespace forereach {
+
+/** An interval whose ends were rounded to nearest. */
+struct PlainInterval {
+  double lower, upper;
+};
+
+/** f0(c), D_z f0(c), and the ranges of the second derivatives over a box, in the order of the model's pattern. */
+struct Expansion {
+  std::array<double, kMaxStates> value;
+  std::array<double, Program::kMaxFirst> jacobian;
+  std::array<PlainInterval, Program::kMaxSecond> hessian;
+};
+
+namespace internal {
+
+inline PlainInterval operator+(PlainInterval a, PlainInterval b) { return {a.lower + b.lower, a.upper + b.upper}; }
+inline PlainInterval operator-(PlainInterval a) { return {-a.upper, -a.lower}; }
+inline PlainInterval operator-(PlainInterval a, PlainInterval b) { return {a.lower - b.upper, a.upper - b.lower}; }
+inline PlainInterval operator*(PlainInterval a, PlainInterval b) {
+  const double p = a.lower * b.lower, q = a.lower * b.upper, r = a.upper * b.lower, s = a.upper * b.upper;
+  return {std::min(std::min(p, q), std::min(r, s)), std::max(std::max(p, q), std::max(r, s))};
+}
+inline PlainInterval Divide(PlainInterval a, PlainInterval b) { return a * PlainInterval{1 / b.upper, 1 / b.lower}; }  // b does not contain 0
+inline PlainInterval Square(PlainInterval a) {
+  const double p = a.lower * a.lower, q = a.upper * a.upper;
+  const bool has_zero = a.lower <= 0 && a.upper >= 0;
+  return {has_zero ? 0 : std::min(p, q), std::max(p, q)};
+}
+inline PlainInterval TanCurvature(PlainInterval t) {
+  return {2 * t.lower * (1 + t.lower * t.lower), 2 * t.upper * (1 + t.upper * t.upper)};
+}
+
+/** Sine and cosine of a small angle: the first term that Taylor's polynomials leave out is below 2^-53 up to 1/4. */
+struct Turn {
+  double sine, cosine;
+
+  explicit Turn(double angle) {
+    if (!(angle <= 0.25)) {
+      sine = std::sin(angle);
+      cosine = std::cos(angle);
+      return;
+    }
+    const double s = angle * angle;
+    sine = angle - angle * s * (1. / 6 - s * (1. / 120 - s * (1. / 5040 - s * (1. / 362880 - s * (1. / 39916800)))));
+    cosine = 1 - s * (1. / 2 - s * (1. / 24 - s * (1. / 720 - s * (1. / 40320 - s * (1. / 3628800)))));
+  }
+};
+
+/** Sine over [c - below, c + above], given sine and cosine of c: the ends by the addition theorem; where an extremum may
+lie inside, or the interval is too wide to tell, 1 or -1. */
+inline PlainInterval SinRange(double sine, double cosine, const Turn& below, const Turn& above, double width) {
+  const double first = sine * below.cosine - cosine * below.sine, last = sine * above.cosine + cosine * above.sine;
+  // The slopes at both ends: of one sign over less than pi, the function is monotone.
+  const double slope_first = cosine * below.cosine + sine * below.sine, slope_last = cosine * above.cosine - sine * above.sine;
+  const bool wide = !(width <= 3);
+  return {wide || (slope_first <= 0 && slope_last >= 0) ? -1 : std::min(first, last),
+          wide || (slope_first >= 0 && slope_last <= 0) ? 1 : std::max(first, last)};
+}
+
+/** Tangent over [c - below, c + above], which holds no pole. */
+inline PlainInterval TanRange(double tangent, const Turn& below, const Turn& above) {
+  const double down = below.sine / below.cosine, up = above.sine / above.cosine;
+  return {(tangent - down) / (1 + tangent * down), (tangent + up) / (1 - tangent * up)};
+}
+
+template <const Program& kProgram, std::size_t I>
+inline void EvaluateAtPoint(const double* parameters, const double* z, double* v) {
+  if constexpr (kProgram.at_point[I]) {
+    constexpr Operation n = kProgram.nodes[I];
+    if constexpr (n.op == Op::kVariable) v[I] = z[n.a];
+    if constexpr (n.op == Op::kParameter) v[I] = parameters[n.a];
+    if constexpr (n.op == Op::kConstant) v[I] = n.constant;
+    if constexpr (n.op == Op::kAdd) v[I] = v[n.a] + v[n.b];
+    if constexpr (n.op == Op::kSubtract) v[I] = v[n.a] - v[n.b];
+    if constexpr (n.op == Op::kMultiply) v[I] = v[n.a] * v[n.b];
+    if constexpr (n.op == Op::kDivide) v[I] = v[n.a] / v[n.b];
+    if constexpr (n.op == Op::kNegate) v[I] = -v[n.a];
+    if constexpr (n.op == Op::kSquare) v[I] = v[n.a] * v[n.a];
+    if constexpr (n.op == Op::kSin) v[I] = std::sin(v[n.a]);
+    if constexpr (n.op == Op::kCos) v[I] = std::cos(v[n.a]);
+    if constexpr (n.op == Op::kTan) v[I] = v[n.b] / v[n.b + 1];
+    static_assert(n.op != Op::kTanCurvature, "a second derivative in the Jacobian");
+  }
+}
+
+template <const Program& kProgram, std::size_t I>
+inline void EvaluateOverBox(const double* parameters, const PlainInterval* box, const double* v, PlainInterval* w) {
+  if constexpr (kProgram.over_box[I]) {
+    constexpr Operation n = kProgram.nodes[I];
+    if constexpr (n.op == Op::kVariable) w[I] = box[n.a];
+    if constexpr (n.op == Op::kParameter) w[I] = {parameters[n.a], parameters[n.a]};
+    if constexpr (n.op == Op::kConstant) w[I] = {n.constant, n.constant};
+    if constexpr (n.op == Op::kAdd) w[I] = w[n.a] + w[n.b];
+    if constexpr (n.op == Op::kSubtract) w[I] = w[n.a] - w[n.b];
+    if constexpr (n.op == Op::kMultiply) w[I] = w[n.a] * w[n.b];
+    if constexpr (n.op == Op::kDivide) w[I] = Divide(w[n.a], w[n.b]);
+    if constexpr (n.op == Op::kNegate) w[I] = -w[n.a];
+    if constexpr (n.op == Op::kSquare) w[I] = Square(w[n.a]);
+    if constexpr (n.op == Op::kTanCurvature) w[I] = TanCurvature(w[n.a]);
+    if constexpr (n.op == Op::kSin || n.op == Op::kCos || n.op == Op::kTan) {
+      const double c = v[n.a], width = w[n.a].upper - w[n.a].lower;
+      const Turn below(c - w[n.a].lower), above(w[n.a].upper - c);
+      if constexpr (n.op == Op::kSin) w[I] = SinRange(v[I], v[I + 1], below, above, width);
+      if constexpr (n.op == Op::kCos) w[I] = SinRange(v[I], -v[I - 1], below, above, width);
+      if constexpr (n.op == Op::kTan) w[I] = TanRange(v[I], below, above);
+    }
+  }
+}
+
+template <const Program& kProgram, std::size_t... I>
+inline void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out,
+                   std::index_sequence<I...>) {
+  std::array<double, sizeof...(I)> v;
+  std::array<PlainInterval, sizeof...(I)> w;
+  (EvaluateAtPoint<kProgram, I>(parameters, z, v.data()), ...);
+  (EvaluateOverBox<kProgram, I>(parameters, box, v.data(), w.data()), ...);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(kProgram.states); ++k)
+    out.value[k] = v[static_cast<std::size_t>(kProgram.value[k])];
+  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e)
+    out.jacobian[e] = v[static_cast<std::size_t>(kProgram.jacobian[e].node)];
+  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_second); ++e)
+    out.hessian[e] = w[static_cast<std::size_t>(kProgram.hessian[e].node)];
+}
+
+}  // namespace internal
+
+/** @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4. */
+template <const Program& kProgram>
+inline void Expand(std::span<const double> parameters, std::span<const double> z, std::span<const PlainInterval> box,
+                   Expansion& out) noexcept {
+  internal::Expand<kProgram>(parameters.data(), z.data(), box.data(), out,
+                             std::make_index_sequence<static_cast<std::size_t>(kProgram.size)>());
+}
+
+}  // namespace forereach
