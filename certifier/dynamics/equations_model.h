@@ -23,6 +23,11 @@ class EquationsModel final : public NominalModel {
     forereach::Expand<kProgram>(parameters(), z, box, out);
   }
 
+  void Map(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice, const double* half_width,
+           Zonotope& next, ImageSums& sums) const noexcept override {
+    MapGenerators<kProgram>(expansion, error, slice, half_width, next, sums);
+  }
+
  private:
   template <class Entry, class Array>
   static std::vector<Entry> List(const Array& array) {

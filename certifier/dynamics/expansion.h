@@ -29,6 +29,10 @@ namespace internal {
 inline PlainInterval operator+(PlainInterval a, PlainInterval b) { return {a.lower + b.lower, a.upper + b.upper}; }
 inline PlainInterval operator-(PlainInterval a) { return {-a.upper, -a.lower}; }
 inline PlainInterval operator-(PlainInterval a, PlainInterval b) { return {a.lower - b.upper, a.upper - b.lower}; }
+inline PlainInterval Scaled(double a, PlainInterval b) {
+  const double p = a * b.lower, q = a * b.upper;
+  return {std::min(p, q), std::max(p, q)};
+}
 inline PlainInterval operator*(PlainInterval a, PlainInterval b) {
   const double p = a.lower * b.lower, q = a.lower * b.upper, r = a.upper * b.lower, s = a.upper * b.upper;
   return {std::min(std::min(p, q), std::min(r, s)), std::max(std::max(p, q), std::max(r, s))};
@@ -59,20 +63,41 @@ struct Turn {
   }
 };
 
-/** Sine over [c - below, c + above], given sine and cosine of c: the ends by the addition theorem; where an extremum may
-lie inside, or the interval is too wide to tell, 1 or -1. */
-inline PlainInterval SinRange(double sine, double cosine, const Turn& below, const Turn& above, double width) {
-  const double first = sine * below.cosine - cosine * below.sine, last = sine * above.cosine + cosine * above.sine;
-  // The slopes at both ends: of one sign over less than pi, the function is monotone.
-  const double slope_first = cosine * below.cosine + sine * below.sine, slope_last = cosine * above.cosine - sine * above.sine;
-  const bool wide = !(width <= 3);
-  return {wide || (slope_first <= 0 && slope_last >= 0) ? -1 : std::min(first, last),
-          wide || (slope_first >= 0 && slope_last <= 0) ? 1 : std::max(first, last)};
-}
+/** The turns from a center c to the ends of an interval around it. */
+struct Turns {
+  Turn below{0}, above{0};
+  bool wide = false;  // too wide to tell by the slopes at its ends whether a sine is monotone on it
+
+  Turns() = default;
+  Turns(double center, PlainInterval x)
+      : below(center - x.lower), above(x.upper - center), wide(!(x.upper - x.lower <= 3)) {}
+};
+
+/** Sine and cosine at both ends by the addition theorems. Where the slope changes its sign an extremum may lie inside. */
+struct Wave {
+  double first_sine, last_sine, first_cosine, last_cosine;
+  bool wide;
+
+  Wave(double sine, double cosine, const Turns& turns)
+      : first_sine(sine * turns.below.cosine - cosine * turns.below.sine),
+        last_sine(sine * turns.above.cosine + cosine * turns.above.sine),
+        first_cosine(cosine * turns.below.cosine + sine * turns.below.sine),
+        last_cosine(cosine * turns.above.cosine - sine * turns.above.sine),
+        wide(turns.wide) {}
+
+  [[nodiscard]] PlainInterval SineRange() const { return Spanned(first_sine, last_sine, first_cosine, last_cosine); }
+  [[nodiscard]] PlainInterval CosineRange() const { return Spanned(first_cosine, last_cosine, -first_sine, -last_sine); }
+
+ private:
+  [[nodiscard]] PlainInterval Spanned(double first, double last, double first_slope, double last_slope) const {
+    return {wide || (first_slope <= 0 && last_slope >= 0) ? -1 : std::min(first, last),
+            wide || (first_slope >= 0 && last_slope <= 0) ? 1 : std::max(first, last)};
+  }
+};
 
 /** Tangent over [c - below, c + above], which holds no pole. */
-inline PlainInterval TanRange(double tangent, const Turn& below, const Turn& above) {
-  const double down = below.sine / below.cosine, up = above.sine / above.cosine;
+inline PlainInterval TanRange(double tangent, const Turns& turns) {
+  const double down = turns.below.sine / turns.below.cosine, up = turns.above.sine / turns.above.cosine;
   return {(tangent - down) / (1 + tangent * down), (tangent + up) / (1 - tangent * up)};
 }
 
@@ -96,27 +121,42 @@ inline void EvaluateAtPoint(const double* parameters, const double* z, double* v
   }
 }
 
+/** Whether the node is the same number over the whole box. */
+template <const Program& kProgram>
+constexpr bool IsNumber(int i) {
+  return kProgram.node(i).op == Op::kParameter || kProgram.node(i).op == Op::kConstant;
+}
+
 template <const Program& kProgram, std::size_t I>
 inline void EvaluateOverBox(const double* parameters, const PlainInterval* box, const double* v, PlainInterval* w) {
-  if constexpr (kProgram.over_box[I]) {
-    constexpr Operation n = kProgram.nodes[I];
+  constexpr Operation n = kProgram.nodes[I];
+  // Sine and cosine of one argument share their ends: the first of them that is needed sets both.
+  constexpr bool kSecondOfPair = n.op == Op::kCos && kProgram.over_box[static_cast<std::size_t>(n.b < 0 ? 0 : n.b)];
+  if constexpr (kProgram.over_box[I] && !kSecondOfPair) {
     if constexpr (n.op == Op::kVariable) w[I] = box[n.a];
     if constexpr (n.op == Op::kParameter) w[I] = {parameters[n.a], parameters[n.a]};
     if constexpr (n.op == Op::kConstant) w[I] = {n.constant, n.constant};
     if constexpr (n.op == Op::kAdd) w[I] = w[n.a] + w[n.b];
     if constexpr (n.op == Op::kSubtract) w[I] = w[n.a] - w[n.b];
-    if constexpr (n.op == Op::kMultiply) w[I] = w[n.a] * w[n.b];
+    if constexpr (n.op == Op::kMultiply) {
+      if constexpr (IsNumber<kProgram>(n.a))
+        w[I] = Scaled(w[n.a].lower, w[n.b]);
+      else if constexpr (IsNumber<kProgram>(n.b))
+        w[I] = Scaled(w[n.b].lower, w[n.a]);
+      else
+        w[I] = w[n.a] * w[n.b];
+    }
     if constexpr (n.op == Op::kDivide) w[I] = Divide(w[n.a], w[n.b]);
     if constexpr (n.op == Op::kNegate) w[I] = -w[n.a];
     if constexpr (n.op == Op::kSquare) w[I] = Square(w[n.a]);
     if constexpr (n.op == Op::kTanCurvature) w[I] = TanCurvature(w[n.a]);
-    if constexpr (n.op == Op::kSin || n.op == Op::kCos || n.op == Op::kTan) {
-      const double c = v[n.a], width = w[n.a].upper - w[n.a].lower;
-      const Turn below(c - w[n.a].lower), above(w[n.a].upper - c);
-      if constexpr (n.op == Op::kSin) w[I] = SinRange(v[I], v[I + 1], below, above, width);
-      if constexpr (n.op == Op::kCos) w[I] = SinRange(v[I], -v[I - 1], below, above, width);
-      if constexpr (n.op == Op::kTan) w[I] = TanRange(v[I], below, above);
+    if constexpr (n.op == Op::kSin) {
+      const Wave wave(v[I], v[I + 1], Turns(v[n.a], w[n.a]));
+      w[I] = wave.SineRange();
+      w[I + 1] = wave.CosineRange();
     }
+    if constexpr (n.op == Op::kCos) w[I] = Wave(v[I - 1], v[I], Turns(v[n.a], w[n.a])).CosineRange();
+    if constexpr (n.op == Op::kTan) w[I] = TanRange(v[I], Turns(v[n.a], w[n.a]));
   }
 }
 

@@ -10,6 +10,7 @@ d_z = states + inputs entries. */
 #include <vector>
 
 #include "certifier/dynamics/expansion.h"
+#include "certifier/dynamics/image.h"
 #include "certifier/dynamics/program.h"
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
@@ -76,6 +77,10 @@ class NominalModel {
   /** All of these at once in plain arithmetic, fast, for the certify step; rounding.h has the error.
   @param z the center c of the box. */
   virtual void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out) const noexcept = 0;
+
+  /** The image of a slice's generators under the expansion's Jacobian (image.h). */
+  virtual void Map(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
+                   const double* half_width, Zonotope& next, ImageSums& sums) const noexcept = 0;
 
  private:
   const Program& program_;

@@ -6,6 +6,8 @@ abs and comparisons are used and sums are always taken in the same order. */
 #include <cstddef>
 #include <cstdint>
 
+#include "certifier/numerics/simd.h"
+
 namespace forereach {
 
 inline constexpr std::size_t kLanes = 4;
@@ -35,5 +37,8 @@ FOREREACH_INLINE Lanes Abs(const Lanes& x) {
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
 FOREREACH_INLINE double Sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
+
+/** What the hot functions outside of classes run on: the best there is, unless a test chooses. */
+inline InstructionSet active_instruction_set = BestInstructionSet();
 
 }  // namespace forereach

@@ -7,7 +7,7 @@ namespace forereach {
 namespace {
 
 // Above the rounding of the few dozen operations that make up a slack.
-constexpr double kRelative = 0x1p-44, kTiny = 0x1p-1050;
+constexpr double kRelative = 0x1p-43, kTiny = 0x1p-1050;
 
 // The plain expansion is used where its error, in the units of the state, is negligible everywhere in the domain.
 constexpr double kLargestError = 1e-6;
@@ -34,18 +34,9 @@ bool IsNegligible(const ExpansionError& error, const Program& program, const std
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        int zonotope_order, Method method)
     : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), remainder_(model.program(), method) {
-  const Program& program = model.program();
-  rows_.resize(static_cast<std::size_t>(program.states));
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
-    const Program::First& entry = program.jacobian[e];
-    if (entry.column < program.states)
-      rows_[static_cast<std::size_t>(entry.row)].weights.push_back({static_cast<std::size_t>(entry.column), e});
-  }
-  for (Row& row : rows_)
-    row.copies = row.weights.size() == 1 && program.IsOne(program.jacobian[row.weights[0].entry].node);
   const std::vector<Interval> box = DomainBox(domain);
-  error_ = BoundExpansionError(program, model.parameters(), box);
-  plain_ = IsNegligible(error_, program, box);
+  error_ = BoundExpansionError(model.program(), model.parameters(), box);
+  plain_ = IsNegligible(error_, model.program(), box);
 }
 
 void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept {
@@ -62,7 +53,7 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
                                    ExpansionError& error) const noexcept {
   Linearization nominal;
   model_.Linearize(center, nominal);
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
+  for (std::size_t k = 0; k < static_cast<std::size_t>(model_.num_states()); ++k) {
     expansion.value[k] = nominal.value[k].Middle();
     error.value[k] = nominal.value[k].DistanceUpper(expansion.value[k]);
   }
@@ -81,42 +72,11 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
   }
 }
 
-void Propagator::MapGenerators(const Zonotope& slice, const double* half_width, const Expansion& expansion,
-                               const ExpansionError& error, Zonotope& next) const noexcept {
-  next.Reset(slice.dim(), slice.num_generators());
-  const std::size_t padded = slice.padded_size();
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
-    const Row& row = rows_[k];
-    double* to = next.mutable_row(static_cast<int>(k));
-    if (row.weights.empty()) {
-      std::fill_n(to, padded, 0.0);
-      continue;
-    }
-    // Each sum of products is off by less than this times the sum of the products' sizes.
-    const double relative = row.copies ? 0 : (2 * static_cast<double>(row.weights.size()) + 2) * kUnitRoundoff;
-    double slack = 0;
-    bool first = true;
-    for (const Weight& weight : row.weights) {
-      const double j = expansion.jacobian[weight.entry], r = half_width[weight.column];
-      const double* from = slice.padded_row(static_cast<int>(weight.column)).data();
-      const Lanes factor = AllLanes(j);
-      if (first)
-        for (std::size_t i = 0; i < padded; i += kLanes) StoreLanes(factor * LoadLanes(from + i), to + i);
-      else
-        for (std::size_t i = 0; i < padded; i += kLanes) StoreLanes(LoadLanes(to + i) + factor * LoadLanes(from + i), to + i);
-      first = false;
-      slack += std::abs(j) * (slice.slack(static_cast<int>(weight.column)) + relative * r) + error.jacobian[weight.entry] * r;
-    }
-    next.mutable_slack(static_cast<int>(k)) = row.copies ? slack : slack * (1 + kRelative) + kTiny;
-  }
-}
-
-StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, Zonotope& next,
-                            StepRecord& record) const noexcept {
+StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
+                            double* next_half_width) const noexcept {
   using Status = StepResult::Status;
   const auto n = static_cast<std::size_t>(slice.dim()), variables = n + input.size();
-  double* half_width = record.half_width.data();
-  HalfWidths(slice, half_width);
+  const double* half_width = record.half_width.data();
   std::array<double, kMaxVariables> center;
   std::array<PlainInterval, kMaxVariables> hull;
   for (std::size_t l = 0; l < n; ++l) {
@@ -128,20 +88,38 @@ StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input
   if (const DomainExit exit = FindExit(domain_, {center.data(), variables}, {half_width, n});
       exit.kind != DomainExit::Kind::kNone)
     return {Status::kDomainExit, exit, -1};
-
-  Expansion expansion;
-  ExpansionError interval_error;
-  const ExpansionError& error = plain_ ? error_ : interval_error;
-  if (plain_)
+  if (plain_) {
+    Expansion expansion;
     model_.Expand({center.data(), variables}, {hull.data(), variables}, expansion);
-  else
-    ExpandByIntervals({center.data(), variables}, {hull.data(), variables}, expansion, interval_error);
+    return Advance(slice, input, expansion, error_, record, next, next_half_width);
+  }
+  return StepByIntervals(slice, input, {center.data(), variables}, {hull.data(), variables}, record, next, next_half_width);
+}
+
+StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const double> input,
+                                       std::span<const double> center, std::span<const PlainInterval> hull,
+                                       StepRecord& record, Zonotope& next, double* next_half_width) const noexcept {
+  Expansion expansion;
+  ExpansionError error;
+  ExpandByIntervals(center, hull, expansion, error);
+  return Advance(slice, input, expansion, error, record, next, next_half_width);
+}
+
+StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
+                               const ExpansionError& error, StepRecord& record, Zonotope& next,
+                               double* next_half_width) const noexcept {
+  using Status = StepResult::Status;
+  const auto n = static_cast<std::size_t>(slice.dim());
+  const double* half_width = record.half_width.data();
   remainder_.Enclose(slice, half_width, expansion.hessian.data(), error.hessian.data(), record.remainder);
   for (std::size_t k = 0; k < n; ++k)
     if (!std::isfinite(record.remainder.half_width[k])) return {Status::kNoFiniteEnclosure, {}, static_cast<int>(k)};
 
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
-  MapGenerators(slice, half_width, expansion, error, next);
+  ImageSums sums;
+  model_.Map(expansion, error, slice, half_width, next, sums);
+  // Above the rounding of a sum of all generators, twice.
+  const double inflation = 1 + (4.0 * slice.num_generators() + 64) * kUnitRoundoff;
   std::array<double, kMaxStates> residual_half_width;
   for (std::size_t k = 0; k < n; ++k) {
     const double lower = record.envelope.lower[k], upper = record.envelope.upper[k];
@@ -155,10 +133,10 @@ StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input
     double& slack = next.mutable_slack(static_cast<int>(k));
     slack = (slack + error.value[k] + rounding) * (1 + kRelative);
     next.mutable_center(static_cast<int>(k)) = next_center;
-    if (!std::isfinite(next_center + residual_half_width[k] + slack))
-      return {Status::kNoFiniteEnclosure, {}, static_cast<int>(k)};
+    next_half_width[k] = (sums.row[k] + record.remainder.half_width[k] + residual_half_width[k] + slack) * inflation;
+    if (!std::isfinite(next_center + next_half_width[k])) return {Status::kNoFiniteEnclosure, {}, static_cast<int>(k)};
   }
-  AppendAndReduce(next, {record.remainder.half_width.data(), n}, {residual_half_width.data(), n}, order_);
+  AppendAndReduce(next, sums.scores, {record.remainder.half_width.data(), n}, {residual_half_width.data(), n}, order_);
   return {};
 }
 

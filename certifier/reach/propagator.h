@@ -8,7 +8,6 @@ envelope. All rounding, that of f0(c), J and J G included, goes to the slack s',
 
 #include <array>
 #include <span>
-#include <vector>
 
 #include "certifier/dynamics/model.h"
 #include "certifier/dynamics/rounding.h"
@@ -45,11 +44,13 @@ class Propagator final {
              Method method);
 
   /** Advances `slice` under `input` into `next`. Where it does not reach kDone, `next` is unspecified. Allocates
-  nothing. @pre order * n + 2 n <= kMaxGenerators, and slice has at most order * n generators. */
-  [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, Zonotope& next,
-                                StepRecord& record) const noexcept;
+  nothing. @pre order * n + 2 n <= kMaxGenerators, and slice has at most order * n generators.
+  @param record its half_width is given (HalfWidths), the rest is set. @param next_half_width n entries: the same of
+  `next`, for the step after. */
+  [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
+                                double* next_half_width) const noexcept;
 
-  /** Upper bounds on the half-widths of the slice's hull, n of them: as in a step's record. */
+  /** Upper bounds on the half-widths of the slice's hull, n of them. */
   static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
 
   /** Whether a step evaluates the model in plain arithmetic, with an error bounded for the whole domain at set-up, or,
@@ -57,26 +58,19 @@ class Propagator final {
   [[nodiscard]] bool expands_in_plain_arithmetic() const { return plain_; }
 
  private:
-  // An entry of J that multiplies a state; those of inputs act on a point.
-  struct Weight {
-    std::size_t column, entry;
-  };
-  struct Row {
-    std::vector<Weight> weights;
-    bool copies;       // x_l+ = x_l exactly: one entry, the constant 1
-  };
-
   void ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
                          ExpansionError& error) const noexcept;
-  void MapGenerators(const Zonotope& slice, const double* half_width, const Expansion& expansion,
-                     const ExpansionError& error, Zonotope& next) const noexcept;
-
+  [[nodiscard]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
+                                           std::span<const double> center, std::span<const PlainInterval> hull,
+                                           StepRecord& record, Zonotope& next, double* next_half_width) const noexcept;
+  [[nodiscard]] StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
+                                   const ExpansionError& error, StepRecord& record, Zonotope& next,
+                                   double* next_half_width) const noexcept;
   const NominalModel& model_;
   const Domain& domain_;
   const ResidualEnclosure& residual_;
   int order_;
   RemainderBound remainder_;
-  std::vector<Row> rows_;
   ExpansionError error_;
   bool plain_;
 };

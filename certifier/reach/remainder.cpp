@@ -31,7 +31,7 @@ struct ProductRange {
   double negative, positive;
 };
 
-ProductRange MixedProduct(const Zonotope& slice, std::size_t i, std::size_t l, double r_i, double r_l) {
+FOREREACH_INLINE ProductRange MixedProduct(const Zonotope& slice, std::size_t i, std::size_t l, double r_i, double r_l) {
   const double product = r_i * r_l;
   if (!(product > 0x1p-900)) return {product, product};
   const double* g_i = slice.padded_row(static_cast<int>(i)).data();
@@ -45,6 +45,15 @@ ProductRange MixedProduct(const Zonotope& slice, std::size_t i, std::size_t l, d
   const double slack = slice.slack(static_cast<int>(i)) * r_l + slice.slack(static_cast<int>(l)) * r_i;
   const double plus = Sum(sum) + slack, minus = Sum(difference) + slack;
   return {std::min(product, minus * minus / (4 * product)), std::min(product, plus * plus / (4 * product))};
+}
+
+using MixedProductFunction = ProductRange(const Zonotope&, std::size_t, std::size_t, double, double);
+
+FOREREACH_AVX2 ProductRange MixedProductAvx2(const Zonotope& slice, std::size_t i, std::size_t l, double r_i, double r_l) {
+  return MixedProduct(slice, i, l, r_i, r_l);
+}
+FOREREACH_FLATTEN ProductRange MixedProductBaseline(const Zonotope& slice, std::size_t i, std::size_t l, double r_i, double r_l) {
+  return MixedProduct(slice, i, l, r_i, r_l);
 }
 
 TermRange Mixed(const PlainInterval& h, const ProductRange& d, double product) {
@@ -62,7 +71,7 @@ RemainderBound::RemainderBound(const Program& program, Method method)
     const Program::Second& entry = program.hessian[e];
     if (entry.row >= program.states || entry.column >= program.states) continue;  // an input is a point: d = 0
     const Term term{static_cast<std::size_t>(entry.output), static_cast<std::size_t>(entry.row),
-                    static_cast<std::size_t>(entry.column), e, false, 0};
+                    static_cast<std::size_t>(entry.column), e, false, 0, 0};
     (entry.row == entry.column ? diagonals : terms_).push_back(term);
   }
   for (const Term& diagonal : diagonals) {
@@ -79,22 +88,40 @@ RemainderBound::RemainderBound(const Program& program, Method method)
     partner->has_diagonal = true;
     partner->diagonal = diagonal.entry;
   }
+  for (Term& term : terms_) {
+    const Pair pair{std::min(term.first, term.second), std::max(term.first, term.second)};
+    if (pair.first == pair.second) continue;
+    const auto known = std::ranges::find(pairs_, pair);
+    term.pair = static_cast<std::size_t>(known - pairs_.begin());
+    if (known == pairs_.end()) pairs_.push_back(pair);
+  }
 }
 
 void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, const PlainInterval* hessian, const double* error,
                              Remainder& out) const noexcept {
-  std::array<double, kMaxStates> lower{}, upper{}, size{}, margin{};
+  struct Sum {
+    double lower, upper, size, margin;
+  };
+  std::array<Sum, kMaxStates> sums;
+  std::fill_n(sums.begin(), states_, Sum{0, 0, 0, 0});
+  std::array<ProductRange, Program::kMaxSecond> products;
+  MixedProductFunction* mixed_product =
+      active_instruction_set == InstructionSet::kAvx2 ? MixedProductAvx2 : MixedProductBaseline;
+  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+    const auto [i, l] = pairs_[p];
+    const double product = half_width[i] * half_width[l];
+    products[p] = method_ == Method::kPaper ? ProductRange{product, product}
+                                            : mixed_product(slice, i, l, half_width[i], half_width[l]);
+  }
   for (const Term& term : terms_) {
     const double r = half_width[term.first], other = half_width[term.second];
     TermRange range;
     if (term.first == term.second) {
       range = Diagonal(hessian[term.entry], r);
-      margin[term.output] += error[term.entry] * r * r + kTiny;
+      sums[term.output].margin += error[term.entry] * r * r + kTiny;
     } else {
-      const ProductRange product = method_ == Method::kPaper ? ProductRange{r * other, r * other}
-                                                             : MixedProduct(slice, term.first, term.second, r, other);
-      range = Mixed(hessian[term.entry], product, r * other);
-      margin[term.output] += error[term.entry] * r * other + kTiny;
+      range = Mixed(hessian[term.entry], products[term.pair], r * other);
+      sums[term.output].margin += error[term.entry] * r * other + kTiny;
     }
     if (term.has_diagonal) {
       const PlainInterval& a = hessian[term.diagonal];
@@ -102,16 +129,18 @@ void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, co
       const double slope = Size(hessian[term.entry]) * other;
       range = {std::max(range.lower + diagonal.lower, -Peak(-a.lower, slope, r)),
                std::min(range.upper + diagonal.upper, Peak(a.upper, slope, r)), range.size + diagonal.size};
-      margin[term.output] += error[term.diagonal] * r * r;
+      sums[term.output].margin += error[term.diagonal] * r * r;
     }
-    lower[term.output] += range.lower;
-    upper[term.output] += range.upper;
-    size[term.output] += range.size;
+    Sum& sum = sums[term.output];
+    sum.lower += range.lower;
+    sum.upper += range.upper;
+    sum.size += range.size;
   }
   for (std::size_t k = 0; k < states_; ++k) {
-    const double rounding = size[k] * kRelative + margin[k] * (1 + kRelative);
-    out.center[k] = method_ == Method::kPaper ? 0 : (lower[k] + upper[k]) / 2;
-    out.half_width[k] = (method_ == Method::kPaper ? size[k] : (upper[k] - lower[k]) / 2) + rounding;
+    const auto& [lower, upper, size, margin] = sums[k];
+    const double rounding = size * kRelative + margin * (1 + kRelative);
+    out.center[k] = method_ == Method::kPaper ? 0 : (lower + upper) / 2;
+    out.half_width[k] = (method_ == Method::kPaper ? size : (upper - lower) / 2) + rounding;
   }
 }
 

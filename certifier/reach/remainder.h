@@ -40,9 +40,16 @@ class RemainderBound final {
     std::size_t output, first, second, entry;
     bool has_diagonal;
     std::size_t diagonal;  // entry of (first, first)
+    std::size_t pair;      // of a mixed one: which of pairs_
+  };
+  // Two variables whose product occurs, in one output or more.
+  struct Pair {
+    std::size_t first, second;
+    friend bool operator==(const Pair&, const Pair&) = default;
   };
 
   std::vector<Term> terms_;
+  std::vector<Pair> pairs_;
   std::size_t states_;
   Method method_;
 };

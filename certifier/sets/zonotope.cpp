@@ -131,11 +131,11 @@ void Zonotope::Assign(const Zonotope& other) noexcept {
 
 namespace {
 
-using Columns = std::array<double, kMaxGenerators>;
+using ColumnMask = std::array<double, kMaxGenerators>;  // bits
+constexpr std::size_t kLastLanes = kMaxGenerators - kLanes;
 
-// |g|_1 - |g|_inf of every column, by plain arithmetic: it only chooses what to keep. The index takes the last bits of
-// the score, so that no two are equal and the earlier of equals is the larger. -1 behind the end, and for zero columns.
-void Scores(const Zonotope& set, Columns& scores) {
+// By plain arithmetic: it only chooses what to keep.
+FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
   for (std::size_t j = 0; j < set.padded_size(); j += kLanes) {
     Lanes sum = AllLanes(0), largest = AllLanes(0);
     for (int k = 0; k < set.dim(); ++k) {
@@ -143,76 +143,122 @@ void Scores(const Zonotope& set, Columns& scores) {
       sum += size;
       largest = Max(largest, size);
     }
-    const auto index = static_cast<std::int64_t>(kMaxGenerators - j);
-    const LaneMask bits = (std::bit_cast<LaneMask>(sum - largest) & ~LaneMask{127, 127, 127, 127}) |
-                          LaneMask{index, index - 1, index - 2, index - 3};
-    StoreLanes(largest > AllLanes(0) ? std::bit_cast<Lanes>(bits) : AllLanes(-1), &scores[j]);
+    StoreLanes(ScoreColumns(sum, largest, j), &scores[j]);
   }
 }
 
-// How many scores lie above this one.
-int Rank(const Columns& scores, std::size_t padded_size, double score) {
-  LaneMask below{};
-  for (std::size_t j = 0; j < padded_size; j += kLanes) below += LoadLanes(&scores[j]) > AllLanes(score);
-  return -static_cast<int>(below[0] + below[1] + below[2] + below[3]);
+// All bits set in each column that is not among the `keep` largest scores. In groups of four times four columns, each
+// compared with every column.
+FOREREACH_INLINE void MarkDropped(const ColumnScores& scores, std::size_t count, int keep, ColumnMask& dropped) {
+  constexpr std::size_t kGroup = 4;
+  const std::int64_t limit = keep;
+  const LaneMask limits{limit, limit, limit, limit};
+  for (std::size_t first = 0; first < count; first += kGroup * kLanes) {
+    Lanes score[kGroup];
+    LaneMask larger[kGroup] = {};  // minus how many lie above
+    for (std::size_t g = 0; g < kGroup; ++g) score[g] = LoadLanes(&scores[std::min(first + g * kLanes, kLastLanes)]);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Lanes other = AllLanes(scores[i]);
+      for (std::size_t g = 0; g < kGroup; ++g) larger[g] += other > score[g];
+    }
+    for (std::size_t g = 0; g < kGroup && first + g * kLanes < count; ++g)
+      StoreLanes(std::bit_cast<Lanes>((score[g] < AllLanes(0)) | (-larger[g] >= limits)), &dropped[first + g * kLanes]);
+  }
 }
 
-// Keeps the columns of the `keep` largest scores in their order and adds the others' sizes to `boxed`.
-void KeepLargest(Zonotope& set, int keep, const Columns& scores, std::span<double> boxed) {
-  Columns dropped{};  // 1 or 0
-  std::array<int, kMaxGenerators> source;
-  int kept = 0;
-  for (int j = 0; j < set.num_generators(); ++j) {
-    const double score = scores[static_cast<std::size_t>(j)];
-    const bool keeps = score >= 0 && Rank(scores, set.padded_size(), score) < keep;
-    dropped[static_cast<std::size_t>(j)] = keeps ? 0 : 1;
-    source[static_cast<std::size_t>(kept)] = j;
-    kept += keeps;
-  }
+// Puts the columns of the `keep` largest scores and the box around the others, plus `boxed`, into the set. The box's
+// columns take the places of those that were dropped.
+FOREREACH_INLINE void KeepLargest(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
+  ColumnMask dropped;
+  const std::size_t padded = set.padded_size();
+  MarkDropped(scores, static_cast<std::size_t>(set.num_generators()), keep, dropped);
   for (int k = 0; k < set.dim(); ++k) {
     double* row = set.mutable_row(k);
     Lanes sum = AllLanes(0);
-    for (std::size_t j = 0; j < set.padded_size(); j += kLanes) sum += Abs(LoadLanes(row + j)) * LoadLanes(&dropped[j]);
-    boxed[static_cast<std::size_t>(k)] += Sum(sum);
-    for (int j = 0; j < kept; ++j) row[j] = row[source[static_cast<std::size_t>(j)]];
+    for (std::size_t j = 0; j < padded; j += kLanes) {
+      const LaneMask mask = std::bit_cast<LaneMask>(LoadLanes(&dropped[j])), bits = std::bit_cast<LaneMask>(LoadLanes(row + j));
+      sum += Abs(std::bit_cast<Lanes>(bits & mask));
+      StoreLanes(std::bit_cast<Lanes>(bits & ~mask), row + j);
+    }
+    boxed[k] = (Sum(sum) + boxed[k]) * inflation;
   }
-  set.Truncate(kept);
+  int axis = 0, columns = set.num_generators();
+  const auto next_axis = [&] {
+    while (axis < set.dim() && boxed[axis] == 0) ++axis;
+    return axis < set.dim();
+  };
+  for (int j = 0; j < columns; ++j) {
+    if (std::bit_cast<std::int64_t>(dropped[static_cast<std::size_t>(j)]) == 0) continue;
+    if (next_axis()) {
+      set.mutable_row(axis)[j] = boxed[axis];
+      ++axis;
+    } else {  // no box left for this place: the last column comes here
+      do --columns;
+      while (columns > j && std::bit_cast<std::int64_t>(dropped[static_cast<std::size_t>(columns)]) != 0);
+      for (int k = 0; k < set.dim() && columns > j; ++k) set.mutable_row(k)[j] = set.mutable_row(k)[columns];
+    }
+  }
+  set.Truncate(columns);
+  for (; next_axis(); ++axis) set.AppendAxis(axis, boxed[axis]);
+}
+
+FOREREACH_AVX2 void KeepLargestAvx2(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
+  KeepLargest(set, keep, scores, inflation, boxed);
+}
+FOREREACH_FLATTEN void KeepLargestBaseline(Zonotope& set, int keep, const ColumnScores& scores, double inflation,
+                                           double* boxed) {
+  KeepLargest(set, keep, scores, inflation, boxed);
 }
 
 int CountNonzero(std::span<const double> lengths) {
-  return static_cast<int>(std::ranges::count_if(lengths, [](double length) { return length != 0; }));
+  int count = 0;
+  for (const double length : lengths) count += length != 0;
+  return count;
 }
 
-int CountZeroColumns(const Zonotope& set, const Columns& scores) {
-  return static_cast<int>(std::count(scores.begin(), scores.begin() + set.num_generators(), -1.0));
+int CountZeroColumns(const Zonotope& set, const ColumnScores& scores) {
+  int count = 0;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(set.num_generators()); ++j) count += scores[j] < 0;
+  return count;
 }
 
 }  // namespace
 
 void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept {
+  ColumnScores scores;
+  ScoreAll(set, scores);
+  AppendAndReduce(set, scores, first, second, order);
+}
+
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
+                     std::span<const double> second, int order) noexcept {
   const int n = set.dim(), axes = CountNonzero(first) + CountNonzero(second), keep = (order - 1) * n;
-  std::array<double, kMaxStates> boxed{};
-  int still_kept = kMaxGenerators;  // axis-aligned generators that remain generators of their own
-  if (set.num_generators() + axes > order * n) {
-    Columns scores;
-    Scores(set, scores);
-    const int columns = set.num_generators() - CountZeroColumns(set, scores);
-    const bool reduces = columns + axes > order * n;
-    if (reduces) still_kept = std::max(0, keep - columns);  // their score is 0, and they come last
-    const int terms = set.num_generators() + 2;
-    KeepLargest(set, reduces ? keep : columns, scores, boxed);
-    if (!reduces) boxed.fill(0);
-    for (double& sum : boxed) sum *= 1 + (2.0 * terms) * kUnitRoundoff;
-  }
+  int columns = set.num_generators();
+  if (columns + axes > order * n) columns -= CountZeroColumns(set, scores);
+  const bool reduces = columns + axes > order * n;
+  // Axis-aligned generators that remain generators of their own: their score is 0, and they come last.
+  int still_kept = reduces ? std::max(0, keep - columns) : kMaxGenerators;
+  std::array<double, kMaxStates> boxed;
+  std::fill_n(boxed.begin(), n, 0.0);
+  std::array<int, 2 * kMaxStates> kept_axes;
+  std::array<double, 2 * kMaxStates> kept_lengths;
+  std::size_t num_kept = 0;
   for (const std::span<const double> lengths : {first, second})
     for (std::size_t k = 0; k < lengths.size(); ++k) {
       if (lengths[k] == 0) continue;
-      if (still_kept-- > 0)
-        set.AppendAxis(static_cast<int>(k), lengths[k]);
-      else
-        boxed[k] = AddUp(boxed[k], lengths[k]);
+      if (still_kept-- > 0) {
+        kept_axes[num_kept] = static_cast<int>(k);
+        kept_lengths[num_kept++] = lengths[k];
+      } else {
+        boxed[k] += lengths[k];
+      }
     }
-  for (int k = 0; k < n; ++k) set.AppendAxis(k, boxed[static_cast<std::size_t>(k)]);
+  if (reduces || columns < set.num_generators()) {
+    const double inflation = 1 + (2.0 * set.num_generators() + 8) * kUnitRoundoff;
+    const auto keep_largest = active_instruction_set == InstructionSet::kAvx2 ? KeepLargestAvx2 : KeepLargestBaseline;
+    keep_largest(set, reduces ? keep : columns, scores, inflation, boxed.data());
+  }
+  for (std::size_t i = 0; i < num_kept; ++i) set.AppendAxis(kept_axes[i], kept_lengths[i]);
 }
 
 }  // namespace forereach

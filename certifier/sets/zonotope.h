@@ -98,6 +98,21 @@ largest |g|_1 - |g|_inf (ties, to 45 bits: the earlier) and encloses the rest in
 are dropped. The slack stays. The result contains the set with all generators. Cost O(n m + m^2), m generators. */
 void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept;
 
+/** The scores |g|_1 - |g|_inf of all columns, made unique: four at a time, from the sum and the largest of the columns'
+absolute values. The index takes the last bits, so that no two are equal and the earlier of equals is the larger. -1 for
+zero columns. */
+using ColumnScores = std::array<double, kMaxGenerators>;
+FOREREACH_INLINE Lanes ScoreColumns(const Lanes& sum, const Lanes& largest, std::size_t first_column) {
+  const auto index = static_cast<std::int64_t>(kMaxGenerators - first_column);
+  const LaneMask bits = (std::bit_cast<LaneMask>(sum - largest) & ~LaneMask{127, 127, 127, 127}) |
+                        LaneMask{index, index - 1, index - 2, index - 3};
+  return largest > AllLanes(0) ? std::bit_cast<Lanes>(bits) : AllLanes(-1);
+}
+
+/** The same where the scores of the set's columns are known already. */
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
+                     std::span<const double> second, int order) noexcept;
+
 /** Reduces the order only. */
 inline void ReduceOrder(Zonotope& set, int order) noexcept { AppendAndReduce(set, {}, {}, order); }
 

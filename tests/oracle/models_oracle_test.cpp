@@ -360,7 +360,7 @@ struct DomainCase {
 
   DomainCase(Random& random, int size) : center(size) {
     for (int l = 0; l < size; ++l) {
-      const double reach = (l == kV ? 20 : l == kDelta ? 1.3 : 3) * std::ldexp(1, -random.Integer(0, 20));
+      const double reach = (l == kV ? 20 : l == kDelta ? 1.3 : 1.5) * std::ldexp(1, -random.Integer(0, 20));
       const double middle = random.Uniform(-1, 1) * (l == kDelta ? 0.1 : 1);
       domain.emplace_back(middle - reach, middle + reach);
       double a = random.Uniform(middle - reach, middle + reach), b = random.Uniform(middle - reach, middle + reach);
