@@ -1,6 +1,6 @@
 /** Eight doubles at a time, the same to the last bit on every machine.
 
-The width is fixed, and a pack knows +, -, *, |.|, max only, each lane by itself: what an instruction set changes is the
+The width is fixed, and a pack knows +, -, *, |.|, max and min only, each lane by itself: what an instruction set changes is the
 time. A hot function is written once, as templates and functions of an unnamed namespace, and becomes machine code twice:
 inlined into an entry point marked FOREREACH_AVX2, and into one marked FOREREACH_FLATTEN. A member of the class that owns
 them holds the InstructionSet and chooses. */
@@ -79,6 +79,11 @@ struct alignas(64) Pack {
           reinterpret_cast<Quad>(reinterpret_cast<QuadMask>(a.high) & mask)};
 }
 
+/** a where a < b, else b. */
+[[gnu::always_inline]] inline Pack Min(const Pack& a, const Pack& b) {
+  return {a.low < b.low ? a.low : b.low, a.high < b.high ? a.high : b.high};
+}
+
 /** a where a > b, else b. */
 [[gnu::always_inline]] inline Pack Max(const Pack& a, const Pack& b) {
   return {a.low > b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
@@ -98,12 +103,19 @@ struct alignas(64) Pack {
   return (s[0] + s[2]) + (s[1] + s[3]);
 }
 
-/** A lane that holds `value`. @pre one does. */
-[[gnu::always_inline]] inline std::size_t LaneOf(const Pack& a, double value) {
-  unsigned found = 0;
-  for (unsigned lane = 0; lane < 4; ++lane)
-    found |= static_cast<unsigned>(a.low[lane] == value) << lane | static_cast<unsigned>(a.high[lane] == value) << (lane + 4);
-  return static_cast<std::size_t>(std::countr_zero(found));
+/** Puts the number of its lane into the last three bits of each, finite, double: an error of seven units in the last
+place at most, for which the largest of eight says where it stands. */
+[[gnu::always_inline]] inline Pack TagLanes(const Pack& a) {
+  const QuadMask rest = ~QuadMask{7, 7, 7, 7};
+  return {reinterpret_cast<Quad>((reinterpret_cast<QuadMask>(a.low) & rest) | QuadMask{0, 1, 2, 3}),
+          reinterpret_cast<Quad>((reinterpret_cast<QuadMask>(a.high) & rest) | QuadMask{4, 5, 6, 7})};
+}
+[[gnu::always_inline]] inline std::size_t TaggedLane(double value) { return std::bit_cast<std::uint64_t>(value) & 7; }
+
+/** a with the lanes that hold `value` set to `other`. */
+[[gnu::always_inline]] inline Pack Replace(const Pack& a, double value, double other) {
+  const Pack v = Fill(value), o = Fill(other);
+  return {a.low == v.low ? o.low : a.low, a.high == v.high ? o.high : a.high};
 }
 
 }  // namespace simd

@@ -9,6 +9,7 @@ namespace forereach {
 namespace {
 
 constexpr int kPatternsPerBlock = 64;
+constexpr double kHuge = 0x1p960;  // far from overflow, and nothing next to the largest double
 
 // Half of an interval's width, rounded up.
 double HalfWidthUpper(double lower, double upper) { return AddUp(upper / 2, -lower / 2); }
@@ -35,7 +36,8 @@ ObservationIndex::Entries LipschitzEnvelope::EntriesOf(const LipschitzRow& row, 
                                                        const Observations& observations, int coordinate) {
   const auto count = static_cast<std::size_t>(observations.size());
   const double sigma = declaration.noise_bound[coordinate];
-  ObservationIndex::Entries entries{row.num_coordinates(), std::vector<double>(count * row.num_coordinates()), {}, {}};
+  ObservationIndex::Entries entries{row.has_patterns() ? ObservationIndex::Shape::kLifted : ObservationIndex::Shape::kBoxed,
+                                    row.num_coordinates(), std::vector<double>(count * row.num_coordinates()), {}, {}};
   for (int i = 0; i < observations.size(); ++i) {
     row.Map([&](int l) { return observations.z(i, l); },
             entries.coordinates.data() + static_cast<std::size_t>(i) * row.num_coordinates());
@@ -64,7 +66,7 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
   const auto a = static_cast<int>(row.distance.columns().size());
   const double magnitude = AddUp(AddUp(values, MulUp(2, locations)), MulUp(3, widths));
   row.error = PlainErrorUpper(magnitude, a + 24, a * (kMaxGenerators + 4));
-  if (!std::isfinite(4 * magnitude)) row.error = kInfinity;
+  if (!(magnitude < kHuge)) row.error = kInfinity;
 }
 
 using internal::Budget;
@@ -77,8 +79,8 @@ struct LipschitzEnvelope::Search {
     if (index.num_blocks() <= static_cast<std::size_t>(options.max_flat_blocks))
       return Narrowed(ScanBlocks(metric, index.block(0), index.num_blocks(), index.num_coordinates(), budget), metric);
     Sides best;
-    best.floor = Descend(metric, index, 0, -kInfinity, budget);
-    best.negated_ceiling = Descend(metric, index, 1, -kInfinity, budget);
+    best.floor = Descend(metric, index, 0, budget);
+    best.negated_ceiling = Descend(metric, index, 1, budget);
     return Narrowed(best, metric);
   }
 
@@ -88,19 +90,20 @@ struct LipschitzEnvelope::Search {
   }
 
   static Sides Best(const Row& row, const QuerySet& set, const EnvelopeOptions& options, Budget& budget) {
+    const double margin = 4 * row.error;  // of bounds in the search, and for the bits that say which child they are of
     switch (row.distance.columns().size()) {
       case 0:
         return {row.floor, row.negated_ceiling};
       case 1:
-        return Run(internal::PatternMetric<1>(row.distance, set), row, options, budget);
+        return Run(internal::PatternMetric<1>(row.distance, set, margin), row, options, budget);
       case 2:
-        return Run(internal::PatternMetric<2>(row.distance, set), row, options, budget);
+        return Run(internal::PatternMetric<2>(row.distance, set, margin), row, options, budget);
       case 3:
-        return Run(internal::PatternMetric<3>(row.distance, set), row, options, budget);
+        return Run(internal::PatternMetric<3>(row.distance, set, margin), row, options, budget);
       default:
         if (row.distance.columns().size() > static_cast<std::size_t>(kMaxExactColumns))
-          return Run(internal::HullMetric(row.distance, set), row, options, budget);
-        return Run(internal::SignMetric(row.distance, set, row.component_errors, row.error), row, options, budget);
+          return Run(internal::HullMetric(row.distance, set, margin), row, options, budget);
+        return Run(internal::SignMetric(row.distance, set, margin, row.component_errors), row, options, budget);
     }
   }
 

@@ -1,8 +1,9 @@
 /** The distances D_i of the envelope, eight observations at a time, for the search over an ObservationIndex.
 
-A metric gives D_i - common() for the observations of a block, and for a node of the index something that is not above
-it for any observation below; `common` is the part that no observation changes. All plain arithmetic, and monotone also
-where it rounds: a node's number is never above what is computed for its observations. For the inside of
+A metric gives D_i - common() for the observations of a block, and for the children of a node an upper bound on
+value_i - (D_i - common()) over the observations below, one side at a time; `common` is the part that no observation
+changes. All plain arithmetic; the bounds are raised by what it may be off by, so that they are never below what is
+computed for an observation. For the inside of
 lipschitz_envelope.cpp only: every function is to be inlined into an entry point for one instruction set. */
 #pragma once
 
@@ -66,7 +67,8 @@ class PatternMetric {
  public:
   static constexpr bool kRefines = false;
 
-  PatternMetric(const LipschitzRow& row, const QuerySet& set) {
+  /** @param margin not below twice the error of plain arithmetic in this row. */
+  PatternMetric(const LipschitzRow& row, const QuerySet& set, double margin) {
     std::array<double, kColumns> weighted;
     std::array<Pack, kColumns> slope;
     std::array<const double*, kColumns> generators;
@@ -88,10 +90,16 @@ class PatternMetric {
       for (std::size_t s = 0; s < kPatterns; ++s) spread[s] = spread[s] + Abs(Signed(s, term));
     }
     common_ = SumLanes(spread[0]) + slack;
+    double farthest = 0;
     for (std::size_t s = 0; s < kPatterns; ++s) {
-      center_[s] = simd::Fill(Signed(s, weighted));
-      extra_[s] = simd::Fill(SumLanes(spread[s]) + slack - common_);
+      const double center = Signed(s, weighted), extra = SumLanes(spread[s]) + slack - common_;
+      center_[s] = simd::Fill(center);
+      extra_[s] = simd::Fill(extra);
+      from_below_[s] = simd::Fill(center - extra + margin);
+      from_above_[s] = simd::Fill(-center - extra + margin);
+      farthest = simd::Max(farthest, extra);
     }
+    anywhere_ = simd::Fill(margin - farthest);
   }
 
   [[nodiscard]] double common() const { return common_; }
@@ -103,11 +111,12 @@ class PatternMetric {
     return distance;
   }
 
-  [[nodiscard]] Pack Node(const Pack* node) const {
-    Pack distance = Gap(node[0], node[1], center_[0]);
-    for (std::size_t s = 1; s < kPatterns; ++s)
-      distance = Max(distance, Gap(node[2 * s], node[2 * s + 1], center_[s]) + extra_[s]);
-    return distance;
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
+    node += side * (2 * kPatterns + 1);
+    Pack bound = simd::Load(node[2 * kPatterns]) + anywhere_;
+    for (std::size_t s = 0; s < kPatterns; ++s)
+      bound = Min(bound, Min(simd::Load(node[2 * s]) + from_below_[s], simd::Load(node[2 * s + 1]) + from_above_[s]));
+    return bound;
   }
 
  private:
@@ -122,6 +131,8 @@ class PatternMetric {
 
   double common_;
   std::array<Pack, kPatterns> center_, extra_;
+  std::array<Pack, kPatterns> from_below_, from_above_;  // A_s - extra_s, -A_s - extra_s, and the margin
+  Pack anywhere_;                                        // the margin - max_s extra_s
 };
 
 /** d_i = sum_l L_kl |c_l - z_il| in any number of columns. */
@@ -146,10 +157,12 @@ class CenterDistance {
     return distance;
   }
 
-  [[nodiscard]] Pack Node(const Pack* node) const {
-    Pack distance = Gap(node[0], node[1], center_[0]);
-    for (std::size_t l = 1; l < columns_; ++l) distance = distance + Gap(node[2 * l], node[2 * l + 1], center_[l]);
-    return distance;
+  /** v_i - d_i at most, but for rounding. */
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
+    Pack bound = simd::Load(node[side]);
+    for (std::size_t l = 0; l < columns_; ++l)
+      bound = bound - Gap(simd::Load(node[2 + 2 * l]), simd::Load(node[3 + 2 * l]), center_[l]);
+    return bound;
   }
 
  private:
@@ -162,14 +175,16 @@ class HullMetric : public CenterDistance {
  public:
   static constexpr bool kRefines = false;
 
-  HullMetric(const LipschitzRow& row, const QuerySet& set) : CenterDistance(row, set) {
+  HullMetric(const LipschitzRow& row, const QuerySet& set, double margin) : CenterDistance(row, set), margin_(simd::Fill(margin)) {
     for (const LipschitzRow::Column& column : row.columns())
       common_ += column.slope * Variable(set, column.variable).half_width;
   }
   [[nodiscard]] double common() const { return common_; }
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const { return CenterDistance::Node(node, side) + margin_; }
 
  private:
   double common_ = 0;
+  Pack margin_;
 };
 
 /** Rows in between: Block and Node give d_i + a lower bound of the spreads w_s, which is not above D_i, and Refine gives
@@ -180,8 +195,8 @@ class SignMetric : public CenterDistance {
   static constexpr bool kRefines = true;
   static constexpr std::size_t kMaxColumns = 12;
 
-  /** @param errors of each column: not below the error of L_kl r_l plus that of v_il. @param error of the whole row. */
-  SignMetric(const LipschitzRow& row, const QuerySet& set, std::span<const double> errors, double error)
+  /** @param errors of each column: not below the error of L_kl r_l plus that of v_il. @param margin as above. */
+  SignMetric(const LipschitzRow& row, const QuerySet& set, double margin, std::span<const double> errors)
       : CenterDistance(row, set), chunks_(Chunks(set.slice).size()) {
     const Chunks chunks(set.slice);
     for (std::size_t l = 0; l < columns(); ++l) {
@@ -193,12 +208,12 @@ class SignMetric : public CenterDistance {
       for (std::size_t j = 0; j < chunks_; ++j)
         weighted_[l][j] = simd::Fill(column.slope) * chunks.Get(variable.generators, j);
     }
-    least_ = simd::Fill(LeastSpread() + slack_ - 4 * error);
+    least_ = simd::Fill(LeastSpread() + slack_ - margin);
   }
 
   [[nodiscard]] double common() const { return 0; }
   [[nodiscard]] Pack Block(const Pack* block) const { return CenterDistance::Block(block) + least_; }
-  [[nodiscard]] Pack Node(const Pack* node) const { return CenterDistance::Node(node) + least_; }
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const { return CenterDistance::Node(node, side) - least_; }
 
   /** D_i of one observation. Needs 2^f patterns for f free signs; where `patterns` does not allow them, the bound over
   the hull, and `capped` is set. */

@@ -12,18 +12,8 @@ using simd::Pack;
 namespace {
 
 constexpr double kMinusInfinity = -std::numeric_limits<double>::infinity();
-
-double Lowest(const Pack& pack, std::size_t used) {
-  double lowest = -kMinusInfinity;
-  for (std::size_t lane = 0; lane < used; ++lane) lowest = std::min(lowest, pack.at(lane));
-  return lowest;
-}
-
-double Highest(const Pack& pack, std::size_t used) {
-  double highest = kMinusInfinity;
-  for (std::size_t lane = 0; lane < used; ++lane) highest = std::max(highest, pack.at(lane));
-  return highest;
-}
+constexpr double kNothing = -std::numeric_limits<double>::max();
+constexpr std::size_t kFanout = kLanes;
 
 }  // namespace
 
@@ -34,9 +24,9 @@ class ObservationIndex::Builder {
     for (std::size_t i = 0; i < count_; ++i) keys_[i].id = static_cast<std::uint32_t>(i);
     Arrange(0, count_);
     StoreBlocks();
-    do {
-      StoreLevel();
-    } while (index_.nodes_.size() > (index_.levels_.back() + 1) * index_.node_packs());
+    StoreLowestLevel();
+    while (index_.nodes_.size() > (level_ + 1) * index_.node_packs()) StoreNextLevel();
+    TurnLowestOver();
   }
 
  private:
@@ -47,9 +37,9 @@ class ObservationIndex::Builder {
 
   // Orders entries [first, first + count), a subtree of its own: all children but the last are full.
   void Arrange(std::size_t first, std::size_t count) {
-    if (count <= kLanes) return;
-    std::size_t child = kLanes;
-    while (child * kLanes < count) child *= kLanes;
+    if (count <= kLeafSize) return;
+    std::size_t child = kLeafSize;
+    while (child * kFanout < count) child *= kFanout;
     Divide(first, count, child);
   }
 
@@ -89,61 +79,87 @@ class ObservationIndex::Builder {
   }
 
   void StoreBlocks() {
-    const std::size_t blocks = (count_ + kLanes - 1) / kLanes, k = entries_.num_coordinates;
+    const std::size_t blocks = index_.num_leaves() * kLeafBlocks, k = entries_.num_coordinates;
     index_.blocks_.assign(blocks * index_.block_packs(), Pack{});
     index_.ids_.assign(blocks * kLanes, kNone);
     for (std::size_t i = 0; i < blocks * kLanes; ++i) {
       Pack* block = index_.blocks_.data() + i / kLanes * index_.block_packs();
       const std::size_t lane = i % kLanes;
-      block[k].set(lane, kMinusInfinity);
-      block[k + 1].set(lane, kMinusInfinity);
-      if (i >= count_) continue;
-      const std::uint32_t id = index_.ids_[i] = keys_[i].id;
-      for (std::size_t c = 0; c < k; ++c) block[c].set(lane, Coordinate(id, c));
-      block[k].set(lane, entries_.floors[id]);
-      block[k + 1].set(lane, -entries_.ceilings[id]);
+      const bool used = i < count_;
+      const std::uint32_t id = used ? keys_[i].id : kNone;
+      index_.ids_[i] = id;
+      for (std::size_t c = 0; c < k; ++c) block[c].set(lane, used ? Coordinate(id, c) : 0);
+      block[k].set(lane, used ? entries_.floors[id] : kMinusInfinity);
+      block[k + 1].set(lane, used ? -entries_.ceilings[id] : kMinusInfinity);
     }
   }
 
-  // The level above the highest there is so far.
-  void StoreLevel() {
-    const std::size_t stored = index_.nodes_.size() / index_.node_packs();
-    const std::size_t below = index_.levels_.empty() ? 0 : index_.levels_.back();
-    const std::size_t children = index_.levels_.empty() ? index_.num_blocks() : stored - below;
-    const std::size_t nodes = (children + kLanes - 1) / kLanes;
-    index_.nodes_.resize((stored + nodes) * index_.node_packs(), Pack{});
-    for (std::size_t i = 0; i < nodes * kLanes; ++i) {
-      Pack* node = index_.nodes_.data() + (stored + i / kLanes) * index_.node_packs();
-      const std::size_t used = std::min(kLanes, grandchildren_ - std::min(grandchildren_, i * kLanes));
-      if (index_.levels_.empty())
-        StoreChild(index_.block(std::min(i, children - 1)), 1, used, node, i % kLanes);
-      else
-        StoreChild(index_.nodes_.data() + (below + std::min(i, children - 1)) * index_.node_packs(), 2, used, node, i % kLanes);
+  // The level above the leaves: what entry i has to say, taken into its leaf's lane.
+  void StoreLowestLevel() {
+    StartLevel(index_.num_leaves());
+    for (std::size_t i = 0; i < count_; ++i) {
+      const Pack* block = index_.block(i / kLanes);
+      const std::size_t k = entries_.num_coordinates, lane = i % kLanes, leaf = i / kLeafSize;
+      for (std::size_t side = 0; side < 2; ++side) Raise(leaf, MaxOf(side), block[k + side].at(lane));
+      for (std::size_t c = 0; c < k; ++c) {
+        const double alpha = block[c].at(lane);
+        if (index_.shape_ == Shape::kBoxed) {
+          Raise(leaf, 2 + 2 * c, -alpha);  // the lowest, negated until the level is done
+          Raise(leaf, 3 + 2 * c, alpha);
+        } else {
+          for (std::size_t side = 0; side < 2; ++side) {
+            Raise(leaf, side * (2 * k + 1) + 2 * c, block[k + side].at(lane) - alpha);
+            Raise(leaf, side * (2 * k + 1) + 2 * c + 1, block[k + side].at(lane) + alpha);
+          }
+        }
+      }
     }
-    grandchildren_ = children;
-    index_.levels_.push_back(stored);
   }
 
-  // A child has `stride` packs a coordinate: a block one, a node two. One that is not there uses no lane.
-  void StoreChild(const Pack* child, std::size_t stride, std::size_t used, Pack* node, std::size_t lane) const {
-    const std::size_t k = entries_.num_coordinates;
-    for (std::size_t c = 0; used > 0 && c < k; ++c) {
-      node[2 * c].set(lane, Lowest(child[stride * c], used));
-      node[2 * c + 1].set(lane, Highest(child[stride * c + stride - 1], used));
-    }
-    node[2 * k].set(lane, Highest(child[stride * k], used));
-    node[2 * k + 1].set(lane, Highest(child[stride * k + 1], used));
+  // The level above the highest there is: of each pack, the largest lane of the node below.
+  void StoreNextLevel() {
+    const std::size_t below = level_, nodes = index_.nodes_.size() / index_.node_packs() - below;
+    StartLevel(nodes);
+    for (std::size_t i = 0; i < nodes; ++i)
+      for (std::size_t p = 0; p < index_.node_packs(); ++p)
+        Raise(i, p, simd::MaxLane(index_.nodes_[(below + i) * index_.node_packs() + p]));
+  }
+
+  void StartLevel(std::size_t children) {
+    level_ = index_.nodes_.size() / index_.node_packs();
+    index_.levels_.push_back(level_);
+    index_.nodes_.resize((level_ + (children + kFanout - 1) / kFanout) * index_.node_packs(), simd::Fill(kNothing));
+  }
+
+  // Child i of the level being stored has at least `value` in pack p.
+  void Raise(std::size_t i, std::size_t p, double value) {
+    Pack& pack = index_.nodes_[(level_ + i / kFanout) * index_.node_packs() + p];
+    if (value > pack.at(i % kFanout)) pack.set(i % kFanout, value);
+  }
+
+  // Where a side's max v stands.
+  std::size_t MaxOf(std::size_t side) const {
+    return index_.shape_ == Shape::kBoxed ? side : side * (2 * entries_.num_coordinates + 1) + 2 * entries_.num_coordinates;
+  }
+
+  void TurnLowestOver() {
+    if (index_.shape_ != Shape::kBoxed) return;
+    for (std::size_t first = 0; first < index_.nodes_.size(); first += index_.node_packs())
+      for (std::size_t c = 0; c < entries_.num_coordinates; ++c) {
+        Pack& lowest = index_.nodes_[first + 2 + 2 * c];
+        for (std::size_t lane = 0; lane < kLanes; ++lane) lowest.set(lane, -lowest.at(lane));
+      }
   }
 
   const Entries& entries_;
   ObservationIndex& index_;
   std::size_t count_;
   std::vector<Key> keys_;
-  std::size_t grandchildren_ = count_;  // what lies below the children of the level being stored
+  std::size_t level_ = 0;  // the first node of the level being stored
 };
 
 ObservationIndex::ObservationIndex(const Entries& entries)
-    : size_(entries.floors.size()), num_coordinates_(entries.num_coordinates) {
+    : shape_(entries.shape), size_(entries.floors.size()), num_coordinates_(entries.num_coordinates) {
   Builder(entries, *this);
 }
 

@@ -21,85 +21,88 @@ struct Sides {
   double floor, negated_ceiling;
 };
 
-inline const Pack kMinusInfinities = simd::Fill(-kInfinity);
-
-/** The best of a block's entries against `best`, exactly evaluated from the most promising one on. */
+/** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry on. */
 template <class Metric>
-double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, Pack optimistic, double best, Budget& budget) {
+double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best, Budget& budget) {
   if constexpr (!Metric::kRefines) {
     return simd::Max(best, MaxLane(optimistic));
   } else {
-    for (;;) {
-      const double next = MaxLane(optimistic);
+    for (Pack left = TagLanes(Max(optimistic, simd::Fill(-kMaxDouble)));;) {
+      const double next = MaxLane(left);
       if (!(next > best)) return best;
-      const std::size_t lane = LaneOf(optimistic, next);
-      optimistic.set(lane, -kInfinity);
+      const std::size_t lane = simd::TaggedLane(next);
+      left = Replace(left, next, -kMaxDouble);
       best = simd::Max(best, values.at(lane) - metric.Refine(block, lane, budget.patterns, budget.capped));
     }
   }
 }
 
+/** All of `count` blocks in a row. */
 template <class Metric>
-Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count, std::size_t coordinates, Budget& budget) {
+Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget& budget) {
   Sides best{-kInfinity, -kInfinity};
-  if constexpr (!Metric::kRefines) {
-    Pack floor = kMinusInfinities, negated_ceiling = kMinusInfinities;
-    for (std::size_t b = 0; b < count; ++b, blocks += coordinates + 2) {
-      const Pack distance = metric.Block(blocks);
-      floor = Max(simd::Load(blocks[coordinates]) - distance, floor);
-      negated_ceiling = Max(simd::Load(blocks[coordinates + 1]) - distance, negated_ceiling);
-    }
-    best = {MaxLane(floor), MaxLane(negated_ceiling)};
-  } else {
-    for (std::size_t b = 0; b < count; ++b, blocks += coordinates + 2) {
-      const Pack distance = metric.Block(blocks);
-      const Pack floors = simd::Load(blocks[coordinates]), ceilings = simd::Load(blocks[coordinates + 1]);
-      best.floor = BestOfBlock(metric, blocks, floors, floors - distance, best.floor, budget);
-      best.negated_ceiling = BestOfBlock(metric, blocks, ceilings, ceilings - distance, best.negated_ceiling, budget);
+  Pack floors = simd::Fill(-kInfinity), ceilings = floors;
+  for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
+    const Pack distance = metric.Block(block), floor = simd::Load(block[coordinates]), ceiling = simd::Load(block[coordinates + 1]);
+    if constexpr (Metric::kRefines) {
+      best.floor = BestOfBlock(metric, block, floor, floor - distance, best.floor, budget);
+      best.negated_ceiling = BestOfBlock(metric, block, ceiling, ceiling - distance, best.negated_ceiling, budget);
+    } else {
+      floors = Max(floor - distance, floors);
+      ceilings = Max(ceiling - distance, ceilings);
     }
   }
-  return best;
+  return {simd::Max(best.floor, MaxLane(floors)), simd::Max(best.negated_ceiling, MaxLane(ceilings))};
+}
+
+/** One side of a leaf. */
+template <class Metric>
+double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best, Budget& budget) {
+  Pack highest = simd::Fill(-kInfinity);
+  for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
+    const Pack values = simd::Load(block[coordinates + side]), optimistic = values - metric.Block(block);
+    if constexpr (Metric::kRefines)
+      best = BestOfBlock(metric, block, values, optimistic, best, budget);
+    else
+      highest = Max(optimistic, highest);
+  }
+  return simd::Max(best, MaxLane(highest));
 }
 
 /** Depth first, the most promising child first. @param side 0 for the floors, 1 for the negated ceilings. */
 template <class Metric>
-double Descend(const Metric& metric, const ObservationIndex& index, std::size_t side, double best, Budget& budget) {
+double Descend(const Metric& metric, const ObservationIndex& index, std::size_t side, Budget& budget) {
   struct Level {
-    Pack optimistic;
+    Pack bounds;  // of the children not yet visited
     std::size_t first_child;
   };
-  const std::size_t k = index.num_coordinates();
   std::array<Level, ObservationIndex::kMaxHeight + 1> levels;
+  const std::size_t k = index.num_coordinates();
   const int top = index.height();
-  const auto enter = [&](int level, std::size_t i) {
-    const Pack* node = index.node(level, i);
-    levels[static_cast<std::size_t>(level)] = {simd::Load(node[2 * k + side]) - metric.Node(node), i * kLanes};
-  };
-  enter(top, 0);
+  double best = -kInfinity;
   int leaves = budget.leaves;
-  for (int level = top; level <= top;) {
-    Level& at = levels[static_cast<std::size_t>(level)];
-    const double next = MaxLane(at.optimistic);
-    if (!(next > best)) {
-      ++level;
-      continue;
+  std::size_t child = 0;
+  for (int level = top + 1;;) {
+    // Down to the parent of leaves, then to one leaf after the other, and up when nothing there can beat the best.
+    if (level > 1) {
+      Level& at = levels[static_cast<std::size_t>(--level)];
+      at.bounds = TagLanes(metric.Node(index.node(level, child), side));
+      at.first_child = child * kLanes;
+    } else {
+      best = BestOfLeaf(metric, index.block(child * ObservationIndex::kLeafBlocks), k, side, best, budget);
+      --leaves;
     }
+    double next;
+    while (!((next = MaxLane(levels[static_cast<std::size_t>(level)].bounds)) > best))
+      if (++level > top) return best;
     if (leaves == 0) {
       budget.capped = true;
-      break;
+      return best;
     }
-    const std::size_t lane = LaneOf(at.optimistic, next), child = at.first_child + lane;
-    at.optimistic.set(lane, -kInfinity);
-    if (level > 1) {
-      enter(--level, child);
-      continue;
-    }
-    --leaves;
-    const Pack* block = index.block(child);
-    const Pack values = simd::Load(block[k + side]);
-    best = BestOfBlock(metric, block, values, values - metric.Block(block), best, budget);
+    Level& at = levels[static_cast<std::size_t>(level)];
+    at.bounds = Replace(at.bounds, next, -kMaxDouble);
+    child = at.first_child + simd::TaggedLane(next);
   }
-  return best;
 }
 
 }  // namespace forereach::internal
