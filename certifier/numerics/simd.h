@@ -51,7 +51,13 @@ struct alignas(64) Pack {
   void set(std::size_t lane, double value) { (lane < 4 ? low[lane] : high[lane - 4]) = value; }
 };
 
-[[gnu::always_inline]] inline Pack Fill(double x) { return {Quad{x, x, x, x}, Quad{x, x, x, x}}; }
+/** One number in every lane, at half the registers. */
+struct Same {
+  Quad all;
+  [[gnu::always_inline]] operator Pack() const { return {all, all}; }  // NOLINT: it is one
+};
+
+[[gnu::always_inline]] inline Same Fill(double x) { return {Quad{x, x, x, x}}; }
 [[gnu::always_inline]] inline Pack Load(const Pack& p) { return {p.low, p.high}; }
 
 /** From any address of eight doubles. */

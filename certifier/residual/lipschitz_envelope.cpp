@@ -8,7 +8,7 @@
 namespace forereach {
 namespace {
 
-constexpr int kPatternsPerBlock = 64;
+constexpr int kPatternsPerLeaf = 64;
 constexpr double kHuge = 0x1p960;  // far from overflow, and nothing next to the largest double
 
 // Half of an interval's width, rounded up.
@@ -73,69 +73,58 @@ using internal::Budget;
 using internal::Sides;
 
 struct LipschitzEnvelope::Search {
-  template <class Metric>
-  static Sides Run(const Metric& metric, const Row& row, const EnvelopeOptions& options, Budget& budget) {
-    const ObservationIndex& index = row.index;
-    if (index.num_blocks() <= static_cast<std::size_t>(options.max_flat_blocks))
-      return Narrowed(ScanBlocks(metric, index.block(0), index.num_blocks(), index.num_coordinates(), budget), metric);
-    Sides best;
-    best.floor = Descend(metric, index, 0, budget);
-    best.negated_ceiling = Descend(metric, index, 1, budget);
-    return Narrowed(best, metric);
-  }
+  const Row& row;
+  const EnvelopeOptions& options;
+  Budget& budget;
 
   template <class Metric>
-  static Sides Narrowed(const Sides& best, const Metric& metric) {
+  [[nodiscard]] Sides Run(const Metric& metric) const {
+    const ObservationIndex& index = row.index;
+    Sides best;
+    if (index.num_blocks() <= static_cast<std::size_t>(options.max_flat_blocks))
+      best = ScanBlocks(metric, index.block(0), index.num_blocks(), index.num_coordinates(), budget);
+    else
+      best = SearchTree(metric, index, budget);
     return {best.floor - metric.common(), best.negated_ceiling - metric.common()};
   }
 
-  static Sides Best(const Row& row, const QuerySet& set, const EnvelopeOptions& options, Budget& budget) {
-    const double margin = 4 * row.error;  // of bounds in the search, and for the bits that say which child they are of
-    switch (row.distance.columns().size()) {
-      case 0:
-        return {row.floor, row.negated_ceiling};
-      case 1:
-        return Run(internal::PatternMetric<1>(row.distance, set, margin), row, options, budget);
-      case 2:
-        return Run(internal::PatternMetric<2>(row.distance, set, margin), row, options, budget);
-      case 3:
-        return Run(internal::PatternMetric<3>(row.distance, set, margin), row, options, budget);
-      default:
-        if (row.distance.columns().size() > static_cast<std::size_t>(kMaxExactColumns))
-          return Run(internal::HullMetric(row.distance, set, margin), row, options, budget);
-        return Run(internal::SignMetric(row.distance, set, margin, row.component_errors), row, options, budget);
-    }
+  // One function for each metric and instruction set, so that each has the registers to itself.
+  template <class Metric, class... More>
+  FOREREACH_FLATTEN [[gnu::noinline]] Sides RunBaseline(const QuerySet& set, const More&... more) const {
+    return Run(Metric(row.distance, set, more...));
+  }
+  template <class Metric, class... More>
+  FOREREACH_AVX2 [[gnu::noinline]] Sides RunAvx2(const QuerySet& set, const More&... more) const {
+    return Run(Metric(row.distance, set, more...));
   }
 
-  static void Enclose(const LipschitzEnvelope& envelope, const QuerySet& set, ResidualBounds& bounds) {
-    bounds.capped = false;
-    const EnvelopeOptions& options = envelope.options_;
-    for (std::size_t k = 0; k < envelope.rows_.size(); ++k) {
-      const Row& row = envelope.rows_[k];
-      if (!std::isfinite(row.error)) {
-        bounds.lower[k] = -kInfinity;
-        bounds.upper[k] = kInfinity;
-        continue;
-      }
-      Budget budget{options.max_leaf_visits, kPatternsPerBlock * options.max_leaf_visits};
-      const Sides best = Best(row, set, options, budget);
-      bounds.lower[k] = best.floor - row.error;
-      bounds.upper[k] = -(best.negated_ceiling - row.error);
-      bounds.capped |= budget.capped;
-    }
+  template <class Metric, class... More>
+  [[nodiscard]] Sides With(const QuerySet& set, const More&... more) const {
+    return options.instructions == InstructionSet::kAvx2 ? RunAvx2<Metric>(set, more...) : RunBaseline<Metric>(set, more...);
+  }
+
+  [[nodiscard]] Sides Best(const QuerySet& set) const {
+    const std::size_t columns = row.distance.columns().size();
+    const double margin = 4 * row.error;  // of bounds in the search, and for the bits that say which child they are of
+    if (columns == 0) return {row.floor, row.negated_ceiling};
+    if (columns == 1) return With<internal::PatternMetric<1>>(set, margin);
+    if (columns == 2) return With<internal::PatternMetric<2>>(set, margin);
+    if (columns == 3) return With<internal::PatternMetric<3>>(set, margin);
+    if (columns > static_cast<std::size_t>(kMaxExactColumns)) return With<internal::HullMetric>(set, margin);
+    return With<internal::SignMetric>(set, margin, std::span<const double>(row.component_errors));
   }
 };
 
 void LipschitzEnvelope::Enclose(const QuerySet& set, ResidualBounds& bounds) const noexcept {
-  options_.instructions == InstructionSet::kAvx2 ? EncloseAvx2(set, bounds) : EncloseBaseline(set, bounds);
-}
-
-FOREREACH_FLATTEN void LipschitzEnvelope::EncloseBaseline(const QuerySet& set, ResidualBounds& bounds) const noexcept {
-  Search::Enclose(*this, set, bounds);
-}
-
-FOREREACH_AVX2 void LipschitzEnvelope::EncloseAvx2(const QuerySet& set, ResidualBounds& bounds) const noexcept {
-  Search::Enclose(*this, set, bounds);
+  bounds.capped = false;
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const Row& row = rows_[k];
+    Budget budget{options_.max_leaf_visits, kPatternsPerLeaf * options_.max_leaf_visits};
+    const Sides best = std::isfinite(row.error) ? Search{row, options_, budget}.Best(set) : Sides{-kInfinity, -kInfinity};
+    bounds.lower[k] = best.floor - row.error;
+    bounds.upper[k] = -(best.negated_ceiling - row.error);
+    bounds.capped |= budget.capped;
+  }
 }
 
 }  // namespace forereach

@@ -29,8 +29,8 @@ Work. Any subset of the observations gives a sound envelope, so a search may sto
 namespace forereach {
 
 struct EnvelopeOptions {
-  /** Blocks of eight observations that one search for one side of one coordinate may look at, at least 1. Beyond it the
-  bounds are wider, and `capped`. Up to 64 sign patterns count as one block. Data that are not made for it do not get there. */
+  /** Leaves of 32 observations that one search for one side of one coordinate may look at, 1 to 2^20. Beyond it the
+  bounds are wider, and `capped`. So they are beyond 64 sign patterns a leaf. Data not made for it do not get there. */
   int max_leaf_visits = 512;
   /** Up to this many blocks are scanned without a tree. */
   int max_flat_blocks = 32;
@@ -70,8 +70,6 @@ class LipschitzEnvelope final : public ResidualEnclosure {
                                                            const Observations& observations, int coordinate);
   void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
                    std::span<const double> domain_lower, std::span<const double> domain_upper) const;
-  void EncloseBaseline(const QuerySet& set, ResidualBounds& bounds) const noexcept;
-  void EncloseAvx2(const QuerySet& set, ResidualBounds& bounds) const noexcept;
 
   EnvelopeOptions options_;
   std::vector<Row> rows_;

@@ -21,6 +21,7 @@ namespace forereach::internal {
 
 using simd::kLanes;
 using simd::Pack;
+using simd::Same;
 
 inline constexpr std::size_t kMaxChunks = kMaxGenerators / kLanes;
 static_assert(kMaxGenerators % kLanes == 0, "the last eight of a row can be read");
@@ -70,7 +71,7 @@ class PatternMetric {
   /** @param margin not below twice the error of plain arithmetic in this row. */
   PatternMetric(const LipschitzRow& row, const QuerySet& set, double margin) {
     std::array<double, kColumns> weighted;
-    std::array<Pack, kColumns> slope;
+    std::array<Same, kColumns> slope;
     std::array<const double*, kColumns> generators;
     double slack = 0;
     for (std::size_t l = 0; l < kColumns; ++l) {
@@ -115,7 +116,8 @@ class PatternMetric {
     node += side * (2 * kPatterns + 1);
     Pack bound = simd::Load(node[2 * kPatterns]) + anywhere_;
     for (std::size_t s = 0; s < kPatterns; ++s)
-      bound = Min(bound, Min(simd::Load(node[2 * s]) + from_below_[s], simd::Load(node[2 * s + 1]) + from_above_[s]));
+      bound = Min(bound, Min(simd::Load(node[2 * s]) + from_below_[s],
+                             simd::Load(node[2 * s + 1]) + from_above_[s]));
     return bound;
   }
 
@@ -130,9 +132,9 @@ class PatternMetric {
   }
 
   double common_;
-  std::array<Pack, kPatterns> center_, extra_;
-  std::array<Pack, kPatterns> from_below_, from_above_;  // A_s - extra_s, -A_s - extra_s, and the margin
-  Pack anywhere_;                                        // the margin - max_s extra_s
+  std::array<Same, kPatterns> center_, extra_;           // A_s, w_s - w_0
+  std::array<Same, kPatterns> from_below_, from_above_;  // A_s - extra_s and -A_s - extra_s, plus the margin
+  Same anywhere_;                                        // the margin - max_s extra_s
 };
 
 /** d_i = sum_l L_kl |c_l - z_il| in any number of columns. */
@@ -148,7 +150,7 @@ class CenterDistance {
   [[nodiscard]] std::size_t columns() const { return columns_; }
   /** L_kl (c_l - z_il) of one observation. */
   [[nodiscard]] double Component(const Pack* block, std::size_t lane, std::size_t l) const {
-    return center_[l].low[0] - block[l].at(lane);
+    return center_[l].all[0] - block[l].at(lane);
   }
 
   [[nodiscard]] Pack Block(const Pack* block) const {
@@ -167,7 +169,7 @@ class CenterDistance {
 
  private:
   std::size_t columns_;
-  std::array<Pack, kMaxVariables> center_;
+  std::array<Same, kMaxVariables> center_;
 };
 
 /** Rows with too many columns for signs, over the interval hull: D_i = d_i + sum_l L_kl r_l, common = the sum. */
@@ -184,7 +186,7 @@ class HullMetric : public CenterDistance {
 
  private:
   double common_ = 0;
-  Pack margin_;
+  Same margin_;
 };
 
 /** Rows in between: Block and Node give d_i + a lower bound of the spreads w_s, which is not above D_i, and Refine gives
@@ -286,7 +288,7 @@ class SignMetric : public CenterDistance {
 
   std::size_t chunks_;
   double hull_ = 0, slack_ = 0;
-  Pack least_;
+  Same least_;
   std::array<double, kMaxColumns> reach_;
   std::array<std::array<Pack, kMaxChunks>, kMaxColumns> weighted_;
 };

@@ -52,6 +52,7 @@ class ObservationIndex final {
   /** K packs of coordinates, then one of values for each side. A lane without an entry has the value minus infinity; so
   have the blocks that fill up the last leaf. */
   [[nodiscard]] const simd::Pack* block(std::size_t b) const { return blocks_.data() + b * block_packs(); }
+  [[nodiscard]] const simd::Pack* leaf(std::size_t i) const { return block(i * kLeafBlocks); }
   [[nodiscard]] std::size_t block_packs() const { return num_coordinates_ + 2; }
   /** Eight ids, kNone in a lane without an entry. */
   [[nodiscard]] const std::uint32_t* ids(std::size_t b) const { return ids_.data() + b * simd::kLanes; }

@@ -41,7 +41,7 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
 template <class Metric>
 Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget& budget) {
   Sides best{-kInfinity, -kInfinity};
-  Pack floors = simd::Fill(-kInfinity), ceilings = floors;
+  Pack floors = simd::Fill(-kInfinity), ceilings = simd::Fill(-kInfinity);
   for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
     const Pack distance = metric.Block(block), floor = simd::Load(block[coordinates]), ceiling = simd::Load(block[coordinates + 1]);
     if constexpr (Metric::kRefines) {
@@ -69,40 +69,73 @@ double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinat
   return simd::Max(best, MaxLane(highest));
 }
 
-/** Depth first, the most promising child first. @param side 0 for the floors, 1 for the negated ceilings. */
+/** One side of an index, depth first, the most promising child first. In steps, so that two descents share the time
+that each would wait for its last comparison or for memory. */
 template <class Metric>
-double Descend(const Metric& metric, const ObservationIndex& index, std::size_t side, Budget& budget) {
+class Descent {
+ public:
+  /** @param side 0 for the floors, 1 for the negated ceilings. */
+  Descent(const Metric& metric, const ObservationIndex& index, std::size_t side, int max_leaves)
+      : metric_(metric), index_(index), side_(side), leaves_(max_leaves), level_(index.height() + 1) {}
+
+  /** Down to the parent of leaves, then to one leaf after the other, and up when nothing there can beat the best. False
+  when nothing is left to see, or nothing may be. */
+  bool Step(Budget& budget) {
+    if (level_ > 1) {
+      Level& at = levels_[static_cast<std::size_t>(--level_)];
+      at.bounds = TagLanes(metric_.Node(index_.node(level_, child_), side_));
+      at.first_child = child_ * kLanes;
+    } else {
+      best_ = BestOfLeaf(metric_, index_.leaf(child_), index_.num_coordinates(), side_, best_, budget);
+      --leaves_;
+    }
+    double next;
+    while (!((next = MaxLane(levels_[static_cast<std::size_t>(level_)].bounds)) > best_))
+      if (++level_ > index_.height()) return false;
+    budget.capped |= leaves_ == 0;
+    if (leaves_ == 0) return false;
+    Level& at = levels_[static_cast<std::size_t>(level_)];
+    at.bounds = Replace(at.bounds, next, -kMaxDouble);
+    child_ = at.first_child + simd::TaggedLane(next);
+    Prefetch();
+    return true;
+  }
+
+  [[nodiscard]] double best() const { return best_; }
+
+ private:
   struct Level {
     Pack bounds;  // of the children not yet visited
     std::size_t first_child;
   };
-  std::array<Level, ObservationIndex::kMaxHeight + 1> levels;
-  const std::size_t k = index.num_coordinates();
-  const int top = index.height();
-  double best = -kInfinity;
-  int leaves = budget.leaves;
-  std::size_t child = 0;
-  for (int level = top + 1;;) {
-    // Down to the parent of leaves, then to one leaf after the other, and up when nothing there can beat the best.
-    if (level > 1) {
-      Level& at = levels[static_cast<std::size_t>(--level)];
-      at.bounds = TagLanes(metric.Node(index.node(level, child), side));
-      at.first_child = child * kLanes;
+
+  void Prefetch() const {
+    if (level_ > 1) {
+      const Pack* node = index_.node(level_ - 1, child_);
+      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p) __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
     } else {
-      best = BestOfLeaf(metric, index.block(child * ObservationIndex::kLeafBlocks), k, side, best, budget);
-      --leaves;
+      const Pack* leaf = index_.leaf(child_);
+      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p) __builtin_prefetch(leaf + p);
     }
-    double next;
-    while (!((next = MaxLane(levels[static_cast<std::size_t>(level)].bounds)) > best))
-      if (++level > top) return best;
-    if (leaves == 0) {
-      budget.capped = true;
-      return best;
-    }
-    Level& at = levels[static_cast<std::size_t>(level)];
-    at.bounds = Replace(at.bounds, next, -kMaxDouble);
-    child = at.first_child + simd::TaggedLane(next);
   }
+
+  const Metric& metric_;
+  const ObservationIndex& index_;
+  const std::size_t side_;
+  int leaves_, level_;
+  std::size_t child_ = 0;
+  double best_ = -kInfinity;
+  std::array<Level, ObservationIndex::kMaxHeight + 1> levels_;
+};
+
+template <class Metric>
+Sides SearchTree(const Metric& metric, const ObservationIndex& index, Budget& budget) {
+  Descent<Metric> floors(metric, index, 0, budget.leaves), ceilings(metric, index, 1, budget.leaves);
+  for (bool more_floors = true, more_ceilings = true; more_floors || more_ceilings;) {
+    if (more_floors) more_floors = floors.Step(budget);
+    if (more_ceilings) more_ceilings = ceilings.Step(budget);
+  }
+  return {floors.best(), ceilings.best()};
 }
 
 }  // namespace forereach::internal
