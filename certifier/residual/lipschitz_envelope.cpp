@@ -32,21 +32,6 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
   }
 }
 
-ObservationIndex::Entries LipschitzEnvelope::EntriesOf(const LipschitzRow& row, const Declaration& declaration,
-                                                       const Observations& observations, int coordinate) {
-  const auto count = static_cast<std::size_t>(observations.size());
-  const double sigma = declaration.noise_bound[coordinate];
-  ObservationIndex::Entries entries{row.has_patterns() ? ObservationIndex::Shape::kLifted : ObservationIndex::Shape::kBoxed,
-                                    row.num_coordinates(), std::vector<double>(count * row.num_coordinates()), {}, {}};
-  for (int i = 0; i < observations.size(); ++i) {
-    row.Map([&](int l) { return observations.z(i, l); },
-            entries.coordinates.data() + static_cast<std::size_t>(i) * row.num_coordinates());
-    entries.floors.push_back(SubDown(observations.lower(i, coordinate), sigma));
-    entries.ceilings.push_back(AddUp(observations.upper(i, coordinate), sigma));
-  }
-  return entries;
-}
-
 // As the header says.
 void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
                                     std::span<const double> domain_lower, std::span<const double> domain_upper) const {

@@ -66,8 +66,6 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   };
   struct Search;
 
-  [[nodiscard]] static ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
-                                                           const Observations& observations, int coordinate);
   void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
                    std::span<const double> domain_lower, std::span<const double> domain_upper) const;
 

@@ -163,4 +163,20 @@ ObservationIndex::ObservationIndex(const Entries& entries)
   Builder(entries, *this);
 }
 
+ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration, const Observations& observations,
+                                    int coordinate) {
+  const auto count = static_cast<std::size_t>(observations.size());
+  const double sigma = declaration.noise_bound[coordinate];
+  using Shape = ObservationIndex::Shape;
+  ObservationIndex::Entries entries{row.has_patterns() ? Shape::kLifted : Shape::kBoxed,
+                                    row.num_coordinates(), std::vector<double>(count * row.num_coordinates()), {}, {}};
+  for (int i = 0; i < observations.size(); ++i) {
+    row.Map([&](int l) { return observations.z(i, l); },
+            entries.coordinates.data() + static_cast<std::size_t>(i) * row.num_coordinates());
+    entries.floors.push_back(SubDown(observations.lower(i, coordinate), sigma));
+    entries.ceilings.push_back(AddUp(observations.upper(i, coordinate), sigma));
+  }
+  return entries;
+}
+
 }  // namespace forereach

@@ -16,6 +16,8 @@ set-up O(K N log N), half a second for 10^6 entries in two coordinates. */
 #include <vector>
 
 #include "certifier/numerics/simd.h"
+#include "certifier/residual/lipschitz_row.h"
+#include "certifier/residual/observations.h"
 
 namespace forereach {
 
@@ -78,5 +80,9 @@ class ObservationIndex final {
   std::vector<std::uint32_t> ids_;
   std::vector<std::size_t> levels_;  // the first node of each level
 };
+
+/** Floors r~_ik - sigma_k and ceilings r~_ik + sigma_k, outward, with their coordinates in plain arithmetic. */
+[[nodiscard]] ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
+                                                  const Observations& observations, int coordinate);
 
 }  // namespace forereach
