@@ -142,13 +142,18 @@ class ObservationIndex::Builder {
     return index_.shape_ == Shape::kBoxed ? side : side * (2 * entries_.num_coordinates + 1) + 2 * entries_.num_coordinates;
   }
 
+  // Lowest coordinates are stored negated so far. A child that is not there becomes the box of the origin.
   void TurnLowestOver() {
     if (index_.shape_ != Shape::kBoxed) return;
     for (std::size_t first = 0; first < index_.nodes_.size(); first += index_.node_packs())
-      for (std::size_t c = 0; c < entries_.num_coordinates; ++c) {
-        Pack& lowest = index_.nodes_[first + 2 + 2 * c];
-        for (std::size_t lane = 0; lane < kLanes; ++lane) lowest.set(lane, -lowest.at(lane));
-      }
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        for (std::size_t c = 0; c < entries_.num_coordinates; ++c) {
+          Pack& lowest = index_.nodes_[first + 2 + 2 * c];
+          Pack& highest = index_.nodes_[first + 3 + 2 * c];
+          const bool there = highest.at(lane) != kNothing;
+          lowest.set(lane, there ? -lowest.at(lane) : 0);
+          if (!there) highest.set(lane, 0);
+        }
   }
 
   const Entries& entries_;

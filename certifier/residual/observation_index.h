@@ -40,7 +40,7 @@ class ObservationIndex final {
   };
 
   ObservationIndex() = default;
-  /** @pre between 1 and 2^32 - 2 entries. */
+  /** @pre between 1 and 2^32 - 2 entries, at least one coordinate. */
   explicit ObservationIndex(const Entries& entries);
 
   [[nodiscard]] std::size_t size() const { return size_; }
