@@ -35,6 +35,16 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   return *problem;
 }
 
+// The domain's box over z = (x, u) envelops every query.
+LipschitzEnvelope MakeEnvelope(const Problem& problem, const Observations& observations) {
+  const Box &state = problem.domain.state, &input = problem.domain.input;
+  Eigen::VectorXd lower(state.dim() + input.dim()), upper(lower.size());
+  lower << state.lower(), input.lower();
+  upper << state.upper(), input.upper();
+  const auto size = static_cast<std::size_t>(lower.size());
+  return LipschitzEnvelope(problem.declaration, observations, {lower.data(), size}, {upper.data(), size});
+}
+
 Decision Falsified(int step, int coordinate) {
   Decision decision;
   decision.outcome = Outcome::kFalsified;
@@ -87,7 +97,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       projection_(problem_->projection, problem_->model->num_states()),
       observations_(Observe(*problem_->model, problem_->transitions)),
       violation_(FindViolation(problem_->declaration, observations_)),
-      envelope_(problem_->declaration, observations_),
+      envelope_(MakeEnvelope(*problem_, observations_)),
       propagator_(*problem_->model, problem_->domain, envelope_, problem_->zonotope_order, problem_->method) {}
 
 void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
