@@ -42,7 +42,9 @@ LipschitzEnvelope MakeEnvelope(const Problem& problem, const Observations& obser
   lower << state.lower(), input.lower();
   upper << state.upper(), input.upper();
   const auto size = static_cast<std::size_t>(lower.size());
-  return LipschitzEnvelope(problem.declaration, observations, {lower.data(), size}, {upper.data(), size});
+  EnvelopeOptions options;
+  options.max_leaf_visits = problem.max_leaf_visits;
+  return LipschitzEnvelope(problem.declaration, observations, {lower.data(), size}, {upper.data(), size}, options);
 }
 
 Decision Falsified(int step, int coordinate) {
@@ -128,8 +130,9 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
   if (violation_) return Falsified(*violation_);
   const Decision stopped = Propagate(plan, tube);
-  if (stopped.outcome != Outcome::kNone) return stopped;
-  return JudgeSafety(obstacles, tube);
+  Decision decision = stopped.outcome == Outcome::kNone ? JudgeSafety(obstacles, tube) : stopped;
+  for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;
+  return decision;
 }
 
 Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {

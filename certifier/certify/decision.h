@@ -34,6 +34,9 @@ struct Decision {
   /** The value that decided and what it was held to. Certificate and S: proven distance from slice to the obstacle's
   core, and its radius (m). D: what the hull reaches, and the domain's bound. F: difference, and what L allows. */
   double margin = 0, threshold = 0;
+
+  /** Whether a search for the tightest observation met its cap: the tube is as sound, and may be wider than it need be. */
+  bool capped = false;
 };
 
 /** A fixed open-loop control sequence u_0 .. u_{T-1}, step by step in memory. Refers to numbers it does not own. */

@@ -55,9 +55,7 @@ std::string ExplainSafety(const Decision& decision) {
          Short(clearance) + " m from " + obstacle;
 }
 
-}  // namespace
-
-std::string Explain(const Decision& decision, const Problem& problem) {
+std::string Sentence(const Decision& decision, const Problem& problem) {
   const NominalModel& model = *problem.model;
   switch (decision.outcome) {
     case Outcome::kFalsified:
@@ -74,6 +72,12 @@ std::string Explain(const Decision& decision, const Problem& problem) {
       break;
   }
   return "no decision";
+}
+
+}  // namespace
+
+std::string Explain(const Decision& decision, const Problem& problem) {
+  return Sentence(decision, problem) + (decision.capped ? "; a search met max_leaf_visits" : "");
 }
 
 }  // namespace forereach

@@ -23,6 +23,7 @@ struct Problem {
   Transitions transitions;                    ///< D_N, all inside the domain
   Eigen::MatrixXd projection;                 ///< P, p-by-n
   Method method = Method::kCentred;           ///< How the nominal remainder is bounded
+  int max_leaf_visits = 512;                  ///< EnvelopeOptions: bounds the work of one search
   int zonotope_order = 5;                     ///< rho: at most rho * n generators after reduction
 };
 

@@ -60,6 +60,13 @@ FOREREACH_INLINE Lanes RowImage(const double* const* rows, std::size_t j, const 
   return sum;
 }
 
+/** Stores numbers four at a time, zeros behind the last. */
+template <std::size_t N>
+FOREREACH_INLINE void StoreAll(const double (&numbers)[N], double* to) {
+  const auto at = [&](std::size_t i) __attribute__((always_inline)) { return i < N ? numbers[i] : 0.0; };
+  for (std::size_t i = 0; i < N; i += kLaneCount) StoreLanes(Lanes{at(i), at(i + 1), at(i + 2), at(i + 3)}, to + i);
+}
+
 template <const Program& kProgram, std::size_t... K>
 FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice, Zonotope& next, ImageSums& sums,
                               std::index_sequence<K...>) {
@@ -68,7 +75,7 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
   std::array<Lanes, Program::kMaxFirst> factors;
   for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e) factors[e] = AllLanes(expansion.jacobian[e]);
   Lanes row_sums[sizeof...(K)] = {(static_cast<void>(K), AllLanes(0))...};
-  for (std::size_t j = 0; j < slice.padded_size(); j += kLanes) {
+  for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
     Lanes column_sum = AllLanes(0), largest = AllLanes(0);
     const auto row = [&]<std::size_t Row>(std::integral_constant<std::size_t, Row>) __attribute__((always_inline)) {
       const Lanes image = RowImage<kProgram, Row>(
@@ -81,9 +88,9 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
       largest = Max(largest, size);
     };
     (row(std::integral_constant<std::size_t, K>()), ...);
-    StoreLanes(ScoreColumns(column_sum, largest, j), &sums.scores[j]);
+    sums.scores.Set(j, column_sum, largest);
   }
-  ((sums.row[K] = Sum(row_sums[K])), ...);
+  StoreAll({Sum(row_sums[K])...}, sums.row.data());
 }
 
 /** What rounding and the slack before add to row k: an upper bound but for a relative 2^-44 of itself. */
@@ -110,7 +117,7 @@ FOREREACH_INLINE void Map(const Expansion& expansion, const ExpansionError& erro
                           const double* half_width, Zonotope& next, ImageSums& sums, std::index_sequence<K...> rows) {
   next.Reset(slice.dim(), slice.num_generators());
   MapRows<kProgram>(expansion, slice, next, sums, rows);
-  ((next.mutable_slack(static_cast<int>(K)) = RowSlack<kProgram, K>(expansion, error, slice, half_width)), ...);
+  StoreAll({RowSlack<kProgram, K>(expansion, error, slice, half_width)...}, next.mutable_slacks());
 }
 
 template <const Program& kProgram>

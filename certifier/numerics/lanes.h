@@ -10,7 +10,7 @@ abs and comparisons are used and sums are always taken in the same order. */
 
 namespace forereach {
 
-inline constexpr std::size_t kLanes = 4;
+inline constexpr std::size_t kLaneCount = 4;
 
 // Passing these between functions depends on the instruction set, so everything here is inlined.
 #if defined(__GNUC__) && !defined(__clang__)
@@ -22,8 +22,8 @@ using LaneMask [[gnu::vector_size(32)]] = std::int64_t;
 
 #define FOREREACH_INLINE [[gnu::always_inline]] inline
 
-/** Up to the next multiple of kLanes. */
-constexpr std::size_t PaddedToLanes(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
+/** Up to the next multiple of kLaneCount. */
+constexpr std::size_t PaddedToLanes(std::size_t count) { return (count + kLaneCount - 1) / kLaneCount * kLaneCount; }
 
 FOREREACH_INLINE Lanes LoadLanes(const double* from) {
   Lanes x;
@@ -36,6 +36,11 @@ FOREREACH_INLINE Lanes Abs(const Lanes& x) {
   return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
+/** Sets one of four doubles in memory. All four are written at once: a later load of all four need not wait for it. */
+FOREREACH_INLINE void StoreLane(std::size_t lane, double value, double* four) {
+  const auto chosen = static_cast<std::int64_t>(lane);
+  StoreLanes(LaneMask{0, 1, 2, 3} == LaneMask{chosen, chosen, chosen, chosen} ? AllLanes(value) : LoadLanes(four), four);
+}
 FOREREACH_INLINE double Sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
 
 /** What the hot functions outside of classes run on: the best there is, unless a test chooses. */

@@ -74,35 +74,37 @@ bool Domain::Contains(std::span<const double> z) const noexcept {
   return FindExit(*this, {point.data(), z.size()}).kind == DomainExit::Kind::kNone;
 }
 
-namespace {
+DomainTest::DomainTest(const Domain& domain)
+    : domain_(domain), size_(static_cast<std::size_t>(domain.state.dim() + domain.input.dim())) {
+  for (std::size_t l = 0; l < size_; ++l) {
+    lower_[l] = BoxLower(domain, static_cast<int>(l));
+    upper_[l] = BoxUpper(domain, static_cast<int>(l));
+  }
+}
 
 // By plain arithmetic with a margin above its rounding: true only if all constraints hold.
-bool LiesWellInside(const Domain& domain, std::span<const double> center, std::span<const double> half_width) noexcept {
+bool DomainTest::LiesWellInside(const double* center, const double* half_width) const noexcept {
   constexpr double kMargin = 0x1p-48;
-  const auto half = [&](std::size_t l) { return l < half_width.size() ? half_width[l] : 0; };
   bool inside = true;
-  for (std::size_t part = 0, l = 0; part < 2; ++part) {
-    const Box& box = part == 0 ? domain.state : domain.input;
-    for (Eigen::Index i = 0; i < box.dim(); ++i, ++l) {
-      const double reach = half(l) + kMargin * (std::abs(center[l]) + half(l));
-      inside &= (box.lower()[i] < center[l] - reach) & (center[l] + reach < box.upper()[i]);
-    }
+  for (std::size_t l = 0; l < size_; ++l) {
+    const double reach = half_width[l] + kMargin * (std::abs(center[l]) + half_width[l]);
+    inside &= (lower_[l] < center[l] - reach) & (center[l] + reach < upper_[l]);
   }
-  for (const auto& [coefficients, bound] : domain.inequalities) {
+  for (const auto& [coefficients, bound] : domain_.inequalities) {
     double value = 0, size = std::abs(bound);
-    for (std::size_t l = 0; l < center.size(); ++l) {
+    for (std::size_t l = 0; l < size_; ++l) {
       const double c = coefficients[static_cast<Eigen::Index>(l)];
-      value += c * center[l] + std::abs(c) * half(l);
-      size += std::abs(c) * (std::abs(center[l]) + half(l));
+      value += c * center[l] + std::abs(c) * half_width[l];
+      size += std::abs(c) * (std::abs(center[l]) + half_width[l]);
     }
     inside &= value + kMargin * size < bound;
   }
-  for (const auto& [coordinates, ball_center, radius] : domain.balls) {
+  for (const auto& [coordinates, ball_center, radius] : domain_.balls) {
     double square = 0;
     for (std::size_t i = 0; i < coordinates.size(); ++i) {
       const auto l = static_cast<std::size_t>(coordinates[i]);
       const double middle = ball_center[static_cast<Eigen::Index>(i)];
-      const double reach = std::abs(center[l] - middle) + half(l) + kMargin * (std::abs(center[l]) + std::abs(middle));
+      const double reach = std::abs(center[l] - middle) + half_width[l] + kMargin * (std::abs(center[l]) + std::abs(middle));
       square += reach * reach;
     }
     inside &= square * (1 + kMargin) < radius * radius * (1 - kMargin);
@@ -110,16 +112,12 @@ bool LiesWellInside(const Domain& domain, std::span<const double> center, std::s
   return inside;
 }
 
-}  // namespace
-
-DomainExit FindExit(const Domain& domain, std::span<const double> center, std::span<const double> half_width) noexcept {
-  if (LiesWellInside(domain, center, half_width)) return {};
+DomainExit DomainTest::FindExit(const double* center, const double* half_width) const noexcept {
+  if (LiesWellInside(center, half_width)) return {};
   std::array<Interval, kMaxVariables> box;
-  for (std::size_t l = 0; l < center.size(); ++l) {
-    const double half = l < half_width.size() ? half_width[l] : 0;
-    box[l] = {SubDown(center[l], half), AddUp(center[l], half)};
-  }
-  return FindExit(domain, {box.data(), center.size()});
+  for (std::size_t l = 0; l < size_; ++l)
+    box[l] = {SubDown(center[l], half_width[l]), AddUp(center[l], half_width[l])};
+  return forereach::FindExit(domain_, {box.data(), size_});
 }
 
 DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept {

@@ -1,12 +1,14 @@
 /** The certification domain Z_cert: where the declaration and the nominal enclosure hold. Closed and convex. */
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "certifier/numerics/interval.h"
+#include "certifier/numerics/limits.h"
 #include "certifier/sets/box.h"
 
 namespace forereach {
@@ -49,9 +51,22 @@ that is met exactly is inside, for a ball where the squares of radius and distan
 rounding error short of that. NaN is outside. Cost O(d_z) a constraint. */
 [[nodiscard]] DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept;
 
-/** The same of the box {z : |z - center| <= half_width}; entries of half_width that are missing are 0. A box that lies
-inside by a margin is found so in plain arithmetic. */
-[[nodiscard]] DomainExit FindExit(const Domain& domain, std::span<const double> center,
-                                  std::span<const double> half_width) noexcept;
+/** The domain in a form that is quick to test against. */
+class DomainTest final {
+ public:
+  /** @param domain outlives the test. */
+  explicit DomainTest(const Domain& domain);
+
+  /** FindExit for the box {z : |z - center| <= half_width}: one that lies inside by a margin is found so in plain
+  arithmetic. d_z entries each. */
+  [[nodiscard]] DomainExit FindExit(const double* center, const double* half_width) const noexcept;
+
+ private:
+  [[nodiscard]] bool LiesWellInside(const double* center, const double* half_width) const noexcept;
+
+  const Domain& domain_;
+  std::size_t size_;
+  std::array<double, kMaxVariables> lower_, upper_;
+};
 
 }  // namespace forereach

@@ -44,7 +44,7 @@ void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept 
   for (int k = 0; k < slice.dim(); ++k) {
     const std::span<const double> row = slice.padded_row(k);
     Lanes sum = AllLanes(0);
-    for (std::size_t j = 0; j < row.size(); j += kLanes) sum += Abs(LoadLanes(&row[j]));
+    for (std::size_t j = 0; j < row.size(); j += kLaneCount) sum += Abs(LoadLanes(&row[j]));
     half_width[k] = (Sum(sum) + slice.slack(k)) * inflation;
   }
 }
@@ -77,16 +77,20 @@ StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input
   using Status = StepResult::Status;
   const auto n = static_cast<std::size_t>(slice.dim()), variables = n + input.size();
   const double* half_width = record.half_width.data();
-  std::array<double, kMaxVariables> center;
+  std::array<double, kMaxVariables> center, reach;
   std::array<PlainInterval, kMaxVariables> hull;
   for (std::size_t l = 0; l < n; ++l) {
     center[l] = slice.center(static_cast<int>(l));
+    reach[l] = half_width[l];
     hull[l] = {center[l] - half_width[l], center[l] + half_width[l]};
   }
-  for (std::size_t l = n; l < variables; ++l) hull[l] = {center[l] = input[l - n], input[l - n]};
+  for (std::size_t l = n; l < variables; ++l) {
+    center[l] = input[l - n];
+    reach[l] = 0;
+    hull[l] = {center[l], center[l]};
+  }
 
-  if (const DomainExit exit = FindExit(domain_, {center.data(), variables}, {half_width, n});
-      exit.kind != DomainExit::Kind::kNone)
+  if (const DomainExit exit = domain_.FindExit(center.data(), reach.data()); exit.kind != DomainExit::Kind::kNone)
     return {Status::kDomainExit, exit, -1};
   if (plain_) {
     Expansion expansion;
@@ -95,6 +99,59 @@ StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input
   }
   return StepByIntervals(slice, input, {center.data(), variables}, {hull.data(), variables}, record, next, next_half_width);
 }
+
+namespace {
+
+// Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
+// no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
+FOREREACH_INLINE bool JoinLanes(const Expansion& expansion, const ExpansionError& error, const StepRecord& record,
+                                const ImageSums& sums, Zonotope& next, double* residual_half_width,
+                                double* next_half_width) noexcept {
+  const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
+  const auto n = static_cast<std::size_t>(next.dim());
+  std::array<double, kMaxStates> good;
+  for (std::size_t k = 0; k < n; k += kLaneCount) {
+    const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
+    const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
+    const Lanes half = (upper - lower) * AllLanes(0.5);
+    const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
+    const Lanes added = Abs(lower) + Abs(upper) + Abs(moved);
+    const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kTiny);
+    const Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
+                         (added > AllLanes(0) ? rounding : AllLanes(0))) * AllLanes(1 + kRelative);
+    const Lanes hull = (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
+    StoreLanes(half, residual_half_width + k);
+    StoreLanes(center, next.mutable_centers() + k);
+    StoreLanes(slack, next.mutable_slacks() + k);
+    StoreLanes(hull, next_half_width + k);
+    StoreLanes(Abs(center) + hull < AllLanes(kInfinity) && lower <= upper ? AllLanes(1) : AllLanes(0), &good[k]);
+  }
+  return std::all_of(good.begin(), good.begin() + n, [](double x) { return x == 1; });
+}
+
+FOREREACH_AVX2 bool JoinAvx2(const Expansion& expansion, const ExpansionError& error, const StepRecord& record,
+                             const ImageSums& sums, Zonotope& next, double* residual_half_width,
+                             double* next_half_width) noexcept {
+  return JoinLanes(expansion, error, record, sums, next, residual_half_width, next_half_width);
+}
+FOREREACH_FLATTEN bool JoinBaseline(const Expansion& expansion, const ExpansionError& error, const StepRecord& record,
+                                    const ImageSums& sums, Zonotope& next, double* residual_half_width,
+                                    double* next_half_width) noexcept {
+  return JoinLanes(expansion, error, record, sums, next, residual_half_width, next_half_width);
+}
+
+// Why the successor could not be joined.
+StepResult Failed(const StepRecord& record, const Zonotope& next, const double* next_half_width) noexcept {
+  using Status = StepResult::Status;
+  for (int k = 0; k < next.dim(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (record.envelope.lower[i] > record.envelope.upper[i]) return {Status::kInconsistent, {}, k};
+    if (!(std::abs(next.center(k)) + next_half_width[i] < kInfinity)) return {Status::kNoFiniteEnclosure, {}, k};
+  }
+  return {Status::kNoFiniteEnclosure, {}, 0};
+}
+
+}  // namespace
 
 StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const double> input,
                                        std::span<const double> center, std::span<const PlainInterval> hull,
@@ -118,24 +175,10 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
   ImageSums sums;
   model_.Map(expansion, error, slice, half_width, next, sums);
-  // Above the rounding of a sum of all generators, twice.
-  const double inflation = 1 + (4.0 * slice.num_generators() + 64) * kUnitRoundoff;
   std::array<double, kMaxStates> residual_half_width;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double lower = record.envelope.lower[k], upper = record.envelope.upper[k];
-    if (lower > upper) return {Status::kInconsistent, {}, static_cast<int>(k)};
-    const double middle = (lower + upper) / 2, moved = record.remainder.center[k];
-    const double next_center = expansion.value[k] + (middle + moved);
-    residual_half_width[k] = (upper - lower) / 2;
-    // The middles, half-widths and the center itself are rounded.
-    const double size = std::abs(expansion.value[k]) + std::abs(lower) + std::abs(upper) + std::abs(moved);
-    const double rounding = lower == 0 && upper == 0 && moved == 0 ? 0 : 4 * kUnitRoundoff * size + kTiny;
-    double& slack = next.mutable_slack(static_cast<int>(k));
-    slack = (slack + error.value[k] + rounding) * (1 + kRelative);
-    next.mutable_center(static_cast<int>(k)) = next_center;
-    next_half_width[k] = (sums.row[k] + record.remainder.half_width[k] + residual_half_width[k] + slack) * inflation;
-    if (!std::isfinite(next_center + next_half_width[k])) return {Status::kNoFiniteEnclosure, {}, static_cast<int>(k)};
-  }
+  const auto join = active_instruction_set == InstructionSet::kAvx2 ? JoinAvx2 : JoinBaseline;
+  if (!join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))
+    return Failed(record, next, next_half_width);
   AppendAndReduce(next, sums.scores, {record.remainder.half_width.data(), n}, {residual_half_width.data(), n}, order_);
   return {};
 }

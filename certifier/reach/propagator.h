@@ -67,7 +67,7 @@ class Propagator final {
                                    const ExpansionError& error, StepRecord& record, Zonotope& next,
                                    double* next_half_width) const noexcept;
   const NominalModel& model_;
-  const Domain& domain_;
+  DomainTest domain_;
   const ResidualEnclosure& residual_;
   int order_;
   RemainderBound remainder_;

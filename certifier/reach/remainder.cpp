@@ -37,7 +37,7 @@ FOREREACH_INLINE ProductRange MixedProduct(const Zonotope& slice, std::size_t i,
   const double* g_i = slice.padded_row(static_cast<int>(i)).data();
   const double* g_l = slice.padded_row(static_cast<int>(l)).data();
   Lanes sum = AllLanes(0), difference = AllLanes(0);
-  for (std::size_t j = 0; j < slice.padded_size(); j += kLanes) {
+  for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
     const Lanes a = LoadLanes(g_i + j) * AllLanes(r_l), b = LoadLanes(g_l + j) * AllLanes(r_i);
     sum += Abs(a + b);
     difference += Abs(a - b);

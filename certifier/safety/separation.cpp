@@ -11,6 +11,35 @@ namespace {
 
 using Vector = Eigen::Vector3d;  // unused coordinates are zero
 
+// The dual bound along a direction of unit length up to rounding, in plain arithmetic less a margin above its rounding.
+double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
+  constexpr double kMargin = 0x1p-45, kTiny = 0x1p-1000;
+  const auto p = static_cast<std::size_t>(slice.dim());
+  double core = kInfinity, size = kTiny;
+  for (const Vector& point : obstacle.hull()) core = std::min(core, d.dot(point));
+  alignas(32) std::array<double, kMaxGenerators> along;
+  std::fill_n(along.begin(), slice.padded_size(), 0.0);
+  double spread = 0, center = 0;
+  for (std::size_t k = 0; k < p; ++k) {
+    const int i = static_cast<int>(k);
+    const double* row = slice.padded_row(i).data();
+    Lanes sum = AllLanes(0);
+    for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
+      const Lanes part = AllLanes(d[i]) * LoadLanes(row + j);
+      StoreLanes(LoadLanes(&along[j]) + part, &along[j]);
+      sum += Abs(part);
+    }
+    center += d[i] * slice.center(i);
+    spread += std::abs(d[i]) * slice.slack(i);
+    size += std::abs(d[i]) * (std::abs(slice.center(i)) + std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i])) + Sum(sum);
+  }
+  Lanes sum = AllLanes(0);
+  for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) sum += Abs(LoadLanes(&along[j]));
+  spread += Sum(sum);
+  const double gap = core - center - spread - kMargin * size;
+  return gap > 0 && gap < kInfinity ? gap * (1 - kMargin) : -kInfinity;
+}
+
 // The dual bound along d, rounded against us.
 double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
   const auto p = static_cast<std::size_t>(slice.dim());
@@ -68,7 +97,7 @@ class Search {
       if (const Vector other = point - center_; d.dot(other) < d.dot(lowest)) lowest = other;
     const double *x = slice_.padded_row(0).data(), *y = slice_.padded_row(1).data();
     Lanes far_x = AllLanes(0), far_y = AllLanes(0), spread = AllLanes(0);
-    for (std::size_t j = 0; j < slice_.padded_size(); j += kLanes) {
+    for (std::size_t j = 0; j < slice_.padded_size(); j += kLaneCount) {
       const Lanes g_x = LoadLanes(x + j), g_y = LoadLanes(y + j);
       const Lanes along = AllLanes(d.x()) * g_x + AllLanes(d.y()) * g_y;
       far_x += along < AllLanes(0) ? -g_x : g_x;
@@ -230,7 +259,10 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
 }
 
 Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  return {DistanceLower(slice, obstacle, BestDirection(slice, obstacle)), obstacle.radius()};
+  const Vector direction = BestDirection(slice, obstacle);
+  if (obstacle.kind() != Obstacle::Kind::kHalfSpace)  // other directions have unit length
+    if (const Separation plain{PlainDistanceLower(slice, obstacle, direction), obstacle.radius()}; plain.IsProven()) return plain;
+  return {DistanceLower(slice, obstacle, direction), obstacle.radius()};
 }
 
 }  // namespace forereach

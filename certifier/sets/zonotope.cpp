@@ -21,13 +21,15 @@ void RequireShape(Eigen::Index center, Eigen::Index rows, Eigen::Index columns) 
 
 // An upper bound on start + sum |g| of a padded row. Zeros add no rounding error, so a single entry is summed exactly.
 double AbsoluteSumUpper(std::span<const double> padded, double start) {
-  Lanes sum = AllLanes(0), nonzero = AllLanes(0);
-  for (std::size_t j = 0; j < padded.size(); j += kLanes) {
+  Lanes sum = AllLanes(0);
+  LaneMask nonzero{};
+  for (std::size_t j = 0; j < padded.size(); j += kLaneCount) {
     const Lanes size = Abs(LoadLanes(&padded[j]));
     sum += size;
-    nonzero += size > AllLanes(0) ? AllLanes(1) : AllLanes(0);
+    nonzero -= size > AllLanes(0);
   }
-  return SumUpper(Sum(sum) + start, static_cast<int>(Sum(nonzero)) + (start != 0));
+  const auto terms = static_cast<int>((nonzero[0] + nonzero[1]) + (nonzero[2] + nonzero[3])) + (start != 0);
+  return SumUpper(Sum(sum) + start, terms);
 }
 
 }  // namespace
@@ -107,18 +109,29 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
 
 void Zonotope::AppendAxis(int k, double length) noexcept {
   if (length == 0) return;
-  const auto j = static_cast<std::size_t>(num_generators_++);
-  for (int i = 0; i < dim_; ++i) {
-    double* row = mutable_row(i);
-    if (j % kLanes == 0) StoreLanes(AllLanes(0), row + j);
-    if (i == k) row[j] = length;
-  }
+  const auto j = static_cast<std::size_t>(num_generators_++), lane = j % kLaneCount;
+  if (lane == 0)
+    for (int i = 0; i < dim_; ++i) StoreLanes(AllLanes(0), mutable_row(i) + j);
+  StoreLane(lane, length, mutable_row(k) + (j - lane));
 }
 
 void Zonotope::Truncate(int num_generators) noexcept {
+  if (num_generators == num_generators_) return;
   for (int k = 0; k < dim_; ++k)
     std::fill(mutable_row(k) + num_generators, mutable_row(k) + padded_size(), 0.0);
   num_generators_ = num_generators;
+}
+
+void Zonotope::FillPlaces(std::array<std::uint64_t, 2> empty) noexcept {
+  int columns = num_generators_;
+  const auto is_empty = [&](int j) { return (empty[static_cast<std::size_t>(j / 64)] >> j % 64 & 1) != 0; };
+  for (int j = 0; (empty[0] | empty[1]) != 0 && j < columns; ++j) {
+    if (!is_empty(j)) continue;
+    do --columns;
+    while (columns > j && is_empty(columns));
+    for (int k = 0; k < dim_; ++k) mutable_row(k)[j] = mutable_row(k)[columns];
+  }
+  Truncate(columns);
 }
 
 void Zonotope::Assign(const Zonotope& other) noexcept {
@@ -131,75 +144,86 @@ void Zonotope::Assign(const Zonotope& other) noexcept {
 
 namespace {
 
-using ColumnMask = std::array<double, kMaxGenerators>;  // bits
-constexpr std::size_t kLastLanes = kMaxGenerators - kLanes;
+constexpr std::size_t kLastLanes = kMaxGenerators - kLaneCount;
 
 // By plain arithmetic: it only chooses what to keep.
 FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
-  for (std::size_t j = 0; j < set.padded_size(); j += kLanes) {
+  for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
     Lanes sum = AllLanes(0), largest = AllLanes(0);
     for (int k = 0; k < set.dim(); ++k) {
       const Lanes size = Abs(LoadLanes(&set.padded_row(k)[j]));
       sum += size;
       largest = Max(largest, size);
     }
-    StoreLanes(ScoreColumns(sum, largest, j), &scores[j]);
+    scores.Set(j, sum, largest);
   }
 }
 
-// All bits set in each column that is not among the `keep` largest scores. In groups of four times four columns, each
-// compared with every column.
-FOREREACH_INLINE void MarkDropped(const ColumnScores& scores, std::size_t count, int keep, ColumnMask& dropped) {
+// Which columns are dropped: all bits of the doubles, and one bit of `words` each.
+struct Dropped {
+  std::array<double, kMaxGenerators> masks;
+  std::array<std::uint64_t, 2> words{};
+
+  FOREREACH_INLINE void Set(std::size_t first, const LaneMask& dropped) {
+    StoreLanes(std::bit_cast<Lanes>(dropped), &masks[first]);
+    const LaneMask bits = dropped & LaneMask{1, 2, 4, 8};
+    words[first / 64] |= static_cast<std::uint64_t>((bits[0] | bits[1]) | (bits[2] | bits[3])) << first % 64;
+  }
+};
+
+// Drops the columns that are not among the `keep` largest scores. In groups of four times four columns, each compared
+// with every column; behind the last column nothing is dropped.
+FOREREACH_INLINE void MarkDropped(const double* scores, std::size_t count, int keep, Dropped& dropped) {
   constexpr std::size_t kGroup = 4;
-  const std::int64_t limit = keep;
-  const LaneMask limits{limit, limit, limit, limit};
-  for (std::size_t first = 0; first < count; first += kGroup * kLanes) {
+  const auto limit = static_cast<std::int64_t>(keep), end = static_cast<std::int64_t>(count);
+  for (std::size_t first = 0; first < count; first += kGroup * kLaneCount) {
     Lanes score[kGroup];
-    LaneMask larger[kGroup] = {};  // minus how many lie above
-    for (std::size_t g = 0; g < kGroup; ++g) score[g] = LoadLanes(&scores[std::min(first + g * kLanes, kLastLanes)]);
+    LaneMask larger[kGroup];  // minus how many lie above
+    for (std::size_t g = 0; g < kGroup; ++g) {
+      score[g] = LoadLanes(&scores[std::min(first + g * kLaneCount, kLastLanes)]);
+      larger[g] = LaneMask{};
+    }
     for (std::size_t i = 0; i < count; ++i) {
       const Lanes other = AllLanes(scores[i]);
       for (std::size_t g = 0; g < kGroup; ++g) larger[g] += other > score[g];
     }
-    for (std::size_t g = 0; g < kGroup && first + g * kLanes < count; ++g)
-      StoreLanes(std::bit_cast<Lanes>((score[g] < AllLanes(0)) | (-larger[g] >= limits)), &dropped[first + g * kLanes]);
+    for (std::size_t g = 0; g < kGroup && first + g * kLaneCount < count; ++g) {
+      const auto j = static_cast<std::int64_t>(first + g * kLaneCount);
+      const LaneMask exists = LaneMask{j, j + 1, j + 2, j + 3} < LaneMask{end, end, end, end};
+      const LaneMask low = (score[g] < AllLanes(0)) | (-larger[g] >= LaneMask{limit, limit, limit, limit});
+      dropped.Set(first + g * kLaneCount, low & exists);
+    }
   }
 }
 
 // Puts the columns of the `keep` largest scores and the box around the others, plus `boxed`, into the set. The box's
 // columns take the places of those that were dropped.
 FOREREACH_INLINE void KeepLargest(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
-  ColumnMask dropped;
+  Dropped dropped;
   const std::size_t padded = set.padded_size();
-  MarkDropped(scores, static_cast<std::size_t>(set.num_generators()), keep, dropped);
+  MarkDropped(scores.data(), static_cast<std::size_t>(set.num_generators()), keep, dropped);
   for (int k = 0; k < set.dim(); ++k) {
     double* row = set.mutable_row(k);
     Lanes sum = AllLanes(0);
-    for (std::size_t j = 0; j < padded; j += kLanes) {
-      const LaneMask mask = std::bit_cast<LaneMask>(LoadLanes(&dropped[j])), bits = std::bit_cast<LaneMask>(LoadLanes(row + j));
+    for (std::size_t j = 0; j < padded; j += kLaneCount) {
+      const LaneMask mask = std::bit_cast<LaneMask>(LoadLanes(&dropped.masks[j]));
+      const LaneMask bits = std::bit_cast<LaneMask>(LoadLanes(row + j));
       sum += Abs(std::bit_cast<Lanes>(bits & mask));
       StoreLanes(std::bit_cast<Lanes>(bits & ~mask), row + j);
     }
     boxed[k] = (Sum(sum) + boxed[k]) * inflation;
   }
-  int axis = 0, columns = set.num_generators();
-  const auto next_axis = [&] {
-    while (axis < set.dim() && boxed[axis] == 0) ++axis;
-    return axis < set.dim();
-  };
-  for (int j = 0; j < columns; ++j) {
-    if (std::bit_cast<std::int64_t>(dropped[static_cast<std::size_t>(j)]) == 0) continue;
-    if (next_axis()) {
-      set.mutable_row(axis)[j] = boxed[axis];
+  int axis = 0;
+  for (std::size_t word = 0; word < 2; ++word)
+    for (std::uint64_t& places = dropped.words[word]; places != 0; places &= places - 1) {
+      while (axis < set.dim() && boxed[axis] == 0) ++axis;
+      if (axis == set.dim()) break;
+      const std::size_t j = 64 * word + static_cast<std::size_t>(std::countr_zero(places)), lane = j % kLaneCount;
+      StoreLane(lane, boxed[axis], set.mutable_row(axis) + (j - lane));
       ++axis;
-    } else {  // no box left for this place: the last column comes here
-      do --columns;
-      while (columns > j && std::bit_cast<std::int64_t>(dropped[static_cast<std::size_t>(columns)]) != 0);
-      for (int k = 0; k < set.dim() && columns > j; ++k) set.mutable_row(k)[j] = set.mutable_row(k)[columns];
     }
-  }
-  set.Truncate(columns);
-  for (; next_axis(); ++axis) set.AppendAxis(axis, boxed[axis]);
+  set.FillPlaces(dropped.words);
+  for (; axis < set.dim(); ++axis) set.AppendAxis(axis, boxed[axis]);
 }
 
 FOREREACH_AVX2 void KeepLargestAvx2(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
@@ -208,18 +232,6 @@ FOREREACH_AVX2 void KeepLargestAvx2(Zonotope& set, int keep, const ColumnScores&
 FOREREACH_FLATTEN void KeepLargestBaseline(Zonotope& set, int keep, const ColumnScores& scores, double inflation,
                                            double* boxed) {
   KeepLargest(set, keep, scores, inflation, boxed);
-}
-
-int CountNonzero(std::span<const double> lengths) {
-  int count = 0;
-  for (const double length : lengths) count += length != 0;
-  return count;
-}
-
-int CountZeroColumns(const Zonotope& set, const ColumnScores& scores) {
-  int count = 0;
-  for (std::size_t j = 0; j < static_cast<std::size_t>(set.num_generators()); ++j) count += scores[j] < 0;
-  return count;
 }
 
 }  // namespace
@@ -232,33 +244,37 @@ void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<con
 
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
                      std::span<const double> second, int order) noexcept {
-  const int n = set.dim(), axes = CountNonzero(first) + CountNonzero(second), keep = (order - 1) * n;
-  int columns = set.num_generators();
-  if (columns + axes > order * n) columns -= CountZeroColumns(set, scores);
-  const bool reduces = columns + axes > order * n;
-  // Axis-aligned generators that remain generators of their own: their score is 0, and they come last.
-  int still_kept = reduces ? std::max(0, keep - columns) : kMaxGenerators;
-  std::array<double, kMaxStates> boxed;
-  std::fill_n(boxed.begin(), n, 0.0);
-  std::array<int, 2 * kMaxStates> kept_axes;
-  std::array<double, 2 * kMaxStates> kept_lengths;
-  std::size_t num_kept = 0;
+  struct Axis {
+    int coordinate;
+    double length;
+  };
+  const int n = set.dim(), keep = (order - 1) * n;
+  std::array<Axis, 2 * kMaxStates> axes;
+  int num_axes = 0;
   for (const std::span<const double> lengths : {first, second})
-    for (std::size_t k = 0; k < lengths.size(); ++k) {
-      if (lengths[k] == 0) continue;
-      if (still_kept-- > 0) {
-        kept_axes[num_kept] = static_cast<int>(k);
-        kept_lengths[num_kept++] = lengths[k];
-      } else {
-        boxed[k] += lengths[k];
-      }
+    for (int k = 0; k < static_cast<int>(lengths.size()); ++k) {
+      const double length = lengths[static_cast<std::size_t>(k)];
+      axes[static_cast<std::size_t>(num_axes)] = {k, length};
+      num_axes += length != 0;
     }
+  const bool over = set.num_generators() + num_axes > order * n;
+  const int columns = over ? scores.num_nonzero() : set.num_generators();
+  const bool reduces = columns + num_axes > order * n;
+  // Axis-aligned generators that remain generators of their own: their score is 0, and they come last.
+  const int kept_axes = reduces ? std::clamp(keep - columns, 0, num_axes) : num_axes;
   if (reduces || columns < set.num_generators()) {
+    std::array<double, kMaxStates> boxed;
+    std::fill_n(boxed.begin(), n, 0.0);
+    for (int i = kept_axes; i < num_axes; ++i) {
+      const auto& [coordinate, length] = axes[static_cast<std::size_t>(i)];
+      boxed[static_cast<std::size_t>(coordinate)] += length;
+    }
     const double inflation = 1 + (2.0 * set.num_generators() + 8) * kUnitRoundoff;
     const auto keep_largest = active_instruction_set == InstructionSet::kAvx2 ? KeepLargestAvx2 : KeepLargestBaseline;
     keep_largest(set, reduces ? keep : columns, scores, inflation, boxed.data());
   }
-  for (std::size_t i = 0; i < num_kept; ++i) set.AppendAxis(kept_axes[i], kept_lengths[i]);
+  for (int i = 0; i < kept_axes; ++i)
+    set.AppendAxis(axes[static_cast<std::size_t>(i)].coordinate, axes[static_cast<std::size_t>(i)].length);
 }
 
 }  // namespace forereach

@@ -5,12 +5,13 @@ The box s, the slack, holds what rounding may have added. It is kept apart so th
 generators nor push a real one out when the order is reduced; a set that was never rounded has none.
 
 A value of fixed capacity: no heap, trivially copyable, so the certify step can work on it in place. Row k of G, the
-part of every generator in coordinate k, is contiguous and ends in zeros up to a multiple of kLanes: a sum over
+part of every generator in coordinate k, is contiguous and ends in zeros up to a multiple of kLaneCount: a sum over
 generators runs along memory, four at a time. */
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include <Eigen/Core>
@@ -63,7 +64,7 @@ class Zonotope final {
   [[nodiscard]] std::span<const double> padded_row(int k) const {
     return {rows_[static_cast<std::size_t>(k)].data(), padded_size()};
   }
-  /** num_generators() up to a multiple of kLanes. */
+  /** num_generators() up to a multiple of kLaneCount. */
   [[nodiscard]] std::size_t padded_size() const { return PaddedToLanes(static_cast<std::size_t>(num_generators_)); }
 
   /** @name In-place construction, for the kernels that own the set. No checks. */
@@ -72,14 +73,19 @@ class Zonotope final {
   void Reset(int dim, int num_generators) {
     dim_ = dim;
     num_generators_ = num_generators;
-    slack_.fill(0);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(dim); ++k) slack_[k] = 0;
   }
   /** Forgets the last generators. */
   void Truncate(int num_generators) noexcept;
+  /** Moves the last generators to the places whose bits are set, which hold zeros: bit j % 64 of word j / 64. */
+  void FillPlaces(std::array<std::uint64_t, 2> empty) noexcept;
   /** Copies what is in use of another set, some 2 kB where the whole value has 15. */
   void Assign(const Zonotope& other) noexcept;
   [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
+  /** kMaxStates entries each, of which dim() count. */
+  [[nodiscard]] double* mutable_slacks() { return slack_.data(); }
+  [[nodiscard]] double* mutable_centers() { return center_.data(); }
   [[nodiscard]] double* mutable_row(int k) { return rows_[static_cast<std::size_t>(k)].data(); }
   /** Appends length * e_k unless length is zero. */
   void AppendAxis(int k, double length) noexcept;
@@ -89,7 +95,7 @@ class Zonotope final {
   int dim_ = 0, num_generators_ = 0;
   std::array<double, kMaxStates> center_, slack_;
   alignas(32) std::array<std::array<double, kMaxGenerators>, kMaxStates> rows_;
-  static_assert(kMaxGenerators % kLanes == 0);
+  static_assert(kMaxGenerators % kLaneCount == 0);
 };
 
 /** Appends the axis-aligned generators first_k e_k, then second_k e_k, those that are not zero, and reduces the order as
@@ -98,16 +104,29 @@ largest |g|_1 - |g|_inf (ties, to 45 bits: the earlier) and encloses the rest in
 are dropped. The slack stays. The result contains the set with all generators. Cost O(n m + m^2), m generators. */
 void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept;
 
-/** The scores |g|_1 - |g|_inf of all columns, made unique: four at a time, from the sum and the largest of the columns'
-absolute values. The index takes the last bits, so that no two are equal and the earlier of equals is the larger. -1 for
-zero columns. */
-using ColumnScores = std::array<double, kMaxGenerators>;
-FOREREACH_INLINE Lanes ScoreColumns(const Lanes& sum, const Lanes& largest, std::size_t first_column) {
-  const auto index = static_cast<std::int64_t>(kMaxGenerators - first_column);
-  const LaneMask bits = (std::bit_cast<LaneMask>(sum - largest) & ~LaneMask{127, 127, 127, 127}) |
-                        LaneMask{index, index - 1, index - 2, index - 3};
-  return largest > AllLanes(0) ? std::bit_cast<Lanes>(bits) : AllLanes(-1);
-}
+/** The scores |g|_1 - |g|_inf of all columns, made unique: the index takes the last bits, so that no two are equal and
+the earlier of equals is the larger. -1 for zero columns. */
+class ColumnScores {
+ public:
+  /** Sets four, from the sums and the largest of the columns' absolute values. */
+  FOREREACH_INLINE void Set(std::size_t first_column, const Lanes& sum, const Lanes& largest) {
+    const auto index = static_cast<std::int64_t>(kMaxGenerators - first_column);
+    const LaneMask bits = (std::bit_cast<LaneMask>(sum - largest) & ~LaneMask{127, 127, 127, 127}) |
+                          LaneMask{index, index - 1, index - 2, index - 3};
+    const LaneMask nonzero = largest > AllLanes(0);
+    nonzero_ -= nonzero;
+    StoreLanes(std::bit_cast<Lanes>((bits & nonzero) | (std::bit_cast<LaneMask>(AllLanes(-1)) & ~nonzero)),
+               &scores_[first_column]);
+  }
+  [[nodiscard]] const double* data() const { return scores_.data(); }
+  [[nodiscard]] int num_nonzero() const {
+    return static_cast<int>((nonzero_[0] + nonzero_[1]) + (nonzero_[2] + nonzero_[3]));
+  }
+
+ private:
+  LaneMask nonzero_{};
+  std::array<double, kMaxGenerators> scores_;
+};
 
 /** The same where the scores of the set's columns are known already. */
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,

@@ -319,6 +319,8 @@ std::shared_ptr<const Problem> ReadProblem(Document& file, TransitionsFile trans
   problem->domain = ReadDomain(file, model);
   const Eigen::VectorXd noise_bound = file.Vector("declaration.noise_bound");
   problem->declaration = {ReadLipschitz(file, model), noise_bound};
+  if (file.Has("certifier.method") && file.Text("certifier.method") == "paper") problem->method = Method::kPaper;
+  file.Read("certifier.max_leaf_visits", problem->max_leaf_visits);
   file.Read("certifier.zonotope_order", problem->zonotope_order);
   RequireOrder(file, problem->zonotope_order, model.num_states());
   if (transitions == TransitionsFile::kIgnore) return problem;

@@ -214,12 +214,16 @@ std::vector<Key> CertifierKeys() {
   const GateOptions gate;
   return {
       Optional(Map("certifier", "How it certifies."), "all defaults"),
-      Optional(Word("certifier.method", {"paper"},
-                    "paper: Algorithm 1 of the paper, with this project's conventions, unchanged for good."),
-               "paper"),
+      Optional(Word("certifier.method", {"centred", "paper"},
+                    "paper: Algorithm 1 of the paper, with this project's conventions, unchanged for good. centred: the "
+                    "same with a tighter bound on the nominal model's remainder."),
+               "centred"),
       Integer("certifier.zonotope_order", Between(1, kMaxGenerators), Problem{}.zonotope_order,
               "rho: a slice has at most rho generators a state. (rho + 2) times the number of states may not exceed " +
                   std::to_string(kMaxGenerators) + "."),
+      Integer("certifier.max_leaf_visits", Between(1, 1 << 20), Problem{}.max_leaf_visits,
+              "Groups of 32 observations that one search for the tightest may look at. Any of them give a sound bound; a "
+              "decision whose search met this cap says so."),
       Optional(Map("gate", "What the certifier accepts from the bus."), "all defaults"),
       Number("gate.max_age_ms", "ms", UpTo(kHourMs), gate.max_age_ms,
              "A candidate older than this is rejected as stale."),
