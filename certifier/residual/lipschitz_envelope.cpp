@@ -66,11 +66,18 @@ struct LipschitzEnvelope::Search {
   [[nodiscard]] Sides Run(const Metric& metric) const {
     const ObservationIndex& index = row.index;
     Sides best;
-    if (index.num_blocks() <= static_cast<std::size_t>(options.max_flat_blocks))
+    if (index.num_blocks() <= MaxFlatBlocks<Metric>())
       best = ScanBlocks(metric, index.block(0), index.num_blocks(), index.num_coordinates(), budget);
     else
       best = SearchTree(metric, index, budget);
     return {best.floor - metric.common(), best.negated_ceiling - metric.common()};
+  }
+
+  // The boxes of a tree say little in many coordinates, and an entry that is refined costs more than a block.
+  template <class Metric>
+  [[nodiscard]] std::size_t MaxFlatBlocks() const {
+    const auto most = static_cast<std::size_t>(options.max_flat_blocks);
+    return Metric::kRefines ? std::min(4 * most, internal::kMaxRefinedBlocks) : most;
   }
 
   // One function for each metric and instruction set, so that each has the registers to itself.

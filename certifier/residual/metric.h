@@ -227,11 +227,11 @@ class SignMetric : public CenterDistance {
     for (std::size_t l = 0; l < columns(); ++l) {
       const double component = Component(block, lane, l);
       if (std::abs(component) > reach_[l])
-        Extend(signs, 0, 0, l, component, component < 0), ++fixed;
+        Extend(signs, 0, 0, l, component, std::copysign(1, component)), ++fixed;
       else
         signs.free[free] = l, signs.components[free++] = component;
     }
-    if (fixed == 0) --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], false);  // s and -s are the same
+    if (fixed == 0) --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], 1);  // s and -s are the same
     if (patterns < 1 << free) {
       capped = true;
       double distance = hull_;
@@ -251,10 +251,11 @@ class SignMetric : public CenterDistance {
     std::array<std::array<Pack, kMaxChunks>, kMaxColumns + 1> along;
   };
 
-  void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, bool negative) const {
-    signs.sums[to] = negative ? signs.sums[from] - component : signs.sums[from] + component;
-    for (std::size_t j = 0; j < chunks_; ++j)
-      signs.along[to][j] = negative ? signs.along[from][j] - weighted_[l][j] : signs.along[from][j] + weighted_[l][j];
+  // Without a branch: signs are as good as random, and a product with one is exact.
+  void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, double sign) const {
+    signs.sums[to] = signs.sums[from] + sign * component;
+    const Same same = simd::Fill(sign);
+    for (std::size_t j = 0; j < chunks_; ++j) signs.along[to][j] = signs.along[from][j] + same * weighted_[l][j];
   }
 
   // Counts through the patterns; the last column changes fastest, so that few sums are made anew.
@@ -263,7 +264,7 @@ class SignMetric : public CenterDistance {
     for (std::size_t pattern = 0; pattern < std::size_t{1} << free; ++pattern) {
       const auto same = pattern == 0 ? 0 : free - 1 - static_cast<std::size_t>(std::countr_zero(pattern));
       for (std::size_t t = same; t < free; ++t)
-        Extend(signs, t, t + 1, signs.free[t], signs.components[t], pattern >> (free - 1 - t) & 1);
+        Extend(signs, t, t + 1, signs.free[t], signs.components[t], pattern >> (free - 1 - t) & 1 ? -1 : 1);
       Pack spread = simd::Fill(0);
       for (std::size_t j = 0; j < chunks_; ++j) spread = spread + Abs(signs.along[free][j]);
       farthest = simd::Max(farthest, std::abs(signs.sums[free]) + (SumLanes(spread) + slack_));

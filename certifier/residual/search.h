@@ -17,6 +17,9 @@ struct Budget {
   bool capped = false;
 };
 
+/** Blocks at most that are scanned without a tree where entries are refined. */
+inline constexpr std::size_t kMaxRefinedBlocks = 128;
+
 struct Sides {
   double floor, negated_ceiling;
 };
@@ -39,20 +42,45 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
 
 /** All of `count` blocks in a row. */
 template <class Metric>
-Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget& budget) {
-  Sides best{-kInfinity, -kInfinity};
+Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget&) {
   Pack floors = simd::Fill(-kInfinity), ceilings = simd::Fill(-kInfinity);
   for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
-    const Pack distance = metric.Block(block), floor = simd::Load(block[coordinates]), ceiling = simd::Load(block[coordinates + 1]);
-    if constexpr (Metric::kRefines) {
-      best.floor = BestOfBlock(metric, block, floor, floor - distance, best.floor, budget);
-      best.negated_ceiling = BestOfBlock(metric, block, ceiling, ceiling - distance, best.negated_ceiling, budget);
-    } else {
-      floors = Max(floor - distance, floors);
-      ceilings = Max(ceiling - distance, ceilings);
+    const Pack distance = metric.Block(block);
+    floors = Max(simd::Load(block[coordinates]) - distance, floors);
+    ceilings = Max(simd::Load(block[coordinates + 1]) - distance, ceilings);
+  }
+  return {MaxLane(floors), MaxLane(ceilings)};
+}
+
+/** The same where entries are refined: the most promising block first, then those that may still beat what it holds. */
+template <class Metric>
+  requires Metric::kRefines
+Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count, std::size_t coordinates, Budget& budget) {
+  std::array<std::array<Pack, kMaxRefinedBlocks>, 2> optimistic;
+  std::array<std::array<double, kMaxRefinedBlocks>, 2> highest;
+  std::array<std::size_t, 2> first{0, 0};
+  std::array<double, 2> top{-kInfinity, -kInfinity};
+  for (std::size_t b = 0; b < count; ++b) {
+    const Pack* block = blocks + b * (coordinates + 2);
+    const Pack distance = metric.Block(block);
+    for (std::size_t side = 0; side < 2; ++side) {
+      optimistic[side][b] = simd::Load(block[coordinates + side]) - distance;
+      highest[side][b] = MaxLane(optimistic[side][b]);
+      first[side] = highest[side][b] > top[side] ? b : first[side];
+      top[side] = simd::Max(highest[side][b], top[side]);
     }
   }
-  return {simd::Max(best.floor, MaxLane(floors)), simd::Max(best.negated_ceiling, MaxLane(ceilings))};
+  std::array<double, 2> best{-kInfinity, -kInfinity};
+  for (std::size_t side = 0; side < 2; ++side) {
+    const auto refine = [&](std::size_t b) {
+      const Pack* block = blocks + b * (coordinates + 2);
+      best[side] = BestOfBlock(metric, block, block[coordinates + side], optimistic[side][b], best[side], budget);
+    };
+    refine(first[side]);
+    for (std::size_t b = 0; b < count; ++b)
+      if (b != first[side] && highest[side][b] > best[side]) refine(b);
+  }
+  return {best[0], best[1]};
 }
 
 /** One side of a leaf. */
