@@ -47,8 +47,9 @@ typedef std::int64_t QuadMask __attribute__((vector_size(32)));
 struct alignas(64) Pack {
   Quad low, high;
 
-  [[nodiscard]] double at(std::size_t lane) const { return lane < 4 ? low[lane] : high[lane - 4]; }
-  void set(std::size_t lane, double value) { (lane < 4 ? low[lane] : high[lane - 4]) = value; }
+  // As memory: one lane is read or written, the others are left alone.
+  [[nodiscard]] double at(std::size_t lane) const { return reinterpret_cast<const double*>(this)[lane]; }
+  void set(std::size_t lane, double value) { reinterpret_cast<double*>(this)[lane] = value; }
 };
 
 /** One number in every lane, at half the registers. */

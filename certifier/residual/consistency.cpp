@@ -25,21 +25,6 @@ std::optional<Violation> TestAllPairs(const Declaration& declaration, const Obse
   return std::nullopt;
 }
 
-double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries, const Observations& o) {
-  double values = 0, locations = 0;
-  for (const double x : entries.floors) values = std::max(values, std::abs(x));
-  for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
-  for (const LipschitzRow::Column& column : row.columns())
-    locations = AddUp(locations, MulUp(column.slope, o.z.col(column.variable).cwiseAbs().maxCoeff()));
-  return PairMarginUpper(values, locations, row.columns().size());
-}
-
-PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i) {
-  const auto at = static_cast<std::size_t>(i);
-  const double* coordinates = entries.coordinates.data() + at * entries.num_coordinates;
-  return {{coordinates, coordinates + entries.num_coordinates}, entries.floors[at], -entries.ceilings[at]};
-}
-
 // The first pair, given that there is one. None of the observations before its first has any partner.
 std::optional<Violation> FirstOf(const Declaration& declaration, const Observations& o, int k, const PairSearch& search,
                                  const ObservationIndex::Entries& entries) {

@@ -34,8 +34,13 @@ struct EnvelopeOptions {
   int max_leaf_visits = 512;
   /** Up to this many blocks are scanned without a tree. */
   int max_flat_blocks = 32;
+  /** E_k holds for observations with |r~_ik| + sigma_k up to this many times the largest given, at least 1. More than 1
+  for an envelope that a tail is to be joined to. */
+  double value_headroom = 1;
   InstructionSet instructions = BestInstructionSet();  ///< Changes the time a query takes, never a bit of its result.
 };
+
+class EnvelopeTail;
 
 class LipschitzEnvelope final : public ResidualEnclosure {
  public:
@@ -53,6 +58,20 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   observations, and where a is 4 to 12, 2^f m for an observation inside the slab of the query set in f columns. */
   void Enclose(const QuerySet& set, ResidualBounds& bounds) const noexcept override;
 
+  /** The envelope of its own observations and the first `count` of the tail. Cost: those are all looked at, eight by eight.
+  @pre the tail was made for this envelope, and count <= tail.size() as read in this thread. */
+  void Enclose(const QuerySet& set, const EnvelopeTail& tail, int count, ResidualBounds& bounds) const noexcept;
+
+  [[nodiscard]] int num_states() const { return static_cast<int>(rows_.size()); }
+  [[nodiscard]] const LipschitzRow& row(int k) const { return rows_[static_cast<std::size_t>(k)].distance; }
+  /** Without entries for a constant row. */
+  [[nodiscard]] const ObservationIndex& index(int k) const { return rows_[static_cast<std::size_t>(k)].index; }
+  /** The highest floor and the lowest ceiling of coordinate k over all observations. */
+  [[nodiscard]] double highest_floor(int k) const { return rows_[static_cast<std::size_t>(k)].floor; }
+  [[nodiscard]] double lowest_ceiling(int k) const { return -rows_[static_cast<std::size_t>(k)].negated_ceiling; }
+  /** The largest |floor| and |ceiling| for which E_k holds. */
+  [[nodiscard]] double value_limit(int k) const { return rows_[static_cast<std::size_t>(k)].value_limit; }
+
   [[nodiscard]] bool uses_hull_distance() const { return uses_hull_distance_; }
 
  private:
@@ -62,10 +81,12 @@ class LipschitzEnvelope final : public ResidualEnclosure {
     ObservationIndex index{};              // none where the row is constant:
     double floor = 0, negated_ceiling = 0;  // then these are its bounds
     double error = 0;                      // E_k
+    double value_limit = 0;                // V
     std::vector<double> component_errors{};  // of each column: of v_il and of L_kl r_l
   };
   struct Search;
 
+  void EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count, ResidualBounds& bounds) const noexcept;
   void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
                    std::span<const double> domain_lower, std::span<const double> domain_upper) const;
 

@@ -42,12 +42,22 @@ struct PairSearch::Kernel {
 
   // The same between the point and the entries of a block.
   Pack Excess(const double* coordinates, double floor, double negated_ceiling, const Pack* block) const {
+    return ExcessOf(coordinates, floor, negated_ceiling, block, k, lifted);
+  }
+  Pack Distance(const double* coordinates, const Pack* block) const { return DistanceOf(coordinates, block, k, lifted); }
+
+  static Pack ExcessOf(const double* coordinates, double floor, double negated_ceiling, const Pack* block, std::size_t k, bool lifted) {
+    return Max(simd::Fill(floor) + simd::Load(block[k + 1]), simd::Fill(negated_ceiling) + simd::Load(block[k])) -
+           DistanceOf(coordinates, block, k, lifted);
+  }
+
+  static Pack DistanceOf(const double* coordinates, const Pack* block, std::size_t k, bool lifted) {
     Pack distance = simd::Fill(0);
     for (std::size_t c = 0; c < k; ++c) {
       const Pack along = Abs(simd::Fill(coordinates[c]) - simd::Load(block[c]));
       distance = lifted ? Max(distance, along) : distance + along;
     }
-    return Max(simd::Fill(floor) + simd::Load(block[k + 1]), simd::Fill(negated_ceiling) + simd::Load(block[k])) - distance;
+    return distance;
   }
 
   void Leaves(const double* group, std::size_t first, std::vector<std::size_t>& leaves) const {
@@ -131,6 +141,52 @@ struct PairSearch::Kernel {
     }
   }
 
+  // As Descent of search.h, for a point and an entry that is left out.
+  Other BestOther(const Point& point, const double* group, std::size_t side, std::uint32_t self) const {
+    Other best;
+    const double own = side == 0 ? point.floor : point.negated_ceiling;
+    std::array<Pack, ObservationIndex::kMaxHeight + 1> bounds;
+    std::array<std::size_t, ObservationIndex::kMaxHeight + 1> first;
+    const int top = index.height();
+    int level = top + 1;
+    for (std::size_t child = 0;;) {
+      if (level > 1) {
+        const auto at = static_cast<std::size_t>(--level);
+        bounds[at] = simd::TagLanes(Max(OneSide(group, index.node(level, child), side), simd::Fill(-kMaxDouble)));
+        first[at] = child * kLanes;
+      } else {
+        for (std::size_t b = child * ObservationIndex::kLeafBlocks; b < (child + 1) * ObservationIndex::kLeafBlocks; ++b)
+          BestOther(point, own, b, side, self, best);
+      }
+      double next;
+      while (!((next = MaxLane(bounds[static_cast<std::size_t>(level)])) >= best.value) || next == -kMaxDouble)
+        if (++level > top) return best;
+      const auto at = static_cast<std::size_t>(level);
+      bounds[at] = Replace(bounds[at], next, -kMaxDouble);
+      child = first[at] + simd::TaggedLane(next);
+    }
+  }
+
+  void BestOther(const Point& point, double own, std::size_t b, std::size_t side, std::uint32_t self, Other& best) const {
+    const Pack* block = index.block(b);
+    const Pack values = simd::Load(block[k + side]) - Distance(point.coordinates.data(), block);
+    if (!(MaxLane(values) > best.value)) return;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const std::uint32_t id = index.ids(b)[lane];
+      const bool same = values.at(lane) == own && block[k + side].at(lane) == own && id > self;
+      if (id != self && !same && values.at(lane) > best.value) best = {values.at(lane), id};
+    }
+  }
+
+  // v_j - d at most, between a group with v = 0 and each child.
+  Pack OneSide(const double* group, const Pack* node, std::size_t side) const {
+    if (lifted) return OneWay(group, node + side * (2 * k + 1)) + simd::Fill(margin);
+    Pack most = simd::Load(node[side]) + simd::Fill(margin);
+    for (std::size_t c = 1; c <= k; ++c)
+      most = most - Max(Max(simd::Load(node[2 * c]) - simd::Fill(group[2 * c + 1]), simd::Fill(group[2 * c]) - simd::Load(node[2 * c + 1])), simd::Fill(0));
+    return most;
+  }
+
   FOREREACH_AVX2 static void LeavesAvx2(const Kernel& kernel, const double* group, std::size_t first, std::vector<std::size_t>& leaves) {
     kernel.Leaves(group, first, leaves);
   }
@@ -160,6 +216,23 @@ void PairSearch::Suspects(const Point& point, std::size_t leaf, std::vector<std:
                                    [&](std::uint32_t partner) { partners.push_back(partner); });
 }
 
+void PairSearch::Suspects(const Point& point, const LipschitzRow& row, const simd::Pack* blocks, std::size_t count,
+                          double margin, std::vector<std::uint32_t>& partners) {
+  partners.clear();
+  const std::size_t k = row.num_coordinates();
+  for (std::size_t first = 0; first < count; first += kLanes, blocks += k + 2) {
+    const Pack excess = Kernel::ExcessOf(point.coordinates.data(), point.floor, point.negated_ceiling, blocks, k, row.has_patterns());
+    if (!(MaxLane(excess) > -margin)) continue;
+    for (std::size_t lane = 0; lane < std::min(kLanes, count - first); ++lane)
+      if (excess.at(lane) > -margin) partners.push_back(static_cast<std::uint32_t>(first + lane));
+  }
+}
+
+PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, std::uint32_t self) const {
+  const Point at_zero{point.coordinates, 0, 0};
+  return Kernel{index_, margin_}.BestOther(point, GroupOf(at_zero).data(), side, self);
+}
+
 std::vector<double> PairSearch::GroupOf(std::size_t leaf) const {
   std::vector<double> group(index_.node_packs());
   const Pack* node = index_.node(1, leaf / kLanes);
@@ -179,6 +252,21 @@ std::vector<double> PairSearch::GroupOf(const Point& point) const {
     group.push_back(value);
   }
   return group;
+}
+
+double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries, const Observations& o) {
+  double values = 0, locations = 0;
+  for (const double x : entries.floors) values = std::max(values, std::abs(x));
+  for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
+  for (const LipschitzRow::Column& column : row.columns())
+    locations = AddUp(locations, MulUp(column.slope, o.z.col(column.variable).cwiseAbs().maxCoeff()));
+  return PairMarginUpper(values, locations, row.columns().size());
+}
+
+PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i) {
+  const auto at = static_cast<std::size_t>(i);
+  const double* coordinates = entries.coordinates.data() + at * entries.num_coordinates;
+  return {{coordinates, coordinates + entries.num_coordinates}, entries.floors[at], -entries.ceilings[at]};
 }
 
 }  // namespace forereach
