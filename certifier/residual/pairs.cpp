@@ -187,6 +187,31 @@ struct PairSearch::Kernel {
     return most;
   }
 
+  void Partners(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
+    Partners(point.coordinates.data(), point.floor, point.negated_ceiling, leaf, 0,
+             [&](std::uint32_t partner) { partners.push_back(partner); });
+  }
+
+  static void InBlocks(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count, double margin,
+                       std::vector<std::uint32_t>& partners) {
+    const std::size_t k = row.num_coordinates();
+    const bool lifted = row.has_patterns();
+    for (std::size_t first = 0; first < count; first += kLanes, blocks += k + 2) {
+      const Pack excess = ExcessOf(point.coordinates.data(), point.floor, point.negated_ceiling, blocks, k, lifted);
+      if (!(MaxLane(excess) > -margin)) continue;
+      for (std::size_t lane = 0; lane < std::min(kLanes, count - first); ++lane)
+        if (excess.at(lane) > -margin) partners.push_back(static_cast<std::uint32_t>(first + lane));
+    }
+  }
+
+  FOREREACH_AVX2 static void PartnersAvx2(const Kernel& kernel, const Point& point, std::size_t leaf,
+                                          std::vector<std::uint32_t>& partners) {
+    kernel.Partners(point, leaf, partners);
+  }
+  FOREREACH_AVX2 static void InBlocksAvx2(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
+                                          double margin, std::vector<std::uint32_t>& partners) {
+    InBlocks(point, row, blocks, count, margin, partners);
+  }
   FOREREACH_AVX2 static void LeavesAvx2(const Kernel& kernel, const double* group, std::size_t first, std::vector<std::size_t>& leaves) {
     kernel.Leaves(group, first, leaves);
   }
@@ -212,20 +237,16 @@ void PairSearch::Suspects(std::size_t leaf, std::size_t other,
 
 void PairSearch::Suspects(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
   partners.clear();
-  Kernel{index_, margin_}.Partners(point.coordinates.data(), point.floor, point.negated_ceiling, leaf, 0,
-                                   [&](std::uint32_t partner) { partners.push_back(partner); });
+  const Kernel kernel{index_, margin_};
+  if (instructions_ == InstructionSet::kAvx2) return Kernel::PartnersAvx2(kernel, point, leaf, partners);
+  kernel.Partners(point, leaf, partners);
 }
 
 void PairSearch::Suspects(const Point& point, const LipschitzRow& row, const simd::Pack* blocks, std::size_t count,
                           double margin, std::vector<std::uint32_t>& partners) {
   partners.clear();
-  const std::size_t k = row.num_coordinates();
-  for (std::size_t first = 0; first < count; first += kLanes, blocks += k + 2) {
-    const Pack excess = Kernel::ExcessOf(point.coordinates.data(), point.floor, point.negated_ceiling, blocks, k, row.has_patterns());
-    if (!(MaxLane(excess) > -margin)) continue;
-    for (std::size_t lane = 0; lane < std::min(kLanes, count - first); ++lane)
-      if (excess.at(lane) > -margin) partners.push_back(static_cast<std::uint32_t>(first + lane));
-  }
+  const bool avx2 = BestInstructionSet() == InstructionSet::kAvx2;
+  (avx2 ? Kernel::InBlocksAvx2 : Kernel::InBlocks)(point, row, blocks, count, margin, partners);
 }
 
 PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, std::uint32_t self) const {
