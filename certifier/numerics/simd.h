@@ -1,9 +1,9 @@
 /** Eight doubles at a time, the same to the last bit on every machine.
 
-The width is fixed, and a pack knows +, -, *, |.|, max and min only, each lane by itself: what an instruction set changes is the
-time. A hot function is written once, as templates and functions of an unnamed namespace, and becomes machine code twice:
-inlined into an entry point marked FOREREACH_AVX2, and into one marked FOREREACH_FLATTEN. A member of the class that owns
-them holds the InstructionSet and chooses. */
+The width is fixed, and a pack knows +, -, *, |.|, max and min only, each lane by itself: what an instruction set
+changes is the time. A hot function is written once, as templates and functions of an unnamed namespace, and becomes
+machine code twice: inlined into an entry point marked FOREREACH_AVX2, and into one marked FOREREACH_FLATTEN. A member
+of the class that owns them holds the InstructionSet and chooses. */
 #pragma once
 
 #include <array>

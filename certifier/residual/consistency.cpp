@@ -14,7 +14,8 @@ std::optional<Violation> TestConstant(const Declaration& declaration, const Obse
   Eigen::Index highest = 0, lowest = 0;
   o.lower.col(k).maxCoeff(&highest);
   o.upper.col(k).minCoeff(&lowest);
-  return TestPair(declaration, o, static_cast<int>(std::min(highest, lowest)), static_cast<int>(std::max(highest, lowest)), k);
+  return TestPair(declaration, o, static_cast<int>(std::min(highest, lowest)),
+                  static_cast<int>(std::max(highest, lowest)), k);
 }
 
 // Where plain arithmetic may overflow.

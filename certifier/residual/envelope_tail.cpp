@@ -12,8 +12,8 @@ EnvelopeTail::EnvelopeTail(const Declaration& declaration, const LipschitzEnvelo
     : envelope_(envelope), noise_bound_(declaration.noise_bound), capacity_(capacity) {
   const auto entries = static_cast<std::size_t>(capacity), blocks = (entries + kLanes - 1) / kLanes;
   for (int k = 0; k < envelope.num_states(); ++k)
-    rows_.push_back({std::vector<simd::Pack>(blocks * (envelope.row(k).num_coordinates() + 2)), std::vector<double>(entries),
-                     std::vector<double>(entries)});
+    rows_.push_back({std::vector<simd::Pack>(blocks * (envelope.row(k).num_coordinates() + 2)),
+                     std::vector<double>(entries), std::vector<double>(entries)});
 }
 
 bool EnvelopeTail::Covers(std::span<const double> lower, std::span<const double> upper) const {
@@ -40,7 +40,8 @@ void EnvelopeTail::Append(std::span<const double> z, std::span<const double> low
     block[columns].set(lane, floor);
     block[columns + 1].set(lane, negated_ceiling);
     row.floors[entry] = entry == 0 ? floor : std::max(floor, row.floors[entry - 1]);
-    row.negated_ceilings[entry] = entry == 0 ? negated_ceiling : std::max(negated_ceiling, row.negated_ceilings[entry - 1]);
+    row.negated_ceilings[entry] =
+        entry == 0 ? negated_ceiling : std::max(negated_ceiling, row.negated_ceilings[entry - 1]);
   }
   size_.store(static_cast<int>(entry) + 1, std::memory_order_release);
 }
@@ -50,7 +51,8 @@ double EnvelopeTail::HighestFloor(int k, int count) const {
 }
 
 double EnvelopeTail::HighestNegatedCeiling(int k, int count) const {
-  return count == 0 ? -kInfinity : rows_[static_cast<std::size_t>(k)].negated_ceilings[static_cast<std::size_t>(count - 1)];
+  return count == 0 ? -kInfinity
+                    : rows_[static_cast<std::size_t>(k)].negated_ceilings[static_cast<std::size_t>(count - 1)];
 }
 
 }  // namespace forereach

@@ -1,5 +1,5 @@
-/** Observations that came after an envelope's index was built: few, in the order in which they came, looked at one block
-after the other beside the index.
+/** Observations that came after an envelope's index was built: few, in the order in which they came, looked at one
+block after the other beside the index.
 
 One thread appends, any number read. A reader that got a size from size() may read that many entries: they were written
 before the size was, and nothing is ever written to them again. */

@@ -34,8 +34,9 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
 }
 
 // As the header says.
-void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
-                                    std::span<const double> domain_lower, std::span<const double> domain_upper) const {
+void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries,
+                                    const Observations& observations, std::span<const double> domain_lower,
+                                    std::span<const double> domain_upper) const {
   double values = 0, locations = 0, widths = 0;  // V, S, W
   for (const double x : entries.floors) values = std::max(values, std::abs(x));
   for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
@@ -87,7 +88,8 @@ struct LipschitzEnvelope::Search {
   // The last block may be written to while it is read: only the lanes that count are.
   template <class Metric>
   [[nodiscard]] Sides ScanTail(const Metric& metric) const {
-    const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kLanes, rest = tail_count % kLanes;
+    const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kLanes,
+                      rest = tail_count % kLanes;
     Sides best{-kInfinity, -kInfinity};
     if (full > 0) best = ScanBlocks(metric, tail, full, coordinates, budget);
     if (rest == 0) return best;
@@ -118,7 +120,8 @@ struct LipschitzEnvelope::Search {
 
   template <class Metric, class... More>
   [[nodiscard]] Sides With(const QuerySet& set, const More&... more) const {
-    return options.instructions == InstructionSet::kAvx2 ? RunAvx2<Metric>(set, more...) : RunBaseline<Metric>(set, more...);
+    return options.instructions == InstructionSet::kAvx2 ? RunAvx2<Metric>(set, more...)
+                                                         : RunBaseline<Metric>(set, more...);
   }
 
   [[nodiscard]] Sides Best(const QuerySet& set) const {

@@ -45,7 +45,8 @@ struct ObservationStore::Generation {
       double locations = 0;
       for (const LipschitzRow::Column& column : envelope.row(k).columns()) {
         const auto l = static_cast<std::size_t>(column.variable);
-        const double farthest = std::max({observations.z.col(column.variable).cwiseAbs().maxCoeff(), std::abs(lower[l]), std::abs(upper[l])});
+        const double farthest = std::max(
+            {observations.z.col(column.variable).cwiseAbs().maxCoeff(), std::abs(lower[l]), std::abs(upper[l])});
         locations = AddUp(locations, MulUp(column.slope, farthest));
       }
       margins.push_back(PairMarginUpper(envelope.value_limit(k), locations, envelope.row(k).columns().size()));
@@ -84,7 +85,8 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
   if (options.tail_capacity < 1 || options.tail_capacity > EnvelopeTail::kMaxCapacity)
     throw std::invalid_argument("observation store: tail_capacity " + std::to_string(options.tail_capacity) +
                                 " is outside [1, " + std::to_string(EnvelopeTail::kMaxCapacity) + "]");
-  if (options.max_observations < 1) throw std::invalid_argument("observation store: max_observations must be at least 1");
+  if (options.max_observations < 1)
+    throw std::invalid_argument("observation store: max_observations must be at least 1");
   options_.envelope.value_headroom = kHeadroom;
   violation_ = FindViolation(declaration_, observations);
   next_id_ = observations.size();
@@ -119,7 +121,8 @@ void ObservationStore::Swap(std::shared_ptr<Generation> generation) {
   current_.swap(generation);  // the old one goes after the lock, if nobody holds it
 }
 
-std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Observations observations, std::vector<int> ids) const {
+std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Observations observations,
+                                                                      std::vector<int> ids) const {
   // A contradiction must not be forgotten for want of room.
   if (ids.size() > options_.max_observations && !Violated()) {
     const std::vector<int> kept = MostUseful(declaration_, observations, options_.max_observations);
@@ -127,7 +130,8 @@ std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Observatio
     for (std::size_t i = 0; i < kept.size(); ++i) ids[i] = ids[static_cast<std::size_t>(kept[i])];
     ids.resize(kept.size());
   }
-  return std::make_shared<Generation>(declaration_, std::move(observations), std::move(ids), domain_lower_, domain_upper_, options_);
+  return std::make_shared<Generation>(declaration_, std::move(observations), std::move(ids), domain_lower_,
+                                      domain_upper_, options_);
 }
 
 std::shared_ptr<ObservationStore::Generation> ObservationStore::Merge(const Generation& generation, int tail_size,
@@ -195,7 +199,8 @@ class ObservationStore::Newcomer {
     const Point point = PointIn(k);
     const int size = generation_.tail.size();
     const double highest = std::max(generation_.envelope.highest_floor(k), generation_.tail.HighestFloor(k, size));
-    const double lowest = std::min(generation_.envelope.lowest_ceiling(k), -generation_.tail.HighestNegatedCeiling(k, size));
+    const double lowest =
+        std::min(generation_.envelope.lowest_ceiling(k), -generation_.tail.HighestNegatedCeiling(k, size));
     const bool open = NextUp(point.floor) > NextDown(lowest) || NextUp(highest) > NextDown(-point.negated_ceiling);
     return open && TestAll(k);
   }
@@ -254,7 +259,8 @@ class ObservationStore::Newcomer {
 };
 
 // With an observation that is too large for the error bound of the index: into a new one at once.
-std::shared_ptr<ObservationStore::Generation> ObservationStore::MergeWith(std::span<const double> z, std::span<const double> lower,
+std::shared_ptr<ObservationStore::Generation> ObservationStore::MergeWith(std::span<const double> z,
+                                                                          std::span<const double> lower,
                                                                           std::span<const double> upper, int id) const {
   const std::shared_ptr<Generation> all = Merge(*current_, current_->tail.size(), -1);
   std::vector<int> ids = all->ids, rows(ids.size() + 1, 0);

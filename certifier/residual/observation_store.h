@@ -1,9 +1,9 @@
 /** Observations that grow while they are used.
 
 One thread at a time inserts, removes and compacts; any number take snapshots and query them, and none of these ever
-waits for an index to be built. New observations go into a tail beside the index, which queries scan in full; Compact makes a new
-index of both, off to the side, and swaps it in. A snapshot is what was known when it was taken: it stays valid, and answers
-the same, for as long as it is held.
+waits for an index to be built. New observations go into a tail beside the index, which queries scan in full; Compact
+makes a new index of both, off to the side, and swaps it in. A snapshot is what was known when it was taken: it stays
+valid, and answers the same, for as long as it is held.
 
 Every set of observations gives a sound envelope, so nothing here can make a bound wrong: not the tail's limit, not the
 budget, not a removal. */
@@ -61,14 +61,15 @@ class ObservationStore final {
 
   struct Insertion {
     int id = -1;  ///< -1 if it was refused: not finite, lower > upper, or z outside the domain.
-    std::optional<Violation> violation;  ///< The first found with an earlier observation, if any; it is added all the same.
+    std::optional<Violation>
+        violation;  ///< The first found with an earlier observation, if any; it is added all the same.
   };
-  /** Adds one observed transition, d_z and n entries, and tests it against all others: about a microsecond. When the tail
-  is full it compacts first, which takes as long as building an index. */
+  /** Adds one observed transition, d_z and n entries, and tests it against all others: about a microsecond. When the
+  tail is full it compacts first, which takes as long as building an index. */
   Insertion Insert(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
-  /** Forgets an observation; false if there is none of that id, or it is the last. A violation it took part in is looked
-  for anew among the others. Costs a new index. Snapshots taken before still know it. */
+  /** Forgets an observation; false if there is none of that id, or it is the last. A violation it took part in is
+  looked for anew among the others. Costs a new index. Snapshots taken before still know it. */
   bool Remove(int id);
 
   /** Puts the tail into the index and keeps to the budget. May run beside Insert, in a thread of its own. */
@@ -80,8 +81,8 @@ class ObservationStore final {
  private:
   std::shared_ptr<Generation> Build(Observations observations, std::vector<int> ids) const;
   std::shared_ptr<Generation> Merge(const Generation& generation, int tail_size, int removed) const;
-  std::shared_ptr<Generation> MergeWith(std::span<const double> z, std::span<const double> lower, std::span<const double> upper,
-                                        int id) const;
+  std::shared_ptr<Generation> MergeWith(std::span<const double> z, std::span<const double> lower,
+                                        std::span<const double> upper, int id) const;
   Insertion Enlist(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
   bool Violated() const;
   void Swap(std::shared_ptr<Generation> generation);

@@ -44,9 +44,12 @@ struct PairSearch::Kernel {
   Pack Excess(const double* coordinates, double floor, double negated_ceiling, const Pack* block) const {
     return ExcessOf(coordinates, floor, negated_ceiling, block, k, lifted);
   }
-  Pack Distance(const double* coordinates, const Pack* block) const { return DistanceOf(coordinates, block, k, lifted); }
+  Pack Distance(const double* coordinates, const Pack* block) const {
+    return DistanceOf(coordinates, block, k, lifted);
+  }
 
-  static Pack ExcessOf(const double* coordinates, double floor, double negated_ceiling, const Pack* block, std::size_t k, bool lifted) {
+  static Pack ExcessOf(const double* coordinates, double floor, double negated_ceiling, const Pack* block,
+                       std::size_t k, bool lifted) {
     return Max(simd::Fill(floor) + simd::Load(block[k + 1]), simd::Fill(negated_ceiling) + simd::Load(block[k])) -
            DistanceOf(coordinates, block, k, lifted);
   }
@@ -101,7 +104,8 @@ struct PairSearch::Kernel {
         if (!(excess.at(lane) > -margin)) continue;
         for (std::size_t c = 0; c < k; ++c) coordinates[c] = block[c].at(lane);
         const std::uint32_t id = index.ids(own)[lane];
-        Partners(coordinates.data(), block[k].at(lane), block[k + 1].at(lane), other, leaf == other ? own * kLanes + lane + 1 : 0,
+        Partners(coordinates.data(), block[k].at(lane), block[k + 1].at(lane), other,
+                 leaf == other ? own * kLanes + lane + 1 : 0,
                  [&](std::uint32_t partner) { pairs.emplace_back(id, partner); });
       }
     }
@@ -116,14 +120,16 @@ struct PairSearch::Kernel {
       for (std::size_t c = 0; c < k; ++c) {
         const Pack alpha = simd::Load(block[c]);
         up = Min(up, Min(floor - alpha + simd::Fill(other[2 * c + 1]), floor + alpha + simd::Fill(other[2 * c])));
-        down = Min(down, Min(ceiling - alpha + simd::Fill(group[2 * c + 1]), ceiling + alpha + simd::Fill(group[2 * c])));
+        down =
+            Min(down, Min(ceiling - alpha + simd::Fill(group[2 * c + 1]), ceiling + alpha + simd::Fill(group[2 * c])));
       }
       return Max(up, down);
     }
     Pack excess = Max(floor + simd::Fill(group[1]), ceiling + simd::Fill(group[0]));
     for (std::size_t c = 0; c < k; ++c) {
       const Pack alpha = simd::Load(block[c]);
-      excess = excess - Max(Max(simd::Fill(group[2 * c + 2]) - alpha, alpha - simd::Fill(group[2 * c + 3])), simd::Fill(0));
+      excess =
+          excess - Max(Max(simd::Fill(group[2 * c + 2]) - alpha, alpha - simd::Fill(group[2 * c + 3])), simd::Fill(0));
     }
     return excess;
   }
@@ -155,7 +161,8 @@ struct PairSearch::Kernel {
         bounds[at] = simd::TagLanes(Max(OneSide(group, index.node(level, child), side), simd::Fill(-kMaxDouble)));
         first[at] = child * kLanes;
       } else {
-        for (std::size_t b = child * ObservationIndex::kLeafBlocks; b < (child + 1) * ObservationIndex::kLeafBlocks; ++b)
+        for (std::size_t b = child * ObservationIndex::kLeafBlocks; b < (child + 1) * ObservationIndex::kLeafBlocks;
+             ++b)
           BestOther(point, own, b, side, self, best);
       }
       double next;
@@ -167,7 +174,8 @@ struct PairSearch::Kernel {
     }
   }
 
-  void BestOther(const Point& point, double own, std::size_t b, std::size_t side, std::uint32_t self, Other& best) const {
+  void BestOther(const Point& point, double own, std::size_t b, std::size_t side, std::uint32_t self,
+                 Other& best) const {
     const Pack* block = index.block(b);
     const Pack values = simd::Load(block[k + side]) - Distance(point.coordinates.data(), block);
     if (!(MaxLane(values) > best.value)) return;
@@ -183,7 +191,9 @@ struct PairSearch::Kernel {
     if (lifted) return OneWay(group, node + side * (2 * k + 1)) + simd::Fill(margin);
     Pack most = simd::Load(node[side]) + simd::Fill(margin);
     for (std::size_t c = 1; c <= k; ++c)
-      most = most - Max(Max(simd::Load(node[2 * c]) - simd::Fill(group[2 * c + 1]), simd::Fill(group[2 * c]) - simd::Load(node[2 * c + 1])), simd::Fill(0));
+      most = most - Max(Max(simd::Load(node[2 * c]) - simd::Fill(group[2 * c + 1]),
+                            simd::Fill(group[2 * c]) - simd::Load(node[2 * c + 1])),
+                        simd::Fill(0));
     return most;
   }
 
@@ -192,8 +202,8 @@ struct PairSearch::Kernel {
              [&](std::uint32_t partner) { partners.push_back(partner); });
   }
 
-  static void InBlocks(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count, double margin,
-                       std::vector<std::uint32_t>& partners) {
+  static void InBlocks(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
+                       double margin, std::vector<std::uint32_t>& partners) {
     const std::size_t k = row.num_coordinates();
     const bool lifted = row.has_patterns();
     for (std::size_t first = 0; first < count; first += kLanes, blocks += k + 2) {
@@ -208,14 +218,16 @@ struct PairSearch::Kernel {
                                           std::vector<std::uint32_t>& partners) {
     kernel.Partners(point, leaf, partners);
   }
-  FOREREACH_AVX2 static void InBlocksAvx2(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
-                                          double margin, std::vector<std::uint32_t>& partners) {
+  FOREREACH_AVX2 static void InBlocksAvx2(const Point& point, const LipschitzRow& row, const Pack* blocks,
+                                          std::size_t count, double margin, std::vector<std::uint32_t>& partners) {
     InBlocks(point, row, blocks, count, margin, partners);
   }
-  FOREREACH_AVX2 static void LeavesAvx2(const Kernel& kernel, const double* group, std::size_t first, std::vector<std::size_t>& leaves) {
+  FOREREACH_AVX2 static void LeavesAvx2(const Kernel& kernel, const double* group, std::size_t first,
+                                        std::vector<std::size_t>& leaves) {
     kernel.Leaves(group, first, leaves);
   }
-  FOREREACH_AVX2 static void SuspectsAvx2(const Kernel& kernel, std::size_t leaf, std::size_t other, const double* group,
+  FOREREACH_AVX2 static void SuspectsAvx2(const Kernel& kernel, std::size_t leaf, std::size_t other,
+                                          const double* group,
                                           std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
     kernel.Suspects(leaf, other, group, pairs);
   }

@@ -1,8 +1,8 @@
 /** Pairs of observations in one residual coordinate that may contradict the declaration: floor_i - ceiling_j > d(i, j).
 
-Plain arithmetic with a margin above its error, so that no contradiction is missed; whoever asks has to test the suspects
-exactly. Leaves of an ObservationIndex are compared by what its nodes know of them, and entries only where two leaves may
-hold a pair. */
+Plain arithmetic with a margin above its error, so that no contradiction is missed; whoever asks has to test the
+suspects exactly. Leaves of an ObservationIndex are compared by what its nodes know of them, and entries only where two
+leaves may hold a pair. */
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@ constexpr std::uint32_t kNone = ObservationIndex::kNone;
 
 // What each observation gains, and the others that would speak for it if it went.
 struct Gains {
-  std::vector<double> gain;                         // in units of the range of r~_k, zero if it never attains the envelope
+  std::vector<double> gain;  // in units of the range of r~_k, zero if it never attains the envelope
   std::vector<std::vector<std::uint32_t>> instead;  // where it gains
 };
 
@@ -54,7 +54,8 @@ void TakeRow(Gains& gains, const Declaration& declaration, const Observations& o
   const ObservationIndex index(entries);
   const double margin = MarginUpper(row, entries, o);
   const PairSearch search(index, std::isfinite(margin) ? margin : 0);
-  for (std::size_t b = 0; b < index.num_blocks(); ++b)  // in the order of the index, whose neighbours need the same leaves
+  for (std::size_t b = 0; b < index.num_blocks();
+       ++b)  // in the order of the index, whose neighbours need the same leaves
     for (std::size_t lane = 0; lane < simd::kLanes; ++lane) {
       const std::uint32_t id = index.ids(b)[lane];
       if (id == kNone) continue;

@@ -1,6 +1,6 @@
-/** max_i (value_i - D_i) over an ObservationIndex, for both sides: value_i is the floor, or the negated ceiling. Scans all
-blocks, or goes down the tree and leaves out what cannot beat the best so far; both find the same number to the last bit,
-in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metric.h. */
+/** max_i (value_i - D_i) over an ObservationIndex, for both sides: value_i is the floor, or the negated ceiling. Scans
+all blocks, or goes down the tree and leaves out what cannot beat the best so far; both find the same number to the last
+bit, in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metric.h. */
 #pragma once
 
 #include "certifier/residual/metric.h"
@@ -24,9 +24,11 @@ struct Sides {
   double floor, negated_ceiling;
 };
 
-/** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry on. */
+/** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry
+ * on. */
 template <class Metric>
-double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best, Budget& budget) {
+double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best,
+                   Budget& budget) {
   if constexpr (!Metric::kRefines) {
     return simd::Max(best, MaxLane(optimistic));
   } else {
@@ -54,8 +56,8 @@ Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std
 
 /** The same where entries are refined: the most promising block first, then those that may still beat what it holds. */
 template <class Metric>
-  requires Metric::kRefines
-Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count, std::size_t coordinates, Budget& budget) {
+requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count,
+                                           std::size_t coordinates, Budget& budget) {
   std::array<std::array<Pack, kMaxRefinedBlocks>, 2> optimistic;
   std::array<std::array<double, kMaxRefinedBlocks>, 2> highest;
   std::array<std::size_t, 2> first{0, 0};
@@ -85,7 +87,8 @@ Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count, st
 
 /** One side of a leaf. */
 template <class Metric>
-double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best, Budget& budget) {
+double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best,
+                  Budget& budget) {
   Pack highest = simd::Fill(-kInfinity);
   for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
     const Pack values = simd::Load(block[coordinates + side]), optimistic = values - metric.Block(block);
@@ -140,10 +143,12 @@ class Descent {
   void Prefetch() const {
     if (level_ > 1) {
       const Pack* node = index_.node(level_ - 1, child_);
-      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p) __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
+      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p)
+        __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
     } else {
       const Pack* leaf = index_.leaf(child_);
-      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p) __builtin_prefetch(leaf + p);
+      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p)
+        __builtin_prefetch(leaf + p);
     }
   }
 

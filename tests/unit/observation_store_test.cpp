@@ -46,7 +46,8 @@ Sample Observe(Random& random) {
 
 Observations Join(const std::vector<Sample>& samples) {
   const auto count = static_cast<Eigen::Index>(samples.size());
-  Observations all{Eigen::MatrixXd(count, kVariables), Eigen::MatrixXd(count, kStates), Eigen::MatrixXd(count, kStates)};
+  Observations all{Eigen::MatrixXd(count, kVariables), Eigen::MatrixXd(count, kStates),
+                   Eigen::MatrixXd(count, kStates)};
   for (Eigen::Index i = 0; i < count; ++i) {
     const Sample& sample = samples[static_cast<std::size_t>(i)];
     all.z.row(i) = sample.z;
@@ -73,7 +74,9 @@ struct Query {
   std::vector<double> half_width;
 
   explicit Query(Random& random)
-      : center(random.Vector(kVariables, 0.9)), slice(center.head(kStates), random.Matrix(kStates, 4, 0.01)), input(center.tail(2)) {
+      : center(random.Vector(kVariables, 0.9)),
+        slice(center.head(kStates), random.Matrix(kStates, 4, 0.01)),
+        input(center.tail(2)) {
     for (int k = 0; k < kStates; ++k) half_width.push_back(slice.HalfWidthUpper(k));
   }
   [[nodiscard]] QuerySet set() const { return {slice, View(input), half_width}; }
@@ -317,12 +320,14 @@ TEST(MostUseful, KeepsEveryBoundWhileAllThatAttainTheEnvelopeHaveRoom) {
       sample.upper[1] += random.Uniform(0, 0.8);  // seen badly
       sample.lower[1] -= random.Uniform(0, 0.8);
     }
-    for (int i = 0; i < 30; ++i) samples.push_back(samples[static_cast<std::size_t>(random.Below(60))]);  // twice the same
+    for (int i = 0; i < 30; ++i)
+      samples.push_back(samples[static_cast<std::size_t>(random.Below(60))]);  // twice the same
     const Observations all = Join(samples);
     const std::vector<int> kept = MostUseful(declaration, all, 89);
     ASSERT_LT(kept.size(), 61u) << "a duplicate stayed";
     ASSERT_TRUE(std::ranges::is_sorted(kept));
-    const LipschitzEnvelope before(declaration, all, kLower, kUpper), after(declaration, Select(all, kept), kLower, kUpper);
+    const LipschitzEnvelope before(declaration, all, kLower, kUpper),
+        after(declaration, Select(all, kept), kLower, kUpper);
     for (int query = 0; query < 20; ++query) {
       const Query ask(random);
       const ResidualBounds expected = Ask(before, ask), bounds = Ask(after, ask);
