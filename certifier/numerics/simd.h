@@ -1,9 +1,9 @@
 /** Eight doubles at a time, the same to the last bit on every machine.
 
-The width is fixed, and a pack knows +, -, *, |.|, max and min only, each lane by itself: what an instruction set changes is the
-time. A hot function is written once, as templates and functions of an unnamed namespace, and becomes machine code twice:
-inlined into an entry point marked FOREREACH_AVX2, and into one marked FOREREACH_FLATTEN. A member of the class that owns
-them holds the InstructionSet and chooses. */
+The width is fixed, and a pack knows +, -, *, |.|, max and min only, each lane by itself: what an instruction set
+changes is the time. A hot function is written once, as templates and functions of an unnamed namespace, and becomes
+machine code twice: inlined into an entry point marked FOREREACH_AVX2, and into one marked FOREREACH_FLATTEN. A member
+of the class that owns them holds the InstructionSet and chooses. */
 #pragma once
 
 #include <array>
@@ -47,8 +47,9 @@ typedef std::int64_t QuadMask __attribute__((vector_size(32)));
 struct alignas(64) Pack {
   Quad low, high;
 
-  [[nodiscard]] double at(std::size_t lane) const { return lane < 4 ? low[lane] : high[lane - 4]; }
-  void set(std::size_t lane, double value) { (lane < 4 ? low[lane] : high[lane - 4]) = value; }
+  // As memory: one lane is read or written, the others are left alone.
+  [[nodiscard]] double at(std::size_t lane) const { return reinterpret_cast<const double*>(this)[lane]; }
+  void set(std::size_t lane, double value) { reinterpret_cast<double*>(this)[lane] = value; }
 };
 
 /** One number in every lane, at half the registers. */

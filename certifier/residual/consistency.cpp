@@ -14,7 +14,8 @@ std::optional<Violation> TestConstant(const Declaration& declaration, const Obse
   Eigen::Index highest = 0, lowest = 0;
   o.lower.col(k).maxCoeff(&highest);
   o.upper.col(k).minCoeff(&lowest);
-  return TestPair(declaration, o, static_cast<int>(std::min(highest, lowest)), static_cast<int>(std::max(highest, lowest)), k);
+  return TestPair(declaration, o, static_cast<int>(std::min(highest, lowest)),
+                  static_cast<int>(std::max(highest, lowest)), k);
 }
 
 // Where plain arithmetic may overflow.
@@ -23,21 +24,6 @@ std::optional<Violation> TestAllPairs(const Declaration& declaration, const Obse
     for (int j = i + 1; j < o.size(); ++j)
       if (const auto violation = TestPair(declaration, o, i, j, k)) return violation;
   return std::nullopt;
-}
-
-double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries, const Observations& o) {
-  double values = 0, locations = 0;
-  for (const double x : entries.floors) values = std::max(values, std::abs(x));
-  for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
-  for (const LipschitzRow::Column& column : row.columns())
-    locations = AddUp(locations, MulUp(column.slope, o.z.col(column.variable).cwiseAbs().maxCoeff()));
-  return PairMarginUpper(values, locations, row.columns().size());
-}
-
-PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i) {
-  const auto at = static_cast<std::size_t>(i);
-  const double* coordinates = entries.coordinates.data() + at * entries.num_coordinates;
-  return {{coordinates, coordinates + entries.num_coordinates}, entries.floors[at], -entries.ceilings[at]};
 }
 
 // The first pair, given that there is one. None of the observations before its first has any partner.

@@ -9,7 +9,8 @@ struct Declaration {
   Eigen::MatrixXd lipschitz;    ///< L, n-by-d_z, not negative. A zero row declares a constant residual coordinate.
   Eigen::VectorXd noise_bound;  ///< sigma, n entries, not negative, state units.
 
-  /** @throws std::invalid_argument naming the entry if a size is not n-by-d_z or n, or an entry negative or not finite. */
+  /** @throws std::invalid_argument naming the entry if a size is not n-by-d_z or n, or an entry negative or not finite.
+   */
   void Validate(int num_states, int num_variables) const;
 };
 

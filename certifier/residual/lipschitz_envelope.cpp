@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "certifier/residual/envelope_tail.h"
 #include "certifier/residual/search.h"
 
 namespace forereach {
@@ -33,8 +34,9 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
 }
 
 // As the header says.
-void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
-                                    std::span<const double> domain_lower, std::span<const double> domain_upper) const {
+void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries,
+                                    const Observations& observations, std::span<const double> domain_lower,
+                                    std::span<const double> domain_upper) const {
   double values = 0, locations = 0, widths = 0;  // V, S, W
   for (const double x : entries.floors) values = std::max(values, std::abs(x));
   for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
@@ -49,28 +51,61 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
     row.component_errors.push_back(PlainErrorUpper(MulUp(4, MulUp(column.slope, farthest)), 4, 4));
   }
   const auto a = static_cast<int>(row.distance.columns().size());
-  const double magnitude = AddUp(AddUp(values, MulUp(2, locations)), MulUp(3, widths));
+  row.value_limit = MulUp(options_.value_headroom, values);
+  const double magnitude = AddUp(AddUp(row.value_limit, MulUp(2, locations)), MulUp(3, widths));
   row.error = PlainErrorUpper(magnitude, a + 24, a * (kMaxGenerators + 4));
   if (!(magnitude < kHuge)) row.error = kInfinity;
 }
 
 using internal::Budget;
 using internal::Sides;
+using simd::kLanes;
+using simd::Pack;
 
 struct LipschitzEnvelope::Search {
   const Row& row;
   const EnvelopeOptions& options;
   Budget& budget;
+  const Pack* tail = nullptr;  // blocks
+  std::size_t tail_count = 0;  // entries
 
   template <class Metric>
   [[nodiscard]] Sides Run(const Metric& metric) const {
     const ObservationIndex& index = row.index;
     Sides best;
-    if (index.num_blocks() <= static_cast<std::size_t>(options.max_flat_blocks))
+    if (index.num_blocks() <= MaxFlatBlocks<Metric>())
       best = ScanBlocks(metric, index.block(0), index.num_blocks(), index.num_coordinates(), budget);
     else
       best = SearchTree(metric, index, budget);
+    if (tail_count > 0) best = Highest(best, ScanTail(metric));
     return {best.floor - metric.common(), best.negated_ceiling - metric.common()};
+  }
+
+  static Sides Highest(const Sides& a, const Sides& b) {
+    return {simd::Max(a.floor, b.floor), simd::Max(a.negated_ceiling, b.negated_ceiling)};
+  }
+
+  // The last block may be written to while it is read: only the lanes that count are.
+  template <class Metric>
+  [[nodiscard]] Sides ScanTail(const Metric& metric) const {
+    const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kLanes,
+                      rest = tail_count % kLanes;
+    Sides best{-kInfinity, -kInfinity};
+    if (full > 0) best = ScanBlocks(metric, tail, full, coordinates, budget);
+    if (rest == 0) return best;
+    std::array<Pack, kMaxVariables + 2> last;
+    for (std::size_t p = 0; p < coordinates + 2; ++p) {
+      last[p] = simd::Fill(p < coordinates ? 0 : -kInfinity);
+      for (std::size_t lane = 0; lane < rest; ++lane) last[p].set(lane, tail[full * (coordinates + 2) + p].at(lane));
+    }
+    return Highest(best, ScanBlocks(metric, last.data(), 1, coordinates, budget));
+  }
+
+  // The boxes of a tree say little in many coordinates, and an entry that is refined costs more than a block.
+  template <class Metric>
+  [[nodiscard]] std::size_t MaxFlatBlocks() const {
+    const auto most = static_cast<std::size_t>(options.max_flat_blocks);
+    return Metric::kRefines ? std::min(4 * most, internal::kMaxRefinedBlocks) : most;
   }
 
   // One function for each metric and instruction set, so that each has the registers to itself.
@@ -85,13 +120,13 @@ struct LipschitzEnvelope::Search {
 
   template <class Metric, class... More>
   [[nodiscard]] Sides With(const QuerySet& set, const More&... more) const {
-    return options.instructions == InstructionSet::kAvx2 ? RunAvx2<Metric>(set, more...) : RunBaseline<Metric>(set, more...);
+    return options.instructions == InstructionSet::kAvx2 ? RunAvx2<Metric>(set, more...)
+                                                         : RunBaseline<Metric>(set, more...);
   }
 
   [[nodiscard]] Sides Best(const QuerySet& set) const {
     const std::size_t columns = row.distance.columns().size();
     const double margin = 4 * row.error;  // of bounds in the search, and for the bits that say which child they are of
-    if (columns == 0) return {row.floor, row.negated_ceiling};
     if (columns == 1) return With<internal::PatternMetric<1>>(set, margin);
     if (columns == 2) return With<internal::PatternMetric<2>>(set, margin);
     if (columns == 3) return With<internal::PatternMetric<3>>(set, margin);
@@ -101,13 +136,30 @@ struct LipschitzEnvelope::Search {
 };
 
 void LipschitzEnvelope::Enclose(const QuerySet& set, ResidualBounds& bounds) const noexcept {
+  EncloseAll(set, nullptr, 0, bounds);
+}
+
+void LipschitzEnvelope::Enclose(const QuerySet& set, const EnvelopeTail& tail, int count,
+                                ResidualBounds& bounds) const noexcept {
+  EncloseAll(set, &tail, count, bounds);
+}
+
+void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count,
+                                   ResidualBounds& bounds) const noexcept {
   bounds.capped = false;
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
-    const Row& row = rows_[k];
+  for (int k = 0; k < num_states(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const Row& row = rows_[i];
     Budget budget{options_.max_leaf_visits, kPatternsPerLeaf * options_.max_leaf_visits};
-    const Sides best = std::isfinite(row.error) ? Search{row, options_, budget}.Best(set) : Sides{-kInfinity, -kInfinity};
-    bounds.lower[k] = best.floor - row.error;
-    bounds.upper[k] = -(best.negated_ceiling - row.error);
+    Sides best{-kInfinity, -kInfinity};
+    if (row.distance.is_constant()) {
+      best = {row.floor, row.negated_ceiling};
+      if (tail) best = Search::Highest(best, {tail->HighestFloor(k, count), tail->HighestNegatedCeiling(k, count)});
+    } else if (std::isfinite(row.error)) {
+      best = Search{row, options_, budget, tail ? tail->blocks(k) : nullptr, static_cast<std::size_t>(count)}.Best(set);
+    }
+    bounds.lower[i] = best.floor - row.error;
+    bounds.upper[i] = -(best.negated_ceiling - row.error);
     bounds.capped |= budget.capped;
   }
 }

@@ -8,10 +8,10 @@ whose leaves are r~_ik -+ sigma_k (taken outward, so exact as far as soundness g
 L_kl s_l. Over all queries their magnitudes add up to at most
     V + 2 S + 3 W,   V = max_i |r~_ik| + sigma_k,  S = sum_l L_kl max |z_l|,  W = sum_l L_kl R_l,
 max |z_l| over the domain and the observations, R_l half the domain's width, which bounds sum_j |G_lj| + s_l. (W counts
-three times because w_s - w_0 + w_0 is computed in place of w_s.) No leaf passes more than a + 24 roundings for a row with
-a columns: sums over generators run in eight lanes. With u = 2^-53 the error is below
-    E_k = 2 (a + 24) u (V + 2 S + 3 W) + one smallest double for each product that may underflow,
-evaluated upward, and lower_k - E_k, upper_k + E_k are bounds in real arithmetic. Where E_k is not finite, nor are they.
+three times because w_s - w_0 + w_0 is computed in place of w_s.) No leaf passes more than a + 24 roundings for a row
+with a columns: sums over generators run in eight lanes. With u = 2^-53 the error is below E_k = 2 (a + 24) u (V + 2 S +
+3 W) + one smallest double for each product that may underflow, evaluated upward, and lower_k - E_k, upper_k + E_k are
+bounds in real arithmetic. Where E_k is not finite, nor are they.
 
 Work. Any subset of the observations gives a sound envelope, so a search may stop when it has seen enough of them. */
 #pragma once
@@ -34,8 +34,13 @@ struct EnvelopeOptions {
   int max_leaf_visits = 512;
   /** Up to this many blocks are scanned without a tree. */
   int max_flat_blocks = 32;
+  /** E_k holds for observations with |r~_ik| + sigma_k up to this many times the largest given, at least 1. More than 1
+  for an envelope that a tail is to be joined to. */
+  double value_headroom = 1;
   InstructionSet instructions = BestInstructionSet();  ///< Changes the time a query takes, never a bit of its result.
 };
+
+class EnvelopeTail;
 
 class LipschitzEnvelope final : public ResidualEnclosure {
  public:
@@ -45,13 +50,29 @@ class LipschitzEnvelope final : public ResidualEnclosure {
 
   /** @param domain_lower, domain_upper d_z entries each: a box that contains the hull of every query.
   @pre declaration.Validate passed and observations is not empty. Cost: ObservationIndex, for each row with columns. */
-  LipschitzEnvelope(const Declaration& declaration, const Observations& observations, std::span<const double> domain_lower,
-                    std::span<const double> domain_upper, const EnvelopeOptions& options = {});
+  LipschitzEnvelope(const Declaration& declaration, const Observations& observations,
+                    std::span<const double> domain_lower, std::span<const double> domain_upper,
+                    const EnvelopeOptions& options = {});
 
-  /** No heap, lock or exception. For each row of L with a nonzero columns: 2^(a-1) m up to three columns, else a m, for m
-  generators; then O(2^(a-1)) or O(a) for each block looked at, in practice some dozens whatever the number of
+  /** No heap, lock or exception. For each row of L with a nonzero columns: 2^(a-1) m up to three columns, else a m, for
+  m generators; then O(2^(a-1)) or O(a) for each block looked at, in practice some dozens whatever the number of
   observations, and where a is 4 to 12, 2^f m for an observation inside the slab of the query set in f columns. */
   void Enclose(const QuerySet& set, ResidualBounds& bounds) const noexcept override;
+
+  /** The envelope of its own observations and the first `count` of the tail. Cost: those are all looked at, eight by
+  eight.
+  @pre the tail was made for this envelope, and count <= tail.size() as read in this thread. */
+  void Enclose(const QuerySet& set, const EnvelopeTail& tail, int count, ResidualBounds& bounds) const noexcept;
+
+  [[nodiscard]] int num_states() const { return static_cast<int>(rows_.size()); }
+  [[nodiscard]] const LipschitzRow& row(int k) const { return rows_[static_cast<std::size_t>(k)].distance; }
+  /** Without entries for a constant row. */
+  [[nodiscard]] const ObservationIndex& index(int k) const { return rows_[static_cast<std::size_t>(k)].index; }
+  /** The highest floor and the lowest ceiling of coordinate k over all observations. */
+  [[nodiscard]] double highest_floor(int k) const { return rows_[static_cast<std::size_t>(k)].floor; }
+  [[nodiscard]] double lowest_ceiling(int k) const { return -rows_[static_cast<std::size_t>(k)].negated_ceiling; }
+  /** The largest |floor| and |ceiling| for which E_k holds. */
+  [[nodiscard]] double value_limit(int k) const { return rows_[static_cast<std::size_t>(k)].value_limit; }
 
   [[nodiscard]] bool uses_hull_distance() const { return uses_hull_distance_; }
 
@@ -59,13 +80,15 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   // A coordinate of the residual.
   struct Row {
     LipschitzRow distance;
-    ObservationIndex index{};              // none where the row is constant:
-    double floor = 0, negated_ceiling = 0;  // then these are its bounds
-    double error = 0;                      // E_k
+    ObservationIndex index{};                // none where the row is constant:
+    double floor = 0, negated_ceiling = 0;   // then these are its bounds
+    double error = 0;                        // E_k
+    double value_limit = 0;                  // V
     std::vector<double> component_errors{};  // of each column: of v_il and of L_kl r_l
   };
   struct Search;
 
+  void EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count, ResidualBounds& bounds) const noexcept;
   void BoundErrors(Row& row, const ObservationIndex::Entries& entries, const Observations& observations,
                    std::span<const double> domain_lower, std::span<const double> domain_upper) const;
 

@@ -1,8 +1,8 @@
 /** Row k of the declaration as a distance between locations: d_k(z, z') = sum_l L_kl |z_l - z'_l|, over the columns l
 with L_kl > 0.
 
-A row with one to three columns is an infinity norm in coordinates of its own, one for each sign pattern s (last sign +):
-alpha^s = sum_l s_l L_kl z_l and d_k(z, z') = max_s |alpha^s - alpha'^s|. Any other is a 1-norm in the coordinates
+A row with one to three columns is an infinity norm in coordinates of its own, one for each sign pattern s (last sign
++): alpha^s = sum_l s_l L_kl z_l and d_k(z, z') = max_s |alpha^s - alpha'^s|. Any other is a 1-norm in the coordinates
 L_kl z_l. A row without columns declares a constant: no coordinates, d_k = 0. */
 #pragma once
 
@@ -73,7 +73,8 @@ double LipschitzRow::WeightedUpper(const Magnitude& magnitude) const {
 /** What plain arithmetic may be off by, in any order: an upper bound on |computed - exact| for an expression of sums,
 products of two, |.|, max and min in which each leaf passes at most `roundings` roundings and the magnitudes of all
 leaves add up to `magnitude` at most, with `products` products that may underflow. Each leaf is exact up to a factor
-within 1 +- gamma_roundings, gamma_p = p u / (1 - p u) <= 2 p u, and |.|, max and min pass an error on undiminished at most. */
+within 1 +- gamma_roundings, gamma_p = p u / (1 - p u) <= 2 p u, and |.|, max and min pass an error on undiminished at
+most. */
 [[nodiscard]] inline double PlainErrorUpper(double magnitude, int roundings, int products) noexcept {
   return AddUp(MulUp(magnitude, 2.0 * roundings * kUnitRoundoff), products * std::numeric_limits<double>::denorm_min());
 }

@@ -10,9 +10,9 @@ lipschitz_envelope.cpp only: every function is to be inlined into an entry point
 #include <bit>
 #include <span>
 
+#include "certifier/numerics/simd.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/residual/lipschitz_row.h"
-#include "certifier/numerics/simd.h"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"
@@ -116,8 +116,7 @@ class PatternMetric {
     node += side * (2 * kPatterns + 1);
     Pack bound = simd::Load(node[2 * kPatterns]) + anywhere_;
     for (std::size_t s = 0; s < kPatterns; ++s)
-      bound = Min(bound, Min(simd::Load(node[2 * s]) + from_below_[s],
-                             simd::Load(node[2 * s + 1]) + from_above_[s]));
+      bound = Min(bound, Min(simd::Load(node[2 * s]) + from_below_[s], simd::Load(node[2 * s + 1]) + from_above_[s]));
     return bound;
   }
 
@@ -127,7 +126,8 @@ class PatternMetric {
   template <class T>
   static T Signed(std::size_t s, const std::array<T, kColumns>& terms) {
     T sum = terms[kColumns - 1];
-    for (std::size_t l = 0; l + 1 < kColumns; ++l) sum = LipschitzRow::IsNegative(s, l) ? sum - terms[l] : sum + terms[l];
+    for (std::size_t l = 0; l + 1 < kColumns; ++l)
+      sum = LipschitzRow::IsNegative(s, l) ? sum - terms[l] : sum + terms[l];
     return sum;
   }
 
@@ -177,21 +177,24 @@ class HullMetric : public CenterDistance {
  public:
   static constexpr bool kRefines = false;
 
-  HullMetric(const LipschitzRow& row, const QuerySet& set, double margin) : CenterDistance(row, set), margin_(simd::Fill(margin)) {
+  HullMetric(const LipschitzRow& row, const QuerySet& set, double margin)
+      : CenterDistance(row, set), margin_(simd::Fill(margin)) {
     for (const LipschitzRow::Column& column : row.columns())
       common_ += column.slope * Variable(set, column.variable).half_width;
   }
   [[nodiscard]] double common() const { return common_; }
-  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const { return CenterDistance::Node(node, side) + margin_; }
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
+    return CenterDistance::Node(node, side) + margin_;
+  }
 
  private:
   double common_ = 0;
   Same margin_;
 };
 
-/** Rows in between: Block and Node give d_i + a lower bound of the spreads w_s, which is not above D_i, and Refine gives
-D_i = max_s |sum_l s_l v_il| + w_s, v_il = L_kl (c_l - z_il). Over all z in the hull, z_l - z_il has one sign where
-|c_l - z_il| >= r_l: there the maximum has that sign, and only the signs of the other columns are tried. */
+/** Rows in between: Block and Node give d_i + a lower bound of the spreads w_s, which is not above D_i, and Refine
+gives D_i = max_s |sum_l s_l v_il| + w_s, v_il = L_kl (c_l - z_il). Over all z in the hull, z_l - z_il has one sign
+where |c_l - z_il| >= r_l: there the maximum has that sign, and only the signs of the other columns are tried. */
 class SignMetric : public CenterDistance {
  public:
   static constexpr bool kRefines = true;
@@ -215,7 +218,9 @@ class SignMetric : public CenterDistance {
 
   [[nodiscard]] double common() const { return 0; }
   [[nodiscard]] Pack Block(const Pack* block) const { return CenterDistance::Block(block) + least_; }
-  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const { return CenterDistance::Node(node, side) - least_; }
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
+    return CenterDistance::Node(node, side) - least_;
+  }
 
   /** D_i of one observation. Needs 2^f patterns for f free signs; where `patterns` does not allow them, the bound over
   the hull, and `capped` is set. */
@@ -227,11 +232,11 @@ class SignMetric : public CenterDistance {
     for (std::size_t l = 0; l < columns(); ++l) {
       const double component = Component(block, lane, l);
       if (std::abs(component) > reach_[l])
-        Extend(signs, 0, 0, l, component, component < 0), ++fixed;
+        Extend(signs, 0, 0, l, component, std::copysign(1, component)), ++fixed;
       else
         signs.free[free] = l, signs.components[free++] = component;
     }
-    if (fixed == 0) --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], false);  // s and -s are the same
+    if (fixed == 0) --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], 1);  // s and -s are the same
     if (patterns < 1 << free) {
       capped = true;
       double distance = hull_;
@@ -251,10 +256,11 @@ class SignMetric : public CenterDistance {
     std::array<std::array<Pack, kMaxChunks>, kMaxColumns + 1> along;
   };
 
-  void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, bool negative) const {
-    signs.sums[to] = negative ? signs.sums[from] - component : signs.sums[from] + component;
-    for (std::size_t j = 0; j < chunks_; ++j)
-      signs.along[to][j] = negative ? signs.along[from][j] - weighted_[l][j] : signs.along[from][j] + weighted_[l][j];
+  // Without a branch: signs are as good as random, and a product with one is exact.
+  void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, double sign) const {
+    signs.sums[to] = signs.sums[from] + sign * component;
+    const Same same = simd::Fill(sign);
+    for (std::size_t j = 0; j < chunks_; ++j) signs.along[to][j] = signs.along[from][j] + same * weighted_[l][j];
   }
 
   // Counts through the patterns; the last column changes fastest, so that few sums are made anew.
@@ -263,7 +269,7 @@ class SignMetric : public CenterDistance {
     for (std::size_t pattern = 0; pattern < std::size_t{1} << free; ++pattern) {
       const auto same = pattern == 0 ? 0 : free - 1 - static_cast<std::size_t>(std::countr_zero(pattern));
       for (std::size_t t = same; t < free; ++t)
-        Extend(signs, t, t + 1, signs.free[t], signs.components[t], pattern >> (free - 1 - t) & 1);
+        Extend(signs, t, t + 1, signs.free[t], signs.components[t], pattern >> (free - 1 - t) & 1 ? -1 : 1);
       Pack spread = simd::Fill(0);
       for (std::size_t j = 0; j < chunks_; ++j) spread = spread + Abs(signs.along[free][j]);
       farthest = simd::Max(farthest, std::abs(signs.sums[free]) + (SumLanes(spread) + slack_));

@@ -48,7 +48,8 @@ class ObservationIndex::Builder {
     const std::size_t children = (count + child - 1) / child;
     if (children == 1) return Arrange(first, count);
     const std::size_t left = children / 2 * child, k = WidestCoordinate(first, count);
-    const auto begin = keys_.begin() + static_cast<std::ptrdiff_t>(first), end = begin + static_cast<std::ptrdiff_t>(count);
+    const auto begin = keys_.begin() + static_cast<std::ptrdiff_t>(first),
+               end = begin + static_cast<std::ptrdiff_t>(count);
     for (auto key = begin; key != end; ++key) key->at = Coordinate(key->id, k);
     std::nth_element(begin, begin + static_cast<std::ptrdiff_t>(left), end,
                      [](const Key& a, const Key& b) { return a.at != b.at ? a.at < b.at : a.id < b.id; });
@@ -139,7 +140,8 @@ class ObservationIndex::Builder {
 
   // Where a side's max v stands.
   std::size_t MaxOf(std::size_t side) const {
-    return index_.shape_ == Shape::kBoxed ? side : side * (2 * entries_.num_coordinates + 1) + 2 * entries_.num_coordinates;
+    return index_.shape_ == Shape::kBoxed ? side
+                                          : side * (2 * entries_.num_coordinates + 1) + 2 * entries_.num_coordinates;
   }
 
   // Lowest coordinates are stored negated so far. A child that is not there becomes the box of the origin.
@@ -168,13 +170,16 @@ ObservationIndex::ObservationIndex(const Entries& entries)
   Builder(entries, *this);
 }
 
-ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration, const Observations& observations,
-                                    int coordinate) {
+ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
+                                    const Observations& observations, int coordinate) {
   const auto count = static_cast<std::size_t>(observations.size());
   const double sigma = declaration.noise_bound[coordinate];
   using Shape = ObservationIndex::Shape;
   ObservationIndex::Entries entries{row.has_patterns() ? Shape::kLifted : Shape::kBoxed,
-                                    row.num_coordinates(), std::vector<double>(count * row.num_coordinates()), {}, {}};
+                                    row.num_coordinates(),
+                                    std::vector<double>(count * row.num_coordinates()),
+                                    {},
+                                    {}};
   for (int i = 0; i < observations.size(); ++i) {
     row.Map([&](int l) { return observations.z(i, l); },
             entries.coordinates.data() + static_cast<std::size_t>(i) * row.num_coordinates());

@@ -1,14 +1,15 @@
-/** Observations of one residual coordinate, in blocks of eight, four blocks a leaf, under a tree of eight children a node.
+/** Observations of one residual coordinate, in blocks of eight, four blocks a leaf, under a tree of eight children a
+node.
 
 An entry i has K coordinates alpha_i (lipschitz_row.h), a floor and a ceiling: floor_i <= r_k(z_i) <= ceiling_i. The two
-sides have the values v_i = floor_i and v_i = -ceiling_i, so that both ask for a maximum. What is close in space is close
-in memory. A node bounds v_i - d(alpha, alpha_i) from above for all entries below each child, any alpha and both sides:
-  lifted   (d an infinity norm)  max_i v_i, and for each coordinate c max_i (v_i - alpha_ic) and max_i (v_i + alpha_ic):
-           v_i - d <= max_i (v_i -+ alpha_ic) +- alpha_c. That knows which value stands where, as a box does not.
-  boxed    (d a 1-norm)          max_i v_i, and for each coordinate the interval of the alpha_ic.
+sides have the values v_i = floor_i and v_i = -ceiling_i, so that both ask for a maximum. What is close in space is
+close in memory. A node bounds v_i - d(alpha, alpha_i) from above for all entries below each child, any alpha and both
+sides: lifted   (d an infinity norm)  max_i v_i, and for each coordinate c max_i (v_i - alpha_ic) and max_i (v_i +
+alpha_ic): v_i - d <= max_i (v_i -+ alpha_ic) +- alpha_c. That knows which value stands where, as a box does not. boxed
+(d a 1-norm)          max_i v_i, and for each coordinate the interval of the alpha_ic.
 
-Immutable: any number of threads may read it. Memory 8 (K + 2) + 4 bytes an entry and up to a fifth of that for the tree;
-set-up O(K N log N), half a second for 10^6 entries in two coordinates. */
+Immutable: any number of threads may read it. Memory 8 (K + 2) + 4 bytes an entry and up to a fifth of that for the
+tree; set-up O(K N log N), half a second for 10^6 entries in two coordinates. */
 #pragma once
 
 #include <cstdint>
@@ -61,8 +62,9 @@ class ObservationIndex final {
 
   /** Node i of level 1..height(), its packs with a lane for each child. Its children are 8 i .. 8 i + 7 of the level
   below; below level 1 are the leaves.
-  Lifted: for each side, max (v - alpha_c) and max (v + alpha_c) of each c, then max v. Boxed: max v of each side, then the
-  lowest and the highest alpha_c of each c. A child that is not there has the largest negative double for every maximum. */
+  Lifted: for each side, max (v - alpha_c) and max (v + alpha_c) of each c, then max v. Boxed: max v of each side, then
+  the lowest and the highest alpha_c of each c. A child that is not there has the largest negative double for every
+  maximum. */
   [[nodiscard]] const simd::Pack* node(int level, std::size_t i) const {
     return nodes_.data() + (levels_[static_cast<std::size_t>(level - 1)] + i) * node_packs();
   }

@@ -42,12 +42,25 @@ struct PairSearch::Kernel {
 
   // The same between the point and the entries of a block.
   Pack Excess(const double* coordinates, double floor, double negated_ceiling, const Pack* block) const {
+    return ExcessOf(coordinates, floor, negated_ceiling, block, k, lifted);
+  }
+  Pack Distance(const double* coordinates, const Pack* block) const {
+    return DistanceOf(coordinates, block, k, lifted);
+  }
+
+  static Pack ExcessOf(const double* coordinates, double floor, double negated_ceiling, const Pack* block,
+                       std::size_t k, bool lifted) {
+    return Max(simd::Fill(floor) + simd::Load(block[k + 1]), simd::Fill(negated_ceiling) + simd::Load(block[k])) -
+           DistanceOf(coordinates, block, k, lifted);
+  }
+
+  static Pack DistanceOf(const double* coordinates, const Pack* block, std::size_t k, bool lifted) {
     Pack distance = simd::Fill(0);
     for (std::size_t c = 0; c < k; ++c) {
       const Pack along = Abs(simd::Fill(coordinates[c]) - simd::Load(block[c]));
       distance = lifted ? Max(distance, along) : distance + along;
     }
-    return Max(simd::Fill(floor) + simd::Load(block[k + 1]), simd::Fill(negated_ceiling) + simd::Load(block[k])) - distance;
+    return distance;
   }
 
   void Leaves(const double* group, std::size_t first, std::vector<std::size_t>& leaves) const {
@@ -91,7 +104,8 @@ struct PairSearch::Kernel {
         if (!(excess.at(lane) > -margin)) continue;
         for (std::size_t c = 0; c < k; ++c) coordinates[c] = block[c].at(lane);
         const std::uint32_t id = index.ids(own)[lane];
-        Partners(coordinates.data(), block[k].at(lane), block[k + 1].at(lane), other, leaf == other ? own * kLanes + lane + 1 : 0,
+        Partners(coordinates.data(), block[k].at(lane), block[k + 1].at(lane), other,
+                 leaf == other ? own * kLanes + lane + 1 : 0,
                  [&](std::uint32_t partner) { pairs.emplace_back(id, partner); });
       }
     }
@@ -106,14 +120,16 @@ struct PairSearch::Kernel {
       for (std::size_t c = 0; c < k; ++c) {
         const Pack alpha = simd::Load(block[c]);
         up = Min(up, Min(floor - alpha + simd::Fill(other[2 * c + 1]), floor + alpha + simd::Fill(other[2 * c])));
-        down = Min(down, Min(ceiling - alpha + simd::Fill(group[2 * c + 1]), ceiling + alpha + simd::Fill(group[2 * c])));
+        down =
+            Min(down, Min(ceiling - alpha + simd::Fill(group[2 * c + 1]), ceiling + alpha + simd::Fill(group[2 * c])));
       }
       return Max(up, down);
     }
     Pack excess = Max(floor + simd::Fill(group[1]), ceiling + simd::Fill(group[0]));
     for (std::size_t c = 0; c < k; ++c) {
       const Pack alpha = simd::Load(block[c]);
-      excess = excess - Max(Max(simd::Fill(group[2 * c + 2]) - alpha, alpha - simd::Fill(group[2 * c + 3])), simd::Fill(0));
+      excess =
+          excess - Max(Max(simd::Fill(group[2 * c + 2]) - alpha, alpha - simd::Fill(group[2 * c + 3])), simd::Fill(0));
     }
     return excess;
   }
@@ -131,10 +147,87 @@ struct PairSearch::Kernel {
     }
   }
 
-  FOREREACH_AVX2 static void LeavesAvx2(const Kernel& kernel, const double* group, std::size_t first, std::vector<std::size_t>& leaves) {
+  // As Descent of search.h, for a point and an entry that is left out.
+  Other BestOther(const Point& point, const double* group, std::size_t side, std::uint32_t self) const {
+    Other best;
+    const double own = side == 0 ? point.floor : point.negated_ceiling;
+    std::array<Pack, ObservationIndex::kMaxHeight + 1> bounds;
+    std::array<std::size_t, ObservationIndex::kMaxHeight + 1> first;
+    const int top = index.height();
+    int level = top + 1;
+    for (std::size_t child = 0;;) {
+      if (level > 1) {
+        const auto at = static_cast<std::size_t>(--level);
+        bounds[at] = simd::TagLanes(Max(OneSide(group, index.node(level, child), side), simd::Fill(-kMaxDouble)));
+        first[at] = child * kLanes;
+      } else {
+        for (std::size_t b = child * ObservationIndex::kLeafBlocks; b < (child + 1) * ObservationIndex::kLeafBlocks;
+             ++b)
+          BestOther(point, own, b, side, self, best);
+      }
+      double next;
+      while (!((next = MaxLane(bounds[static_cast<std::size_t>(level)])) >= best.value) || next == -kMaxDouble)
+        if (++level > top) return best;
+      const auto at = static_cast<std::size_t>(level);
+      bounds[at] = Replace(bounds[at], next, -kMaxDouble);
+      child = first[at] + simd::TaggedLane(next);
+    }
+  }
+
+  void BestOther(const Point& point, double own, std::size_t b, std::size_t side, std::uint32_t self,
+                 Other& best) const {
+    const Pack* block = index.block(b);
+    const Pack values = simd::Load(block[k + side]) - Distance(point.coordinates.data(), block);
+    if (!(MaxLane(values) > best.value)) return;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const std::uint32_t id = index.ids(b)[lane];
+      const bool same = values.at(lane) == own && block[k + side].at(lane) == own && id > self;
+      if (id != self && !same && values.at(lane) > best.value) best = {values.at(lane), id};
+    }
+  }
+
+  // v_j - d at most, between a group with v = 0 and each child.
+  Pack OneSide(const double* group, const Pack* node, std::size_t side) const {
+    if (lifted) return OneWay(group, node + side * (2 * k + 1)) + simd::Fill(margin);
+    Pack most = simd::Load(node[side]) + simd::Fill(margin);
+    for (std::size_t c = 1; c <= k; ++c)
+      most = most - Max(Max(simd::Load(node[2 * c]) - simd::Fill(group[2 * c + 1]),
+                            simd::Fill(group[2 * c]) - simd::Load(node[2 * c + 1])),
+                        simd::Fill(0));
+    return most;
+  }
+
+  void Partners(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
+    Partners(point.coordinates.data(), point.floor, point.negated_ceiling, leaf, 0,
+             [&](std::uint32_t partner) { partners.push_back(partner); });
+  }
+
+  static void InBlocks(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
+                       double margin, std::vector<std::uint32_t>& partners) {
+    const std::size_t k = row.num_coordinates();
+    const bool lifted = row.has_patterns();
+    for (std::size_t first = 0; first < count; first += kLanes, blocks += k + 2) {
+      const Pack excess = ExcessOf(point.coordinates.data(), point.floor, point.negated_ceiling, blocks, k, lifted);
+      if (!(MaxLane(excess) > -margin)) continue;
+      for (std::size_t lane = 0; lane < std::min(kLanes, count - first); ++lane)
+        if (excess.at(lane) > -margin) partners.push_back(static_cast<std::uint32_t>(first + lane));
+    }
+  }
+
+  FOREREACH_AVX2 static void PartnersAvx2(const Kernel& kernel, const Point& point, std::size_t leaf,
+                                          std::vector<std::uint32_t>& partners) {
+    kernel.Partners(point, leaf, partners);
+  }
+  FOREREACH_AVX2 static void InBlocksAvx2(const Point& point, const LipschitzRow& row, const Pack* blocks,
+                                          std::size_t count, double margin, std::vector<std::uint32_t>& partners) {
+    InBlocks(point, row, blocks, count, margin, partners);
+  }
+  FOREREACH_AVX2 static void LeavesAvx2(const Kernel& kernel, const double* group, std::size_t first,
+                                        std::vector<std::size_t>& leaves) {
     kernel.Leaves(group, first, leaves);
   }
-  FOREREACH_AVX2 static void SuspectsAvx2(const Kernel& kernel, std::size_t leaf, std::size_t other, const double* group,
+  FOREREACH_AVX2 static void SuspectsAvx2(const Kernel& kernel, std::size_t leaf, std::size_t other,
+                                          const double* group,
                                           std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
     kernel.Suspects(leaf, other, group, pairs);
   }
@@ -156,8 +249,21 @@ void PairSearch::Suspects(std::size_t leaf, std::size_t other,
 
 void PairSearch::Suspects(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
   partners.clear();
-  Kernel{index_, margin_}.Partners(point.coordinates.data(), point.floor, point.negated_ceiling, leaf, 0,
-                                   [&](std::uint32_t partner) { partners.push_back(partner); });
+  const Kernel kernel{index_, margin_};
+  if (instructions_ == InstructionSet::kAvx2) return Kernel::PartnersAvx2(kernel, point, leaf, partners);
+  kernel.Partners(point, leaf, partners);
+}
+
+void PairSearch::Suspects(const Point& point, const LipschitzRow& row, const simd::Pack* blocks, std::size_t count,
+                          double margin, std::vector<std::uint32_t>& partners) {
+  partners.clear();
+  const bool avx2 = BestInstructionSet() == InstructionSet::kAvx2;
+  (avx2 ? Kernel::InBlocksAvx2 : Kernel::InBlocks)(point, row, blocks, count, margin, partners);
+}
+
+PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, std::uint32_t self) const {
+  const Point at_zero{point.coordinates, 0, 0};
+  return Kernel{index_, margin_}.BestOther(point, GroupOf(at_zero).data(), side, self);
 }
 
 std::vector<double> PairSearch::GroupOf(std::size_t leaf) const {
@@ -179,6 +285,21 @@ std::vector<double> PairSearch::GroupOf(const Point& point) const {
     group.push_back(value);
   }
   return group;
+}
+
+double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries, const Observations& o) {
+  double values = 0, locations = 0;
+  for (const double x : entries.floors) values = std::max(values, std::abs(x));
+  for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
+  for (const LipschitzRow::Column& column : row.columns())
+    locations = AddUp(locations, MulUp(column.slope, o.z.col(column.variable).cwiseAbs().maxCoeff()));
+  return PairMarginUpper(values, locations, row.columns().size());
+}
+
+PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i) {
+  const auto at = static_cast<std::size_t>(i);
+  const double* coordinates = entries.coordinates.data() + at * entries.num_coordinates;
+  return {{coordinates, coordinates + entries.num_coordinates}, entries.floors[at], -entries.ceilings[at]};
 }
 
 }  // namespace forereach

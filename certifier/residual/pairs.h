@@ -1,8 +1,8 @@
 /** Pairs of observations in one residual coordinate that may contradict the declaration: floor_i - ceiling_j > d(i, j).
 
-Plain arithmetic with a margin above its error, so that no contradiction is missed; whoever asks has to test the suspects
-exactly. Leaves of an ObservationIndex are compared by what its nodes know of them, and entries only where two leaves may
-hold a pair. */
+Plain arithmetic with a margin above its error, so that no contradiction is missed; whoever asks has to test the
+suspects exactly. Leaves of an ObservationIndex are compared by what its nodes know of them, and entries only where two
+leaves may hold a pair. */
 #pragma once
 
 #include <cstdint>
@@ -35,6 +35,19 @@ class PairSearch final {
   template <class Test>
   bool AnyPartner(const Point& point, const Test& test) const;
 
+  /** Suspects of a point among the first `count` entries of blocks that lie in the order of their numbers. */
+  static void Suspects(const Point& point, const LipschitzRow& row, const simd::Pack* blocks, std::size_t count,
+                       double margin, std::vector<std::uint32_t>& partners);
+
+  /** The entry other than `self` that says most about the point on one side: the largest v_j - d(point, j), v the floor
+  for side 0 and the negated ceiling for side 1. An entry that is the same as the point there, and whose id is above
+  `self`, does not count: of two that are the same, only the later has one that says as much. */
+  struct Other {
+    double value = -kInfinity;
+    std::uint32_t id = ObservationIndex::kNone;
+  };
+  [[nodiscard]] Other BestOther(const Point& point, std::size_t side, std::uint32_t self) const;
+
   /** Leaves that may hold a partner, from number `first` on. Group: as a node's child, node_packs() doubles. */
   void Leaves(const std::vector<double>& group, std::size_t first, std::vector<std::size_t>& leaves) const;
   /** Suspects of a leaf with another or with itself, each pair once. */
@@ -60,6 +73,12 @@ class PairSearch final {
   if (!(magnitude < 0x1p960)) return kInfinity;
   return PlainErrorUpper(magnitude, 2 * (static_cast<int>(columns) + 8), 4 * static_cast<int>(columns));
 }
+
+/** The same for all pairs of the given observations. */
+[[nodiscard]] double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries,
+                                 const Observations& observations);
+
+[[nodiscard]] PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i);
 
 template <class Test>
 bool PairSearch::AnyPair(const Test& test) const {

@@ -1,6 +1,6 @@
-/** max_i (value_i - D_i) over an ObservationIndex, for both sides: value_i is the floor, or the negated ceiling. Scans all
-blocks, or goes down the tree and leaves out what cannot beat the best so far; both find the same number to the last bit,
-in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metric.h. */
+/** max_i (value_i - D_i) over an ObservationIndex, for both sides: value_i is the floor, or the negated ceiling. Scans
+all blocks, or goes down the tree and leaves out what cannot beat the best so far; both find the same number to the last
+bit, in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metric.h. */
 #pragma once
 
 #include "certifier/residual/metric.h"
@@ -17,13 +17,18 @@ struct Budget {
   bool capped = false;
 };
 
+/** Blocks at most that are scanned without a tree where entries are refined. */
+inline constexpr std::size_t kMaxRefinedBlocks = 128;
+
 struct Sides {
   double floor, negated_ceiling;
 };
 
-/** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry on. */
+/** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry
+ * on. */
 template <class Metric>
-double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best, Budget& budget) {
+double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best,
+                   Budget& budget) {
   if constexpr (!Metric::kRefines) {
     return simd::Max(best, MaxLane(optimistic));
   } else {
@@ -39,25 +44,51 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
 
 /** All of `count` blocks in a row. */
 template <class Metric>
-Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget& budget) {
-  Sides best{-kInfinity, -kInfinity};
+Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget&) {
   Pack floors = simd::Fill(-kInfinity), ceilings = simd::Fill(-kInfinity);
   for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
-    const Pack distance = metric.Block(block), floor = simd::Load(block[coordinates]), ceiling = simd::Load(block[coordinates + 1]);
-    if constexpr (Metric::kRefines) {
-      best.floor = BestOfBlock(metric, block, floor, floor - distance, best.floor, budget);
-      best.negated_ceiling = BestOfBlock(metric, block, ceiling, ceiling - distance, best.negated_ceiling, budget);
-    } else {
-      floors = Max(floor - distance, floors);
-      ceilings = Max(ceiling - distance, ceilings);
+    const Pack distance = metric.Block(block);
+    floors = Max(simd::Load(block[coordinates]) - distance, floors);
+    ceilings = Max(simd::Load(block[coordinates + 1]) - distance, ceilings);
+  }
+  return {MaxLane(floors), MaxLane(ceilings)};
+}
+
+/** The same where entries are refined: the most promising block first, then those that may still beat what it holds. */
+template <class Metric>
+requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count,
+                                           std::size_t coordinates, Budget& budget) {
+  std::array<std::array<Pack, kMaxRefinedBlocks>, 2> optimistic;
+  std::array<std::array<double, kMaxRefinedBlocks>, 2> highest;
+  std::array<std::size_t, 2> first{0, 0};
+  std::array<double, 2> top{-kInfinity, -kInfinity};
+  for (std::size_t b = 0; b < count; ++b) {
+    const Pack* block = blocks + b * (coordinates + 2);
+    const Pack distance = metric.Block(block);
+    for (std::size_t side = 0; side < 2; ++side) {
+      optimistic[side][b] = simd::Load(block[coordinates + side]) - distance;
+      highest[side][b] = MaxLane(optimistic[side][b]);
+      first[side] = highest[side][b] > top[side] ? b : first[side];
+      top[side] = simd::Max(highest[side][b], top[side]);
     }
   }
-  return {simd::Max(best.floor, MaxLane(floors)), simd::Max(best.negated_ceiling, MaxLane(ceilings))};
+  std::array<double, 2> best{-kInfinity, -kInfinity};
+  for (std::size_t side = 0; side < 2; ++side) {
+    const auto refine = [&](std::size_t b) {
+      const Pack* block = blocks + b * (coordinates + 2);
+      best[side] = BestOfBlock(metric, block, block[coordinates + side], optimistic[side][b], best[side], budget);
+    };
+    refine(first[side]);
+    for (std::size_t b = 0; b < count; ++b)
+      if (b != first[side] && highest[side][b] > best[side]) refine(b);
+  }
+  return {best[0], best[1]};
 }
 
 /** One side of a leaf. */
 template <class Metric>
-double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best, Budget& budget) {
+double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best,
+                  Budget& budget) {
   Pack highest = simd::Fill(-kInfinity);
   for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
     const Pack values = simd::Load(block[coordinates + side]), optimistic = values - metric.Block(block);
@@ -112,10 +143,12 @@ class Descent {
   void Prefetch() const {
     if (level_ > 1) {
       const Pack* node = index_.node(level_ - 1, child_);
-      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p) __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
+      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p)
+        __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
     } else {
       const Pack* leaf = index_.leaf(child_);
-      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p) __builtin_prefetch(leaf + p);
+      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p)
+        __builtin_prefetch(leaf + p);
     }
   }
 

@@ -1,5 +1,5 @@
-// The search over observations against looking at every one: the same number to the last bit, in a tree and in a row, on
-// every instruction set; and what a cap makes of it is wider.
+// The search over observations against looking at every one: the same number to the last bit, in a tree and in a row,
+// on every instruction set; and what a cap makes of it is wider.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,11 +26,13 @@ struct Data {
 
 Data Make(Random& random, int count, int active, double scale) {
   Data data;
-  data.declaration = {Eigen::MatrixXd::Zero(1, kVariables), Eigen::VectorXd::Constant(1, random.Coin() ? 0 : 0.01 * scale)};
+  data.declaration = {Eigen::MatrixXd::Zero(1, kVariables),
+                      Eigen::VectorXd::Constant(1, random.Coin() ? 0 : 0.01 * scale)};
   std::vector<int> columns(kVariables);
   for (int l = 0; l < kVariables; ++l) columns[static_cast<std::size_t>(l)] = l;
   for (int a = 0; a < active; ++a) {
-    std::swap(columns[static_cast<std::size_t>(a)], columns[static_cast<std::size_t>(random.Integer(a, kVariables - 1))]);
+    std::swap(columns[static_cast<std::size_t>(a)],
+              columns[static_cast<std::size_t>(random.Integer(a, kVariables - 1))]);
     data.declaration.lipschitz(0, columns[static_cast<std::size_t>(a)]) = random.Uniform(0, 1);
   }
   Observations& o = data.observations;
@@ -57,7 +59,8 @@ struct Query {
   std::vector<double> half_width;
 
   Query(Random& random, double scale, int generators)
-      : slice(random.Vector(kStates, scale), random.Matrix(kStates, generators, scale / (generators + 1) * random.Uniform(0, 0.9))),
+      : slice(random.Vector(kStates, scale),
+              random.Matrix(kStates, generators, scale / (generators + 1) * random.Uniform(0, 0.9))),
         input(random.Vector(kInputs, scale)) {
     for (int k = 0; k < kStates; ++k) {
       slice.mutable_slack(k) = random.Coin() ? 0 : 1e-3 * scale * random.Uniform(0, 1);
@@ -89,7 +92,8 @@ TEST_P(Search, TreeAndRowAgreeToTheLastBitOnEveryInstructionSet) {
     std::vector<LipschitzEnvelope> envelopes;
     for (const InstructionSet instructions : InstructionSets())
       for (const int flat : {kFlat, 0})
-        envelopes.push_back(EnvelopeOf(data, {.max_leaf_visits = 1 << 20, .max_flat_blocks = flat, .instructions = instructions}));
+        envelopes.push_back(
+            EnvelopeOf(data, {.max_leaf_visits = 1 << 20, .max_flat_blocks = flat, .instructions = instructions}));
     for (int trial = 0; trial < (count > 1000 ? 5 : 20); ++trial) {
       const Query query(random, scale, random.Integer(0, 20));
       const ResidualBounds expected = Ask(envelopes.front(), query);

@@ -1,0 +1,58 @@
+#include "certifier/residual/envelope_tail.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace forereach {
+
+using simd::kLanes;
+
+EnvelopeTail::EnvelopeTail(const Declaration& declaration, const LipschitzEnvelope& envelope, int capacity)
+    : envelope_(envelope), noise_bound_(declaration.noise_bound), capacity_(capacity) {
+  const auto entries = static_cast<std::size_t>(capacity), blocks = (entries + kLanes - 1) / kLanes;
+  for (int k = 0; k < envelope.num_states(); ++k)
+    rows_.push_back({std::vector<simd::Pack>(blocks * (envelope.row(k).num_coordinates() + 2)),
+                     std::vector<double>(entries), std::vector<double>(entries)});
+}
+
+bool EnvelopeTail::Covers(std::span<const double> lower, std::span<const double> upper) const {
+  for (int k = 0; k < envelope_.num_states(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const double magnitude = AddUp(std::max(std::abs(lower[i]), std::abs(upper[i])), noise_bound_[k]);
+    if (!envelope_.row(k).is_constant() && !(magnitude <= envelope_.value_limit(k))) return false;
+  }
+  return true;
+}
+
+void EnvelopeTail::Append(std::span<const double> z, std::span<const double> lower, std::span<const double> upper) {
+  const auto entry = static_cast<std::size_t>(size_.load(std::memory_order_relaxed)), lane = entry % kLanes;
+  std::array<double, kMaxVariables> coordinates;
+  for (int k = 0; k < envelope_.num_states(); ++k) {
+    const LipschitzRow& distance = envelope_.row(k);
+    Row& row = rows_[static_cast<std::size_t>(k)];
+    const double floor = SubDown(lower[static_cast<std::size_t>(k)], noise_bound_[k]);
+    const double negated_ceiling = -AddUp(upper[static_cast<std::size_t>(k)], noise_bound_[k]);
+    const std::size_t columns = distance.num_coordinates();
+    simd::Pack* block = row.blocks.data() + entry / kLanes * (columns + 2);
+    distance.Map([&](int l) { return z[static_cast<std::size_t>(l)]; }, coordinates.data());
+    for (std::size_t c = 0; c < columns; ++c) block[c].set(lane, coordinates[c]);
+    block[columns].set(lane, floor);
+    block[columns + 1].set(lane, negated_ceiling);
+    row.floors[entry] = entry == 0 ? floor : std::max(floor, row.floors[entry - 1]);
+    row.negated_ceilings[entry] =
+        entry == 0 ? negated_ceiling : std::max(negated_ceiling, row.negated_ceilings[entry - 1]);
+  }
+  size_.store(static_cast<int>(entry) + 1, std::memory_order_release);
+}
+
+double EnvelopeTail::HighestFloor(int k, int count) const {
+  return count == 0 ? -kInfinity : rows_[static_cast<std::size_t>(k)].floors[static_cast<std::size_t>(count - 1)];
+}
+
+double EnvelopeTail::HighestNegatedCeiling(int k, int count) const {
+  return count == 0 ? -kInfinity
+                    : rows_[static_cast<std::size_t>(k)].negated_ceilings[static_cast<std::size_t>(count - 1)];
+}
+
+}  // namespace forereach

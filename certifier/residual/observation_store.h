@@ -1,0 +1,102 @@
+/** Observations that grow while they are used.
+
+One thread at a time inserts, removes and compacts; any number take snapshots and query them, and none of these ever
+waits for an index to be built. New observations go into a tail beside the index, which queries scan in full; Compact
+makes a new index of both, off to the side, and swaps it in. A snapshot is what was known when it was taken: it stays
+valid, and answers the same, for as long as it is held.
+
+Every set of observations gives a sound envelope, so nothing here can make a bound wrong: not the tail's limit, not the
+budget, not a removal. */
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "certifier/residual/consistency.h"
+#include "certifier/residual/envelope_tail.h"
+#include "certifier/residual/lipschitz_envelope.h"
+
+namespace forereach {
+
+struct StoreOptions {
+  /** Observations in the tail until an index has to be built, 1 to EnvelopeTail::kMaxCapacity. A query looks at all. */
+  int tail_capacity = 256;
+  /** Observations an index may hold, at least 1: memory is about 16 (d_z + n) bytes for each and what ObservationIndex
+  states. When Compact finds more, it keeps those that attain the envelope, MostUseful. */
+  std::size_t max_observations = 10'000'000;
+  EnvelopeOptions envelope;  ///< value_headroom is set by the store.
+};
+
+class ObservationStore final {
+ private:
+  struct Generation;
+  class Newcomer;
+
+ public:
+  class Snapshot final : public ResidualEnclosure {
+   public:
+    void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
+    [[nodiscard]] std::size_t size() const;
+    /** A provable contradiction among the observations, by their ids: then no residual is admissible. */
+    [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
+
+   private:
+    friend class ObservationStore;
+    std::shared_ptr<const Generation> generation_;
+    int tail_size_ = 0;
+    std::optional<Violation> violation_;
+  };
+
+  /** Observations get the ids 0, 1, ... in their order. @param domain as of LipschitzEnvelope.
+  @throws std::invalid_argument if the declaration does not fit, there are none, or an option is out of its range. */
+  ObservationStore(Declaration declaration, const Observations& observations, std::span<const double> domain_lower,
+                   std::span<const double> domain_upper, const StoreOptions& options = {});
+  ~ObservationStore();
+
+  /** All that is known now. Cost: a lock for the time of copying a pointer. */
+  [[nodiscard]] Snapshot snapshot() const;
+
+  struct Insertion {
+    int id = -1;  ///< -1 if it was refused: not finite, lower > upper, or z outside the domain.
+    std::optional<Violation>
+        violation;  ///< The first found with an earlier observation, if any; it is added all the same.
+  };
+  /** Adds one observed transition, d_z and n entries, and tests it against all others: about a microsecond. When the
+  tail is full it compacts first, which takes as long as building an index. */
+  Insertion Insert(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
+
+  /** Forgets an observation; false if there is none of that id, or it is the last. A violation it took part in is
+  looked for anew among the others. Costs a new index. Snapshots taken before still know it. */
+  bool Remove(int id);
+
+  /** Puts the tail into the index and keeps to the budget. May run beside Insert, in a thread of its own. */
+  void Compact();
+
+  /** How full the tail is, so that a thread that has the time can compact before it must. */
+  [[nodiscard]] int tail_size() const;
+
+ private:
+  std::shared_ptr<Generation> Build(Observations observations, std::vector<int> ids) const;
+  std::shared_ptr<Generation> Merge(const Generation& generation, int tail_size, int removed) const;
+  std::shared_ptr<Generation> MergeWith(std::span<const double> z, std::span<const double> lower,
+                                        std::span<const double> upper, int id) const;
+  Insertion Enlist(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
+  bool Violated() const;
+  void Swap(std::shared_ptr<Generation> generation);
+
+  const Declaration declaration_;
+  const std::vector<double> domain_lower_, domain_upper_;
+  StoreOptions options_;
+
+  std::mutex compacting_;  // one at a time; taken before the others
+  std::mutex writing_;     // the tail's end, next_id_; taken before current_lock_
+  int next_id_ = 0;
+  mutable std::mutex current_lock_;  // the two below, to copy or set them
+  std::shared_ptr<Generation> current_;
+  std::optional<Violation> violation_;
+};
+
+}  // namespace forereach

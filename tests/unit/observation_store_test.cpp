@@ -1,0 +1,374 @@
+// Observations that grow: whatever way they came in, the store answers as an envelope of all of them does.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "certifier/residual/observation_store.h"
+#include "certifier/residual/retention.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kStates = 3, kVariables = 5;
+const std::vector<double> kLower(kVariables, -1), kUpper(kVariables, 1);
+
+// Row 0 is constant, row 1 has two columns, row 2 all five.
+Declaration MakeDeclaration() {
+  Declaration declaration{Eigen::MatrixXd::Zero(kStates, kVariables), Eigen::VectorXd::Constant(kStates, 1e-3)};
+  declaration.lipschitz(1, 0) = 0.5;
+  declaration.lipschitz(1, 3) = 1;
+  declaration.lipschitz.row(2).setConstant(0.25);
+  return declaration;
+}
+
+// An admissible residual, and what is seen of it.
+double Truth(const Eigen::VectorXd& z, int k) {
+  if (k == 0) return 0.5;
+  if (k == 1) return 0.4 * std::sin(z[0]) - 0.8 * std::abs(z[3]);
+  return 0.2 * (std::abs(z[1]) + std::cos(z[2]) - std::abs(z[4] - 0.3));
+}
+
+struct Sample {
+  Eigen::VectorXd z, lower, upper;
+};
+
+Sample Observe(Random& random) {
+  Sample sample{random.Vector(kVariables), Eigen::VectorXd(kStates), Eigen::VectorXd(kStates)};
+  for (int k = 0; k < kStates; ++k) sample.lower[k] = Truth(sample.z, k) + random.Uniform(-1e-3, 1e-3);
+  sample.upper = sample.lower;
+  return sample;
+}
+
+Observations Join(const std::vector<Sample>& samples) {
+  const auto count = static_cast<Eigen::Index>(samples.size());
+  Observations all{Eigen::MatrixXd(count, kVariables), Eigen::MatrixXd(count, kStates),
+                   Eigen::MatrixXd(count, kStates)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Sample& sample = samples[static_cast<std::size_t>(i)];
+    all.z.row(i) = sample.z;
+    all.lower.row(i) = sample.lower;
+    all.upper.row(i) = sample.upper;
+  }
+  return all;
+}
+
+std::vector<Sample> Observe(Random& random, int count) {
+  std::vector<Sample> samples;
+  for (int i = 0; i < count; ++i) samples.push_back(Observe(random));
+  return samples;
+}
+
+ObservationStore::Insertion Insert(ObservationStore& store, const Sample& sample) {
+  return store.Insert(View(sample.z), View(sample.lower), View(sample.upper));
+}
+
+struct Query {
+  Eigen::VectorXd center;
+  Zonotope slice;
+  Eigen::VectorXd input;
+  std::vector<double> half_width;
+
+  explicit Query(Random& random)
+      : center(random.Vector(kVariables, 0.9)),
+        slice(center.head(kStates), random.Matrix(kStates, 4, 0.01)),
+        input(center.tail(2)) {
+    for (int k = 0; k < kStates; ++k) half_width.push_back(slice.HalfWidthUpper(k));
+  }
+  [[nodiscard]] QuerySet set() const { return {slice, View(input), half_width}; }
+};
+
+ResidualBounds Ask(const ResidualEnclosure& enclosure, const Query& query) {
+  ResidualBounds bounds;
+  enclosure.Enclose(query.set(), bounds);
+  return bounds;
+}
+
+// The error bounds may differ by their headroom, the rest may not.
+void ExpectSame(const ResidualEnclosure& a, const ResidualEnclosure& b, Random& random, double tolerance = 1e-13) {
+  for (int trial = 0; trial < 10; ++trial) {
+    const Query query(random);
+    const ResidualBounds left = Ask(a, query), right = Ask(b, query);
+    for (std::size_t k = 0; k < kStates; ++k) {
+      ASSERT_NEAR(left.lower[k], right.lower[k], tolerance) << "coordinate " << k;
+      ASSERT_NEAR(left.upper[k], right.upper[k], tolerance) << "coordinate " << k;
+    }
+  }
+}
+
+LipschitzEnvelope EnvelopeOf(const std::vector<Sample>& samples) {
+  return LipschitzEnvelope(MakeDeclaration(), Join(samples), kLower, kUpper);
+}
+
+StoreOptions Options(int tail_capacity, std::size_t max_observations = 1'000'000) {
+  StoreOptions options;
+  options.tail_capacity = tail_capacity;
+  options.max_observations = max_observations;
+  return options;
+}
+
+ObservationStore StoreOf(const std::vector<Sample>& samples, const StoreOptions& options = {}) {
+  return ObservationStore(MakeDeclaration(), Join(samples), kLower, kUpper, options);
+}
+
+TEST(ObservationStore, AnswersAsAnEnvelopeOfAllItHolds) {
+  Random random(800);
+  SCOPED_TRACE(random.trace());
+  for (const int capacity : {1, 7, 8, 64}) {
+    std::vector<Sample> samples = Observe(random, 30);
+    ObservationStore store = StoreOf(samples, Options(capacity));
+    for (int i = 0; i < 150; ++i) {
+      samples.push_back(Observe(random));
+      const auto insertion = Insert(store, samples.back());
+      ASSERT_EQ(insertion.id, 30 + i);
+      ASSERT_FALSE(insertion.violation);
+      ASSERT_EQ(store.snapshot().size(), samples.size());
+      ASSERT_LE(store.tail_size(), capacity);
+      if (i % 13 == 0) ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
+TEST(ObservationStore, ASnapshotStaysAsItWas) {
+  Random random(801);
+  SCOPED_TRACE(random.trace());
+  const std::vector<Sample> samples = Observe(random, 20);
+  ObservationStore store = StoreOf(samples, Options(16));
+  const auto before = store.snapshot();
+  for (int i = 0; i < 100; ++i) Insert(store, Observe(random));
+  ASSERT_TRUE(store.Remove(3));
+  EXPECT_EQ(before.size(), 20u);
+  ExpectSame(before, EnvelopeOf(samples), random);
+}
+
+TEST(ObservationStore, FindsTheContradictionWhereverItIs) {
+  Random random(802);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 120; ++trial) {
+    const int coordinate = trial % kStates;
+    std::vector<Sample> samples = Observe(random, 40);
+    ObservationStore store = StoreOf(samples, Options(trial % 2 ? 64 : 8));
+    for (int i = 0; i < random.Integer(0, 20); ++i) {
+      samples.push_back(Observe(random));
+      Insert(store, samples.back());
+    }
+    Sample liar = Observe(random);
+    liar.lower[coordinate] += random.Sign() * random.Uniform(0, 1.5);
+    liar.upper = liar.lower;
+    samples.push_back(liar);
+    const auto insertion = Insert(store, liar);
+    const auto expected = FindViolation(MakeDeclaration(), Join(samples));
+    ASSERT_EQ(insertion.violation.has_value(), expected.has_value());
+    ASSERT_EQ(store.snapshot().violation().has_value(), expected.has_value());
+    if (!expected) continue;
+    ASSERT_EQ(insertion.violation->coordinate, coordinate);
+    ASSERT_EQ(insertion.violation->second, insertion.id);
+    ASSERT_TRUE(TestPair(MakeDeclaration(), Join(samples), insertion.violation->first, insertion.id, coordinate));
+    store.Compact();
+    ASSERT_TRUE(store.snapshot().violation()) << "forgotten";
+    ASSERT_TRUE(store.Remove(insertion.id));
+    ASSERT_FALSE(store.snapshot().violation());
+    samples.pop_back();
+    ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
+  }
+}
+
+TEST(ObservationStore, RemovesFromTheIndexAndFromTheTail) {
+  Random random(803);
+  SCOPED_TRACE(random.trace());
+  std::vector<Sample> samples = Observe(random, 25);
+  ObservationStore store = StoreOf(samples);
+  std::vector<int> ids;
+  for (int i = 0; i < 25; ++i) ids.push_back(i);
+  for (int i = 0; i < 25; ++i) {
+    samples.push_back(Observe(random));
+    ids.push_back(Insert(store, samples.back()).id);
+  }
+  EXPECT_FALSE(store.Remove(50));
+  EXPECT_FALSE(store.Remove(-1));
+  while (ids.size() > 1) {
+    const int at = random.Below(static_cast<int>(ids.size()));
+    ASSERT_TRUE(store.Remove(ids[static_cast<std::size_t>(at)]));
+    ASSERT_FALSE(store.Remove(ids[static_cast<std::size_t>(at)])) << "is gone already";
+    ids.erase(ids.begin() + at);
+    samples.erase(samples.begin() + at);
+    ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
+    samples.push_back(Observe(random));
+    ids.push_back(Insert(store, samples.back()).id);
+    ASSERT_TRUE(store.Remove(ids.back()));
+    ids.pop_back();
+    samples.pop_back();
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_FALSE(store.Remove(ids.front())) << "the last one stays";
+}
+
+TEST(ObservationStore, TakesValuesFarAboveThoseItBeganWith) {
+  Random random(804);
+  std::vector<Sample> samples = Observe(random, 3);
+  for (Sample& sample : samples) sample.lower[1] *= 1e-6, sample.upper[1] = sample.lower[1];
+  ObservationStore store = StoreOf(samples);
+  for (int i = 0; i < 30; ++i) {
+    samples.push_back(Observe(random));
+    samples.back().lower[1] *= std::ldexp(1, i - 20);
+    samples.back().upper[1] = samples.back().lower[1];
+    Insert(store, samples.back());
+    ASSERT_EQ(store.snapshot().size(), samples.size());
+    ExpectSame(store.snapshot(), EnvelopeOf(samples), random, 1e-10);
+  }
+}
+
+TEST(ObservationStore, RefusesWhatIsNoObservationOfThisDomain) {
+  Random random(805);
+  ObservationStore store = StoreOf(Observe(random, 3));
+  for (const double bad : {1.0000000000000002, -2.0, kInfinity, std::nan("")}) {
+    Sample sample = Observe(random);
+    sample.z[2] = bad;
+    EXPECT_EQ(Insert(store, sample).id, -1);
+    sample = Observe(random);
+    sample.upper[1] = std::isnan(bad) || bad == kInfinity ? bad : sample.lower[1] - 1e-9;
+    EXPECT_EQ(Insert(store, sample).id, -1);
+  }
+  Sample corner = Observe(random);
+  corner.z.setOnes();
+  for (int k = 0; k < kStates; ++k) corner.lower[k] = corner.upper[k] = Truth(corner.z, k);
+  EXPECT_EQ(Insert(store, corner).id, 3);
+  EXPECT_EQ(store.snapshot().size(), 4u);
+}
+
+TEST(ObservationStore, RefusesOptionsOutsideTheirRange) {
+  Random random(806);
+  const std::vector<Sample> samples = Observe(random, 2);
+  EXPECT_THROW(StoreOf(samples, Options(0)), std::invalid_argument);
+  EXPECT_THROW(StoreOf(samples, Options(EnvelopeTail::kMaxCapacity + 1)), std::invalid_argument);
+  EXPECT_THROW(StoreOf(samples, Options(8, 0)), std::invalid_argument);
+  EXPECT_THROW(StoreOf({}), std::invalid_argument);
+}
+
+// Readers ask while one thread inserts and another compacts: what they get is sound, and each snapshot is one thing.
+TEST(ObservationStore, IsReadWhileItGrows) {
+  Random random(807);
+  SCOPED_TRACE(random.trace());
+  ObservationStore store = StoreOf(Observe(random, 50), Options(32));
+  std::atomic<bool> done = false;
+  std::atomic<int> wrong = 0, asked = 0;
+  const auto read = [&](std::uint64_t seed) {
+    Random own(seed);
+    std::size_t last = 0;
+    while (!done) {
+      const auto snapshot = store.snapshot();
+      if (snapshot.size() < last || snapshot.violation()) ++wrong;
+      last = snapshot.size();
+      const Query query(own);
+      const ResidualBounds first = Ask(snapshot, query), second = Ask(snapshot, query);
+      for (std::size_t k = 0; k < kStates; ++k) {
+        const double truth = Truth(query.center, static_cast<int>(k));
+        if (!(first.lower[k] <= truth && truth <= first.upper[k])) ++wrong;
+        if (first.lower[k] != second.lower[k] || first.upper[k] != second.upper[k]) ++wrong;
+      }
+      ++asked;
+    }
+  };
+  std::vector<std::thread> threads;
+  threads.emplace_back(read, 1);
+  threads.emplace_back(read, 2);
+  threads.emplace_back([&] {
+    while (!done) {
+      if (store.tail_size() > 20) store.Compact();
+      std::this_thread::yield();
+    }
+  });
+  for (int i = 0; i < 1500; ++i) {
+    ASSERT_EQ(Insert(store, Observe(random)).id, 50 + i);
+    if (i % 50 == 0) std::this_thread::yield();
+  }
+  while (asked < 200) std::this_thread::yield();
+  done = true;
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_EQ(store.snapshot().size(), 1550u);
+}
+
+TEST(ObservationStore, KeepsToItsBudget) {
+  Random random(808);
+  SCOPED_TRACE(random.trace());
+  std::vector<Sample> samples = Observe(random, 30);
+  ObservationStore store = StoreOf(samples, Options(32, 100));
+  for (int i = 0; i < 1000; ++i) {
+    Insert(store, Observe(random));
+    ASSERT_LE(store.snapshot().size(), 132u);
+  }
+  store.Compact();
+  EXPECT_LE(store.snapshot().size(), 100u);
+  EXPECT_GE(store.snapshot().size(), 50u);
+}
+
+TEST(MostUseful, KeepsEveryBoundWhileAllThatAttainTheEnvelopeHaveRoom) {
+  Random random(810);
+  SCOPED_TRACE(random.trace());
+  Declaration declaration = MakeDeclaration();
+  declaration.lipschitz.row(2).setZero();  // so that some never attain it
+  for (int trial = 0; trial < 20; ++trial) {
+    std::vector<Sample> samples = Observe(random, 60);
+    for (Sample& sample : samples) {
+      sample.lower[2] = sample.upper[2] = 0.1 + random.Uniform(-1e-3, 1e-3);
+      sample.upper[1] += random.Uniform(0, 0.8);  // seen badly
+      sample.lower[1] -= random.Uniform(0, 0.8);
+    }
+    for (int i = 0; i < 30; ++i)
+      samples.push_back(samples[static_cast<std::size_t>(random.Below(60))]);  // twice the same
+    const Observations all = Join(samples);
+    const std::vector<int> kept = MostUseful(declaration, all, 89);
+    ASSERT_LT(kept.size(), 61u) << "a duplicate stayed";
+    ASSERT_TRUE(std::ranges::is_sorted(kept));
+    const LipschitzEnvelope before(declaration, all, kLower, kUpper),
+        after(declaration, Select(all, kept), kLower, kUpper);
+    for (int query = 0; query < 20; ++query) {
+      const Query ask(random);
+      const ResidualBounds expected = Ask(before, ask), bounds = Ask(after, ask);
+      for (std::size_t k = 0; k < kStates; ++k) {
+        ASSERT_NEAR(bounds.lower[k], expected.lower[k], 1e-14);
+        ASSERT_NEAR(bounds.upper[k], expected.upper[k], 1e-14);
+      }
+    }
+    // None of them can go without a change at its own place.
+    for (const int i : kept) {
+      std::vector<int> others = kept;
+      std::erase(others, i);
+      const LipschitzEnvelope without(declaration, Select(all, others), kLower, kUpper);
+      const Eigen::VectorXd z = all.z.row(i);
+      const Zonotope point(z.head(kStates), Eigen::MatrixXd(kStates, 0));
+      const std::vector<double> half_width(kStates, 0);
+      const Eigen::VectorXd input = z.tail(2);
+      ResidualBounds with_it, without_it;
+      after.Enclose({point, View(input), half_width}, with_it);
+      without.Enclose({point, View(input), half_width}, without_it);
+      bool changes = false;
+      for (std::size_t k = 0; k < kStates; ++k)
+        changes |= without_it.lower[k] < with_it.lower[k] || without_it.upper[k] > with_it.upper[k];
+      ASSERT_TRUE(changes) << "observation " << i;
+    }
+  }
+}
+
+TEST(MostUseful, DropsTheLeastGainFirst) {
+  // Far apart on a line, all but two that stand close together: either may go, not both.
+  Declaration declaration{Eigen::MatrixXd::Constant(1, 1, 1), Eigen::VectorXd::Zero(1)};
+  Observations o{Eigen::MatrixXd(5, 1), Eigen::MatrixXd::Zero(5, 1), Eigen::MatrixXd::Zero(5, 1)};
+  o.z << -10, -5, 0, 0.001, 10;
+  const std::vector<int> four = MostUseful(declaration, o, 4);
+  EXPECT_EQ(std::ranges::count_if(four, [](int i) { return i == 2 || i == 3; }), 1);
+  EXPECT_EQ(four.size(), 4u);
+  const std::vector<int> three = MostUseful(declaration, o, 3);
+  EXPECT_EQ(three.size(), 3u);
+  EXPECT_EQ(std::ranges::count_if(three, [](int i) { return i == 2 || i == 3; }), 1);
+  EXPECT_EQ(MostUseful(declaration, o, 1).size(), 1u);
+}
+
+}  // namespace
+}  // namespace forereach
