@@ -184,6 +184,10 @@ std::string NameOf(Scenario scenario) {
   return {};
 }
 
+std::string NameOf(Scenario scenario, int observations) {
+  return NameOf(scenario).append("/").append(std::to_string(observations));
+}
+
 Task MakeTask(Scenario scenario, int observations) { return Made(scenario, observations, 3.5); }
 
 Task MakeBlockedTask(Scenario scenario, int observations) { return Made(scenario, observations, 0); }

@@ -33,6 +33,8 @@ enum class Scenario {
 };
 
 [[nodiscard]] std::string NameOf(Scenario scenario);
+/** "bicycle/400". */
+[[nodiscard]] std::string NameOf(Scenario scenario, int observations);
 
 /** One plan of 12 steps and one circle beside its path, far enough for a certificate at every N >= 25, so that no
 abstention cuts the work short. The N observations are drawn uniformly around the plan from a residual that satisfies
