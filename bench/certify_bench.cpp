@@ -82,10 +82,12 @@ void RegisterCertify(Scenario scenario, int observations) {
 
   // A second a call and more, and the same work a thousand times: not run.
   if (observations > (scenario == Scenario::kDense ? 400 : 10'000)) return;
-  benchmark::RegisterBenchmark(std::string("straightforward/").append(suffix).c_str(), [=](State& state) {
-    const Task& task = CachedTask(scenario, observations);
-    RunStraightforward(state, Straightforward(task.problem, PlainModelOf(scenario)), task);
-  })->Unit(benchmark::kMicrosecond);
+  for (const auto& [name, spelling] : {std::pair("straightforward/", Straightforward::Spelling::kMatrices),
+                                       std::pair("straightforward_loops/", Straightforward::Spelling::kLoops)})
+    benchmark::RegisterBenchmark(std::string(name).append(suffix).c_str(), [=, spelling = spelling](State& state) {
+      const Task& task = CachedTask(scenario, observations);
+      RunStraightforward(state, Straightforward(task.problem, PlainModelOf(scenario), spelling), task);
+    })->Unit(benchmark::kMicrosecond);
 }
 
 void RegisterPlainPairwise(int observations) {

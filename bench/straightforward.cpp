@@ -57,22 +57,24 @@ MatrixXd Reduce(const MatrixXd& generators, int order) {
 
 // The corners of a planar zonotope in order: its generators sorted by angle, walked once up and once down.
 std::vector<Eigen::Vector2d> Corners(const VectorXd& center, const MatrixXd& generators) {
-  std::vector<Eigen::Vector2d> sides;
+  struct Side {
+    double angle;
+    Eigen::Vector2d half;
+  };
+  std::vector<Side> sides;
   for (int j = 0; j < generators.cols(); ++j) {
-    const Eigen::Vector2d g = generators.col(j);
-    sides.push_back(g.y() < 0 || (g.y() == 0 && g.x() < 0) ? Eigen::Vector2d(-g) : g);
+    const Eigen::Vector2d g = generators.col(j), up = g.y() < 0 || (g.y() == 0 && g.x() < 0) ? Eigen::Vector2d(-g) : g;
+    sides.push_back({std::atan2(up.y(), up.x()), up});
   }
-  std::sort(sides.begin(), sides.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    return std::atan2(a.y(), a.x()) < std::atan2(b.y(), b.x());
-  });
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.angle < b.angle; });
   if (sides.empty()) return {center};
   Eigen::Vector2d corner = center;
-  for (const Eigen::Vector2d& side : sides) corner -= side;
+  for (const Side& side : sides) corner -= side.half;
   std::vector<Eigen::Vector2d> corners;
   for (const double direction : {2.0, -2.0}) {
-    for (const Eigen::Vector2d& side : sides) {
+    for (const Side& side : sides) {
       corners.push_back(corner);
-      corner += direction * side;
+      corner += direction * side.half;
     }
   }
   return corners;
@@ -149,8 +151,8 @@ PlainModel PlainPointMass(double dt) {
   return model;
 }
 
-Straightforward::Straightforward(std::shared_ptr<const Problem> problem, PlainModel model)
-    : problem_(std::move(problem)), model_(std::move(model)) {
+Straightforward::Straightforward(std::shared_ptr<const Problem> problem, PlainModel model, Spelling spelling)
+    : problem_(std::move(problem)), model_(std::move(model)), spelling_(spelling) {
   const Transitions& data = problem_->transitions;
   const MatrixXd& lipschitz = problem_->declaration.lipschitz;
   const auto count = static_cast<Eigen::Index>(data.size());
@@ -199,7 +201,13 @@ void Straightforward::Envelope(const PlainZonotope& query, VectorXd& lower, Vect
     const VectorXd spread = (row.signs * generators).cwiseAbs().rowwise().sum();
     for (Eigen::Index i = 0; i < residuals_.cols(); ++i) {
       const VectorXd offset = center - row.locations.col(i);
-      const double distance = (row.signs * offset + spread).maxCoeff();
+      double distance = 0;
+      if (spelling_ == Spelling::kMatrices) {
+        distance = (row.signs * offset + spread).maxCoeff();
+      } else {
+        for (Eigen::Index s = 0; s < spread.size(); ++s)
+          distance = std::max(distance, row.signs.row(s).dot(offset) + spread[s]);
+      }
       lower[k] = std::max(lower[k], residuals_(k, i) - errors_[k] - distance);
       upper[k] = std::min(upper[k], residuals_(k, i) + errors_[k] + distance);
     }

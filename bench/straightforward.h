@@ -2,8 +2,8 @@
 doubles. The yardstick that ForeReach's speed is a ratio of.
 
 It does what the paper does and no more work than needed at that level: columns of L that are zero are left out of the
-signs, |G^T W s|_1 is computed once a query and not once an observation, residuals are computed once. It has no rounding
-control, so its answers are no proofs. */
+signs, rows that are zero are not searched observation by observation, |G^T W s|_1 is computed once a query and not once
+an observation, residuals are computed once. It has no rounding control, so its answers are no proofs. */
 #pragma once
 
 #include <functional>
@@ -39,6 +39,9 @@ struct PlainModel {
 
 class Straightforward {
  public:
+  /** How the maximum over signs is written: as a product of matrices, or as a loop. The first is faster where a row of L
+  has many columns, the second where it has few. */
+  enum class Spelling { kMatrices, kLoops };
   enum class Outcome { kCertified, kDomain, kSafety };
   struct Answer {
     Outcome outcome;
@@ -46,7 +49,7 @@ class Straightforward {
   };
 
   /** @param model the problem's nominal model. */
-  Straightforward(std::shared_ptr<const Problem> problem, PlainModel model);
+  Straightforward(std::shared_ptr<const Problem> problem, PlainModel model, Spelling spelling = Spelling::kMatrices);
 
   /** Eq. (falsification) for every pair and coordinate; the first pair that violates it. Cost O(N^2 n d_z). */
   [[nodiscard]] std::optional<std::pair<int, int>> FindViolation() const;
@@ -71,6 +74,7 @@ class Straightforward {
 
   std::shared_ptr<const Problem> problem_;
   PlainModel model_;
+  Spelling spelling_;
   std::vector<Row> rows_;
   Eigen::MatrixXd residuals_;  // n-by-N
   Eigen::VectorXd errors_;     // sigma, and 1e-12 for rounding

@@ -30,22 +30,26 @@ Straightforward::Outcome OutcomeOf(const Decision& decision) {
   }
 }
 
+void ExpectNear(const Zonotope& slice, const PlainZonotope& plain, int t) {
+  const Eigen::VectorXd half_width = plain.HalfWidth();
+  for (int k = 0; k < half_width.size(); ++k) {
+    EXPECT_NEAR(slice.HalfWidthUpper(k), half_width[k], kTolerance) << "t " << t << " k " << k;
+    EXPECT_NEAR(slice.center(k), plain.center[k], kTolerance) << "t " << t << " k " << k;
+  }
+}
+
 // Returns how many steps both have completed.
 int ExpectSame(const std::shared_ptr<const Problem>& problem, const Eigen::MatrixXd& controls,
                const Zonotope& initial_set, const std::vector<Obstacle>& obstacles) {
   Tube tube;
   const Decision decision = Certifier(problem).Certify(Task::PlanOf(controls), initial_set, obstacles, tube);
-  const Straightforward plain(problem, PlainModelOf(*problem));
-  const auto answer = plain.Certify(controls, PlainOf(initial_set), obstacles);
-  EXPECT_EQ(OutcomeOf(decision), answer.outcome);
-  EXPECT_EQ(tube.length() + 1, static_cast<int>(answer.tube.size()));
-  for (int t = 0; t <= std::min(tube.length(), static_cast<int>(answer.tube.size()) - 1); ++t) {
-    const PlainZonotope& slice = answer.tube[static_cast<std::size_t>(t)];
-    const Eigen::VectorXd half_width = slice.HalfWidth();
-    for (int k = 0; k < half_width.size(); ++k) {
-      EXPECT_NEAR(tube.slice(t).HalfWidthUpper(k), half_width[k], kTolerance) << "t " << t << " k " << k;
-      EXPECT_NEAR(tube.slice(t).center(k), slice.center[k], kTolerance) << "t " << t << " k " << k;
-    }
+  for (const auto spelling : {Straightforward::Spelling::kMatrices, Straightforward::Spelling::kLoops}) {
+    const Straightforward plain(problem, PlainModelOf(*problem), spelling);
+    const auto answer = plain.Certify(controls, PlainOf(initial_set), obstacles);
+    EXPECT_EQ(OutcomeOf(decision), answer.outcome);
+    EXPECT_EQ(tube.length() + 1, static_cast<int>(answer.tube.size()));
+    for (int t = 0; t <= std::min(tube.length(), static_cast<int>(answer.tube.size()) - 1); ++t)
+      ExpectNear(tube.slice(t), answer.tube[static_cast<std::size_t>(t)], t);
   }
   return tube.length();
 }
