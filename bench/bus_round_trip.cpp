@@ -1,9 +1,9 @@
 // What the certifier adds to a round trip on the bus.
 //   bus_round_trip [--rounds N]        prints one JSON document, microseconds
-// Two processes answer candidates on loopback UDP multicast, each on a port of its own: the certifier's node with its gate,
-// and an echo that sends messages of the same sizes back without looking at what came. This process asks one, then the
-// other, and so on, so both see the same machine. Two questions: a plan that is certified (the answer is decision_t and
-// certified_plan_t) and one that is not (decision_t alone).
+// Two processes answer candidates on loopback UDP multicast, each on a port of its own: the certifier's node with its
+// gate, and an echo that sends messages of the same sizes back without looking at what came. This process asks one,
+// then the other, and so on, so both see the same machine. Two questions: a plan that is certified (the answer is
+// decision_t and certified_plan_t) and one that is not (decision_t alone).
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -35,7 +35,8 @@ constexpr int kPatienceMs = 2000, kWarmUp = 200;
 // Answers each candidate with as many bytes as the certifier would.
 class EchoNode final : public Node {
  public:
-  EchoNode(const BusOptions& channels, Bus& bus, bool certifies) : channels_(channels), bus_(bus), certifies_(certifies) {
+  EchoNode(const BusOptions& channels, Bus& bus, bool certifies)
+      : channels_(channels), bus_(bus), certifies_(certifies) {
     bus_.Subscribe(channels_.candidate, [this](const Received& received) {
       waiting_.push_back({received.bytes.begin(), received.bytes.end()});
     });
@@ -161,8 +162,8 @@ void Alternate(int rounds, candidate_plan_t& candidate, Asker& echo, Asker& cert
 nlohmann::json Compare(const Task& task, bool certifies, int rounds, int ports) {
   const Config config = MakeConfig(task);
   const std::string echo_url = PortUrl(ports), gate_url = PortUrl(ports + 1);
-  const Answerer echo_process(
-      echo_url, [&](Bus& bus) { return std::make_unique<EchoNode>(config.bus, bus, certifies); });
+  const Answerer echo_process(echo_url,
+                              [&](Bus& bus) { return std::make_unique<EchoNode>(config.bus, bus, certifies); });
   const Answerer gate_process(gate_url, [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
 
   const std::int16_t expected = certifies ? decision_t::CERTIFIED : decision_t::ABSTAIN_SAFETY;

@@ -78,7 +78,8 @@ void RegisterCertify(Scenario scenario, int observations) {
     RunCertify(state, CachedCertifier(scenario, observations), CachedTask(scenario, observations));
   })->Unit(benchmark::kMicrosecond);
   // The cost of rigour: where the kernel has a variant without rounding bounds, register it here as
-  // "certify_unrounded/" + suffix, in the same way. The report then shows the ratio; without it, it says "not measured".
+  // "certify_unrounded/" + suffix, in the same way. The report then shows the ratio; without it, it says "not
+  // measured".
 
   // A second a call and more, and the same work a thousand times: not run.
   if (observations > (scenario == Scenario::kDense ? 400 : 10'000)) return;
@@ -114,7 +115,9 @@ void RegisterBatch() {
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   for (int threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1)
     benchmark::RegisterBenchmark("batch/bicycle/400", RunBatch, 400)
-        ->Threads(threads)->UseRealTime()->Unit(benchmark::kMicrosecond);
+        ->Threads(threads)
+        ->UseRealTime()
+        ->Unit(benchmark::kMicrosecond);
 }
 
 void RegisterAll(int largest) {

@@ -21,9 +21,9 @@ namespace bn = boost::numeric;
 // Outward rounding by the processor's rounding mode; sin, cos and tan are the C library's in that mode, whose errors
 // nobody bounds: rigorous up to them.
 using BoostInterval =
-    bn::interval<double, bn::interval_lib::policies<
-                             bn::interval_lib::save_state<bn::interval_lib::rounded_transc_std<double>>,
-                             bn::interval_lib::checking_base<double>>>;
+    bn::interval<double,
+                 bn::interval_lib::policies<bn::interval_lib::save_state<bn::interval_lib::rounded_transc_std<double>>,
+                                            bn::interval_lib::checking_base<double>>>;
 
 constexpr std::size_t kStates = 6, kInputs = 2;
 
@@ -149,7 +149,10 @@ void Run(benchmark::State& state) {
 
 BENCHMARK_TEMPLATE(Run, Natural)->Name("nominal_tube/boost_natural")->Unit(benchmark::kMicrosecond);
 BENCHMARK_TEMPLATE(Run, MeanValue)->Name("nominal_tube/boost_mean_value")->Unit(benchmark::kMicrosecond);
-BENCHMARK_TEMPLATE(Run, SampledHull)->Name("nominal_tube/sampled_inner_hull")->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK_TEMPLATE(Run, SampledHull)
+    ->Name("nominal_tube/sampled_inner_hull")
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace forereach::bench

@@ -45,8 +45,7 @@ void RunCertifyAlone(State& state) {
   const Certifier certifier(task.problem);
   const Zonotope initial_set = task.initial_set();
   Tube tube;
-  for (auto _ : state)
-    benchmark::DoNotOptimize(certifier.Certify(task.plan(), initial_set, task.obstacles, tube));
+  for (auto _ : state) benchmark::DoNotOptimize(certifier.Certify(task.plan(), initial_set, task.obstacles, tube));
 }
 
 void RunDecode(State& state) {

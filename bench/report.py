@@ -136,7 +136,7 @@ class Report:
                     rows.append([stage.replace("_", ", "), number(times[400]), "", "", ""])
                 else:
                     rows.append([f"{stage.replace('_', ', ')}, {scenario}"] + [number(times.get(n)) for n in SIZES])
-        rows.sort(key=lambda row: row[2] == "")
+        rows.sort(key=lambda row: (row[2] == "", row[0]))
         return table(["", *("N = " + size_name(n) for n in SIZES)], rows)
 
     def plain_pairwise(self):

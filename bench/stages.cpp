@@ -52,7 +52,8 @@ const Midway& CachedMidway(Scenario scenario, int observations) {
   static std::map<std::pair<Scenario, int>, std::unique_ptr<const Midway>> known;
   auto& midway = known[{scenario, observations}];
   if (!midway)
-    midway = std::make_unique<const Midway>(CachedTask(scenario, observations), CachedCertifier(scenario, observations));
+    midway =
+        std::make_unique<const Midway>(CachedTask(scenario, observations), CachedCertifier(scenario, observations));
   return *midway;
 }
 
@@ -73,8 +74,7 @@ void RunEnvelope(State& state, const Midway& midway) {
 }
 
 void RunPairwise(State& state, const Midway& midway) {
-  for (auto _ : state)
-    benchmark::DoNotOptimize(FindViolation(midway.task.problem->declaration, midway.observations));
+  for (auto _ : state) benchmark::DoNotOptimize(FindViolation(midway.task.problem->declaration, midway.observations));
 }
 
 void RunLinearize(State& state, const Midway& midway) {
@@ -109,7 +109,8 @@ void RunReduction(State& state, const Midway& midway) {
   }
 }
 
-void RunSeparation(State& state, const Midway& midway, Separation (*separate)(const Zonotope&, const Obstacle&) noexcept) {
+void RunSeparation(State& state, const Midway& midway,
+                   Separation (*separate)(const Zonotope&, const Obstacle&) noexcept) {
   Zonotope projected;
   Projection(midway.task.problem->projection, midway.slice.dim()).Enclose(midway.slice, projected);
   for (auto _ : state) benchmark::DoNotOptimize(separate(projected, midway.task.obstacles.front()));

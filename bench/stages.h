@@ -1,5 +1,5 @@
-/** Benchmarks of the certify call's stages, each alone. They look inside the library: where its parts change, this is the
-place to follow. */
+/** Benchmarks of the certify call's stages, each alone. They look inside the library: where its parts change, this is
+the place to follow. */
 #pragma once
 
 namespace forereach::bench {

@@ -45,7 +45,8 @@ MatrixXd Beside(const MatrixXd& a, const MatrixXd& b, const MatrixXd& c) {
 MatrixXd Reduce(const MatrixXd& generators, int order) {
   const auto n = static_cast<int>(generators.rows()), m = static_cast<int>(generators.cols());
   if (m <= order * n) return generators;
-  const VectorXd scores = (generators.cwiseAbs().colwise().sum() - generators.cwiseAbs().colwise().maxCoeff()).transpose();
+  const VectorXd scores =
+      (generators.cwiseAbs().colwise().sum() - generators.cwiseAbs().colwise().maxCoeff()).transpose();
   std::vector<int> columns(static_cast<std::size_t>(m));
   std::iota(columns.begin(), columns.end(), 0);
   std::stable_sort(columns.begin(), columns.end(), [&](int a, int b) { return scores[a] > scores[b]; });
@@ -227,8 +228,8 @@ bool Straightforward::InDomain(const VectorXd& lower, const VectorXd& upper) con
     if (a.cwiseMax(0).dot(upper) + a.cwiseMin(0).dot(lower) > inequality.bound) return false;
   }
   for (const Domain::Ball& ball : domain.balls) {
-    const VectorXd far = (lower(ball.coordinates) - ball.center).cwiseAbs().cwiseMax(
-        (upper(ball.coordinates) - ball.center).cwiseAbs());
+    const VectorXd far =
+        (lower(ball.coordinates) - ball.center).cwiseAbs().cwiseMax((upper(ball.coordinates) - ball.center).cwiseAbs());
     if (far.norm() > ball.radius) return false;
   }
   return true;
@@ -253,8 +254,8 @@ std::optional<PlainZonotope> Straightforward::Step(const PlainZonotope& slice, c
   VectorXd from_below, from_above;
   Envelope(query, from_below, from_above);
   const VectorXd middle = (from_above + from_below) / 2, half_width = (from_above - from_below) / 2;
-  const MatrixXd generators = Beside(model_.jacobian(query.center) * query.generators, remainder.asDiagonal(),
-                                     half_width.asDiagonal());
+  const MatrixXd generators =
+      Beside(model_.jacobian(query.center) * query.generators, remainder.asDiagonal(), half_width.asDiagonal());
   return PlainZonotope{model_.value(query.center) + middle,
                        Reduce(WithoutZeroColumns(generators), problem_->zonotope_order)};
 }
@@ -271,8 +272,8 @@ Straightforward::Answer Straightforward::Certify(const MatrixXd& controls, const
     answer.tube.push_back(std::move(*next));
   }
   for (const PlainZonotope& slice : answer.tube) {
-    const auto corners = Corners(problem_->projection * slice.center,
-                                 WithoutZeroColumns(problem_->projection * slice.generators));
+    const auto corners =
+        Corners(problem_->projection * slice.center, WithoutZeroColumns(problem_->projection * slice.generators));
     for (const Obstacle& obstacle : obstacles) {
       if (obstacle.kind() != Obstacle::Kind::kCircle) throw std::invalid_argument("obstacle: not a circle");
       if (Distance(corners, obstacle.points().front()) <= obstacle.radius()) answer.outcome = Outcome::kSafety;

@@ -1,5 +1,5 @@
-/** Algorithm 1 of the paper as one would first write it: Eigen matrices of dynamic size, a loop over observations, plain
-doubles. The yardstick that ForeReach's speed is a ratio of.
+/** Algorithm 1 of the paper as one would first write it: Eigen matrices of dynamic size, a loop over observations,
+plain doubles. The yardstick that ForeReach's speed is a ratio of.
 
 It does what the paper does and no more work than needed at that level: columns of L that are zero are left out of the
 signs, rows that are zero are not searched observation by observation, |G^T W s|_1 is computed once a query and not once
@@ -39,8 +39,8 @@ struct PlainModel {
 
 class Straightforward {
  public:
-  /** How the maximum over signs is written: as a product of matrices, or as a loop. The first is faster where a row of L
-  has many columns, the second where it has few. */
+  /** How the maximum over signs is written: as a product of matrices, or as a loop. The first is faster where a row of
+  L has many columns, the second where it has few. */
   enum class Spelling { kMatrices, kLoops };
   enum class Outcome { kCertified, kDomain, kSafety };
   struct Answer {

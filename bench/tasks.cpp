@@ -1,5 +1,6 @@
 #include "bench/tasks.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -33,16 +34,18 @@ Target Sum(Equations equations, Residual residual) {
   };
 }
 
-// r_k(z) = 0.9 sum_l L_kl sin(z_l + k + l): every partial derivative is within 0.9 of its bound.
+// r_k(z) = 0.9 sum_l +-L_kl sin(z_l + l), other signs for every k: each partial derivative is within 0.9 of its bound.
 struct Waves {
   Eigen::MatrixXd lipschitz;
 
   void operator()(std::span<const Wide> z, std::span<Wide> residual) const {
-    for (std::size_t k = 0; k < residual.size(); ++k) {
-      residual[k] = 0;
-      for (std::size_t l = 0; l < z.size(); ++l)
-        residual[k] += 0.9L * lipschitz(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(l)) *
-                       std::sin(z[l] + static_cast<Wide>(k + l));
+    std::ranges::fill(residual, Wide(0));
+    for (std::size_t l = 0; l < z.size(); ++l) {
+      const Wide wave = 0.9L * std::sin(z[l] + static_cast<Wide>(l));
+      for (std::size_t k = 0; k < residual.size(); ++k) {
+        const Wide slope = lipschitz(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(l));
+        residual[k] += (k & (l + 1)) != 0 ? -slope * wave : slope * wave;
+      }
     }
   }
 };
@@ -93,8 +96,11 @@ Problem BarePointMass() {
 
 // The middle of group C's ranges.
 Task BicycleQuestion() {
-  return {nullptr, Vec({0, 0, 0, 12, 0, 0.32}), Vec({0.025, 0.025, 0.005, 0.025, 0.01, 0.002}),
-          Vec({0.2, 0.02}).replicate(1, kHorizon), {}};
+  return {nullptr,
+          Vec({0, 0, 0, 12, 0, 0.32}),
+          Vec({0.025, 0.025, 0.005, 0.025, 0.01, 0.002}),
+          Vec({0.2, 0.02}).replicate(1, kHorizon),
+          {}};
 }
 
 Task PointMassQuestion() {
@@ -199,8 +205,11 @@ Task MakeNominalTube() {
   };
   const Eigen::VectorXd center = Vec({0, 0, 0, 10, 0, 0.05}), z = Vec({0, 0, 0, 10, 0, 0.05, 0.5, 0.1});
   problem.transitions = Observed(target, Box(z, z), 1, 6);
-  return {std::make_shared<const Problem>(std::move(problem)), center, Vec({0.1, 0.1, 0.02, 0.2, 0.02, 0.005}),
-          Vec({0.5, 0.1}).replicate(1, kHorizon), {}};
+  return {std::make_shared<const Problem>(std::move(problem)),
+          center,
+          Vec({0.1, 0.1, 0.02, 0.2, 0.02, 0.005}),
+          Vec({0.5, 0.1}).replicate(1, kHorizon),
+          {}};
 }
 
 std::vector<Eigen::MatrixXd> MakePlans(const Task& task, int count) {

@@ -1,4 +1,5 @@
-// The yardstick of the benchmarks computes what the certifier computes: same tube, same answer.
+// The yardstick of the benchmarks computes what the certifier computes: same tube, same answer; and the tasks are what
+// they claim to be.
 #include "bench/straightforward.h"
 
 #include <algorithm>
@@ -6,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "bench/latencies.h"
 #include "bench/tasks.h"
 #include "certifier/certify/certifier.h"
 #include "tests/oracle/problems.h"
@@ -102,6 +104,15 @@ TEST(TasksTest, EachNGivesACertificateAndABlockedPathAnAbstentionS) {
       EXPECT_EQ(outcome(MakeBlockedTask(scenario, observations).obstacles), Outcome::kSafety);
     }
   }
+}
+
+TEST(LatenciesTest, PercentilesAreMeasuredLatencies) {
+  Latencies latencies(100);
+  for (int i = 100; i > 0; --i) latencies.Add(i);
+  EXPECT_EQ(latencies.Percentile(0.5), 50);
+  EXPECT_EQ(latencies.Percentile(0.99), 99);
+  EXPECT_EQ(latencies.Percentile(0.9999), 100);
+  EXPECT_EQ(latencies.Percentile(1), 100);
 }
 
 TEST(TasksTest, FewerObservationsAreTheFirstOfMore) {
