@@ -36,7 +36,7 @@ Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obst
       const StepRecord& step = tube.step(t);
       slice["envelope"] = {{"lower", std::span(step.envelope.lower.data(), n)},
                            {"upper", std::span(step.envelope.upper.data(), n)}};
-      slice["remainder"] = std::span(step.remainder.data(), n);
+      slice["remainder"] = std::span(step.remainder.half_width.data(), n);
     }
     slices.push_back(std::move(slice));
   }

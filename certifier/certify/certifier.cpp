@@ -35,6 +35,16 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   return *problem;
 }
 
+// The domain's box over z = (x, u) envelops every query.
+LipschitzEnvelope MakeEnvelope(const Problem& problem, const Observations& observations) {
+  const Box &state = problem.domain.state, &input = problem.domain.input;
+  Eigen::VectorXd lower(state.dim() + input.dim()), upper(lower.size());
+  lower << state.lower(), input.lower();
+  upper << state.upper(), input.upper();
+  const auto size = static_cast<std::size_t>(lower.size());
+  return LipschitzEnvelope(problem.declaration, observations, {lower.data(), size}, {upper.data(), size});
+}
+
 Decision Falsified(int step, int coordinate) {
   Decision decision;
   decision.outcome = Outcome::kFalsified;
@@ -87,8 +97,8 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       projection_(problem_->projection, problem_->model->num_states()),
       observations_(Observe(*problem_->model, problem_->transitions)),
       violation_(FindViolation(problem_->declaration, observations_)),
-      envelope_(problem_->declaration, observations_),
-      propagator_(*problem_->model, problem_->domain, envelope_, problem_->zonotope_order) {}
+      envelope_(MakeEnvelope(*problem_, observations_)),
+      propagator_(*problem_->model, problem_->domain, envelope_, problem_->zonotope_order, problem_->method) {}
 
 void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
   const NominalModel& model = *problem_->model;
@@ -114,51 +124,88 @@ void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span
 Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
                             Tube& tube) const noexcept {
   tube.length_ = 0;
-  tube.slices_[0] = initial_set;
+  tube.slices_[0].Assign(initial_set);
+  Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
   if (violation_) return Falsified(*violation_);
   const Decision stopped = Propagate(plan, tube);
-  return stopped.outcome == Outcome::kNone ? JudgeSafety(obstacles, tube) : stopped;
+  if (stopped.outcome != Outcome::kNone) return stopped;
+  return JudgeSafety(obstacles, tube);
 }
 
 Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
   for (int t = 0; t < plan.num_steps; ++t) {
     const auto i = static_cast<std::size_t>(t);
     StepRecord& record = tube.steps_[i];
-    const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), tube.slices_[i + 1], record);
+    const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1], tube.steps_[i + 1].half_width.data());
     if (result.status != StepResult::Status::kDone) return Stopped(result, t, record);
     tube.length_ = t + 1;
   }
   return {};
 }
 
-Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept {
-  Decision decision;
-  decision.margin = kInfinity;
-  double smallest_clearance = kInfinity;
-  Zonotope projected;
-  for (int t = 0; t <= tube.length(); ++t) {
-    projection_.Enclose(tube.slice(t), projected);
-    for (std::size_t o = 0; o < obstacles.size(); ++o) {
-      // A cheap bound settles all that stays farther away than what was found already.
-      Separation separation = SeparateQuickly(projected, obstacles[o]);
-      if (separation.IsProven() && separation.clearance() >= smallest_clearance) continue;
-      if (const Separation best = Separate(projected, obstacles[o]); best.distance > separation.distance)
-        separation = best;
-      if (separation.IsProven() && separation.clearance() >= smallest_clearance) continue;
-      smallest_clearance = separation.clearance();
-      decision.obstacle = static_cast<int>(o);
-      decision.closest_step = t;
-      decision.margin = separation.distance;
-      decision.threshold = separation.threshold;
-      if (separation.IsProven()) continue;
-      decision.outcome = Outcome::kSafety;
-      decision.cause = Cause::kObstacle;
-      decision.step = t;
-      return decision;
-    }
+namespace {
+
+// The closest approach found so far.
+struct Closest {
+  double clearance = kInfinity;
+  int step = -1, obstacle = -1;
+  Separation separation{kInfinity, 0};
+
+  void Consider(const Separation& found, int t, int o) noexcept {
+    if (found.clearance() < clearance) *this = {found.clearance(), t, o, found};
   }
-  decision.outcome = Outcome::kCertified;
+};
+
+Decision Judged(Outcome outcome, const Closest& closest) {
+  Decision decision;
+  decision.outcome = outcome;
+  decision.obstacle = closest.obstacle;
+  decision.closest_step = closest.step;
+  decision.margin = closest.separation.distance;
+  decision.threshold = closest.separation.threshold;
+  if (outcome == Outcome::kSafety) {
+    decision.cause = Cause::kObstacle;
+    decision.step = closest.step;
+  }
   return decision;
+}
+
+}  // namespace
+
+// Interval hulls settle what is far away. What they do not prove, and then what they leave as possibly closest, is
+// settled by the best direction.
+Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept {
+  Closest by_hull, closest;
+  const auto separate = [&](int t, int o, const Separation& by_hulls) {
+    Zonotope projected;
+    projection_.Enclose(tube.slice(t), projected);
+    const Separation best = Separate(projected, obstacles[static_cast<std::size_t>(o)]);
+    return best.distance > by_hulls.distance ? best : by_hulls;
+  };
+  const auto hull_separation = [&](int t, int o) {
+    return SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacles[static_cast<std::size_t>(o)]);
+  };
+  const int count = static_cast<int>(obstacles.size());
+  for (int t = 0; t <= tube.length(); ++t)
+    for (int o = 0; o < count; ++o) {
+      const Separation by_hulls = hull_separation(t, o);
+      if (by_hulls.IsProven()) {
+        by_hull.Consider(by_hulls, t, o);
+        continue;
+      }
+      const Separation best = separate(t, o, by_hulls);
+      if (!best.IsProven()) return Judged(Outcome::kSafety, {best.clearance(), t, o, best});
+      closest.Consider(best, t, o);
+    }
+  if (by_hull.clearance < closest.clearance)
+    closest.Consider(separate(by_hull.step, by_hull.obstacle, by_hull.separation), by_hull.step, by_hull.obstacle);
+  for (int t = 0; t <= tube.length(); ++t)
+    for (int o = 0; o < count; ++o) {
+      const Separation by_hulls = hull_separation(t, o);
+      if (!by_hulls.IsProven() || by_hulls.clearance() >= closest.clearance) continue;
+      if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o, by_hulls), t, o);
+    }
+  return Judged(Outcome::kCertified, closest);
 }
 
 }  // namespace forereach

@@ -51,8 +51,12 @@ struct Plan {
 Made once, reused for every plan: it holds the longest horizon and is some 2 MB large. */
 class Tube final {
  public:
-  Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps) {}
+  Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps + 1) {}
 
+  /** Upper bounds on the half-widths of the hull of X_t, t <= length(). */
+  [[nodiscard]] std::span<const double> half_width(int t) const {
+    return {step(t).half_width.data(), static_cast<std::size_t>(slice(t).dim())};
+  }
   /** Completed steps; X_0 .. X_length() are valid. */
   [[nodiscard]] int length() const { return length_; }
   [[nodiscard]] const Zonotope& slice(int t) const { return slices_[static_cast<std::size_t>(t)]; }

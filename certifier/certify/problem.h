@@ -8,6 +8,7 @@ holds, and which coordinates safety is judged in. */
 
 #include "certifier/dynamics/model.h"
 #include "certifier/reach/domain.h"
+#include "certifier/reach/remainder.h"
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/transitions.h"
 #include "certifier/safety/obstacle.h"
@@ -21,6 +22,7 @@ struct Problem {
   Declaration declaration;                    ///< L and sigma
   Transitions transitions;                    ///< D_N, all inside the domain
   Eigen::MatrixXd projection;                 ///< P, p-by-n
+  Method method = Method::kCentred;           ///< How the nominal remainder is bounded
   int zonotope_order = 5;                     ///< rho: at most rho * n generators after reduction
 };
 

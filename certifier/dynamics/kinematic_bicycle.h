@@ -13,22 +13,31 @@ struct KinematicBicycle {
   // m, m, rad, m/s, m/s^2, rad
   static constexpr std::array<const char*, kStates> kStateNames{"x", "y", "theta", "v", "a", "delta"};
   static constexpr std::array<const char*, kInputs> kInputNames{"jerk", "steer_rate"};  // m/s^3, rad/s
+  static constexpr std::array<const char*, 2> kParameterNames{"dt", "wheelbase"};       // s, m
 
   double dt;         ///< s
   double wheelbase;  ///< m
 
   /** The equations, once, for every scalar: z = (x, y, theta, v, a, delta, jerk, steer_rate). */
   template <class T>
-  void operator()(std::span<const T> z, std::span<T> next) const {
+  static constexpr void Step(std::span<const T> parameters, std::span<const T> z, std::span<T> next) {
     using std::cos, std::sin, std::tan;
-    const T step(dt);
+    const T &dt = parameters[0], &wheelbase = parameters[1];
     const T &theta = z[2], &v = z[3], &a = z[4], &delta = z[5], &jerk = z[6], &steer_rate = z[7];
-    next[0] = z[0] + step * (v * cos(theta));
-    next[1] = z[1] + step * (v * sin(theta));
-    next[2] = theta + step / T(wheelbase) * (v * tan(delta));
-    next[3] = v + step * a;
-    next[4] = a + step * jerk;
-    next[5] = delta + step * steer_rate;
+    next[0] = z[0] + dt * (v * cos(theta));
+    next[1] = z[1] + dt * (v * sin(theta));
+    next[2] = theta + dt / wheelbase * (v * tan(delta));
+    next[3] = v + dt * a;
+    next[4] = a + dt * jerk;
+    next[5] = delta + dt * steer_rate;
+  }
+
+  [[nodiscard]] std::array<double, 2> parameters() const { return {dt, wheelbase}; }
+
+  template <class T>
+  void operator()(std::span<const T> z, std::span<T> next) const {
+    const std::array<T, 2> exact{T(dt), T(wheelbase)};
+    Step<T>(exact, z, next);
   }
 };
 

@@ -1,15 +1,17 @@
 /** A nominal model f0 : (x, u) -> x+, known to the certifier by what it can enclose.
 
-Every implementation comes from one definition of its equations (equations_model.h). z = (x, u) has
+A model is the program of its equations (program.h) and the numbers of its parameters. z = (x, u) has
 d_z = states + inputs entries. */
 #pragma once
 
 #include <array>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "certifier/dynamics/expansion.h"
+#include "certifier/dynamics/image.h"
+#include "certifier/dynamics/program.h"
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/sets/linear_map.h"
@@ -19,7 +21,7 @@ namespace forereach {
 /** Encloses f0(z) and its Jacobian at one point. Entries of the Jacobian that are not listed are exactly zero. */
 struct Linearization {
   std::array<Interval, kMaxStates> value;
-  std::array<MatrixEntry, kMaxStates * kMaxVariables> entries;
+  std::array<MatrixEntry, Program::kMaxFirst> entries;
   int count = 0;
 
   [[nodiscard]] std::span<const MatrixEntry> jacobian() const { return {entries.data(), static_cast<std::size_t>(count)}; }
@@ -32,34 +34,58 @@ struct HessianEnclosure {
     int output, row, column;
     Interval second_derivative;
   };
-  static constexpr int kMaxEntries = 512;
-  std::array<Entry, kMaxEntries> entries;
+  std::array<Entry, Program::kMaxSecond> entries;
   int count = 0;
+};
+
+/** What a model is called, for people and digests. */
+struct ModelNames {
+  std::string name;
+  std::vector<std::string> states, inputs, parameters;
 };
 
 class NominalModel {
  public:
+  /** @param program outlives the model. */
+  NominalModel(const Program& program, std::vector<double> parameters, ModelNames names)
+      : program_(program), parameters_(std::move(parameters)), names_(std::move(names)) {}
   virtual ~NominalModel() = default;
 
-  [[nodiscard]] virtual const std::string& name() const = 0;
-  [[nodiscard]] virtual const std::vector<std::string>& state_names() const = 0;
-  [[nodiscard]] virtual const std::vector<std::string>& input_names() const = 0;
+  [[nodiscard]] const std::string& name() const { return names_.name; }
+  [[nodiscard]] const std::vector<std::string>& state_names() const { return names_.states; }
+  [[nodiscard]] const std::vector<std::string>& input_names() const { return names_.inputs; }
+  [[nodiscard]] const std::vector<std::string>& parameter_names() const { return names_.parameters; }
+  [[nodiscard]] std::span<const double> parameters() const { return parameters_; }
+  [[nodiscard]] const Program& program() const { return program_; }
   /** Name and parameters, enough to tell two models apart: what the model's digest is made of. */
-  [[nodiscard]] virtual std::string description() const = 0;
+  [[nodiscard]] std::string description() const;
 
-  [[nodiscard]] int num_states() const { return static_cast<int>(state_names().size()); }
-  [[nodiscard]] int num_inputs() const { return static_cast<int>(input_names().size()); }
-  [[nodiscard]] int num_variables() const { return num_states() + num_inputs(); }
+  [[nodiscard]] int num_states() const { return program_.states; }
+  [[nodiscard]] int num_inputs() const { return program_.variables - program_.states; }
+  [[nodiscard]] int num_variables() const { return program_.variables; }
 
   /** f0(z), evaluated in extended precision and rounded once. For planning, simulation and display, not for bounds. */
-  virtual void Evaluate(std::span<const double> z, std::span<double> next) const noexcept = 0;
+  void Evaluate(std::span<const double> z, std::span<double> next) const noexcept;
 
-  /** Encloses f0(z) and D_z f0(z), Eq. (propagation). */
-  virtual void Linearize(std::span<const double> z, Linearization& out) const noexcept = 0;
+  /** Encloses f0(z) and D_z f0(z), Eq. (propagation), by interval arithmetic. */
+  void Linearize(std::span<const double> z, Linearization& out) const noexcept;
 
-  /** Encloses every second derivative of f0 over the box of d_z intervals, Eq. (qt-formula). An entry may be
-  infinite where no finite enclosure exists, for example where a steering interval meets the tangent's pole. */
-  virtual void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept = 0;
+  /** Encloses every second derivative of f0 over the box of d_z intervals, Eq. (qt-formula), by interval arithmetic. An
+  entry may be infinite where no finite enclosure exists, for example where a steering interval meets the tangent's pole. */
+  void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept;
+
+  /** All of these at once in plain arithmetic, fast, for the certify step; rounding.h has the error.
+  @param z the center c of the box. */
+  virtual void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out) const noexcept = 0;
+
+  /** The image of a slice's generators under the expansion's Jacobian (image.h). */
+  virtual void Map(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
+                   const double* half_width, Zonotope& next, ImageSums& sums) const noexcept = 0;
+
+ private:
+  const Program& program_;
+  std::vector<double> parameters_;
+  ModelNames names_;
 };
 
 }  // namespace forereach

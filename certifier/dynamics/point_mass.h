@@ -11,17 +11,27 @@ struct PointMass {
   static constexpr const char* kName = "point_mass";
   static constexpr std::array<const char*, kStates> kStateNames{"px", "py", "vx", "vy"};  // m, m/s
   static constexpr std::array<const char*, kInputs> kInputNames{"ax", "ay"};              // m/s^2
+  static constexpr std::array<const char*, 1> kParameterNames{"dt"};                      // s
 
   double dt;  ///< s
 
   /** The equations, once, for every scalar: z = (px, py, vx, vy, ax, ay). */
   template <class T>
-  void operator()(std::span<const T> z, std::span<T> next) const {
-    const T step(dt), half_square = step * step / T(2);
+  static constexpr void Step(std::span<const T> parameters, std::span<const T> z, std::span<T> next) {
+    const T& dt = parameters[0];
+    const T half_square = dt * dt / T(2);
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      next[axis] = z[axis] + step * z[axis + 2] + half_square * z[axis + 4];
-      next[axis + 2] = z[axis + 2] + step * z[axis + 4];
+      next[axis] = z[axis] + dt * z[axis + 2] + half_square * z[axis + 4];
+      next[axis + 2] = z[axis + 2] + dt * z[axis + 4];
     }
+  }
+
+  [[nodiscard]] std::array<double, 1> parameters() const { return {dt}; }
+
+  template <class T>
+  void operator()(std::span<const T> z, std::span<T> next) const {
+    const std::array<T, 1> exact{T(dt)};
+    Step<T>(exact, z, next);
   }
 };
 

@@ -74,6 +74,54 @@ bool Domain::Contains(std::span<const double> z) const noexcept {
   return FindExit(*this, {point.data(), z.size()}).kind == DomainExit::Kind::kNone;
 }
 
+namespace {
+
+// By plain arithmetic with a margin above its rounding: true only if all constraints hold.
+bool LiesWellInside(const Domain& domain, std::span<const double> center, std::span<const double> half_width) noexcept {
+  constexpr double kMargin = 0x1p-48;
+  const auto half = [&](std::size_t l) { return l < half_width.size() ? half_width[l] : 0; };
+  bool inside = true;
+  for (std::size_t part = 0, l = 0; part < 2; ++part) {
+    const Box& box = part == 0 ? domain.state : domain.input;
+    for (Eigen::Index i = 0; i < box.dim(); ++i, ++l) {
+      const double reach = half(l) + kMargin * (std::abs(center[l]) + half(l));
+      inside &= (box.lower()[i] < center[l] - reach) & (center[l] + reach < box.upper()[i]);
+    }
+  }
+  for (const auto& [coefficients, bound] : domain.inequalities) {
+    double value = 0, size = std::abs(bound);
+    for (std::size_t l = 0; l < center.size(); ++l) {
+      const double c = coefficients[static_cast<Eigen::Index>(l)];
+      value += c * center[l] + std::abs(c) * half(l);
+      size += std::abs(c) * (std::abs(center[l]) + half(l));
+    }
+    inside &= value + kMargin * size < bound;
+  }
+  for (const auto& [coordinates, ball_center, radius] : domain.balls) {
+    double square = 0;
+    for (std::size_t i = 0; i < coordinates.size(); ++i) {
+      const auto l = static_cast<std::size_t>(coordinates[i]);
+      const double middle = ball_center[static_cast<Eigen::Index>(i)];
+      const double reach = std::abs(center[l] - middle) + half(l) + kMargin * (std::abs(center[l]) + std::abs(middle));
+      square += reach * reach;
+    }
+    inside &= square * (1 + kMargin) < radius * radius * (1 - kMargin);
+  }
+  return inside;
+}
+
+}  // namespace
+
+DomainExit FindExit(const Domain& domain, std::span<const double> center, std::span<const double> half_width) noexcept {
+  if (LiesWellInside(domain, center, half_width)) return {};
+  std::array<Interval, kMaxVariables> box;
+  for (std::size_t l = 0; l < center.size(); ++l) {
+    const double half = l < half_width.size() ? half_width[l] : 0;
+    box[l] = {SubDown(center[l], half), AddUp(center[l], half)};
+  }
+  return FindExit(domain, {box.data(), center.size()});
+}
+
 DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept {
   using Kind = DomainExit::Kind;
   for (int l = 0; l < static_cast<int>(box.size()); ++l) {

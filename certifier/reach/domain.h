@@ -49,4 +49,9 @@ that is met exactly is inside, for a ball where the squares of radius and distan
 rounding error short of that. NaN is outside. Cost O(d_z) a constraint. */
 [[nodiscard]] DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept;
 
+/** The same of the box {z : |z - center| <= half_width}; entries of half_width that are missing are 0. A box that lies
+inside by a margin is found so in plain arithmetic. */
+[[nodiscard]] DomainExit FindExit(const Domain& domain, std::span<const double> center,
+                                  std::span<const double> half_width) noexcept;
+
 }  // namespace forereach

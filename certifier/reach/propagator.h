@@ -1,16 +1,18 @@
 /** One step of the reachable tube, Eq. (propagation) and Eq. (order-reduction):
 
-    X_{t+1} = red < f0(c) + mu, [J G, diag(q), diag(h)] >,
+    X_{t+1} = red < f0(c) + rho + mu, [J G, diag(q), diag(h)] > + [-s', s'],
 
-with J = D_z f0(c), q the remainder half-width over Box(Z_t), mu and h the middle and half-width of the residual
-envelope. All rounding, that of f0(c), J and J G included, is added to h. */
+with J = D_z f0(c), rho and q the middle and half-width of the remainder over Box(Z_t), mu and h those of the residual
+envelope. All rounding, that of f0(c), J and J G included, goes to the slack s', with |J| s of the slack before it. */
 #pragma once
 
 #include <array>
 #include <span>
 
 #include "certifier/dynamics/model.h"
+#include "certifier/dynamics/rounding.h"
 #include "certifier/reach/domain.h"
+#include "certifier/reach/remainder.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/sets/zonotope.h"
 
@@ -18,8 +20,9 @@ namespace forereach {
 
 /** What one step found on its way. */
 struct StepRecord {
+  std::array<double, kMaxStates> half_width;  ///< r, of the hull of X_t
   ResidualBounds envelope;
-  std::array<double, kMaxStates> remainder;  ///< q
+  Remainder remainder;
 };
 
 struct StepResult {
@@ -37,19 +40,39 @@ struct StepResult {
 /** Immutable, so any number of threads may step at once. Refers to its parts, which must outlive it. */
 class Propagator final {
  public:
-  Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual, int zonotope_order)
-      : model_(model), domain_(domain), residual_(residual), order_(zonotope_order) {}
+  Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual, int zonotope_order,
+             Method method);
 
   /** Advances `slice` under `input` into `next`. Where it does not reach kDone, `next` is unspecified. Allocates
-  nothing. @pre order * n + 2 n <= kMaxGenerators, and slice has at most order * n generators. */
-  [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, Zonotope& next,
-                                StepRecord& record) const noexcept;
+  nothing. @pre order * n + 2 n <= kMaxGenerators, and slice has at most order * n generators.
+  @param record its half_width is given (HalfWidths), the rest is set. @param next_half_width n entries: the same of
+  `next`, for the step after. */
+  [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
+                                double* next_half_width) const noexcept;
+
+  /** Upper bounds on the half-widths of the slice's hull, n of them. */
+  static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
+
+  /** Whether a step evaluates the model in plain arithmetic, with an error bounded for the whole domain at set-up, or,
+  where that bound is not small, in interval arithmetic, which takes longer. */
+  [[nodiscard]] bool expands_in_plain_arithmetic() const { return plain_; }
 
  private:
+  void ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
+                         ExpansionError& error) const noexcept;
+  [[nodiscard]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
+                                           std::span<const double> center, std::span<const PlainInterval> hull,
+                                           StepRecord& record, Zonotope& next, double* next_half_width) const noexcept;
+  [[nodiscard]] StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
+                                   const ExpansionError& error, StepRecord& record, Zonotope& next,
+                                   double* next_half_width) const noexcept;
   const NominalModel& model_;
   const Domain& domain_;
   const ResidualEnclosure& residual_;
   int order_;
+  RemainderBound remainder_;
+  ExpansionError error_;
+  bool plain_;
 };
 
 }  // namespace forereach

@@ -1,13 +1,76 @@
 #include "certifier/residual/consistency.h"
 
+#include <algorithm>
 #include <cmath>
-#include <vector>
+
+#include "certifier/residual/observation_index.h"
+#include "certifier/residual/pairs.h"
 
 namespace forereach {
 namespace {
 
-// The test itself, rounded in favour of the declaration.
-std::optional<Violation> Test(const Declaration& declaration, const Observations& o, int i, int j, int k) {
+// A constant coordinate: only the largest lower end against the smallest upper end can be the worst pair.
+std::optional<Violation> TestConstant(const Declaration& declaration, const Observations& o, int k) {
+  Eigen::Index highest = 0, lowest = 0;
+  o.lower.col(k).maxCoeff(&highest);
+  o.upper.col(k).minCoeff(&lowest);
+  return TestPair(declaration, o, static_cast<int>(std::min(highest, lowest)), static_cast<int>(std::max(highest, lowest)), k);
+}
+
+// Where plain arithmetic may overflow.
+std::optional<Violation> TestAllPairs(const Declaration& declaration, const Observations& o, int k) {
+  for (int i = 0; i < o.size(); ++i)
+    for (int j = i + 1; j < o.size(); ++j)
+      if (const auto violation = TestPair(declaration, o, i, j, k)) return violation;
+  return std::nullopt;
+}
+
+double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries, const Observations& o) {
+  double values = 0, locations = 0;
+  for (const double x : entries.floors) values = std::max(values, std::abs(x));
+  for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
+  for (const LipschitzRow::Column& column : row.columns())
+    locations = AddUp(locations, MulUp(column.slope, o.z.col(column.variable).cwiseAbs().maxCoeff()));
+  return PairMarginUpper(values, locations, row.columns().size());
+}
+
+PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i) {
+  const auto at = static_cast<std::size_t>(i);
+  const double* coordinates = entries.coordinates.data() + at * entries.num_coordinates;
+  return {{coordinates, coordinates + entries.num_coordinates}, entries.floors[at], -entries.ceilings[at]};
+}
+
+// The first pair, given that there is one. None of the observations before its first has any partner.
+std::optional<Violation> FirstOf(const Declaration& declaration, const Observations& o, int k, const PairSearch& search,
+                                 const ObservationIndex::Entries& entries) {
+  std::optional<Violation> first;
+  for (int i = 0; i < o.size() && !first; ++i)
+    search.AnyPartner(PointOf(entries, i), [&](std::uint32_t id) {
+      const int j = static_cast<int>(id);
+      if (j > i && (!first || j < first->second))
+        if (const auto violation = TestPair(declaration, o, i, j, k)) first = violation;
+      return false;
+    });
+  return first;
+}
+
+std::optional<Violation> TestRow(const Declaration& declaration, const Observations& o, int k) {
+  const LipschitzRow row(declaration, k);
+  if (row.is_constant()) return TestConstant(declaration, o, k);
+  const ObservationIndex::Entries entries = EntriesOf(row, declaration, o, k);
+  const double margin = MarginUpper(row, entries, o);
+  if (!std::isfinite(margin)) return TestAllPairs(declaration, o, k);
+  const ObservationIndex index(entries);
+  const PairSearch search(index, margin);
+  const bool violated = search.AnyPair([&](std::uint32_t i, std::uint32_t j) {
+    return TestPair(declaration, o, static_cast<int>(i), static_cast<int>(j), k).has_value();
+  });
+  return violated ? FirstOf(declaration, o, k, search, entries) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Violation> TestPair(const Declaration& declaration, const Observations& o, int i, int j, int k) {
   const double difference = std::max(SubDown(o.lower(i, k), o.upper(j, k)), SubDown(o.lower(j, k), o.upper(i, k)));
   double bound = MulUp(2, declaration.noise_bound[k]);
   for (Eigen::Index l = 0; l < o.z.cols(); ++l) {
@@ -20,50 +83,9 @@ std::optional<Violation> Test(const Declaration& declaration, const Observations
   return std::nullopt;
 }
 
-// A constant coordinate: only the largest lower end against the smallest upper end can be the worst pair.
-std::optional<Violation> TestConstant(const Declaration& declaration, const Observations& o, int k) {
-  Eigen::Index highest = 0, lowest = 0;
-  o.lower.col(k).maxCoeff(&highest);
-  o.upper.col(k).minCoeff(&lowest);
-  return Test(declaration, o, static_cast<int>(std::min(highest, lowest)), static_cast<int>(std::max(highest, lowest)), k);
-}
-
-// Finds suspects by plain arithmetic with a margin far above its rounding error; Test decides.
-std::optional<Violation> TestPairs(const Declaration& declaration, const Observations& o, int k) {
-  std::vector<Eigen::VectorXd> scaled;  // L_kl z_l of all observations, for each active column l
-  double scale = 0;
-  for (Eigen::Index l = 0; l < o.z.cols(); ++l) {
-    if (declaration.lipschitz(k, l) == 0) continue;
-    scaled.push_back(declaration.lipschitz(k, l) * o.z.col(l));
-    scale += scaled.back().cwiseAbs().maxCoeff();
-  }
-  const Eigen::VectorXd lower = o.lower.col(k), upper = o.upper.col(k);
-  scale += std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff()) + declaration.noise_bound[k];
-  const double slack = 2 * declaration.noise_bound[k] - 1e-13 * scale;
-  const int count = o.size();
-  Eigen::ArrayXd excess(count);
-  for (int i = 0; i < count; ++i) {
-    const int rest = count - i - 1;
-    auto tail = excess.tail(rest);
-    tail = (lower[i] - upper.tail(rest).array()).max(lower.tail(rest).array() - upper[i]);
-    for (const Eigen::VectorXd& column : scaled) tail -= (column.tail(rest).array() - column[i]).abs();
-    if (rest == 0 || tail.maxCoeff() <= slack) continue;
-    for (int j = i + 1; j < count; ++j)
-      if (excess[j] > slack)
-        if (const auto violation = Test(declaration, o, i, j, k)) return violation;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations) {
-  for (int k = 0; k < observations.num_states(); ++k) {
-    const bool constant = (declaration.lipschitz.row(k).array() == 0).all();
-    const auto violation =
-        constant ? TestConstant(declaration, observations, k) : TestPairs(declaration, observations, k);
-    if (violation) return violation;
-  }
+  for (int k = 0; k < observations.num_states(); ++k)
+    if (const auto violation = TestRow(declaration, observations, k)) return violation;
   return std::nullopt;
 }
 

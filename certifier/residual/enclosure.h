@@ -14,6 +14,7 @@ namespace forereach {
 /** lower <= r_k(z) <= upper for every admissible residual r and every z in the query set. */
 struct ResidualBounds {
   std::array<double, kMaxStates> lower, upper;
+  bool capped;  ///< True if a limit on the work was met: sound, and perhaps wider than the observations allow.
 };
 
 /** Z_t = X_t x {u_t}, with what the step knows of it already. */

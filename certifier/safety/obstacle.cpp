@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/numerics/directed.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -49,13 +48,22 @@ double HullDistance(const std::vector<Eigen::Vector2d>& offsets) {
 
 }  // namespace
 
+void Obstacle::SetHull(std::vector<Eigen::Vector3d> hull) {
+  hull_ = std::move(hull);
+  lower_ = upper_ = hull_.front();
+  for (const Eigen::Vector3d& point : hull_) {
+    lower_ = lower_.cwiseMin(point);
+    upper_ = upper_.cwiseMax(point);
+  }
+}
+
 Obstacle Obstacle::Circle(const Eigen::VectorXd& center, double radius) {
   Require(center.size() == 2, "circle: center has " + std::to_string(center.size()) + " entries, must have 2");
   Require(radius >= 0 && radius < kInfinity, "circle: radius " + ToText(radius) + " is negative or not finite");
   Obstacle circle(Kind::kCircle, SafetyDim("circle: center", center));
   circle.radius_ = radius;
   circle.points_ = {center};
-  circle.hull_ = {Padded(center)};
+  circle.SetHull({Padded(center)});
   return circle;
 }
 
@@ -65,11 +73,13 @@ Obstacle Obstacle::AxisBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& 
   for (Eigen::Index k = 0; k < lower.size(); ++k)
     Require(lower[k] <= upper[k], "box: lower " + ToText(lower[k]) + " is above upper " + ToText(upper[k]));
   box.points_ = {lower, upper};
+  std::vector<Eigen::Vector3d> hull;
   for (int corner = 0; corner < 1 << box.dim_; ++corner) {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
     for (int k = 0; k < box.dim_; ++k) point[k] = corner >> k & 1 ? upper[k] : lower[k];
-    box.hull_.push_back(point);
+    hull.push_back(point);
   }
+  box.SetHull(std::move(hull));
   return box;
 }
 
@@ -79,10 +89,12 @@ Obstacle Obstacle::Polygon(const std::vector<Eigen::VectorXd>& vertices) {
               std::to_string(kMaxObstaclePoints));
   Obstacle polygon(Kind::kPolygon, 2);
   polygon.points_ = vertices;
+  std::vector<Eigen::Vector3d> hull;
   for (const Eigen::VectorXd& vertex : vertices) {
     Require(SafetyDim("polygon: vertex", vertex) == 2, "polygon: a vertex must have 2 entries");
-    polygon.hull_.push_back(Padded(vertex));
+    hull.push_back(Padded(vertex));
   }
+  polygon.SetHull(std::move(hull));
   return polygon;
 }
 

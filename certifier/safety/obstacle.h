@@ -9,6 +9,7 @@ Each is a core, the convex hull of points or a half-space, grown by a radius:
 
 #include <Eigen/Core>
 
+#include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 
 namespace forereach {
@@ -36,15 +37,22 @@ class Obstacle final {
   [[nodiscard]] const std::vector<Eigen::VectorXd>& points() const { return points_; }
   /** The points whose hull the core is; empty for a half-space. A box gives its 2^p corners. */
   [[nodiscard]] const std::vector<Eigen::Vector3d>& hull() const { return hull_; }
+  /** @name The bounding box of the core; everything for a half-space. Unused coordinates are zero. */
+  ///@{
+  [[nodiscard]] const Eigen::Vector3d& lower() const { return lower_; }
+  [[nodiscard]] const Eigen::Vector3d& upper() const { return upper_; }
+  ///@}
 
  private:
   Obstacle(Kind kind, int dim) : kind_(kind), dim_(dim) {}
+  void SetHull(std::vector<Eigen::Vector3d> hull);
 
   Kind kind_;
   int dim_;
   double radius_ = 0, offset_ = 0;
   std::vector<Eigen::VectorXd> points_;
   std::vector<Eigen::Vector3d> hull_;
+  Eigen::Vector3d lower_ = Eigen::Vector3d::Constant(-kInfinity), upper_ = Eigen::Vector3d::Constant(kInfinity);
 };
 
 /** Distance from a point y to the obstacle, negative inside, by plain arithmetic: for planning, simulation and

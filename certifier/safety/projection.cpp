@@ -1,5 +1,7 @@
 #include "certifier/safety/projection.h"
 
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -13,6 +15,22 @@ Projection::Projection(const Eigen::MatrixXd& matrix, int num_states) : dim_(sta
   for (int k = 0; k < dim_; ++k)
     for (int l = 0; l < num_states; ++l)
       if (matrix(k, l) != 0) entries_.push_back({k, l, Interval(matrix(k, l))});
+}
+
+Hull Projection::EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept {
+  constexpr double kMargin = 0x1p-47;  // above the rounding of both sums
+  Hull hull{};
+  std::array<double, kMaxSafetyDim> size{};
+  for (const MatrixEntry& entry : entries_) {
+    const auto k = static_cast<std::size_t>(entry.row), l = static_cast<std::size_t>(entry.column);
+    const double weight = entry.value.lower, middle = weight * slice.center(entry.column);
+    hull.center[k] += middle;
+    hull.half_width[k] += std::abs(weight) * half_width[l];
+    size[k] += std::abs(middle) + std::abs(weight) * half_width[l];
+  }
+  for (std::size_t k = 0; k < static_cast<std::size_t>(dim_); ++k)
+    hull.half_width[k] += kMargin * size[k] + std::numeric_limits<double>::min();
+  return hull;
 }
 
 }  // namespace forereach

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "certifier/safety/separation.h"
 #include "certifier/sets/linear_map.h"
 
 namespace forereach {
@@ -15,6 +16,9 @@ class Projection final {
   Projection(const Eigen::MatrixXd& matrix, int num_states);
 
   [[nodiscard]] int dim() const { return dim_; }
+
+  /** Encloses the interval hull of P X, given X's center and upper bounds on its hull's half-widths. */
+  [[nodiscard]] Hull EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept;
 
   /** A zonotope that contains P X; exactly P X where each row of P copies a coordinate. */
   void Enclose(const Zonotope& slice, Zonotope& projected) const noexcept {

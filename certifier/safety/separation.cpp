@@ -48,6 +48,9 @@ class Search {
     return g;
   }
 
+  // A point of {core - slice}.
+  [[nodiscard]] Vector Offset() const { return hull_.front() - center_; }
+
   void Consider(const Vector& direction) noexcept {
     const double length = direction.norm();
     if (!(length > 0 && length < kInfinity)) return;
@@ -56,6 +59,25 @@ class Search {
   }
 
   [[nodiscard]] const Vector& best() const { return best_; }
+  [[nodiscard]] double value() const { return value_; }
+
+  // The first point of {core - slice} that a unit direction d meets, from below; considers d.
+  [[nodiscard]] Vector Lowest(const Vector& d) noexcept {
+    Vector lowest = hull_.front() - center_;
+    for (const Vector& point : hull_)
+      if (const Vector other = point - center_; d.dot(other) < d.dot(lowest)) lowest = other;
+    const double *x = slice_.padded_row(0).data(), *y = slice_.padded_row(1).data();
+    Lanes far_x = AllLanes(0), far_y = AllLanes(0), spread = AllLanes(0);
+    for (std::size_t j = 0; j < slice_.padded_size(); j += kLanes) {
+      const Lanes g_x = LoadLanes(x + j), g_y = LoadLanes(y + j);
+      const Lanes along = AllLanes(d.x()) * g_x + AllLanes(d.y()) * g_y;
+      far_x += along < AllLanes(0) ? -g_x : g_x;
+      far_y += along < AllLanes(0) ? -g_y : g_y;
+      spread += Abs(along);
+    }
+    Keep(d, d.dot(lowest) - Sum(spread));
+    return lowest - Vector(Sum(far_x), Sum(far_y), 0);
+  }
 
   // The corner of {core - slice} that direction d + tilt (tilt infinitely small) supports, seen from the origin.
   [[nodiscard]] Vector Corner(const Vector& d, const Vector& tilt) const noexcept {
@@ -85,10 +107,13 @@ class Search {
       for (std::size_t j = 0; j < row.size(); ++j) along[j] += d[k] * row[j];
     }
     for (std::size_t j = 0; j < static_cast<std::size_t>(slice_.num_generators()); ++j) value -= std::abs(along[j]);
-    if (value > value_) {
-      value_ = value;
-      best_ = d;
-    }
+    Keep(d, value);
+  }
+
+  void Keep(const Vector& d, double value) noexcept {
+    if (!(value > value_)) return;
+    value_ = value;
+    best_ = d;
   }
 
   const Zonotope& slice_;
@@ -100,17 +125,46 @@ class Search {
 
 Vector Turned(const Vector& edge) { return {-edge.y(), edge.x(), 0}; }
 
+// The point of the segment [a, b] next to the origin.
+Vector NearestOnSegment(const Vector& a, const Vector& b) {
+  const Vector edge = b - a;
+  const double length_square = edge.squaredNorm();
+  if (!(length_square > 0)) return a;
+  return a + edge * std::clamp(-a.dot(edge) / length_square, 0.0, 1.0);
+}
+
+// Gilbert, Johnson and Keerthi's search for the point of {core - slice} next to the origin: from one point found towards
+// it, the lowest point in that direction, and the nearest point of the segments between those kept. A few steps do.
+void Descend(Search& search, Vector nearest) noexcept {
+  constexpr int kMaxSteps = 12;
+  Vector kept[2] = {nearest, nearest};
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const double length = nearest.norm();
+    if (!(length > 0 && length < kInfinity)) return;
+    const Vector lowest = search.Lowest(nearest / length);
+    if (search.value() >= length * (1 - 1e-15)) return;
+    const Vector first = NearestOnSegment(lowest, kept[0]), second = NearestOnSegment(lowest, kept[1]);
+    const bool with_first = first.squaredNorm() < second.squaredNorm();
+    nearest = with_first ? first : second;
+    kept[with_first ? 1 : 0] = lowest;
+  }
+}
+
 // In the plane the distance is attained along the normal of an edge of {core - slice}, or towards a corner next to the
 // best such edge: the dual bound is concave in d, so it rises to its maximum and falls after it.
-Vector BestPlanar(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  Search search(slice, obstacle);
-  const auto& hull = obstacle.hull();
+void TryAllNormals(Search& search, const Zonotope& slice, const std::vector<Vector>& hull) noexcept {
   for (int j = 0; j < slice.num_generators(); ++j) search.Consider(Turned(search.generator(j)));
   for (std::size_t a = 0; a < hull.size(); ++a)
     for (std::size_t b = 0; b < a; ++b) search.Consider(Turned(hull[a] - hull[b]));
   const Vector normal = search.best();
   search.Consider(search.Corner(normal, Turned(normal)));
   search.Consider(search.Corner(normal, -Turned(normal)));
+}
+
+Vector BestPlanar(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  Search search(slice, obstacle);
+  Descend(search, search.Offset());
+  if (!(search.value() > obstacle.radius())) TryAllNormals(search, slice, obstacle.hull());
   return search.best();
 }
 
@@ -148,14 +202,31 @@ Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
 
 }  // namespace
 
-Separation SeparateQuickly(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return Separate(slice, obstacle);
-  Vector center = Vector::Zero();
-  for (int k = 0; k < slice.dim(); ++k) center[k] = slice.center(k);
-  Vector nearest = obstacle.hull().front() - center;
-  for (const Vector& point : obstacle.hull())
-    if ((point - center).squaredNorm() < nearest.squaredNorm()) nearest = point - center;
-  return {DistanceLower(slice, obstacle, nearest), obstacle.radius()};
+Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
+  constexpr double kMargin = 0x1p-47;  // above the rounding of the few operations here, relative to what they add up
+  const auto p = static_cast<std::size_t>(obstacle.dim());
+  double square = 0;
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+    const Eigen::VectorXd& normal = obstacle.points()[0];
+    double gap = obstacle.offset(), size = std::abs(gap);
+    for (std::size_t k = 0; k < p; ++k) {
+      const double d = normal[static_cast<Eigen::Index>(k)], part = std::abs(d) * slice.half_width[k];
+      gap -= d * slice.center[k] + part;
+      size += std::abs(d * slice.center[k]) + part;
+      square += d * d;
+    }
+    const double distance = (gap - kMargin * size) / std::sqrt(square) * (1 - kMargin);
+    return {distance > 0 && distance < kInfinity && square > 0x1p-900 ? distance : -kInfinity, 0};
+  }
+  for (std::size_t k = 0; k < p; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const double below = obstacle.lower()[i] - slice.center[k], above = slice.center[k] - obstacle.upper()[i];
+    const double size = std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i]) + std::abs(slice.center[k]) + slice.half_width[k];
+    const double gap = std::max(below, above) - slice.half_width[k] - kMargin * size;
+    square += gap > 0 ? gap * gap : 0;
+  }
+  const double distance = std::sqrt(square) * (1 - kMargin);
+  return {distance > 0x1p-400 && distance < kInfinity ? distance : -kInfinity, obstacle.radius()};
 }
 
 Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept {

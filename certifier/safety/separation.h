@@ -6,6 +6,8 @@ The search for a good d runs in plain arithmetic and may fail; the left side is 
 what is reported holds for whatever d was found. */
 #pragma once
 
+#include <array>
+
 #include "certifier/safety/obstacle.h"
 #include "certifier/sets/zonotope.h"
 
@@ -22,12 +24,18 @@ struct Separation {
   [[nodiscard]] double clearance() const { return SubDown(distance, threshold); }
 };
 
-/** By the one direction from the slice's center to the core's nearest point. Sound, cheap, O(m), and loose. */
-[[nodiscard]] Separation SeparateQuickly(const Zonotope& slice, const Obstacle& obstacle) noexcept;
+/** The hull of a projected slice: center +- half_width in each of p coordinates. */
+struct Hull {
+  std::array<double, kMaxSafetyDim> center, half_width;
+};
+
+/** By the interval hulls of slice and core, for a half-space by its normal. Sound, O(p), and loose. */
+[[nodiscard]] Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept;
 
 /** By the best direction. In the plane and on the line its distance is exact up to rounding; in three dimensions it
-proves every separation that exists, up to rounding, by the normals of faces and pairs of edges. Cost O(m^2) in the
-plane, O(m^3) in space. @pre slice.dim() == obstacle.dim() */
+proves every separation that exists, up to rounding, by the normals of faces and pairs of edges. Cost O(m) for the few
+directions that a planar search takes, O(m^2) where that proves nothing, O(m^3) in space.
+@pre slice.dim() == obstacle.dim() */
 [[nodiscard]] Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept;
 
 }  // namespace forereach

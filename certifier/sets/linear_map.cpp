@@ -9,7 +9,7 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
                    int rows, Zonotope& image, std::span<double> error) noexcept {
   const auto m = static_cast<std::size_t>(set.num_generators());
   image.Reset(rows, set.num_generators());
-  for (int k = 0; k < rows; ++k) std::ranges::fill(image.mutable_row(k), 0.0);
+  for (int k = 0; k < rows; ++k) std::fill_n(image.mutable_row(k), image.padded_size(), 0.0);
 
   std::array<double, kMaxStates> magnitude{};  // sum_l |M_kl| r_l >= sum_j sum_l |M_kl G_lj|
   std::array<int, kMaxStates> terms{};
@@ -19,7 +19,7 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
     const auto k = static_cast<std::size_t>(entry.row);
     const double half_width = half_widths[static_cast<std::size_t>(entry.column)], weight = entry.value.Middle();
     const std::span<const double> from = set.row(entry.column);
-    const std::span<double> to = image.mutable_row(entry.row);
+    double* to = image.mutable_row(entry.row);
     for (std::size_t j = 0; j < m; ++j) to[j] += weight * from[j];
 
     error[k] = AddUp(error[k], MulUp(entry.value.DistanceUpper(weight), half_width));

@@ -19,15 +19,15 @@ void RequireShape(Eigen::Index center, Eigen::Index rows, Eigen::Index columns) 
                                 std::to_string(kMaxGenerators) + " columns");
 }
 
-// An upper bound on start + sum |g|. Zeros add no rounding error, so a single entry is summed exactly.
-double AbsoluteSumUpper(std::span<const double> row, double start = 0) {
-  double sum = start;
-  int terms = start != 0;
-  for (const double g : row) {
-    sum += std::abs(g);
-    terms += g != 0;
+// An upper bound on start + sum |g| of a padded row. Zeros add no rounding error, so a single entry is summed exactly.
+double AbsoluteSumUpper(std::span<const double> padded, double start) {
+  Lanes sum = AllLanes(0), nonzero = AllLanes(0);
+  for (std::size_t j = 0; j < padded.size(); j += kLanes) {
+    const Lanes size = Abs(LoadLanes(&padded[j]));
+    sum += size;
+    nonzero += size > AllLanes(0) ? AllLanes(1) : AllLanes(0);
   }
-  return SumUpper(sum, terms);
+  return SumUpper(Sum(sum) + start, static_cast<int>(Sum(nonzero)) + (start != 0));
 }
 
 }  // namespace
@@ -39,7 +39,8 @@ Zonotope::Zonotope(const Eigen::VectorXd& center, const Eigen::MatrixXd& generat
   Reset(static_cast<int>(center.size()), static_cast<int>(generators.cols()));
   for (int k = 0; k < dim_; ++k) {
     mutable_center(k) = center[k];
-    for (int j = 0; j < num_generators_; ++j) mutable_row(k)[static_cast<std::size_t>(j)] = generators(k, j);
+    std::fill_n(mutable_row(k), padded_size(), 0.0);
+    for (int j = 0; j < num_generators_; ++j) mutable_row(k)[j] = generators(k, j);
   }
 }
 
@@ -77,7 +78,7 @@ Eigen::MatrixXd Zonotope::GeneratorMatrix() const {
   return generators.leftCols(columns);
 }
 
-double Zonotope::HalfWidthUpper(int k) const noexcept { return AbsoluteSumUpper(row(k), slack(k)); }
+double Zonotope::HalfWidthUpper(int k) const noexcept { return AbsoluteSumUpper(padded_row(k), slack(k)); }
 
 Interval Zonotope::Hull(int k) const noexcept {
   const double half_width = HalfWidthUpper(k);
@@ -87,7 +88,7 @@ Interval Zonotope::Hull(int k) const noexcept {
 double Zonotope::SupportUpper(std::span<const double> direction) const noexcept {
   Interval value(0);
   double magnitude = 0, slack_along = 0;
-  std::array<double, kMaxGenerators> along{};
+  alignas(32) std::array<double, kMaxGenerators> along{};
   for (int k = 0; k < dim_; ++k) {
     const double d = direction[static_cast<std::size_t>(k)];
     if (d == 0) continue;
@@ -97,7 +98,7 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
     const std::span<const double> entries = row(k);
     for (std::size_t j = 0; j < entries.size(); ++j) along[j] += d * entries[j];
   }
-  const double spread = AbsoluteSumUpper({along.data(), static_cast<std::size_t>(num_generators_)});
+  const double spread = AbsoluteSumUpper({along.data(), padded_size()}, 0);
   // Every |d . g_j| is off by a rounding error whose sum over j the magnitude bounds.
   const double underflow = num_generators_ * dim_ * std::numeric_limits<double>::denorm_min();
   const double error = AddUp(DotErrorUpper(magnitude, dim_), underflow);
@@ -107,55 +108,157 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
 void Zonotope::AppendAxis(int k, double length) noexcept {
   if (length == 0) return;
   const auto j = static_cast<std::size_t>(num_generators_++);
-  for (int i = 0; i < dim_; ++i) rows_[static_cast<std::size_t>(i)][j] = i == k ? length : 0;
+  for (int i = 0; i < dim_; ++i) {
+    double* row = mutable_row(i);
+    if (j % kLanes == 0) StoreLanes(AllLanes(0), row + j);
+    if (i == k) row[j] = length;
+  }
+}
+
+void Zonotope::Truncate(int num_generators) noexcept {
+  for (int k = 0; k < dim_; ++k)
+    std::fill(mutable_row(k) + num_generators, mutable_row(k) + padded_size(), 0.0);
+  num_generators_ = num_generators;
+}
+
+void Zonotope::Assign(const Zonotope& other) noexcept {
+  dim_ = other.dim_;
+  num_generators_ = other.num_generators_;
+  center_ = other.center_;
+  slack_ = other.slack_;
+  for (int k = 0; k < dim_; ++k) std::ranges::copy(other.padded_row(k), mutable_row(k));
 }
 
 namespace {
 
-// |g|_1 - |g|_inf of every column, by plain arithmetic: it only chooses what to keep.
-void Scores(const Zonotope& set, std::span<double> scores) {
-  std::array<double, kMaxGenerators> largest{};
-  std::fill(scores.begin(), scores.end(), 0.0);
+using ColumnMask = std::array<double, kMaxGenerators>;  // bits
+constexpr std::size_t kLastLanes = kMaxGenerators - kLanes;
+
+// By plain arithmetic: it only chooses what to keep.
+FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
+  for (std::size_t j = 0; j < set.padded_size(); j += kLanes) {
+    Lanes sum = AllLanes(0), largest = AllLanes(0);
+    for (int k = 0; k < set.dim(); ++k) {
+      const Lanes size = Abs(LoadLanes(&set.padded_row(k)[j]));
+      sum += size;
+      largest = Max(largest, size);
+    }
+    StoreLanes(ScoreColumns(sum, largest, j), &scores[j]);
+  }
+}
+
+// All bits set in each column that is not among the `keep` largest scores. In groups of four times four columns, each
+// compared with every column.
+FOREREACH_INLINE void MarkDropped(const ColumnScores& scores, std::size_t count, int keep, ColumnMask& dropped) {
+  constexpr std::size_t kGroup = 4;
+  const std::int64_t limit = keep;
+  const LaneMask limits{limit, limit, limit, limit};
+  for (std::size_t first = 0; first < count; first += kGroup * kLanes) {
+    Lanes score[kGroup];
+    LaneMask larger[kGroup] = {};  // minus how many lie above
+    for (std::size_t g = 0; g < kGroup; ++g) score[g] = LoadLanes(&scores[std::min(first + g * kLanes, kLastLanes)]);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Lanes other = AllLanes(scores[i]);
+      for (std::size_t g = 0; g < kGroup; ++g) larger[g] += other > score[g];
+    }
+    for (std::size_t g = 0; g < kGroup && first + g * kLanes < count; ++g)
+      StoreLanes(std::bit_cast<Lanes>((score[g] < AllLanes(0)) | (-larger[g] >= limits)), &dropped[first + g * kLanes]);
+  }
+}
+
+// Puts the columns of the `keep` largest scores and the box around the others, plus `boxed`, into the set. The box's
+// columns take the places of those that were dropped.
+FOREREACH_INLINE void KeepLargest(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
+  ColumnMask dropped;
+  const std::size_t padded = set.padded_size();
+  MarkDropped(scores, static_cast<std::size_t>(set.num_generators()), keep, dropped);
   for (int k = 0; k < set.dim(); ++k) {
-    const std::span<const double> row = set.row(k);
-    for (std::size_t j = 0; j < row.size(); ++j) {
-      const double size = std::abs(row[j]);
-      scores[j] += size;
-      largest[j] = std::max(largest[j], size);
+    double* row = set.mutable_row(k);
+    Lanes sum = AllLanes(0);
+    for (std::size_t j = 0; j < padded; j += kLanes) {
+      const LaneMask mask = std::bit_cast<LaneMask>(LoadLanes(&dropped[j])), bits = std::bit_cast<LaneMask>(LoadLanes(row + j));
+      sum += Abs(std::bit_cast<Lanes>(bits & mask));
+      StoreLanes(std::bit_cast<Lanes>(bits & ~mask), row + j);
+    }
+    boxed[k] = (Sum(sum) + boxed[k]) * inflation;
+  }
+  int axis = 0, columns = set.num_generators();
+  const auto next_axis = [&] {
+    while (axis < set.dim() && boxed[axis] == 0) ++axis;
+    return axis < set.dim();
+  };
+  for (int j = 0; j < columns; ++j) {
+    if (std::bit_cast<std::int64_t>(dropped[static_cast<std::size_t>(j)]) == 0) continue;
+    if (next_axis()) {
+      set.mutable_row(axis)[j] = boxed[axis];
+      ++axis;
+    } else {  // no box left for this place: the last column comes here
+      do --columns;
+      while (columns > j && std::bit_cast<std::int64_t>(dropped[static_cast<std::size_t>(columns)]) != 0);
+      for (int k = 0; k < set.dim() && columns > j; ++k) set.mutable_row(k)[j] = set.mutable_row(k)[columns];
     }
   }
-  for (std::size_t j = 0; j < scores.size(); ++j) scores[j] -= largest[j];
+  set.Truncate(columns);
+  for (; next_axis(); ++axis) set.AppendAxis(axis, boxed[axis]);
+}
+
+FOREREACH_AVX2 void KeepLargestAvx2(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
+  KeepLargest(set, keep, scores, inflation, boxed);
+}
+FOREREACH_FLATTEN void KeepLargestBaseline(Zonotope& set, int keep, const ColumnScores& scores, double inflation,
+                                           double* boxed) {
+  KeepLargest(set, keep, scores, inflation, boxed);
+}
+
+int CountNonzero(std::span<const double> lengths) {
+  int count = 0;
+  for (const double length : lengths) count += length != 0;
+  return count;
+}
+
+int CountZeroColumns(const Zonotope& set, const ColumnScores& scores) {
+  int count = 0;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(set.num_generators()); ++j) count += scores[j] < 0;
+  return count;
 }
 
 }  // namespace
 
-void ReduceOrder(Zonotope& set, int order) noexcept {
-  const int n = set.dim(), m = set.num_generators();
-  if (m <= order * n) return;
-  std::array<double, kMaxGenerators> scores;
-  Scores(set, {scores.data(), static_cast<std::size_t>(m)});
+void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept {
+  ColumnScores scores;
+  ScoreAll(set, scores);
+  AppendAndReduce(set, scores, first, second, order);
+}
 
-  std::array<int, kMaxGenerators> columns;
-  std::iota(columns.begin(), columns.begin() + m, 0);
-  const auto kept_end = columns.begin() + (order - 1) * n;
-  std::nth_element(columns.begin(), kept_end, columns.begin() + m, [&](int a, int b) {
-    const double score_a = scores[static_cast<std::size_t>(a)], score_b = scores[static_cast<std::size_t>(b)];
-    return score_a > score_b || (score_a == score_b && a < b);
-  });
-  std::sort(columns.begin(), kept_end);
-
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
+                     std::span<const double> second, int order) noexcept {
+  const int n = set.dim(), axes = CountNonzero(first) + CountNonzero(second), keep = (order - 1) * n;
+  int columns = set.num_generators();
+  if (columns + axes > order * n) columns -= CountZeroColumns(set, scores);
+  const bool reduces = columns + axes > order * n;
+  // Axis-aligned generators that remain generators of their own: their score is 0, and they come last.
+  int still_kept = reduces ? std::max(0, keep - columns) : kMaxGenerators;
   std::array<double, kMaxStates> boxed;
-  for (int k = 0; k < n; ++k) {
-    const std::span<double> row = set.mutable_row(k);
-    double sum = 0;
-    for (auto column = kept_end; column != columns.begin() + m; ++column)
-      sum += std::abs(row[static_cast<std::size_t>(*column)]);
-    boxed[static_cast<std::size_t>(k)] = SumUpper(sum, m);
-    std::size_t j = 0;
-    for (auto column = columns.begin(); column != kept_end; ++column) row[j++] = row[static_cast<std::size_t>(*column)];
+  std::fill_n(boxed.begin(), n, 0.0);
+  std::array<int, 2 * kMaxStates> kept_axes;
+  std::array<double, 2 * kMaxStates> kept_lengths;
+  std::size_t num_kept = 0;
+  for (const std::span<const double> lengths : {first, second})
+    for (std::size_t k = 0; k < lengths.size(); ++k) {
+      if (lengths[k] == 0) continue;
+      if (still_kept-- > 0) {
+        kept_axes[num_kept] = static_cast<int>(k);
+        kept_lengths[num_kept++] = lengths[k];
+      } else {
+        boxed[k] += lengths[k];
+      }
+    }
+  if (reduces || columns < set.num_generators()) {
+    const double inflation = 1 + (2.0 * set.num_generators() + 8) * kUnitRoundoff;
+    const auto keep_largest = active_instruction_set == InstructionSet::kAvx2 ? KeepLargestAvx2 : KeepLargestBaseline;
+    keep_largest(set, reduces ? keep : columns, scores, inflation, boxed.data());
   }
-  set.SetNumGenerators((order - 1) * n);
-  for (int k = 0; k < n; ++k) set.AppendAxis(k, boxed[static_cast<std::size_t>(k)]);
+  for (std::size_t i = 0; i < num_kept; ++i) set.AppendAxis(kept_axes[i], kept_lengths[i]);
 }
 
 }  // namespace forereach

@@ -5,7 +5,8 @@ The box s, the slack, holds what rounding may have added. It is kept apart so th
 generators nor push a real one out when the order is reduced; a set that was never rounded has none.
 
 A value of fixed capacity: no heap, trivially copyable, so the certify step can work on it in place. Row k of G, the
-part of every generator in coordinate k, is contiguous: a sum over generators runs along memory. */
+part of every generator in coordinate k, is contiguous and ends in zeros up to a multiple of kLanes: a sum over
+generators runs along memory, four at a time. */
 #pragma once
 
 #include <array>
@@ -15,6 +16,7 @@ part of every generator in coordinate k, is contiguous: a sum over generators ru
 #include <Eigen/Core>
 
 #include "certifier/numerics/interval.h"
+#include "certifier/numerics/lanes.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/sets/box.h"
 
@@ -57,19 +59,28 @@ class Zonotope final {
   /** An upper bound on the support function max {d . z : z in Z}, Eq. (zonotope-support). Cost O(n m). */
   [[nodiscard]] double SupportUpper(std::span<const double> direction) const noexcept;
 
+  /** The row with the zeros that follow it. */
+  [[nodiscard]] std::span<const double> padded_row(int k) const {
+    return {rows_[static_cast<std::size_t>(k)].data(), padded_size()};
+  }
+  /** num_generators() up to a multiple of kLanes. */
+  [[nodiscard]] std::size_t padded_size() const { return PaddedToLanes(static_cast<std::size_t>(num_generators_)); }
+
   /** @name In-place construction, for the kernels that own the set. No checks. */
   ///@{
+  /** Sets sizes, and the slack to zero. Who then writes the rows keeps their padding zero. */
   void Reset(int dim, int num_generators) {
     dim_ = dim;
     num_generators_ = num_generators;
     slack_.fill(0);
   }
-  void SetNumGenerators(int num_generators) { num_generators_ = num_generators; }
+  /** Forgets the last generators. */
+  void Truncate(int num_generators) noexcept;
+  /** Copies what is in use of another set, some 2 kB where the whole value has 15. */
+  void Assign(const Zonotope& other) noexcept;
   [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
-  [[nodiscard]] std::span<double> mutable_row(int k) {
-    return {rows_[static_cast<std::size_t>(k)].data(), static_cast<std::size_t>(num_generators_)};
-  }
+  [[nodiscard]] double* mutable_row(int k) { return rows_[static_cast<std::size_t>(k)].data(); }
   /** Appends length * e_k unless length is zero. */
   void AppendAxis(int k, double length) noexcept;
   ///@}
@@ -77,13 +88,32 @@ class Zonotope final {
  private:
   int dim_ = 0, num_generators_ = 0;
   std::array<double, kMaxStates> center_, slack_;
-  std::array<std::array<double, kMaxGenerators>, kMaxStates> rows_;
+  alignas(32) std::array<std::array<double, kMaxGenerators>, kMaxStates> rows_;
+  static_assert(kMaxGenerators % kLanes == 0);
 };
 
-/** Girard's order reduction, Eq. (order-reduction). A set with more than order * n generators keeps the
-(order - 1) * n columns of largest |g|_1 - |g|_inf (ties: the earlier) and encloses the rest in a box, rounded outward;
-any other set stays as it is; the slack stays in any
-case. Contains the original. Cost O(n m + m log m), m generators. */
-void ReduceOrder(Zonotope& set, int order) noexcept;
+/** Appends the axis-aligned generators first_k e_k, then second_k e_k, those that are not zero, and reduces the order as
+Girard does, Eq. (order-reduction): a set with more than order * n generators keeps the (order - 1) * n columns of
+largest |g|_1 - |g|_inf (ties, to 45 bits: the earlier) and encloses the rest in a box, rounded outward; zero columns
+are dropped. The slack stays. The result contains the set with all generators. Cost O(n m + m^2), m generators. */
+void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept;
+
+/** The scores |g|_1 - |g|_inf of all columns, made unique: four at a time, from the sum and the largest of the columns'
+absolute values. The index takes the last bits, so that no two are equal and the earlier of equals is the larger. -1 for
+zero columns. */
+using ColumnScores = std::array<double, kMaxGenerators>;
+FOREREACH_INLINE Lanes ScoreColumns(const Lanes& sum, const Lanes& largest, std::size_t first_column) {
+  const auto index = static_cast<std::int64_t>(kMaxGenerators - first_column);
+  const LaneMask bits = (std::bit_cast<LaneMask>(sum - largest) & ~LaneMask{127, 127, 127, 127}) |
+                        LaneMask{index, index - 1, index - 2, index - 3};
+  return largest > AllLanes(0) ? std::bit_cast<Lanes>(bits) : AllLanes(-1);
+}
+
+/** The same where the scores of the set's columns are known already. */
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
+                     std::span<const double> second, int order) noexcept;
+
+/** Reduces the order only. */
+inline void ReduceOrder(Zonotope& set, int order) noexcept { AppendAndReduce(set, {}, {}, order); }
 
 }  // namespace forereach

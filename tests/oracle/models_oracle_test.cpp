@@ -6,8 +6,9 @@
 #include <tuple>
 #include <vector>
 
-#include "certifier/dynamics/dual.h"
+#include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/models.h"
+#include "certifier/dynamics/rounding.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
 
@@ -259,23 +260,28 @@ TEST(Models, RefuseStepsThatAreNotPositive) {
   EXPECT_NE(MakePointMass(0.1)->description(), MakePointMass(NextUp(0.1))->description());
 }
 
-// Expressions with hand-made derivatives, over doubles and over intervals at a point.
-template <class T>
-struct Expression {
-  const char* name;
-  Dual<T, 3> (*f)(const Dual<T, 3>&, const Dual<T, 3>&, const Dual<T, 3>&);
-};
+// Expressions with hand-made derivatives, as a model with three variables that count.
+struct Expressions {
+  static constexpr int kStates = 7, kInputs = 0;
+  static constexpr const char* kName = "expressions";
+  static constexpr std::array<const char*, kStates> kStateNames{
+      "x y / w", "sin x cos y", "tan(x y)", "-x (y - w) + 3", "x x x", "1 / (x + 2)", "cos(sin(x) y)"};
+  static constexpr std::array<const char*, 0> kInputNames{};
+  static constexpr std::array<const char*, 0> kParameterNames{};
 
-template <class T>
-const std::array<Expression<T>, 7> kExpressions{{
-    {"x y / w", [](const auto& x, const auto& y, const auto& w) { return x * y / w; }},
-    {"sin x cos y", [](const auto& x, const auto& y, const auto&) { return sin(x) * cos(y); }},
-    {"tan(x y)", [](const auto& x, const auto& y, const auto&) { return tan(x * y); }},
-    {"-x (y - w) + 3", [](const auto& x, const auto& y, const auto& w) { return -x * (y - w) + Dual<T, 3>(3); }},
-    {"x x x", [](const auto& x, const auto&, const auto&) { return x * x * x; }},
-    {"1 / (x + 2)", [](const auto& x, const auto&, const auto&) { return Dual<T, 3>(1) / (x + Dual<T, 3>(2)); }},
-    {"cos(sin(x) y)", [](const auto& x, const auto& y, const auto&) { return cos(sin(x) * y); }},
-}};
+  template <class T>
+  static constexpr void Step(std::span<const T>, std::span<const T> z, std::span<T> next) {
+    const T &x = z[0], &y = z[1], &w = z[2];
+    next[0] = x * y / w;
+    next[1] = sin(x) * cos(y);
+    next[2] = tan(x * y);
+    next[3] = -x * (y - w) + T(3);
+    next[4] = x * x * x;
+    next[5] = T(1) / (x + T(2));
+    next[6] = cos(sin(x) * y);
+  }
+  [[nodiscard]] std::array<double, 0> parameters() const { return {}; }
+};
 
 struct Derivatives {
   double gradient[3], hessian[3][3];
@@ -303,47 +309,128 @@ Derivatives ByHand(std::size_t expression, double x, double y, double w) {
   }
 }
 
-template <class T>
-Dual<T, 3> Evaluate(const Expression<T>& expression, const double (&z)[3]) {
-  return expression.f(Dual<T, 3>::Variable(T(z[0]), 0), Dual<T, 3>::Variable(T(z[1]), 1), Dual<T, 3>::Variable(T(z[2]), 2));
-}
-
-TEST(DualNumbers, AgreeWithDerivativesMadeByHand) {
+TEST(Program, DerivativesAgreeWithThoseMadeByHand) {
   Random random(507);
   SCOPED_TRACE(random.trace());
+  const EquationsModel<Expressions> model{Expressions{}};
+  const Program& program = model.program();
   for (int trial = 0; trial < 300; ++trial) {
-    const double z[3] = {random.Uniform(-1, 1), random.Uniform(-1, 1), random.Sign() * random.Uniform(0.5, 2)};
-    for (std::size_t e = 0; e < kExpressions<double>.size(); ++e) {
-      SCOPED_TRACE(kExpressions<double>[e].name);
-      const auto f = Evaluate(kExpressions<double>[e], z);
-      const auto enclosed = Evaluate(kExpressions<Interval>[e], z);
-      const Derivatives expected = ByHand(e, z[0], z[1], z[2]);
+    const std::array<double, 7> z{random.Uniform(-1, 1), random.Uniform(-1, 1), random.Sign() * random.Uniform(0.5, 2)};
+    std::vector<PlainInterval> ranges;
+    std::vector<Interval> intervals;
+    for (const double x : z) ranges.push_back({x, x}), intervals.emplace_back(x);
+    Expansion plain;
+    model.Expand(z, ranges, plain);
+    Linearization linearization;
+    model.Linearize(z, linearization);
+    HessianEnclosure hessian;
+    model.EncloseHessian(intervals, hessian);
+    std::map<std::pair<int, int>, int> first;
+    std::map<std::tuple<int, int, int>, int> second;
+    for (int e = 0; e < program.num_first; ++e) first[{program.jacobian[e].row, program.jacobian[e].column}] = e;
+    for (int e = 0; e < program.num_second; ++e)
+      second[{program.hessian[e].output, program.hessian[e].row, program.hessian[e].column}] = e;
+    for (std::size_t f = 0; f < 7; ++f) {
+      SCOPED_TRACE(Expressions::kStateNames[f]);
+      const int output = static_cast<int>(f);
+      const Derivatives expected = ByHand(f, z[0], z[1], z[2]);
       for (int i = 0; i < 3; ++i) {
-        ASSERT_NEAR(f.HasGradient(i) ? f.gradient(i) : 0, expected.gradient[i], 1e-13);
-        ASSERT_EQ(f.HasGradient(i), enclosed.HasGradient(i));
-        if (f.HasGradient(i)) {
-          ASSERT_NEAR(enclosed.gradient(i).Middle(), expected.gradient[i], 1e-13);
+        const auto entry = first.find({output, i});
+        ASSERT_NEAR(entry == first.end() ? 0 : plain.jacobian[entry->second], expected.gradient[i], 1e-13);
+        if (entry != first.end()) {
+          ASSERT_NEAR(linearization.entries[entry->second].value.Middle(), expected.gradient[i], 1e-13);
         }
-        for (int j = 0; j < 3; ++j) {
-          ASSERT_NEAR(f.HasHessian(i, j) ? f.hessian(i, j) : 0, expected.hessian[i][j], 1e-12) << i << ", " << j;
-          if (enclosed.HasHessian(i, j)) {
-            ASSERT_NEAR(enclosed.hessian(i, j).Middle(), expected.hessian[i][j], 1e-12);
-          }
+        for (int j = i; j < 3; ++j) {
+          const auto place = second.find({output, i, j});
+          ASSERT_NEAR(place == second.end() ? 0 : plain.hessian[place->second].lower, expected.hessian[i][j], 1e-12) << i << j;
+          if (place == second.end()) continue;
+          ASSERT_NEAR(plain.hessian[place->second].upper, expected.hessian[i][j], 1e-12);
+          ASSERT_NEAR(hessian.entries[place->second].second_derivative.Middle(), expected.hessian[i][j], 1e-12);
         }
       }
     }
   }
 }
 
-TEST(DualNumbers, AffineExpressionsHaveNoSecondDerivatives) {
-  using D = Dual<double, 3>;
-  const D x = D::Variable(1, 0), y = D::Variable(2, 1);
-  const D affine = D(2) * x - y / D(3) + x * D(0.5) - D(7);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) EXPECT_FALSE(affine.HasHessian(i, j));
-  EXPECT_TRUE(affine.HasGradient(0) && affine.HasGradient(1));
-  EXPECT_FALSE(affine.HasGradient(2));
-  EXPECT_TRUE((x * y).HasHessian(0, 1));
+// The domain of a random task, wide or narrow, and a box inside it around a center.
+struct DomainCase {
+  std::vector<Interval> domain, box;
+  std::vector<PlainInterval> ranges;
+  Eigen::VectorXd center;
+
+  DomainCase(Random& random, int size) : center(size) {
+    for (int l = 0; l < size; ++l) {
+      const double reach = (l == kV ? 20 : l == kDelta ? 1.3 : 1.5) * std::ldexp(1, -random.Integer(0, 20));
+      const double middle = random.Uniform(-1, 1) * (l == kDelta ? 0.1 : 1);
+      domain.emplace_back(middle - reach, middle + reach);
+      double a = random.Uniform(middle - reach, middle + reach), b = random.Uniform(middle - reach, middle + reach);
+      if (random.Coin()) b = a + (b - a) * std::ldexp(1, -random.Integer(0, 50));
+      if (random.Coin(0.1)) b = a;
+      const double half = std::abs(b - a) / 2;
+      center[l] = std::clamp((a + b) / 2, middle - reach, middle + reach);
+      const double lower = std::max(center[l] - half, middle - reach), upper = std::min(center[l] + half, middle + reach);
+      box.emplace_back(lower, upper);
+      ranges.push_back({lower, upper});
+    }
+  }
+};
+
+TEST_P(Model, ExpansionErrorBoundsThePlainEvaluation) {
+  Random random(508);
+  SCOPED_TRACE(random.trace());
+  const Program& program = model().program();
+  for (int trial = 0; trial < 3000; ++trial) {
+    const DomainCase c(random, model().num_variables());
+    const ExpansionError error = BoundExpansionError(program, model().parameters(), c.domain);
+    Expansion plain;
+    model().Expand(View(c.center), c.ranges, plain);
+    const Formulas at_center = At(GetParam(), c.center);
+    for (std::size_t k = 0; k < at_center.value.size(); ++k) {
+      ASSERT_LT(error.value[k], 1e-9);
+      ASSERT_TRUE(Inside(at_center.value[k], Interval(plain.value[k]) + Interval(-error.value[k], error.value[k])));
+    }
+    for (int e = 0; e < program.num_first; ++e) {
+      const auto entry = at_center.jacobian.find({program.jacobian[e].row, program.jacobian[e].column});
+      const Real exact = entry == at_center.jacobian.end() ? Real(0) : entry->second;
+      ASSERT_TRUE(Inside(exact, Interval(plain.jacobian[e]) + Interval(-error.jacobian[e], error.jacobian[e])));
+    }
+    for (int sample = 0; sample < 4; ++sample) {
+      const Formulas inside = GetParam().formulas(PointIn(random, c.box));
+      for (int e = 0; e < program.num_second; ++e) {
+        const auto entry = inside.hessian.find({program.hessian[e].output, program.hessian[e].row, program.hessian[e].column});
+        const Real exact = entry == inside.hessian.end() ? Real(0) : entry->second;
+        const Interval range(plain.hessian[e].lower, plain.hessian[e].upper);
+        ASSERT_TRUE(Inside(exact, range + Interval(-error.hessian[e], error.hessian[e]))) << "entry " << e;
+      }
+    }
+  }
+}
+
+// The plain ranges are no looser than interval arithmetic's, which are the true ones where each variable occurs once.
+TEST_P(Model, ExpansionRangesAreTight) {
+  Random random(509);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 2000; ++trial) {
+    const DomainCase c(random, model().num_variables());
+    Expansion plain;
+    model().Expand(View(c.center), c.ranges, plain);
+    HessianEnclosure hessian;
+    model().EncloseHessian(c.box, hessian);
+    for (int e = 0; e < hessian.count; ++e) {
+      const Interval& tight = hessian.entries[e].second_derivative;
+      const double slack = 1e-10 * (1 + tight.Magnitude());
+      ASSERT_GE(plain.hessian[e].lower, tight.lower - slack);
+      ASSERT_LE(plain.hessian[e].upper, tight.upper + slack);
+    }
+  }
+}
+
+TEST(ExpansionError, IsInfiniteWhereTheDomainHoldsAPole) {
+  const auto model = MakeKinematicBicycle(kDt, kWheelbase);
+  std::vector<Interval> domain(8, Interval(-1, 1));
+  EXPECT_LT(BoundExpansionError(model->program(), model->parameters(), domain).value[kTheta], 1e-12);
+  domain[kDelta] = Interval(0, 2);
+  EXPECT_EQ(BoundExpansionError(model->program(), model->parameters(), domain).value[kTheta], kInfinity);
 }
 
 }  // namespace

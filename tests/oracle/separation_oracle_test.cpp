@@ -14,6 +14,15 @@
 namespace forereach {
 namespace {
 
+Separation SeparateByHulls(const Zonotope& slice, const Obstacle& obstacle) {
+  Hull hull{};
+  for (int k = 0; k < slice.dim(); ++k) {
+    hull.center[static_cast<std::size_t>(k)] = slice.center(k);
+    hull.half_width[static_cast<std::size_t>(k)] = slice.HalfWidthUpper(k);
+  }
+  return SeparateHulls(hull, obstacle);
+}
+
 using exact::Rational;
 
 struct Point {
@@ -77,7 +86,7 @@ Rational SquaredDistance(const Zonotope& slice, const Obstacle& obstacle) {
 
 void ExpectSoundAndExact(const Zonotope& slice, const Obstacle& obstacle) {
   const Rational square = SquaredDistance(slice, obstacle), radius(obstacle.radius());
-  const Separation best = Separate(slice, obstacle), quick = SeparateQuickly(slice, obstacle);
+  const Separation best = Separate(slice, obstacle), quick = SeparateByHulls(slice, obstacle);
   ASSERT_EQ(best.threshold, obstacle.radius());
   for (const Separation& s : {best, quick}) {
     if (s.distance > 0) {
@@ -152,7 +161,7 @@ TEST(PlanarSeparation, HoldsFarFromTheOriginAndAtEveryScale) {
     const Obstacle obstacle = random.Coin() ? Obstacle::Circle(center, random.Uniform(0, scale))
                                             : Obstacle::AxisBox(center, center + random.Vector(2, scale).cwiseAbs());
     const Rational square = SquaredDistance(slice, obstacle), radius(obstacle.radius());
-    for (const Separation& s : {Separate(slice, obstacle), SeparateQuickly(slice, obstacle)}) {
+    for (const Separation& s : {Separate(slice, obstacle), SeparateByHulls(slice, obstacle)}) {
       if (s.distance > 0) {
         ASSERT_LE(Rational(s.distance) * Rational(s.distance), square);
       }
@@ -173,7 +182,7 @@ TEST(PlanarSeparation, AnyDoublesAreNeverWronglyProven) {
     const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any), Eigen::MatrixXd::NullaryExpr(2, random.Integer(0, 3), any));
     const Eigen::VectorXd point = Eigen::VectorXd::NullaryExpr(2, any);
     const Obstacle obstacle = random.Coin() ? Obstacle::Circle(point, std::abs(random.Double())) : Obstacle::AxisBox(point, point);
-    for (const Separation& s : {Separate(slice, obstacle), SeparateQuickly(slice, obstacle)}) {
+    for (const Separation& s : {Separate(slice, obstacle), SeparateByHulls(slice, obstacle)}) {
       if (!s.IsProven()) continue;
       ASSERT_LE(Rational(s.distance) * Rational(s.distance), SquaredDistance(slice, obstacle));
     }
@@ -287,7 +296,7 @@ TEST(SpatialSeparation, OfBoxesIsDecidedExactly) {
     const Eigen::VectorXd size = Eigen::VectorXd::NullaryExpr(3, entry).cwiseAbs();
     const Obstacle box = Obstacle::AxisBox(lower, lower + size);
     const double gap = WidestSpatialGap(slice, box);
-    for (const Separation& s : {Separate(slice, box), SeparateQuickly(slice, box)}) {
+    for (const Separation& s : {Separate(slice, box), SeparateByHulls(slice, box)}) {
       if (s.IsProven()) {
         ASSERT_GT(gap, 0) << "proven, though they meet or touch";
       }
@@ -336,7 +345,7 @@ TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
     const Rational gap = Rational(offset) - exact::Support(slice, View(normal));
     Rational square = 0;
     for (const double entry : normal) square += Rational(entry) * Rational(entry);
-    for (const Separation& s : {Separate(slice, Obstacle::HalfSpace(normal, offset)), SeparateQuickly(slice, Obstacle::HalfSpace(normal, offset))}) {
+    for (const Separation& s : {Separate(slice, Obstacle::HalfSpace(normal, offset)), SeparateByHulls(slice, Obstacle::HalfSpace(normal, offset))}) {
       ASSERT_EQ(s.threshold, 0);
       if (s.IsProven()) {
         ASSERT_LE(Rational(s.distance) * Rational(s.distance) * square, gap * gap);

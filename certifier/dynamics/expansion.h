@@ -1,0 +1,188 @@
+/** The nominal model around a point, in plain arithmetic: what the certify step evaluates. rounding.h bounds, once and
+for the whole domain, how far each number can lie from the exact one. */
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "certifier/dynamics/program.h"
+
+namespace forereach {
+
+/** An interval whose ends were rounded to nearest. */
+struct PlainInterval {
+  double lower, upper;
+};
+
+/** f0(c), D_z f0(c), and the ranges of the second derivatives over a box, in the order of the model's pattern. */
+struct Expansion {
+  std::array<double, kMaxStates> value;
+  std::array<double, Program::kMaxFirst> jacobian;
+  std::array<PlainInterval, Program::kMaxSecond> hessian;
+};
+
+namespace internal {
+
+inline PlainInterval operator+(PlainInterval a, PlainInterval b) { return {a.lower + b.lower, a.upper + b.upper}; }
+inline PlainInterval operator-(PlainInterval a) { return {-a.upper, -a.lower}; }
+inline PlainInterval operator-(PlainInterval a, PlainInterval b) { return {a.lower - b.upper, a.upper - b.lower}; }
+inline PlainInterval Scaled(double a, PlainInterval b) {
+  const double p = a * b.lower, q = a * b.upper;
+  return {std::min(p, q), std::max(p, q)};
+}
+inline PlainInterval operator*(PlainInterval a, PlainInterval b) {
+  const double p = a.lower * b.lower, q = a.lower * b.upper, r = a.upper * b.lower, s = a.upper * b.upper;
+  return {std::min(std::min(p, q), std::min(r, s)), std::max(std::max(p, q), std::max(r, s))};
+}
+inline PlainInterval Divide(PlainInterval a, PlainInterval b) { return a * PlainInterval{1 / b.upper, 1 / b.lower}; }  // b does not contain 0
+inline PlainInterval Square(PlainInterval a) {
+  const double p = a.lower * a.lower, q = a.upper * a.upper;
+  const bool has_zero = a.lower <= 0 && a.upper >= 0;
+  return {has_zero ? 0 : std::min(p, q), std::max(p, q)};
+}
+inline PlainInterval TanCurvature(PlainInterval t) {
+  return {2 * t.lower * (1 + t.lower * t.lower), 2 * t.upper * (1 + t.upper * t.upper)};
+}
+
+/** Sine and cosine of a small angle: the first term that Taylor's polynomials leave out is below 2^-53 up to 1/4. */
+struct Turn {
+  double sine, cosine;
+
+  explicit Turn(double angle) {
+    if (!(angle <= 0.25)) {
+      sine = std::sin(angle);
+      cosine = std::cos(angle);
+      return;
+    }
+    const double s = angle * angle;
+    sine = angle - angle * s * (1. / 6 - s * (1. / 120 - s * (1. / 5040 - s * (1. / 362880 - s * (1. / 39916800)))));
+    cosine = 1 - s * (1. / 2 - s * (1. / 24 - s * (1. / 720 - s * (1. / 40320 - s * (1. / 3628800)))));
+  }
+};
+
+/** The turns from a center c to the ends of an interval around it. */
+struct Turns {
+  Turn below{0}, above{0};
+  bool wide = false;  // too wide to tell by the slopes at its ends whether a sine is monotone on it
+
+  Turns() = default;
+  Turns(double center, PlainInterval x)
+      : below(center - x.lower), above(x.upper - center), wide(!(x.upper - x.lower <= 3)) {}
+};
+
+/** Sine and cosine at both ends by the addition theorems. Where the slope changes its sign an extremum may lie inside. */
+struct Wave {
+  double first_sine, last_sine, first_cosine, last_cosine;
+  bool wide;
+
+  Wave(double sine, double cosine, const Turns& turns)
+      : first_sine(sine * turns.below.cosine - cosine * turns.below.sine),
+        last_sine(sine * turns.above.cosine + cosine * turns.above.sine),
+        first_cosine(cosine * turns.below.cosine + sine * turns.below.sine),
+        last_cosine(cosine * turns.above.cosine - sine * turns.above.sine),
+        wide(turns.wide) {}
+
+  [[nodiscard]] PlainInterval SineRange() const { return Spanned(first_sine, last_sine, first_cosine, last_cosine); }
+  [[nodiscard]] PlainInterval CosineRange() const { return Spanned(first_cosine, last_cosine, -first_sine, -last_sine); }
+
+ private:
+  [[nodiscard]] PlainInterval Spanned(double first, double last, double first_slope, double last_slope) const {
+    return {wide || (first_slope <= 0 && last_slope >= 0) ? -1 : std::min(first, last),
+            wide || (first_slope >= 0 && last_slope <= 0) ? 1 : std::max(first, last)};
+  }
+};
+
+/** Tangent over [c - below, c + above], which holds no pole. */
+inline PlainInterval TanRange(double tangent, const Turns& turns) {
+  const double down = turns.below.sine / turns.below.cosine, up = turns.above.sine / turns.above.cosine;
+  return {(tangent - down) / (1 + tangent * down), (tangent + up) / (1 - tangent * up)};
+}
+
+template <const Program& kProgram, std::size_t I>
+inline void EvaluateAtPoint(const double* parameters, const double* z, double* v) {
+  if constexpr (kProgram.at_point[I]) {
+    constexpr Operation n = kProgram.nodes[I];
+    if constexpr (n.op == Op::kVariable) v[I] = z[n.a];
+    if constexpr (n.op == Op::kParameter) v[I] = parameters[n.a];
+    if constexpr (n.op == Op::kConstant) v[I] = n.constant;
+    if constexpr (n.op == Op::kAdd) v[I] = v[n.a] + v[n.b];
+    if constexpr (n.op == Op::kSubtract) v[I] = v[n.a] - v[n.b];
+    if constexpr (n.op == Op::kMultiply) v[I] = v[n.a] * v[n.b];
+    if constexpr (n.op == Op::kDivide) v[I] = v[n.a] / v[n.b];
+    if constexpr (n.op == Op::kNegate) v[I] = -v[n.a];
+    if constexpr (n.op == Op::kSquare) v[I] = v[n.a] * v[n.a];
+    if constexpr (n.op == Op::kSin) v[I] = std::sin(v[n.a]);
+    if constexpr (n.op == Op::kCos) v[I] = std::cos(v[n.a]);
+    if constexpr (n.op == Op::kTan) v[I] = v[n.b] / v[n.b + 1];
+    static_assert(n.op != Op::kTanCurvature, "a second derivative in the Jacobian");
+  }
+}
+
+/** Whether the node is the same number over the whole box. */
+template <const Program& kProgram>
+constexpr bool IsNumber(int i) {
+  return kProgram.node(i).op == Op::kParameter || kProgram.node(i).op == Op::kConstant;
+}
+
+template <const Program& kProgram, std::size_t I>
+inline void EvaluateOverBox(const double* parameters, const PlainInterval* box, const double* v, PlainInterval* w) {
+  constexpr Operation n = kProgram.nodes[I];
+  // Sine and cosine of one argument share their ends: the first of them that is needed sets both.
+  constexpr bool kSecondOfPair = n.op == Op::kCos && kProgram.over_box[static_cast<std::size_t>(n.b < 0 ? 0 : n.b)];
+  if constexpr (kProgram.over_box[I] && !kSecondOfPair) {
+    if constexpr (n.op == Op::kVariable) w[I] = box[n.a];
+    if constexpr (n.op == Op::kParameter) w[I] = {parameters[n.a], parameters[n.a]};
+    if constexpr (n.op == Op::kConstant) w[I] = {n.constant, n.constant};
+    if constexpr (n.op == Op::kAdd) w[I] = w[n.a] + w[n.b];
+    if constexpr (n.op == Op::kSubtract) w[I] = w[n.a] - w[n.b];
+    if constexpr (n.op == Op::kMultiply) {
+      if constexpr (IsNumber<kProgram>(n.a))
+        w[I] = Scaled(w[n.a].lower, w[n.b]);
+      else if constexpr (IsNumber<kProgram>(n.b))
+        w[I] = Scaled(w[n.b].lower, w[n.a]);
+      else
+        w[I] = w[n.a] * w[n.b];
+    }
+    if constexpr (n.op == Op::kDivide) w[I] = Divide(w[n.a], w[n.b]);
+    if constexpr (n.op == Op::kNegate) w[I] = -w[n.a];
+    if constexpr (n.op == Op::kSquare) w[I] = Square(w[n.a]);
+    if constexpr (n.op == Op::kTanCurvature) w[I] = TanCurvature(w[n.a]);
+    if constexpr (n.op == Op::kSin) {
+      const Wave wave(v[I], v[I + 1], Turns(v[n.a], w[n.a]));
+      w[I] = wave.SineRange();
+      w[I + 1] = wave.CosineRange();
+    }
+    if constexpr (n.op == Op::kCos) w[I] = Wave(v[I - 1], v[I], Turns(v[n.a], w[n.a])).CosineRange();
+    if constexpr (n.op == Op::kTan) w[I] = TanRange(v[I], Turns(v[n.a], w[n.a]));
+  }
+}
+
+template <const Program& kProgram, std::size_t... I>
+inline void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out,
+                   std::index_sequence<I...>) {
+  std::array<double, sizeof...(I)> v;
+  std::array<PlainInterval, sizeof...(I)> w;
+  (EvaluateAtPoint<kProgram, I>(parameters, z, v.data()), ...);
+  (EvaluateOverBox<kProgram, I>(parameters, box, v.data(), w.data()), ...);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(kProgram.states); ++k)
+    out.value[k] = v[static_cast<std::size_t>(kProgram.value[k])];
+  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e)
+    out.jacobian[e] = v[static_cast<std::size_t>(kProgram.jacobian[e].node)];
+  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_second); ++e)
+    out.hessian[e] = w[static_cast<std::size_t>(kProgram.hessian[e].node)];
+}
+
+}  // namespace internal
+
+/** @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4. */
+template <const Program& kProgram>
+inline void Expand(std::span<const double> parameters, std::span<const double> z, std::span<const PlainInterval> box,
+                   Expansion& out) noexcept {
+  internal::Expand<kProgram>(parameters.data(), z.data(), box.data(), out,
+                             std::make_index_sequence<static_cast<std::size_t>(kProgram.size)>());
+}
+
+}  // namespace forereach

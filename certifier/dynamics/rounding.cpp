@@ -1,0 +1,124 @@
+#include "certifier/dynamics/rounding.h"
+
+#include <cmath>
+#include <limits>
+
+#include "certifier/dynamics/evaluate.h"
+
+namespace forereach {
+namespace {
+
+constexpr double kHalfUlp = kUnitRoundoff, kTiny = 0x1p-1070;
+
+// One rounding of a result of this size, twice over: the size is that of the exact value.
+double Rounding(double size) { return AddUp(MulUp(size, 2 * kHalfUlp), kTiny); }
+
+// Error bounds of one node, at a point and over a box.
+struct Error {
+  double point = 0, box = 0;
+
+  template <class Bound>
+  static Error Both(const Error& a, const Error& b, Bound bound) {
+    return {bound(a.point, b.point), bound(a.box, b.box)};
+  }
+};
+
+class Analysis {
+ public:
+  Analysis(const Program& program, std::span<const double> parameters, std::span<const Interval> domain)
+      : program_(program) {
+    std::array<bool, Program::kMaxOperations> all;
+    all.fill(true);
+    Evaluate<Interval>(program, all, parameters, domain, range_);
+    for (int i = 0; i < program.size; ++i) error_[static_cast<std::size_t>(i)] = ErrorOf(program.node(i));
+  }
+
+  [[nodiscard]] const Error& error(int node) const { return error_[static_cast<std::size_t>(node)]; }
+
+ private:
+  [[nodiscard]] double Size(int node) const { return range_[static_cast<std::size_t>(node)].Magnitude(); }
+
+  [[nodiscard]] Error ErrorOf(const Operation& n) const {
+    const double infinity = kInfinity;
+    switch (n.op) {
+      case Op::kVariable:  // the ends of a hull, center +- half-width, are rounded
+        return {0, Rounding(range_[static_cast<std::size_t>(n.a)].Magnitude())};
+      case Op::kParameter:
+      case Op::kConstant:
+        return {};
+      case Op::kNegate:
+        return error(n.a);
+      case Op::kAdd:
+      case Op::kSubtract: {
+        const double rounding = Rounding(AddUp(Size(n.a), Size(n.b)));
+        return Error::Both(error(n.a), error(n.b), [&](double a, double b) { return AddUp(AddUp(a, b), rounding); });
+      }
+      case Op::kMultiply:
+        return Error::Both(error(n.a), error(n.b), [&](double a, double b) { return Product(Size(n.a), a, Size(n.b), b); });
+      case Op::kSquare:
+        return Error::Both(error(n.a), error(n.a), [&](double a, double b) { return Product(Size(n.a), a, Size(n.a), b); });
+      case Op::kDivide:
+        return Error::Both(error(n.a), error(n.b), [&](double a, double b) { return Quotient(n.a, a, n.b, b); });
+      case Op::kSin:
+      case Op::kCos: {
+        // Both are 1-Lipschitz; the C library's are within an ulp; a range takes some ten operations on numbers <= 1
+        // and the width of its argument.
+        if (!(Size(n.a) <= 0x1p20)) return {infinity, infinity};
+        return {AddUp(error(n.a).point, 0x1p-50), AddUp(AddUp(error(n.a).box, Rounding(4 * Size(n.a))), 0x1p-46)};
+      }
+      case Op::kTan: {
+        const double t = range_[static_cast<std::size_t>(&n - program_.nodes.data())].Magnitude();
+        if (!(Size(n.a) <= 0x1p20 && t < 0x1p10)) return {infinity, infinity};
+        // Slope 1 + t^2. Sine over cosine, the latter at least 1 / sqrt(1 + t^2); over a box a quotient whose
+        // denominator is as large, of numbers of size (1 + t)^2.
+        const double slope = AddUp(1, MulUp(t, t)), wide = MulUp(MulUp(1 + t, 1 + t), MulUp(slope, 4));
+        const double turns = AddUp(error(n.a).box, Rounding(4 * Size(n.a)));
+        return {AddUp(MulUp(MulUp(2, slope), error(n.a).point), MulUp(wide, 0x1p-50)),
+                AddUp(MulUp(wide, turns), MulUp(wide, 0x1p-44))};
+      }
+      case Op::kTanCurvature: {  // slope 2 + 6 t^2
+        const double t = AddUp(Size(n.a), error(n.a).box), slope = AddUp(2, MulUp(6, MulUp(t, t)));
+        return {infinity, AddUp(MulUp(slope, error(n.a).box), Rounding(MulUp(4 * t, slope)))};
+      }
+    }
+    return {infinity, infinity};
+  }
+
+  static double Product(double size_a, double a, double size_b, double b) {
+    const double across = AddUp(AddUp(MulUp(size_a, b), MulUp(size_b, a)), MulUp(a, b));
+    return AddUp(across, Rounding(MulUp(AddUp(size_a, a), AddUp(size_b, b))));
+  }
+
+  // |a~ / b~ - a / b| <= (a + |a / b| b) / |b~|, with the plain quotient made of two roundings.
+  [[nodiscard]] double Quotient(int numerator, double a, int denominator, double b) const {
+    const Interval& divisor = range_[static_cast<std::size_t>(denominator)];
+    if (divisor.Contains(0)) return kInfinity;
+    const double smallest = SubDown(std::min(std::abs(divisor.lower), std::abs(divisor.upper)), b);
+    if (!(smallest > 0)) return kInfinity;
+    const double quotient = DivUp(AddUp(Size(numerator), a), smallest);
+    return AddUp(AddUp(DivUp(a, smallest), DivUp(MulUp(quotient, b), smallest)), Rounding(MulUp(4, quotient)));
+  }
+
+  const Program& program_;
+  NodeValues<Interval> range_;
+  std::array<Error, Program::kMaxOperations> error_;
+};
+
+double FiniteOrInfinity(double error) { return error < kInfinity ? error : kInfinity; }
+
+}  // namespace
+
+ExpansionError BoundExpansionError(const Program& program, std::span<const double> parameters,
+                                   std::span<const Interval> domain) {
+  const Analysis analysis(program, parameters, domain);
+  ExpansionError error;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(program.states); ++k)
+    error.value[k] = FiniteOrInfinity(analysis.error(program.value[k]).point);
+  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e)
+    error.jacobian[e] = FiniteOrInfinity(analysis.error(program.jacobian[e].node).point);
+  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e)
+    error.hessian[e] = FiniteOrInfinity(analysis.error(program.hessian[e].node).box);
+  return error;
+}
+
+}  // namespace forereach

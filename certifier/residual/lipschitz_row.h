@@ -1,0 +1,81 @@
+/** Row k of the declaration as a distance between locations: d_k(z, z') = sum_l L_kl |z_l - z'_l|, over the columns l
+with L_kl > 0.
+
+A row with one to three columns is an infinity norm in coordinates of its own, one for each sign pattern s (last sign +):
+alpha^s = sum_l s_l L_kl z_l and d_k(z, z') = max_s |alpha^s - alpha'^s|. Any other is a 1-norm in the coordinates
+L_kl z_l. A row without columns declares a constant: no coordinates, d_k = 0. */
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "certifier/numerics/directed.h"
+#include "certifier/residual/declaration.h"
+
+namespace forereach {
+
+class LipschitzRow final {
+ public:
+  static constexpr std::size_t kMaxPatternColumns = 3;
+
+  struct Column {
+    int variable;  // index into z
+    double slope;  // L_kl > 0
+  };
+
+  LipschitzRow(const Declaration& declaration, int coordinate);
+
+  [[nodiscard]] const std::vector<Column>& columns() const { return columns_; }
+  [[nodiscard]] bool is_constant() const { return columns_.empty(); }
+  [[nodiscard]] bool has_patterns() const { return !is_constant() && columns_.size() <= kMaxPatternColumns; }
+  /** Coordinates a location has in this row: 2^(a-1), a or none, for a columns. */
+  [[nodiscard]] std::size_t num_coordinates() const {
+    return has_patterns() ? std::size_t{1} << (columns_.size() - 1) : columns_.size();
+  }
+
+  /** Coordinates of the location z, entries by z(l), in plain arithmetic: a product and up to a - 1 sums each. */
+  template <class Location>
+  void Map(const Location& z, double* coordinates) const {
+    if (!has_patterns()) {
+      for (const Column& column : columns_) *coordinates++ = column.slope * z(column.variable);
+      return;
+    }
+    for (std::size_t s = 0; s < num_coordinates(); ++s) {
+      double sum = 0;
+      for (std::size_t l = 0; l < columns_.size(); ++l) {
+        const double term = columns_[l].slope * z(columns_[l].variable);
+        sum = IsNegative(s, l) ? sum - term : sum + term;
+      }
+      coordinates[s] = sum;
+    }
+  }
+
+  /** Whether sign pattern s has -1 at column l. */
+  [[nodiscard]] static constexpr bool IsNegative(std::size_t s, std::size_t l) { return s >> l & 1; }
+
+  /** sum_l L_kl magnitude[l], rounded up. */
+  template <class Magnitude>
+  [[nodiscard]] double WeightedUpper(const Magnitude& magnitude) const;
+
+ private:
+  std::vector<Column> columns_;
+};
+
+template <class Magnitude>
+double LipschitzRow::WeightedUpper(const Magnitude& magnitude) const {
+  double sum = 0;
+  for (const Column& column : columns_) sum = AddUp(sum, MulUp(column.slope, magnitude[column.variable]));
+  return sum;
+}
+
+/** What plain arithmetic may be off by, in any order: an upper bound on |computed - exact| for an expression of sums,
+products of two, |.|, max and min in which each leaf passes at most `roundings` roundings and the magnitudes of all
+leaves add up to `magnitude` at most, with `products` products that may underflow. Each leaf is exact up to a factor
+within 1 +- gamma_roundings, gamma_p = p u / (1 - p u) <= 2 p u, and |.|, max and min pass an error on undiminished at most. */
+[[nodiscard]] inline double PlainErrorUpper(double magnitude, int roundings, int products) noexcept {
+  return AddUp(MulUp(magnitude, 2.0 * roundings * kUnitRoundoff), products * std::numeric_limits<double>::denorm_min());
+}
+
+}  // namespace forereach

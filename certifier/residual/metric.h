@@ -1,0 +1,298 @@
+/** The distances D_i of the envelope, eight observations at a time, for the search over an ObservationIndex.
+
+A metric gives D_i - common() for the observations of a block, and for the children of a node an upper bound on
+value_i - (D_i - common()) over the observations below, one side at a time; `common` is the part that no observation
+changes. All plain arithmetic; the bounds are raised by what it may be off by, so that they are never below what is
+computed for an observation. For the inside of
+lipschitz_envelope.cpp only: every function is to be inlined into an entry point for one instruction set. */
+#pragma once
+
+#include <bit>
+#include <span>
+
+#include "certifier/residual/enclosure.h"
+#include "certifier/residual/lipschitz_row.h"
+#include "certifier/numerics/simd.h"
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace forereach::internal {
+
+using simd::kLanes;
+using simd::Pack;
+using simd::Same;
+
+inline constexpr std::size_t kMaxChunks = kMaxGenerators / kLanes;
+static_assert(kMaxGenerators % kLanes == 0, "the last eight of a row can be read");
+alignas(64) inline constexpr std::array<double, kMaxGenerators> kNoGenerators{};
+
+/** One variable of Z_t = <c, G> + [-s, s] x {u}: an input has neither generators nor slack. */
+struct Variable {
+  double center, slack, half_width;
+  const double* generators;
+
+  Variable(const QuerySet& set, int l) {
+    const int n = set.slice.dim();
+    const bool is_state = l < n;
+    center = is_state ? set.slice.center(l) : set.input[static_cast<std::size_t>(l - n)];
+    slack = is_state ? set.slice.slack(l) : 0;
+    half_width = is_state ? set.half_width[static_cast<std::size_t>(l)] : 0;
+    generators = is_state ? set.slice.row(l).data() : kNoGenerators.data();
+  }
+};
+
+/** Eight generators of a row at a time; those after the last are zero. */
+class Chunks {
+ public:
+  explicit Chunks(const Zonotope& slice) : generators_(static_cast<std::size_t>(slice.num_generators())) {}
+  [[nodiscard]] std::size_t size() const { return (generators_ + kLanes - 1) / kLanes; }
+  [[nodiscard]] Pack Get(const double* row, std::size_t chunk) const {
+    const std::size_t first = chunk * kLanes;
+    return first + kLanes <= generators_ ? simd::Load(row + first) : simd::LoadFirst(row + first, generators_ - first);
+  }
+
+ private:
+  std::size_t generators_;
+};
+
+/** How far x is from each of eight intervals. */
+inline Pack Gap(const Pack& lowest, const Pack& highest, const Pack& x) {
+  return Max(Max(lowest - x, x - highest), simd::Fill(0));
+}
+
+/** Rows with one to three columns: D_i = max_s (|A_s - alpha_is| + w_s), A_s = sum_l s_l L_kl c_l and
+w_s = sum_j |sum_l s_l L_kl G_lj| + sum_l L_kl s_l, common = w_0. */
+template <std::size_t kColumns>
+class PatternMetric {
+ public:
+  static constexpr bool kRefines = false;
+
+  /** @param margin not below twice the error of plain arithmetic in this row. */
+  PatternMetric(const LipschitzRow& row, const QuerySet& set, double margin) {
+    std::array<double, kColumns> weighted;
+    std::array<Same, kColumns> slope;
+    std::array<const double*, kColumns> generators;
+    double slack = 0;
+    for (std::size_t l = 0; l < kColumns; ++l) {
+      const LipschitzRow::Column& column = row.columns()[l];
+      const Variable variable(set, column.variable);
+      weighted[l] = column.slope * variable.center;
+      slack += column.slope * variable.slack;
+      slope[l] = simd::Fill(column.slope);
+      generators[l] = variable.generators;
+    }
+    std::array<Pack, kPatterns> spread;
+    spread.fill(simd::Fill(0));
+    const Chunks chunks(set.slice);
+    for (std::size_t j = 0; j < chunks.size(); ++j) {
+      std::array<Pack, kColumns> term;
+      for (std::size_t l = 0; l < kColumns; ++l) term[l] = slope[l] * chunks.Get(generators[l], j);
+      for (std::size_t s = 0; s < kPatterns; ++s) spread[s] = spread[s] + Abs(Signed(s, term));
+    }
+    common_ = SumLanes(spread[0]) + slack;
+    double farthest = 0;
+    for (std::size_t s = 0; s < kPatterns; ++s) {
+      const double center = Signed(s, weighted), extra = SumLanes(spread[s]) + slack - common_;
+      center_[s] = simd::Fill(center);
+      extra_[s] = simd::Fill(extra);
+      from_below_[s] = simd::Fill(center - extra + margin);
+      from_above_[s] = simd::Fill(-center - extra + margin);
+      farthest = simd::Max(farthest, extra);
+    }
+    anywhere_ = simd::Fill(margin - farthest);
+  }
+
+  [[nodiscard]] double common() const { return common_; }
+
+  [[nodiscard]] Pack Block(const Pack* block) const {
+    Pack distance = Abs(center_[0] - simd::Load(block[0]));
+    for (std::size_t s = 1; s < kPatterns; ++s)
+      distance = Max(distance, Abs(center_[s] - simd::Load(block[s])) + extra_[s]);
+    return distance;
+  }
+
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
+    node += side * (2 * kPatterns + 1);
+    Pack bound = simd::Load(node[2 * kPatterns]) + anywhere_;
+    for (std::size_t s = 0; s < kPatterns; ++s)
+      bound = Min(bound, Min(simd::Load(node[2 * s]) + from_below_[s],
+                             simd::Load(node[2 * s + 1]) + from_above_[s]));
+    return bound;
+  }
+
+ private:
+  static constexpr std::size_t kPatterns = std::size_t{1} << (kColumns - 1);
+
+  template <class T>
+  static T Signed(std::size_t s, const std::array<T, kColumns>& terms) {
+    T sum = terms[kColumns - 1];
+    for (std::size_t l = 0; l + 1 < kColumns; ++l) sum = LipschitzRow::IsNegative(s, l) ? sum - terms[l] : sum + terms[l];
+    return sum;
+  }
+
+  double common_;
+  std::array<Same, kPatterns> center_, extra_;           // A_s, w_s - w_0
+  std::array<Same, kPatterns> from_below_, from_above_;  // A_s - extra_s and -A_s - extra_s, plus the margin
+  Same anywhere_;                                        // the margin - max_s extra_s
+};
+
+/** d_i = sum_l L_kl |c_l - z_il| in any number of columns. */
+class CenterDistance {
+ public:
+  CenterDistance(const LipschitzRow& row, const QuerySet& set) : columns_(row.columns().size()) {
+    for (std::size_t l = 0; l < columns_; ++l) {
+      const LipschitzRow::Column& column = row.columns()[l];
+      center_[l] = simd::Fill(column.slope * Variable(set, column.variable).center);
+    }
+  }
+
+  [[nodiscard]] std::size_t columns() const { return columns_; }
+  /** L_kl (c_l - z_il) of one observation. */
+  [[nodiscard]] double Component(const Pack* block, std::size_t lane, std::size_t l) const {
+    return center_[l].all[0] - block[l].at(lane);
+  }
+
+  [[nodiscard]] Pack Block(const Pack* block) const {
+    Pack distance = Abs(center_[0] - simd::Load(block[0]));
+    for (std::size_t l = 1; l < columns_; ++l) distance = distance + Abs(center_[l] - simd::Load(block[l]));
+    return distance;
+  }
+
+  /** v_i - d_i at most, but for rounding. */
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
+    Pack bound = simd::Load(node[side]);
+    for (std::size_t l = 0; l < columns_; ++l)
+      bound = bound - Gap(simd::Load(node[2 + 2 * l]), simd::Load(node[3 + 2 * l]), center_[l]);
+    return bound;
+  }
+
+ private:
+  std::size_t columns_;
+  std::array<Same, kMaxVariables> center_;
+};
+
+/** Rows with too many columns for signs, over the interval hull: D_i = d_i + sum_l L_kl r_l, common = the sum. */
+class HullMetric : public CenterDistance {
+ public:
+  static constexpr bool kRefines = false;
+
+  HullMetric(const LipschitzRow& row, const QuerySet& set, double margin) : CenterDistance(row, set), margin_(simd::Fill(margin)) {
+    for (const LipschitzRow::Column& column : row.columns())
+      common_ += column.slope * Variable(set, column.variable).half_width;
+  }
+  [[nodiscard]] double common() const { return common_; }
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const { return CenterDistance::Node(node, side) + margin_; }
+
+ private:
+  double common_ = 0;
+  Same margin_;
+};
+
+/** Rows in between: Block and Node give d_i + a lower bound of the spreads w_s, which is not above D_i, and Refine gives
+D_i = max_s |sum_l s_l v_il| + w_s, v_il = L_kl (c_l - z_il). Over all z in the hull, z_l - z_il has one sign where
+|c_l - z_il| >= r_l: there the maximum has that sign, and only the signs of the other columns are tried. */
+class SignMetric : public CenterDistance {
+ public:
+  static constexpr bool kRefines = true;
+  static constexpr std::size_t kMaxColumns = 12;
+
+  /** @param errors of each column: not below the error of L_kl r_l plus that of v_il. @param margin as above. */
+  SignMetric(const LipschitzRow& row, const QuerySet& set, double margin, std::span<const double> errors)
+      : CenterDistance(row, set), chunks_(Chunks(set.slice).size()) {
+    const Chunks chunks(set.slice);
+    for (std::size_t l = 0; l < columns(); ++l) {
+      const LipschitzRow::Column& column = row.columns()[l];
+      const Variable variable(set, column.variable);
+      reach_[l] = column.slope * variable.half_width + errors[l];
+      hull_ += reach_[l];
+      slack_ += column.slope * variable.slack;
+      for (std::size_t j = 0; j < chunks_; ++j)
+        weighted_[l][j] = simd::Fill(column.slope) * chunks.Get(variable.generators, j);
+    }
+    least_ = simd::Fill(LeastSpread() + slack_ - margin);
+  }
+
+  [[nodiscard]] double common() const { return 0; }
+  [[nodiscard]] Pack Block(const Pack* block) const { return CenterDistance::Block(block) + least_; }
+  [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const { return CenterDistance::Node(node, side) - least_; }
+
+  /** D_i of one observation. Needs 2^f patterns for f free signs; where `patterns` does not allow them, the bound over
+  the hull, and `capped` is set. */
+  [[nodiscard]] double Refine(const Pack* block, std::size_t lane, int& patterns, bool& capped) const {
+    Signs signs;
+    signs.sums[0] = 0;
+    for (std::size_t j = 0; j < chunks_; ++j) signs.along[0][j] = simd::Fill(0);
+    std::size_t free = 0, fixed = 0;
+    for (std::size_t l = 0; l < columns(); ++l) {
+      const double component = Component(block, lane, l);
+      if (std::abs(component) > reach_[l])
+        Extend(signs, 0, 0, l, component, component < 0), ++fixed;
+      else
+        signs.free[free] = l, signs.components[free++] = component;
+    }
+    if (fixed == 0) --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], false);  // s and -s are the same
+    if (patterns < 1 << free) {
+      capped = true;
+      double distance = hull_;
+      for (std::size_t l = 0; l < columns(); ++l) distance += std::abs(Component(block, lane, l));
+      return distance;
+    }
+    patterns -= 1 << free;
+    return Farthest(signs, free);
+  }
+
+ private:
+  // Depth t holds the sums over the fixed columns and the first t free ones, under the pattern being tried.
+  struct Signs {
+    std::array<std::size_t, kMaxColumns> free;
+    std::array<double, kMaxColumns> components;
+    std::array<double, kMaxColumns + 1> sums;
+    std::array<std::array<Pack, kMaxChunks>, kMaxColumns + 1> along;
+  };
+
+  void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, bool negative) const {
+    signs.sums[to] = negative ? signs.sums[from] - component : signs.sums[from] + component;
+    for (std::size_t j = 0; j < chunks_; ++j)
+      signs.along[to][j] = negative ? signs.along[from][j] - weighted_[l][j] : signs.along[from][j] + weighted_[l][j];
+  }
+
+  // Counts through the patterns; the last column changes fastest, so that few sums are made anew.
+  double Farthest(Signs& signs, std::size_t free) const {
+    double farthest = 0;
+    for (std::size_t pattern = 0; pattern < std::size_t{1} << free; ++pattern) {
+      const auto same = pattern == 0 ? 0 : free - 1 - static_cast<std::size_t>(std::countr_zero(pattern));
+      for (std::size_t t = same; t < free; ++t)
+        Extend(signs, t, t + 1, signs.free[t], signs.components[t], pattern >> (free - 1 - t) & 1);
+      Pack spread = simd::Fill(0);
+      for (std::size_t j = 0; j < chunks_; ++j) spread = spread + Abs(signs.along[free][j]);
+      farthest = simd::Max(farthest, std::abs(signs.sums[free]) + (SumLanes(spread) + slack_));
+    }
+    return farthest;
+  }
+
+  // |sum_l s_l g_l| >= 2 max_l |g_l| - sum_l |g_l|, for each generator.
+  double LeastSpread() const {
+    Pack least = simd::Fill(0);
+    for (std::size_t j = 0; j < chunks_; ++j) {
+      Pack sum = simd::Fill(0), largest = simd::Fill(0);
+      for (std::size_t l = 0; l < columns(); ++l) {
+        const Pack term = Abs(weighted_[l][j]);
+        sum = sum + term;
+        largest = Max(largest, term);
+      }
+      least = least + Max(largest + largest - sum, simd::Fill(0));
+    }
+    return SumLanes(least);
+  }
+
+  std::size_t chunks_;
+  double hull_ = 0, slack_ = 0;
+  Same least_;
+  std::array<double, kMaxColumns> reach_;
+  std::array<std::array<Pack, kMaxChunks>, kMaxColumns> weighted_;
+};
+
+}  // namespace forereach::internal
+
+#pragma GCC diagnostic pop

@@ -1,0 +1,143 @@
+/** max_i (value_i - D_i) over an ObservationIndex, for both sides: value_i is the floor, or the negated ceiling. Scans all
+blocks, or goes down the tree and leaves out what cannot beat the best so far; both find the same number to the last bit,
+in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metric.h. */
+#pragma once
+
+#include "certifier/residual/metric.h"
+#include "certifier/residual/observation_index.h"
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace forereach::internal {
+
+/** What a search may spend, and whether it would have gone on. */
+struct Budget {
+  int leaves, patterns;
+  bool capped = false;
+};
+
+struct Sides {
+  double floor, negated_ceiling;
+};
+
+/** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry on. */
+template <class Metric>
+double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best, Budget& budget) {
+  if constexpr (!Metric::kRefines) {
+    return simd::Max(best, MaxLane(optimistic));
+  } else {
+    for (Pack left = TagLanes(Max(optimistic, simd::Fill(-kMaxDouble)));;) {
+      const double next = MaxLane(left);
+      if (!(next > best)) return best;
+      const std::size_t lane = simd::TaggedLane(next);
+      left = Replace(left, next, -kMaxDouble);
+      best = simd::Max(best, values.at(lane) - metric.Refine(block, lane, budget.patterns, budget.capped));
+    }
+  }
+}
+
+/** All of `count` blocks in a row. */
+template <class Metric>
+Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget& budget) {
+  Sides best{-kInfinity, -kInfinity};
+  Pack floors = simd::Fill(-kInfinity), ceilings = simd::Fill(-kInfinity);
+  for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
+    const Pack distance = metric.Block(block), floor = simd::Load(block[coordinates]), ceiling = simd::Load(block[coordinates + 1]);
+    if constexpr (Metric::kRefines) {
+      best.floor = BestOfBlock(metric, block, floor, floor - distance, best.floor, budget);
+      best.negated_ceiling = BestOfBlock(metric, block, ceiling, ceiling - distance, best.negated_ceiling, budget);
+    } else {
+      floors = Max(floor - distance, floors);
+      ceilings = Max(ceiling - distance, ceilings);
+    }
+  }
+  return {simd::Max(best.floor, MaxLane(floors)), simd::Max(best.negated_ceiling, MaxLane(ceilings))};
+}
+
+/** One side of a leaf. */
+template <class Metric>
+double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best, Budget& budget) {
+  Pack highest = simd::Fill(-kInfinity);
+  for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
+    const Pack values = simd::Load(block[coordinates + side]), optimistic = values - metric.Block(block);
+    if constexpr (Metric::kRefines)
+      best = BestOfBlock(metric, block, values, optimistic, best, budget);
+    else
+      highest = Max(optimistic, highest);
+  }
+  return simd::Max(best, MaxLane(highest));
+}
+
+/** One side of an index, depth first, the most promising child first. In steps, so that two descents share the time
+that each would wait for its last comparison or for memory. */
+template <class Metric>
+class Descent {
+ public:
+  /** @param side 0 for the floors, 1 for the negated ceilings. */
+  Descent(const Metric& metric, const ObservationIndex& index, std::size_t side, int max_leaves)
+      : metric_(metric), index_(index), side_(side), leaves_(max_leaves), level_(index.height() + 1) {}
+
+  /** Down to the parent of leaves, then to one leaf after the other, and up when nothing there can beat the best. False
+  when nothing is left to see, or nothing may be. */
+  bool Step(Budget& budget) {
+    if (level_ > 1) {
+      Level& at = levels_[static_cast<std::size_t>(--level_)];
+      at.bounds = TagLanes(metric_.Node(index_.node(level_, child_), side_));
+      at.first_child = child_ * kLanes;
+    } else {
+      best_ = BestOfLeaf(metric_, index_.leaf(child_), index_.num_coordinates(), side_, best_, budget);
+      --leaves_;
+    }
+    double next;
+    while (!((next = MaxLane(levels_[static_cast<std::size_t>(level_)].bounds)) > best_))
+      if (++level_ > index_.height()) return false;
+    budget.capped |= leaves_ == 0;
+    if (leaves_ == 0) return false;
+    Level& at = levels_[static_cast<std::size_t>(level_)];
+    at.bounds = Replace(at.bounds, next, -kMaxDouble);
+    child_ = at.first_child + simd::TaggedLane(next);
+    Prefetch();
+    return true;
+  }
+
+  [[nodiscard]] double best() const { return best_; }
+
+ private:
+  struct Level {
+    Pack bounds;  // of the children not yet visited
+    std::size_t first_child;
+  };
+
+  void Prefetch() const {
+    if (level_ > 1) {
+      const Pack* node = index_.node(level_ - 1, child_);
+      for (std::size_t p = 0; p < index_.node_packs() / 2; ++p) __builtin_prefetch(node + side_ * index_.node_packs() / 2 + p);
+    } else {
+      const Pack* leaf = index_.leaf(child_);
+      for (std::size_t p = 0; p < ObservationIndex::kLeafBlocks * index_.block_packs(); ++p) __builtin_prefetch(leaf + p);
+    }
+  }
+
+  const Metric& metric_;
+  const ObservationIndex& index_;
+  const std::size_t side_;
+  int leaves_, level_;
+  std::size_t child_ = 0;
+  double best_ = -kInfinity;
+  std::array<Level, ObservationIndex::kMaxHeight + 1> levels_;
+};
+
+template <class Metric>
+Sides SearchTree(const Metric& metric, const ObservationIndex& index, Budget& budget) {
+  Descent<Metric> floors(metric, index, 0, budget.leaves), ceilings(metric, index, 1, budget.leaves);
+  for (bool more_floors = true, more_ceilings = true; more_floors || more_ceilings;) {
+    if (more_floors) more_floors = floors.Step(budget);
+    if (more_ceilings) more_ceilings = ceilings.Step(budget);
+  }
+  return {floors.best(), ceilings.best()};
+}
+
+}  // namespace forereach::internal
+
+#pragma GCC diagnostic pop

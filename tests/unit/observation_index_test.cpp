@@ -1,0 +1,259 @@
+// The search over observations against looking at every one: the same number to the last bit, in a tree and in a row, on
+// every instruction set; and what a cap makes of it is wider.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "certifier/residual/consistency.h"
+#include "certifier/residual/lipschitz_envelope.h"
+#include "certifier/residual/pairs.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kStates = 9, kInputs = 5, kVariables = kStates + kInputs;
+constexpr int kFlat = 1 << 20;
+
+// One row with `active` columns, at random places.
+struct Data {
+  Declaration declaration;
+  Observations observations;
+  std::vector<double> lower, upper;  // the domain
+};
+
+Data Make(Random& random, int count, int active, double scale) {
+  Data data;
+  data.declaration = {Eigen::MatrixXd::Zero(1, kVariables), Eigen::VectorXd::Constant(1, random.Coin() ? 0 : 0.01 * scale)};
+  std::vector<int> columns(kVariables);
+  for (int l = 0; l < kVariables; ++l) columns[static_cast<std::size_t>(l)] = l;
+  for (int a = 0; a < active; ++a) {
+    std::swap(columns[static_cast<std::size_t>(a)], columns[static_cast<std::size_t>(random.Integer(a, kVariables - 1))]);
+    data.declaration.lipschitz(0, columns[static_cast<std::size_t>(a)]) = random.Uniform(0, 1);
+  }
+  Observations& o = data.observations;
+  o.z = random.Matrix(count, kVariables, scale);
+  o.lower = random.Matrix(count, 1, 0.1 * scale) + 0.3 * o.z.leftCols(kStates).rowwise().sum();
+  for (int i = 0; i < count; ++i)  // duplicates, ties, and points on top of each other
+    if (const int j = random.Below(count); random.Coin(0.2)) {
+      o.z.row(i) = o.z.row(j);
+      if (random.Coin()) o.lower.row(i) = o.lower.row(j);
+    }
+  o.upper = o.lower.array() + 0.001 * scale * random.Below(2);
+  data.lower.assign(kVariables, -2 * scale);
+  data.upper.assign(kVariables, 2 * scale);
+  return data;
+}
+
+LipschitzEnvelope EnvelopeOf(const Data& data, const EnvelopeOptions& options) {
+  return LipschitzEnvelope(data.declaration, data.observations, data.lower, data.upper, options);
+}
+
+struct Query {
+  Zonotope slice;
+  Eigen::VectorXd input;
+  std::vector<double> half_width;
+
+  Query(Random& random, double scale, int generators)
+      : slice(random.Vector(kStates, scale), random.Matrix(kStates, generators, scale / (generators + 1) * random.Uniform(0, 0.9))),
+        input(random.Vector(kInputs, scale)) {
+    for (int k = 0; k < kStates; ++k) {
+      slice.mutable_slack(k) = random.Coin() ? 0 : 1e-3 * scale * random.Uniform(0, 1);
+      half_width.push_back(slice.HalfWidthUpper(k));
+    }
+  }
+  [[nodiscard]] QuerySet set() const { return {slice, View(input), half_width}; }
+};
+
+ResidualBounds Ask(const LipschitzEnvelope& envelope, const Query& query) {
+  ResidualBounds bounds;
+  envelope.Enclose(query.set(), bounds);
+  return bounds;
+}
+
+std::vector<InstructionSet> InstructionSets() {
+  std::set<InstructionSet> sets{InstructionSet::kBaseline, BestInstructionSet()};
+  return {sets.begin(), sets.end()};
+}
+
+class Search : public testing::TestWithParam<int> {};  // active columns
+
+TEST_P(Search, TreeAndRowAgreeToTheLastBitOnEveryInstructionSet) {
+  Random random(700 + static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(random.trace());
+  for (const int count : {1, 2, 7, 8, 9, 31, 32, 33, 64, 65, 255, 256, 257, 300, 2000, 20000}) {
+    const double scale = std::ldexp(1, count == 300 ? -1060 : count == 257 ? 500 : random.Integer(-3, 3));
+    const Data data = Make(random, count, GetParam(), scale);
+    std::vector<LipschitzEnvelope> envelopes;
+    for (const InstructionSet instructions : InstructionSets())
+      for (const int flat : {kFlat, 0})
+        envelopes.push_back(EnvelopeOf(data, {.max_leaf_visits = 1 << 20, .max_flat_blocks = flat, .instructions = instructions}));
+    for (int trial = 0; trial < (count > 1000 ? 5 : 20); ++trial) {
+      const Query query(random, scale, random.Integer(0, 20));
+      const ResidualBounds expected = Ask(envelopes.front(), query);
+      ASSERT_TRUE(std::isfinite(expected.lower[0]) && std::isfinite(expected.upper[0]));
+      ASSERT_FALSE(expected.capped);
+      for (const LipschitzEnvelope& envelope : envelopes) {
+        const ResidualBounds bounds = Ask(envelope, query);
+        ASSERT_EQ(bounds.lower[0], expected.lower[0]) << count << " observations";
+        ASSERT_EQ(bounds.upper[0], expected.upper[0]) << count << " observations";
+        ASSERT_FALSE(bounds.capped);
+      }
+    }
+  }
+}
+
+// Each observation by itself is an envelope of one: the best of them all is the envelope.
+TEST_P(Search, IsTheBestOfAllObservations) {
+  Random random(720 + static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(random.trace());
+  for (const int count : {1, 3, 40, 200}) {
+    const Data data = Make(random, count, GetParam(), 1);
+    const LipschitzEnvelope envelope = EnvelopeOf(data, {.max_flat_blocks = 0});
+    for (int trial = 0; trial < 3; ++trial) {
+      const Query query(random, 1, random.Integer(0, 20));
+      double highest = -kInfinity, lowest = kInfinity;
+      for (int i = 0; i < count; ++i) {
+        Data one = data;
+        one.observations = {data.observations.z.row(i), data.observations.lower.row(i), data.observations.upper.row(i)};
+        const ResidualBounds bounds = Ask(EnvelopeOf(one, {}), query);
+        highest = std::max(highest, bounds.lower[0]);
+        lowest = std::min(lowest, bounds.upper[0]);
+      }
+      const ResidualBounds bounds = Ask(envelope, query);
+      ASSERT_NEAR(bounds.lower[0], highest, 1e-12);
+      ASSERT_NEAR(bounds.upper[0], lowest, 1e-12);
+    }
+  }
+}
+
+TEST_P(Search, WithACapIsWiderAndSaysSo) {
+  Random random(740 + static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(random.trace());
+  const Data data = Make(random, 3000, GetParam(), 1);
+  const LipschitzEnvelope all = EnvelopeOf(data, {.max_leaf_visits = 1 << 20, .max_flat_blocks = kFlat});
+  int capped = 0, wider = 0;
+  for (const int cap : {1, 2, 3, 4}) {
+    const LipschitzEnvelope some = EnvelopeOf(data, {.max_leaf_visits = cap, .max_flat_blocks = 0});
+    for (int trial = 0; trial < 25; ++trial) {
+      const Query query(random, 1, random.Integer(0, 20));
+      const ResidualBounds expected = Ask(all, query), bounds = Ask(some, query);
+      ASSERT_TRUE(std::isfinite(bounds.lower[0]) && std::isfinite(bounds.upper[0]));
+      ASSERT_LE(bounds.lower[0], expected.lower[0]);
+      ASSERT_GE(bounds.upper[0], expected.upper[0]);
+      const bool differs = bounds.lower[0] != expected.lower[0] || bounds.upper[0] != expected.upper[0];
+      ASSERT_TRUE(bounds.capped || !differs) << "wider, and does not say so";
+      capped += bounds.capped;
+      wider += differs;
+    }
+  }
+  if (GetParam() > 0) {
+    EXPECT_GT(capped, 0);
+  }
+  if (GetParam() > 3) {
+    EXPECT_GT(wider, 0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ActiveColumns, Search, testing::Range(0, 15));
+
+TEST(ObservationIndex, HoldsEveryObservationOnce) {
+  Random random(760);
+  SCOPED_TRACE(random.trace());
+  for (const int count : {1, 8, 31, 33, 257, 5000})
+    for (const int active : {1, 2, 3, 5}) {
+      const Data data = Make(random, count, active, 1);
+      const LipschitzRow row(data.declaration, 0);
+      const ObservationIndex::Entries entries = EntriesOf(row, data.declaration, data.observations, 0);
+      const ObservationIndex index(entries);
+      const std::size_t k = index.num_coordinates();
+      std::set<std::uint32_t> seen;
+      for (std::size_t b = 0; b < index.num_leaves() * ObservationIndex::kLeafBlocks; ++b)
+        for (std::size_t lane = 0; lane < simd::kLanes; ++lane) {
+          const std::uint32_t id = index.ids(b)[lane];
+          if (id == ObservationIndex::kNone) {
+            ASSERT_EQ(index.block(b)[k].at(lane), -kInfinity);
+            ASSERT_EQ(index.block(b)[k + 1].at(lane), -kInfinity);
+            continue;
+          }
+          ASSERT_TRUE(seen.insert(id).second);
+          ASSERT_EQ(index.block(b)[k].at(lane), entries.floors[id]);
+          ASSERT_EQ(index.block(b)[k + 1].at(lane), -entries.ceilings[id]);
+          for (std::size_t c = 0; c < k; ++c) ASSERT_EQ(index.block(b)[c].at(lane), entries.coordinates[id * k + c]);
+        }
+      ASSERT_EQ(seen.size(), static_cast<std::size_t>(count));
+    }
+}
+
+// The first pair in the order i < j, as by trying them all.
+std::optional<Violation> TryAll(const Data& data) {
+  for (int i = 0; i < data.observations.size(); ++i)
+    for (int j = i + 1; j < data.observations.size(); ++j)
+      if (const auto violation = TestPair(data.declaration, data.observations, i, j, 0)) return violation;
+  return std::nullopt;
+}
+
+TEST(FindViolation, AgreesWithTryingAllPairs) {
+  Random random(770);
+  SCOPED_TRACE(random.trace());
+  int found = 0, tried = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const int count = trial < 360 ? random.Integer(1, 150) : random.Integer(300, 1200);
+    Data data = Make(random, count, random.Integer(1, 14), std::ldexp(1, random.Integer(-300, 300)));
+    // Residuals that keep to the declaration, often to its very edge, and here and there one that does not.
+    Observations& o = data.observations;
+    const double share = random.Coin() ? 1 : 0.7;
+    for (int i = 0; i < count; ++i) o.lower(i, 0) = share * data.declaration.lipschitz.row(0).dot(o.z.row(i));
+    o.upper = o.lower;
+    if (random.Coin())
+      for (int i = random.Integer(0, 2); i > 0; --i) o.upper(random.Below(count), 0) *= random.Uniform(0.5, 1.5);
+    o.lower = o.lower.cwiseMin(o.upper);
+    o.upper = o.lower;
+    const auto expected = TryAll(data), violation = FindViolation(data.declaration, o);
+    ASSERT_EQ(violation.has_value(), expected.has_value());
+    ++tried;
+    if (!expected) continue;
+    ++found;
+    ASSERT_EQ(violation->first, expected->first);
+    ASSERT_EQ(violation->second, expected->second);
+    ASSERT_EQ(violation->difference, expected->difference);
+    ASSERT_EQ(violation->bound, expected->bound);
+  }
+  EXPECT_GT(found, 50);
+  EXPECT_LT(found, tried - 50);
+}
+
+TEST(FindViolation, TakesManyObservationsThatAllContradictEachOther) {
+  Random random(771);
+  Data data = Make(random, 30000, 2, 1);
+  data.observations.lower = random.Matrix(30000, 1, 100);
+  data.observations.upper = data.observations.lower;
+  const auto violation = FindViolation(data.declaration, data.observations);
+  ASSERT_TRUE(violation);
+  EXPECT_EQ(violation->first, 0);
+}
+
+TEST(PairSearch, SaysTheSameOnEveryInstructionSet) {
+  Random random(772);
+  SCOPED_TRACE(random.trace());
+  for (const int active : {1, 2, 3, 7}) {
+    const Data data = Make(random, 700, active, 1);
+    const LipschitzRow row(data.declaration, 0);
+    const ObservationIndex index(EntriesOf(row, data.declaration, data.observations, 0));
+    std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> pairs;
+    for (const InstructionSet instructions : InstructionSets()) {
+      pairs.emplace_back();
+      EXPECT_FALSE(PairSearch(index, 1e-9, instructions).AnyPair([&](std::uint32_t i, std::uint32_t j) {
+        pairs.back().emplace_back(i, j);
+        return false;
+      }));
+    }
+    EXPECT_FALSE(pairs.front().empty());
+    EXPECT_EQ(pairs.front(), pairs.back());
+  }
+}
+
+}  // namespace
+}  // namespace forereach
