@@ -103,10 +103,12 @@ void RegisterPlainPairwise(int observations) {
 }
 
 void RegisterNominalTube() {
-  benchmark::RegisterBenchmark("nominal_tube/forereach", [](State& state) {
-    const Task task = MakeNominalTube();
-    RunCertify(state, Certifier(task.problem), task);
-  })->Unit(benchmark::kMicrosecond);
+  for (const auto& [name, method] : {std::pair("nominal_tube/forereach", Method::kCentred),
+                                     std::pair("nominal_tube/forereach_paper", Method::kPaper)})
+    benchmark::RegisterBenchmark(name, [method = method](State& state) {
+      const Task task = MakeNominalTube(method);
+      RunCertify(state, Certifier(task.problem), task);
+    })->Unit(benchmark::kMicrosecond);
   benchmark::RegisterBenchmark("nominal_tube/straightforward", [](State& state) {
     const Task task = MakeNominalTube();
     RunStraightforward(state, Straightforward(task.problem, PlainModelOf(Scenario::kBicycle)), task);

@@ -217,6 +217,7 @@ class Report:
         for name, label, rigorous in (
             ("sampled_inner_hull/iterations:1", "sampled inner hull", ""),
             ("forereach", "**ForeReach**", "yes"),
+            ("forereach_paper", "**ForeReach**, method: paper", "yes"),
             ("straightforward", "straightforward, Eigen", "no"),
             ("boost_natural", "Boost.Interval, natural", "up to the C library's sin, cos, tan"),
             ("boost_mean_value", "Boost.Interval, mean value", "up to the C library's sin, cos, tan"),

@@ -29,7 +29,7 @@ struct Midway {
   Midway(const Task& the_task, const Certifier& certifier)
       : task(the_task),
         observations(Observe(*task.problem->model, task.problem->transitions)),
-        envelope(task.problem->declaration, observations) {
+        envelope(task.problem->declaration, observations, Ends(&Box::lower), Ends(&Box::upper)) {
     Tube tube;
     (void)certifier.Certify(task.plan(), task.initial_set(), task.obstacles, tube);
     slice = tube.slice(kStep);
@@ -39,6 +39,14 @@ struct Midway {
   [[nodiscard]] std::span<const double> input() const { return task.plan().input(kStep); }
   [[nodiscard]] QuerySet query() const {
     return {slice, input(), {half_width.data(), static_cast<std::size_t>(slice.dim())}};
+  }
+
+  // Lower or upper ends of the domain over z.
+  [[nodiscard]] std::vector<double> Ends(const Eigen::VectorXd& (Box::*ends)() const) const {
+    const Eigen::VectorXd &state = (task.problem->domain.state.*ends)(), &input = (task.problem->domain.input.*ends)();
+    std::vector<double> both(state.begin(), state.end());
+    both.insert(both.end(), input.begin(), input.end());
+    return both;
   }
 
   const Task& task;
@@ -59,10 +67,13 @@ const Midway& CachedMidway(Scenario scenario, int observations) {
 
 void RunStep(State& state, const Midway& midway) {
   const Problem& problem = *midway.task.problem;
-  const Propagator propagator(*problem.model, problem.domain, midway.envelope, problem.zonotope_order);
+  const Propagator propagator(*problem.model, problem.domain, midway.envelope, problem.zonotope_order, problem.method);
   Zonotope next;
   StepRecord record;
-  for (auto _ : state) benchmark::DoNotOptimize(propagator.Step(midway.slice, midway.input(), next, record));
+  record.half_width = midway.half_width;
+  std::array<double, kMaxStates> next_half_width;
+  for (auto _ : state)
+    benchmark::DoNotOptimize(propagator.Step(midway.slice, midway.input(), record, next, next_half_width.data()));
 }
 
 void RunEnvelope(State& state, const Midway& midway) {
@@ -77,23 +88,17 @@ void RunPairwise(State& state, const Midway& midway) {
   for (auto _ : state) benchmark::DoNotOptimize(FindViolation(midway.task.problem->declaration, midway.observations));
 }
 
-void RunLinearize(State& state, const Midway& midway) {
+void RunExpand(State& state, const Midway& midway) {
   std::vector<double> z(midway.slice.center().begin(), midway.slice.center().end());
   z.insert(z.end(), midway.input().begin(), midway.input().end());
-  Linearization out;
-  for (auto _ : state) {
-    midway.task.problem->model->Linearize(z, out);
-    benchmark::DoNotOptimize(out);
+  std::vector<PlainInterval> box;
+  for (std::size_t l = 0; l < z.size(); ++l) {
+    const double half_width = l < static_cast<std::size_t>(midway.slice.dim()) ? midway.half_width[l] : 0;
+    box.push_back({z[l] - half_width, z[l] + half_width});
   }
-}
-
-void RunHessian(State& state, const Midway& midway) {
-  std::vector<Interval> box;
-  for (int k = 0; k < midway.slice.dim(); ++k) box.push_back(midway.slice.Hull(k));
-  for (const double u : midway.input()) box.emplace_back(u);
-  HessianEnclosure out;
+  Expansion out;
   for (auto _ : state) {
-    midway.task.problem->model->EncloseHessian(box, out);
+    midway.task.problem->model->Expand(z, box, out);
     benchmark::DoNotOptimize(out);
   }
 }
@@ -109,11 +114,18 @@ void RunReduction(State& state, const Midway& midway) {
   }
 }
 
-void RunSeparation(State& state, const Midway& midway,
-                   Separation (*separate)(const Zonotope&, const Obstacle&) noexcept) {
+void RunSeparationByHulls(State& state, const Midway& midway) {
+  const Projection projection(midway.task.problem->projection, midway.slice.dim());
+  const std::span<const double> half_width(midway.half_width.data(), static_cast<std::size_t>(midway.slice.dim()));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        SeparateHulls(projection.EncloseHull(midway.slice, half_width), midway.task.obstacles.front()));
+}
+
+void RunSeparation(State& state, const Midway& midway) {
   Zonotope projected;
   Projection(midway.task.problem->projection, midway.slice.dim()).Enclose(midway.slice, projected);
-  for (auto _ : state) benchmark::DoNotOptimize(separate(projected, midway.task.obstacles.front()));
+  for (auto _ : state) benchmark::DoNotOptimize(Separate(projected, midway.task.obstacles.front()));
 }
 
 using Run = void (*)(State&, const Midway&);
@@ -136,13 +148,10 @@ void RegisterStages(int observations) {
   Register("step", Scenario::kBicycle, observations, RunStep);
   // Insertion of one observation: register "stage/insertion" here once the envelope can take one.
   if (observations != 400) return;  // the others do not look at observations
-  Register("linearize", Scenario::kBicycle, observations, RunLinearize);
-  Register("hessian", Scenario::kBicycle, observations, RunHessian);
+  Register("expansion", Scenario::kBicycle, observations, RunExpand);
   Register("reduction", Scenario::kBicycle, observations, RunReduction);
-  Register("separation_quick", Scenario::kBicycle, observations,
-           [](State& state, const Midway& midway) { RunSeparation(state, midway, SeparateQuickly); });
-  Register("separation_exact", Scenario::kBicycle, observations,
-           [](State& state, const Midway& midway) { RunSeparation(state, midway, Separate); });
+  Register("separation_by_hulls", Scenario::kBicycle, observations, RunSeparationByHulls);
+  Register("separation_exact", Scenario::kBicycle, observations, RunSeparation);
 }
 
 }  // namespace forereach::bench

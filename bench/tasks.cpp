@@ -75,6 +75,7 @@ Transitions Observed(const Target& target, const Box& region, int count, int sta
 
 Problem BareBicycle() {
   Problem problem;
+  problem.method = Method::kPaper;
   problem.model = MakeKinematicBicycle(kBicycleStep, kWheelbase);
   problem.domain.state = Box(Vec({-40, -40, -M_PI, 0, -3, -0.48}), Vec({40, 40, M_PI, 25, 3, 0.48}));
   problem.domain.input = Box(Vec({-20, -2}), Vec({20, 2}));
@@ -85,6 +86,7 @@ Problem BareBicycle() {
 
 Problem BarePointMass() {
   Problem problem;
+  problem.method = Method::kPaper;
   problem.model = MakePointMass(kPointMassStep);
   problem.domain.state = Box(Vec({-20, -20, -5.4, -5.4}), Vec({20, 20, 5.4, 5.4}));
   problem.domain.input = Box(Vec({-3, -3}), Vec({3, 3}));
@@ -198,8 +200,9 @@ Task MakeTask(Scenario scenario, int observations) { return Made(scenario, obser
 
 Task MakeBlockedTask(Scenario scenario, int observations) { return Made(scenario, observations, 0); }
 
-Task MakeNominalTube() {
+Task MakeNominalTube(Method method) {
   Problem problem = BareBicycle();
+  problem.method = method;
   const Target target = [](std::span<const Wide> z, std::span<Wide> next) {
     KinematicBicycle{kBicycleStep, kWheelbase}(z, next);
   };

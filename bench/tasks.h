@@ -38,7 +38,7 @@ enum class Scenario {
 
 /** One plan of 12 steps and one circle beside its path, far enough for a certificate at every N >= 25, so that no
 abstention cuts the work short. The N observations are drawn uniformly around the plan from a residual that satisfies
-the declaration; those of a smaller N are the first ones of a larger. */
+the declaration; those of a smaller N are the first ones of a larger. Method kPaper, as the straightforward version. */
 [[nodiscard]] Task MakeTask(Scenario scenario, int observations);
 
 /** The same with a circle on the path: the whole tube is computed, and the answer is S. */
@@ -46,7 +46,7 @@ the declaration; those of a smaller N are the first ones of a larger. */
 
 /** The nominal tube alone: the bicycle without a residual (L = 0), 12 steps of jerk 0.5 and steering rate 0.1 from the
 box (0.1, 0.1, 0.02, 0.2, 0.02, 0.005) around (0, 0, 0, 10, 0, 0.05), no obstacle. */
-[[nodiscard]] Task MakeNominalTube();
+[[nodiscard]] Task MakeNominalTube(Method method = Method::kPaper);
 
 /** The task's plan and `count - 1` variations of it by a few per cent. */
 [[nodiscard]] std::vector<Eigen::MatrixXd> MakePlans(const Task& task, int count);

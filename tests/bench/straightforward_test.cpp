@@ -62,6 +62,7 @@ TEST(StraightforwardTest, AgreesOnRandomTasks) {
     Random random(seed);
     SCOPED_TRACE(random.trace());
     const auto problem = AnyProblem(random, random.Coin(), random.Integer(1, 60));
+    problem->method = Method::kPaper;
     ASSERT_FALSE(Straightforward(problem, PlainModelOf(*problem)).FindViolation());
     for (int question = 0; question < 5; ++question, ++questions) {
       Query query = AnyQuery(random, *problem);
