@@ -48,6 +48,7 @@ class IncludesTest : public testing::Test {
     Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"certifier/sets/box.h\"\n");
     Write("logger/database.cpp", "#include <sqlite3.h>\n#include <cairo-svg.h>\n");
     Write("tests/logger/log_test.cpp", "#include <lcm/lcm-cpp.hpp>\n");
+    Write("bench/gate_bench.cpp", "#include \"certifier/gate/gate.h\"\n#include <benchmark/benchmark.h>\n");
   }
   ~IncludesTest() override { std::filesystem::remove_all(root_); }
 
@@ -82,7 +83,7 @@ TEST_F(IncludesTest, TheSourcesKeepToTheArrows) {
 TEST_F(IncludesTest, AHouseInOrderPasses) {
   const Result result = CheckIncludes(root_.string());
   EXPECT_EQ(result.exit_code, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("11 files, 18 includes, 0 against the arrows"));
+  EXPECT_THAT(result.output, HasSubstr("12 files, 20 includes, 0 against the arrows"));
 }
 
 TEST_F(IncludesTest, AnEmptyHouseIsAnErrorNotAPass) {
@@ -114,10 +115,11 @@ TEST_F(IncludesTest, TheLibraryNeedsEigenOnly) {
 TEST_F(IncludesTest, ThePartsOfTheHouse) {
   Refuse("lcmtypes/bad.h", "\"certifier/sets/box.h\"", "lcmtypes may not include certifier");
   Refuse("certifier/process/bad.cpp", "\"logger/database.h\"", "certifier may not include logger");
-  for (const char* other : {"planner_bridge", "logger", "robot", "cli"})
+  for (const char* other : {"planner_bridge", "logger", "robot", "cli", "bench"})
     Refuse("certifier/gate/bad.cpp", std::string("\"") + other + "/x.h\"",
            std::string("certifier may not include ") + other);
   Refuse("robot/bad.cpp", "\"planner_bridge/x.h\"", "robot may not include planner_bridge");
+  Refuse("bench/bad.cpp", "\"logger/x.h\"", "bench may not include logger");
   Refuse("logger/bad.cpp", "\"tests/logger/scratch.h\"", "logger may not include tests");
   ExpectRefused();
 }

@@ -1,0 +1,212 @@
+// What the certifier adds to a round trip on the bus.
+//   bus_round_trip [--rounds N]        prints one JSON document, microseconds
+// Two processes answer candidates on loopback UDP multicast, each on a port of its own: the certifier's node with its
+// gate, and an echo that sends messages of the same sizes back without looking at what came. This process asks one,
+// then the other, and so on, so both see the same machine. Two questions: a plan that is certified (the answer is
+// decision_t and certified_plan_t) and one that is not (decision_t alone).
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+
+#include "bench/candidates.h"
+#include "bench/latencies.h"
+#include "certifier/process/certifier_node.h"
+#include "lcmtypes/node.h"
+
+namespace forereach::bench {
+namespace {
+
+constexpr int kObservations = 400;
+constexpr int kPatienceMs = 2000, kWarmUp = 200;
+
+// Answers each candidate with as many bytes as the certifier would.
+class EchoNode final : public Node {
+ public:
+  EchoNode(const BusOptions& channels, Bus& bus, bool certifies)
+      : channels_(channels), bus_(bus), certifies_(certifies) {
+    bus_.Subscribe(channels_.candidate, [this](const Received& received) {
+      waiting_.push_back({received.bytes.begin(), received.bytes.end()});
+    });
+  }
+
+  void Tick(std::int64_t) override {
+    for (std::size_t i = 0; i < waiting_.size(); ++i) {
+      if (certifies_) bus_.Publish(channels_.certified, Bytes(certified_));
+      bus_.Publish(channels_.decision, Bytes(decision_));
+    }
+    waiting_.clear();
+  }
+
+ private:
+  const BusOptions channels_;
+  Bus& bus_;
+  const bool certifies_;
+  std::vector<std::vector<std::uint8_t>> waiting_;
+  const std::vector<std::uint8_t> certified_ = Encode(certified_plan_t{}), decision_ = Encode(decision_t{});
+};
+
+using MakeNode = std::function<std::unique_ptr<Node>(Bus& bus)>;
+
+// A child process that runs a node until this object goes.
+class Answerer {
+ public:
+  Answerer(const std::string& url, const MakeNode& make) : process_(fork()) {
+    if (process_ < 0) throw std::runtime_error("fork failed");
+    if (process_ == 0) Run(url, make);
+  }
+  ~Answerer() {
+    kill(process_, SIGTERM);
+    waitpid(process_, nullptr, 0);
+  }
+  Answerer(const Answerer&) = delete;
+  Answerer& operator=(const Answerer&) = delete;
+
+ private:
+  [[noreturn]] static void Run(const std::string& url, const MakeNode& make) {
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);  // standard output is the measurement's
+    try {
+      const std::unique_ptr<Bus> bus = OpenBus(url);
+      const std::unique_ptr<Node> node = make(*bus);
+      RunNode(*node, *bus);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "bus_round_trip: %s\n", error.what());
+    }
+    _exit(0);
+  }
+
+  pid_t process_;
+};
+
+// The asking end of one bus.
+class Asker {
+ public:
+  Asker(const std::string& url, const BusOptions& channels, std::int16_t expected)
+      : channels_(channels), expected_(expected), bus_(OpenBus(url)) {
+    bus_->Subscribe(channels_.decision, [this](const Received& received) {
+      ++answers_;
+      last_ = Decoded<decision_t>(received.bytes);
+    });
+  }
+
+  // Until an answer comes: the other process may still be starting.
+  void Reach(candidate_plan_t& candidate) {
+    for (int attempt = 0; attempt < 50; ++attempt)
+      if (Ask(candidate, kPatienceMs / 20) >= 0) return;
+    throw std::runtime_error("no answer on the bus");
+  }
+
+  // Microseconds from publishing to having the decision; negative if none came in time.
+  double Ask(candidate_plan_t& candidate, int patience_ms = kPatienceMs) {
+    Stamp(candidate, ++plan_id_, WallClockUs());
+    const std::vector<std::uint8_t> bytes = Encode(candidate);
+    const int before = answers_;
+    const auto begin = std::chrono::steady_clock::now();
+    const auto deadline = begin + std::chrono::milliseconds(patience_ms);
+    bus_->Publish(channels_.candidate, Bytes(bytes));
+    while (answers_ == before) {
+      bus_->Dispatch(patience_ms);
+      if (answers_ == before && std::chrono::steady_clock::now() > deadline) return -1;
+    }
+    const std::chrono::duration<double, std::micro> elapsed = std::chrono::steady_clock::now() - begin;
+    if (!last_ || last_->outcome != expected_) ++unexpected_;
+    return elapsed.count();
+  }
+
+  [[nodiscard]] int unexpected() const { return unexpected_; }
+
+ private:
+  const BusOptions channels_;
+  const std::int16_t expected_;
+  std::int64_t plan_id_ = 0;
+  int answers_ = 0, unexpected_ = 0;
+  std::optional<decision_t> last_;
+  std::unique_ptr<Bus> bus_;
+};
+
+std::string PortUrl(int offset) {
+  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 4 + offset) % 20'000) +
+         "?ttl=0&recv_buf_size=2097152";
+}
+
+struct Results {
+  Latencies echo, certifier;
+  int lost = 0, unexpected = 0;
+};
+
+void Alternate(int rounds, candidate_plan_t& candidate, Asker& echo, Asker& certifier, Results& results) {
+  for (int round = -kWarmUp; round < rounds; ++round) {
+    const double bare = echo.Ask(candidate), gated = certifier.Ask(candidate);
+    if (bare < 0 || gated < 0) {
+      ++results.lost;
+    } else if (round >= 0) {
+      results.echo.Add(bare);
+      results.certifier.Add(gated);
+    }
+  }
+}
+
+nlohmann::json Compare(const Task& task, bool certifies, int rounds, int ports) {
+  const Config config = MakeConfig(task);
+  const std::string echo_url = PortUrl(ports), gate_url = PortUrl(ports + 1);
+  const Answerer echo_process(echo_url,
+                              [&](Bus& bus) { return std::make_unique<EchoNode>(config.bus, bus, certifies); });
+  const Answerer gate_process(gate_url, [&](Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
+
+  const std::int16_t expected = certifies ? decision_t::CERTIFIED : decision_t::ABSTAIN_SAFETY;
+  Asker echo(echo_url, config.bus, 0), certifier(gate_url, config.bus, expected);
+  candidate_plan_t candidate = MakeCandidate(task);
+  echo.Reach(candidate);
+  certifier.Reach(candidate);
+
+  const auto expected_rounds = static_cast<std::size_t>(rounds);
+  Results results{Latencies(expected_rounds), Latencies(expected_rounds)};
+  Alternate(rounds, candidate, echo, certifier, results);
+  return {{"echo", results.echo.ToJson()},
+          {"certifier", results.certifier.ToJson()},
+          {"added_p50", results.certifier.Percentile(0.5) - results.echo.Percentile(0.5)},
+          {"added_p99", results.certifier.Percentile(0.99) - results.echo.Percentile(0.99)},
+          {"ratio_p50", results.certifier.Percentile(0.5) / results.echo.Percentile(0.5)},
+          {"ratio_p99", results.certifier.Percentile(0.99) / results.echo.Percentile(0.99)},
+          {"lost", results.lost},
+          {"unexpected", certifier.unexpected()}};
+}
+
+}  // namespace
+}  // namespace forereach::bench
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  using namespace forereach::bench;
+  int rounds = 20'000;
+  CLI::App app("Round trips on the bus, by a bare echo and by the certifier: percentiles as JSON");
+  app.add_option("--rounds", rounds, "round trips of each kind")->check(CLI::Range(1, 10'000'000));
+  CLI11_PARSE(app, argc, argv);
+  try {
+    const nlohmann::json certified = Compare(MakeTask(Scenario::kBicycle, kObservations), true, rounds, 0);
+    const nlohmann::json abstained = Compare(MakeBlockedTask(Scenario::kBicycle, kObservations), false, rounds, 2);
+    std::cout << nlohmann::json{{"candidate_bytes", EncodedSize<candidate_plan_t>()},
+                                {"decision_bytes", EncodedSize<decision_t>()},
+                                {"certified_bytes", EncodedSize<certified_plan_t>()},
+                                {"certified", certified},
+                                {"abstained", abstained}}
+                     .dump(2)
+              << std::endl;
+  } catch (const std::exception& error) {
+    std::cerr << "bus_round_trip: " << error.what() << "\n";
+    return 1;
+  }
+}

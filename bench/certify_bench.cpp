@@ -1,0 +1,162 @@
+// How long one certify call takes, beside the straightforward version, and each stage of it alone.
+//   certify_bench [--largest=N] [any flag of Google Benchmark]
+// Names are scenario/N: what scripts/bench reads from the JSON. --largest leaves out tasks of more observations.
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "bench/stages.h"
+#include "bench/straightforward.h"
+#include "bench/tasks.h"
+
+namespace forereach::bench {
+namespace {
+
+constexpr std::array kScenarios{Scenario::kBicycle, Scenario::kPointMass, Scenario::kDense};
+constexpr std::array kSizes{25, 400, 10'000, 1'000'000};
+constexpr int kBatch = 64;
+// In eight dimensions the pairwise test, once when the certifier is made, compares nearly all pairs of observations.
+constexpr int kLargestDense = 10'000;
+
+using benchmark::State;
+
+PlainModel PlainModelOf(Scenario scenario) {
+  return scenario == Scenario::kPointMass ? PlainPointMass(0.15) : PlainBicycle(0.1, 2.5);
+}
+
+void AddWidths(State& state, const std::function<double(int)>& half_width) {
+  state.counters["width_x"] = 2 * half_width(0);
+  state.counters["width_y"] = 2 * half_width(1);
+  state.counters["width_theta"] = 2 * half_width(2);
+}
+
+// One call on one plan. Skips, loudly, where the answer is not the certificate that the task is made for.
+void RunCertify(State& state, const Certifier& certifier, const Task& task) {
+  const Plan plan = task.plan();
+  const Zonotope initial_set = task.initial_set();
+  Tube tube;
+  if (certifier.Certify(plan, initial_set, task.obstacles, tube).outcome != Outcome::kCertified)
+    return state.SkipWithError("no certificate");
+  for (auto _ : state) benchmark::DoNotOptimize(certifier.Certify(plan, initial_set, task.obstacles, tube));
+  AddWidths(state, [&](int k) { return tube.slice(tube.length()).HalfWidthUpper(k); });
+}
+
+void RunStraightforward(State& state, const Straightforward& plain, const Task& task) {
+  const PlainZonotope initial_set{task.center, task.half_width.asDiagonal()};
+  if (plain.Certify(task.controls, initial_set, task.obstacles).outcome != Straightforward::Outcome::kCertified)
+    return state.SkipWithError("no certificate");
+  Straightforward::Answer answer;
+  for (auto _ : state) {
+    answer = plain.Certify(task.controls, initial_set, task.obstacles);
+    benchmark::DoNotOptimize(answer.outcome);
+  }
+  const Eigen::VectorXd half_width = answer.tube.back().HalfWidth();
+  AddWidths(state, [&](int k) { return half_width[k]; });
+}
+
+// Each thread certifies `kBatch` plans an iteration with a tube of its own; the certifier is shared.
+void RunBatch(State& state, int observations) {
+  const Task& task = CachedTask(Scenario::kBicycle, observations);
+  const Certifier& certifier = CachedCertifier(Scenario::kBicycle, observations);
+  const std::vector<Eigen::MatrixXd> plans = MakePlans(task, kBatch);
+  const Zonotope initial_set = task.initial_set();
+  Tube tube;
+  for (auto _ : state)
+    for (const Eigen::MatrixXd& plan : plans)
+      benchmark::DoNotOptimize(certifier.Certify(Task::PlanOf(plan), initial_set, task.obstacles, tube));
+  state.SetItemsProcessed(state.iterations() * kBatch);
+}
+
+void RegisterCertify(Scenario scenario, int observations) {
+  const std::string suffix = NameOf(scenario, observations);
+  benchmark::RegisterBenchmark(std::string("certify/").append(suffix).c_str(), [=](State& state) {
+    RunCertify(state, CachedCertifier(scenario, observations), CachedTask(scenario, observations));
+  })->Unit(benchmark::kMicrosecond);
+  // The cost of rigour: where the kernel has a variant without rounding bounds, register it here as
+  // "certify_unrounded/" + suffix, in the same way. The report then shows the ratio; without it, it says "not
+  // measured".
+
+  // A second a call and more, and the same work a thousand times: not run.
+  if (observations > (scenario == Scenario::kDense ? 400 : 10'000)) return;
+  for (const auto& [name, spelling] : {std::pair("straightforward/", Straightforward::Spelling::kMatrices),
+                                       std::pair("straightforward_loops/", Straightforward::Spelling::kLoops)})
+    benchmark::RegisterBenchmark(std::string(name).append(suffix).c_str(), [=, spelling = spelling](State& state) {
+      const Task& task = CachedTask(scenario, observations);
+      RunStraightforward(state, Straightforward(task.problem, PlainModelOf(scenario), spelling), task);
+    })->Unit(benchmark::kMicrosecond);
+}
+
+void RegisterPlainPairwise(int observations) {
+  if (observations > 400) return;
+  const std::string name = std::string("straightforward_pairwise/").append(NameOf(Scenario::kBicycle, observations));
+  benchmark::RegisterBenchmark(name.c_str(), [=](State& state) {
+    const Straightforward plain(CachedTask(Scenario::kBicycle, observations).problem, PlainModelOf(Scenario::kBicycle));
+    for (auto _ : state) benchmark::DoNotOptimize(plain.FindViolation());
+  })->Unit(benchmark::kMicrosecond);
+}
+
+void RegisterNominalTube() {
+  for (const auto& [name, method] : {std::pair("nominal_tube/forereach", Method::kCentred),
+                                     std::pair("nominal_tube/forereach_paper", Method::kPaper)})
+    benchmark::RegisterBenchmark(name, [method = method](State& state) {
+      const Task task = MakeNominalTube(method);
+      RunCertify(state, Certifier(task.problem), task);
+    })->Unit(benchmark::kMicrosecond);
+  benchmark::RegisterBenchmark("nominal_tube/straightforward", [](State& state) {
+    const Task task = MakeNominalTube();
+    RunStraightforward(state, Straightforward(task.problem, PlainModelOf(Scenario::kBicycle)), task);
+  })->Unit(benchmark::kMicrosecond);
+}
+
+void RegisterBatch() {
+  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  for (int threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1)
+    benchmark::RegisterBenchmark("batch/bicycle/400", RunBatch, 400)
+        ->Threads(threads)
+        ->UseRealTime()
+        ->Unit(benchmark::kMicrosecond);
+}
+
+void RegisterAll(int largest) {
+  for (const int observations : kSizes) {
+    if (observations > largest) continue;
+    for (const Scenario scenario : kScenarios)
+      if (scenario != Scenario::kDense || observations <= kLargestDense) RegisterCertify(scenario, observations);
+    RegisterPlainPairwise(observations);
+    RegisterStages(observations);
+  }
+  RegisterNominalTube();
+  RegisterBatch();
+}
+
+// Takes --largest=N out of the arguments.
+int TakeLargest(int& argc, char** argv) {
+  constexpr std::string_view flag = "--largest=";
+  int largest = kSizes.back(), kept = 1;
+  for (int i = 1; i < argc; ++i) {
+    if (std::string_view(argv[i]).starts_with(flag))
+      largest = std::atoi(argv[i] + flag.size());
+    else
+      argv[kept++] = argv[i];
+  }
+  argc = kept;
+  return largest;
+}
+
+}  // namespace
+}  // namespace forereach::bench
+
+int main(int argc, char** argv) {
+  const int largest = forereach::bench::TakeLargest(argc, argv);
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  forereach::bench::RegisterAll(largest);
+  benchmark::RunSpecifiedBenchmarks();
+}

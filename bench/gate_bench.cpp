@@ -1,0 +1,81 @@
+// The gate whole, bytes in and messages out, and what it does beside certifying: digests and codecs.
+//   gate_bench [any flag of Google Benchmark]
+#include <chrono>
+
+#include <benchmark/benchmark.h>
+
+#include "bench/candidates.h"
+#include "certifier/gate/gate.h"
+
+namespace forereach::bench {
+namespace {
+
+using benchmark::State;
+
+constexpr int kObservations = 400;
+constexpr std::int64_t kNow = 1'700'000'000'000'000;
+
+Task TaskFor(std::int16_t outcome) {
+  return outcome == decision_t::CERTIFIED ? MakeTask(Scenario::kBicycle, kObservations)
+                                          : MakeBlockedTask(Scenario::kBicycle, kObservations);
+}
+
+// Bytes to encoded answers, as the process does it. Only that is timed: each candidate needs a new plan_id.
+void RunDecide(State& state, std::int16_t outcome) {
+  const Task task = TaskFor(outcome);
+  Gate gate(MakeConfig(task));
+  candidate_plan_t candidate = MakeCandidate(task);
+  std::int64_t plan_id = 0;
+  for (auto _ : state) {
+    Stamp(candidate, ++plan_id, kNow);
+    const std::vector<std::uint8_t> bytes = Encode(candidate);
+    const auto begin = std::chrono::steady_clock::now();
+    const GateAnswer answer = gate.Decide(bytes, kNow);
+    if (answer.certified) benchmark::DoNotOptimize(Encode(*answer.certified));
+    benchmark::DoNotOptimize(Encode(answer.decision));
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+    state.SetIterationTime(elapsed.count());
+    if (answer.decision.outcome != outcome) return state.SkipWithError("not the outcome the task is made for");
+  }
+}
+
+// What the gate's answer contains of the certify call alone: the same task, the same candidate.
+void RunCertifyAlone(State& state) {
+  const Task task = TaskFor(decision_t::CERTIFIED);
+  const Certifier certifier(task.problem);
+  const Zonotope initial_set = task.initial_set();
+  Tube tube;
+  for (auto _ : state) benchmark::DoNotOptimize(certifier.Certify(task.plan(), initial_set, task.obstacles, tube));
+}
+
+void RunDecode(State& state) {
+  const std::vector<std::uint8_t> bytes = Encode(MakeCandidate(TaskFor(decision_t::CERTIFIED)));
+  candidate_plan_t candidate;
+  for (auto _ : state) benchmark::DoNotOptimize(Decode(bytes, candidate));
+}
+
+template <class Message>
+void RunEncode(State& state) {
+  const Message message{};
+  for (auto _ : state) benchmark::DoNotOptimize(Encode(message));
+}
+
+template <class Message>
+void RunDigest(State& state) {
+  const std::vector<std::uint8_t> bytes = Encode(Message{});
+  for (auto _ : state) benchmark::DoNotOptimize(DigestOf(Bytes(bytes)));
+}
+
+BENCHMARK_CAPTURE(RunDecide, certified, decision_t::CERTIFIED)->Name("gate/certified")->UseManualTime();
+BENCHMARK_CAPTURE(RunDecide, blocked, decision_t::ABSTAIN_SAFETY)->Name("gate/abstained")->UseManualTime();
+BENCHMARK(RunCertifyAlone)->Name("gate/certify_alone");
+BENCHMARK(RunDecode)->Name("gate/decode_candidate");
+BENCHMARK_TEMPLATE(RunDigest, candidate_plan_t)->Name("gate/digest_candidate");
+BENCHMARK_TEMPLATE(RunDigest, certified_plan_t)->Name("gate/digest_certified");
+BENCHMARK_TEMPLATE(RunEncode, decision_t)->Name("gate/encode_decision");
+BENCHMARK_TEMPLATE(RunEncode, certified_plan_t)->Name("gate/encode_certified");
+
+}  // namespace
+}  // namespace forereach::bench
+
+BENCHMARK_MAIN();

@@ -1,0 +1,284 @@
+#!/usr/bin/env python3
+"""Writes the performance report: fills the @names@ of a template from the benchmarks' JSON. No figure is typed by hand.
+
+  bench/report.py --results DIR --build DIR [--load L] [--command TEXT] TEMPLATE OUTPUT
+"""
+import argparse
+import json
+import math
+import os
+import re
+import subprocess
+from datetime import date
+from pathlib import Path
+
+SIZES = [25, 400, 10_000, 1_000_000]
+SCENARIOS = ["bicycle", "point_mass", "dense"]
+TO_MICROSECONDS = {"ns": 1e-3, "us": 1, "ms": 1e3, "s": 1e6}
+
+
+class Benchmark:
+    """The median of one benchmark's repetitions; times in microseconds."""
+
+    def __init__(self, entry):
+        scale = TO_MICROSECONDS[entry["time_unit"]]
+        self.cpu, self.real = entry["cpu_time"] * scale, entry["real_time"] * scale
+        self.rate = entry.get("items_per_second")
+        self.widths = [entry.get("width_" + name) for name in ("x", "y", "theta")]
+
+
+def read_benchmarks(path):
+    found = {}
+    for entry in json.loads(path.read_text())["benchmarks"]:
+        if not entry.get("error_occurred") and entry.get("aggregate_name", "median") == "median":
+            found[entry["run_name"]] = Benchmark(entry)
+    return found
+
+
+def number(value, digits=3):
+    """To so many significant digits, at least all those before the point; with thousands set apart."""
+    if value is None:
+        return "-"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value)))) if value else 0
+    return f"{value:,.{decimals}f}"
+
+
+def table(header, rows):
+    lines = [header, ["---"] + ["---:"] * (len(header) - 1)] + rows
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def size_name(size):
+    return f"{size:,}"
+
+
+def ratio(a, b):
+    return a / b if a is not None and b is not None else None
+
+
+class Report:
+    def __init__(self, arguments):
+        self.arguments = arguments
+        results = Path(arguments.results)
+        self.benchmarks = {}
+        for name in ("certify_bench", "gate_bench", "comparison"):
+            self.benchmarks |= read_benchmarks(results / f"{name}.json")
+        self.tail_data = json.loads((results / "tail.json").read_text())
+        self.bus_data = json.loads((results / "bus_round_trip.json").read_text())
+
+    def cpu(self, name):
+        return self.benchmarks[name].cpu if name in self.benchmarks else None
+
+    # What stands for each @name@ of the template.
+
+    def command(self):
+        return self.arguments.command
+
+    def machine(self):
+        lscpu = dict(line.split(":", 1) for line in output("lscpu").splitlines() if ":" in line)
+        compiler, flags = compiled_with(Path(self.arguments.build))
+        commit = output("git", "rev-parse", "--short", "HEAD")
+        changed = " with changes" if output("git", "status", "--porcelain", "--untracked-files=no") else ""
+        return table(["", ""], [
+            ["processor", f"{lscpu.get('Model name', '?').strip()}, {os.cpu_count()} cores" + virtualised(lscpu)],
+            ["system", f"{os_name()}, Linux {os.uname().release}"],
+            ["compiler", compiler],
+            ["flags", f"`{flags}`"],
+            ["commit", commit + changed],
+            ["date", date.today().isoformat()],
+            ["load before", self.arguments.load],
+        ]).replace("---:", "---")
+
+    def done(self):
+        certify = {n: self.cpu(f"certify/bicycle/{n}") for n in SIZES}
+        speedup = ratio(self.cpu("straightforward/bicycle/400"), certify[400])
+        growth = None
+        if certify[400] and certify[1_000_000]:
+            growth = math.log(certify[1_000_000] / certify[400]) / math.log(1_000_000 / 400)
+        rigour = ratio(certify[400], self.cpu("certify_unrounded/bicycle/400"))
+        threads, scaling = self.scaling()
+        rows = [
+            at_least("ratio to the straightforward version, bicycle, N = 400", speedup, 250),
+            at_least("the same to its spelling by loops",
+                     ratio(self.cpu("straightforward_loops/bicycle/400"), certify[400]), 250),
+            at_most("growth of the time from N = 400 to 10^6, as a power of N", growth, 0.12),
+            at_most("rigour: time over the same code without rounding bounds", rigour, 1.05),
+            at_most("p99 of the bus with the certifier over a bare echo, certificates",
+                    self.bus_data["certified"]["ratio_p99"], 1.2),
+            at_most("the same, abstentions", self.bus_data["abstained"]["ratio_p99"], 1.2),
+            at_most("dense declaration, N = 400, microseconds", self.cpu("certify/dense/400"), 100),
+            at_most("bicycle, N = 400, microseconds", certify[400], 3),
+            at_most("bicycle, N = 10^6, microseconds", certify[1_000_000], 5),
+            at_least(f"batch on {threads} cores over one core", scaling, 0.9 * threads),
+        ]
+        return table(["", "asked", "measured", ""], rows)
+
+    def certify(self):
+        rows = []
+        for scenario in SCENARIOS:
+            for size in SIZES:
+                ours, plain, loops = (self.cpu(f"{kind}/{scenario}/{size}")
+                                      for kind in ("certify", "straightforward", "straightforward_loops"))
+                if ours or plain:
+                    rows.append([f"{scenario}, N = {size_name(size)}", number(ours), number(plain),
+                                 number(ratio(plain, ours)), number(loops), number(ratio(loops, ours))])
+        return table(["", "ForeReach", "straightforward", "ratio", "by loops", "ratio"], rows)
+
+    def stages(self):
+        by_stage = {}
+        for name in self.benchmarks:
+            if match := re.fullmatch(r"stage/(\w+)/(\w+)/(\d+)", name):
+                by_stage.setdefault(match[1], {}).setdefault(match[2], {})[int(match[3])] = self.cpu(name)
+        rows = []
+        for stage, scenarios in by_stage.items():
+            for scenario, times in scenarios.items():
+                if list(times) == [400]:  # does not depend on N
+                    rows.append([stage.replace("_", ", "), number(times[400]), "", "", ""])
+                else:
+                    rows.append([f"{stage.replace('_', ', ')}, {scenario}"] + [number(times.get(n)) for n in SIZES])
+        rows.sort(key=lambda row: (row[2] == "", row[0]))
+        return table(["", *("N = " + size_name(n) for n in SIZES)], rows)
+
+    def plain_pairwise(self):
+        times = [f"{number(time)} us at N = {n}" for n in SIZES
+                 if (time := self.cpu(f"straightforward_pairwise/bicycle/{n}"))]
+        return ", ".join(times) or "not measured"
+
+    def insertion(self):
+        times = [f"{number(time)} us at N = {n}" for n in SIZES if (time := self.cpu(f"stage/insertion/bicycle/{n}"))]
+        return ", ".join(times) or "not measured, the library cannot do it yet"
+
+    def batch_rates(self):
+        rates = {}
+        for name, benchmark in self.benchmarks.items():
+            if match := re.fullmatch(r"batch/.*/threads:(\d+)", name):
+                rates[int(match[1])] = benchmark.rate
+        return rates
+
+    def scaling(self):
+        rates = self.batch_rates()
+        most = max(rates, default=1)
+        return most, ratio(rates.get(most), rates.get(1))
+
+    def batch(self):
+        rates = self.batch_rates()
+        rows = [[str(threads), number(rate, 4), number(ratio(rate, rates[1]))] for threads, rate in sorted(rates.items())]
+        return ("Bicycle, N = 400: threads share one certifier, each with a tube of its own.\n\n"
+                + table(["threads", "plans a second", "over one thread"], rows))
+
+    def tail(self):
+        keys = ["p50", "p99", "p99.9", "p99.99", "max"]
+        rows = [[label] + [number(self.tail_data[name][key]) for key in keys]
+                for name, label in (("bicycle", "certify"), ("clock", "reading the clock alone"))]
+        return (f"{self.tail_data['bicycle']['count']:,} calls, bicycle, N = {self.tail_data['observations']}, microseconds.\n\n"
+                + table(["", *keys], rows))
+
+    def gate(self):
+        labels = {
+            "gate/certified/manual_time": "the whole gate, certificate",
+            "gate/abstained/manual_time": "the whole gate, abstention S",
+            "gate/certify_alone": "certify call within it",
+            "gate/decode_candidate": "decode the candidate",
+            "gate/digest_candidate": "digest of the candidate",
+            "gate/digest_certified": "digest of the certified plan",
+            "gate/encode_certified": "encode the certified plan (twice: for the digest and the bus)",
+            "gate/encode_decision": "encode the decision",
+        }
+        rows = []
+        for name, label in labels.items():
+            benchmark = self.benchmarks.get(name)
+            time = benchmark and (benchmark.real if "manual" in name else benchmark.cpu)
+            rows.append([label, number(time)])
+        return table(["", "us"], rows)
+
+    def candidate_bytes(self):
+        return f"{self.bus_data['candidate_bytes']:,}"
+
+    def decision_bytes(self):
+        return f"{self.bus_data['decision_bytes']:,}"
+
+    def certified_bytes(self):
+        return f"{self.bus_data['certified_bytes']:,}"
+
+    def bus(self):
+        rows = []
+        for name, label in (("certified", "certificate"), ("abstained", "abstention")):
+            data = self.bus_data[name]
+            rows.append([f"{label}: echo"] + [number(data["echo"][p]) for p in ("p50", "p99")])
+            rows.append([f"{label}: certifier"] + [number(data["certifier"][p]) for p in ("p50", "p99")])
+            rows.append([f"{label}: added"] + [number(data[f"added_{p}"]) for p in ("p50", "p99")])
+            rows.append([f"{label}: ratio"] + [number(data[f"ratio_{p}"]) for p in ("p50", "p99")])
+        counts = [self.bus_data[name]["certifier"]["count"] for name in ("certified", "abstained")]
+        lost = sum(self.bus_data[name]["lost"] for name in ("certified", "abstained"))
+        return table(["", "p50", "p99"], rows) + f"\n\n{sum(counts):,} round trips each, {lost} lost."
+
+    def nominal(self):
+        rows = []
+        for name, label, rigorous in (
+            ("sampled_inner_hull/iterations:1", "sampled inner hull", ""),
+            ("forereach", "**ForeReach**", "yes"),
+            ("forereach_paper", "**ForeReach**, method: paper", "yes"),
+            ("straightforward", "straightforward, Eigen", "no"),
+            ("boost_natural", "Boost.Interval, natural", "up to the C library's sin, cos, tan"),
+            ("boost_mean_value", "Boost.Interval, mean value", "up to the C library's sin, cos, tan"),
+        ):
+            if benchmark := self.benchmarks.get("nominal_tube/" + name):
+                time = "-" if "sampled" in name else number(benchmark.cpu)
+                rows.append([label, time, *(f"{width:.5f}" for width in benchmark.widths), rigorous])
+        return table(["tool", "median us", "x", "y", "theta", "rigorous"], rows)
+
+
+def output(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def virtualised(lscpu):
+    hypervisor = lscpu.get("Hypervisor vendor")
+    return f", virtual ({hypervisor.strip()})" if hypervisor else ""
+
+
+def os_name():
+    fields = dict(line.split("=", 1) for line in Path("/etc/os-release").read_text().splitlines() if "=" in line)
+    return fields.get("PRETTY_NAME", "?").strip('"')
+
+
+def compiled_with(build):
+    """Compiler and flags of the certifier library, as the build has them."""
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        if entry["file"].endswith("certifier/certify/certifier.cpp"):
+            words = entry["command"].split()
+            compiler = next(word for word in words if word.endswith(("++", "g++-12", "clang++")))
+            flags = [word for word in words if re.match(r"-(O|f|m|std|DNDEBUG)", word)]
+            return output(compiler, "--version").splitlines()[0], " ".join(flags)
+    return "?", "?"
+
+
+def at_most(label, value, bound):
+    return criterion(label, value, bound, "at most", lambda: value <= bound)
+
+
+def at_least(label, value, bound):
+    return criterion(label, value, bound, "at least", lambda: value >= bound)
+
+
+def criterion(label, value, bound, relation, met):
+    verdict = "not measured" if value is None else "met" if met() else "**not met**"
+    return [label, f"{relation} {bound:g}", number(value), verdict]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--results", required=True)
+    parser.add_argument("--build", required=True)
+    parser.add_argument("--load", default="?")
+    parser.add_argument("--command", default="scripts/bench")
+    parser.add_argument("template")
+    parser.add_argument("output")
+    arguments = parser.parse_args()
+    report = Report(arguments)
+    text = re.sub(r"@(\w+)@", lambda match: getattr(report, match[1])(), Path(arguments.template).read_text())
+    Path(arguments.output).write_text(text)
+
+
+if __name__ == "__main__":
+    main()
