@@ -47,7 +47,7 @@ inline PlainInterval TanCurvature(PlainInterval t) {
   return {2 * t.lower * (1 + t.lower * t.lower), 2 * t.upper * (1 + t.upper * t.upper)};
 }
 
-/** Sine and cosine of a small angle: the first term that Taylor's polynomials leave out is below 2^-53 up to 1/4. */
+/** Sine and cosine of a small angle: the first term that Taylor's polynomials leave out is below 2^-52 up to 1/4. */
 struct Turn {
   double sine, cosine;
 

@@ -50,8 +50,11 @@ class Analysis {
         return error(n.a);
       case Op::kAdd:
       case Op::kSubtract: {
-        const double rounding = Rounding(AddUp(Size(n.a), Size(n.b)));
-        return Error::Both(error(n.a), error(n.b), [&](double a, double b) { return AddUp(AddUp(a, b), rounding); });
+        const double size = AddUp(Size(n.a), Size(n.b));
+        return Error::Both(error(n.a), error(n.b), [&](double a, double b) {
+          const double errors = AddUp(a, b);
+          return AddUp(errors, Rounding(AddUp(size, errors)));
+        });
       }
       case Op::kMultiply:
         return Error::Both(error(n.a), error(n.b), [&](double a, double b) { return Product(Size(n.a), a, Size(n.b), b); });
@@ -68,7 +71,9 @@ class Analysis {
       }
       case Op::kTan: {
         const double t = range_[static_cast<std::size_t>(&n - program_.nodes.data())].Magnitude();
-        if (!(Size(n.a) <= 0x1p20 && t < 0x1p10)) return {infinity, infinity};
+        // The angle's own error has to be small for its slope to bound what it does.
+        if (!(Size(n.a) <= 0x1p20 && t < 0x1p10 && error(n.a).point <= 0x1p-30 && error(n.a).box <= 0x1p-30))
+          return {infinity, infinity};
         // Slope 1 + t^2. Sine over cosine, the latter at least 1 / sqrt(1 + t^2); over a box a quotient whose
         // denominator is as large, of numbers of size (1 + t)^2.
         const double slope = AddUp(1, MulUp(t, t)), wide = MulUp(MulUp(1 + t, 1 + t), MulUp(slope, 4));

@@ -91,7 +91,7 @@ bool DomainTest::LiesWellInside(const double* center, const double* half_width) 
     inside &= (lower_[l] < center[l] - reach) & (center[l] + reach < upper_[l]);
   }
   for (const auto& [coefficients, bound] : domain_.inequalities) {
-    double value = 0, size = std::abs(bound);
+    double value = 0, size = std::abs(bound) + 0x1p-1000;
     for (std::size_t l = 0; l < size_; ++l) {
       const double c = coefficients[static_cast<Eigen::Index>(l)];
       value += c * center[l] + std::abs(c) * half_width[l];
@@ -107,7 +107,7 @@ bool DomainTest::LiesWellInside(const double* center, const double* half_width) 
       const double reach = std::abs(center[l] - middle) + half_width[l] + kMargin * (std::abs(center[l]) + std::abs(middle));
       square += reach * reach;
     }
-    inside &= square * (1 + kMargin) < radius * radius * (1 - kMargin);
+    inside &= radius > 0x1p-400 && square * (1 + kMargin) < radius * radius * (1 - kMargin);
   }
   return inside;
 }

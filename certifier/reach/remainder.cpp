@@ -23,7 +23,7 @@ TermRange Diagonal(const PlainInterval& h, double r) {
 
 // max over 0 <= s <= r of 1/2 a s^2 + b s, b >= 0.
 double Peak(double a, double b, double r) {
-  return -a * r > b ? b * b / (-2 * a) : std::max(0.0, (a * r / 2 + b) * r);
+  return -a * r > b ? b * (b / (-2 * a)) : std::max(0.0, (a * r / 2 + b) * r);
 }
 
 // d_i d_l in [-negative, positive].
@@ -33,7 +33,7 @@ struct ProductRange {
 
 FOREREACH_INLINE ProductRange MixedProduct(const Zonotope& slice, std::size_t i, std::size_t l, double r_i, double r_l) {
   const double product = r_i * r_l;
-  if (!(product > 0x1p-900)) return {product, product};
+  if (!(product > 0x1p-400)) return {product, product};  // the squares below could underflow
   const double* g_i = slice.padded_row(static_cast<int>(i)).data();
   const double* g_l = slice.padded_row(static_cast<int>(l)).data();
   Lanes sum = AllLanes(0), difference = AllLanes(0);
@@ -118,10 +118,10 @@ void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, co
     TermRange range;
     if (term.first == term.second) {
       range = Diagonal(hessian[term.entry], r);
-      sums[term.output].margin += error[term.entry] * r * r + kTiny;
+      sums[term.output].margin += error[term.entry] * r * r + kTiny * (1 + Size(hessian[term.entry]));
     } else {
       range = Mixed(hessian[term.entry], products[term.pair], r * other);
-      sums[term.output].margin += error[term.entry] * r * other + kTiny;
+      sums[term.output].margin += error[term.entry] * r * other + kTiny * (1 + Size(hessian[term.entry]));
     }
     if (term.has_diagonal) {
       const PlainInterval& a = hessian[term.diagonal];
@@ -129,7 +129,7 @@ void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, co
       const double slope = Size(hessian[term.entry]) * other;
       range = {std::max(range.lower + diagonal.lower, -Peak(-a.lower, slope, r)),
                std::min(range.upper + diagonal.upper, Peak(a.upper, slope, r)), range.size + diagonal.size};
-      sums[term.output].margin += error[term.diagonal] * r * r;
+      sums[term.output].margin += error[term.diagonal] * r * r + kTiny * (1 + Size(a));
     }
     Sum& sum = sums[term.output];
     sum.lower += range.lower;

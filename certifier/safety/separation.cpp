@@ -63,6 +63,9 @@ double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vect
   return square.lower > 0 && distance < kInfinity ? distance : -kInfinity;  // NaN fails
 }
 
+// Shorter vectors have squares that underflow, and no direction that could be trusted.
+bool IsSafeLength(double length) { return length > 0x1p-400 && length < kInfinity; }
+
 // Directions are compared by plain arithmetic on unit vectors.
 class Search {
  public:
@@ -82,7 +85,7 @@ class Search {
 
   void Consider(const Vector& direction) noexcept {
     const double length = direction.norm();
-    if (!(length > 0 && length < kInfinity)) return;
+    if (!IsSafeLength(length)) return;
     ConsiderUnit(direction / length);
     ConsiderUnit(-direction / length);
   }
@@ -169,7 +172,7 @@ void Descend(Search& search, Vector nearest) noexcept {
   Vector kept[2] = {nearest, nearest};
   for (int step = 0; step < kMaxSteps; ++step) {
     const double length = nearest.norm();
-    if (!(length > 0 && length < kInfinity)) return;
+    if (!IsSafeLength(length)) return;
     const Vector lowest = search.Lowest(nearest / length);
     if (search.value() >= length * (1 - 1e-15)) return;
     const Vector first = NearestOnSegment(lowest, kept[0]), second = NearestOnSegment(lowest, kept[1]);
@@ -237,7 +240,7 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
   double square = 0;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     const Eigen::VectorXd& normal = obstacle.points()[0];
-    double gap = obstacle.offset(), size = std::abs(gap);
+    double gap = obstacle.offset(), size = std::abs(gap) + 0x1p-900;
     for (std::size_t k = 0; k < p; ++k) {
       const double d = normal[static_cast<Eigen::Index>(k)], part = std::abs(d) * slice.half_width[k];
       gap -= d * slice.center[k] + part;
@@ -245,7 +248,7 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
       square += d * d;
     }
     const double distance = (gap - kMargin * size) / std::sqrt(square) * (1 - kMargin);
-    return {distance > 0 && distance < kInfinity && square > 0x1p-900 ? distance : -kInfinity, 0};
+    return {distance > 0x1p-400 && distance < kInfinity && square > 0x1p-400 ? distance : -kInfinity, 0};
   }
   for (std::size_t k = 0; k < p; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
@@ -260,7 +263,7 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
 
 Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept {
   const Vector direction = BestDirection(slice, obstacle);
-  if (obstacle.kind() != Obstacle::Kind::kHalfSpace)  // other directions have unit length
+  if (obstacle.kind() != Obstacle::Kind::kHalfSpace && std::abs(direction.squaredNorm() - 1) < 0x1p-46)
     if (const Separation plain{PlainDistanceLower(slice, obstacle, direction), obstacle.radius()}; plain.IsProven()) return plain;
   return {DistanceLower(slice, obstacle, direction), obstacle.radius()};
 }

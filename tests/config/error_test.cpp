@@ -152,7 +152,7 @@ TEST_F(ErrorTest, WordsThatAreNotKnown) {
   EXPECT_EQ(files_.ErrorWith("point_mass", "pointmass"),
             "task.yaml:1: model.name: pointmass is not known; did you mean point_mass?");
   EXPECT_EQ(ErrorAfter("certifier: {method: magic}\n"),
-            "task.yaml:19: certifier.method: magic is not known; known here: paper");
+            "task.yaml:19: certifier.method: magic is not known; known here: centred, paper");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, pz]"),
             "task.yaml:17: task.projection[1]: pz is not a coordinate; did you mean px?");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, ax]"),

@@ -351,9 +351,19 @@ TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
         ASSERT_LE(Rational(s.distance) * Rational(s.distance) * square, gap * gap);
         ASSERT_GT(gap, 0);
       }
-      const double distance = gap.get_d() / std::sqrt(square.get_d());
-      ASSERT_NEAR(s.distance, distance, 1e-11 * (1 + std::abs(distance) + std::abs(offset) / scale));
     }
+    const double distance = gap.get_d() / std::sqrt(square.get_d());
+    ASSERT_NEAR(Separate(slice, Obstacle::HalfSpace(normal, offset)).distance, distance,
+                1e-11 * (1 + std::abs(distance) + std::abs(offset) / scale));
+  }
+}
+
+// The normal of a generator whose squares underflow is no unit vector.
+TEST(PlanarSeparation, TinyGeneratorsProveNothingWrong) {
+  for (const double tiny : {1.22 * 0x1p-537, 0x1p-538, 0x1p-600, 0x1p-1074}) {
+    const Zonotope slice(Eigen::Vector2d::Zero(), Eigen::Vector2d(tiny, 0));
+    EXPECT_FALSE(Separate(slice, Obstacle::Circle(Eigen::Vector2d(0, 0.9), 1)).IsProven()) << tiny;
+    EXPECT_TRUE(Separate(slice, Obstacle::Circle(Eigen::Vector2d(0, 1.1), 1)).IsProven()) << tiny;
   }
 }
 

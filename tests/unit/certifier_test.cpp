@@ -26,8 +26,8 @@ constexpr int kPx = 0, kVx = 2, kVy = 3, kAx = 4;
 constexpr int kTheta = 2, kV = 3, kDelta = 5, kJerk = 6;
 
 static_assert(noexcept(std::declval<const Certifier&>().Certify({}, std::declval<const Zonotope&>(), {}, std::declval<Tube&>())));
-static_assert(noexcept(std::declval<const Propagator&>().Step(std::declval<const Zonotope&>(), {}, std::declval<Zonotope&>(),
-                                                              std::declval<StepRecord&>())));
+static_assert(noexcept(std::declval<const Propagator&>().Step(std::declval<const Zonotope&>(), {}, std::declval<StepRecord&>(),
+                                                              std::declval<Zonotope&>(), nullptr)));
 
 Eigen::VectorXd Vec(std::initializer_list<double> entries) {
   Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
@@ -268,7 +268,7 @@ TEST(Certifier, ConstantResidualMovesTheTube) {
   EXPECT_NEAR(judge.tube().slice(1).Hull(kVx).upper, 1.375, 1e-15);
   EXPECT_LE(judge.tube().slice(1).Hull(kVx).lower, 1.125);
   EXPECT_GE(judge.tube().slice(1).Hull(kVx).upper, 1.375);
-  EXPECT_EQ(judge.tube().step(0).remainder[0], 0) << "an affine model has no remainder";
+  EXPECT_EQ(judge.tube().step(0).remainder.half_width[0], 0) << "an affine model has no remainder";
 }
 
 TEST(Certifier, UsesTheHullDistanceOnlyAboveTwelveColumns) {
