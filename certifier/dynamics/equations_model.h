@@ -4,6 +4,7 @@ function, evaluated over extended precision, over dual intervals at a point, and
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,9 @@ class EquationsModel final : public NominalModel {
   static constexpr int kStates = Equations::kStates, kVariables = Equations::kStates + Equations::kInputs;
   static_assert(kStates <= kMaxStates && Equations::kInputs <= kMaxInputs);
 
-  EquationsModel(Equations equations, std::string description)
+  EquationsModel(Equations equations, std::string description, std::map<std::string, double> parameters)
       : equations_(equations),
+        parameters_(std::move(parameters)),
         name_(Equations::kName),
         description_(std::move(description)),
         state_names_(Equations::kStateNames.begin(), Equations::kStateNames.end()),
@@ -29,6 +31,7 @@ class EquationsModel final : public NominalModel {
   const std::vector<std::string>& state_names() const override { return state_names_; }
   const std::vector<std::string>& input_names() const override { return input_names_; }
   std::string description() const override { return description_; }
+  std::map<std::string, double> parameters() const override { return parameters_; }
 
   void Evaluate(std::span<const double> z, std::span<double> next) const noexcept override {
     std::array<long double, kVariables> wide;
@@ -75,6 +78,7 @@ class EquationsModel final : public NominalModel {
   }
 
   Equations equations_;
+  std::map<std::string, double> parameters_;
   std::string name_, description_;
   std::vector<std::string> state_names_, input_names_;
 };

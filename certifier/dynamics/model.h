@@ -5,6 +5,7 @@ d_z = states + inputs entries. */
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -46,6 +47,9 @@ class NominalModel {
   [[nodiscard]] virtual const std::vector<std::string>& input_names() const = 0;
   /** Name and parameters, enough to tell two models apart: what the model's digest is made of. */
   [[nodiscard]] virtual std::string description() const = 0;
+  /** The numbers in the equations by name, all of them, so that others can write the same equations down. Empty where
+  a model cannot be told by numbers. */
+  [[nodiscard]] virtual std::map<std::string, double> parameters() const { return {}; }
 
   [[nodiscard]] int num_states() const { return static_cast<int>(state_names().size()); }
   [[nodiscard]] int num_inputs() const { return static_cast<int>(input_names().size()); }

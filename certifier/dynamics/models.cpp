@@ -19,14 +19,16 @@ void RequirePositive(const char* name, double value) {
 
 std::shared_ptr<const NominalModel> MakePointMass(double dt) {
   RequirePositive("dt", dt);
-  return std::make_shared<EquationsModel<PointMass>>(PointMass{dt}, "point_mass dt=" + ToText(dt));
+  return std::make_shared<EquationsModel<PointMass>>(PointMass{dt}, "point_mass dt=" + ToText(dt),
+                                                     std::map<std::string, double>{{"dt", dt}});
 }
 
 std::shared_ptr<const NominalModel> MakeKinematicBicycle(double dt, double wheelbase) {
   RequirePositive("dt", dt);
   RequirePositive("wheelbase", wheelbase);
   return std::make_shared<EquationsModel<KinematicBicycle>>(
-      KinematicBicycle{dt, wheelbase}, "kinematic_bicycle dt=" + ToText(dt) + " wheelbase=" + ToText(wheelbase));
+      KinematicBicycle{dt, wheelbase}, "kinematic_bicycle dt=" + ToText(dt) + " wheelbase=" + ToText(wheelbase),
+      std::map<std::string, double>{{"dt", dt}, {"wheelbase", wheelbase}});
 }
 
 }  // namespace forereach
