@@ -89,7 +89,7 @@ class Search {
       const Eigen::VectorXd& normal = obstacle_.points()[0];
       return Try(RealVector(normal.begin(), normal.end()));
     }
-    if (TryTowardsCore()) return true;
+    if (TryTowardsCore() || TryNearestPoint()) return true;
     CollectNormals();
     return TryBest();
   }
@@ -166,25 +166,121 @@ class Search {
     }
   }
 
+  // A corner of {core - slice}: which point of the core, and the sign of every generator.
+  struct Choice {
+    std::size_t point;
+    std::vector<bool> plus;
+
+    bool operator==(const Choice&) const = default;
+  };
+
+  [[nodiscard]] Choice LowestAlong(const Vector& d) const {
+    Choice choice{0, {}};
+    for (std::size_t i = 1; i < core_.size(); ++i)
+      if (d.dot(rough_core_[i]) < d.dot(rough_core_[choice.point])) choice.point = i;
+    for (const Vector& g : rough_generators_) choice.plus.push_back(d.dot(g) > 0);
+    return choice;
+  }
+  [[nodiscard]] Vector Rough(const Choice& choice) const {
+    Vector corner = rough_core_[choice.point];
+    for (std::size_t j = 0; j < choice.plus.size(); ++j)
+      corner += choice.plus[j] ? Vector(-rough_generators_[j]) : rough_generators_[j];
+    return corner;
+  }
+  [[nodiscard]] RealVector Exact(const Choice& choice) const {
+    RealVector corner = core_[choice.point];
+    for (std::size_t j = 0; j < choice.plus.size(); ++j)
+      for (std::size_t k = 0; k < corner.size(); ++k) {
+        if (choice.plus[j])
+          corner[k] -= slice_.generators()[j][k];
+        else
+          corner[k] += slice_.generators()[j][k];
+      }
+    return corner;
+  }
+
+  // The point of {core - slice} next to the origin, by Wolfe's algorithm in doubles; then the same point of the face
+  // that it ended on in full, whose direction is the best there is.
+  bool TryNearestPoint() {
+    std::vector<Choice> corners{LowestAlong(Rough(LowestAlong(rough_core_.front())))};
+    std::vector<double> weights{1};
+    Vector nearest = Rough(corners.front());
+    for (int round = 0; round < 200 && nearest.norm() > 0; ++round) {
+      const Choice next = LowestAlong(nearest);
+      const double progress = nearest.squaredNorm() - nearest.dot(Rough(next));
+      if (progress <= 1e-15 * nearest.squaredNorm() || std::ranges::find(corners, next) != corners.end()) break;
+      corners.push_back(next);
+      weights.push_back(0);
+      while (!MoveToAffineMinimum(corners, weights)) {
+      }
+      nearest.setZero();
+      for (std::size_t i = 0; i < corners.size(); ++i) nearest += weights[i] * Rough(corners[i]);
+    }
+    const RealVector d = ExactAffineMinimum(corners);
+    return !d.empty() && Try(d);
+  }
+
+  // Weights towards the affine minimum until one of them is zero; that corner goes. True if the minimum was reached.
+  bool MoveToAffineMinimum(std::vector<Choice>& corners, std::vector<double>& weights) const {
+    const auto size = static_cast<Eigen::Index>(corners.size());
+    Eigen::MatrixXd system = Eigen::MatrixXd::Ones(size + 1, size + 1);
+    system(size, size) = 0;
+    for (Eigen::Index i = 0; i < size; ++i)
+      for (Eigen::Index j = 0; j < size; ++j)
+        system(i, j) = Rough(corners[static_cast<std::size_t>(i)]).dot(Rough(corners[static_cast<std::size_t>(j)]));
+    const Eigen::VectorXd target = system.completeOrthogonalDecomposition().solve(Eigen::VectorXd::Unit(size + 1, size));
+    double step = 1;
+    std::size_t leaves = corners.size();
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const double end = target[static_cast<Eigen::Index>(i)];
+      if (!(end <= 0)) continue;
+      const double fraction = weights[i] > end ? weights[i] / (weights[i] - end) : 0;
+      if (fraction <= step) step = fraction, leaves = i;
+    }
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      weights[i] += step * (target[static_cast<Eigen::Index>(i)] - weights[i]);
+    if (leaves == corners.size() || corners.size() == 1) return true;
+    corners.erase(corners.begin() + static_cast<std::ptrdiff_t>(leaves));
+    weights.erase(weights.begin() + static_cast<std::ptrdiff_t>(leaves));
+    return corners.size() == 1;
+  }
+
+  // p_0 + sum a_i (p_i - p_0) of least length, by Gauss's elimination on middles; empty where it is singular.
+  [[nodiscard]] RealVector ExactAffineMinimum(const std::vector<Choice>& corners) const {
+    RealVector nearest = Exact(corners.front());
+    std::vector<RealVector> edges, rows;
+    for (std::size_t i = 1; i < corners.size(); ++i) edges.push_back(Minus(Exact(corners[i]), nearest));
+    for (const RealVector& a : edges) {
+      RealVector& row = rows.emplace_back();
+      for (const RealVector& b : edges) row.push_back(Dot(a, b).middle());
+      row.push_back((-Dot(a, nearest)).middle());
+    }
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      if (rows[i][i].IsZero()) return {};
+      for (std::size_t r = 0; r < rows.size(); ++r) {
+        if (r == i) continue;
+        const Real factor = (rows[r][i] / rows[i][i]).middle();
+        for (std::size_t c = i; c < rows[r].size(); ++c) rows[r][c] = (rows[r][c] - factor * rows[i][c]).middle();
+      }
+    }
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      for (std::size_t k = 0; k < nearest.size(); ++k)
+        nearest[k] += (rows[i].back() / rows[i][i]).middle() * edges[i][k];
+    for (Real& entry : nearest) entry = entry.middle();
+    return nearest;
+  }
+
   // The corner of {core - slice} that d + tilt, tilt infinitely small, supports: in full.
   [[nodiscard]] RealVector Corner(const Vector& d, const Vector& tilt) const {
     const auto side = [&](const Vector& x) {
       const double along = d.dot(x);
       return std::abs(along) > 1e-12 * x.norm() ? along : tilt.dot(x);
     };
-    std::size_t lowest = 0;
+    Choice choice{0, {}};
     for (std::size_t i = 1; i < core_.size(); ++i)
-      if (side(rough_core_[i] - rough_core_[lowest]) < 0) lowest = i;
-    RealVector corner = core_[lowest];
-    for (std::size_t j = 0; j < rough_generators_.size(); ++j)
-      for (std::size_t k = 0; k < corner.size(); ++k) {
-        const Real& g = slice_.generators()[j][k];
-        if (side(rough_generators_[j]) > 0)
-          corner[k] -= g;
-        else
-          corner[k] += g;
-      }
-    return corner;
+      if (side(rough_core_[i] - rough_core_[choice.point]) < 0) choice.point = i;
+    for (const Vector& g : rough_generators_) choice.plus.push_back(side(g) > 0);
+    return Exact(choice);
   }
 
   bool TryBest() {
