@@ -1,7 +1,8 @@
 /** How far a projected slice is from an obstacle: lower bounds from directions, each evaluated in high precision.
 
 For any direction d:   min {d . w : w in core} - max {d . y : y in P X} <= |d|_2 * distance(core, P X).
-Doubles choose directions, by the generators, edges and corners that they come from; these are then taken in full. */
+The largest value belongs to the direction of the nearest point of {core - P X}, found by Wolfe's algorithm with the
+bits of Precision, so that nothing that a double can tell is lost. */
 #pragma once
 
 #include <vector>
@@ -33,8 +34,8 @@ class ProjectedSlice final {
   std::vector<std::vector<Real>> generators_;
 };
 
-/** Whether the distance from slice to obstacle exceeds `clearance` (is at least that, if it is positive): kYes is a
-proof, kNo says that no direction of the search gives one. @param best the largest lower bound found. */
+/** Whether the distance from slice to obstacle is above zero, and at least `clearance`. kYes is a proof; kNo says that
+the best direction gives none. @param best the largest lower bound found. */
 [[nodiscard]] Answer IsClear(const ProjectedSlice& slice, const Obstacle& obstacle, double clearance, Real& best);
 
 }  // namespace forereach::verifier

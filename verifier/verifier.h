@@ -19,6 +19,9 @@ everything that was recorded, and keeps clear of every obstacle. Refuted: one of
 
 namespace forereach::verifier {
 
+/** The method that the problem asks for. */
+[[nodiscard]] Method MethodOf(const Problem& problem);
+
 /** What was recorded of X_t; what has no entries was not recorded. */
 struct RecordedSlice {
   Eigen::VectorXd lower, upper;        ///< The hull by its ends ...

@@ -181,7 +181,7 @@ Counts RunProblem(std::uint64_t seed, long number, Tube& tube, std::mutex& outpu
     ++counts.calls;
     if (decision.outcome != Outcome::kCertified) continue;
     ++counts.certified;
-    if (!judge) judge = std::make_unique<verifier::Verifier>(problem, MethodOf(*problem));
+    if (!judge) judge = std::make_unique<verifier::Verifier>(problem, verifier::MethodOf(*problem));
     const auto verdict = judge->Verify(CertificateOf(*certifier, query.plan(), query.initial_set, query.obstacles, tube));
     counts.confirmed += verdict.status == verifier::Status::kConfirmed;
     counts.refuted += verdict.status == verifier::Status::kRefuted;

@@ -55,7 +55,4 @@ namespace forereach {
   return certificate;
 }
 
-/** The method in a problem, in the verifier's words. */
-[[nodiscard]] inline verifier::Method MethodOf(const Problem&) { return verifier::Method::kPaper; }
-
 }  // namespace forereach
