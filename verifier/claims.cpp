@@ -1,7 +1,7 @@
 #include "verifier/claims.h"
 
-#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "verifier/separation.h"
 
@@ -10,29 +10,27 @@ namespace {
 
 std::size_t Index(Eigen::Index k) { return static_cast<std::size_t>(k); }
 
-// Collects claims a <= b and keeps the first that fails.
+// Keeps the first claim that fails. Words are made for that one only.
 class Claims {
  public:
   Claims(int step, std::optional<Failure>& failure) : step_(step), failure_(failure) {}
 
-  /** `found` has to be at most (with least = true: at least) `bound`. A NaN bounds nothing. */
-  void AtMost(const std::string& what, const Real& found, const Real& bound) {
-    Judge(IsAtMost(found, bound), what, found, bound);
+  /** `found` has to be at most (at least) `bound`, `what` says of what. A NaN bounds nothing. Deviations are seen
+  against `scale`. */
+  template <class What>
+  void AtMost(const Real& found, const Real& bound, const Real& scale, What what) {
+    Judge(IsAtMost(found, bound), found, bound, scale, what);
   }
-  void AtLeast(const std::string& what, const Real& found, const Real& bound) {
-    Judge(IsAtMost(bound, found), what, found, bound);
+  template <class What>
+  void AtLeast(const Real& found, const Real& bound, const Real& scale, What what) {
+    Judge(IsAtMost(bound, found), found, bound, scale, what);
   }
-  void Judge(Answer answer, const std::string& what, const Real& found, const Real& bound) {
+  template <class What>
+  void Judge(Answer answer, const Real& found, const Real& bound, const Real& scale, What what) {
     if (failure_ || answer == Answer::kYes) return;
-    failure_ = Failure{step_, what, found.text(), bound.text(), answer == Answer::kNo};
-    const Real scale = max(abs(found), abs(bound)), excess = abs(found - bound);
-    if (scale.IsFinite() && !scale.IsZero()) failure_->excess = (excess / scale).ToDouble();
-  }
-  /** The same, with the size that a deviation is to be seen against. */
-  void JudgeAgainst(Answer answer, const std::string& what, const Real& found, const Real& bound, const Real& scale) {
-    const bool first = !failure_;
-    Judge(answer, what, found, bound);
-    if (first && failure_ && !scale.IsZero()) failure_->excess = (abs(found - bound) / scale).ToDouble();
+    failure_ = Failure{step_, what(), found.text(), bound.text(), answer == Answer::kNo};
+    if (const Real excess = abs(found - bound); excess.IsFinite() && !scale.IsZero())
+      failure_->excess = (excess / scale).ToDouble();
   }
 
  private:
@@ -57,51 +55,59 @@ class SliceCheck {
  private:
   [[nodiscard]] const std::string& name(int k) const { return problem_.model->state_names()[Index(k)]; }
 
-  void Contains(const std::string& what, int k, const Real& lower, const Real& upper) {
-    const Real &c = slice_.center[Index(k)], r = slice_.HalfWidth(k), scale = abs(c) + r;
-    claims_.JudgeAgainst(IsAtMost(lower, c - r), what + " contains " + name(k) + " of the slice", lower, c - r, scale);
-    claims_.JudgeAgainst(IsAtMost(c + r, upper), what + " contains " + name(k) + " of the slice", upper, c + r, scale);
-  }
-
   void CheckHull(int k) {
-    if (recorded_.lower.size() > 0) Contains("the recorded hull", k, recorded_.lower[k], recorded_.upper[k]);
+    const Real &c = slice_.center[Index(k)], r = slice_.HalfWidth(k), lower = c - r, upper = c + r, scale = abs(c) + r;
+    const auto contains = [&](const char* which, const Real& below, const Real& above) {
+      const auto what = [&] { return std::string(which) + " contains " + name(k) + " of the slice"; };
+      claims_.AtMost(below, lower, scale, what);
+      claims_.AtLeast(above, upper, scale, what);
+    };
+    if (recorded_.lower.size() > 0) contains("the recorded hull", recorded_.lower[k], recorded_.upper[k]);
     if (recorded_.center.size() == 0) return;
     const Real center(recorded_.center[k]), half_width(recorded_.half_width[k]);
-    Contains("the recorded hull", k, center - half_width, center + half_width);
+    contains("the recorded hull", center - half_width, center + half_width);
     if (!recorded_.has_generators) return;
     Real sum;
-    for (const double g : recorded_.generators.row(k)) sum += Real(std::abs(g));
-    claims_.AtMost("the recorded generators stay in the recorded hull in " + name(k), sum, half_width);
-    Contains("the hull of the recorded generators", k, center - sum, center + sum);
+    for (const double g : recorded_.generators.row(k))
+      if (g != 0) sum += Real(std::abs(g));
+    claims_.AtMost(sum, half_width, half_width,
+                   [&] { return "the recorded generators stay in the recorded hull in " + name(k); });
+    contains("the hull of the recorded generators", center - sum, center + sum);
   }
 
   void CheckStep(int k) {
     const auto i = Index(k);
     if (recorded_.envelope_lower.size() > 0) {
       const auto& [lower, upper] = step_->envelope[i];
-      const std::string what = "the recorded envelope contains the residual of " + name(k);
-      claims_.AtMost(what, recorded_.envelope_lower[k], lower);
-      claims_.AtLeast(what, recorded_.envelope_upper[k], upper);
+      const Real scale = abs(lower) + abs(upper);
+      const auto what = [&] { return "the recorded envelope contains the residual of " + name(k); };
+      claims_.AtMost(recorded_.envelope_lower[k], lower, scale, what);
+      claims_.AtLeast(recorded_.envelope_upper[k], upper, scale, what);
     }
     if (recorded_.remainder.size() > 0) {
       const auto& [lower, upper] = step_->remainder[i];
-      claims_.AtLeast("the recorded remainder covers that of " + name(k), recorded_.remainder[k], Real(0.5) * (upper - lower));
+      const Real half = Real(0.5) * (upper - lower);
+      claims_.AtLeast(recorded_.remainder[k], half, half,
+                      [&] { return "the recorded remainder covers that of " + name(k); });
     }
   }
 
   void CheckSafety() {
     const ProjectedSlice projected(slice_, problem_.projection);
-    if (recorded_.radius)
-      claims_.AtLeast("the recorded radius covers the projected slice", *recorded_.radius, projected.Radius());
-    for (std::size_t o = 0; o < certificate_.obstacles.size(); ++o) {
+    if (recorded_.radius) {
+      const Real radius = projected.Radius();
+      claims_.AtLeast(*recorded_.radius, radius, radius, [] { return std::string("the recorded radius covers the projected slice"); });
+    }
+    for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
-      const std::string obstacle = "obstacle " + std::to_string(o);
-      if (!(claimed >= 0) || (claimed == 0 && !recorded_.clearance.empty()))
-        claims_.Judge(Answer::kNo, "the record claims to be clear of " + obstacle, claimed, 0.0);
-      if (failure_) return;
+      if (!recorded_.clearance.empty() && !(claimed > 0))
+        claims_.Judge(Answer::kNo, claimed, 0.0, 1.0,
+                      [&] { return "the record claims to be clear of obstacle " + std::to_string(o); });
       Real best;
       const Answer answer = IsClear(projected, certificate_.obstacles[o], claimed, best);
-      claims_.Judge(answer, "the slice keeps clear of " + obstacle + (claimed > 0 ? " by what is recorded" : ""), best, claimed);
+      claims_.Judge(answer, best, claimed, abs(best) + Real(certificate_.obstacles[o].radius()), [&] {
+        return "the slice keeps clear of obstacle " + std::to_string(o) + (claimed > 0 ? " by what is recorded" : "");
+      });
     }
   }
 

@@ -96,6 +96,7 @@ class Search {
     });
     if (Try(*nearest)) return true;
     const Face face = NearestFace(*nearest);
+    undecided_ |= !face.is_best;
     return Try(face.nearest) || TryExactly(face);
   }
 
@@ -107,6 +108,7 @@ class Search {
   struct Face {
     std::vector<RealVector> corners;
     RealVector nearest;
+    bool is_best;  ///< No corner lies below the nearest point; false: more bits are needed to go on.
   };
 
   [[nodiscard]] bool IsHalfSpace() const { return obstacle_.kind() == Obstacle::Kind::kHalfSpace; }
@@ -171,10 +173,12 @@ class Search {
     std::vector<RealVector> corners{Lowest(start)};
     RealVector weights{Real(1.0)}, nearest = corners.front();
     const Real tolerance = Tolerance();
+    bool is_best = false;
     for (int round = 0; round < kMostRounds; ++round) {
       const RealVector corner = Lowest(nearest);
       const Real square = Dot(nearest, nearest).middle(), progress = (square - Dot(nearest, corner)).middle();
-      if (!IsPositive(square) || !CertainlyBelow(tolerance * square, progress)) break;
+      is_best = !CertainlyBelow(tolerance * square, progress);
+      if (is_best) break;
       corners.push_back(corner);
       weights.push_back(Real());
       if (!Shrink(corners, weights)) break;
@@ -185,7 +189,7 @@ class Search {
       if (!CertainlyBelow(Dot(point, point).middle(), square)) break;
       nearest = std::move(point);
     }
-    return {std::move(corners), std::move(nearest)};
+    return {std::move(corners), std::move(nearest), is_best};
   }
 
   // Where no progress of a corner counts as none: most of the bits.
@@ -234,8 +238,8 @@ ProjectedSlice::ProjectedSlice(const Slice& slice, const Eigen::MatrixXd& projec
     RealVector y(static_cast<std::size_t>(projection.rows()));
     for (Eigen::Index k = 0; k < projection.rows(); ++k)
       for (Eigen::Index l = 0; l < projection.cols(); ++l)
-        if (projection(k, l) != 0 && !x[static_cast<std::size_t>(l)].IsZero())
-          y[static_cast<std::size_t>(k)] += Real(projection(k, l)) * x[static_cast<std::size_t>(l)];
+        if (const Real& entry = x[static_cast<std::size_t>(l)]; projection(k, l) != 0 && !entry.IsZero())
+          y[static_cast<std::size_t>(k)] += projection(k, l) == 1 ? entry : Real(projection(k, l)) * entry;
     return y;
   };
   center_ = image(slice.center);
@@ -262,16 +266,15 @@ Real ProjectedSlice::Radius() const {
   for (Eigen::Index j = 0; j < rough.cols(); ++j)
     for (Eigen::Index k = 0; k < p; ++k)
       rough(k, j) = generators_[static_cast<std::size_t>(j)][static_cast<std::size_t>(k)].ToDouble(-exponent);
-  Eigen::VectorXd best = Eigen::VectorXd::Ones(rough.cols());
+  Eigen::VectorXd best = Eigen::VectorXd::Ones(rough.cols()), signs;
   double longest = -1;
   for (Eigen::Index j = 0; j < rough.cols(); ++j) {
     const Eigen::Vector3d g = rough.col(j);
-    for (const Eigen::Vector3d& d : {g, Eigen::Vector3d(-g.y(), g.x(), g.z())})
-      for (const double tilt : {0.0, 1e-9, -1e-9}) {
-        const Eigen::VectorXd along = rough.transpose() * (d + tilt * g);
-        const Eigen::VectorXd signs = (along.array() < 0).select(-Eigen::ArrayXd::Ones(along.size()), 1).matrix();
-        if (const double length = (rough * signs).norm(); length > longest) longest = length, best = signs;
-      }
+    const Eigen::Vector3d normal(-g.y(), g.x(), g.z());
+    for (const Eigen::Vector3d& d : {g, Eigen::Vector3d(normal + 1e-9 * g), Eigen::Vector3d(normal - 1e-9 * g)}) {
+      signs = (rough.transpose() * d).unaryExpr([](double along) { return along < 0 ? -1.0 : 1.0; });
+      if (const double length = (rough * signs).norm(); length > longest) longest = length, best = signs;
+    }
   }
   RealVector sum(center_.size());
   for (std::size_t j = 0; j < generators_.size(); ++j)

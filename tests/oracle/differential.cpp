@@ -135,6 +135,44 @@ Query AnyCall(Random& random, const Problem& problem, bool absurd) {
   return query;
 }
 
+// An obstacle that a slice of the tube just touches, or just does not.
+Obstacle Touching(Random& random, const Certifier& certifier, const Tube& tube) {
+  Zonotope slice;
+  certifier.projection().Enclose(tube.slice(random.Integer(0, tube.length())), slice);
+  const int p = slice.dim();
+  Eigen::VectorXd d = random.Vector(p);
+  if (random.Coin(0.3)) d = random.Sign() * Eigen::VectorXd::Unit(p, random.Below(p));
+  if (p == 2 && slice.num_generators() > 0 && random.Coin()) {
+    const int j = random.Below(slice.num_generators());
+    d = random.Sign() * Eigen::Vector2d(-slice.generator(1, j), slice.generator(0, j));
+  }
+  d.stableNormalize();
+  if (!(d.norm() > 0.5)) d = Eigen::VectorXd::Unit(p, 0);
+  const double reach = slice.SupportUpper(View(d));
+  const double edge = reach + std::abs(reach) * random.Integer(-4, 12) * 0x1p-52 + (random.Coin(0.2) ? 1e-9 : 0);
+  Eigen::VectorXd corner = slice.CenterVector();  // a point of the slice that lies farthest along d
+  for (int j = 0; j < slice.num_generators(); ++j) {
+    double along = 0;
+    for (int k = 0; k < p; ++k) along += d[k] * slice.generator(k, j);
+    for (int k = 0; k < p; ++k) corner[k] += (along < 0 ? -1 : 1) * slice.generator(k, j);
+  }
+  const Eigen::VectorXd place = corner + (edge - d.dot(corner)) * d;
+  if (p == 2 && random.Coin(0.3)) {
+    const double radius = random.Coin(0.2) ? 0 : random.Uniform(0, 2);
+    return Obstacle::Circle(place + radius * d, radius);
+  }
+  if (p == 2 && random.Coin(0.4)) {
+    const Eigen::Vector2d along = random.Coin() ? Eigen::Vector2d(-d[1], d[0]) : Eigen::Vector2d(random.Vector(2));
+    return Obstacle::Polygon({place, place + along, place + d + 0.5 * along, place - random.Uniform(0, 1) * along});
+  }
+  if (random.Coin(0.4)) {
+    Eigen::VectorXd far = place;
+    for (int k = 0; k < p; ++k) far[k] += d[k] < 0 ? -random.Uniform(0, 1) : random.Uniform(0, 1);
+    return Obstacle::AxisBox(place.cwiseMin(far), place.cwiseMax(far));
+  }
+  return Obstacle::HalfSpace(d, edge);
+}
+
 struct Counts {
   long calls = 0, certified = 0, confirmed = 0, refuted = 0, cannot_verify = 0, problems = 0, refused = 0;
 
@@ -175,7 +213,14 @@ Counts RunProblem(std::uint64_t seed, long number, Tube& tube, std::mutex& outpu
   }
   std::unique_ptr<verifier::Verifier> judge;
   for (int i = 0; i < kCallsPerProblem; ++i) {
-    const Query query = AnyCall(random, *problem, absurd);
+    Query query = AnyCall(random, *problem, absurd);
+    if (random.Coin(0.3) &&
+        certifier->Certify(query.plan(), query.initial_set, {}, tube).outcome == Outcome::kCertified) {
+      try {
+        query.obstacles = {Touching(random, *certifier, tube)};
+      } catch (const std::invalid_argument&) {  // a sum that overflowed
+      }
+    }
     certifier->Require(query.plan(), query.initial_set, query.obstacles);
     const Decision decision = certifier->Certify(query.plan(), query.initial_set, query.obstacles, tube);
     ++counts.calls;
