@@ -19,16 +19,16 @@ class Claims {
   against `scale`. */
   template <class What>
   void AtMost(const Real& found, const Real& bound, const Real& scale, What what) {
-    Judge(IsAtMost(found, bound), found, bound, scale, what);
+    Judge(IsAtMost(found, bound), found, bound, scale, "at most", what);
   }
   template <class What>
   void AtLeast(const Real& found, const Real& bound, const Real& scale, What what) {
-    Judge(IsAtMost(bound, found), found, bound, scale, what);
+    Judge(IsAtMost(bound, found), found, bound, scale, "at least", what);
   }
   template <class What>
-  void Judge(Answer answer, const Real& found, const Real& bound, const Real& scale, What what) {
+  void Judge(Answer answer, const Real& found, const Real& bound, const Real& scale, const char* relation, What what) {
     if (failure_ || answer == Answer::kYes) return;
-    failure_ = Failure{step_, what(), found.text(), bound.text(), answer == Answer::kNo};
+    failure_ = Failure{step_, what(), found.text(), relation + (" " + bound.text()), answer == Answer::kNo};
     if (const Real excess = abs(found - bound); excess.IsFinite() && !scale.IsZero())
       failure_->excess = (excess / scale).ToDouble();
   }
@@ -101,11 +101,12 @@ class SliceCheck {
     for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
       if (!recorded_.clearance.empty() && !(claimed > 0))
-        claims_.Judge(Answer::kNo, claimed, 0.0, 1.0,
+        claims_.Judge(Answer::kNo, claimed, 0.0, 1.0, "above",
                       [&] { return "the record claims to be clear of obstacle " + std::to_string(o); });
       Real best;
       const Answer answer = IsClear(projected, certificate_.obstacles[o], claimed, best);
-      claims_.Judge(answer, best, claimed, abs(best) + Real(certificate_.obstacles[o].radius()), [&] {
+      claims_.Judge(answer, best, claimed, abs(best) + Real(certificate_.obstacles[o].radius()),
+                    claimed > 0 ? "at least" : "above", [&] {
         return "the slice keeps clear of obstacle " + std::to_string(o) + (claimed > 0 ? " by what is recorded" : "");
       });
     }

@@ -210,7 +210,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     const auto& [lower, upper] = step.envelope[Index(k)];
     // By less than a double's rounding the certifier cannot have seen it; then no system exists and all that follows holds.
     if (CertainlyBelow(upper + Real(0x1p-40) * (abs(lower) + abs(upper)), lower))
-      return Failure{query.t, "some residual is consistent with data and declaration", lower.text(), upper.text()};
+      return Failure{query.t, "some residual is consistent with data and declaration", lower.text(), "at most " + upper.text()};
     next.center[Index(k)] += half * (lower + upper);
     if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
     if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
@@ -223,8 +223,9 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
 
 std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
   const Domain& domain = problem_.domain;
-  const auto refuse = [&](const std::string& what, const Real& found, const Real& bound, Answer answer) {
-    return Failure{query.t, "the tube stays in the domain: " + what, found.text(), bound.text(), answer == Answer::kNo};
+  const auto refuse = [&](const std::string& what, const Real& found, const Real& bound, Answer answer,
+                          const char* relation = "at most ") {
+    return Failure{query.t, "the tube stays in the domain: " + what, found.text(), relation + bound.text(), answer == Answer::kNo};
   };
   const int n = domain.state.dim();
   for (int l = 0; l < static_cast<int>(query.hull.size()); ++l) {
@@ -232,7 +233,7 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
     const Real upper(l < n ? domain.state.upper()[l] : domain.input.upper()[l - n]);
     const Real &center = query.center[Index(l)], &r = query.half_width[Index(l)];
     const std::string name = l < n ? problem_.model->state_names()[Index(l)] : problem_.model->input_names()[Index(l - n)];
-    if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes) return refuse(name, center - r, lower, a);
+    if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes) return refuse(name, center - r, lower, a, "at least ");
     if (const Answer a = IsAtMost(center + r, upper); a != Answer::kYes) return refuse(name, center + r, upper, a);
   }
   for (std::size_t i = 0; i < domain.inequalities.size(); ++i) {
