@@ -96,8 +96,10 @@ class Search {
     });
     if (Try(*nearest)) return true;
     const Face face = NearestFace(*nearest);
-    undecided_ |= !face.is_best;
-    return Try(face.nearest) || TryExactly(face);
+    if (Try(face.nearest) || TryExactly(face)) return true;
+    if (Touches(face.nearest)) undecided_ = false;
+    else undecided_ |= !face.is_best;
+    return false;
   }
 
   [[nodiscard]] const std::optional<Real>& best() const { return best_; }
@@ -132,6 +134,17 @@ class Search {
     const Answer answer = clearance_ > 0 ? IsAtMost(needed, gap) : IsBelow(needed, gap);
     undecided_ |= answer == Answer::kUnknown;
     return answer == Answer::kYes;
+  }
+
+  // The nearest point is one of {core - slice}: the distance is at most its length. With many bits, one that is nothing
+  // beside the corners is zero: distances of sets of doubles have no such size.
+  [[nodiscard]] bool Touches(const RealVector& nearest) const {
+    const Real length = sqrt(Dot(nearest, nearest));
+    if (CertainlyBelow(length + Tolerance() * length, Real(clearance_) + Real(obstacle_.radius()))) return true;
+    Real size;
+    for (const RealVector& point : core_) size = max(size, Dot(point, point));
+    for (const RealVector& g : slice_.generators()) size = max(size, Dot(g, g));
+    return Precision::bits() > 4 * 1074 && CertainlyAtMost(length, Tolerance() * sqrt(size));
   }
 
   // Where the distance is a double, a direction that is off by its last bit cannot tell. A face's normal needs no

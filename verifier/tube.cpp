@@ -65,16 +65,24 @@ Score ScoreOf(const std::vector<Real>& column, std::size_t index) {
 // Whether the certifier, in doubles, may rank these two the other way round.
 bool NearTie(const Score& a, const Score& b) {
   if (a.value.IsZero() && b.value.IsZero()) return false;
-  return std::abs(a.rounded - b.rounded) <= 0x1p-44 * (a.size + b.size) || a.size < 0x1p-960 || b.size < 0x1p-960;
+  return std::abs(a.rounded - b.rounded) <= 0x1p-44 * (a.size + b.size) || std::max(a.size, b.size) < 0x1p-960;
+}
+
+// Too small for any double to tell it from nothing beside the rest of the slice, or to hold it at all.
+bool IsNegligible(const std::vector<Real>& column, const std::vector<Real>& half_width) {
+  for (std::size_t k = 0; k < column.size(); ++k)
+    if (!column[k].IsZero() && column[k].exponent() + 200 > half_width[k].exponent()) return false;
+  return true;
+}
+bool MayUnderflow(const std::vector<Real>& column) {
+  return std::ranges::all_of(column, [](const Real& entry) { return entry.exponent() < -1073; });
 }
 
 // Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
 // whether it was a close choice.
 bool Reduce(Slice& slice, int order) {
   const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
-  const bool tiny = std::ranges::any_of(slice.columns, [](const auto& column) {
-    return std::ranges::all_of(column, [](const Real& entry) { return entry.exponent() < -1020; });
-  });
+  const bool tiny = std::ranges::any_of(slice.columns, MayUnderflow);
   if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return tiny;
   std::vector<Score> scores;
   for (std::size_t j = 0; j < slice.columns.size(); ++j) scores.push_back(ScoreOf(slice.columns[j], j));
@@ -82,7 +90,11 @@ bool Reduce(Slice& slice, int order) {
   std::ranges::stable_sort(scores, [](const Score& a, const Score& b) {
     return CertainlyBelow(b.value.middle(), a.value.middle());
   });
-  const bool close = kept > 0 && NearTie(scores[kept - 1], scores[kept]);
+  std::vector<Real> half_width;
+  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidth(k));
+  const bool close = kept > 0 && NearTie(scores[kept - 1], scores[kept]) &&
+                     !(IsNegligible(slice.columns[scores[kept - 1].column], half_width) &&
+                       IsNegligible(slice.columns[scores[kept].column], half_width));
   const auto rest = scores.begin() + static_cast<std::ptrdiff_t>(kept);
   std::sort(scores.begin(), rest, [](const Score& a, const Score& b) { return a.column < b.column; });
   Slice reduced{slice.center, {}};
