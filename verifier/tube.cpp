@@ -45,27 +45,29 @@ Slice SliceOf(const InitialSet& set) {
   return slice;
 }
 
-// What the reduction ranks a column by, and how far off a double's rounding may put that.
+// What the reduction ranks a column by, |g|_1 - |g|_inf, and how far off a double's rounding may put that. A column
+// along an axis has exactly zero, in doubles too.
 struct Score {
   std::size_t column;
   Real value;
-  double rounded, size;
+  double rounded, error, size;
 };
 
 Score ScoreOf(const std::vector<Real>& column, std::size_t index) {
-  Real sum, largest;
-  for (const Real& entry : column) {
-    sum += abs(entry);
-    largest = max(largest, abs(entry));
-  }
-  const Real value = sum - largest;
-  return {index, value, value.ToDouble(), sum.ToDouble()};
+  std::size_t largest = 0;
+  for (std::size_t k = 1; k < column.size(); ++k)
+    if (CertainlyBelow(abs(column[largest]).middle(), abs(column[k]).middle())) largest = k;
+  Real sum;
+  for (std::size_t k = 0; k < column.size(); ++k)
+    if (k != largest && !column[k].IsZero()) sum += abs(column[k]);
+  const double rounded = sum.ToDouble(), size = (sum + abs(column[largest])).ToDouble();
+  return {index, rounded == 0 ? Real() : sum, rounded, rounded == 0 ? 0 : 0x1p-44 * size, size};
 }
 
 // Whether the certifier, in doubles, may rank these two the other way round.
 bool NearTie(const Score& a, const Score& b) {
   if (a.value.IsZero() && b.value.IsZero()) return false;
-  return std::abs(a.rounded - b.rounded) <= 0x1p-44 * (a.size + b.size) || std::max(a.size, b.size) < 0x1p-960;
+  return std::abs(a.rounded - b.rounded) <= a.error + b.error || std::max(a.size, b.size) < 0x1p-960;
 }
 
 // Too small for any double to tell it from nothing beside the rest of the slice, or to hold it at all.
