@@ -57,7 +57,8 @@ verifier::RecordedSlice SliceOf(const Json& slice) {
   recorded.generators = ColumnsOf(slice.at("generators"), recorded.center.size());
   recorded.has_generators = true;
   recorded.clearance = slice.at("clearance").get<std::vector<double>>();
-  recorded.radius = slice.at("radius").get<double>();
+  if (const Json& radius = slice.at("radius"); !radius.is_null())
+    recorded.radius = radius.get<double>();  // else infinite
   if (!slice.contains("envelope")) return recorded;
   recorded.envelope_lower = VectorOf(slice["envelope"].at("lower"));
   recorded.envelope_upper = VectorOf(slice["envelope"].at("upper"));
@@ -118,7 +119,8 @@ class ObstacleHistory {
     const auto message = Decoded<obstacles_t>(event.data);
     const auto us = [](double ms) { return static_cast<std::int64_t>(std::llround(ms * 1e3)); };
     if (!message || message->sequence <= last_sequence_ ||
-        FreshnessOf(message->utime, event.utime, us(config_.gate.max_age_ms), us(config_.gate.max_ahead_ms)) != Freshness::kFresh)
+        FreshnessOf(message->utime, event.utime, us(config_.gate.max_age_ms), us(config_.gate.max_ahead_ms)) !=
+            Freshness::kFresh)
       return;
     try {
       auto obstacles = FromMessage(*message, static_cast<int>(config_.problem->projection.rows()));
@@ -178,14 +180,17 @@ class LogReading {
          status = reader.Next(event))
       if (status == LogStatus::kEvent) Take(event);
     if (reader.corruptions() > 0)
-      certificates_.push_back({path, {}, "the log is damaged in " + std::to_string(reader.corruptions()) + " places", {}});
+      certificates_.push_back(
+          {path, {}, "the log is damaged in " + std::to_string(reader.corruptions()) + " places", {}});
     for (const auto& [digest, outcome] : outcomes_)
       if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
-        certificates_.push_back({"plan with digest " + ToHex(digest), {}, "decided as certified, but the log has no certified plan", {}});
+        certificates_.push_back(
+            {"plan with digest " + ToHex(digest), {}, "decided as certified, but the log has no certified plan", {}});
   }
 
   [[nodiscard]] std::size_t abstentions() const {
-    return static_cast<std::size_t>(std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
+    return static_cast<std::size_t>(
+        std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
   }
   [[nodiscard]] const std::map<Digest, std::int16_t>& outcomes() const { return outcomes_; }
   [[nodiscard]] const std::set<Digest>& plans() const { return plans_; }
@@ -256,7 +261,8 @@ class LogReading {
     compare(kOtherInput, "declaration", config_.declaration_digest, GetDigest(certified.declaration_digest));
     compare(kOtherInput, "observations", config_.observations_digest, GetDigest(certified.observations_digest));
     compare(kOtherInput, "obstacles in force", version.digest, named);
-    if (sent == in_force_.end()) certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
+    if (sent == in_force_.end())
+      certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
   }
 
   const Config& config_;
@@ -289,8 +295,10 @@ void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, cons
     if (certified.erase(row.plan_digest) == 0) certificate.missing = "the log has no such certificate";
     Compare(certificate, std::string(kOtherInput) + "config", ToHex(config.digest), row.config_digest);
     Compare(certificate, std::string(kOtherInput) + "model", ToHex(config.model_digest), row.model_digest);
-    Compare(certificate, std::string(kOtherInput) + "declaration", ToHex(config.declaration_digest), row.declaration_digest);
-    Compare(certificate, std::string(kOtherInput) + "observations", ToHex(config.observations_digest), row.observations_digest);
+    Compare(certificate, std::string(kOtherInput) + "declaration", ToHex(config.declaration_digest),
+            row.declaration_digest);
+    Compare(certificate, std::string(kOtherInput) + "observations", ToHex(config.observations_digest),
+            row.observations_digest);
     if (!certificate.missing.empty() || !certificate.mismatches.empty()) {
       if (certificate.missing.empty()) certificate.missing = "the row disagrees with the log";
       certificates.push_back(std::move(certificate));
@@ -340,7 +348,8 @@ Config TaskGiven(const std::string& path, const std::string& config_path) {
 CertificateFile ReadCertificates(const std::string& path, const std::string& config_path) {
   const std::string first = FirstBytes(path);
   try {
-    if (first.rfind(std::string("SQLite format 3\0", 16), 0) == 0) return FromDatabase(path, TaskGiven(path, config_path));
+    if (first.rfind(std::string("SQLite format 3\0", 16), 0) == 0)
+      return FromDatabase(path, TaskGiven(path, config_path));
     if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLog(path, TaskGiven(path, config_path));
     if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{') {
       std::ifstream stream = OpenForReading(path);

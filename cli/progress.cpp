@@ -14,7 +14,10 @@ constexpr std::size_t kWidth = 30;
 }  // namespace
 
 Progress::Progress(std::string what, std::size_t total)
-    : what_(std::move(what)), total_(total), terminal_(isatty(STDERR_FILENO) != 0), begin_(std::chrono::steady_clock::now()) {}
+    : what_(std::move(what)),
+      total_(total),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      begin_(std::chrono::steady_clock::now()) {}
 
 Progress::~Progress() {
   if (shown_at_ > 0) std::cerr << "\r\x1b[K" << std::flush;
@@ -31,8 +34,8 @@ void Progress::Advance() {
 
 std::string Progress::Line(const std::string& what, std::size_t done, std::size_t total, double seconds) {
   const std::size_t full = total == 0 ? kWidth : done * kWidth / total;
-  std::string line = "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "] " + std::to_string(done) + " of " +
-                     std::to_string(total) + " " + what;
+  std::string line = "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "] " + std::to_string(done) +
+                     " of " + std::to_string(total) + " " + what;
   if (done == 0 || done >= total) return line;
   const double left = seconds / static_cast<double>(done) * static_cast<double>(total - done);
   return line + ", " + std::to_string(std::lround(std::ceil(left))) + " s left";

@@ -42,7 +42,8 @@ std::vector<Verdict> VerifyAll(const CertificateFile& file, unsigned jobs) {
       const RecordedCertificate& recorded = file.certificates[i];
       verdicts[i] = recorded.missing.empty() ? verifier.Verify(recorded.certificate)
                                              : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
-      if (!recorded.mismatches.empty() && verdicts[i].status == Status::kConfirmed) verdicts[i].status = Status::kRefuted;
+      if (!recorded.mismatches.empty() && verdicts[i].status == Status::kConfirmed)
+        verdicts[i].status = Status::kRefuted;
       progress.Advance();
     }
   };
@@ -70,7 +71,8 @@ std::string InWords(const RecordedCertificate& recorded, const Verdict& verdict)
   std::ostringstream text;
   text << (verdict.status == Status::kRefuted ? "refuted: " : "cannot verify: ") << recorded.name << "\n";
   for (const Mismatch& mismatch : recorded.mismatches)
-    text << "  " << mismatch.what << "\n    expected " << mismatch.expected << "\n    found    " << mismatch.found << "\n";
+    text << "  " << mismatch.what << "\n    expected " << mismatch.expected << "\n    found    " << mismatch.found
+         << "\n";
   const verifier::Failure& failure = verdict.failure;
   if (failure.what.empty()) {
     text << "  every step of its mathematics holds for the inputs given\n";
@@ -80,6 +82,7 @@ std::string InWords(const RecordedCertificate& recorded, const Verdict& verdict)
   if (failure.step >= 0) text << "step " << failure.step << ": ";
   text << (verdict.status == Status::kRefuted ? "not so: " : "") << failure.what << "\n";
   if (!failure.bound.empty()) text << "    expected " << failure.bound << "\n    found    " << failure.found << "\n";
+  if (failure.excess < 1e-12) text << "    which is off by " << failure.excess << " of its size\n";
   return text.str();
 }
 
@@ -93,7 +96,8 @@ nlohmann::json ToJson(const RecordedCertificate& recorded, const Verdict& verdic
                           {"found", failure.found},
                           {"mismatches", nlohmann::json::array()}};
   for (const Mismatch& mismatch : recorded.mismatches)
-    document["mismatches"].push_back({{"what", mismatch.what}, {"expected", mismatch.expected}, {"found", mismatch.found}});
+    document["mismatches"].push_back(
+        {{"what", mismatch.what}, {"expected", mismatch.expected}, {"found", mismatch.found}});
   return document;
 }
 
@@ -116,9 +120,10 @@ void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& ver
     std::cout << InWords(file.certificates[i], verdicts[i]);
     break;
   }
-  std::cout << "verify: " << verdicts.size() << " certificates, " << summary.confirmed << " confirmed, " << summary.refuted
-            << " refuted, " << summary.cannot_verify << " cannot be verified";
-  if (file.not_certificates > 0) std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
+  std::cout << "verify: " << verdicts.size() << " certificates, " << summary.confirmed << " confirmed, "
+            << summary.refuted << " refuted, " << summary.cannot_verify << " cannot be verified";
+  if (file.not_certificates > 0)
+    std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
   std::cout << std::endl;
 }
 
@@ -138,14 +143,18 @@ int Verify(const Options& options) {
 
 void AddVerifyCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "verify",
-      "Derive recorded certificates anew, in high precision and with code of its own: exit 0 if there are any and all are "
-      "confirmed, 1 with the first that is not and the first step of it that fails, 2 bad input");
-  command->add_option("file", options->file,
-                      "What holds the certificates: a decision (the output of certify --json), an LCM event log, or a decision "
-                      "database with its logs beside it")
-      ->required()->type_name("DECISION|LOG|DATABASE");
+  CLI::App* command =
+      app.add_subcommand("verify",
+                         "Derive recorded certificates anew, in high precision and with code of its own: exit 0 if "
+                         "there are any and all are "
+                         "confirmed, 1 with the first that is not and the first step of it that fails, 2 bad input");
+  command
+      ->add_option(
+          "file", options->file,
+          "What holds the certificates: a decision (the output of certify --json), an LCM event log, or a decision "
+          "database with its logs beside it")
+      ->required()
+      ->type_name("DECISION|LOG|DATABASE");
   command->add_option("--config", options->config, "The task file they were made with; a decision names its own")
       ->type_name("FILE");
   command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();
@@ -155,7 +164,8 @@ void AddVerifyCommand(CLI::App& app, Action& action) {
       "recorded number has to cover what was derived, and the derived tube has to keep clear of every obstacle.\n"
       "Abstentions claim nothing and are not verified.\n\n"
       "Examples:\n"
-      "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > decision.json\n"
+      "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > "
+      "decision.json\n"
       "  forereach verify decision.json\n"
       "  forereach verify run/log/events-20260101-120000.lcmlog --config config/demo.yaml");
   command->callback([options, &action] { action = [options] { return Verify(*options); }; });

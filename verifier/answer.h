@@ -21,10 +21,10 @@ enum class Answer { kYes, kNo, kUnknown };
 
 /** A claim that does not hold, or could not be told. */
 struct Failure {
-  int step = -1;              ///< t of X_t, -1 where none applies.
-  std::string what;           ///< The claim, in words.
-  std::string found, bound;   ///< A number, and what it was held to: "at most 4.5".
-  bool certain = true;        ///< False: more bits might tell.
+  int step = -1;             ///< t of X_t, -1 where none applies.
+  std::string what;          ///< The claim, in words.
+  std::string found, bound;  ///< A number, and what it was held to: "at most 4.5".
+  bool certain = true;       ///< False: more bits might tell.
   /** found - bound against the larger of the two, 1 where that says nothing. A tiny one is a rounding error's size. */
   double excess = 1;
 };

@@ -41,9 +41,12 @@ class Claims {
 class SliceCheck {
  public:
   SliceCheck(const Problem& problem, const Certificate& certificate, const Tube& tube, int t)
-      : problem_(problem), certificate_(certificate), slice_(tube.slices[Index(t)]),
+      : problem_(problem),
+        certificate_(certificate),
+        slice_(tube.slices[Index(t)]),
         step_(t < static_cast<int>(tube.steps.size()) ? &tube.steps[Index(t)] : nullptr),
-        recorded_(certificate.slices.empty() ? nothing_ : certificate.slices[Index(t)]), claims_(t, failure_) {}
+        recorded_(certificate.slices.empty() ? nothing_ : certificate.slices[Index(t)]),
+        claims_(t, failure_) {}
 
   [[nodiscard]] std::optional<Failure> Run() {
     for (int k = 0; k < slice_.dim() && !failure_; ++k) CheckHull(k);
@@ -96,7 +99,8 @@ class SliceCheck {
     const ProjectedSlice projected(slice_, problem_.projection);
     if (recorded_.radius) {
       const Real radius = projected.Radius();
-      claims_.AtLeast(*recorded_.radius, radius, radius, [] { return std::string("the recorded radius covers the projected slice"); });
+      claims_.AtLeast(*recorded_.radius, radius, radius,
+                      [] { return std::string("the recorded radius covers the projected slice"); });
     }
     for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
@@ -107,8 +111,9 @@ class SliceCheck {
       const Answer answer = IsClear(projected, certificate_.obstacles[o], claimed, best);
       claims_.Judge(answer, best, claimed, abs(best) + Real(certificate_.obstacles[o].radius()),
                     claimed > 0 ? "at least" : "above", [&] {
-        return "the slice keeps clear of obstacle " + std::to_string(o) + (claimed > 0 ? " by what is recorded" : "");
-      });
+                      return "the slice keeps clear of obstacle " + std::to_string(o) +
+                             (claimed > 0 ? " by what is recorded" : "");
+                    });
     }
   }
 

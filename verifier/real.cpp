@@ -1,10 +1,58 @@
 #include "verifier/real.h"
 
 #include <limits>
+#include <vector>
 
 namespace forereach::verifier {
 
 thread_local int Precision::bits_ = 256;
+
+namespace {
+
+// Numbers come and go by the million: a few are kept for the next, all of one precision.
+struct Pool {
+  static constexpr std::size_t kMost = 512;
+  std::vector<__mpfi_struct> numbers;
+  int bits = 0;
+
+  Pool() { numbers.reserve(kMost); }
+  ~Pool() {
+    Clear();
+    closed = true;
+  }
+  void Clear() {
+    for (__mpfi_struct& number : numbers) mpfi_clear(&number);
+    numbers.clear();
+  }
+
+  static thread_local bool closed;  // a number may outlive its thread's pool
+};
+thread_local bool Pool::closed = false;
+thread_local Pool pool;
+
+}  // namespace
+
+Real::Real(Uninitialized) {
+  const int bits = Precision::bits();
+  if (Pool::closed || pool.bits != bits || pool.numbers.empty()) {
+    mpfi_init2(value_, bits);
+  } else {
+    *value_ = pool.numbers.back();
+    pool.numbers.pop_back();
+  }
+}
+
+void Real::Release() {
+  if (Pool::closed) return mpfi_clear(value_);
+  if (pool.bits != Precision::bits()) {
+    pool.Clear();
+    pool.bits = Precision::bits();
+  }
+  if (pool.numbers.size() == Pool::kMost || mpfi_get_prec(value_) != static_cast<mpfr_prec_t>(pool.bits))
+    mpfi_clear(value_);
+  else
+    pool.numbers.push_back(*value_);
+}
 
 Real::Real(double x) : Real(Uninitialized{}) { mpfi_set_d(value_, x); }
 Real::Real(const Real& other) : Real(Uninitialized{}) { mpfi_set(value_, other.value_); }
@@ -69,17 +117,17 @@ Real& Real::operator-=(const Real& other) {
   return *this;
 }
 
-#define FOREREACH_BINARY(name, function)          \
-  Real name(const Real& a, const Real& b) {       \
-    Real result{Real::Uninitialized{}};           \
-    function(result.value_, a.value_, b.value_);  \
-    return result;                                \
+#define FOREREACH_BINARY(name, function)         \
+  Real name(const Real& a, const Real& b) {      \
+    Real result{Real::Uninitialized{}};          \
+    function(result.value_, a.value_, b.value_); \
+    return result;                               \
   }
-#define FOREREACH_UNARY(name, function)  \
-  Real name(const Real& a) {             \
-    Real result{Real::Uninitialized{}};  \
-    function(result.value_, a.value_);   \
-    return result;                       \
+#define FOREREACH_UNARY(name, function) \
+  Real name(const Real& a) {            \
+    Real result{Real::Uninitialized{}}; \
+    function(result.value_, a.value_);  \
+    return result;                      \
   }
 FOREREACH_BINARY(operator+, mpfi_add)
 FOREREACH_BINARY(operator-, mpfi_sub)
@@ -108,9 +156,7 @@ Real min(const Real& a, const Real& b) {
   return result;
 }
 
-bool CertainlyAtMost(const Real& a, const Real& b) {
-  return mpfr_lessequal_p(&a.value_->right, &b.value_->left) != 0;
-}
+bool CertainlyAtMost(const Real& a, const Real& b) { return mpfr_lessequal_p(&a.value_->right, &b.value_->left) != 0; }
 bool CertainlyBelow(const Real& a, const Real& b) { return mpfr_less_p(&a.value_->right, &b.value_->left) != 0; }
 
 }  // namespace forereach::verifier

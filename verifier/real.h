@@ -39,7 +39,7 @@ class Real final {
     return *this;
   }
   ~Real() {
-    if (value_->left._mpfr_d != nullptr) mpfi_clear(value_);
+    if (value_->left._mpfr_d != nullptr) Release();
   }
 
   /** Everything from the lower end of a to the upper end of b; the empty case a > b is the caller's to exclude. */
@@ -87,7 +87,8 @@ class Real final {
 
  private:
   struct Uninitialized {};
-  explicit Real(Uninitialized) { mpfi_init2(value_, Precision::bits()); }
+  explicit Real(Uninitialized);
+  void Release();
   static __mpfi_struct Empty() { return {}; }
 
   mpfi_t value_;

@@ -91,14 +91,15 @@ class Search {
       const Eigen::VectorXd& normal = obstacle_.points()[0];
       return Try(RealVector(normal.begin(), normal.end()));
     }
-    const auto nearest = std::ranges::min_element(core_, [](const RealVector& a, const RealVector& b) {
-      return CertainlyBelow(Dot(a, a), Dot(b, b));
-    });
+    const auto nearest = std::ranges::min_element(
+        core_, [](const RealVector& a, const RealVector& b) { return CertainlyBelow(Dot(a, a), Dot(b, b)); });
     if (Try(*nearest)) return true;
     const Face face = NearestFace(*nearest);
     if (Try(face.nearest) || TryExactly(face)) return true;
-    if (Touches(face.nearest)) undecided_ = false;
-    else undecided_ |= !face.is_best;
+    if (Touches(face.nearest))
+      undecided_ = false;
+    else
+      undecided_ |= !face.is_best;
     return false;
   }
 

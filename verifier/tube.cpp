@@ -89,9 +89,8 @@ bool Reduce(Slice& slice, int order) {
   std::vector<Score> scores;
   for (std::size_t j = 0; j < slice.columns.size(); ++j) scores.push_back(ScoreOf(slice.columns[j], j));
   // Exact zeros are exact; all others are told apart by the middles of enclosures far below a double's last place.
-  std::ranges::stable_sort(scores, [](const Score& a, const Score& b) {
-    return CertainlyBelow(b.value.middle(), a.value.middle());
-  });
+  std::ranges::stable_sort(
+      scores, [](const Score& a, const Score& b) { return CertainlyBelow(b.value.middle(), a.value.middle()); });
   std::vector<Real> half_width;
   for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidth(k));
   const bool close = kept > 0 && NearTie(scores[kept - 1], scores[kept]) &&
@@ -198,7 +197,9 @@ Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& contr
 std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const TubeOptions& options) const {
   const int n = query.slice.dim();
   if (const auto failure = LeavesDomain(query)) return failure;
-  const auto no_bound = [&](const std::string& what) { return Failure{query.t, what + " has no finite enclosure", "", ""}; };
+  const auto no_bound = [&](const std::string& what) {
+    return Failure{query.t, what + " has no finite enclosure", "", ""};
+  };
 
   Step step;
   step.remainder = Remainder(query, options.split_remainder);
@@ -222,9 +223,11 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   }
   for (int k = 0; k < n; ++k) {  // diag(h)
     const auto& [lower, upper] = step.envelope[Index(k)];
-    // By less than a double's rounding the certifier cannot have seen it; then no system exists and all that follows holds.
+    // By less than a double's rounding the certifier cannot have seen it; then no system exists and all that follows
+    // holds.
     if (CertainlyBelow(upper + Real(0x1p-40) * (abs(lower) + abs(upper)), lower))
-      return Failure{query.t, "some residual is consistent with data and declaration", lower.text(), "at most " + upper.text()};
+      return Failure{query.t, "some residual is consistent with data and declaration", lower.text(),
+                     "at most " + upper.text()};
     next.center[Index(k)] += half * (lower + upper);
     if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
     if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
@@ -239,15 +242,18 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
   const Domain& domain = problem_.domain;
   const auto refuse = [&](const std::string& what, const Real& found, const Real& bound, Answer answer,
                           const char* relation = "at most ") {
-    return Failure{query.t, "the tube stays in the domain: " + what, found.text(), relation + bound.text(), answer == Answer::kNo};
+    return Failure{query.t, "the tube stays in the domain: " + what, found.text(), relation + bound.text(),
+                   answer == Answer::kNo};
   };
   const int n = domain.state.dim();
   for (int l = 0; l < static_cast<int>(query.hull.size()); ++l) {
     const Real lower(l < n ? domain.state.lower()[l] : domain.input.lower()[l - n]);
     const Real upper(l < n ? domain.state.upper()[l] : domain.input.upper()[l - n]);
     const Real &center = query.center[Index(l)], &r = query.half_width[Index(l)];
-    const std::string name = l < n ? problem_.model->state_names()[Index(l)] : problem_.model->input_names()[Index(l - n)];
-    if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes) return refuse(name, center - r, lower, a, "at least ");
+    const std::string name =
+        l < n ? problem_.model->state_names()[Index(l)] : problem_.model->input_names()[Index(l - n)];
+    if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes)
+      return refuse(name, center - r, lower, a, "at least ");
     if (const Answer a = IsAtMost(center + r, upper); a != Answer::kYes) return refuse(name, center + r, upper, a);
   }
   for (std::size_t i = 0; i < domain.inequalities.size(); ++i) {
@@ -289,8 +295,8 @@ std::vector<Bounds> TubeMaker::Remainder(const Query& query, bool split) const {
   return bounds;
 }
 
-// One row k of L over one Z_t. D_i = max_s |sum_l s_l L_l (c_l - z_il)| + sum_j |sum_l s_l L_l G_lj| over the signs s of
-// the nonzero columns l, or over the hull: sum_l L_l (|c_l - z_il| + r_l).
+// One row k of L over one Z_t. D_i = max_s |sum_l s_l L_l (c_l - z_il)| + sum_j |sum_l s_l L_l G_lj| over the signs s
+// of the nonzero columns l, or over the hull: sum_l L_l (|c_l - z_il| + r_l).
 struct TubeMaker::Row {
   const Query& query;
   std::vector<int> columns;

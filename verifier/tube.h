@@ -35,8 +35,8 @@ struct Slice {
 
 /** X_0: a box, or a zonotope of doubles. */
 struct InitialSet {
-  Eigen::VectorXd lower, upper;    ///< A box if these have entries, ...
-  Eigen::VectorXd center;          ///< ... else <center, generators>.
+  Eigen::VectorXd lower, upper;  ///< A box if these have entries, ...
+  Eigen::VectorXd center;        ///< ... else <center, generators>.
   Eigen::MatrixXd generators;
 };
 
@@ -62,8 +62,8 @@ struct Tube {
 
 /** Ways to a tube that is sound all the same, and tighter. */
 struct TubeOptions {
-  bool reduce = true;           ///< Reduce the order as the certifier does, or never.
-  bool split_remainder = false; ///< Bound the Hessian over half the box too: the integral remainder in two parts.
+  bool reduce = true;            ///< Reduce the order as the certifier does, or never.
+  bool split_remainder = false;  ///< Bound the Hessian over half the box too: the integral remainder in two parts.
 };
 
 /** A problem prepared for any number of plans, with as many bits as Precision said when it was made. Immutable. */
@@ -73,7 +73,8 @@ class TubeMaker final {
   TubeMaker(const Problem& problem, const Equations& equations, Method method);
 
   /** @param controls inputs-by-T. */
-  [[nodiscard]] Tube Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls, const TubeOptions& options) const;
+  [[nodiscard]] Tube Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls,
+                          const TubeOptions& options) const;
 
  private:
   struct Query;
@@ -87,7 +88,8 @@ class TubeMaker final {
   const Problem& problem_;
   const Equations& equations_;
   Method method_;
-  /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included; [observation][state]. */
+  /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included; [observation][state].
+   */
   std::vector<std::vector<Bounds>> residuals_;
 };
 

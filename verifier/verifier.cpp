@@ -1,12 +1,14 @@
 #include "verifier/verifier.h"
 
+#include <array>
+
 #include "verifier/claims.h"
 
 namespace forereach::verifier {
 namespace {
 
-// A product of three doubles has at most 159 bits, but a sum of such products spans 6453: there it is exact.
-constexpr int kBits = 256, kFineBits = 6656;
+// A sum of doubles spans 2098 bits, one of products of three doubles 6453: with so many each is exact.
+constexpr std::array kBits{256, 2304, 6656};
 // What exceeds a record by more than this is no matter of the certifier's rounding.
 constexpr double kRounding = 0x1p-40;
 
@@ -21,7 +23,8 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
   const bool box = set.lower.size() > 0;
   if (box ? set.lower.size() != n || set.upper.size() != n || !(set.lower.array() <= set.upper.array()).all() ||
                 !set.lower.allFinite() || !set.upper.allFinite()
-          : set.center.size() != n || set.generators.rows() != n || !set.center.allFinite() || !set.generators.allFinite())
+          : set.center.size() != n || set.generators.rows() != n || !set.center.allFinite() ||
+                !set.generators.allFinite())
     return misfit("the initial set is finite and fits the model");
   for (const Obstacle& obstacle : certificate.obstacles)
     if (obstacle.dim() != problem.projection.rows()) return misfit("the obstacles fit the projection");
@@ -36,8 +39,7 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
     if (!fits(slice.lower) || slice.lower.size() != slice.upper.size() || !fits(slice.center) ||
         slice.center.size() != slice.half_width.size() || (slice.has_generators && slice.generators.rows() != n) ||
         !fits(slice.envelope_lower) || slice.envelope_lower.size() != slice.envelope_upper.size() ||
-        !fits(slice.remainder) ||
-        (!slice.clearance.empty() && slice.clearance.size() != certificate.obstacles.size()))
+        !fits(slice.remainder) || (!slice.clearance.empty() && slice.clearance.size() != certificate.obstacles.size()))
       return Failure{static_cast<int>(t), "the recorded slice has the task's sizes", "", ""};
   }
   return std::nullopt;
@@ -48,13 +50,11 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
 Method MethodOf(const Problem&) { return Method::kPaper; }
 
 Verifier::Verifier(std::shared_ptr<const Problem> problem, Method method)
-    : problem_(std::move(problem)), method_(method), equations_(EquationsOf(*problem_->model)) {
-  if (equations_) static_cast<void>(MakerOf(kBits));
-}
+    : problem_(std::move(problem)), method_(method), equations_(EquationsOf(*problem_->model)) {}
 
 const TubeMaker& Verifier::MakerOf(int bits) const {
   const std::lock_guard lock(mutex_);
-  auto& maker = bits == kBits ? maker_ : fine_maker_;
+  auto& maker = makers_[bits];
   if (!maker) {
     const Precision precision(bits);
     maker = std::make_unique<TubeMaker>(*problem_, *equations_, method_);
@@ -63,16 +63,17 @@ const TubeMaker& Verifier::MakerOf(int bits) const {
 }
 
 Tube Verifier::Derive(const Certificate& certificate) const {
-  const Precision precision(kBits);
-  return MakerOf(kBits).Make(certificate.initial_set, certificate.controls, {});
+  const Precision precision(kBits[0]);
+  return MakerOf(kBits[0]).Make(certificate.initial_set, certificate.controls, {});
 }
 
 Verdict Verifier::Verify(const Certificate& certificate) const {
   if (!equations_)
-    return {Status::kCannotVerify, {-1, "cannot verify: no equations for the model " + problem_->model->name(), "", ""}};
+    return {Status::kCannotVerify,
+            {-1, "cannot verify: no equations for the model " + problem_->model->name(), "", ""}};
   if (const auto misfit = FindMisfit(*problem_, certificate)) return {Status::kRefuted, *misfit};
   std::optional<Failure> failure;
-  for (const int bits : {kBits, kFineBits}) {
+  for (const int bits : kBits) {
     const Precision precision(bits);
     failure = Check(MakerOf(bits), certificate);
     if (!failure) return {Status::kConfirmed, {}};

@@ -1,9 +1,10 @@
 /** Confirms or refutes a certificate by deriving it anew from its inputs, in intervals of 256 bits and more.
 
-Confirmed: a tube of the verifier's own, sound for the given doubles in real arithmetic, stays in the domain, lies inside
-everything that was recorded, and keeps clear of every obstacle. Refuted: one of these does not hold. */
+Confirmed: a tube of the verifier's own, sound for the given doubles in real arithmetic, stays in the domain, lies
+inside everything that was recorded, and keeps clear of every obstacle. Refuted: one of these does not hold. */
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -28,7 +29,7 @@ struct RecordedSlice {
   Eigen::VectorXd center, half_width;  ///< ... or by its middle.
   Eigen::MatrixXd generators;          ///< X_t = <center, generators>, if has_generators.
   bool has_generators = false;
-  std::vector<double> clearance;       ///< Per obstacle.
+  std::vector<double> clearance;  ///< Per obstacle.
   std::optional<double> radius;
   Eigen::VectorXd envelope_lower, envelope_upper, remainder;
 };
@@ -54,8 +55,8 @@ class Verifier final {
   /** @pre the problem is one that a Certifier accepts. */
   Verifier(std::shared_ptr<const Problem> problem, Method method);
 
-  /** Cost some 0.1 s for 50 steps, 400 observations and 10 obstacles. Repeats with 6656 bits, in which sums
-  and products of doubles are exact, where 256 cannot tell. */
+  /** Cost some 0.1 s for 50 steps, 400 observations and 10 obstacles. Repeats with more bits, at last
+  so many that sums of products of doubles are exact, where 256 cannot tell. */
   [[nodiscard]] Verdict Verify(const Certificate& certificate) const;
 
   /** The tube alone, for display and tests. @pre knows_model. */
@@ -70,7 +71,7 @@ class Verifier final {
   Method method_;
   std::unique_ptr<Equations> equations_;
   mutable std::mutex mutex_;
-  mutable std::unique_ptr<TubeMaker> maker_, fine_maker_;
+  mutable std::map<int, std::unique_ptr<TubeMaker>> makers_;  // by bits
 };
 
 }  // namespace forereach::verifier

@@ -54,17 +54,14 @@ void Exaggerate(Random& random, Problem& problem) {
       problem.declaration.lipschitz *= std::ldexp(1, random.Integer(-1074, 30));
       problem.declaration.noise_bound.setConstant(1);
       break;
-    case 1:
-      problem.declaration.noise_bound.setConstant(std::ldexp(1, random.Integer(-1074, 300)));
-      break;
+    case 1: problem.declaration.noise_bound.setConstant(std::ldexp(1, random.Integer(-1074, 300))); break;
     case 2: {
       const Eigen::VectorXd all = Eigen::VectorXd::Constant(n, std::ldexp(1, random.Integer(6, 1000)));
-      problem.domain = {Box(-all, all), Box(-Eigen::VectorXd::Constant(inputs, 1e3), Eigen::VectorXd::Constant(inputs, 1e3)), {}, {}};
+      problem.domain = {
+          Box(-all, all), Box(-Eigen::VectorXd::Constant(inputs, 1e3), Eigen::VectorXd::Constant(inputs, 1e3)), {}, {}};
       break;
     }
-    case 3:
-      problem.projection *= std::ldexp(1, random.Integer(-1000, 900));
-      break;
+    case 3: problem.projection *= std::ldexp(1, random.Integer(-1000, 900)); break;
     default:
       problem.transitions.x_next *= 1 + 0x1p-52 * random.Integer(-4, 4);
       problem.declaration.noise_bound.array() += 1e-9;
@@ -81,17 +78,18 @@ Obstacle AnyObstacle(Random& random, const Eigen::VectorXd& place) {
   const int p = static_cast<int>(place.size());
   switch (random.Below(p == 2 ? 4 : 2)) {
     case 0:
-      return Obstacle::AxisBox(place, place + (random.Coin(0.2) ? Eigen::VectorXd(Eigen::VectorXd::Zero(p)) : Eigen::VectorXd(random.Vector(p).cwiseAbs())));
+      return Obstacle::AxisBox(place, place + (random.Coin(0.2) ? Eigen::VectorXd(Eigen::VectorXd::Zero(p))
+                                                                : Eigen::VectorXd(random.Vector(p).cwiseAbs())));
     case 1: {
       const Eigen::VectorXd normal = NormalOf(random, p);
       const double offset = normal.dot(place);
       return Obstacle::HalfSpace(normal, offset + std::abs(offset) * random.Uniform(0, 1));
     }
-    case 2:
-      return Obstacle::Circle(place, random.Coin(0.1) ? 0 : random.Uniform(0, 2));
+    case 2: return Obstacle::Circle(place, random.Coin(0.1) ? 0 : random.Uniform(0, 2));
     default: {
       std::vector<Eigen::VectorXd> vertices;
-      for (int i = random.Integer(3, 8); i > 0; --i) vertices.push_back(place + random.Vector(p, random.Coin(0.1) ? 0 : 1));
+      for (int i = random.Integer(3, 8); i > 0; --i)
+        vertices.push_back(place + random.Vector(p, random.Coin(0.1) ? 0 : 1));
       return Obstacle::Polygon(vertices);
     }
   }
@@ -107,18 +105,13 @@ Query AnyCall(Random& random, const Problem& problem, bool absurd) {
   Eigen::MatrixXd generators = query.initial_set.GeneratorMatrix();
   const int most = problem.zonotope_order * n;
   switch (random.Below(6)) {
-    case 0:
-      generators = random.Matrix(n, random.Integer(0, most), std::ldexp(1, random.Integer(-14, -7)));
-      break;
+    case 0: generators = random.Matrix(n, random.Integer(0, most), std::ldexp(1, random.Integer(-14, -7))); break;
     case 1:  // nearly parallel, and nearly equal in length
       generators = random.Matrix(n, 1, 0.01).replicate(1, random.Integer(1, most));
       generators += random.Matrix(n, static_cast<int>(generators.cols()), 1e-12);
       break;
-    case 2:
-      generators.setZero();
-      break;
-    default:
-      break;
+    case 2: generators.setZero(); break;
+    default: break;
   }
   if (absurd && random.Coin(0.3) && generators.cols() > 0) generators *= std::ldexp(1, random.Integer(-1074, 2));
   if (absurd && random.Coin(0.3)) center[random.Below(n)] = random.Double();
@@ -227,7 +220,8 @@ Counts RunProblem(std::uint64_t seed, long number, Tube& tube, std::mutex& outpu
     if (decision.outcome != Outcome::kCertified) continue;
     ++counts.certified;
     if (!judge) judge = std::make_unique<verifier::Verifier>(problem, verifier::MethodOf(*problem));
-    const auto verdict = judge->Verify(CertificateOf(*certifier, query.plan(), query.initial_set, query.obstacles, tube));
+    const auto verdict =
+        judge->Verify(CertificateOf(*certifier, query.plan(), query.initial_set, query.obstacles, tube));
     counts.confirmed += verdict.status == verifier::Status::kConfirmed;
     counts.refuted += verdict.status == verifier::Status::kRefuted;
     counts.cannot_verify += verdict.status == verifier::Status::kCannotVerify;
@@ -251,7 +245,9 @@ int main(int argc, char** argv) {
   double seconds = 0;
   app.add_option("--count", count, "Certify calls")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--seed", seed, "Of the random numbers")->capture_default_str();
-  app.add_option("--jobs", jobs, "Threads; the problems are the same for any number")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--jobs", jobs, "Threads; the problems are the same for any number")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--problem", only, "This problem only");
   CLI11_PARSE(app, argc, argv);
   const auto begin = std::chrono::steady_clock::now();
@@ -277,7 +273,8 @@ int main(int argc, char** argv) {
   seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   std::cout << "seed " << seed << ": " << total.calls << " certify calls of " << total.problems << " problems ("
             << total.refused << " refused), " << total.certified << " certified, " << total.confirmed << " confirmed, "
-            << total.refuted << " refuted, " << total.cannot_verify << " cannot verify; " << seconds << " s" << std::endl;
+            << total.refuted << " refuted, " << total.cannot_verify << " cannot verify; " << seconds << " s"
+            << std::endl;
   const bool enough = only >= 0 || total.certified * 20 >= total.calls;  // a fuzz that certifies nothing tests nothing
   return total.refuted == 0 && total.cannot_verify == 0 && enough ? 0 : 1;
 }

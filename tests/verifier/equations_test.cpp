@@ -45,7 +45,9 @@ TEST_P(Derivatives, AreThoseOfTheEquations) {
     }
     for (int k = 0; k < model.num_states(); ++k)
       for (int l = 0; l < model.num_variables(); ++l) {
-        const auto value = [&](const std::vector<Real>& at) { return equations->Value(at)[static_cast<std::size_t>(k)]; };
+        const auto value = [&](const std::vector<Real>& at) {
+          return equations->Value(at)[static_cast<std::size_t>(k)];
+        };
         EXPECT_TRUE(Agree((first[{k, l}]), Slope(value, z, l))) << k << ", " << l;
         for (int j = l; j < model.num_variables(); ++j) {
           const auto slope = [&](const std::vector<Real>& at) {

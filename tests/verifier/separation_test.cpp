@@ -52,10 +52,11 @@ TEST(Separation, ObliqueEdges) {
 }
 
 TEST(Separation, OnTheLineAndInSpace) {
-  ExpectDistance(BoxSlice({1}), Obstacle::AxisBox(Eigen::VectorXd::Constant(1, 1.25), Eigen::VectorXd::Constant(1, 2)), 0.25);
+  ExpectDistance(BoxSlice({1}), Obstacle::AxisBox(Eigen::VectorXd::Constant(1, 1.25), Eigen::VectorXd::Constant(1, 2)),
+                 0.25);
   const Slice cube = BoxSlice({1, 1, 1});
-  ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(2, 3, 3), Eigen::Vector3d(9, 9, 9)), 3);         // corners
-  ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(4, 5, -1), Eigen::Vector3d(9, 9, 9)), 5);        // edges
+  ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(2, 3, 3), Eigen::Vector3d(9, 9, 9)), 3);            // corners
+  ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(4, 5, -1), Eigen::Vector3d(9, 9, 9)), 5);           // edges
   ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(-1, 1.125, -1), Eigen::Vector3d(9, 9, 9)), 0.125);  // faces
 }
 

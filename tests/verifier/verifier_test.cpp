@@ -191,6 +191,20 @@ TEST(HandMade, CentredRemainderKnowsTheSign) {
   EXPECT_DOUBLE_EQ(paper.slices[1].center[0].ToDouble(), 0.5);
 }
 
+TEST(HandMade, CloseChoicesOfTheReductionAreTold) {
+  const auto problem = Halves();
+  problem->zonotope_order = 2;  // of the 8 columns and 4 of the envelope, 4 are kept
+  Certificate certificate = OneStep();
+  certificate.slices.clear();
+  certificate.initial_set = {{}, {}, Eigen::Vector4d::Zero(), Eigen::MatrixXd(4, 8)};
+  for (int j = 0; j < 8; ++j) certificate.initial_set.generators.col(j) << 0, 0, 0x1p-6 * (j + 1), 0x1p-8 * (j + 1);
+  const Verifier verifier(problem, Method::kPaper);
+  EXPECT_FALSE(verifier.Derive(certificate).ambiguous);
+  EXPECT_EQ(verifier.Derive(certificate).slices[1].columns.size(), 8u);
+  certificate.initial_set.generators.col(3) = certificate.initial_set.generators.col(4) * (1 + 0x1p-50);
+  EXPECT_TRUE(verifier.Derive(certificate).ambiguous);
+}
+
 TEST(HandMade, SizesThatDoNotFitAreRefuted) {
   Certificate certificate = OneStep();
   certificate.slices.pop_back();

@@ -32,7 +32,8 @@ Output Forereach(const std::string& what) {
   std::FILE* pipe = popen(command.c_str(), "r");
   Output output{-1, {}};
   std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.text.append(buffer.data(), size);
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe))
+    output.text.append(buffer.data(), size);
   output.code = WEXITSTATUS(pclose(pipe));
   return output;
 }
@@ -57,7 +58,8 @@ class VerifyDecision : public testing::Test {
   void WriteTask(const std::string& text) { std::ofstream(scratch_ / "task.yaml") << text; }
 
   Json Certify(const std::string& plan) {
-    return Json::parse(Forereach("certify --json --config " + scratch_ / "task.yaml --plan config/plans/" + plan + ".csv").text);
+    return Json::parse(
+        Forereach("certify --json --config " + scratch_ / "task.yaml --plan config/plans/" + plan + ".csv").text);
   }
 
   Output Verify(const std::string& options = "") {
@@ -93,7 +95,8 @@ TEST_F(VerifyDecision, AsItIsConfirmed) {
 TEST_F(VerifyDecision, OfEveryShippedCertificateConfirmed) {
   for (const char* task : {"bicycle", "point_mass"}) {
     const std::string file = scratch_ / task;
-    Forereach(std::string("certify --json --config config/") + task + ".yaml --plan config/plans/" + task + "_certified.csv > " + file);
+    Forereach(std::string("certify --json --config config/") + task + ".yaml --plan config/plans/" + task +
+              "_certified.csv > " + file);
     EXPECT_EQ(Forereach("verify " + file).code, 0) << task;
   }
 }
@@ -203,7 +206,8 @@ TEST_F(VerifyDecision, BadInputExitsWithTwo) {
 TEST(VerifyHelp, Teaches) {
   const Output output = Forereach("verify --help");
   EXPECT_EQ(output.code, 0);
-  for (const char* text : {"DECISION|LOG|DATABASE", "exit 0", "forereach verify decision.json", "--config config/demo.yaml"})
+  for (const char* text :
+       {"DECISION|LOG|DATABASE", "exit 0", "forereach verify decision.json", "--config config/demo.yaml"})
     EXPECT_THAT(output.text, HasSubstr(text));
 }
 

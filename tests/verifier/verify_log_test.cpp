@@ -79,7 +79,8 @@ TEST(VerifyLog, SliceShrunkenByOneUlp) {
 
 TEST(VerifyLog, SliceShrunkenAndResealed) {
   Scratch scratch;
-  const auto path = EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.slice_upper[9][0] -= 1e-9; });
+  const auto path =
+      EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.slice_upper[9][0] -= 1e-9; });
   const auto file = ReadCertificates(path, kConfig);
   EXPECT_TRUE(file.certificates[0].mismatches.empty());
   const Verdict verdict = Judge(file, 0);
@@ -90,7 +91,8 @@ TEST(VerifyLog, SliceShrunkenAndResealed) {
 
 TEST(VerifyLog, ChangedControlOfTheCertifiedPlan) {
   Scratch scratch;
-  const auto path = EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.plan.control[4][0] += 0.01; });
+  const auto path =
+      EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.plan.control[4][0] += 0.01; });
   const auto file = ReadCertificates(path, kConfig);
   EXPECT_EQ(file.certificates[0].mismatches.size(), 2u);  // the plan's digest, and no such candidate was sent
   EXPECT_EQ(Judge(file, 0).failure.step, 5);
@@ -117,7 +119,8 @@ TEST(VerifyLog, DamageIsNoticed) {
   log << std::string(300, 'x');
   log.close();
   const auto file = ReadCertificates(scratch / "damaged.lcmlog", kConfig);
-  EXPECT_TRUE(std::ranges::any_of(file.certificates, [](const auto& c) { return !c.missing.empty() || !c.mismatches.empty(); }));
+  EXPECT_TRUE(std::ranges::any_of(file.certificates,
+                                  [](const auto& c) { return !c.missing.empty() || !c.mismatches.empty(); }));
 }
 
 // ---- Obstacles that come by the bus.
@@ -182,27 +185,31 @@ TEST_F(VerifyObstacles, ThoseInForceAreTaken) {
 
 TEST_F(VerifyObstacles, MovedOntoThePath) {
   const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
-    obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
-    obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
-  }), kConfig);
+                                       obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
+                                       obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
+                                     }),
+                                     kConfig);
   ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
   EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("obstacles in force"));
   EXPECT_THAT(Judge(file, 0).failure.what, HasSubstr("clear of obstacle 0"));
 }
 
 TEST_F(VerifyObstacles, MovedOntoThePathAndResealed) {
-  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
-    obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
-    obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
-    SetDigest(certified.obstacles_digest, ObstaclesDigest(FromMessage(obstacles, 2)));
-    SetDigest(certified.certificate_digest, CertificateDigest(certified));
-  }), kConfig);
+  const auto file =
+      ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+                         obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
+                         obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
+                         SetDigest(certified.obstacles_digest, ObstaclesDigest(FromMessage(obstacles, 2)));
+                         SetDigest(certified.certificate_digest, CertificateDigest(certified));
+                       }),
+                       kConfig);
   EXPECT_TRUE(file.certificates[0].mismatches.empty());
   EXPECT_EQ(Judge(file, 0).status, Status::kRefuted);
 }
 
 TEST_F(VerifyObstacles, StaleOnesWereNeverInForce) {
-  const auto file = ReadCertificates(Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kConfig);
+  const auto file = ReadCertificates(
+      Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kConfig);
   EXPECT_EQ(file.certificates[0].mismatches.size(), 1u);
   EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
 }
