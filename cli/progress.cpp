@@ -34,8 +34,9 @@ void Progress::Advance() {
 
 std::string Progress::Line(const std::string& what, std::size_t done, std::size_t total, double seconds) {
   const std::size_t full = total == 0 ? kWidth : done * kWidth / total;
-  std::string line = "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "] " + std::to_string(done) +
-                     " of " + std::to_string(total) + " " + what;
+  std::string line(1, '[');
+  line.append(full, '#').append(kWidth - full, '.');
+  line += "] " + std::to_string(done) + " of " + std::to_string(total) + " " + what;
   if (done == 0 || done >= total) return line;
   const double left = seconds / static_cast<double>(done) * static_cast<double>(total - done);
   return line + ", " + std::to_string(std::lround(std::ceil(left))) + " s left";

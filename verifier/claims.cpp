@@ -28,7 +28,8 @@ class Claims {
   template <class What>
   void Judge(Answer answer, const Real& found, const Real& bound, const Real& scale, const char* relation, What what) {
     if (failure_ || answer == Answer::kYes) return;
-    failure_ = Failure{step_, what(), found.text(), relation + (" " + bound.text()), answer == Answer::kNo};
+    const std::string held_to = std::string(relation) + ' ' + bound.text();
+    failure_ = Failure{step_, what(), found.text(), held_to, answer == Answer::kNo};
     if (const Real excess = abs(found - bound); excess.IsFinite() && !scale.IsZero())
       failure_->excess = (excess / scale).ToDouble();
   }
