@@ -80,22 +80,34 @@ bool MayUnderflow(const std::vector<Real>& column) {
   return std::ranges::all_of(column, [](const Real& entry) { return entry.exponent() < -1073; });
 }
 
+// All columns by their score, the largest first, ties to the earlier. Exact zeros are exact; all others are told apart
+// by the middles of enclosures far below a double's last place.
+std::vector<Score> Ranking(const Slice& slice) {
+  std::vector<Score> scores;
+  for (std::size_t j = 0; j < slice.columns.size(); ++j) scores.push_back(ScoreOf(slice.columns[j], j));
+  std::ranges::stable_sort(
+      scores, [](const Score& a, const Score& b) { return CertainlyBelow(b.value.middle(), a.value.middle()); });
+  return scores;
+}
+
+// Whether the certifier may have chosen between the last column kept and the first that is not the other way round, and
+// that makes a difference.
+bool IsCloseChoice(const Slice& slice, const Score& last, const Score& first) {
+  if (!NearTie(last, first)) return false;
+  std::vector<Real> half_width;
+  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidth(k));
+  return !IsNegligible(slice.columns[last.column], half_width) ||
+         !IsNegligible(slice.columns[first.column], half_width);
+}
+
 // Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
-// whether it was a close choice.
+// whether the certifier, in doubles, may have gone another way.
 bool Reduce(Slice& slice, int order) {
   const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
   const bool tiny = std::ranges::any_of(slice.columns, MayUnderflow);
   if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return tiny;
-  std::vector<Score> scores;
-  for (std::size_t j = 0; j < slice.columns.size(); ++j) scores.push_back(ScoreOf(slice.columns[j], j));
-  // Exact zeros are exact; all others are told apart by the middles of enclosures far below a double's last place.
-  std::ranges::stable_sort(
-      scores, [](const Score& a, const Score& b) { return CertainlyBelow(b.value.middle(), a.value.middle()); });
-  std::vector<Real> half_width;
-  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidth(k));
-  const bool close = kept > 0 && NearTie(scores[kept - 1], scores[kept]) &&
-                     !(IsNegligible(slice.columns[scores[kept - 1].column], half_width) &&
-                       IsNegligible(slice.columns[scores[kept].column], half_width));
+  std::vector<Score> scores = Ranking(slice);
+  const bool close = kept > 0 && IsCloseChoice(slice, scores[kept - 1], scores[kept]);
   const auto rest = scores.begin() + static_cast<std::ptrdiff_t>(kept);
   std::sort(scores.begin(), rest, [](const Score& a, const Score& b) { return a.column < b.column; });
   Slice reduced{slice.center, {}};

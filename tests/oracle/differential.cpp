@@ -128,10 +128,8 @@ Query AnyCall(Random& random, const Problem& problem, bool absurd) {
   return query;
 }
 
-// An obstacle that a slice of the tube just touches, or just does not.
-Obstacle Touching(Random& random, const Certifier& certifier, const Tube& tube) {
-  Zonotope slice;
-  certifier.projection().Enclose(tube.slice(random.Integer(0, tube.length())), slice);
+// A unit vector: any, along an axis, or across an edge of the slice.
+Eigen::VectorXd AnyDirection(Random& random, const Zonotope& slice) {
   const int p = slice.dim();
   Eigen::VectorXd d = random.Vector(p);
   if (random.Coin(0.3)) d = random.Sign() * Eigen::VectorXd::Unit(p, random.Below(p));
@@ -140,7 +138,15 @@ Obstacle Touching(Random& random, const Certifier& certifier, const Tube& tube) 
     d = random.Sign() * Eigen::Vector2d(-slice.generator(1, j), slice.generator(0, j));
   }
   d.stableNormalize();
-  if (!(d.norm() > 0.5)) d = Eigen::VectorXd::Unit(p, 0);
+  return d.norm() > 0.5 ? d : Eigen::VectorXd(Eigen::VectorXd::Unit(p, 0));
+}
+
+// An obstacle that a slice of the tube just touches, or just does not.
+Obstacle Touching(Random& random, const Certifier& certifier, const Tube& tube) {
+  Zonotope slice;
+  certifier.projection().Enclose(tube.slice(random.Integer(0, tube.length())), slice);
+  const int p = slice.dim();
+  const Eigen::VectorXd d = AnyDirection(random, slice);
   const double reach = slice.SupportUpper(View(d));
   const double edge = reach + std::abs(reach) * random.Integer(-4, 12) * 0x1p-52 + (random.Coin(0.2) ? 1e-9 : 0);
   Eigen::VectorXd corner = slice.CenterVector();  // a point of the slice that lies farthest along d
