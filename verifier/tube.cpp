@@ -50,7 +50,7 @@ Slice SliceOf(const InitialSet& set) {
 struct Score {
   std::size_t column;
   Real value;
-  double rounded, error, size;
+  double rounded, error;
 };
 
 Score ScoreOf(const std::vector<Real>& column, std::size_t index) {
@@ -60,22 +60,11 @@ Score ScoreOf(const std::vector<Real>& column, std::size_t index) {
   Real sum;
   for (std::size_t k = 0; k < column.size(); ++k)
     if (k != largest && !column[k].IsZero()) sum += abs(column[k]);
-  const double rounded = sum.ToDouble(), size = (sum + abs(column[largest])).ToDouble();
-  return {index, rounded == 0 ? Real() : sum, rounded, rounded == 0 ? 0 : 0x1p-44 * size, size};
+  const double rounded = sum.ToDouble(), error = 0x1p-44 * (sum + abs(column[largest])).ToDouble();
+  return {index, rounded == 0 ? Real() : sum, rounded, rounded == 0 ? 0 : error};
 }
 
-// Whether the certifier, in doubles, may rank these two the other way round.
-bool NearTie(const Score& a, const Score& b) {
-  if (a.value.IsZero() && b.value.IsZero()) return false;
-  return std::abs(a.rounded - b.rounded) <= a.error + b.error || std::max(a.size, b.size) < 0x1p-960;
-}
-
-// Too small for any double to tell it from nothing beside the rest of the slice, or to hold it at all.
-bool IsNegligible(const std::vector<Real>& column, const std::vector<Real>& half_width) {
-  for (std::size_t k = 0; k < column.size(); ++k)
-    if (!column[k].IsZero() && column[k].exponent() + 200 > half_width[k].exponent()) return false;
-  return true;
-}
+// Cannot be held in doubles: the certifier's column may be zero, and dropped.
 bool MayUnderflow(const std::vector<Real>& column) {
   return std::ranges::all_of(column, [](const Real& entry) { return entry.exponent() < -1073; });
 }
@@ -90,24 +79,37 @@ std::vector<Score> Ranking(const Slice& slice) {
   return scores;
 }
 
-// Whether the certifier may have chosen between the last column kept and the first that is not the other way round, and
-// that makes a difference.
-bool IsCloseChoice(const Slice& slice, const Score& last, const Score& first) {
-  if (!NearTie(last, first)) return false;
-  std::vector<Real> half_width;
-  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidth(k));
-  return !IsNegligible(slice.columns[last.column], half_width) ||
-         !IsNegligible(slice.columns[first.column], half_width);
+// What boxing a column may cost, relative to center and half-width: all but one of its entries lose their connection.
+double CostOfBoxing(const std::vector<Real>& column, const std::vector<double>& size) {
+  double largest = 0, second = 0;
+  for (std::size_t k = 0; k < column.size(); ++k) {
+    if (column[k].IsZero()) continue;
+    const double share = std::abs(column[k].ToDouble()) / size[k];
+    second = std::max(second, std::min(share, largest));
+    largest = std::max(largest, share);
+  }
+  return second;
+}
+
+// Whether the certifier, in doubles, may have ranked the last column kept and the first boxed the other way round, and
+// what that may cost; zero if not. Its columns carry a double's rounding of their own size and of the slice's.
+double CostOfConfusing(const Slice& slice, const Score& last, const Score& first) {
+  if (last.value.IsZero() && first.value.IsZero()) return 0;
+  std::vector<double> size;
+  for (int k = 0; k < slice.dim(); ++k) size.push_back((abs(slice.center[Index(k)]) + slice.HalfWidth(k)).ToDouble());
+  const double rounding = 0x1p-48 * *std::ranges::max_element(size);
+  if (std::abs(last.rounded - first.rounded) > last.error + first.error + rounding) return 0;
+  return std::max(CostOfBoxing(slice.columns[last.column], size), CostOfBoxing(slice.columns[first.column], size));
 }
 
 // Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
-// whether the certifier, in doubles, may have gone another way.
-bool Reduce(Slice& slice, int order) {
+// what it may have cost the certifier, in doubles, to go another way.
+double Reduce(Slice& slice, int order) {
   const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
-  const bool tiny = std::ranges::any_of(slice.columns, MayUnderflow);
+  const double tiny = std::ranges::any_of(slice.columns, MayUnderflow) ? 1 : 0;
   if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return tiny;
   std::vector<Score> scores = Ranking(slice);
-  const bool close = kept > 0 && IsCloseChoice(slice, scores[kept - 1], scores[kept]);
+  const double close = kept > 0 ? CostOfConfusing(slice, scores[kept - 1], scores[kept]) : 0;
   const auto rest = scores.begin() + static_cast<std::ptrdiff_t>(kept);
   std::sort(scores.begin(), rest, [](const Score& a, const Score& b) { return a.column < b.column; });
   Slice reduced{slice.center, {}};
@@ -119,7 +121,7 @@ bool Reduce(Slice& slice, int order) {
     if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
   }
   slice = std::move(reduced);
-  return close || tiny;
+  return std::max(close, tiny);
 }
 
 // The remainder's bounds, with every second derivative over a box in `hessian` and half-widths r.
@@ -244,7 +246,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
     if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
   }
-  if (options.reduce && Reduce(next, problem_.zonotope_order)) tube.ambiguous = true;
+  if (options.reduce) tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order));
   tube.steps.push_back(std::move(step));
   tube.slices.push_back(std::move(next));
   return std::nullopt;
@@ -254,8 +256,13 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
   const Domain& domain = problem_.domain;
   const auto refuse = [&](const std::string& what, const Real& found, const Real& bound, Answer answer,
                           const char* relation = "at most ") {
-    return Failure{query.t, "the tube stays in the domain: " + what, found.text(), relation + bound.text(),
-                   answer == Answer::kNo};
+    const Real scale = max(abs(found), abs(bound));
+    return Failure{query.t,
+                   "the tube stays in the domain: " + what,
+                   found.text(),
+                   relation + bound.text(),
+                   answer == Answer::kNo,
+                   scale.IsZero() ? 1 : (abs(found - bound) / scale).ToDouble()};
   };
   const int n = domain.state.dim();
   for (int l = 0; l < static_cast<int>(query.hull.size()); ++l) {

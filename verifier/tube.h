@@ -55,9 +55,10 @@ struct Tube {
   std::vector<Step> steps;
   /** Why it went no further: Box(Z_t) leaves the domain, or something has no finite enclosure. */
   std::optional<Failure> failure;
-  /** Some reduction chose between columns whose scores differ by no more than a double's rounding, or that a double
-  cannot hold: the certifier may have chosen otherwise. */
-  bool ambiguous = false;
+  /** Not zero if some reduction chose between columns whose scores differ by no more than a double's rounding, or that
+  a double cannot hold: the certifier may have chosen otherwise, and this is what it may have lost, relative to the
+  slice. */
+  double ambiguity = 0;
 };
 
 /** Ways to a tube that is sound all the same, and tighter. */

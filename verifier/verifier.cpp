@@ -1,5 +1,6 @@
 #include "verifier/verifier.h"
 
+#include <algorithm>
 #include <array>
 
 #include "verifier/claims.h"
@@ -11,6 +12,8 @@ namespace {
 constexpr std::array kBits{256, 2304, 6656};
 // What exceeds a record by more than this is no matter of the certifier's rounding.
 constexpr double kRounding = 0x1p-40;
+// How far a difference between slices may have grown when a claim fails for it.
+constexpr double kGrowth = 1024;
 
 // What does not fit before anything is derived.
 std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& certificate) {
@@ -82,22 +85,23 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
   return {Status::kCannotVerify, *failure};
 }
 
-// The certifier's own rules first. Where these leave a choice that its rounding may have taken otherwise, a tube that
-// needs no choice confirms as well: never reduced, and with a tighter remainder.
+// The certifier's own rules first. Where these leave a choice that its rounding may have taken otherwise, and the claim
+// fails by no more than that may matter, a tube that needs no choice confirms as well: never reduced, and with a
+// tighter remainder.
 std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate& certificate) const {
-  const auto attempt = [&](const TubeOptions& options, bool& ambiguous) {
+  double ambiguity = 0;
+  const auto attempt = [&](const TubeOptions& options) {
     const Tube tube = maker.Make(certificate.initial_set, certificate.controls, options);
-    ambiguous = tube.ambiguous;
+    ambiguity = std::max(ambiguity, tube.ambiguity);
     return tube.failure ? tube.failure : FindFalseClaim(*problem_, certificate, tube);
   };
-  bool ambiguous = false, ignored = false;
-  const std::optional<Failure> failure = attempt({}, ambiguous);
+  const std::optional<Failure> failure = attempt({});
   if (!failure) return std::nullopt;
   // The centred remainder may shrink where its center moves; by a rounding error, that is no difference of rules.
-  const bool rounding = method_ == Method::kCentred && failure->excess < kRounding;
-  if (!ambiguous && !rounding) return failure;
+  const double rounding = method_ == Method::kCentred ? kRounding : 0;
+  if (!(failure->excess < std::max(kGrowth * ambiguity, rounding))) return failure;
   for (const TubeOptions& options : {TubeOptions{false, false}, TubeOptions{false, true}})
-    if (!attempt(options, ignored)) return std::nullopt;
+    if (!attempt(options)) return std::nullopt;
   return failure;
 }
 
