@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 
 #include "certifier/certify/explain.h"
-#include "certifier/task/canonical.h"
 #include "cli/commands.h"
 #include "cli/decision_json.h"
 
@@ -15,14 +14,6 @@ struct Options {
   std::string config, plan;
   bool json = false;
 };
-
-Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set) {
-  CanonicalBytes bytes("plan");
-  bytes.Numbers(controls);
-  bytes.Numbers(initial_set.lower());
-  bytes.Numbers(initial_set.upper());
-  return bytes.digest();
-}
 
 void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifier& certifier) {
   std::cout << Explain(result.decision, certifier.problem()) << "\n";
@@ -55,7 +46,7 @@ int Certify(const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
   result.decision = certifier.Certify(plan, initial_set, config.obstacles, tube);
   result.elapsed_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
-  result.plan_digest = PlanDigest(controls, config.initial_set);
+  result.controls = controls;
 
   if (options.json)
     std::cout << ToJson(result, tube, certifier, config).dump() << std::endl;

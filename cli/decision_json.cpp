@@ -1,6 +1,8 @@
 #include "cli/decision_json.h"
 
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 
 #include "certifier/certify/explain.h"
 #include "certifier/safety/separation.h"
@@ -15,7 +17,8 @@ using Json = nlohmann::json;
 Json SliceJson(const Zonotope& slice, const Certifier& certifier, std::span<const Obstacle> obstacles) {
   Json half_width = Json::array(), generators = Json::array(), clearance = Json::array();
   for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
-  for (const auto column : slice.GeneratorMatrix().colwise()) generators.push_back(std::vector(column.begin(), column.end()));
+  const Eigen::MatrixXd matrix = slice.GeneratorMatrix();
+  for (const auto column : matrix.colwise()) generators.push_back(std::vector(column.begin(), column.end()));
   Zonotope projected;
   certifier.projection().Enclose(slice, projected);
   for (const Obstacle& obstacle : obstacles)
@@ -43,7 +46,51 @@ Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obst
   return slices;
 }
 
+Json InputsJson(const Eigen::MatrixXd& controls, const Config& config) {
+  Json steps = Json::array();
+  for (const auto column : controls.colwise()) steps.push_back(std::vector(column.begin(), column.end()));
+  const Box& set = config.initial_set;
+  return {{"config", {{"given", config.path}, {"absolute", std::filesystem::absolute(config.path).lexically_normal().string()}}},
+          {"controls", steps},
+          {"initial_set", {{"lower", std::vector(set.lower().begin(), set.lower().end())},
+                           {"upper", std::vector(set.upper().begin(), set.upper().end())}}}};
+}
+
+void Append(CanonicalBytes& bytes, const Json& value) {
+  if (value.is_object()) {
+    bytes.Text("object");
+    bytes.Count(static_cast<std::int64_t>(value.size()));
+    for (const auto& [key, entry] : value.items()) {  // sorted by key
+      bytes.Text(key);
+      Append(bytes, entry);
+    }
+  } else if (value.is_array()) {
+    bytes.Text("array");
+    bytes.Count(static_cast<std::int64_t>(value.size()));
+    for (const Json& entry : value) Append(bytes, entry);
+  } else if (value.is_number() && std::isfinite(value.get<double>())) {
+    bytes.Text("number");
+    bytes.Number(value.get<double>());
+  } else {
+    bytes.Text(value.is_string() ? value.get<std::string>() : "null");
+  }
+}
+
 }  // namespace
+
+Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set) {
+  CanonicalBytes bytes("plan");
+  bytes.Numbers(controls);
+  bytes.Numbers(initial_set.lower());
+  bytes.Numbers(initial_set.upper());
+  return bytes.digest();
+}
+
+Digest TubeDigest(const nlohmann::json& tube) {
+  CanonicalBytes bytes("forereach tube");
+  Append(bytes, tube);
+  return bytes.digest();
+}
 
 nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certifier& certifier,
                       const Config& config) {
@@ -54,9 +101,12 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   document["step"] = decision.step < 0 ? Json(nullptr) : Json(decision.step);
   document["cause"] =
       decision.cause == Cause::kNone ? Json(nullptr) : Json(CauseName(static_cast<std::int16_t>(decision.cause)));
+  document["capped"] = decision.capped;
   document["message"] = Explain(decision, certifier.problem());
+  document["inputs"] = InputsJson(result.controls, config);
   document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles);
-  document["digests"] = {{"plan", ToHex(result.plan_digest)},
+  document["digests"] = {{"plan", ToHex(PlanDigest(result.controls, config.initial_set))},
+                         {"tube", ToHex(TubeDigest(document["tube"]))},
                          {"config", ToHex(config.digest)},
                          {"model", ToHex(config.model_digest)},
                          {"declaration", ToHex(config.declaration_digest)},

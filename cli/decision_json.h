@@ -13,11 +13,18 @@ namespace forereach {
 /** What was asked and answered. */
 struct CertifyResult {
   Decision decision;
-  Digest plan_digest{};
+  Eigen::MatrixXd controls;  ///< A column a step.
   double elapsed_us = 0;
 };
 
-/** Keys: outcome, step, cause, message, tube, digests, elapsed_us. `tube` has an object for each X_t that was computed:
+/** Of the controls and X0. */
+[[nodiscard]] Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set);
+
+/** Of every number in the document's `tube`, so that none can be altered unnoticed. What is infinite counts as null. */
+[[nodiscard]] Digest TubeDigest(const nlohmann::json& tube);
+
+/** Keys: outcome, step, cause, message, inputs, tube, digests, elapsed_us. With `inputs` (config {given, absolute},
+controls {a list a step}, initial_set {lower, upper}) the document can be verified by itself. `tube` has an object for each X_t that was computed:
 center, half_width (of the interval hull), generators (list of columns), clearance (per obstacle, a lower bound on the
 distance to it in metres, negative where none was proven), radius (of the projected slice, metres), and for each
 completed step also envelope {lower, upper} and remainder. Numbers that are infinite are null. */

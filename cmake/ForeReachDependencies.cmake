@@ -1,4 +1,5 @@
-# Debian 12's packages, each in docs/dependencies.md. LCM, libsodium, SQLite and cairo have no CMake package.
+# Debian 12's packages, each in docs/dependencies.md. LCM, libsodium, SQLite and cairo have no CMake package,
+# MPFI not even a pkg-config file.
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
@@ -11,6 +12,7 @@ pkg_check_modules(SODIUM REQUIRED IMPORTED_TARGET GLOBAL libsodium)
 pkg_check_modules(SQLITE REQUIRED IMPORTED_TARGET GLOBAL sqlite3)
 pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET GLOBAL cairo cairo-svg cairo-png)
 pkg_check_modules(OMPL REQUIRED IMPORTED_TARGET GLOBAL ompl)
+pkg_check_modules(MPFR REQUIRED IMPORTED_TARGET GLOBAL mpfr gmp)
 find_program(LCM_GEN lcm-gen REQUIRED)
 
 # Headers of others are not ours to warn about.
@@ -20,3 +22,9 @@ foreach(target PkgConfig::LCM PkgConfig::SODIUM PkgConfig::SQLITE PkgConfig::CAI
     set_target_properties(${target} PROPERTIES INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${directories}")
   endif()
 endforeach()
+
+find_path(MPFI_INCLUDE_DIR mpfi.h REQUIRED)
+find_library(MPFI_LIBRARY mpfi REQUIRED)
+add_library(forereach_mpfi INTERFACE IMPORTED GLOBAL)
+target_include_directories(forereach_mpfi SYSTEM INTERFACE ${MPFI_INCLUDE_DIR})
+target_link_libraries(forereach_mpfi INTERFACE ${MPFI_LIBRARY} PkgConfig::MPFR)

@@ -47,6 +47,8 @@ class IncludesTest : public testing::Test {
     Write("robot/guard.cpp", "#include \"robot/guard.h\"\n");
     Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"certifier/sets/box.h\"\n");
     Write("logger/database.cpp", "#include <sqlite3.h>\n#include <cairo-svg.h>\n");
+    Write("verifier/real.h", "#include <mpfi.h>\n");
+    Write("verifier/tube.cpp", "#include \"certifier/sets/box.h\"\n#include \"verifier/real.h\"\n");
     Write("tests/logger/log_test.cpp", "#include <lcm/lcm-cpp.hpp>\n");
     Write("bench/gate_bench.cpp", "#include \"certifier/gate/gate.h\"\n#include <benchmark/benchmark.h>\n");
   }
@@ -83,7 +85,7 @@ TEST_F(IncludesTest, TheSourcesKeepToTheArrows) {
 TEST_F(IncludesTest, AHouseInOrderPasses) {
   const Result result = CheckIncludes(root_.string());
   EXPECT_EQ(result.exit_code, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("12 files, 20 includes, 0 against the arrows"));
+  EXPECT_THAT(result.output, HasSubstr("14 files, 23 includes, 0 against the arrows"));
 }
 
 TEST_F(IncludesTest, AnEmptyHouseIsAnErrorNotAPass) {
@@ -127,6 +129,16 @@ TEST_F(IncludesTest, ThePartsOfTheHouse) {
 TEST_F(IncludesTest, TheGuardIncludesLcmtypesOnly) {
   for (const char* include : {"\"certifier/sets/box.h\"", "\"robot/target.h\"", "<Eigen/Core>", "<spdlog/spdlog.h>"})
     Refuse("robot/guard.cpp", include, "the guard may include lcmtypes only");
+  ExpectRefused();
+}
+
+TEST_F(IncludesTest, TheVerifierSharesNoArithmetic) {
+  for (const char* include : {"\"certifier/numerics/interval.h\"", "\"certifier/gate/gate.h\""})
+    Refuse("verifier/bad.cpp", include, "the verifier may include the certifier's data only");
+  Refuse("verifier/bad.cpp", "\"lcmtypes/codec.h\"", "verifier may not include lcmtypes");
+  Refuse("certifier/gate/bad.cpp", "\"verifier/real.h\"", "certifier may not include verifier");
+  Refuse("logger/bad.cpp", "\"verifier/real.h\"", "logger may not include verifier");
+  Refuse("verifier/tube.cpp", "<mpfi.h>", "MPFI belongs to verifier/real.h alone");
   ExpectRefused();
 }
 

@@ -1,0 +1,370 @@
+#include "cli/certificate_files.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/freshness.h"
+#include "certifier/gate/obstacle_message.h"
+#include "certifier/task/files.h"
+#include "cli/decision_json.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "lcmtypes/names.h"
+#include "logger/database.h"
+#include "logger/event_log.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+void Compare(RecordedCertificate& certificate, const std::string& what, const std::string& expected,
+             const std::string& found) {
+  if (expected != found) certificate.mismatches.push_back({what, expected, found});
+}
+
+constexpr const char* kAltered = "the record was altered after it was made: digest of ";
+constexpr const char* kOtherInput = "another input than the certificate was made of: digest of the ";
+
+// ---- A decision's document.
+
+Eigen::VectorXd VectorOf(const Json& list) {
+  const auto numbers = list.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+}
+
+Eigen::MatrixXd ColumnsOf(const Json& lists, Eigen::Index rows) {
+  Eigen::MatrixXd matrix(rows, static_cast<Eigen::Index>(lists.size()));
+  for (std::size_t j = 0; j < lists.size(); ++j) {
+    const Eigen::VectorXd column = VectorOf(lists[j]);
+    if (column.size() != rows)
+      throw ConfigError("a list of " + std::to_string(column.size()) + " numbers, must have " + std::to_string(rows));
+    matrix.col(static_cast<Eigen::Index>(j)) = column;
+  }
+  return matrix;
+}
+
+verifier::RecordedSlice SliceOf(const Json& slice) {
+  verifier::RecordedSlice recorded;
+  recorded.center = VectorOf(slice.at("center"));
+  recorded.half_width = VectorOf(slice.at("half_width"));
+  recorded.generators = ColumnsOf(slice.at("generators"), recorded.center.size());
+  recorded.has_generators = true;
+  recorded.clearance = slice.at("clearance").get<std::vector<double>>();
+  if (const Json& radius = slice.at("radius"); !radius.is_null())
+    recorded.radius = radius.get<double>();  // else infinite
+  if (!slice.contains("envelope")) return recorded;
+  recorded.envelope_lower = VectorOf(slice["envelope"].at("lower"));
+  recorded.envelope_upper = VectorOf(slice["envelope"].at("upper"));
+  recorded.remainder = VectorOf(slice.at("remainder"));
+  return recorded;
+}
+
+std::string TaskOf(const Json& inputs) {
+  const auto absolute = inputs.at("config").at("absolute").get<std::string>();
+  return std::filesystem::exists(absolute) ? absolute : inputs["config"].at("given").get<std::string>();
+}
+
+CertificateFile FromDecision(const std::string& path, const Json& document, const std::string& config_path) {
+  const Json& inputs = document.at("inputs");
+  CertificateFile file;
+  file.config = LoadConfig(config_path.empty() ? TaskOf(inputs) : config_path);
+  if (document.at("outcome") != "certified") {
+    file.not_certificates = 1;
+    return file;
+  }
+  RecordedCertificate& certificate = file.certificates.emplace_back();
+  certificate.name = path;
+  verifier::Certificate& recorded = certificate.certificate;
+  recorded.controls = ColumnsOf(inputs.at("controls"), file.config.problem->model->num_inputs());
+  recorded.initial_set.lower = VectorOf(inputs.at("initial_set").at("lower"));
+  recorded.initial_set.upper = VectorOf(inputs["initial_set"].at("upper"));
+  recorded.obstacles = file.config.obstacles;
+  for (const Json& slice : document.at("tube")) recorded.slices.push_back(SliceOf(slice));
+
+  const Json& digests = document.at("digests");
+  const auto compare = [&](const char* what, const std::string& name, const Digest& digest) {
+    Compare(certificate, what + name, ToHex(digest), digests.at(name).get<std::string>());
+  };
+  compare(kAltered, "tube", TubeDigest(document["tube"]));
+  compare(kAltered, "plan", PlanDigest(recorded.controls, Box(recorded.initial_set.lower, recorded.initial_set.upper)));
+  compare(kOtherInput, "config", file.config.digest);
+  compare(kOtherInput, "model", file.config.model_digest);
+  compare(kOtherInput, "declaration", file.config.declaration_digest);
+  compare(kOtherInput, "observations", file.config.observations_digest);
+  compare(kOtherInput, "obstacles", file.config.obstacles_digest);
+  return file;
+}
+
+// ---- An event log.
+
+// The obstacles that were in force, one version after the other, in the order of the log.
+class ObstacleHistory {
+ public:
+  explicit ObstacleHistory(const Config& config) : config_(config) { Restart(); }
+
+  void Restart() {
+    versions_.push_back({config_.obstacles, config_.obstacles_digest});
+    last_sequence_ = -1;
+  }
+
+  // As the gate takes them: fresh, in order, whole or not at all.
+  void Update(const LogEvent& event) {
+    const auto message = Decoded<obstacles_t>(event.data);
+    const auto us = [](double ms) { return static_cast<std::int64_t>(std::llround(ms * 1e3)); };
+    if (!message || message->sequence <= last_sequence_ ||
+        FreshnessOf(message->utime, event.utime, us(config_.gate.max_age_ms), us(config_.gate.max_ahead_ms)) !=
+            Freshness::kFresh)
+      return;
+    try {
+      auto obstacles = FromMessage(*message, static_cast<int>(config_.problem->projection.rows()));
+      const Digest digest = ObstaclesDigest(obstacles);
+      versions_.push_back({std::move(obstacles), digest});
+      last_sequence_ = message->sequence;
+    } catch (const std::invalid_argument&) {
+    }
+  }
+
+  [[nodiscard]] std::size_t now() const { return versions_.size() - 1; }
+
+  // The version of that digest that was in force some time since `first`; without one, that which was at `first`.
+  [[nodiscard]] std::size_t Find(std::size_t first, const Digest& digest) const {
+    for (std::size_t i = first; i < versions_.size(); ++i)
+      if (versions_[i].digest == digest) return i;
+    return first;
+  }
+
+  struct Version {
+    std::vector<Obstacle> obstacles;
+    Digest digest;
+  };
+  [[nodiscard]] const Version& version(std::size_t i) const { return versions_[i]; }
+
+ private:
+  const Config& config_;
+  std::vector<Version> versions_;
+  std::int64_t last_sequence_ = -1;
+};
+
+verifier::Certificate CertificateOf(const certified_plan_t& certified, const std::vector<Obstacle>& obstacles) {
+  const candidate_plan_t& plan = certified.plan;
+  const int n = plan.num_states;
+  verifier::Certificate certificate;
+  certificate.initial_set.center = Eigen::Map<const Eigen::VectorXd>(plan.initial_center, n);
+  certificate.initial_set.generators = Eigen::Map<const Eigen::VectorXd>(plan.initial_half_width, n).asDiagonal();
+  certificate.controls.resize(plan.num_inputs, plan.num_steps);
+  for (int t = 0; t < plan.num_steps; ++t)
+    certificate.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.control[t], plan.num_inputs);
+  certificate.obstacles = obstacles;
+  for (int t = 0; t <= plan.num_steps; ++t) {
+    verifier::RecordedSlice& slice = certificate.slices.emplace_back();
+    slice.lower = Eigen::Map<const Eigen::VectorXd>(certified.slice_lower[t], n);
+    slice.upper = Eigen::Map<const Eigen::VectorXd>(certified.slice_upper[t], n);
+  }
+  return certificate;
+}
+
+class LogReading {
+ public:
+  LogReading(const std::string& path, const Config& config, std::vector<RecordedCertificate>& certificates)
+      : config_(config), obstacles_(config), certificates_(certificates) {
+    EventLogReader reader(path);
+    LogEvent event;
+    for (LogStatus status = reader.Next(event); status != LogStatus::kEnd && status != LogStatus::kCutTail;
+         status = reader.Next(event))
+      if (status == LogStatus::kEvent) Take(event);
+    if (reader.corruptions() > 0)
+      certificates_.push_back(
+          {path, {}, "the log is damaged in " + std::to_string(reader.corruptions()) + " places", {}});
+    for (const auto& [digest, outcome] : outcomes_)
+      if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
+        certificates_.push_back(
+            {"plan with digest " + ToHex(digest), {}, "decided as certified, but the log has no certified plan", {}});
+  }
+
+  [[nodiscard]] std::size_t abstentions() const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
+  }
+  [[nodiscard]] const std::map<Digest, std::int16_t>& outcomes() const { return outcomes_; }
+  [[nodiscard]] const std::set<Digest>& plans() const { return plans_; }
+
+ private:
+  void Take(const LogEvent& event) {
+    if (event.channel == config_.bus.obstacles) {
+      obstacles_.Update(event);
+    } else if (event.channel == config_.bus.candidate) {
+      in_force_.insert_or_assign(DigestOf(event.data), obstacles_.now());
+    } else if (event.channel == config_.bus.decision) {
+      TakeDecision(event);
+    } else if (event.channel == config_.bus.certified) {
+      TakeCertified(event);
+    }
+  }
+
+  // A certifier that was started again has the task's obstacles again.
+  void NoticeRestart(std::int64_t sequence, std::int64_t& last) {
+    if (sequence < last) obstacles_.Restart();
+    last = sequence;
+  }
+
+  void TakeDecision(const LogEvent& event) {
+    const auto decision = Decoded<decision_t>(event.data);
+    if (!decision) return;
+    NoticeRestart(decision->sequence, last_decision_);
+    // A candidate that comes twice is rejected the second time: the certificate is the first's.
+    std::int16_t& outcome = outcomes_[GetDigest(decision->plan_digest)];
+    if (outcome != decision_t::CERTIFIED) outcome = decision->outcome;
+  }
+
+  void TakeCertified(const LogEvent& event) {
+    RecordedCertificate certificate;
+    const auto certified = Decoded<certified_plan_t>(event.data);
+    certificate.name = "event " + std::to_string(event.number);
+    if (!certified || !HasSizes(certified->plan)) {
+      certificate.missing = "not a certified_plan_t of this task's sizes";
+      certificates_.push_back(std::move(certificate));
+      return;
+    }
+    NoticeRestart(certified->sequence, last_certified_);
+    certificate.name += ", plan " + std::to_string(certified->plan.plan_id) + " of " + GetText(certified->plan.source);
+    CheckDigests(*certified, certificate);
+    certificates_.push_back(std::move(certificate));
+  }
+
+  [[nodiscard]] bool HasSizes(const candidate_plan_t& plan) const {
+    const NominalModel& model = *config_.problem->model;
+    return plan.num_states == model.num_states() && plan.num_inputs == model.num_inputs() && 1 <= plan.num_steps &&
+           plan.num_steps <= kMaxSteps;
+  }
+
+  void CheckDigests(const certified_plan_t& certified, RecordedCertificate& certificate) {
+    const Digest plan = DigestOf(Encode(certified.plan));
+    plans_.insert(plan);
+    const auto sent = in_force_.find(plan);
+    const Digest named = GetDigest(certified.obstacles_digest);
+    const auto& version = obstacles_.version(obstacles_.Find(sent == in_force_.end() ? 0 : sent->second, named));
+    certificate.certificate = CertificateOf(certified, version.obstacles);
+    const auto compare = [&](const char* what, const char* name, const Digest& expected, const Digest& found) {
+      Compare(certificate, std::string(what) + name, ToHex(expected), ToHex(found));
+    };
+    compare(kAltered, "certificate", CertificateDigest(certified), GetDigest(certified.certificate_digest));
+    compare(kAltered, "plan", plan, GetDigest(certified.plan_digest));
+    compare(kOtherInput, "config", config_.digest, GetDigest(certified.config_digest));
+    compare(kOtherInput, "model", config_.model_digest, GetDigest(certified.model_digest));
+    compare(kOtherInput, "declaration", config_.declaration_digest, GetDigest(certified.declaration_digest));
+    compare(kOtherInput, "observations", config_.observations_digest, GetDigest(certified.observations_digest));
+    compare(kOtherInput, "obstacles in force", version.digest, named);
+    if (sent == in_force_.end())
+      certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
+  }
+
+  const Config& config_;
+  ObstacleHistory obstacles_;
+  std::vector<RecordedCertificate>& certificates_;
+  std::map<Digest, std::size_t> in_force_;  // when a candidate was sent
+  std::map<Digest, std::int16_t> outcomes_;
+  std::set<Digest> plans_;
+  std::int64_t last_decision_ = -1, last_certified_ = -1;
+};
+
+CertificateFile FromLog(const std::string& path, Config config) {
+  CertificateFile file;
+  file.config = std::move(config);
+  file.not_certificates = LogReading(path, file.config, file.certificates).abstentions();
+  return file;
+}
+
+// ---- A decision database: its logs lie beside it, and its rows have to say what they say.
+
+void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const Config& config,
+               std::vector<RecordedCertificate>& certificates) {
+  std::set<std::string> certified;
+  for (const auto& [digest, outcome] : log.outcomes())
+    if (outcome == decision_t::CERTIFIED) certified.insert(ToHex(digest));
+  for (const DecisionRow& row : rows) {
+    if (row.outcome != OutcomeName(decision_t::CERTIFIED)) continue;
+    RecordedCertificate certificate;
+    certificate.name = row.event.log_file + " event " + std::to_string(row.event.event_number) + " in the database";
+    if (certified.erase(row.plan_digest) == 0) certificate.missing = "the log has no such certificate";
+    Compare(certificate, std::string(kOtherInput) + "config", ToHex(config.digest), row.config_digest);
+    Compare(certificate, std::string(kOtherInput) + "model", ToHex(config.model_digest), row.model_digest);
+    Compare(certificate, std::string(kOtherInput) + "declaration", ToHex(config.declaration_digest),
+            row.declaration_digest);
+    Compare(certificate, std::string(kOtherInput) + "observations", ToHex(config.observations_digest),
+            row.observations_digest);
+    if (!certificate.missing.empty() || !certificate.mismatches.empty()) {
+      if (certificate.missing.empty()) certificate.missing = "the row disagrees with the log";
+      certificates.push_back(std::move(certificate));
+    }
+  }
+  for (const std::string& digest : certified)
+    certificates.push_back({"plan with digest " + digest, {}, "certified in the log, but not in the database", {}});
+}
+
+CertificateFile FromDatabase(const std::string& path, Config config) {
+  CertificateFile file;
+  file.config = std::move(config);
+  Database database(path);
+  for (const RunRow& run : database.Runs()) {
+    const std::string log = (std::filesystem::path(path).parent_path() / run.log_file).string();
+    if (!std::filesystem::exists(log)) {
+      file.certificates.push_back({run.log_file, {}, "the log is not beside the database", {}});
+      continue;
+    }
+    const std::size_t before = file.certificates.size();
+    const LogReading reading(log, file.config, file.certificates);
+    for (std::size_t i = before; i < file.certificates.size(); ++i)
+      file.certificates[i].name = run.log_file + " " + file.certificates[i].name;
+    file.not_certificates += reading.abstentions();
+    CheckRows(database.Read(run.log_file).decisions, reading, file.config, file.certificates);
+  }
+  return file;
+}
+
+// ---- Which of the three.
+
+std::string FirstBytes(const std::string& path) {
+  std::ifstream file = OpenForReading(path);
+  std::string bytes(16, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  return bytes;
+}
+
+Config TaskGiven(const std::string& path, const std::string& config_path) {
+  if (config_path.empty()) throw ConfigError(path + ": name its task with --config FILE");
+  return LoadConfig(config_path);
+}
+
+}  // namespace
+
+CertificateFile ReadCertificates(const std::string& path, const std::string& config_path) {
+  const std::string first = FirstBytes(path);
+  try {
+    if (first.rfind(std::string("SQLite format 3\0", 16), 0) == 0)
+      return FromDatabase(path, TaskGiven(path, config_path));
+    if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLog(path, TaskGiven(path, config_path));
+    if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{') {
+      std::ifstream stream = OpenForReading(path);
+      return FromDecision(path, Json::parse(stream), config_path);
+    }
+  } catch (const Json::exception& error) {
+    throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());
+  } catch (const LogError& error) {
+    throw ConfigError(error.what());
+  } catch (const DatabaseError& error) {
+    throw ConfigError(error.what());
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(path + ": " + error.what());
+  }
+  throw ConfigError(path + ": neither a decision (JSON), nor an event log, nor a decision database");
+}
+
+}  // namespace forereach

@@ -1,0 +1,37 @@
+/** The certificates in a decision's JSON document, an event log or a decision database, with what they were made of:
+all that the verifier needs. Digests are held against the inputs here; the mathematics is the verifier's. */
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "certifier/task/config.h"
+#include "verifier/verifier.h"
+
+namespace forereach {
+
+/** Something recorded that is not what it has to be. */
+struct Mismatch {
+  std::string what, expected, found;
+};
+
+struct RecordedCertificate {
+  std::string name;                  ///< Which one, for a person.
+  std::vector<Mismatch> mismatches;  ///< Digests and the like that are wrong; the record was altered, or its inputs.
+  std::string missing;               ///< Why there is nothing to derive, or empty.
+  verifier::Certificate certificate;
+};
+
+struct CertificateFile {
+  Config config;
+  std::vector<RecordedCertificate> certificates;
+  std::size_t not_certificates = 0;  ///< Abstentions and rejections: nothing to verify.
+};
+
+/** Reads any of the three; which one it is, is told from its first bytes.
+@param config_path the task; may be empty for a decision, which names its own.
+@throws ConfigError if the file is none of the three, cannot be read, or needs a task file and has none. */
+[[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path);
+
+}  // namespace forereach

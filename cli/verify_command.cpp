@@ -1,0 +1,174 @@
+#include <atomic>
+#include <iostream>
+#include <sstream>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "certifier/certify/certifier.h"
+#include "cli/certificate_files.h"
+#include "cli/commands.h"
+#include "cli/progress.h"
+
+namespace forereach {
+namespace {
+
+using verifier::Status;
+using verifier::Verdict;
+
+struct Options {
+  std::string file, config;
+  bool json = false;
+  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+};
+
+// What the verifier relies on: the certifier accepts no other problem.
+void RequireAcceptable(const Config& config) {
+  try {
+    const Certifier certifier(config.problem);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(config.path + ": " + error.what());
+  }
+}
+
+std::vector<Verdict> VerifyAll(const CertificateFile& file, unsigned jobs) {
+  const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
+  std::vector<Verdict> verdicts(file.certificates.size());
+  Progress progress("certificates verified", verdicts.size());
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&] {
+    for (std::size_t i = next++; i < verdicts.size(); i = next++) {
+      const RecordedCertificate& recorded = file.certificates[i];
+      verdicts[i] = recorded.missing.empty() ? verifier.Verify(recorded.certificate)
+                                             : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
+      if (!recorded.mismatches.empty() && verdicts[i].status == Status::kConfirmed)
+        verdicts[i].status = Status::kRefuted;
+      progress.Advance();
+    }
+  };
+  std::vector<std::thread> threads;
+  for (unsigned j = 0; j < std::min<std::size_t>(jobs, verdicts.size()); ++j) threads.emplace_back(work);
+  for (std::thread& thread : threads) thread.join();
+  return verdicts;
+}
+
+struct Summary {
+  std::size_t confirmed = 0, refuted = 0, cannot_verify = 0;
+};
+
+Summary Count(const std::vector<Verdict>& verdicts) {
+  Summary summary;
+  for (const Verdict& verdict : verdicts) {
+    summary.confirmed += verdict.status == Status::kConfirmed;
+    summary.refuted += verdict.status == Status::kRefuted;
+    summary.cannot_verify += verdict.status == Status::kCannotVerify;
+  }
+  return summary;
+}
+
+std::string InWords(const RecordedCertificate& recorded, const Verdict& verdict) {
+  std::ostringstream text;
+  text << (verdict.status == Status::kRefuted ? "refuted: " : "cannot verify: ") << recorded.name << "\n";
+  for (const Mismatch& mismatch : recorded.mismatches)
+    text << "  " << mismatch.what << "\n    expected " << mismatch.expected << "\n    found    " << mismatch.found
+         << "\n";
+  const verifier::Failure& failure = verdict.failure;
+  if (failure.what.empty()) {
+    text << "  every step of its mathematics holds for the inputs given\n";
+    return text.str();
+  }
+  text << "  ";
+  if (failure.step >= 0) text << "step " << failure.step << ": ";
+  text << (verdict.status == Status::kRefuted ? "not so: " : "") << failure.what << "\n";
+  if (!failure.bound.empty()) text << "    expected " << failure.bound << "\n    found    " << failure.found << "\n";
+  if (failure.excess < 1e-12) text << "    which is off by " << failure.excess << " of its size\n";
+  return text.str();
+}
+
+nlohmann::json ToJson(const RecordedCertificate& recorded, const Verdict& verdict) {
+  const verifier::Failure& failure = verdict.failure;
+  nlohmann::json document{{"certificate", recorded.name},
+                          {"verdict", verdict.status == Status::kRefuted ? "refuted" : "cannot_verify"},
+                          {"step", failure.step < 0 ? nlohmann::json(nullptr) : nlohmann::json(failure.step)},
+                          {"claim", failure.what},
+                          {"expected", failure.bound},
+                          {"found", failure.found},
+                          {"mismatches", nlohmann::json::array()}};
+  for (const Mismatch& mismatch : recorded.mismatches)
+    document["mismatches"].push_back(
+        {{"what", mismatch.what}, {"expected", mismatch.expected}, {"found", mismatch.found}});
+  return document;
+}
+
+void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts, const Summary& summary) {
+  nlohmann::json failures = nlohmann::json::array();
+  for (std::size_t i = 0; i < verdicts.size(); ++i)
+    if (verdicts[i].status != Status::kConfirmed) failures.push_back(ToJson(file.certificates[i], verdicts[i]));
+  std::cout << nlohmann::json{{"certificates", verdicts.size()},
+                              {"confirmed", summary.confirmed},
+                              {"refuted", summary.refuted},
+                              {"cannot_verify", summary.cannot_verify},
+                              {"not_certificates", file.not_certificates},
+                              {"failures", failures}}
+            << std::endl;
+}
+
+void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& verdicts, const Summary& summary) {
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    if (verdicts[i].status == Status::kConfirmed) continue;
+    std::cout << InWords(file.certificates[i], verdicts[i]);
+    break;
+  }
+  std::cout << "verify: " << verdicts.size() << " certificates, " << summary.confirmed << " confirmed, "
+            << summary.refuted << " refuted, " << summary.cannot_verify << " cannot be verified";
+  if (file.not_certificates > 0)
+    std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
+  std::cout << std::endl;
+}
+
+int Verify(const Options& options) {
+  const CertificateFile file = ReadCertificates(options.file, options.config);
+  RequireAcceptable(file.config);
+  const std::vector<Verdict> verdicts = VerifyAll(file, options.jobs);
+  const Summary summary = Count(verdicts);
+  if (options.json)
+    PrintJson(file, verdicts, summary);
+  else
+    PrintForPeople(file, verdicts, summary);
+  return summary.confirmed == verdicts.size() && !verdicts.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+void AddVerifyCommand(CLI::App& app, Action& action) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("verify",
+                         "Derive recorded certificates anew, in high precision and with code of its own: exit 0 if "
+                         "there are any and all are "
+                         "confirmed, 1 with the first that is not and the first step of it that fails, 2 bad input");
+  command
+      ->add_option(
+          "file", options->file,
+          "What holds the certificates: a decision (the output of certify --json), an LCM event log, or a decision "
+          "database with its logs beside it")
+      ->required()
+      ->type_name("DECISION|LOG|DATABASE");
+  command->add_option("--config", options->config, "The task file they were made with; a decision names its own")
+      ->type_name("FILE");
+  command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON document on standard output");
+  command->footer(
+      "Each certificate is held against the digests of its inputs, then against a tube derived anew from these: every\n"
+      "recorded number has to cover what was derived, and the derived tube has to keep clear of every obstacle.\n"
+      "Abstentions claim nothing and are not verified.\n\n"
+      "Examples:\n"
+      "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > "
+      "decision.json\n"
+      "  forereach verify decision.json\n"
+      "  forereach verify run/log/events-20260101-120000.lcmlog --config config/demo.yaml");
+  command->callback([options, &action] { action = [options] { return Verify(*options); }; });
+}
+
+}  // namespace forereach

@@ -1,0 +1,286 @@
+// The certifier against the verifier: random problems and plans, certified by the one and derived anew by the other.
+// `forereach_differential --count N --seed S --jobs J`; exit 1 if a certificate is refuted. `--problem P` repeats one.
+#include <CLI/CLI.hpp>
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/oracle/problems.h"
+#include "tests/oracle/random.h"
+#include "tests/verifier/record.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kCallsPerProblem = 50;
+
+// What AnyProblem leaves out: any safety dimension, dense rows of L, high orders, domains cut by inequalities.
+void Vary(Random& random, Problem& problem) {
+  const int n = problem.model->num_states(), variables = problem.model->num_variables();
+  problem.zonotope_order = random.Integer(1, 8);
+  if (random.Coin(0.3)) {
+    const int p = random.Coin() ? 1 : 3;
+    problem.projection = random.Coin() ? Eigen::MatrixXd(Eigen::MatrixXd::Identity(p, n)) : random.Matrix(p, n);
+  }
+  if (random.Coin(0.1)) {  // L may only grow: then the data stay consistent
+    const int k = random.Below(n);
+    for (int l = 0; l < variables; ++l) problem.declaration.lipschitz(k, l) += random.Uniform(0, 0.02);
+  }
+  if (random.Coin(0.2)) {
+    Eigen::VectorXd normal = random.Vector(variables);
+    const double bound = (problem.transitions.z * normal).maxCoeff() + 1;
+    problem.domain.inequalities.push_back({std::move(normal), bound});
+  }
+  if (random.Coin(0.1)) {  // identical observations, and one more than once
+    problem.transitions.z.row(problem.transitions.size() - 1) = problem.transitions.z.row(0);
+    problem.transitions.x_next.row(problem.transitions.size() - 1) = problem.transitions.x_next.row(0);
+  }
+}
+
+// Numbers where arithmetic changes its rules.
+void Exaggerate(Random& random, Problem& problem) {
+  const int n = problem.model->num_states(), inputs = problem.model->num_inputs();
+  switch (random.Below(5)) {
+    case 0:
+      problem.declaration.lipschitz *= std::ldexp(1, random.Integer(-1074, 30));
+      problem.declaration.noise_bound.setConstant(1);
+      break;
+    case 1: problem.declaration.noise_bound.setConstant(std::ldexp(1, random.Integer(-1074, 300))); break;
+    case 2: {
+      const Eigen::VectorXd all = Eigen::VectorXd::Constant(n, std::ldexp(1, random.Integer(6, 1000)));
+      problem.domain = {
+          Box(-all, all), Box(-Eigen::VectorXd::Constant(inputs, 1e3), Eigen::VectorXd::Constant(inputs, 1e3)), {}, {}};
+      break;
+    }
+    case 3: problem.projection *= std::ldexp(1, random.Integer(-1000, 900)); break;
+    default:
+      problem.transitions.x_next *= 1 + 0x1p-52 * random.Integer(-4, 4);
+      problem.declaration.noise_bound.array() += 1e-9;
+  }
+}
+
+Eigen::VectorXd NormalOf(Random& random, int p) {
+  Eigen::VectorXd normal = random.Vector(p);
+  if (random.Coin(0.2)) normal *= std::ldexp(1, random.Integer(-1000, 1000));
+  return normal;
+}
+
+Obstacle AnyObstacle(Random& random, const Eigen::VectorXd& place) {
+  const int p = static_cast<int>(place.size());
+  switch (random.Below(p == 2 ? 4 : 2)) {
+    case 0:
+      return Obstacle::AxisBox(place, place + (random.Coin(0.2) ? Eigen::VectorXd(Eigen::VectorXd::Zero(p))
+                                                                : Eigen::VectorXd(random.Vector(p).cwiseAbs())));
+    case 1: {
+      const Eigen::VectorXd normal = NormalOf(random, p);
+      const double offset = normal.dot(place);
+      return Obstacle::HalfSpace(normal, offset + std::abs(offset) * random.Uniform(0, 1));
+    }
+    case 2: return Obstacle::Circle(place, random.Coin(0.1) ? 0 : random.Uniform(0, 2));
+    default: {
+      std::vector<Eigen::VectorXd> vertices;
+      for (int i = random.Integer(3, 8); i > 0; --i)
+        vertices.push_back(place + random.Vector(p, random.Coin(0.1) ? 0 : 1));
+      return Obstacle::Polygon(vertices);
+    }
+  }
+}
+
+Query AnyCall(Random& random, const Problem& problem, bool absurd) {
+  const int n = problem.model->num_states(), p = static_cast<int>(problem.projection.rows());
+  Problem planar = problem;  // AnyQuery knows the plane only; the obstacles are made here
+  planar.projection = Eigen::MatrixXd::Identity(2, n);
+  Query query = AnyQuery(random, planar);
+  query.obstacles.clear();
+  Eigen::VectorXd center = query.initial_set.CenterVector();
+  Eigen::MatrixXd generators = query.initial_set.GeneratorMatrix();
+  const int most = problem.zonotope_order * n;
+  switch (random.Below(6)) {
+    case 0: generators = random.Matrix(n, random.Integer(0, most), std::ldexp(1, random.Integer(-14, -7))); break;
+    case 1:  // nearly parallel, and nearly equal in length
+      generators = random.Matrix(n, 1, 0.01).replicate(1, random.Integer(1, most));
+      generators += random.Matrix(n, static_cast<int>(generators.cols()), 1e-12);
+      break;
+    case 2: generators.setZero(); break;
+    default: break;
+  }
+  if (absurd && random.Coin(0.3) && generators.cols() > 0) generators *= std::ldexp(1, random.Integer(-1074, 2));
+  if (absurd && random.Coin(0.3)) center[random.Below(n)] = random.Double();
+  if (absurd && random.Coin(0.1)) query.controls *= std::ldexp(1, random.Integer(-1074, 8));
+  query.initial_set = Zonotope(center, generators.leftCols(std::min<Eigen::Index>(generators.cols(), most)));
+  for (int o = random.Integer(0, 4); o > 0; --o) {
+    Eigen::VectorXd place = problem.projection * center + random.Vector(p, random.Coin() ? 30 : 8);
+    if (absurd && random.Coin(0.2)) place[random.Below(p)] = random.Double();
+    try {
+      query.obstacles.push_back(AnyObstacle(random, place));
+    } catch (const std::invalid_argument&) {  // a sum that overflowed
+    }
+  }
+  return query;
+}
+
+// A unit vector: any, along an axis, or across an edge of the slice.
+Eigen::VectorXd AnyDirection(Random& random, const Zonotope& slice) {
+  const int p = slice.dim();
+  Eigen::VectorXd d = random.Vector(p);
+  if (random.Coin(0.3)) d = random.Sign() * Eigen::VectorXd::Unit(p, random.Below(p));
+  if (p == 2 && slice.num_generators() > 0 && random.Coin()) {
+    const int j = random.Below(slice.num_generators());
+    d = random.Sign() * Eigen::Vector2d(-slice.generator(1, j), slice.generator(0, j));
+  }
+  d.stableNormalize();
+  return d.norm() > 0.5 ? d : Eigen::VectorXd(Eigen::VectorXd::Unit(p, 0));
+}
+
+// An obstacle that a slice of the tube just touches, or just does not.
+Obstacle Touching(Random& random, const Certifier& certifier, const Tube& tube) {
+  Zonotope slice;
+  certifier.projection().Enclose(tube.slice(random.Integer(0, tube.length())), slice);
+  const int p = slice.dim();
+  const Eigen::VectorXd d = AnyDirection(random, slice);
+  const double reach = slice.SupportUpper(View(d));
+  const double edge = reach + std::abs(reach) * random.Integer(-4, 12) * 0x1p-52 + (random.Coin(0.2) ? 1e-9 : 0);
+  Eigen::VectorXd corner = slice.CenterVector();  // a point of the slice that lies farthest along d
+  for (int j = 0; j < slice.num_generators(); ++j) {
+    double along = 0;
+    for (int k = 0; k < p; ++k) along += d[k] * slice.generator(k, j);
+    for (int k = 0; k < p; ++k) corner[k] += (along < 0 ? -1 : 1) * slice.generator(k, j);
+  }
+  const Eigen::VectorXd place = corner + (edge - d.dot(corner)) * d;
+  if (p == 2 && random.Coin(0.3)) {
+    const double radius = random.Coin(0.2) ? 0 : random.Uniform(0, 2);
+    return Obstacle::Circle(place + radius * d, radius);
+  }
+  if (p == 2 && random.Coin(0.4)) {
+    const Eigen::Vector2d along = random.Coin() ? Eigen::Vector2d(-d[1], d[0]) : Eigen::Vector2d(random.Vector(2));
+    return Obstacle::Polygon({place, place + along, place + d + 0.5 * along, place - random.Uniform(0, 1) * along});
+  }
+  if (random.Coin(0.4)) {
+    Eigen::VectorXd far = place;
+    for (int k = 0; k < p; ++k) far[k] += d[k] < 0 ? -random.Uniform(0, 1) : random.Uniform(0, 1);
+    return Obstacle::AxisBox(place.cwiseMin(far), place.cwiseMax(far));
+  }
+  return Obstacle::HalfSpace(d, edge);
+}
+
+struct Counts {
+  long calls = 0, certified = 0, confirmed = 0, refuted = 0, cannot_verify = 0, problems = 0, refused = 0;
+
+  void Add(const Counts& other) {
+    calls += other.calls;
+    certified += other.certified;
+    confirmed += other.confirmed;
+    refuted += other.refuted;
+    cannot_verify += other.cannot_verify;
+    problems += other.problems;
+    refused += other.refused;
+  }
+};
+
+std::string Describe(const verifier::Verdict& verdict) {
+  const verifier::Failure& failure = verdict.failure;
+  std::ostringstream text;
+  text << "step " << failure.step << ": " << failure.what << ": found " << failure.found << ", bound " << failure.bound
+       << ", excess " << failure.excess;
+  return text.str();
+}
+
+// All that follows from one seed and one problem's number.
+Counts RunProblem(std::uint64_t seed, long number, Tube& tube, std::mutex& output) {
+  Random random(seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number));
+  Counts counts;
+  counts.problems = 1;
+  const bool absurd = random.Coin(0.25);
+  const auto problem = AnyProblem(random, random.Coin(), random.Integer(1, 20));
+  Vary(random, *problem);
+  if (absurd) Exaggerate(random, *problem);
+  std::unique_ptr<Certifier> certifier;
+  try {
+    certifier = std::make_unique<Certifier>(problem);
+  } catch (const std::invalid_argument&) {
+    counts.refused = 1;
+    return counts;
+  }
+  std::unique_ptr<verifier::Verifier> judge;
+  for (int i = 0; i < kCallsPerProblem; ++i) {
+    Query query = AnyCall(random, *problem, absurd);
+    if (random.Coin(0.3) &&
+        certifier->Certify(query.plan(), query.initial_set, {}, tube).outcome == Outcome::kCertified) {
+      try {
+        query.obstacles = {Touching(random, *certifier, tube)};
+      } catch (const std::invalid_argument&) {  // a sum that overflowed
+      }
+    }
+    certifier->Require(query.plan(), query.initial_set, query.obstacles);
+    const Decision decision = certifier->Certify(query.plan(), query.initial_set, query.obstacles, tube);
+    ++counts.calls;
+    if (decision.outcome != Outcome::kCertified) continue;
+    ++counts.certified;
+    if (!judge) judge = std::make_unique<verifier::Verifier>(problem, verifier::MethodOf(*problem));
+    const auto verdict =
+        judge->Verify(CertificateOf(*certifier, query.plan(), query.initial_set, query.obstacles, tube));
+    counts.confirmed += verdict.status == verifier::Status::kConfirmed;
+    counts.refuted += verdict.status == verifier::Status::kRefuted;
+    counts.cannot_verify += verdict.status == verifier::Status::kCannotVerify;
+    if (verdict.status == verifier::Status::kConfirmed) continue;
+    const std::lock_guard lock(output);
+    std::cerr << (verdict.status == verifier::Status::kRefuted ? "REFUTED" : "cannot verify") << ": --seed " << seed
+              << " --problem " << number << ", call " << i << ": " << Describe(verdict) << std::endl;
+  }
+  return counts;
+}
+
+}  // namespace
+}  // namespace forereach
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  CLI::App app{"Certifies random plans of random problems and lets the verifier derive every certificate anew."};
+  long count = 100000, only = -1;
+  std::uint64_t seed = 1;
+  unsigned jobs = 1;
+  double seconds = 0;
+  app.add_option("--count", count, "Certify calls")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--seed", seed, "Of the random numbers")->capture_default_str();
+  app.add_option("--jobs", jobs, "Threads; the problems are the same for any number")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--problem", only, "This problem only");
+  CLI11_PARSE(app, argc, argv);
+  const auto begin = std::chrono::steady_clock::now();
+
+  std::atomic<long> next = only < 0 ? 0 : only, called = 0;
+  std::mutex mutex;
+  Counts total;
+  const auto work = [&] {
+    Tube tube;
+    while (called < count) {
+      const long number = next++;
+      if (only >= 0 && number > only) break;
+      const Counts counts = RunProblem(seed, number, tube, mutex);
+      called += counts.calls;
+      const std::lock_guard lock(mutex);
+      total.Add(counts);
+    }
+  };
+  std::vector<std::thread> threads;
+  for (unsigned j = 0; j < jobs; ++j) threads.emplace_back(work);
+  for (std::thread& thread : threads) thread.join();
+
+  seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  std::cout << "seed " << seed << ": " << total.calls << " certify calls of " << total.problems << " problems ("
+            << total.refused << " refused), " << total.certified << " certified, " << total.confirmed << " confirmed, "
+            << total.refuted << " refuted, " << total.cannot_verify << " cannot verify; " << seconds << " s"
+            << std::endl;
+  const bool enough = only >= 0 || total.certified * 20 >= total.calls;  // a fuzz that certifies nothing tests nothing
+  return total.refuted == 0 && total.cannot_verify == 0 && enough ? 0 : 1;
+}

@@ -1,0 +1,52 @@
+// The verifier's numbers: enclosures, comparisons that are certain or none, and precision that can be raised.
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "verifier/answer.h"
+#include "verifier/real.h"
+
+namespace forereach::verifier {
+namespace {
+
+TEST(Real, ThirdIsEnclosedButNotKnown) {
+  const Real third = Real(1.0) / Real(3.0);
+  EXPECT_FALSE(CertainlyAtMost(third.upper(), third.lower()));
+  EXPECT_EQ(IsAtMost(Real(3.0) * third, 1.0), Answer::kUnknown);
+  EXPECT_EQ(IsBelow(third, 1.0 / 3), Answer::kNo);  // the double is below a third
+}
+
+TEST(Real, SumsOfDoublesAreExactWithEnoughBits) {
+  const double tiny = std::numeric_limits<double>::denorm_min(), huge = std::numeric_limits<double>::max();
+  EXPECT_EQ(IsBelow(Real(huge), Real(huge) + Real(tiny)), Answer::kUnknown);
+  const Precision precision(6656);
+  EXPECT_EQ(IsBelow(Real(huge), Real(huge) + Real(tiny)), Answer::kYes);
+  EXPECT_TRUE((Real(huge) + Real(tiny) - Real(huge) - Real(tiny)).IsZero());
+}
+
+TEST(Real, AnswersAtEquality) {
+  EXPECT_EQ(IsAtMost(1.0, 1.0), Answer::kYes);
+  EXPECT_EQ(IsBelow(1.0, 1.0), Answer::kNo);
+  EXPECT_EQ(IsAtMost(std::nan(""), 1.0), Answer::kUnknown);
+  EXPECT_EQ(IsAtMost(1.0, std::numeric_limits<double>::infinity()), Answer::kYes);
+}
+
+TEST(Real, TangentIsUnboundedOverItsPole) {
+  EXPECT_FALSE(tan(Real::FromTo(1.5, 1.6)).IsFinite());
+  EXPECT_TRUE(tan(Real::FromTo(1.4, 1.5)).IsFinite());
+}
+
+TEST(Real, EndsAndMiddle) {
+  const Real x = Real::FromTo(-1.0, 3.0);
+  EXPECT_EQ(x.lower().ToDouble(), -1);
+  EXPECT_EQ(x.upper().ToDouble(), 3);
+  EXPECT_EQ(x.middle().ToDouble(), 1);
+  EXPECT_EQ(x.magnitude().ToDouble(), 3);
+  EXPECT_EQ(Real(12.0).ToDouble(-2), 3);
+  EXPECT_EQ(Real(12.0).exponent(), 4);
+  EXPECT_EQ(Real(0.1).text(), "0.10000000000000001");
+}
+
+}  // namespace
+}  // namespace forereach::verifier

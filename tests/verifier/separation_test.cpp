@@ -1,0 +1,78 @@
+// Distances known by hand: what is exactly so far away is confirmed, a last bit more is not.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "verifier/separation.h"
+
+namespace forereach::verifier {
+namespace {
+
+Slice BoxSlice(std::vector<double> half_widths) {
+  Slice slice;
+  for (std::size_t k = 0; k < half_widths.size(); ++k) {
+    slice.center.emplace_back();
+    std::vector<Real> column(half_widths.size());
+    column[k] = half_widths[k];
+    slice.columns.push_back(column);
+  }
+  return slice;
+}
+
+void ExpectDistance(const Slice& slice, const Obstacle& obstacle, double distance) {
+  const ProjectedSlice projected(slice, Eigen::MatrixXd::Identity(obstacle.dim(), slice.dim()));
+  Real best;
+  const Precision precision(2400);
+  EXPECT_EQ(IsClear(projected, obstacle, distance, best), distance > 0 ? Answer::kYes : Answer::kNo);
+  EXPECT_DOUBLE_EQ(best.ToDouble(), distance);
+  EXPECT_EQ(IsClear(projected, obstacle, std::nextafter(distance, 100), best), Answer::kNo);
+}
+
+TEST(Separation, PlanarDistances) {
+  const Slice unit = BoxSlice({1, 1});
+  ExpectDistance(unit, Obstacle::Circle(Eigen::Vector2d(4, 5), 2), 3);  // corner (1, 1), 3-4-5
+  ExpectDistance(unit, Obstacle::Circle(Eigen::Vector2d(4, 0.5), 2), 1);
+  ExpectDistance(unit, Obstacle::Circle(Eigen::Vector2d(3, 0), 2), 0);
+  ExpectDistance(unit, Obstacle::AxisBox(Eigen::Vector2d(4, 5), Eigen::Vector2d(7, 8)), 5);
+  ExpectDistance(unit, Obstacle::AxisBox(Eigen::Vector2d(1.5, -9), Eigen::Vector2d(2, 9)), 0.5);
+  ExpectDistance(unit, Obstacle::HalfSpace(Eigen::Vector2d(3, 4), 17), 2);
+  ExpectDistance(unit, Obstacle::HalfSpace(Eigen::Vector2d(3, 4), 7), 0);
+  ExpectDistance(unit, Obstacle::Polygon({Eigen::Vector2d(0, 3), Eigen::Vector2d(-2, 9), Eigen::Vector2d(2, 9)}), 2);
+}
+
+TEST(Separation, ObliqueEdges) {
+  Slice rhombus;  // |x| + |y| <= 2
+  rhombus.center = {Real(), Real()};
+  rhombus.columns = {{Real(1.0), Real(1.0)}, {Real(1.0), Real(-1.0)}};
+  const ProjectedSlice projected(rhombus, Eigen::Matrix2d::Identity());
+  Real best;
+  const Obstacle circle = Obstacle::Circle(Eigen::Vector2d(3, 3), 0);  // 2 sqrt(2) away
+  EXPECT_EQ(IsClear(projected, circle, 2.8284271247461898, best), Answer::kYes);
+  EXPECT_EQ(IsClear(projected, circle, 2.8284271247461903, best), Answer::kNo);  // the double above it
+}
+
+TEST(Separation, OnTheLineAndInSpace) {
+  ExpectDistance(BoxSlice({1}), Obstacle::AxisBox(Eigen::VectorXd::Constant(1, 1.25), Eigen::VectorXd::Constant(1, 2)),
+                 0.25);
+  const Slice cube = BoxSlice({1, 1, 1});
+  ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(2, 3, 3), Eigen::Vector3d(9, 9, 9)), 3);            // corners
+  ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(4, 5, -1), Eigen::Vector3d(9, 9, 9)), 5);           // edges
+  ExpectDistance(cube, Obstacle::AxisBox(Eigen::Vector3d(-1, 1.125, -1), Eigen::Vector3d(9, 9, 9)), 0.125);  // faces
+}
+
+TEST(Separation, OverlapHasNoDirection) {
+  const ProjectedSlice unit(BoxSlice({1, 1}), Eigen::Matrix2d::Identity());
+  Real best;
+  EXPECT_EQ(IsClear(unit, Obstacle::Circle(Eigen::Vector2d(0.5, 0), 0.1), 0, best), Answer::kNo);
+  const Precision precision(6656);  // without a radius only many bits tell zero from next to nothing
+  EXPECT_EQ(IsClear(unit, Obstacle::AxisBox(Eigen::Vector2d(-3, -3), Eigen::Vector2d(3, 3)), 0, best), Answer::kNo);
+}
+
+TEST(Separation, RadiusIsThatOfTheFarthestCorner) {
+  EXPECT_EQ(ProjectedSlice(BoxSlice({3, 4}), Eigen::Matrix2d::Identity()).Radius().ToDouble(), 5);
+  EXPECT_EQ(ProjectedSlice(BoxSlice({3}), Eigen::MatrixXd::Identity(1, 1)).Radius().ToDouble(), 3);
+  EXPECT_EQ(ProjectedSlice(BoxSlice({2, 3, 6}), Eigen::Matrix3d::Identity()).Radius().ToDouble(), 7);
+}
+
+}  // namespace
+}  // namespace forereach::verifier

@@ -1,0 +1,325 @@
+// Certificates made by hand, true by a hair and false by a hair, and the certifier's own with one thing changed.
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/models.h"
+#include "tests/verifier/record.h"
+
+namespace forereach::verifier {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kTiny = std::numeric_limits<double>::denorm_min();
+
+double Up(double x) { return std::nextafter(x, HUGE_VAL); }
+double Down(double x) { return std::nextafter(x, -HUGE_VAL); }
+
+// dt = 1/2, so that every number of a step is a double. The one observation is of the nominal model: its residual is
+// known to a last bit of zero, the smallest double there is, in every coordinate.
+std::shared_ptr<Problem> Halves() {
+  auto problem = std::make_shared<Problem>();
+  problem->model = MakePointMass(0.5);
+  problem->domain.state = Box(Eigen::Vector4d::Constant(-8), Eigen::Vector4d::Constant(8));
+  problem->domain.input = Box(Eigen::Vector2d(-2, -2), Eigen::Vector2d(2, 2));
+  problem->declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
+  problem->transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
+  problem->projection = Eigen::MatrixXd::Identity(2, 4);
+  return problem;
+}
+
+// One step with u = (1, 0) from the unit box: X_1 has center (1/8, 0, 1/2, 0) and half-widths (3/2, 3/2, 1, 1), and
+// kTiny more.
+Certificate OneStep() {
+  Certificate certificate;
+  certificate.initial_set.lower = Eigen::Vector4d::Constant(-1);
+  certificate.initial_set.upper = Eigen::Vector4d::Constant(1);
+  certificate.controls = Eigen::Vector2d(1, 0);
+  RecordedSlice first, second;
+  first.lower = certificate.initial_set.lower;
+  first.upper = certificate.initial_set.upper;
+  second.lower = Eigen::Vector4d(Down(-1.375), Down(-1.5), Down(-0.5), Down(-1));
+  second.upper = Eigen::Vector4d(Up(1.625), Up(1.5), Up(1.5), Up(1));
+  certificate.slices = {first, second};
+  return certificate;
+}
+
+Verdict Judge(const std::shared_ptr<const Problem>& problem, const Certificate& certificate,
+              Method method = Method::kPaper) {
+  return Verifier(problem, method).Verify(certificate);
+}
+
+void ExpectConfirmed(const Verdict& verdict) {
+  EXPECT_EQ(verdict.status, Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
+}
+
+void ExpectRefuted(const Verdict& verdict, int step, const std::string& what) {
+  EXPECT_EQ(verdict.status, Status::kRefuted);
+  EXPECT_EQ(verdict.failure.step, step);
+  EXPECT_THAT(verdict.failure.what, HasSubstr(what));
+}
+
+TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), OneStep())); }
+
+TEST(HandMade, ASliceWithoutItsLastBitIsRefuted) {
+  for (int k = 0; k < 4; ++k) {
+    Certificate certificate = OneStep();
+    certificate.slices[1].upper[k] = Down(certificate.slices[1].upper[k]);  // now short by the smallest double
+    ExpectRefuted(Judge(Halves(), certificate), 1, "hull");
+    certificate = OneStep();
+    certificate.slices[1].lower[k] = Up(certificate.slices[1].lower[k]);
+    ExpectRefuted(Judge(Halves(), certificate), 1, "hull");
+    certificate = OneStep();
+    certificate.slices[0].upper[k] = Down(1);
+    ExpectRefuted(Judge(Halves(), certificate), 0, "hull");
+  }
+}
+
+TEST(HandMade, DomainIsClosed) {
+  const auto problem = Halves();
+  problem->domain.state = Box(Eigen::Vector4d::Constant(-1), Eigen::Vector4d::Constant(1));
+  ExpectConfirmed(Judge(problem, OneStep()));
+  problem->domain.state = Box(Eigen::Vector4d::Constant(-1), Eigen::Vector4d(1, 1, 1, Down(1)));
+  ExpectRefuted(Judge(problem, OneStep()), 0, "domain: vy");
+  problem->domain.input = Box(Eigen::Vector2d(-2, -2), Eigen::Vector2d(Down(1), 2));
+  problem->domain.state = Box(Eigen::Vector4d::Constant(-1), Eigen::Vector4d::Constant(1));
+  ExpectRefuted(Judge(problem, OneStep()), 0, "domain: ax");
+}
+
+TEST(HandMade, InequalitiesAndBallsAreClosed) {
+  const auto problem = Halves();
+  Eigen::VectorXd normal(6);
+  normal << 1, 0, 0, -1, 2, 0;  // reaches 1 + 1 + 2
+  problem->domain.inequalities = {{normal, 4}};
+  problem->domain.balls = {{{0, 1}, Eigen::Vector2d(-2, -3), 5}};  // corner (1, 1) is 3-4-5 away
+  ExpectConfirmed(Judge(problem, OneStep()));
+  problem->domain.inequalities[0].bound = Down(4);
+  ExpectRefuted(Judge(problem, OneStep()), 0, "inequality 0");
+  problem->domain.inequalities.clear();
+  problem->domain.balls[0].radius = Down(5);
+  ExpectRefuted(Judge(problem, OneStep()), 0, "ball 0");
+}
+
+TEST(HandMade, TouchingIsNotClear) {
+  Certificate certificate = OneStep();
+  const Eigen::Vector2d right(1, 0);
+  certificate.obstacles = {Obstacle::HalfSpace(right, Up(1.625))};
+  ExpectConfirmed(Judge(Halves(), certificate));
+  certificate.obstacles = {Obstacle::HalfSpace(right, 1.625)};  // X_1 reaches kTiny into it
+  ExpectRefuted(Judge(Halves(), certificate), 1, "clear of obstacle 0");
+  certificate.obstacles = {Obstacle::HalfSpace(right, 9), Obstacle::Circle(Eigen::Vector2d(0, 0), 0)};
+  ExpectRefuted(Judge(Halves(), certificate), 0, "clear of obstacle 1");
+}
+
+TEST(HandMade, ClearanceIsADistance) {
+  Certificate certificate = OneStep();
+  certificate.obstacles = {Obstacle::Circle(Eigen::Vector2d(4, 5), 2)};
+  certificate.slices[0].clearance = {3};
+  certificate.slices[1].clearance = {2};
+  ExpectConfirmed(Judge(Halves(), certificate));
+  certificate.slices[0].clearance = {Up(3)};
+  ExpectRefuted(Judge(Halves(), certificate), 0, "by what is recorded");
+  certificate.slices[0].clearance = {0};
+  ExpectRefuted(Judge(Halves(), certificate), 0, "claims to be clear");
+  certificate.slices[0].clearance = {std::nan("")};
+  ExpectRefuted(Judge(Halves(), certificate), 0, "claims to be clear");
+}
+
+TEST(HandMade, EnvelopeAndRadius) {
+  Certificate certificate = OneStep();
+  certificate.slices[0].envelope_lower = Eigen::Vector4d::Constant(-kTiny);
+  certificate.slices[0].envelope_upper = Eigen::Vector4d::Constant(kTiny);
+  certificate.slices[0].remainder = Eigen::Vector4d::Zero();
+  certificate.slices[0].radius = std::sqrt(2);  // the double is above the root
+  ExpectConfirmed(Judge(Halves(), certificate));
+  certificate.slices[0].radius = Down(std::sqrt(2));
+  ExpectRefuted(Judge(Halves(), certificate), 0, "radius");
+  certificate.slices[0].envelope_upper[2] = 0;
+  ExpectRefuted(Judge(Halves(), certificate), 0, "residual of vx");
+}
+
+TEST(HandMade, DistanceFromSetToSampleIsExact) {
+  const auto problem = Halves();
+  problem->declaration.lipschitz(0, 2) = 0.25;  // two columns: over the unit box D = 1/4 + 1/2 at the sample 0
+  problem->declaration.lipschitz(0, 3) = 0.5;
+  Certificate certificate = OneStep();
+  certificate.slices[0].envelope_lower = Eigen::Vector4d(Down(-0.75), -kTiny, -kTiny, -kTiny);
+  certificate.slices[0].envelope_upper = Eigen::Vector4d(Up(0.75), kTiny, kTiny, kTiny);
+  certificate.slices[1].upper[0] = Up(1.625 + 0.75);
+  certificate.slices[1].lower[0] = Down(-1.375 - 0.75);
+  ExpectConfirmed(Judge(problem, certificate));
+  certificate.slices[0].envelope_upper[0] = 0.75;
+  ExpectRefuted(Judge(problem, certificate), 0, "residual of px");
+  // On the diagonal v = (b, -b), seen from the sample at v = (1, 1): |b - 1| / 4 + |b + 1| / 2 <= 1, over the box 3/2.
+  problem->transitions.z.row(0) << 0, 0, 1, 1, 0, 0;
+  problem->transitions.x_next.row(0) << 0.5, 0.5, 1, 1;
+  certificate = OneStep();
+  certificate.initial_set = {{}, {}, Eigen::Vector4d::Zero(), Eigen::Vector4d(0, 0, 1, -1)};
+  const forereach::verifier::Tube tube = Verifier(problem, Method::kPaper).Derive(certificate);
+  EXPECT_DOUBLE_EQ(tube.steps[0].envelope[0].upper.ToDouble(), 1);
+}
+
+TEST(HandMade, ContradictingDataAreNoCertificate) {
+  const auto problem = Halves();
+  problem->transitions = {Eigen::MatrixXd::Zero(2, 6), Eigen::MatrixXd::Zero(2, 4)};
+  problem->transitions.x_next(1, 3) = 0.5;  // a constant residual cannot be 0 and 1/2
+  ExpectRefuted(Judge(problem, OneStep()), 0, "consistent");
+}
+
+TEST(HandMade, CentredRemainderKnowsTheSign) {
+  auto problem = Halves();
+  problem->model = MakeKinematicBicycle(0.5, 1);
+  problem->domain.state = Box(Eigen::VectorXd::Constant(6, -1.5), Eigen::VectorXd::Constant(6, 1.5));
+  problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+  problem->transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
+  problem->projection = Eigen::MatrixXd::Identity(2, 6);
+  Certificate certificate;  // v = 1 and theta within 1/4: x+ = x + cos(theta)/2 lies below x + 1/2
+  certificate.initial_set = {{}, {}, Eigen::VectorXd::Zero(6), Eigen::VectorXd::Zero(6)};
+  certificate.initial_set.center[3] = 1;
+  certificate.initial_set.generators(2, 0) = 0.25;
+  certificate.controls = Eigen::Vector2d(0, 0);
+  const Tube paper = Verifier(problem, Method::kPaper).Derive(certificate);
+  const Tube centred = Verifier(problem, Method::kCentred).Derive(certificate);
+  // Here H = -cos(theta) / 2 in [-1/2, -cos(1/4)/2]: 1/2 r^2 H in [-1/64, 0].
+  EXPECT_DOUBLE_EQ(paper.steps[0].remainder[0].upper.ToDouble(), 1.0 / 64);
+  EXPECT_EQ(centred.steps[0].remainder[0].upper.ToDouble(), 0);
+  EXPECT_DOUBLE_EQ(centred.steps[0].remainder[0].lower.ToDouble(), -1.0 / 64);
+  EXPECT_DOUBLE_EQ(centred.slices[1].center[0].ToDouble(), 0.5 - 1.0 / 128);
+  EXPECT_DOUBLE_EQ(paper.slices[1].center[0].ToDouble(), 0.5);
+}
+
+TEST(HandMade, CloseChoicesOfTheReductionAreTold) {
+  const auto problem = Halves();
+  problem->zonotope_order = 2;  // of the 8 columns and 4 of the envelope, 4 are kept
+  Certificate certificate = OneStep();
+  certificate.slices.clear();
+  certificate.initial_set = {{}, {}, Eigen::Vector4d::Zero(), Eigen::MatrixXd(4, 8)};
+  for (int j = 0; j < 8; ++j) certificate.initial_set.generators.col(j) << 0, 0, 0x1p-6 * (j + 1), 0x1p-8 * (j + 1);
+  const Verifier verifier(problem, Method::kPaper);
+  EXPECT_EQ(verifier.Derive(certificate).ambiguity, 0);
+  EXPECT_EQ(verifier.Derive(certificate).slices[1].columns.size(), 8u);
+  certificate.initial_set.generators.col(3) = certificate.initial_set.generators.col(4) * (1 + 0x1p-50);
+  EXPECT_GT(verifier.Derive(certificate).ambiguity, 0);
+}
+
+TEST(HandMade, SizesThatDoNotFitAreRefuted) {
+  Certificate certificate = OneStep();
+  certificate.slices.pop_back();
+  ExpectRefuted(Judge(Halves(), certificate), 1, "a slice for every step");
+  certificate = OneStep();
+  certificate.slices[1].upper.conservativeResize(3);
+  ExpectRefuted(Judge(Halves(), certificate), 1, "sizes");
+  certificate = OneStep();
+  certificate.controls(0, 0) = HUGE_VAL;
+  ExpectRefuted(Judge(Halves(), certificate), -1, "controls");
+}
+
+TEST(HandMade, WithoutRecordedSlicesSafetyIsDerived) {
+  Certificate certificate = OneStep();
+  certificate.slices.clear();
+  ExpectConfirmed(Judge(Halves(), certificate));
+  certificate.obstacles = {Obstacle::Circle(Eigen::Vector2d(1.5, 1.5), 0.1)};
+  ExpectRefuted(Judge(Halves(), certificate), 1, "clear of obstacle 0");
+}
+
+// ---- The certifier's own certificate, with one thing changed and no digest to tell.
+
+class Tampered : public testing::Test {
+ protected:
+  Tampered() {
+    problem_ = std::make_shared<Problem>();
+    problem_->model = MakeKinematicBicycle(0.1, 2.5);
+    Eigen::VectorXd reach(6);
+    reach << 40, 40, 3.1, 25, 3, 0.48;
+    problem_->domain.state = Box(-reach, reach);
+    problem_->domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
+    problem_->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+    problem_->declaration.lipschitz(2, 3) = 0.018;
+    problem_->declaration.lipschitz(2, 5) = 0.61;
+    problem_->transitions = {Eigen::MatrixXd(5, 8), Eigen::MatrixXd(5, 6)};
+    for (int i = 0; i < 5; ++i) {
+      Eigen::VectorXd z = Eigen::VectorXd::Zero(8), next(6);
+      z[3] = 8 + i;
+      z[5] = 0.02 * i;
+      problem_->model->Evaluate({z.data(), 8}, {next.data(), 6});
+      problem_->transitions.z.row(i) = z;
+      problem_->transitions.x_next.row(i) = next;
+    }
+    problem_->projection = Eigen::MatrixXd::Identity(2, 6);
+    const Certifier certifier(problem_);
+    Eigen::VectorXd center = Eigen::VectorXd::Zero(6), half(6);
+    center[3] = 10;
+    half << 0.05, 0.05, 0.01, 0.1, 0.01, 0.005;
+    const Zonotope initial_set = Zonotope::FromBox(center, half);
+    const Eigen::MatrixXd controls = Eigen::Vector2d(0.5, 0.1).replicate(1, 10);
+    const Plan plan{controls.data(), 2, 10, 2};
+    const std::vector<Obstacle> obstacles{Obstacle::Circle(Eigen::Vector2d(9, 3), 1)};
+    forereach::Tube tube;
+    EXPECT_EQ(certifier.Certify(plan, initial_set, obstacles, tube).outcome, Outcome::kCertified);
+    certificate_ = CertificateOf(certifier, plan, initial_set, obstacles, tube);
+  }
+
+  [[nodiscard]] Verdict Verdict_() const { return Judge(problem_, certificate_); }
+
+  std::shared_ptr<Problem> problem_;
+  Certificate certificate_;
+};
+
+TEST_F(Tampered, Untouched) { ExpectConfirmed(Verdict_()); }
+
+TEST_F(Tampered, MovedObstacle) {
+  certificate_.obstacles = {Obstacle::Circle(Eigen::Vector2d(9, 3 - 0x1p-30), 1)};  // the clearances are now too large
+  EXPECT_EQ(Verdict_().status, Status::kRefuted);
+  for (RecordedSlice& slice : certificate_.slices) slice.clearance.clear();
+  ExpectConfirmed(Verdict_());
+  certificate_.obstacles = {Obstacle::Circle(Eigen::Vector2d(9, 0.8), 1)};
+  EXPECT_THAT(Verdict_().failure.what, HasSubstr("clear of obstacle 0"));
+}
+
+TEST_F(Tampered, ShrunkenSlice) {
+  certificate_.slices[4].half_width[0] *= 1 - 0x1p-40;
+  ExpectRefuted(Verdict_(), 4, "hull");
+}
+
+TEST_F(Tampered, DroppedGenerator) {
+  Eigen::MatrixXd& generators = certificate_.slices[6].generators;
+  generators = generators.rightCols(generators.cols() - 1).eval();
+  ExpectRefuted(Verdict_(), 6, "the hull of the recorded generators");
+}
+
+TEST_F(Tampered, ChangedSigma) {
+  problem_->declaration.noise_bound[2] = 1e-12;
+  ExpectRefuted(Verdict_(), 0, "residual of theta");
+}
+
+TEST_F(Tampered, ChangedDeclaration) {
+  problem_->declaration.lipschitz(2, 5) += 1e-12;
+  ExpectRefuted(Verdict_(), 0, "residual of theta");
+}
+
+TEST_F(Tampered, ChangedWheelbase) {
+  problem_->model = MakeKinematicBicycle(0.1, 2.49);
+  EXPECT_EQ(Verdict_().status, Status::kRefuted);
+}
+
+TEST_F(Tampered, ChangedControl) {
+  certificate_.controls(1, 3) += 1e-9;
+  EXPECT_EQ(Verdict_().status, Status::kRefuted);
+  EXPECT_EQ(Verdict_().failure.step, 4);
+}
+
+TEST_F(Tampered, ShrunkenEnvelopeAndRemainder) {
+  RecordedSlice& slice = certificate_.slices[3];
+  const double before = slice.remainder[0];
+  slice.remainder[0] *= 1 - 0x1p-40;
+  ExpectRefuted(Verdict_(), 3, "remainder");
+  slice.remainder[0] = before;
+  slice.envelope_upper[2] -= 1e-12;
+  ExpectRefuted(Verdict_(), 3, "residual of theta");
+}
+
+}  // namespace
+}  // namespace forereach::verifier

@@ -1,0 +1,221 @@
+// `forereach verify` on a decision: confirmed as it is, refuted with one thing changed, digests made good again or not.
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/decision_json.h"
+#include "cli/progress.h"
+#include "tests/logger/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using Json = nlohmann::json;
+
+struct Output {
+  int code;
+  std::string text;
+};
+
+Output Forereach(const std::string& what) {
+  const std::string command = "cd '" FOREREACH_SOURCE_DIR "' && '" FOREREACH_PROGRAM "' " + what;
+  std::FILE* pipe = popen(command.c_str(), "r");
+  Output output{-1, {}};
+  std::array<char, 4096> buffer;
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe))
+    output.text.append(buffer.data(), size);
+  output.code = WEXITSTATUS(pclose(pipe));
+  return output;
+}
+
+std::string Read(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+// A task of its own beside its transitions, and the decision on a plan of it.
+class VerifyDecision : public testing::Test {
+ protected:
+  VerifyDecision() {
+    std::filesystem::copy(FOREREACH_SOURCE_DIR "/config/data", scratch_ / "data");
+    task_ = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+    WriteTask(task_);
+    decision_ = Certify("bicycle_certified");
+  }
+
+  void WriteTask(const std::string& text) { std::ofstream(scratch_ / "task.yaml") << text; }
+
+  Json Certify(const std::string& plan) {
+    return Json::parse(
+        Forereach("certify --json --config " + scratch_ / "task.yaml --plan config/plans/" + plan + ".csv").text);
+  }
+
+  Output Verify(const std::string& options = "") {
+    std::ofstream(scratch_ / "decision.json") << decision_;
+    return Forereach("verify " + scratch_ / "decision.json " + options + " 2>&1");
+  }
+
+  // As somebody would who knows how digests are made.
+  void Reseal() { decision_["digests"]["tube"] = ToHex(TubeDigest(decision_["tube"])); }
+  void Reseal(const Config& config) {
+    decision_["digests"]["config"] = ToHex(config.digest);
+    decision_["digests"]["declaration"] = ToHex(config.declaration_digest);
+    decision_["digests"]["obstacles"] = ToHex(config.obstacles_digest);
+  }
+
+  void ExpectRefuted(std::initializer_list<const char*> texts) {
+    const Output output = Verify();
+    EXPECT_EQ(output.code, 1);
+    for (const char* text : texts) EXPECT_THAT(output.text, HasSubstr(text));
+  }
+
+  Scratch scratch_;
+  std::string task_;
+  Json decision_;
+};
+
+TEST_F(VerifyDecision, AsItIsConfirmed) {
+  const Output output = Verify();
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr("1 certificates, 1 confirmed, 0 refuted"));
+}
+
+TEST_F(VerifyDecision, OfEveryShippedCertificateConfirmed) {
+  for (const char* task : {"bicycle", "point_mass"}) {
+    const std::string file = scratch_ / task;
+    Forereach(std::string("certify --json --config config/") + task + ".yaml --plan config/plans/" + task +
+              "_certified.csv > " + file);
+    EXPECT_EQ(Forereach("verify " + file).code, 0) << task;
+  }
+}
+
+TEST_F(VerifyDecision, AsJson) {
+  Json document = Json::parse(Verify("--json").text);
+  EXPECT_EQ(document["confirmed"], 1);
+  EXPECT_TRUE(document["failures"].empty());
+  decision_["tube"][3]["half_width"][0] = 0;
+  document = Json::parse(Verify("--json").text);
+  EXPECT_EQ(document["refuted"], 1);
+  EXPECT_EQ(document["failures"][0]["step"], 3);
+  EXPECT_EQ(document["failures"][0]["mismatches"].size(), 1u);
+}
+
+TEST_F(VerifyDecision, AnotherTaskByOption) {
+  EXPECT_EQ(Verify("--config config/bicycle.yaml").code, 0);
+  EXPECT_EQ(Verify("--config config/point_mass.yaml").code, 1);
+  EXPECT_EQ(Verify("--config none.yaml").code, 2);
+}
+
+TEST_F(VerifyDecision, AbstentionIsNoCertificate) {
+  decision_ = Certify("bicycle_safety");
+  const Output output = Verify();
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("0 certificates"));
+  decision_["outcome"] = "certified";
+  ExpectRefuted({"refuted", "clear of obstacle"});
+}
+
+TEST_F(VerifyDecision, SliceShrunkenByOneUlp) {
+  for (std::size_t t = 0; t < decision_["tube"].size(); ++t) {
+    const Json before = decision_;
+    Json& half_width = decision_["tube"][t]["half_width"][t % 6];
+    half_width = std::nextafter(half_width.get<double>(), 0.0);
+    ExpectRefuted({"refuted", "the record was altered after it was made: digest of tube"});
+    decision_ = before;
+  }
+}
+
+TEST_F(VerifyDecision, SliceShrunkenAndResealed) {
+  Json& half_width = decision_["tube"][5]["half_width"][0];
+  half_width = half_width.get<double>() * (1 - 1e-12);
+  Reseal();
+  const Output output = Verify();
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("step 5: not so: the recorded hull contains x"));
+  EXPECT_THAT(output.text, Not(HasSubstr("altered")));
+}
+
+TEST_F(VerifyDecision, InitialSliceShrunkenByOneUlpAndResealed) {
+  Json& slice = decision_["tube"][0];
+  slice["half_width"][3] = std::nextafter(slice["half_width"][3].get<double>(), 0.0);
+  Reseal();
+  ExpectRefuted({"step 0: not so"});
+}
+
+TEST_F(VerifyDecision, DroppedGenerator) {
+  decision_["tube"][7]["generators"].erase(2);
+  ExpectRefuted({"digest of tube", "step 7: not so: the hull of the recorded generators"});
+  Reseal();
+  ExpectRefuted({"step 7: not so: the hull of the recorded generators"});
+}
+
+TEST_F(VerifyDecision, ChangedControl) {
+  decision_["inputs"]["controls"][2][1] = decision_["inputs"]["controls"][2][1].get<double>() + 1e-6;
+  ExpectRefuted({"digest of plan", "step 3: not so"});
+}
+
+TEST_F(VerifyDecision, ChangedSigma) {
+  WriteTask(std::regex_replace(task_, std::regex("noise_bound: .*"), "noise_bound: [0, 0, 1e-9, 0, 0, 0]"));
+  ExpectRefuted({"digest of the config", "digest of the declaration", "step 0: not so", "residual of theta"});
+  Reseal(LoadConfig(scratch_ / "task.yaml"));
+  const Output output = Verify();
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, Not(HasSubstr("digest")));
+}
+
+TEST_F(VerifyDecision, MovedObstacle) {
+  std::smatch center;
+  ASSERT_TRUE(std::regex_search(task_, center, std::regex("circle: \\{center: \\[([^,]*), ([^\\]]*)\\]")));
+  const Json& last = decision_["tube"].back()["center"];
+  std::ostringstream moved;
+  moved << "circle: {center: [" << last[0] << ", " << last[1] << "]";
+  WriteTask(center.prefix().str() + moved.str() + center.suffix().str());
+  ExpectRefuted({"digest of the config", "digest of the obstacles", "clear of obstacle 0"});
+  Reseal(LoadConfig(scratch_ / "task.yaml"));
+  ExpectRefuted({"not so: the slice keeps clear of obstacle 0"});
+}
+
+TEST_F(VerifyDecision, ChangedObservation) {
+  std::string data = Read(scratch_ / "data/bicycle_corridor_400.csv");
+  data.erase(data.rfind('\n', data.size() - 2) + 1);  // the last row
+  std::ofstream(scratch_ / "data/bicycle_corridor_400.csv") << data;
+  ExpectRefuted({"digest of the observations"});
+}
+
+TEST_F(VerifyDecision, BadInputExitsWithTwo) {
+  for (const char* file : {"none.json", "README.md", "config/bicycle.yaml", "tests/data/course.lcmlog"})
+    EXPECT_EQ(Forereach(std::string("verify ") + file + " 2>/dev/null").code, 2) << file;
+  decision_.erase("inputs");
+  EXPECT_EQ(Verify().code, 2);
+  decision_ = Json::array();
+  EXPECT_EQ(Verify().code, 2);
+}
+
+TEST(VerifyHelp, Teaches) {
+  const Output output = Forereach("verify --help");
+  EXPECT_EQ(output.code, 0);
+  for (const char* text :
+       {"DECISION|LOG|DATABASE", "exit 0", "forereach verify decision.json", "--config config/demo.yaml"})
+    EXPECT_THAT(output.text, HasSubstr(text));
+}
+
+TEST(ProgressTest, SaysHowMuchAndHowLong) {
+  EXPECT_EQ(Progress::Line("plans", 5, 10, 3), "[###############...............] 5 of 10 plans, 3 s left");
+  EXPECT_EQ(Progress::Line("plans", 0, 10, 3), "[..............................] 0 of 10 plans");
+  EXPECT_EQ(Progress::Line("plans", 10, 10, 3), "[##############################] 10 of 10 plans");
+}
+
+}  // namespace
+}  // namespace forereach

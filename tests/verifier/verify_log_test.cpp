@@ -1,0 +1,218 @@
+// `forereach verify` on event logs and decision databases: recorded ones, and ones with one message changed.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/gate/gate.h"
+#include "certifier/gate/obstacle_message.h"
+#include "cli/certificate_files.h"
+#include "forereach/certified_plan_t.hpp"
+#include "tests/logger/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using verifier::Status;
+using verifier::Verdict;
+
+const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+Verdict Judge(const CertificateFile& file, std::size_t i) {
+  return verifier::Verifier(file.config.problem, verifier::MethodOf(*file.config.problem))
+      .Verify(file.certificates[i].certificate);
+}
+
+// Copies the recorded log, each event changed by `edit`; false leaves it out.
+std::string Edited(const Scratch& scratch, const std::function<bool(LogEvent&)>& edit) {
+  const std::string path = scratch / "edited.lcmlog";
+  std::filesystem::remove(path);
+  EventLogReader reader(kLog);
+  EventLogWriter writer(path);
+  LogEvent event;
+  while (reader.Next(event) == LogStatus::kEvent)
+    if (edit(event)) writer.Append(event.utime, event.channel, event.data);
+  EXPECT_TRUE(writer.Flush());
+  return path;
+}
+
+// Changes the first certified plan, and if asked makes its digest good again.
+std::string EditedCertificate(const Scratch& scratch, bool reseal, const std::function<void(certified_plan_t&)>& edit) {
+  bool done = false;
+  return Edited(scratch, [&](LogEvent& event) {
+    auto certified = Decoded<certified_plan_t>(event.data);
+    if (!certified || done) return true;
+    done = true;
+    edit(*certified);
+    if (reseal) SetDigest(certified->certificate_digest, CertificateDigest(*certified));
+    event.data = Encode(*certified);
+    return true;
+  });
+}
+
+TEST(VerifyLog, RecordedCourseIsConfirmed) {
+  const CertificateFile file = ReadCertificates(kLog, kConfig);
+  EXPECT_GE(file.certificates.size(), 10u);
+  EXPECT_GT(file.not_certificates, 0u);
+  for (std::size_t i = 0; i < file.certificates.size(); ++i) {
+    EXPECT_TRUE(file.certificates[i].mismatches.empty()) << file.certificates[i].name;
+    const Verdict verdict = Judge(file, i);
+    EXPECT_EQ(verdict.status, Status::kConfirmed) << file.certificates[i].name << ": " << verdict.failure.what;
+  }
+}
+
+TEST(VerifyLog, SliceShrunkenByOneUlp) {
+  Scratch scratch;
+  const auto path = EditedCertificate(scratch, false, [](certified_plan_t& certified) {
+    certified.slice_upper[9][0] = std::nextafter(certified.slice_upper[9][0], -HUGE_VAL);
+  });
+  const auto file = ReadCertificates(path, kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("altered"));
+  EXPECT_TRUE(file.certificates[1].mismatches.empty());
+}
+
+TEST(VerifyLog, SliceShrunkenAndResealed) {
+  Scratch scratch;
+  const auto path =
+      EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.slice_upper[9][0] -= 1e-9; });
+  const auto file = ReadCertificates(path, kConfig);
+  EXPECT_TRUE(file.certificates[0].mismatches.empty());
+  const Verdict verdict = Judge(file, 0);
+  EXPECT_EQ(verdict.status, Status::kRefuted);
+  EXPECT_EQ(verdict.failure.step, 9);
+  EXPECT_THAT(verdict.failure.what, HasSubstr("contains x"));
+}
+
+TEST(VerifyLog, ChangedControlOfTheCertifiedPlan) {
+  Scratch scratch;
+  const auto path =
+      EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.plan.control[4][0] += 0.01; });
+  const auto file = ReadCertificates(path, kConfig);
+  EXPECT_EQ(file.certificates[0].mismatches.size(), 2u);  // the plan's digest, and no such candidate was sent
+  EXPECT_EQ(Judge(file, 0).failure.step, 5);
+}
+
+TEST(VerifyLog, MissingCertifiedPlanIsNoticed) {
+  Scratch scratch;
+  bool dropped = false;
+  const auto path = Edited(scratch, [&](LogEvent& event) {
+    if (dropped || !Decoded<certified_plan_t>(event.data)) return true;
+    dropped = true;
+    return false;
+  });
+  const auto whole = ReadCertificates(kLog, kConfig), file = ReadCertificates(path, kConfig);
+  EXPECT_EQ(file.certificates.size(), whole.certificates.size());
+  EXPECT_THAT(file.certificates.back().missing, HasSubstr("no certified plan"));
+}
+
+TEST(VerifyLog, DamageIsNoticed) {
+  Scratch scratch;
+  std::filesystem::copy(kLog, scratch / "damaged.lcmlog");
+  std::fstream log(scratch / "damaged.lcmlog", std::ios::in | std::ios::out | std::ios::binary);
+  log.seekp(4000);
+  log << std::string(300, 'x');
+  log.close();
+  const auto file = ReadCertificates(scratch / "damaged.lcmlog", kConfig);
+  EXPECT_TRUE(std::ranges::any_of(file.certificates,
+                                  [](const auto& c) { return !c.missing.empty() || !c.mismatches.empty(); }));
+}
+
+// ---- Obstacles that come by the bus.
+
+constexpr std::int64_t kStart = 1'700'000'000'000'000;
+
+class VerifyObstacles : public testing::Test {
+ protected:
+  VerifyObstacles() : config_(LoadConfig(kConfig)) {
+    EventLogReader reader(kLog);
+    LogEvent event;
+    while (reader.Next(event) == LogStatus::kEvent) {
+      const auto certified = Decoded<certified_plan_t>(event.data);
+      if (!certified) continue;
+      candidate_ = certified->plan;
+      break;
+    }
+    candidate_.utime = kStart + 2;
+    candidate_.start_utime = kStart + 1000;
+  }
+
+  [[nodiscard]] obstacles_t Message(double x, std::int64_t sequence, std::int64_t utime) const {
+    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)});
+    message.utime = utime;
+    message.sequence = sequence;
+    return message;
+  }
+
+  // Obstacles, a candidate, and what the gate says of it. `edit` changes what is written, not what is decided on.
+  std::string Record(const std::function<void(obstacles_t&, certified_plan_t&)>& edit = {}) {
+    Gate gate(config_);
+    obstacles_t obstacles = Message(80, 0, kStart);
+    EXPECT_EQ(gate.UpdateObstacles(Encode(obstacles), kStart + 1), "");
+    const auto bytes = Encode(candidate_);
+    GateAnswer answer = gate.Decide(bytes, kStart + 3);
+    EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
+    certified_plan_t certified = answer.certified.value_or(certified_plan_t{});
+    if (edit) edit(obstacles, certified);
+    const std::string path = scratch_ / "log.lcmlog";
+    EventLogWriter writer(path);
+    writer.Append(kStart + 1, config_.bus.obstacles, Encode(obstacles));
+    writer.Append(kStart + 3, config_.bus.candidate, bytes);
+    writer.Append(kStart + 4, config_.bus.decision, Encode(answer.decision));
+    writer.Append(kStart + 5, config_.bus.obstacles, Encode(Message(60, 1, kStart + 5)));
+    writer.Append(kStart + 6, config_.bus.certified, Encode(certified));
+    EXPECT_TRUE(writer.Flush());
+    return path;
+  }
+
+  Scratch scratch_;
+  Config config_;
+  candidate_plan_t candidate_{};
+};
+
+TEST_F(VerifyObstacles, ThoseInForceAreTaken) {
+  const auto file = ReadCertificates(Record(), kConfig);
+  ASSERT_EQ(file.certificates.size(), 1u);
+  EXPECT_TRUE(file.certificates[0].mismatches.empty());
+  EXPECT_EQ(file.certificates[0].certificate.obstacles[0].points()[0][0], 80);
+  EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed);
+}
+
+TEST_F(VerifyObstacles, MovedOntoThePath) {
+  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+                                       obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
+                                       obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
+                                     }),
+                                     kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("obstacles in force"));
+  EXPECT_THAT(Judge(file, 0).failure.what, HasSubstr("clear of obstacle 0"));
+}
+
+TEST_F(VerifyObstacles, MovedOntoThePathAndResealed) {
+  const auto file =
+      ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+                         obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
+                         obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
+                         SetDigest(certified.obstacles_digest, ObstaclesDigest(FromMessage(obstacles, 2)));
+                         SetDigest(certified.certificate_digest, CertificateDigest(certified));
+                       }),
+                       kConfig);
+  EXPECT_TRUE(file.certificates[0].mismatches.empty());
+  EXPECT_EQ(Judge(file, 0).status, Status::kRefuted);
+}
+
+TEST_F(VerifyObstacles, StaleOnesWereNeverInForce) {
+  const auto file = ReadCertificates(
+      Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kConfig);
+  EXPECT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
+}
+
+}  // namespace
+}  // namespace forereach

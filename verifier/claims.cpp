@@ -1,0 +1,139 @@
+#include "verifier/claims.h"
+
+#include <cmath>
+#include <string>
+
+#include "verifier/separation.h"
+
+namespace forereach::verifier {
+namespace {
+
+std::size_t Index(Eigen::Index k) { return static_cast<std::size_t>(k); }
+
+// Keeps the first claim that fails. Words are made for that one only.
+class Claims {
+ public:
+  Claims(int step, std::optional<Failure>& failure) : step_(step), failure_(failure) {}
+
+  /** `found` has to be at most (at least) `bound`, `what` says of what. A NaN bounds nothing. Deviations are seen
+  against `scale`. */
+  template <class What>
+  void AtMost(const Real& found, const Real& bound, const Real& scale, What what) {
+    Judge(IsAtMost(found, bound), found, bound, scale, "at most", what);
+  }
+  template <class What>
+  void AtLeast(const Real& found, const Real& bound, const Real& scale, What what) {
+    Judge(IsAtMost(bound, found), found, bound, scale, "at least", what);
+  }
+  template <class What>
+  void Judge(Answer answer, const Real& found, const Real& bound, const Real& scale, const char* relation, What what) {
+    if (failure_ || answer == Answer::kYes) return;
+    const std::string held_to = std::string(relation) + ' ' + bound.text();
+    failure_ = Failure{step_, what(), found.text(), held_to, answer == Answer::kNo};
+    if (const Real excess = abs(found - bound); excess.IsFinite() && !scale.IsZero())
+      failure_->excess = (excess / scale).ToDouble();
+  }
+
+ private:
+  int step_;
+  std::optional<Failure>& failure_;
+};
+
+class SliceCheck {
+ public:
+  SliceCheck(const Problem& problem, const Certificate& certificate, const Tube& tube, int t)
+      : problem_(problem),
+        certificate_(certificate),
+        slice_(tube.slices[Index(t)]),
+        step_(t < static_cast<int>(tube.steps.size()) ? &tube.steps[Index(t)] : nullptr),
+        recorded_(certificate.slices.empty() ? nothing_ : certificate.slices[Index(t)]),
+        claims_(t, failure_) {}
+
+  [[nodiscard]] std::optional<Failure> Run() {
+    for (int k = 0; k < slice_.dim() && !failure_; ++k) CheckHull(k);
+    for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
+    if (!failure_) CheckSafety();
+    return failure_;
+  }
+
+ private:
+  [[nodiscard]] const std::string& name(int k) const { return problem_.model->state_names()[Index(k)]; }
+
+  void CheckHull(int k) {
+    const Real &c = slice_.center[Index(k)], r = slice_.HalfWidth(k), lower = c - r, upper = c + r, scale = abs(c) + r;
+    const auto contains = [&](const char* which, const Real& below, const Real& above) {
+      const auto what = [&] { return std::string(which) + " contains " + name(k) + " of the slice"; };
+      claims_.AtMost(below, lower, scale, what);
+      claims_.AtLeast(above, upper, scale, what);
+    };
+    if (recorded_.lower.size() > 0) contains("the recorded hull", recorded_.lower[k], recorded_.upper[k]);
+    if (recorded_.center.size() == 0) return;
+    const Real center(recorded_.center[k]), half_width(recorded_.half_width[k]);
+    contains("the recorded hull", center - half_width, center + half_width);
+    if (!recorded_.has_generators) return;
+    Real sum;
+    for (const double g : recorded_.generators.row(k))
+      if (g != 0) sum += Real(std::abs(g));
+    claims_.AtMost(sum, half_width, half_width,
+                   [&] { return "the recorded generators stay in the recorded hull in " + name(k); });
+    contains("the hull of the recorded generators", center - sum, center + sum);
+  }
+
+  void CheckStep(int k) {
+    const auto i = Index(k);
+    if (recorded_.envelope_lower.size() > 0) {
+      const auto& [lower, upper] = step_->envelope[i];
+      const Real scale = abs(lower) + abs(upper);
+      const auto what = [&] { return "the recorded envelope contains the residual of " + name(k); };
+      claims_.AtMost(recorded_.envelope_lower[k], lower, scale, what);
+      claims_.AtLeast(recorded_.envelope_upper[k], upper, scale, what);
+    }
+    if (recorded_.remainder.size() > 0) {
+      const auto& [lower, upper] = step_->remainder[i];
+      const Real half = Real(0.5) * (upper - lower);
+      claims_.AtLeast(recorded_.remainder[k], half, half,
+                      [&] { return "the recorded remainder covers that of " + name(k); });
+    }
+  }
+
+  void CheckSafety() {
+    const ProjectedSlice projected(slice_, problem_.projection);
+    if (recorded_.radius) {
+      const Real radius = projected.Radius();
+      claims_.AtLeast(*recorded_.radius, radius, radius,
+                      [] { return std::string("the recorded radius covers the projected slice"); });
+    }
+    for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
+      const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
+      if (!recorded_.clearance.empty() && !(claimed > 0))
+        claims_.Judge(Answer::kNo, claimed, 0.0, 1.0, "above",
+                      [&] { return "the record claims to be clear of obstacle " + std::to_string(o); });
+      Real best;
+      const Answer answer = IsClear(projected, certificate_.obstacles[o], claimed, best);
+      claims_.Judge(answer, best, claimed, abs(best) + Real(certificate_.obstacles[o].radius()),
+                    claimed > 0 ? "at least" : "above", [&] {
+                      return "the slice keeps clear of obstacle " + std::to_string(o) +
+                             (claimed > 0 ? " by what is recorded" : "");
+                    });
+    }
+  }
+
+  inline static const RecordedSlice nothing_{};
+  const Problem& problem_;
+  const Certificate& certificate_;
+  const Slice& slice_;
+  const Step* step_;
+  const RecordedSlice& recorded_;
+  std::optional<Failure> failure_;
+  Claims claims_;
+};
+
+}  // namespace
+
+std::optional<Failure> FindFalseClaim(const Problem& problem, const Certificate& certificate, const Tube& tube) {
+  for (int t = 0; t < static_cast<int>(tube.slices.size()); ++t)
+    if (auto failure = SliceCheck(problem, certificate, tube, t).Run()) return failure;
+  return std::nullopt;
+}
+
+}  // namespace forereach::verifier

@@ -1,0 +1,162 @@
+#include "verifier/real.h"
+
+#include <limits>
+#include <vector>
+
+namespace forereach::verifier {
+
+thread_local int Precision::bits_ = 256;
+
+namespace {
+
+// Numbers come and go by the million: a few are kept for the next, all of one precision.
+struct Pool {
+  static constexpr std::size_t kMost = 512;
+  std::vector<__mpfi_struct> numbers;
+  int bits = 0;
+
+  Pool() { numbers.reserve(kMost); }
+  ~Pool() {
+    Clear();
+    closed = true;
+  }
+  void Clear() {
+    for (__mpfi_struct& number : numbers) mpfi_clear(&number);
+    numbers.clear();
+  }
+
+  static thread_local bool closed;  // a number may outlive its thread's pool
+};
+thread_local bool Pool::closed = false;
+thread_local Pool pool;
+
+}  // namespace
+
+Real::Real(Uninitialized) {
+  const int bits = Precision::bits();
+  if (Pool::closed || pool.bits != bits || pool.numbers.empty()) {
+    mpfi_init2(value_, bits);
+  } else {
+    *value_ = pool.numbers.back();
+    pool.numbers.pop_back();
+  }
+}
+
+void Real::Release() {
+  if (Pool::closed) return mpfi_clear(value_);
+  if (pool.bits != Precision::bits()) {
+    pool.Clear();
+    pool.bits = Precision::bits();
+  }
+  if (pool.numbers.size() == Pool::kMost || mpfi_get_prec(value_) != static_cast<mpfr_prec_t>(pool.bits))
+    mpfi_clear(value_);
+  else
+    pool.numbers.push_back(*value_);
+}
+
+Real::Real(double x) : Real(Uninitialized{}) { mpfi_set_d(value_, x); }
+Real::Real(const Real& other) : Real(Uninitialized{}) { mpfi_set(value_, other.value_); }
+Real& Real::operator=(const Real& other) {
+  if (this != &other) *this = Real(other);
+  return *this;
+}
+
+Real Real::FromTo(const Real& a, const Real& b) {
+  Real result{Uninitialized{}};
+  mpfr_set(&result.value_->left, &a.value_->left, MPFR_RNDD);
+  mpfr_set(&result.value_->right, &b.value_->right, MPFR_RNDU);
+  return result;
+}
+
+Real Real::lower() const {
+  Real result{Uninitialized{}};
+  mpfi_set_fr(result.value_, &value_->left);
+  return result;
+}
+Real Real::upper() const {
+  Real result{Uninitialized{}};
+  mpfi_set_fr(result.value_, &value_->right);
+  return result;
+}
+Real Real::middle() const {
+  Real result{Uninitialized{}};
+  mpfi_mid(&result.value_->left, value_);
+  mpfr_set(&result.value_->right, &result.value_->left, MPFR_RNDU);
+  return result;
+}
+Real Real::magnitude() const { return abs(*this).upper(); }
+
+double Real::ToDouble(long shift) const {
+  Real scaled{Uninitialized{}};
+  if (shift >= 0)
+    mpfi_mul_2exp(scaled.value_, value_, static_cast<unsigned long>(shift));
+  else
+    mpfi_div_2exp(scaled.value_, value_, static_cast<unsigned long>(-shift));
+  return mpfi_get_d(scaled.value_);
+}
+
+long Real::exponent() const {
+  const Real size = magnitude();
+  if (size.IsZero()) return std::numeric_limits<long>::min();
+  return size.IsFinite() ? mpfr_get_exp(&size.value_->right) : std::numeric_limits<long>::max();
+}
+
+std::string Real::text() const {
+  char digits[64];
+  const Real number = middle();
+  mpfr_snprintf(digits, sizeof digits, "%.17Rg", &number.value_->left);
+  return digits;
+}
+
+Real& Real::operator+=(const Real& other) {
+  mpfi_add(value_, value_, other.value_);
+  return *this;
+}
+Real& Real::operator-=(const Real& other) {
+  mpfi_sub(value_, value_, other.value_);
+  return *this;
+}
+
+#define FOREREACH_BINARY(name, function)         \
+  Real name(const Real& a, const Real& b) {      \
+    Real result{Real::Uninitialized{}};          \
+    function(result.value_, a.value_, b.value_); \
+    return result;                               \
+  }
+#define FOREREACH_UNARY(name, function) \
+  Real name(const Real& a) {            \
+    Real result{Real::Uninitialized{}}; \
+    function(result.value_, a.value_);  \
+    return result;                      \
+  }
+FOREREACH_BINARY(operator+, mpfi_add)
+FOREREACH_BINARY(operator-, mpfi_sub)
+FOREREACH_BINARY(operator*, mpfi_mul)
+FOREREACH_BINARY(operator/, mpfi_div)
+FOREREACH_UNARY(operator-, mpfi_neg)
+FOREREACH_UNARY(sqr, mpfi_sqr)
+FOREREACH_UNARY(sqrt, mpfi_sqrt)
+FOREREACH_UNARY(abs, mpfi_abs)
+FOREREACH_UNARY(sin, mpfi_sin)
+FOREREACH_UNARY(cos, mpfi_cos)
+FOREREACH_UNARY(tan, mpfi_tan)
+#undef FOREREACH_BINARY
+#undef FOREREACH_UNARY
+
+Real max(const Real& a, const Real& b) {
+  Real result{Real::Uninitialized{}};
+  mpfr_max(&result.value_->left, &a.value_->left, &b.value_->left, MPFR_RNDD);
+  mpfr_max(&result.value_->right, &a.value_->right, &b.value_->right, MPFR_RNDU);
+  return result;
+}
+Real min(const Real& a, const Real& b) {
+  Real result{Real::Uninitialized{}};
+  mpfr_min(&result.value_->left, &a.value_->left, &b.value_->left, MPFR_RNDD);
+  mpfr_min(&result.value_->right, &a.value_->right, &b.value_->right, MPFR_RNDU);
+  return result;
+}
+
+bool CertainlyAtMost(const Real& a, const Real& b) { return mpfr_lessequal_p(&a.value_->right, &b.value_->left) != 0; }
+bool CertainlyBelow(const Real& a, const Real& b) { return mpfr_less_p(&a.value_->right, &b.value_->left) != 0; }
+
+}  // namespace forereach::verifier

@@ -1,0 +1,97 @@
+/** A real number known to lie between two numbers of many bits (MPFI): the verifier's arithmetic.
+
+Every operation gives an interval that contains the exact result for all numbers of its operands. Exponents have 62
+bits, so nothing overflows and nothing is subnormal. */
+#pragma once
+
+#include <mpfi.h>
+
+#include <string>
+#include <utility>
+
+namespace forereach::verifier {
+
+/** While one lives, this thread's new numbers have so many bits; without one 256. */
+class Precision final {
+ public:
+  explicit Precision(int bits) : before_(std::exchange(bits_, bits)) {}
+  ~Precision() { bits_ = before_; }
+  Precision(const Precision&) = delete;
+  Precision& operator=(const Precision&) = delete;
+
+  [[nodiscard]] static int bits() { return bits_; }
+
+ private:
+  static thread_local int bits_;
+  int before_;
+};
+
+class Real final {
+ public:
+  Real() : Real(0.0) {}
+  /** Exactly x. */
+  Real(double x);  // NOLINT: as numbers do
+  Real(const Real& other);
+  Real(Real&& other) noexcept { *value_ = std::exchange(*other.value_, Empty()); }
+  Real& operator=(const Real& other);
+  Real& operator=(Real&& other) noexcept {
+    std::swap(*value_, *other.value_);
+    return *this;
+  }
+  ~Real() {
+    if (value_->left._mpfr_d != nullptr) Release();
+  }
+
+  /** Everything from the lower end of a to the upper end of b; the empty case a > b is the caller's to exclude. */
+  [[nodiscard]] static Real FromTo(const Real& a, const Real& b);
+
+  /** The ends, as numbers that are known exactly. */
+  [[nodiscard]] Real lower() const;
+  [[nodiscard]] Real upper() const;
+  /** A number between the ends. */
+  [[nodiscard]] Real middle() const;
+  /** The largest absolute value. */
+  [[nodiscard]] Real magnitude() const;
+
+  [[nodiscard]] bool IsZero() const { return mpfi_is_zero(value_) > 0; }
+  [[nodiscard]] bool IsFinite() const { return mpfi_bounded_p(value_) != 0; }
+  /** The double nearest to the middle, after a multiplication by two to the power `shift`. Not a bound. */
+  [[nodiscard]] double ToDouble(long shift = 0) const;
+  /** e with |x| < 2^e for the upper end of |x|; the least number possible for zero. */
+  [[nodiscard]] long exponent() const;
+  /** In decimal, 17 digits of the middle. */
+  [[nodiscard]] std::string text() const;
+
+  Real& operator+=(const Real& other);
+  Real& operator-=(const Real& other);
+
+  friend Real operator+(const Real& a, const Real& b);
+  friend Real operator-(const Real& a, const Real& b);
+  friend Real operator*(const Real& a, const Real& b);
+  friend Real operator/(const Real& a, const Real& b);
+  friend Real operator-(const Real& a);
+  friend Real sqr(const Real& a);
+  friend Real sqrt(const Real& a);
+  friend Real abs(const Real& a);
+  friend Real sin(const Real& a);
+  friend Real cos(const Real& a);
+  /** Unbounded over a pole. */
+  friend Real tan(const Real& a);
+  /** The larger and the smaller of two numbers. */
+  friend Real max(const Real& a, const Real& b);
+  friend Real min(const Real& a, const Real& b);
+
+  /** Whether every number of a is at most (below) every number of b: then the numbers meant are, for certain. */
+  friend bool CertainlyAtMost(const Real& a, const Real& b);
+  friend bool CertainlyBelow(const Real& a, const Real& b);
+
+ private:
+  struct Uninitialized {};
+  explicit Real(Uninitialized);
+  void Release();
+  static __mpfi_struct Empty() { return {}; }
+
+  mpfi_t value_;
+};
+
+}  // namespace forereach::verifier

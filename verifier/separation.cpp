@@ -1,0 +1,308 @@
+#include "verifier/separation.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include <Eigen/Core>
+
+namespace forereach::verifier {
+namespace {
+
+using RealVector = std::vector<Real>;
+
+constexpr int kMostRounds = 1000;
+
+Real Dot(const RealVector& a, const RealVector& b) {
+  Real sum;
+  for (std::size_t k = 0; k < a.size(); ++k)
+    if (!a[k].IsZero() && !b[k].IsZero()) sum += a[k] * b[k];
+  return sum;
+}
+
+RealVector Minus(const RealVector& a, const RealVector& b) {
+  RealVector difference;
+  for (std::size_t k = 0; k < a.size(); ++k) difference.push_back(a[k] - b[k]);
+  return difference;
+}
+
+// One vector between the ends: the search needs no rigour.
+RealVector Middle(RealVector vector) {
+  for (Real& entry : vector) entry = entry.middle();
+  return vector;
+}
+
+bool IsPositive(const Real& x) { return CertainlyBelow(Real(), x); }
+
+// The points whose hull the obstacle's core is.
+std::vector<RealVector> CorePoints(const Obstacle& obstacle) {
+  std::vector<RealVector> points;
+  const auto& given = obstacle.points();
+  if (obstacle.kind() != Obstacle::Kind::kBox) {
+    for (const Eigen::VectorXd& point : given) points.emplace_back(point.begin(), point.end());
+    return points;
+  }
+  for (int corner = 0; corner < 1 << obstacle.dim(); ++corner) {
+    RealVector& point = points.emplace_back();
+    for (int k = 0; k < obstacle.dim(); ++k) point.emplace_back(given[corner >> k & 1 ? 1 : 0][k]);
+  }
+  return points;
+}
+
+// Weights w, sum 1, that minimise |sum w_i p_i|, by Gauss's elimination; empty where the points are dependent.
+RealVector AffineMinimum(const std::vector<RealVector>& points) {
+  std::vector<RealVector> edges, rows;
+  for (std::size_t i = 1; i < points.size(); ++i) edges.push_back(Minus(points[i], points[0]));
+  for (const RealVector& a : edges) {
+    RealVector& row = rows.emplace_back();
+    for (const RealVector& b : edges) row.push_back(Dot(a, b));
+    row.push_back(-Dot(a, points[0]));
+    row = Middle(row);
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (!IsPositive(rows[i][i])) return {};
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      if (r == i) continue;
+      const Real factor = rows[r][i] / rows[i][i];
+      for (std::size_t c = i; c < rows[r].size(); ++c) rows[r][c] -= factor * rows[i][c];
+      rows[r] = Middle(rows[r]);
+    }
+  }
+  RealVector weights{Real(1.0)};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    weights.push_back((rows[i].back() / rows[i][i]).middle());
+    weights[0] = (weights[0] - weights.back()).middle();
+  }
+  return weights;
+}
+
+// The dual bound along directions, the best of which leads to the point of {core - slice} nearest to the origin.
+class Search {
+ public:
+  Search(const ProjectedSlice& slice, const Obstacle& obstacle, double clearance)
+      : slice_(slice), obstacle_(obstacle), clearance_(clearance) {
+    if (IsHalfSpace()) return;
+    for (const RealVector& point : CorePoints(obstacle)) core_.push_back(Minus(point, slice.center()));
+  }
+
+  /** True once a direction proves the clearance. */
+  bool Run() {
+    if (IsHalfSpace()) {
+      const Eigen::VectorXd& normal = obstacle_.points()[0];
+      return Try(RealVector(normal.begin(), normal.end()));
+    }
+    const auto nearest = std::ranges::min_element(
+        core_, [](const RealVector& a, const RealVector& b) { return CertainlyBelow(Dot(a, a), Dot(b, b)); });
+    if (Try(*nearest)) return true;
+    const Face face = NearestFace(*nearest);
+    if (Try(face.nearest) || TryExactly(face)) return true;
+    if (Touches(face.nearest))
+      undecided_ = false;
+    else
+      undecided_ |= !face.is_best;
+    return false;
+  }
+
+  [[nodiscard]] const std::optional<Real>& best() const { return best_; }
+  [[nodiscard]] bool undecided() const { return undecided_; }
+
+ private:
+  /** Corners of {core - slice}, and the point of their simplex that is nearest to the origin. */
+  struct Face {
+    std::vector<RealVector> corners;
+    RealVector nearest;
+    bool is_best;  ///< No corner lies below the nearest point; false: more bits are needed to go on.
+  };
+
+  [[nodiscard]] bool IsHalfSpace() const { return obstacle_.kind() == Obstacle::Kind::kHalfSpace; }
+
+  // Whether d proves the clearance: gap >= (clearance + radius) |d|.
+  bool Try(const RealVector& d) {
+    const Real square = Dot(d, d);
+    if (!IsPositive(square)) return false;
+    const Real length = sqrt(square);
+    Real gap;
+    if (IsHalfSpace()) {
+      gap = Real(obstacle_.offset()) - slice_.Support(d);
+    } else {
+      gap = Dot(d, core_.front());
+      for (const RealVector& point : core_) gap = min(gap, Dot(d, point));
+      for (const RealVector& g : slice_.generators()) gap -= abs(Dot(d, g));
+    }
+    const Real bound = (gap / length - Real(obstacle_.radius())).lower();
+    best_ = best_ ? max(*best_, bound) : bound;
+    const Real needed = (Real(clearance_) + Real(obstacle_.radius())) * length;
+    const Answer answer = clearance_ > 0 ? IsAtMost(needed, gap) : IsBelow(needed, gap);
+    undecided_ |= answer == Answer::kUnknown;
+    return answer == Answer::kYes;
+  }
+
+  // The nearest point is one of {core - slice}: the distance is at most its length. With many bits, one that is nothing
+  // beside the corners is zero: distances of sets of doubles have no such size.
+  [[nodiscard]] bool Touches(const RealVector& nearest) const {
+    const Real length = sqrt(Dot(nearest, nearest));
+    if (CertainlyBelow(length + Tolerance() * length, Real(clearance_) + Real(obstacle_.radius()))) return true;
+    Real size;
+    for (const RealVector& point : core_) size = max(size, Dot(point, point));
+    for (const RealVector& g : slice_.generators()) size = max(size, Dot(g, g));
+    return Precision::bits() > 4 * 1074 && CertainlyAtMost(length, Tolerance() * sqrt(size));
+  }
+
+  // Where the distance is a double, a direction that is off by its last bit cannot tell. A face's normal needs no
+  // division, and what is next to nothing along an axis may be nothing.
+  bool TryExactly(const Face& face) {
+    const auto& corners = face.corners;
+    RealVector normal;
+    if (corners.size() == 2 && slice_.dim() == 2) {
+      const RealVector edge = Minus(corners[1], corners[0]);
+      normal = {-edge[1], edge[0]};
+    } else if (corners.size() == 3 && slice_.dim() == 3) {
+      const RealVector a = Minus(corners[1], corners[0]), b = Minus(corners[2], corners[0]);
+      normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    }
+    if (!normal.empty() && IsPositive(-Dot(normal, face.nearest))) normal = Minus(RealVector(normal.size()), normal);
+    if (!normal.empty() && Try(normal)) return true;
+    RealVector straight = face.nearest;
+    const Real little = Tolerance() * Dot(straight, straight);
+    for (Real& entry : straight)
+      if (CertainlyBelow(sqr(entry), little)) entry = Real();
+    return Try(straight);
+  }
+
+  // The corner of {core - slice} with the smallest d . y.
+  [[nodiscard]] RealVector Lowest(const RealVector& d) const {
+    RealVector corner = *std::ranges::min_element(core_, [&](const RealVector& a, const RealVector& b) {
+      return CertainlyBelow(Dot(d, a).middle(), Dot(d, b).middle());
+    });
+    for (const RealVector& g : slice_.generators()) {
+      const bool plus = IsPositive(Dot(d, g).middle());
+      for (std::size_t k = 0; k < corner.size(); ++k)
+        if (!g[k].IsZero()) corner[k] = plus ? corner[k] - g[k] : corner[k] + g[k];
+    }
+    return Middle(corner);
+  }
+
+  // By Wolfe's algorithm: the nearest point of a simplex of corners, until no corner lies below it.
+  [[nodiscard]] Face NearestFace(const RealVector& start) const {
+    std::vector<RealVector> corners{Lowest(start)};
+    RealVector weights{Real(1.0)}, nearest = corners.front();
+    const Real tolerance = Tolerance();
+    bool is_best = false;
+    for (int round = 0; round < kMostRounds; ++round) {
+      const RealVector corner = Lowest(nearest);
+      const Real square = Dot(nearest, nearest).middle(), progress = (square - Dot(nearest, corner)).middle();
+      is_best = !CertainlyBelow(tolerance * square, progress);
+      if (is_best) break;
+      corners.push_back(corner);
+      weights.push_back(Real());
+      if (!Shrink(corners, weights)) break;
+      RealVector point(nearest.size());
+      for (std::size_t i = 0; i < corners.size(); ++i)
+        for (std::size_t k = 0; k < point.size(); ++k) point[k] += weights[i] * corners[i][k];
+      point = Middle(point);
+      if (!CertainlyBelow(Dot(point, point).middle(), square)) break;
+      nearest = std::move(point);
+    }
+    return {std::move(corners), std::move(nearest), is_best};
+  }
+
+  // Where no progress of a corner counts as none: most of the bits.
+  [[nodiscard]] static Real Tolerance() {
+    Real tolerance(1.0);
+    for (int bit = 0; bit < Precision::bits() * 3 / 4; ++bit) tolerance = tolerance * Real(0.5);
+    return tolerance;
+  }
+
+  // Moves the weights to the affine minimum and drops every corner whose weight becomes zero on the way. False if the
+  // corners are dependent.
+  static bool Shrink(std::vector<RealVector>& corners, RealVector& weights) {
+    while (corners.size() > 1) {
+      const RealVector target = AffineMinimum(corners);
+      if (target.empty()) return false;
+      Real step(1.0);
+      std::size_t leaves = corners.size();
+      for (std::size_t i = 0; i < corners.size(); ++i) {
+        if (IsPositive(target[i])) continue;
+        const Real way = weights[i] - target[i];
+        const Real fraction = IsPositive(way) ? (weights[i] / way).middle() : Real();
+        if (leaves == corners.size() || CertainlyBelow(fraction, step)) step = fraction, leaves = i;
+      }
+      for (std::size_t i = 0; i < corners.size(); ++i)
+        weights[i] = (weights[i] + step * (target[i] - weights[i])).middle();
+      if (leaves == corners.size()) return true;
+      corners.erase(corners.begin() + static_cast<std::ptrdiff_t>(leaves));
+      weights.erase(weights.begin() + static_cast<std::ptrdiff_t>(leaves));
+    }
+    weights = {Real(1.0)};
+    return true;
+  }
+
+  const ProjectedSlice& slice_;
+  const Obstacle& obstacle_;
+  const double clearance_;
+  std::vector<RealVector> core_;  // relative to the slice's center
+  std::optional<Real> best_;
+  bool undecided_ = false;
+};
+
+}  // namespace
+
+ProjectedSlice::ProjectedSlice(const Slice& slice, const Eigen::MatrixXd& projection) {
+  const auto image = [&](const std::vector<Real>& x) {
+    RealVector y(static_cast<std::size_t>(projection.rows()));
+    for (Eigen::Index k = 0; k < projection.rows(); ++k)
+      for (Eigen::Index l = 0; l < projection.cols(); ++l)
+        if (const Real& entry = x[static_cast<std::size_t>(l)]; projection(k, l) != 0 && !entry.IsZero())
+          y[static_cast<std::size_t>(k)] += projection(k, l) == 1 ? entry : Real(projection(k, l)) * entry;
+    return y;
+  };
+  center_ = image(slice.center);
+  for (const auto& column : slice.columns) {
+    RealVector g = image(column);
+    if (!std::ranges::all_of(g, [](const Real& entry) { return entry.IsZero(); })) generators_.push_back(std::move(g));
+  }
+}
+
+Real ProjectedSlice::Support(const std::vector<Real>& d) const {
+  Real value = Dot(d, center_);
+  for (const RealVector& g : generators_) value += abs(Dot(d, g));
+  return value;
+}
+
+// The farthest point is a corner; in the plane its signs are those of a direction next to some generator's normal.
+// Doubles choose, brought to a size near one.
+Real ProjectedSlice::Radius() const {
+  long exponent = -100000;
+  for (const RealVector& g : generators_)
+    for (const Real& entry : g) exponent = std::max(exponent, entry.exponent());
+  const auto p = static_cast<Eigen::Index>(center_.size());
+  Eigen::MatrixXd rough = Eigen::MatrixXd::Zero(3, static_cast<Eigen::Index>(generators_.size()));
+  for (Eigen::Index j = 0; j < rough.cols(); ++j)
+    for (Eigen::Index k = 0; k < p; ++k)
+      rough(k, j) = generators_[static_cast<std::size_t>(j)][static_cast<std::size_t>(k)].ToDouble(-exponent);
+  Eigen::VectorXd best = Eigen::VectorXd::Ones(rough.cols()), signs;
+  double longest = -1;
+  for (Eigen::Index j = 0; j < rough.cols(); ++j) {
+    const Eigen::Vector3d g = rough.col(j);
+    const Eigen::Vector3d normal(-g.y(), g.x(), g.z());
+    for (const Eigen::Vector3d& d : {g, Eigen::Vector3d(normal + 1e-9 * g), Eigen::Vector3d(normal - 1e-9 * g)}) {
+      signs = (rough.transpose() * d).unaryExpr([](double along) { return along < 0 ? -1.0 : 1.0; });
+      if (const double length = (rough * signs).norm(); length > longest) longest = length, best = signs;
+    }
+  }
+  RealVector sum(center_.size());
+  for (std::size_t j = 0; j < generators_.size(); ++j)
+    for (std::size_t k = 0; k < sum.size(); ++k)
+      sum[k] = best[static_cast<Eigen::Index>(j)] < 0 ? sum[k] - generators_[j][k] : sum[k] + generators_[j][k];
+  return sqrt(Dot(sum, sum)).lower();
+}
+
+Answer IsClear(const ProjectedSlice& slice, const Obstacle& obstacle, double clearance, Real& best) {
+  Search search(slice, obstacle, clearance);
+  const bool proven = search.Run();
+  best = search.best() ? *search.best() : Real(-std::numeric_limits<double>::infinity());
+  if (proven) return Answer::kYes;
+  return search.undecided() ? Answer::kUnknown : Answer::kNo;
+}
+
+}  // namespace forereach::verifier

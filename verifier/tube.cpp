@@ -1,0 +1,519 @@
+#include "verifier/tube.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace forereach::verifier {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+// Rows of L with more nonzero columns than this are bounded over the hull: that is part of the method.
+constexpr std::size_t kMaxExactColumns = 12;
+
+std::size_t Index(int k) { return static_cast<std::size_t>(k); }
+
+Real Around(const Real& center, const Real& radius) { return Real::FromTo(center - radius, center + radius); }
+
+double UlpOf(double x) { return std::nextafter(std::abs(x), kNone) - std::abs(x); }
+
+bool IsZeroColumn(const std::vector<Real>& column) {
+  return std::ranges::all_of(column, [](const Real& entry) { return entry.IsZero(); });
+}
+
+std::vector<Real> Axis(int dim, int k, const Real& length) {
+  std::vector<Real> column(Index(dim));
+  column[Index(k)] = length;
+  return column;
+}
+
+Slice SliceOf(const InitialSet& set) {
+  Slice slice;
+  if (set.lower.size() > 0) {
+    const int n = static_cast<int>(set.lower.size());
+    for (int k = 0; k < n; ++k) {
+      const Real lower(set.lower[k]), upper(set.upper[k]), half(0.5);
+      slice.center.push_back(half * (lower + upper));
+      if (set.lower[k] != set.upper[k]) slice.columns.push_back(Axis(n, k, half * (upper - lower)));
+    }
+    return slice;
+  }
+  slice.center.assign(set.center.begin(), set.center.end());
+  for (const auto column : set.generators.colwise()) slice.columns.emplace_back(column.begin(), column.end());
+  std::erase_if(slice.columns, IsZeroColumn);
+  return slice;
+}
+
+// What the reduction ranks a column by, |g|_1 - |g|_inf, and how far off a double's rounding may put that. A column
+// along an axis has exactly zero, in doubles too.
+struct Score {
+  std::size_t column;
+  Real value;
+  double rounded, error;
+};
+
+Score ScoreOf(const std::vector<Real>& column, std::size_t index) {
+  std::size_t largest = 0;
+  for (std::size_t k = 1; k < column.size(); ++k)
+    if (CertainlyBelow(abs(column[largest]).middle(), abs(column[k]).middle())) largest = k;
+  Real sum;
+  for (std::size_t k = 0; k < column.size(); ++k)
+    if (k != largest && !column[k].IsZero()) sum += abs(column[k]);
+  const double rounded = sum.ToDouble(), error = 0x1p-44 * (sum + abs(column[largest])).ToDouble();
+  return {index, rounded == 0 ? Real() : sum, rounded, rounded == 0 ? 0 : error};
+}
+
+// Cannot be held in doubles: the certifier's column may be zero, and dropped.
+bool MayUnderflow(const std::vector<Real>& column) {
+  return std::ranges::all_of(column, [](const Real& entry) { return entry.exponent() < -1073; });
+}
+
+// All columns by their score, the largest first, ties to the earlier. Exact zeros are exact; all others are told apart
+// by the middles of enclosures far below a double's last place.
+std::vector<Score> Ranking(const Slice& slice) {
+  std::vector<Score> scores;
+  for (std::size_t j = 0; j < slice.columns.size(); ++j) scores.push_back(ScoreOf(slice.columns[j], j));
+  std::ranges::stable_sort(
+      scores, [](const Score& a, const Score& b) { return CertainlyBelow(b.value.middle(), a.value.middle()); });
+  return scores;
+}
+
+// What boxing a column may cost, relative to center and half-width: all but one of its entries lose their connection.
+double CostOfBoxing(const std::vector<Real>& column, const std::vector<double>& size) {
+  double largest = 0, second = 0;
+  for (std::size_t k = 0; k < column.size(); ++k) {
+    if (column[k].IsZero()) continue;
+    const double share = std::abs(column[k].ToDouble()) / size[k];
+    second = std::max(second, std::min(share, largest));
+    largest = std::max(largest, share);
+  }
+  return second;
+}
+
+// Whether the certifier, in doubles, may have ranked the last column kept and the first boxed the other way round, and
+// what that may cost; zero if not. Its columns carry a double's rounding of their own size and of the slice's.
+double CostOfConfusing(const Slice& slice, const Score& last, const Score& first) {
+  if (last.value.IsZero() && first.value.IsZero()) return 0;
+  std::vector<double> size;
+  for (int k = 0; k < slice.dim(); ++k) size.push_back((abs(slice.center[Index(k)]) + slice.HalfWidth(k)).ToDouble());
+  const double rounding = 0x1p-48 * *std::ranges::max_element(size);
+  if (std::abs(last.rounded - first.rounded) > last.error + first.error + rounding) return 0;
+  return std::max(CostOfBoxing(slice.columns[last.column], size), CostOfBoxing(slice.columns[first.column], size));
+}
+
+// Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
+// what it may have cost the certifier, in doubles, to go another way.
+double Reduce(Slice& slice, int order) {
+  const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
+  const double tiny = std::ranges::any_of(slice.columns, MayUnderflow) ? 1 : 0;
+  if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return tiny;
+  std::vector<Score> scores = Ranking(slice);
+  const double close = kept > 0 ? CostOfConfusing(slice, scores[kept - 1], scores[kept]) : 0;
+  const auto rest = scores.begin() + static_cast<std::ptrdiff_t>(kept);
+  std::sort(scores.begin(), rest, [](const Score& a, const Score& b) { return a.column < b.column; });
+  Slice reduced{slice.center, {}};
+  for (auto score = scores.begin(); score != rest; ++score)
+    reduced.columns.push_back(std::move(slice.columns[score->column]));
+  for (int k = 0; k < slice.dim(); ++k) {
+    Real sum;
+    for (auto score = rest; score != scores.end(); ++score) sum += abs(slice.columns[score->column][Index(k)]);
+    if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
+  }
+  slice = std::move(reduced);
+  return std::max(close, tiny);
+}
+
+// d_i d_l over the slice: at most r_i r_l in size, and within a quarter of the squares of the half-widths of
+// d_i / r_i + d_l / r_l and of their difference, times r_i r_l.
+Bounds MixedProduct(const Slice& slice, const std::vector<Real>& r, int i, int l, Method method) {
+  const Real product = r[Index(i)] * r[Index(l)];
+  if (method == Method::kPaper || product.IsZero()) return {-product, product};
+  Real plus, minus;
+  for (const auto& column : slice.columns) {
+    const Real a = column[Index(i)] * r[Index(l)], b = column[Index(l)] * r[Index(i)];
+    plus += abs(a + b);
+    minus += abs(a - b);
+  }
+  const Real four = Real(4.0) * product;
+  return {-min(product, sqr(minus) / four), min(product, sqr(plus) / four)};
+}
+
+// max over 0 <= s <= r of a s^2 / 2 + b s, b >= 0.
+Real Peak(const Real& a, const Real& b, const Real& r) {
+  const Real at_end = max(Real(), (Real(0.5) * a * r + b) * r);
+  const bool rises_to_the_end = Real(-a * r).upper() <= b.lower();
+  return rises_to_the_end ? at_end : b * b / (Real(-2.0) * a);
+}
+
+Bounds Times(const Real& h, const Bounds& d) {
+  const Real ends[] = {h.lower() * d.lower, h.lower() * d.upper, h.upper() * d.lower, h.upper() * d.upper};
+  return {min(min(ends[0], ends[1]), min(ends[2], ends[3])), max(max(ends[0], ends[1]), max(ends[2], ends[3]))};
+}
+
+// A mixed second derivative of states, or a diagonal one; a mixed one takes a diagonal one of its variables along.
+struct RemainderTerm {
+  const SecondDerivative* entry;
+  const SecondDerivative* diagonal = nullptr;
+};
+
+std::vector<RemainderTerm> TermsOf(const std::vector<SecondDerivative>& hessian) {
+  std::vector<RemainderTerm> terms;
+  for (const SecondDerivative& entry : hessian)
+    if (entry.row != entry.column) terms.push_back({&entry});
+  for (const SecondDerivative& entry : hessian) {
+    if (entry.row != entry.column) continue;
+    const auto partner = std::ranges::find_if(terms, [&](const RemainderTerm& term) {
+      return term.entry->output == entry.output && term.entry->row != term.entry->column && term.diagonal == nullptr &&
+             (term.entry->row == entry.row || term.entry->column == entry.row);
+    });
+    if (partner == terms.end())
+      terms.push_back({&entry});
+    else
+      partner->diagonal = &entry;
+  }
+  return terms;
+}
+
+// Of a diagonal term: d^2 lies in [0, r^2].
+Bounds DiagonalRange(const Real& h, const Real& r) {
+  const Real half_square = Real(0.5) * r * r;
+  return {half_square * min(Real(), h.lower()), half_square * max(Real(), h.upper())};
+}
+
+// Of a term of the centred method: the sum of its parts' ranges, or the range of their sum over the box, if that is less.
+Bounds CentredRange(const RemainderTerm& term, const Slice& slice, const std::vector<Real>& r) {
+  const SecondDerivative& entry = *term.entry;
+  if (entry.row == entry.column) return DiagonalRange(entry.value, r[Index(entry.row)]);
+  Bounds range = Times(entry.value, MixedProduct(slice, r, entry.row, entry.column, Method::kCentred));
+  if (term.diagonal == nullptr) return range;
+  const int shared = term.diagonal->row, other = shared == entry.row ? entry.column : entry.row;
+  const Real& curve = term.diagonal->value;
+  const Bounds square = DiagonalRange(curve, r[Index(shared)]);
+  const Real slope = entry.value.magnitude() * r[Index(other)];
+  return {max(range.lower + square.lower, -Peak(-curve.lower(), slope, r[Index(shared)])),
+          min(range.upper + square.upper, Peak(curve.upper(), slope, r[Index(shared)]))};
+}
+
+// The remainder's bounds, with every second derivative over a box in `hessian` and half-widths r.
+std::vector<Bounds> RemainderOver(const std::vector<SecondDerivative>& hessian, const Slice& slice,
+                                  const std::vector<Real>& r, int n, Method method) {
+  std::vector<Bounds> bounds(Index(n));
+  if (method == Method::kPaper) {
+    for (const SecondDerivative& entry : hessian) {
+      const Real once = entry.row == entry.column ? Real(0.5) : Real(1.0);  // off the diagonal (i, j) and (j, i) count
+      const Real most = once * r[Index(entry.row)] * r[Index(entry.column)] * entry.value.magnitude();
+      bounds[Index(entry.output)].lower -= most;
+      bounds[Index(entry.output)].upper += most;
+    }
+    return bounds;
+  }
+  for (const RemainderTerm& term : TermsOf(hessian)) {
+    const Bounds range = CentredRange(term, slice, r);
+    bounds[Index(term.entry->output)].lower += range.lower;
+    bounds[Index(term.entry->output)].upper += range.upper;
+  }
+  return bounds;
+}
+
+bool AllFinite(const std::vector<SecondDerivative>& hessian) {
+  return std::ranges::all_of(hessian, [](const SecondDerivative& entry) { return entry.value.IsFinite(); });
+}
+
+}  // namespace
+
+Real Slice::HalfWidth(int k) const {
+  Real sum;
+  for (const auto& column : columns)
+    if (!column[Index(k)].IsZero()) sum += abs(column[Index(k)]);
+  return sum;
+}
+
+// Z_t = X_t x {u_t}: the slice, and center, half-width and hull of every variable.
+struct TubeMaker::Query {
+  int t;
+  const Slice& slice;
+  std::vector<Real> center, half_width, hull;
+
+  Query(int step, const Slice& set, const Eigen::VectorXd& input) : t(step), slice(set), center(set.center) {
+    for (int k = 0; k < set.dim(); ++k) half_width.push_back(set.HalfWidth(k));
+    for (const double u : input) {
+      center.emplace_back(u);
+      half_width.emplace_back();
+    }
+    hull = Box(Real(1.0));
+  }
+
+  /** The hull scaled about its center. */
+  [[nodiscard]] std::vector<Real> Box(const Real& scale) const {
+    std::vector<Real> box;
+    for (std::size_t l = 0; l < center.size(); ++l) box.push_back(Around(center[l], scale * half_width[l]));
+    return box;
+  }
+};
+
+TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method method)
+    : problem_(problem), equations_(equations), method_(method) {
+  const Transitions& data = problem.transitions;
+  for (int i = 0; i < data.size(); ++i) {
+    std::vector<Real> z;
+    for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
+    const std::vector<Real> nominal = equations.Value(z);
+    std::vector<Bounds>& row = residuals_.emplace_back();
+    for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
+      const double x_next = data.x_next(i, k);
+      const Real allowed = Real(UlpOf(x_next)) + Real(problem.declaration.noise_bound[k]);
+      const Real observed = Real(x_next) - nominal[static_cast<std::size_t>(k)];
+      row.push_back({observed - allowed, observed + allowed});
+    }
+  }
+}
+
+Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls, const TubeOptions& options) const {
+  Tube tube;
+  tube.slices.push_back(SliceOf(initial_set));
+  for (int t = 0; t < controls.cols() && !tube.failure; ++t) {
+    const Slice slice = tube.slices.back();
+    tube.failure = Advance(tube, Query(t, slice, controls.col(t)), options);
+  }
+  return tube;
+}
+
+std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const TubeOptions& options) const {
+  const int n = query.slice.dim();
+  if (const auto failure = LeavesDomain(query)) return failure;
+  const auto no_bound = [&](const std::string& what) {
+    return Failure{query.t, what + " has no finite enclosure", "", ""};
+  };
+
+  Step step;
+  step.remainder = Remainder(query, options.split_remainder);
+  if (step.remainder.empty()) return no_bound("the nominal model's second derivative");
+  for (int k = 0; k < n; ++k) step.envelope.push_back(Envelope(query, k));
+
+  Slice next;
+  next.center = equations_.Value(query.center);
+  const std::vector<FirstDerivative> jacobian = equations_.First(query.center);
+  for (const auto& column : query.slice.columns) {
+    std::vector<Real> image(Index(n));
+    for (const auto& [output, variable, value] : jacobian)
+      if (variable < n && !column[Index(variable)].IsZero()) image[Index(output)] += value * column[Index(variable)];
+    if (!IsZeroColumn(image)) next.columns.push_back(std::move(image));
+  }
+  const Real half(0.5);
+  for (int k = 0; k < n; ++k) {  // diag(q)
+    const auto& [lower, upper] = step.remainder[Index(k)];
+    next.center[Index(k)] += half * (lower + upper);
+    if (const Real q = half * (upper - lower); !q.IsZero()) next.columns.push_back(Axis(n, k, q));
+  }
+  for (int k = 0; k < n; ++k) {  // diag(h)
+    const auto& [lower, upper] = step.envelope[Index(k)];
+    // By less than a double's rounding the certifier cannot have seen it; then no system exists and all that follows
+    // holds.
+    if (CertainlyBelow(upper + Real(0x1p-40) * (abs(lower) + abs(upper)), lower))
+      return Failure{query.t, "some residual is consistent with data and declaration", lower.text(),
+                     "at most " + upper.text()};
+    next.center[Index(k)] += half * (lower + upper);
+    if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
+    if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
+  }
+  if (options.reduce) tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order));
+  tube.steps.push_back(std::move(step));
+  tube.slices.push_back(std::move(next));
+  return std::nullopt;
+}
+
+std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
+  const Domain& domain = problem_.domain;
+  const auto refuse = [&](const std::string& what, const Real& found, const Real& bound, Answer answer,
+                          const char* relation = "at most ") {
+    const Real scale = max(abs(found), abs(bound));
+    return Failure{query.t,
+                   "the tube stays in the domain: " + what,
+                   found.text(),
+                   relation + bound.text(),
+                   answer == Answer::kNo,
+                   scale.IsZero() ? 1 : (abs(found - bound) / scale).ToDouble()};
+  };
+  const int n = domain.state.dim();
+  for (int l = 0; l < static_cast<int>(query.hull.size()); ++l) {
+    const Real lower(l < n ? domain.state.lower()[l] : domain.input.lower()[l - n]);
+    const Real upper(l < n ? domain.state.upper()[l] : domain.input.upper()[l - n]);
+    const Real &center = query.center[Index(l)], &r = query.half_width[Index(l)];
+    const std::string name =
+        l < n ? problem_.model->state_names()[Index(l)] : problem_.model->input_names()[Index(l - n)];
+    if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes)
+      return refuse(name, center - r, lower, a, "at least ");
+    if (const Answer a = IsAtMost(center + r, upper); a != Answer::kYes) return refuse(name, center + r, upper, a);
+  }
+  for (std::size_t i = 0; i < domain.inequalities.size(); ++i) {
+    const auto& [coefficients, bound] = domain.inequalities[i];
+    Real largest;
+    for (std::size_t l = 0; l < query.center.size(); ++l) {
+      const Real c(coefficients[static_cast<Eigen::Index>(l)]);
+      largest += c * query.center[l] + abs(c) * query.half_width[l];
+    }
+    if (const Answer a = IsAtMost(largest, bound); a != Answer::kYes)
+      return refuse("inequality " + std::to_string(i), largest, bound, a);
+  }
+  for (std::size_t i = 0; i < domain.balls.size(); ++i) {
+    const auto& [coordinates, center, radius] = domain.balls[i];
+    Real square;
+    for (std::size_t c = 0; c < coordinates.size(); ++c) {
+      const auto l = Index(coordinates[c]);
+      square += sqr(abs(query.center[l] - Real(center[static_cast<Eigen::Index>(c)])) + query.half_width[l]);
+    }
+    if (const Answer a = IsAtMost(square, sqr(Real(radius))); a != Answer::kYes)
+      return refuse("ball " + std::to_string(i), sqrt(square), radius, a);
+  }
+  return std::nullopt;
+}
+
+// With f0(z) = f0(c) + J (z - c) + int_0^1 (1 - s) (z - c)^T H(c + s (z - c)) (z - c) ds: over s <= 1/2 the argument
+// stays in half the box, and that part of the integral of 1 - s weighs 3/4.
+std::vector<Bounds> TubeMaker::Remainder(const Query& query, bool split) const {
+  const int n = query.slice.dim();
+  const std::vector<SecondDerivative> whole = equations_.Second(query.hull);
+  if (!AllFinite(whole)) return {};
+  std::vector<Bounds> bounds = RemainderOver(whole, query.slice, query.half_width, n, method_);
+  if (!split) return bounds;
+  const auto inner = RemainderOver(equations_.Second(query.Box(Real(0.5))), query.slice, query.half_width, n, method_);
+  for (std::size_t k = 0; k < bounds.size(); ++k) {
+    bounds[k].lower = Real(0.25) * bounds[k].lower + Real(0.75) * inner[k].lower;
+    bounds[k].upper = Real(0.25) * bounds[k].upper + Real(0.75) * inner[k].upper;
+  }
+  return bounds;
+}
+
+// One row k of L over one Z_t. D_i = max_s |sum_l s_l L_l (c_l - z_il)| + sum_j |sum_l s_l L_l G_lj| over the signs s
+// of the nonzero columns l, or over the hull: sum_l L_l (|c_l - z_il| + r_l).
+struct TubeMaker::Row {
+  const Query& query;
+  std::vector<int> columns;
+  std::vector<double> slopes;
+  bool exact;
+  std::size_t patterns;
+  // Doubles choose; scale bounds all that goes into one of them but the observation.
+  std::vector<double> center, spread;
+  double scale = 0;
+  mutable std::vector<std::optional<Real>> exact_spread;
+
+  Row(const Declaration& declaration, const Query& set, int k) : query(set) {
+    for (int l = 0; l < static_cast<int>(set.center.size()); ++l)
+      if (declaration.lipschitz(k, l) > 0) {
+        columns.push_back(l);
+        slopes.push_back(declaration.lipschitz(k, l));
+        center.push_back(set.center[Index(l)].ToDouble());
+        scale += slopes.back() * (std::abs(center.back()) + set.half_width[Index(l)].ToDouble());
+      }
+    exact = columns.size() <= kMaxExactColumns;
+    patterns = exact && !columns.empty() ? std::size_t{1} << (columns.size() - 1) : 1;  // s and -s give the same
+    exact_spread.resize(patterns);
+    std::vector<std::vector<double>> generators;
+    for (const auto& column : set.slice.columns) {
+      std::vector<double>& entries = generators.emplace_back();
+      for (const int l : columns) entries.push_back(l < set.slice.dim() ? column[Index(l)].ToDouble() : 0);
+    }
+    for (std::size_t s = 0; s < patterns; ++s) {
+      double sum = 0;
+      for (const auto& entries : generators) {
+        double along = 0;
+        for (std::size_t l = 0; l < columns.size(); ++l) along += Sign(s, l) * slopes[l] * entries[l];
+        sum += std::abs(along);
+      }
+      spread.push_back(sum);
+    }
+    if (!exact) spread[0] = Spread(0).ToDouble();
+  }
+
+  static double Sign(std::size_t pattern, std::size_t column) { return pattern >> column & 1 ? -1 : 1; }
+
+  [[nodiscard]] const Real& Spread(std::size_t s) const {
+    if (exact_spread[s]) return *exact_spread[s];
+    Real sum;
+    if (!exact)
+      for (std::size_t l = 0; l < columns.size(); ++l) sum += Real(slopes[l]) * query.half_width[Index(columns[l])];
+    if (exact)
+      for (const auto& column : query.slice.columns) {
+        Real along;
+        for (std::size_t l = 0; l < columns.size(); ++l)
+          if (columns[l] < query.slice.dim() && !column[Index(columns[l])].IsZero())
+            along += Real(Sign(s, l) * slopes[l]) * column[Index(columns[l])];
+        sum += abs(along);
+      }
+    exact_spread[s] = sum;
+    return *exact_spread[s];
+  }
+
+  [[nodiscard]] double Roughly(const Eigen::MatrixXd& z, int i, std::size_t s) const {
+    double sum = 0;
+    for (std::size_t l = 0; l < columns.size(); ++l) {
+      const double away = slopes[l] * (center[l] - z(i, columns[l]));
+      sum += exact ? Sign(s, l) * away : std::abs(away);
+    }
+    return std::abs(sum) + spread[s];
+  }
+
+  [[nodiscard]] double ScaleAt(const Eigen::MatrixXd& z, int i) const {
+    double sum = scale;
+    for (std::size_t l = 0; l < columns.size(); ++l) sum += slopes[l] * std::abs(z(i, columns[l]));
+    return sum;
+  }
+
+  [[nodiscard]] double Roughly(const Eigen::MatrixXd& z, int i) const {
+    double largest = 0;
+    for (std::size_t s = 0; s < patterns; ++s) largest = std::max(largest, Roughly(z, i, s));
+    return largest;
+  }
+
+  // Plain sums of some hundred doubles are good to 2^-40 of their scale while nothing under- or overflows: a pattern
+  // that falls short of the largest by more than that is not the maximum.
+  [[nodiscard]] Real Distance(const Eigen::MatrixXd& z, int i) const {
+    std::vector<double> rough;
+    for (std::size_t s = 0; s < patterns; ++s) rough.push_back(Roughly(z, i, s));
+    const double total = ScaleAt(z, i), largest = *std::ranges::max_element(rough);
+    const bool trusted = total > 1e-250 && total < 1e250;
+    Real distance;
+    for (std::size_t s = 0; s < patterns; ++s) {
+      if (trusted && rough[s] < largest - 0x1p-38 * total) continue;
+      Real sum;
+      for (std::size_t l = 0; l < columns.size(); ++l) {
+        const Real away = Real(slopes[l]) * (query.center[Index(columns[l])] - Real(z(i, columns[l])));
+        sum += exact ? Real(Sign(s, l)) * away : abs(away);
+      }
+      distance = max(distance, abs(sum) + Spread(s));
+    }
+    return distance;
+  }
+};
+
+// Every observation gives a bound; doubles choose those that may give the tightest.
+Bounds TubeMaker::Envelope(const Query& query, int k) const {
+  const Row row(problem_.declaration, query, k);
+  const Eigen::MatrixXd& z = problem_.transitions.z;
+  const int count = static_cast<int>(residuals_.size());
+  std::vector<double> lower, upper, slack;
+  double highest = -kNone, lowest = kNone;
+  bool trusted = true;
+  for (int i = 0; i < count; ++i) {
+    const Bounds& residual = residuals_[Index(i)][Index(k)];
+    const double distance = row.Roughly(z, i), below = residual.lower.ToDouble(), above = residual.upper.ToDouble();
+    lower.push_back(below - distance);
+    upper.push_back(above + distance);
+    slack.push_back(0x1p-36 * (row.ScaleAt(z, i) + std::abs(below) + std::abs(above)));
+    trusted &= std::isfinite(slack.back()) && slack.back() > 1e-250;
+    highest = std::max(highest, lower.back() - slack.back());
+    lowest = std::min(lowest, upper.back() + slack.back());
+  }
+  std::optional<Bounds> bounds;
+  for (std::size_t i = 0; i < Index(count); ++i) {
+    if (trusted && lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest) continue;
+    const Real distance = row.Distance(z, static_cast<int>(i));
+    const Bounds& residual = residuals_[i][Index(k)];
+    const Bounds found{residual.lower - distance, residual.upper + distance};
+    bounds = bounds ? Bounds{max(bounds->lower, found.lower), min(bounds->upper, found.upper)} : found;
+  }
+  return *bounds;
+}
+
+}  // namespace forereach::verifier

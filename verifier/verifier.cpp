@@ -1,0 +1,110 @@
+#include "verifier/verifier.h"
+
+#include <algorithm>
+#include <array>
+
+#include "verifier/claims.h"
+
+namespace forereach::verifier {
+namespace {
+
+// A sum of doubles spans 2098 bits, one of products of three doubles 6453: with so many each is exact.
+constexpr std::array kBits{256, 2304, 6656};
+// What exceeds a record by more than this is no matter of the certifier's rounding.
+constexpr double kRounding = 0x1p-40;
+// How far a difference between slices may have grown when a claim fails for it.
+constexpr double kGrowth = 1024;
+
+// What does not fit before anything is derived.
+std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& certificate) {
+  const auto misfit = [](const std::string& what) { return Failure{-1, what, "", ""}; };
+  const int n = problem.model->num_states();
+  const auto& set = certificate.initial_set;
+  if (certificate.controls.rows() != problem.model->num_inputs() || certificate.controls.cols() < 1 ||
+      !certificate.controls.allFinite())
+    return misfit("the controls are finite and fit the model");
+  const bool box = set.lower.size() > 0;
+  if (box ? set.lower.size() != n || set.upper.size() != n || !(set.lower.array() <= set.upper.array()).all() ||
+                !set.lower.allFinite() || !set.upper.allFinite()
+          : set.center.size() != n || set.generators.rows() != n || !set.center.allFinite() ||
+                !set.generators.allFinite())
+    return misfit("the initial set is finite and fits the model");
+  for (const Obstacle& obstacle : certificate.obstacles)
+    if (obstacle.dim() != problem.projection.rows()) return misfit("the obstacles fit the projection");
+  if (certificate.slices.empty()) return std::nullopt;
+  const auto steps = static_cast<std::size_t>(certificate.controls.cols());
+  if (certificate.slices.size() != steps + 1)
+    return Failure{static_cast<int>(certificate.slices.size()), "the record has a slice for every step",
+                   std::to_string(certificate.slices.size()), std::to_string(steps + 1)};
+  for (std::size_t t = 0; t <= steps; ++t) {
+    const RecordedSlice& slice = certificate.slices[t];
+    const auto fits = [&](const Eigen::VectorXd& vector) { return vector.size() == 0 || vector.size() == n; };
+    if (!fits(slice.lower) || slice.lower.size() != slice.upper.size() || !fits(slice.center) ||
+        slice.center.size() != slice.half_width.size() || (slice.has_generators && slice.generators.rows() != n) ||
+        !fits(slice.envelope_lower) || slice.envelope_lower.size() != slice.envelope_upper.size() ||
+        !fits(slice.remainder) || (!slice.clearance.empty() && slice.clearance.size() != certificate.obstacles.size()))
+      return Failure{static_cast<int>(t), "the recorded slice has the task's sizes", "", ""};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Method MethodOf(const Problem& problem) {
+  return problem.method == forereach::Method::kPaper ? Method::kPaper : Method::kCentred;
+}
+
+Verifier::Verifier(std::shared_ptr<const Problem> problem, Method method)
+    : problem_(std::move(problem)), method_(method), equations_(EquationsOf(*problem_->model)) {}
+
+const TubeMaker& Verifier::MakerOf(int bits) const {
+  const std::lock_guard lock(mutex_);
+  auto& maker = makers_[bits];
+  if (!maker) {
+    const Precision precision(bits);
+    maker = std::make_unique<TubeMaker>(*problem_, *equations_, method_);
+  }
+  return *maker;
+}
+
+Tube Verifier::Derive(const Certificate& certificate) const {
+  const Precision precision(kBits[0]);
+  return MakerOf(kBits[0]).Make(certificate.initial_set, certificate.controls, {});
+}
+
+Verdict Verifier::Verify(const Certificate& certificate) const {
+  if (!equations_)
+    return {Status::kCannotVerify,
+            {-1, "cannot verify: no equations for the model " + problem_->model->name(), "", ""}};
+  if (const auto misfit = FindMisfit(*problem_, certificate)) return {Status::kRefuted, *misfit};
+  std::optional<Failure> failure;
+  for (const int bits : kBits) {
+    const Precision precision(bits);
+    failure = Check(MakerOf(bits), certificate);
+    if (!failure) return {Status::kConfirmed, {}};
+    if (failure->certain) return {Status::kRefuted, *failure};
+  }
+  return {Status::kCannotVerify, *failure};
+}
+
+// The certifier's own rules first. Where these leave a choice that its rounding may have taken otherwise, and the claim
+// fails by no more than that may matter, a tube that needs no choice confirms as well: never reduced, and with a
+// tighter remainder.
+std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate& certificate) const {
+  double ambiguity = 0;
+  const auto attempt = [&](const TubeOptions& options) {
+    const Tube tube = maker.Make(certificate.initial_set, certificate.controls, options);
+    ambiguity = std::max(ambiguity, tube.ambiguity);
+    return tube.failure ? tube.failure : FindFalseClaim(*problem_, certificate, tube);
+  };
+  const std::optional<Failure> failure = attempt({});
+  if (!failure) return std::nullopt;
+  // The centred remainder may shrink where its center moves; by a rounding error, that is no difference of rules.
+  const double rounding = method_ == Method::kCentred ? kRounding : 0;
+  if (!(failure->excess < std::max(kGrowth * ambiguity, rounding))) return failure;
+  for (const TubeOptions& options : {TubeOptions{false, false}, TubeOptions{false, true}})
+    if (!attempt(options)) return std::nullopt;
+  return failure;
+}
+
+}  // namespace forereach::verifier
