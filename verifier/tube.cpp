@@ -142,7 +142,7 @@ Bounds MixedProduct(const Slice& slice, const std::vector<Real>& r, int i, int l
 // max over 0 <= s <= r of a s^2 / 2 + b s, b >= 0.
 Real Peak(const Real& a, const Real& b, const Real& r) {
   const Real at_end = max(Real(), (Real(0.5) * a * r + b) * r);
-  const bool rises_to_the_end = Real(-a * r).upper() <= b.lower();
+  const bool rises_to_the_end = CertainlyAtMost(-a * r, b);
   return rises_to_the_end ? at_end : b * b / (Real(-2.0) * a);
 }
 

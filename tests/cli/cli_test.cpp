@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(CertifyJsonTest, HasExactlyTheKeysOfTheContract) {
   const Json decision = CertifyJson("bicycle", "bicycle_certified");
   EXPECT_EQ(KeysOf(decision),
-            (std::set<std::string>{"outcome", "step", "cause", "message", "inputs", "tube", "digests", "elapsed_us"}));
+            (std::set<std::string>{"outcome", "step", "cause", "message", "capped", "inputs", "tube", "digests", "elapsed_us"}));
   EXPECT_EQ(KeysOf(decision["digests"]),
             (std::set<std::string>{"plan", "tube", "config", "model", "declaration", "observations", "obstacles"}));
   const Json& tube = decision["tube"];
