@@ -14,7 +14,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json SliceJson(const Zonotope& slice, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+Json SliceJson(const Tube& tube, int t, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+  const Zonotope& slice = tube.slice(t);
   Json half_width = Json::array(), generators = Json::array(), clearance = Json::array();
   for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
   const Eigen::MatrixXd matrix = slice.GeneratorMatrix();
@@ -22,7 +23,7 @@ Json SliceJson(const Zonotope& slice, const Certifier& certifier, std::span<cons
   Zonotope projected;
   certifier.projection().Enclose(slice, projected);
   for (const Obstacle& obstacle : obstacles)
-    clearance.push_back(std::max(Separate(projected, obstacle).clearance(), -kMaxDouble));
+    clearance.push_back(std::max(certifier.SeparateSlice(tube, t, obstacle).clearance(), -kMaxDouble));
   return {{"center", slice.center()},
           {"half_width", half_width},
           {"generators", generators},
@@ -34,7 +35,7 @@ Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obst
   Json slices = Json::array();
   const auto n = static_cast<std::size_t>(certifier.problem().model->num_states());
   for (int t = 0; t <= tube.length(); ++t) {
-    Json slice = SliceJson(tube.slice(t), certifier, obstacles);
+    Json slice = SliceJson(tube, t, certifier, obstacles);
     if (t < tube.length()) {
       const StepRecord& step = tube.step(t);
       slice["envelope"] = {{"lower", std::span(step.envelope.lower.data(), n)},

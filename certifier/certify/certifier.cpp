@@ -175,16 +175,19 @@ Decision Judged(Outcome outcome, const Closest& closest) {
 
 }  // namespace
 
+Separation Certifier::SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept {
+  Zonotope projected;
+  projection_.Enclose(tube.slice(t), projected);
+  const Separation best = Separate(projected, obstacle);
+  const Separation by_hulls = SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacle);
+  return best.distance > by_hulls.distance ? best : by_hulls;
+}
+
 // Interval hulls settle what is far away. What they do not prove, and then what they leave as possibly closest, is
 // settled by the best direction.
 Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept {
   Closest by_hull, closest;
-  const auto separate = [&](int t, int o, const Separation& by_hulls) {
-    Zonotope projected;
-    projection_.Enclose(tube.slice(t), projected);
-    const Separation best = Separate(projected, obstacles[static_cast<std::size_t>(o)]);
-    return best.distance > by_hulls.distance ? best : by_hulls;
-  };
+  const auto separate = [&](int t, int o) { return SeparateSlice(tube, t, obstacles[static_cast<std::size_t>(o)]); };
   const auto hull_separation = [&](int t, int o) {
     return SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacles[static_cast<std::size_t>(o)]);
   };
@@ -196,17 +199,17 @@ Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube&
         by_hull.Consider(by_hulls, t, o);
         continue;
       }
-      const Separation best = separate(t, o, by_hulls);
+      const Separation best = separate(t, o);
       if (!best.IsProven()) return Judged(Outcome::kSafety, {best.clearance(), t, o, best});
       closest.Consider(best, t, o);
     }
   if (by_hull.clearance < closest.clearance)
-    closest.Consider(separate(by_hull.step, by_hull.obstacle, by_hull.separation), by_hull.step, by_hull.obstacle);
+    closest.Consider(separate(by_hull.step, by_hull.obstacle), by_hull.step, by_hull.obstacle);
   for (int t = 0; t <= tube.length(); ++t)
     for (int o = 0; o < count; ++o) {
       const Separation by_hulls = hull_separation(t, o);
       if (!by_hulls.IsProven() || by_hulls.clearance() >= closest.clearance) continue;
-      if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o, by_hulls), t, o);
+      if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o), t, o);
     }
   return Judged(Outcome::kCertified, closest);
 }

@@ -12,6 +12,7 @@ the envelope's tables. Certify then allocates nothing, locks nothing, logs nothi
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/lipschitz_envelope.h"
 #include "certifier/safety/projection.h"
+#include "certifier/safety/separation.h"
 
 namespace forereach {
 
@@ -27,6 +28,10 @@ class Certifier final {
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
   [[nodiscard]] bool uses_hull_distance() const { return envelope_.uses_hull_distance(); }
+
+  /** What is proven of the distance between slice t of a tube and an obstacle: by interval hulls or by the best
+  direction, whichever proves more. */
+  [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept;
 
   /** Throws std::invalid_argument, naming value and bound, unless Certify may be called with these: sizes as the
   problem's, 1..kMaxSteps steps, finite controls, obstacles in the safety dimension, X_0 with at most order * n generators. */

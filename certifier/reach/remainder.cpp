@@ -115,22 +115,22 @@ void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, co
   }
   for (const Term& term : terms_) {
     const double r = half_width[term.first], other = half_width[term.second];
+    if (r == 0 && (term.has_diagonal || term.first == term.second || other == 0)) continue;  // exactly zero
     TermRange range;
-    if (term.first == term.second) {
+    double margin = error[term.entry] * r * other + (r > 0 && other > 0 ? kTiny * (1 + Size(hessian[term.entry])) : 0);
+    if (term.first == term.second)
       range = Diagonal(hessian[term.entry], r);
-      sums[term.output].margin += error[term.entry] * r * r + kTiny * (1 + Size(hessian[term.entry]));
-    } else {
+    else
       range = Mixed(hessian[term.entry], products[term.pair], r * other);
-      sums[term.output].margin += error[term.entry] * r * other + kTiny * (1 + Size(hessian[term.entry]));
-    }
     if (term.has_diagonal) {
       const PlainInterval& a = hessian[term.diagonal];
       const TermRange diagonal = Diagonal(a, r);
       const double slope = Size(hessian[term.entry]) * other;
       range = {std::max(range.lower + diagonal.lower, -Peak(-a.lower, slope, r)),
                std::min(range.upper + diagonal.upper, Peak(a.upper, slope, r)), range.size + diagonal.size};
-      sums[term.output].margin += error[term.diagonal] * r * r + kTiny * (1 + Size(a));
+      margin += error[term.diagonal] * r * r + kTiny * (1 + Size(a));
     }
+    sums[term.output].margin += margin;
     Sum& sum = sums[term.output];
     sum.lower += range.lower;
     sum.upper += range.upper;

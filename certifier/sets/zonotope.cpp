@@ -122,16 +122,19 @@ void Zonotope::Truncate(int num_generators) noexcept {
   num_generators_ = num_generators;
 }
 
-void Zonotope::FillPlaces(std::array<std::uint64_t, 2> empty) noexcept {
-  int columns = num_generators_;
-  const auto is_empty = [&](int j) { return (empty[static_cast<std::size_t>(j / 64)] >> j % 64 & 1) != 0; };
-  for (int j = 0; (empty[0] | empty[1]) != 0 && j < columns; ++j) {
-    if (!is_empty(j)) continue;
-    do --columns;
-    while (columns > j && is_empty(columns));
-    for (int k = 0; k < dim_; ++k) mutable_row(k)[j] = mutable_row(k)[columns];
+void Zonotope::Close(std::array<std::uint64_t, 2> gaps) noexcept {
+  std::array<std::uint8_t, kMaxGenerators> source;
+  int kept = 0, in_place = 0;
+  for (int j = 0; j < num_generators_; ++j) {
+    source[static_cast<std::size_t>(kept)] = static_cast<std::uint8_t>(j);
+    kept += static_cast<int>(~gaps[static_cast<std::size_t>(j / 64)] >> j % 64 & 1);
+    in_place += kept == j + 1;
   }
-  Truncate(columns);
+  for (int k = 0; k < dim_; ++k) {
+    double* row = mutable_row(k);
+    for (int j = in_place; j < kept; ++j) row[j] = row[source[static_cast<std::size_t>(j)]];
+  }
+  Truncate(kept);
 }
 
 void Zonotope::Assign(const Zonotope& other) noexcept {
@@ -196,8 +199,7 @@ FOREREACH_INLINE void MarkDropped(const double* scores, std::size_t count, int k
   }
 }
 
-// Puts the columns of the `keep` largest scores and the box around the others, plus `boxed`, into the set. The box's
-// columns take the places of those that were dropped.
+// Leaves the columns of the `keep` largest scores, in their order, and then the box around the others, plus `boxed`.
 FOREREACH_INLINE void KeepLargest(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
   Dropped dropped;
   const std::size_t padded = set.padded_size();
@@ -209,21 +211,11 @@ FOREREACH_INLINE void KeepLargest(Zonotope& set, int keep, const ColumnScores& s
       const LaneMask mask = std::bit_cast<LaneMask>(LoadLanes(&dropped.masks[j]));
       const LaneMask bits = std::bit_cast<LaneMask>(LoadLanes(row + j));
       sum += Abs(std::bit_cast<Lanes>(bits & mask));
-      StoreLanes(std::bit_cast<Lanes>(bits & ~mask), row + j);
     }
     boxed[k] = (Sum(sum) + boxed[k]) * inflation;
   }
-  int axis = 0;
-  for (std::size_t word = 0; word < 2; ++word)
-    for (std::uint64_t& places = dropped.words[word]; places != 0; places &= places - 1) {
-      while (axis < set.dim() && boxed[axis] == 0) ++axis;
-      if (axis == set.dim()) break;
-      const std::size_t j = 64 * word + static_cast<std::size_t>(std::countr_zero(places)), lane = j % kLaneCount;
-      StoreLane(lane, boxed[axis], set.mutable_row(axis) + (j - lane));
-      ++axis;
-    }
-  set.FillPlaces(dropped.words);
-  for (; axis < set.dim(); ++axis) set.AppendAxis(axis, boxed[axis]);
+  set.Close(dropped.words);
+  for (int axis = 0; axis < set.dim(); ++axis) set.AppendAxis(axis, boxed[axis]);
 }
 
 FOREREACH_AVX2 void KeepLargestAvx2(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {

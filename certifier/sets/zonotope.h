@@ -77,8 +77,8 @@ class Zonotope final {
   }
   /** Forgets the last generators. */
   void Truncate(int num_generators) noexcept;
-  /** Moves the last generators to the places whose bits are set, which hold zeros: bit j % 64 of word j / 64. */
-  void FillPlaces(std::array<std::uint64_t, 2> empty) noexcept;
+  /** Forgets the generators whose bits are set, bit j % 64 of word j / 64; the others move up, in their order. */
+  void Close(std::array<std::uint64_t, 2> gaps) noexcept;
   /** Copies what is in use of another set, some 2 kB where the whole value has 15. */
   void Assign(const Zonotope& other) noexcept;
   [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }

@@ -195,12 +195,13 @@ std::string Describe(const verifier::Verdict& verdict) {
 }
 
 // All that follows from one seed and one problem's number.
-Counts RunProblem(std::uint64_t seed, long number, Tube& tube, std::mutex& output) {
+Counts RunProblem(std::uint64_t seed, long number, Method method, Tube& tube, std::mutex& output) {
   Random random(seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number));
   Counts counts;
   counts.problems = 1;
   const bool absurd = random.Coin(0.25);
   const auto problem = AnyProblem(random, random.Coin(), random.Integer(1, 20));
+  problem->method = method;
   Vary(random, *problem);
   if (absurd) Exaggerate(random, *problem);
   std::unique_ptr<Certifier> certifier;
@@ -254,6 +255,10 @@ int main(int argc, char** argv) {
   app.add_option("--jobs", jobs, "Threads; the problems are the same for any number")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  std::string method = "paper";
+  app.add_option("--method", method, "How the remainder is bounded")
+      ->check(CLI::IsMember({"paper", "centred"}))
+      ->capture_default_str();
   app.add_option("--problem", only, "This problem only");
   CLI11_PARSE(app, argc, argv);
   const auto begin = std::chrono::steady_clock::now();
@@ -266,7 +271,7 @@ int main(int argc, char** argv) {
     while (called < count) {
       const long number = next++;
       if (only >= 0 && number > only) break;
-      const Counts counts = RunProblem(seed, number, tube, mutex);
+      const Counts counts = RunProblem(seed, number, method == "paper" ? Method::kPaper : Method::kCentred, tube, mutex);
       called += counts.calls;
       const std::lock_guard lock(mutex);
       total.Add(counts);

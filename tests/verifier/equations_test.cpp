@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/models.h"
 #include "tests/oracle/random.h"
 #include "verifier/equations.h"
@@ -84,22 +85,19 @@ TEST_P(Derivatives, BoundTheirRangeOverABox) {
 INSTANTIATE_TEST_SUITE_P(Models, Derivatives, testing::Values(MakePointMass(0.15), MakeKinematicBicycle(0.1, 2.5)),
                          [](const auto& test) { return test.param->name(); });
 
-class Unknown final : public NominalModel {
- public:
-  const std::string& name() const override { return name_; }
-  const std::vector<std::string>& state_names() const override { return names_; }
-  const std::vector<std::string>& input_names() const override { return names_; }
-  std::string description() const override { return name_; }
-  void Evaluate(std::span<const double>, std::span<double>) const noexcept override {}
-  void Linearize(std::span<const double>, Linearization&) const noexcept override {}
-  void EncloseHessian(std::span<const Interval>, HessianEnclosure&) const noexcept override {}
-
- private:
-  std::string name_ = "unicycle";
-  std::vector<std::string> names_{"a"};
+struct Unicycle {
+  static constexpr int kStates = 1, kInputs = 1;
+  static constexpr const char* kName = "unicycle";
+  static constexpr std::array<const char*, 1> kStateNames{"x"}, kInputNames{"v"};
+  static constexpr std::array<const char*, 0> kParameterNames{};
+  template <class T>
+  static constexpr void Step(std::span<const T>, std::span<const T> z, std::span<T> next) {
+    next[0] = z[0] + z[1];
+  }
+  [[nodiscard]] std::array<double, 0> parameters() const { return {}; }
 };
 
-TEST(Equations, OfAnUnknownModelAreNone) { EXPECT_FALSE(EquationsOf(Unknown())); }
+TEST(Equations, OfAnUnknownModelAreNone) { EXPECT_FALSE(EquationsOf(EquationsModel<Unicycle>(Unicycle{}))); }
 
 }  // namespace
 }  // namespace forereach::verifier

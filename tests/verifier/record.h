@@ -30,7 +30,7 @@ namespace forereach {
   Zonotope projected;
   certifier.projection().Enclose(slice, projected);
   for (const Obstacle& obstacle : obstacles)
-    record.clearance.push_back(Separate(projected, obstacle).clearance());
+    record.clearance.push_back(certifier.SeparateSlice(tube, t, obstacle).clearance());
   record.radius = RadiusUpper(projected);
   if (t == tube.length()) return record;
   const StepRecord& step = tube.step(t);

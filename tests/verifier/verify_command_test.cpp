@@ -143,7 +143,7 @@ TEST_F(VerifyDecision, SliceShrunkenAndResealed) {
   Reseal();
   const Output output = Verify();
   EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, HasSubstr("step 5: not so: the recorded hull contains x"));
+  EXPECT_THAT(output.text, HasSubstr("step 5: not so: "));
   EXPECT_THAT(output.text, Not(HasSubstr("altered")));
 }
 
