@@ -238,6 +238,7 @@ class Tampered : public testing::Test {
     problem_->domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
     problem_->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
     problem_->declaration.lipschitz(2, 3) = 0.018;
+    problem_->method = forereach::Method::kPaper;
     problem_->declaration.lipschitz(2, 5) = 0.61;
     problem_->transitions = {Eigen::MatrixXd(5, 8), Eigen::MatrixXd(5, 6)};
     for (int i = 0; i < 5; ++i) {
