@@ -1,0 +1,114 @@
+// The remainder's bound against exact rationals: no quadratic form over the slice leaves it.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+#include "certifier/dynamics/models.h"
+#include "certifier/reach/propagator.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+using exact::Rational;
+
+// A slice, generators alike in some coordinates, and Hessians that are anything.
+struct Case {
+  Zonotope slice;
+  std::array<double, kMaxStates> half_width;
+  std::vector<PlainInterval> hessian;
+  std::vector<double> error;
+
+  Case(Random& random, const Program& program) {
+    const int m = random.Integer(0, 12);
+    const double scale = std::ldexp(1, random.Coin(0.2) ? random.Integer(-540, -150) : random.Integer(-30, 10));
+    Eigen::MatrixXd generators = random.Matrix(program.states, m, scale);
+    if (random.Coin()) generators.row(3) = generators.row(2) * random.Uniform(-2, 2);
+    if (random.Coin(0.3)) generators.row(random.Below(program.states)).setZero();
+    slice = Zonotope(random.Vector(program.states), generators);
+    for (int k = 0; k < program.states; ++k)
+      if (random.Coin(0.3)) slice.mutable_slack(k) = random.Uniform(0, scale);
+    Propagator::HalfWidths(slice, half_width.data());
+    for (int e = 0; e < program.num_second; ++e) {
+      const double a = random.Uniform(-2, 2), b = random.Coin() ? a : random.Uniform(-2, 2);
+      hessian.push_back({std::min(a, b), std::max(a, b)});
+      error.push_back(random.Coin() ? 0 : random.Uniform(0, 0.01));
+    }
+  }
+
+  [[nodiscard]] Remainder Bound(const Program& program, Method method) const {
+    Remainder remainder;
+    RemainderBound(program, method).Enclose(slice, half_width.data(), hessian.data(), error.data(), remainder);
+    return remainder;
+  }
+};
+
+// Corners mostly, where quadratic forms are largest.
+std::vector<Rational> PointOf(Random& random, const Zonotope& slice) {
+  std::vector<Rational> d;
+  for (int k = 0; k < slice.dim(); ++k) d.push_back(Rational(random.Sign()) * Rational(slice.slack(k)));
+  for (int j = 0; j < slice.num_generators(); ++j) {
+    const Rational weight(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
+    for (int k = 0; k < slice.dim(); ++k) d[static_cast<std::size_t>(k)] += weight * Rational(slice.generator(k, j));
+  }
+  return d;
+}
+
+TEST(RemainderOracle, ContainsEveryQuadraticFormOfTheSlice) {
+  Random random(611);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  const Program& program = model->program();
+  for (int trial = 0; trial < 3000; ++trial) {
+    const Case c(random, program);
+    for (const Method method : {Method::kPaper, Method::kCentred}) {
+      const Remainder bound = c.Bound(program, method);
+      for (int sample = 0; sample < 6; ++sample) {
+        const std::vector<Rational> d = PointOf(random, c.slice);
+        std::vector<Rational> form(static_cast<std::size_t>(program.states));
+        for (int e = 0; e < program.num_second; ++e) {
+          const auto i = static_cast<std::size_t>(e);
+          const Program::Second& entry = program.hessian[i];
+          const bool low = random.Coin();
+          Rational h(low ? c.hessian[i].lower : c.hessian[i].upper);
+          h += Rational(low ? -c.error[i] : c.error[i]);
+          const Rational once(entry.row == entry.column ? 0.5 : 1.0);
+          form[static_cast<std::size_t>(entry.output)] +=
+              once * h * d[static_cast<std::size_t>(entry.row)] * d[static_cast<std::size_t>(entry.column)];
+        }
+        for (std::size_t k = 0; k < form.size(); ++k)
+          ASSERT_LE(abs(form[k] - Rational(bound.center[k])), Rational(bound.half_width[k])) << "output " << k;
+      }
+    }
+  }
+}
+
+TEST(RemainderOracle, CentredIsNeverWiderThanThePapers) {
+  Random random(612);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  int narrower = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Case c(random, model->program());
+    const Remainder paper = c.Bound(model->program(), Method::kPaper);
+    const Remainder centred = c.Bound(model->program(), Method::kCentred);
+    for (std::size_t k = 0; k < 6; ++k) {
+      EXPECT_EQ(paper.center[k], 0);
+      ASSERT_LE(centred.half_width[k], paper.half_width[k] * (1 + 1e-12));
+      narrower += centred.half_width[k] < 0.9 * paper.half_width[k];
+    }
+  }
+  EXPECT_GT(narrower, 500);
+}
+
+TEST(RemainderOracle, OfAnAffineModelIsExactlyZero) {
+  Random random(613);
+  const auto model = MakePointMass(0.15);
+  const Case c(random, model->program());
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(c.Bound(model->program(), Method::kCentred).half_width[k], 0);
+}
+
+}  // namespace
+}  // namespace forereach
