@@ -19,6 +19,7 @@ struct Pool {
   ~Pool() {
     Clear();
     closed = true;
+    mpfr_free_cache2(MPFR_FREE_LOCAL_CACHE);  // what the library keeps for this thread
   }
   void Clear() {
     for (__mpfi_struct& number : numbers) mpfi_clear(&number);
