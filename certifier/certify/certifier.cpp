@@ -187,15 +187,15 @@ Separation Certifier::SeparateSlice(const Tube& tube, int t, const Obstacle& obs
 // settled by the best direction.
 Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept {
   Closest by_hull, closest;
+  double next_by_hull = kInfinity;  // the second smallest clearance by hulls
   const auto separate = [&](int t, int o) { return SeparateSlice(tube, t, obstacles[static_cast<std::size_t>(o)]); };
-  const auto hull_separation = [&](int t, int o) {
-    return SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacles[static_cast<std::size_t>(o)]);
-  };
   const int count = static_cast<int>(obstacles.size());
-  for (int t = 0; t <= tube.length(); ++t)
+  for (int t = 0; t <= tube.length(); ++t) {
+    const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
     for (int o = 0; o < count; ++o) {
-      const Separation by_hulls = hull_separation(t, o);
+      const Separation by_hulls = SeparateHulls(hull, obstacles[static_cast<std::size_t>(o)]);
       if (by_hulls.IsProven()) {
+        next_by_hull = std::min(next_by_hull, std::max(by_hulls.clearance(), by_hull.clearance));
         by_hull.Consider(by_hulls, t, o);
         continue;
       }
@@ -203,14 +203,17 @@ Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube&
       if (!best.IsProven()) return Judged(Outcome::kSafety, {best.clearance(), t, o, best});
       closest.Consider(best, t, o);
     }
+  }
   if (by_hull.clearance < closest.clearance)
     closest.Consider(separate(by_hull.step, by_hull.obstacle), by_hull.step, by_hull.obstacle);
-  for (int t = 0; t <= tube.length(); ++t)
+  for (int t = 0; t <= tube.length() && next_by_hull < closest.clearance; ++t) {
+    const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
     for (int o = 0; o < count; ++o) {
-      const Separation by_hulls = hull_separation(t, o);
+      const Separation by_hulls = SeparateHulls(hull, obstacles[static_cast<std::size_t>(o)]);
       if (!by_hulls.IsProven() || by_hulls.clearance() >= closest.clearance) continue;
       if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o), t, o);
     }
+  }
   return Judged(Outcome::kCertified, closest);
 }
 

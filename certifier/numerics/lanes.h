@@ -2,6 +2,7 @@
 abs and comparisons are used and sums are always taken in the same order. */
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -36,10 +37,39 @@ FOREREACH_INLINE Lanes Abs(const Lanes& x) {
   return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
-/** Sets one of four doubles in memory. All four are written at once: a later load of all four need not wait for it. */
-FOREREACH_INLINE void StoreLane(std::size_t lane, double value, double* four) {
-  const auto chosen = static_cast<std::int64_t>(lane);
-  StoreLanes(LaneMask{0, 1, 2, 3} == LaneMask{chosen, chosen, chosen, chosen} ? AllLanes(value) : LoadLanes(four), four);
+/** The first `count` of four, zeros behind them. */
+FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count) {
+  const auto end = static_cast<std::int64_t>(count);
+  return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & (LaneMask{0, 1, 2, 3} < LaneMask{end, end, end, end}));
+}
+/** One bit for each lane of a mask. */
+FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
+  const LaneMask bits = mask & LaneMask{1, 2, 4, 8};
+  return static_cast<unsigned>((bits[0] | bits[1]) | (bits[2] | bits[3]));
+}
+
+namespace internal {
+
+// Where the two halves of each lane come from when the lanes of the index's bits are left out.
+inline constexpr auto kPacking = [] {
+  std::array<std::array<std::int32_t, 2 * kLaneCount>, 1 << kLaneCount> from{};
+  for (std::size_t left_out = 0; left_out < from.size(); ++left_out)
+    for (std::size_t lane = 0, to = 0; lane < kLaneCount; ++lane) {
+      if (left_out >> lane & 1) continue;
+      from[left_out][to++] = static_cast<std::int32_t>(2 * lane);
+      from[left_out][to++] = static_cast<std::int32_t>(2 * lane + 1);
+    }
+  return from;
+}();
+
+}  // namespace internal
+
+/** Moves the lanes whose bits are not set to the front, in their order; those behind them are of no meaning. */
+FOREREACH_INLINE Lanes PackLanes(const Lanes& x, unsigned left_out) {
+  using Halves [[gnu::vector_size(32)]] = std::int32_t;
+  Halves from;
+  __builtin_memcpy(&from, internal::kPacking[left_out].data(), sizeof from);
+  return std::bit_cast<Lanes>(__builtin_shuffle(std::bit_cast<Halves>(x), from));
 }
 FOREREACH_INLINE double Sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
 

@@ -62,6 +62,11 @@ TermRange Mixed(const PlainInterval& h, const ProductRange& d, double product) {
           Size(h) * product};
 }
 
+// What the ends of a term's range may be off by, underflow included.
+double Margin(const PlainInterval& h, double error, double r_i, double r_l) {
+  return error * r_i * r_l + kTiny * (1 + Size(h));
+}
+
 }  // namespace
 
 RemainderBound::RemainderBound(const Program& program, Method method)
@@ -73,6 +78,7 @@ RemainderBound::RemainderBound(const Program& program, Method method)
     const Term term{static_cast<std::size_t>(entry.output), static_cast<std::size_t>(entry.row),
                     static_cast<std::size_t>(entry.column), e, false, 0, 0};
     (entry.row == entry.column ? diagonals : terms_).push_back(term);
+    entries_.push_back({term.output, term.first, term.second, e, entry.row == entry.column ? 0.5 : 1});
   }
   for (const Term& diagonal : diagonals) {
     const auto shares = [&](const Term& term) {
@@ -99,6 +105,27 @@ RemainderBound::RemainderBound(const Program& program, Method method)
 
 void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, const PlainInterval* hessian, const double* error,
                              Remainder& out) const noexcept {
+  if (method_ == Method::kPaper)
+    EncloseSizes(half_width, hessian, error, out);
+  else
+    EncloseCentred(slice, half_width, hessian, error, out);
+}
+
+void RemainderBound::EncloseSizes(const double* half_width, const PlainInterval* hessian, const double* error,
+                                  Remainder& out) const noexcept {
+  std::fill_n(out.center.begin(), states_, 0.0);
+  std::fill_n(out.half_width.begin(), states_, 0.0);
+  for (const Entry& entry : entries_) {
+    const PlainInterval& h = hessian[entry.index];
+    const double r = half_width[entry.first], other = half_width[entry.second];
+    if (r == 0 || other == 0) continue;  // exactly zero
+    out.half_width[entry.output] +=
+        (entry.weight * Size(h) * (r * other) + Margin(h, error[entry.index], r, other)) * (1 + kRelative);
+  }
+}
+
+void RemainderBound::EncloseCentred(const Zonotope& slice, const double* half_width, const PlainInterval* hessian, const double* error,
+                             Remainder& out) const noexcept {
   struct Sum {
     double lower, upper, size, margin;
   };
@@ -109,29 +136,26 @@ void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, co
       active_instruction_set == InstructionSet::kAvx2 ? MixedProductAvx2 : MixedProductBaseline;
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     const auto [i, l] = pairs_[p];
-    const double product = half_width[i] * half_width[l];
-    products[p] = method_ == Method::kPaper ? ProductRange{product, product}
-                                            : mixed_product(slice, i, l, half_width[i], half_width[l]);
+    products[p] = mixed_product(slice, i, l, half_width[i], half_width[l]);
   }
   for (const Term& term : terms_) {
     const double r = half_width[term.first], other = half_width[term.second];
-    if (r == 0 && (term.has_diagonal || term.first == term.second || other == 0)) continue;  // exactly zero
-    TermRange range;
-    double margin = error[term.entry] * r * other + (r > 0 && other > 0 ? kTiny * (1 + Size(hessian[term.entry])) : 0);
-    if (term.first == term.second)
-      range = Diagonal(hessian[term.entry], r);
-    else
-      range = Mixed(hessian[term.entry], products[term.pair], r * other);
+    Sum& sum = sums[term.output];
+    TermRange range{0, 0, 0};
+    if (r == 0) continue;  // exactly zero, and so is the mixed term where `other` is
+    if (other != 0) {
+      const PlainInterval& h = hessian[term.entry];
+      range = term.first == term.second ? Diagonal(h, r) : Mixed(h, products[term.pair], r * other);
+      sum.margin += Margin(h, error[term.entry], r, other);
+    }
     if (term.has_diagonal) {
       const PlainInterval& a = hessian[term.diagonal];
       const TermRange diagonal = Diagonal(a, r);
-      const double slope = Size(hessian[term.entry]) * other;
+      const double slope = other == 0 ? 0 : Size(hessian[term.entry]) * other;
       range = {std::max(range.lower + diagonal.lower, -Peak(-a.lower, slope, r)),
                std::min(range.upper + diagonal.upper, Peak(a.upper, slope, r)), range.size + diagonal.size};
-      margin += error[term.diagonal] * r * r + kTiny * (1 + Size(a));
+      sum.margin += Margin(a, error[term.diagonal], r, r);
     }
-    sums[term.output].margin += margin;
-    Sum& sum = sums[term.output];
     sum.lower += range.lower;
     sum.upper += range.upper;
     sum.size += range.size;
@@ -139,8 +163,8 @@ void RemainderBound::Enclose(const Zonotope& slice, const double* half_width, co
   for (std::size_t k = 0; k < states_; ++k) {
     const auto& [lower, upper, size, margin] = sums[k];
     const double rounding = size * kRelative + margin * (1 + kRelative);
-    out.center[k] = method_ == Method::kPaper ? 0 : (lower + upper) / 2;
-    out.half_width[k] = (method_ == Method::kPaper ? size : (upper - lower) / 2) + rounding;
+    out.center[k] = (lower + upper) / 2;
+    out.half_width[k] = (upper - lower) / 2 + rounding;
   }
 }
 

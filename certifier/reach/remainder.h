@@ -35,7 +35,12 @@ class RemainderBound final {
                Remainder& out) const noexcept;
 
  private:
-  // One second derivative of states, or a mixed one together with a diagonal one of its first variable.
+  // One second derivative of states. Its term of 1/2 r^T B r is weight B_il r_i r_l.
+  struct Entry {
+    std::size_t output, first, second, index;
+    double weight;
+  };
+  // The same, or a mixed one together with a diagonal one of its first variable.
   struct Term {
     std::size_t output, first, second, entry;
     bool has_diagonal;
@@ -48,6 +53,12 @@ class RemainderBound final {
     friend bool operator==(const Pair&, const Pair&) = default;
   };
 
+  void EncloseSizes(const double* half_width, const PlainInterval* hessian, const double* error,
+                    Remainder& out) const noexcept;
+  void EncloseCentred(const Zonotope& slice, const double* half_width, const PlainInterval* hessian, const double* error,
+                      Remainder& out) const noexcept;
+
+  std::vector<Entry> entries_;
   std::vector<Term> terms_;
   std::vector<Pair> pairs_;
   std::size_t states_;

@@ -107,34 +107,22 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
   return AddUp(value.upper, AddUp(AddUp(spread, slack_along), error));
 }
 
-void Zonotope::AppendAxis(int k, double length) noexcept {
-  if (length == 0) return;
-  const auto j = static_cast<std::size_t>(num_generators_++), lane = j % kLaneCount;
-  if (lane == 0)
-    for (int i = 0; i < dim_; ++i) StoreLanes(AllLanes(0), mutable_row(i) + j);
-  StoreLane(lane, length, mutable_row(k) + (j - lane));
-}
-
-void Zonotope::Truncate(int num_generators) noexcept {
-  if (num_generators == num_generators_) return;
-  for (int k = 0; k < dim_; ++k)
-    std::fill(mutable_row(k) + num_generators, mutable_row(k) + padded_size(), 0.0);
+void Zonotope::Resize(int kept, int num_generators) noexcept {
   num_generators_ = num_generators;
-}
-
-void Zonotope::Close(std::array<std::uint64_t, 2> gaps) noexcept {
-  std::array<std::uint8_t, kMaxGenerators> source;
-  int kept = 0, in_place = 0;
-  for (int j = 0; j < num_generators_; ++j) {
-    source[static_cast<std::size_t>(kept)] = static_cast<std::uint8_t>(j);
-    kept += static_cast<int>(~gaps[static_cast<std::size_t>(j / 64)] >> j % 64 & 1);
-    in_place += kept == j + 1;
-  }
+  const std::size_t rest = static_cast<std::size_t>(kept) % kLaneCount, end = padded_size();
   for (int k = 0; k < dim_; ++k) {
     double* row = mutable_row(k);
-    for (int j = in_place; j < kept; ++j) row[j] = row[source[static_cast<std::size_t>(j)]];
+    std::size_t j = static_cast<std::size_t>(kept) - rest;
+    if (rest > 0) StoreLanes(FirstLanes(LoadLanes(row + j), rest), row + j), j += kLaneCount;
+    for (; j < end; j += kLaneCount) StoreLanes(AllLanes(0), row + j);
   }
-  Truncate(kept);
+}
+
+void Zonotope::AppendAxis(int k, double length) noexcept {
+  if (length == 0) return;
+  const int j = num_generators_;
+  Resize(j, j + 1);
+  mutable_row(k)[j] = length;
 }
 
 void Zonotope::Assign(const Zonotope& other) noexcept {
@@ -146,8 +134,6 @@ void Zonotope::Assign(const Zonotope& other) noexcept {
 }
 
 namespace {
-
-constexpr std::size_t kLastLanes = kMaxGenerators - kLaneCount;
 
 // By plain arithmetic: it only chooses what to keep.
 FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
@@ -162,69 +148,153 @@ FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
   }
 }
 
-// Which columns are dropped: all bits of the doubles, and one bit of `words` each.
-struct Dropped {
-  std::array<double, kMaxGenerators> masks;
-  std::array<std::uint64_t, 2> words{};
+// Four lists of eight numbers, one in each lane.
+using Lists = std::array<Lanes, 8>;
 
-  FOREREACH_INLINE void Set(std::size_t first, const LaneMask& dropped) {
-    StoreLanes(std::bit_cast<Lanes>(dropped), &masks[first]);
-    const LaneMask bits = dropped & LaneMask{1, 2, 4, 8};
-    words[first / 64] |= static_cast<std::uint64_t>((bits[0] | bits[1]) | (bits[2] | bits[3])) << first % 64;
-  }
-};
-
-// Drops the columns that are not among the `keep` largest scores. In groups of four times four columns, each compared
-// with every column; behind the last column nothing is dropped.
-FOREREACH_INLINE void MarkDropped(const double* scores, std::size_t count, int keep, Dropped& dropped) {
-  constexpr std::size_t kGroup = 4;
-  const auto limit = static_cast<std::int64_t>(keep), end = static_cast<std::int64_t>(count);
-  for (std::size_t first = 0; first < count; first += kGroup * kLaneCount) {
-    Lanes score[kGroup];
-    LaneMask larger[kGroup];  // minus how many lie above
-    for (std::size_t g = 0; g < kGroup; ++g) {
-      score[g] = LoadLanes(&scores[std::min(first + g * kLaneCount, kLastLanes)]);
-      larger[g] = LaneMask{};
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      const Lanes other = AllLanes(scores[i]);
-      for (std::size_t g = 0; g < kGroup; ++g) larger[g] += other > score[g];
-    }
-    for (std::size_t g = 0; g < kGroup && first + g * kLaneCount < count; ++g) {
-      const auto j = static_cast<std::int64_t>(first + g * kLaneCount);
-      const LaneMask exists = LaneMask{j, j + 1, j + 2, j + 3} < LaneMask{end, end, end, end};
-      const LaneMask low = (score[g] < AllLanes(0)) | (-larger[g] >= LaneMask{limit, limit, limit, limit});
-      dropped.Set(first + g * kLaneCount, low & exists);
-    }
-  }
+FOREREACH_INLINE void Order(Lists& x, std::size_t i, std::size_t j) {
+  const Lanes low = x[j] < x[i] ? x[j] : x[i];
+  x[j] = x[j] < x[i] ? x[i] : x[j];
+  x[i] = low;
 }
 
-// Leaves the columns of the `keep` largest scores, in their order, and then the box around the others, plus `boxed`.
-FOREREACH_INLINE void KeepLargest(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
-  Dropped dropped;
-  const std::size_t padded = set.padded_size();
-  MarkDropped(scores.data(), static_cast<std::size_t>(set.num_generators()), keep, dropped);
+// Sorts each list, by Batcher's network of 19 comparisons.
+FOREREACH_INLINE void Sort(Lists& x) {
+  constexpr std::uint8_t kPairs[][2] = {{0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}, {0, 1}, {2, 3},
+                                        {4, 5}, {6, 7}, {2, 4}, {3, 5}, {1, 4}, {3, 6}, {1, 2}, {3, 4}, {5, 6}};
+#pragma GCC unroll 19
+  for (const auto& [i, j] : kPairs) Order(x, i, j);
+}
+
+// Of each list and its partner, both sorted, the eight smallest, sorted.
+FOREREACH_INLINE void MergeSmallest(Lists& x, const Lists& partner) {
+  Lists smallest;
+#pragma GCC unroll 8
+  for (std::size_t i = 0; i < 8; ++i) smallest[i] = partner[7 - i] < x[i] ? partner[7 - i] : x[i];
+  x = smallest;  // rises, then falls, in a circle
+#pragma GCC unroll 3
+  for (std::size_t distance = 4; distance > 0; distance /= 2)
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < 8; ++i)
+      if ((i & distance) == 0) Order(x, i, i + distance);
+}
+
+FOREREACH_INLINE Lists Shuffled(const Lists& x, const LaneMask& from) {
+  Lists shuffled;
+#pragma GCC unroll 8
+  for (std::size_t i = 0; i < 8; ++i) shuffled[i] = __builtin_shuffle(x[i], from);
+  return shuffled;
+}
+
+// Which of the columns first .. first + 3 there are.
+FOREREACH_INLINE LaneMask Exist(std::size_t first, std::size_t count) {
+  const auto j = static_cast<std::int64_t>(first), end = static_cast<std::int64_t>(count);
+  return LaneMask{j, j + 1, j + 2, j + 3} < LaneMask{end, end, end, end};
+}
+
+// The rank-th smallest of `count` scores, rank = 1 .. 8. Without a branch on a score: they are as good as random.
+FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::size_t rank) {
+  Lists smallest;
+  smallest.fill(AllLanes(kInfinity));
+  for (std::size_t first = 0; first < count; first += 8 * kLaneCount) {
+    Lists next;
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::size_t j = first + i * kLaneCount;
+      next[i] = AllLanes(kInfinity);
+      if (j < count) next[i] = Exist(j, count) ? LoadLanes(&scores[j]) : next[i];
+    }
+    Sort(next);
+    if (first > 0)
+      MergeSmallest(smallest, next);
+    else
+      smallest = next;
+  }
+  MergeSmallest(smallest, Shuffled(smallest, LaneMask{1, 0, 3, 2}));
+  MergeSmallest(smallest, Shuffled(smallest, LaneMask{2, 3, 0, 1}));
+  alignas(32) std::array<double, 8 * kLaneCount> sorted;
+  for (std::size_t i = 0; i < 8; ++i) StoreLanes(smallest[i], &sorted[i * kLaneCount]);
+  return sorted[(rank - 1) * kLaneCount];
+}
+
+double SmallestOfMany(const double* scores, std::size_t count, std::size_t rank) {
+  std::array<double, kMaxGenerators> sorted;
+  std::copy_n(scores, count, sorted.begin());
+  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(rank - 1);
+  std::nth_element(sorted.begin(), at, sorted.begin() + static_cast<std::ptrdiff_t>(count));
+  return *at;
+}
+
+// Moves all columns but the `drop` of smallest score to the front, in their order, and adds the absolute values of those
+// to `boxed`. Returns how many those in front are; what is behind them is of no meaning.
+FOREREACH_INLINE int Drop(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
+  // Which of four columns are dropped: all bits of the doubles, and one bit each; how many are left.
+  struct Dropped {
+    LaneMask mask;
+    unsigned bits;
+    std::ptrdiff_t left;
+  };
+  std::array<Dropped, kMaxGenerators / kLaneCount> dropped;
+  const auto count = static_cast<std::size_t>(set.num_generators());
+  const double largest = drop <= 8 ? Smallest(scores.data(), count, drop) : SmallestOfMany(scores.data(), count, drop);
+  const std::size_t chunks = set.padded_size() / kLaneCount;
+  for (std::size_t c = 0; c < chunks; ++c) {
+    const LaneMask low = LoadLanes(scores.data() + c * kLaneCount) <= AllLanes(largest);
+    const LaneMask mask = low & Exist(c * kLaneCount, count);
+    const unsigned bits = BitsOf(mask);
+    dropped[c] = {mask, bits, static_cast<std::ptrdiff_t>(kLaneCount) - std::popcount(bits)};
+  }
+  std::size_t first = 0;
+  while (dropped[first].bits == 0) ++first;
   for (int k = 0; k < set.dim(); ++k) {
     double* row = set.mutable_row(k);
+    double* to = row + first * kLaneCount;
     Lanes sum = AllLanes(0);
-    for (std::size_t j = 0; j < padded; j += kLaneCount) {
-      const LaneMask mask = std::bit_cast<LaneMask>(LoadLanes(&dropped.masks[j]));
-      const LaneMask bits = std::bit_cast<LaneMask>(LoadLanes(row + j));
-      sum += Abs(std::bit_cast<Lanes>(bits & mask));
+    for (std::size_t c = first; c < chunks; ++c) {
+      const Lanes four = LoadLanes(row + c * kLaneCount);
+      sum += Abs(std::bit_cast<Lanes>(std::bit_cast<LaneMask>(four) & dropped[c].mask));
+      StoreLanes(PackLanes(four, dropped[c].bits), to);
+      to += dropped[c].left;
     }
     boxed[k] = (Sum(sum) + boxed[k]) * inflation;
   }
-  set.Close(dropped.words);
-  for (int axis = 0; axis < set.dim(); ++axis) set.AppendAxis(axis, boxed[axis]);
+  return static_cast<int>(count - drop);
 }
 
-FOREREACH_AVX2 void KeepLargestAvx2(Zonotope& set, int keep, const ColumnScores& scores, double inflation, double* boxed) {
-  KeepLargest(set, keep, scores, inflation, boxed);
+FOREREACH_AVX2 int DropAvx2(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
+  return Drop(set, drop, scores, inflation, boxed);
 }
-FOREREACH_FLATTEN void KeepLargestBaseline(Zonotope& set, int keep, const ColumnScores& scores, double inflation,
-                                           double* boxed) {
-  KeepLargest(set, keep, scores, inflation, boxed);
+FOREREACH_FLATTEN int DropBaseline(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation,
+                                   double* boxed) {
+  return Drop(set, drop, scores, inflation, boxed);
 }
+
+// Axis-aligned generators.
+class Axes {
+ public:
+  void Add(std::span<const double> lengths) {
+    auto size = static_cast<std::size_t>(size_);
+    for (std::size_t k = 0; k < lengths.size(); ++k) {
+      list_[size] = {static_cast<int>(k), lengths[k]};
+      size += lengths[k] != 0;
+    }
+    size_ = static_cast<int>(size);
+  }
+  /** Leaves the first `kept`, adding up the others. */
+  void Box(int kept, double* lengths) {
+    for (; size_ > kept; --size_) lengths[list_[static_cast<std::size_t>(size_ - 1)].coordinate] += list_[static_cast<std::size_t>(size_ - 1)].length;
+  }
+  [[nodiscard]] int size() const { return size_; }
+  [[nodiscard]] auto begin() const { return list_.begin(); }
+  [[nodiscard]] auto end() const { return list_.begin() + size_; }
+
+ private:
+  struct Axis {
+    int coordinate;
+    double length;
+  };
+  std::array<Axis, 3 * kMaxStates + 1> list_;  // one more is written, and forgotten if its length is zero
+  int size_ = 0;
+};
 
 }  // namespace
 
@@ -236,37 +306,29 @@ void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<con
 
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
                      std::span<const double> second, int order) noexcept {
-  struct Axis {
-    int coordinate;
-    double length;
-  };
   const int n = set.dim(), keep = (order - 1) * n;
-  std::array<Axis, 2 * kMaxStates> axes;
-  int num_axes = 0;
-  for (const std::span<const double> lengths : {first, second})
-    for (int k = 0; k < static_cast<int>(lengths.size()); ++k) {
-      const double length = lengths[static_cast<std::size_t>(k)];
-      axes[static_cast<std::size_t>(num_axes)] = {k, length};
-      num_axes += length != 0;
+  Axes axes;
+  axes.Add(first);
+  axes.Add(second);
+  int kept = set.num_generators();
+  if (kept + axes.size() > order * n) {
+    const int columns = scores.num_nonzero();
+    const bool reduces = columns + axes.size() > order * n;
+    if (reduces || columns < kept) {
+      std::array<double, kMaxStates> boxed;
+      std::fill_n(boxed.begin(), n, 0.0);
+      // The score of an axis-aligned generator is 0, and the new ones come last.
+      if (reduces) axes.Box(std::max(keep - columns, 0), boxed.data());
+      const double inflation = 1 + (2.0 * kept + 8) * kUnitRoundoff;
+      const auto drop = active_instruction_set == InstructionSet::kAvx2 ? DropAvx2 : DropBaseline;
+      const int left = reduces ? std::min(keep, columns) : columns;
+      if (left < kept) kept = drop(set, static_cast<std::size_t>(kept - left), scores, inflation, boxed.data());
+      axes.Add({boxed.data(), static_cast<std::size_t>(n)});
     }
-  const bool over = set.num_generators() + num_axes > order * n;
-  const int columns = over ? scores.num_nonzero() : set.num_generators();
-  const bool reduces = columns + num_axes > order * n;
-  // Axis-aligned generators that remain generators of their own: their score is 0, and they come last.
-  const int kept_axes = reduces ? std::clamp(keep - columns, 0, num_axes) : num_axes;
-  if (reduces || columns < set.num_generators()) {
-    std::array<double, kMaxStates> boxed;
-    std::fill_n(boxed.begin(), n, 0.0);
-    for (int i = kept_axes; i < num_axes; ++i) {
-      const auto& [coordinate, length] = axes[static_cast<std::size_t>(i)];
-      boxed[static_cast<std::size_t>(coordinate)] += length;
-    }
-    const double inflation = 1 + (2.0 * set.num_generators() + 8) * kUnitRoundoff;
-    const auto keep_largest = active_instruction_set == InstructionSet::kAvx2 ? KeepLargestAvx2 : KeepLargestBaseline;
-    keep_largest(set, reduces ? keep : columns, scores, inflation, boxed.data());
   }
-  for (int i = 0; i < kept_axes; ++i)
-    set.AppendAxis(axes[static_cast<std::size_t>(i)].coordinate, axes[static_cast<std::size_t>(i)].length);
+  set.Resize(kept, kept + axes.size());
+  int j = kept;
+  for (const auto& [coordinate, length] : axes) set.mutable_row(coordinate)[j++] = length;
 }
 
 }  // namespace forereach

@@ -75,10 +75,8 @@ class Zonotope final {
     num_generators_ = num_generators;
     for (std::size_t k = 0; k < static_cast<std::size_t>(dim); ++k) slack_[k] = 0;
   }
-  /** Forgets the last generators. */
-  void Truncate(int num_generators) noexcept;
-  /** Forgets the generators whose bits are set, bit j % 64 of word j / 64; the others move up, in their order. */
-  void Close(std::array<std::uint64_t, 2> gaps) noexcept;
+  /** Leaves the first `kept` columns; those after them, up to `num_generators`, are zero. */
+  void Resize(int kept, int num_generators) noexcept;
   /** Copies what is in use of another set, some 2 kB where the whole value has 15. */
   void Assign(const Zonotope& other) noexcept;
   [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }
