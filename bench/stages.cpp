@@ -124,7 +124,8 @@ void RunSeparationByHulls(State& state, const Midway& midway) {
 
 void RunSeparation(State& state, const Midway& midway) {
   Zonotope projected;
-  Projection(midway.task.problem->projection, midway.slice.dim()).Enclose(midway.slice, projected);
+  const std::span<const double> half_width(midway.half_width.data(), static_cast<std::size_t>(midway.slice.dim()));
+  Projection(midway.task.problem->projection, midway.slice.dim()).Enclose(midway.slice, half_width, projected);
   for (auto _ : state) benchmark::DoNotOptimize(Separate(projected, midway.task.obstacles.front()));
 }
 

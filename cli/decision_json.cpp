@@ -21,7 +21,7 @@ Json SliceJson(const Tube& tube, int t, const Certifier& certifier, std::span<co
   const Eigen::MatrixXd matrix = slice.GeneratorMatrix();
   for (const auto column : matrix.colwise()) generators.push_back(std::vector(column.begin(), column.end()));
   Zonotope projected;
-  certifier.projection().Enclose(slice, projected);
+  certifier.projection().Enclose(slice, tube.half_width(t), projected);
   for (const Obstacle& obstacle : obstacles)
     clearance.push_back(std::max(certifier.SeparateSlice(tube, t, obstacle).clearance(), -kMaxDouble));
   return {{"center", slice.center()},

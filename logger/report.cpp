@@ -109,7 +109,7 @@ class PictureMaker final {
     std::vector<Picture::Polygon> outlines;
     Zonotope projected;
     for (int t = 0; t <= std::min(last_step, tube_.length()); ++t) {
-      certifier_.projection().Enclose(tube_.slice(t), projected);
+      certifier_.projection().Enclose(tube_.slice(t), tube_.half_width(t), projected);
       outlines.push_back(Outline(projected));
     }
     return outlines;

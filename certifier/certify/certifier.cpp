@@ -177,7 +177,7 @@ Decision Judged(Outcome outcome, const Closest& closest) {
 
 Separation Certifier::SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept {
   Zonotope projected;
-  projection_.Enclose(tube.slice(t), projected);
+  projection_.Enclose(tube.slice(t), tube.half_width(t), projected);
   const Separation best = Separate(projected, obstacle);
   const Separation by_hulls = SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacle);
   return best.distance > by_hulls.distance ? best : by_hulls;

@@ -90,6 +90,7 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
     (row(std::integral_constant<std::size_t, K>()), ...);
     sums.scores.Set(j, column_sum, largest);
   }
+  sums.scores.Finish(static_cast<std::size_t>(slice.num_generators()));
   StoreAll({Sum(row_sums[K])...}, sums.row.data());
 }
 

@@ -37,15 +37,15 @@ FOREREACH_INLINE Lanes Abs(const Lanes& x) {
   return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
-/** The first `count` of four, zeros behind them. */
-FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count) {
+/** The first `count` of four, `other` behind them. */
+FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count, double other) {
   const auto end = static_cast<std::int64_t>(count);
-  return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & (LaneMask{0, 1, 2, 3} < LaneMask{end, end, end, end}));
+  return LaneMask{0, 1, 2, 3} < LaneMask{end, end, end, end} ? x : AllLanes(other);
 }
 /** One bit for each lane of a mask. */
 FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
-  const LaneMask bits = mask & LaneMask{1, 2, 4, 8};
-  return static_cast<unsigned>((bits[0] | bits[1]) | (bits[2] | bits[3]));
+  const LaneMask bits = mask & LaneMask{1, 2, 4, 8}, pairs = bits | __builtin_shuffle(bits, LaneMask{2, 3, 0, 1});
+  return static_cast<unsigned>((pairs | __builtin_shuffle(pairs, LaneMask{1, 0, 3, 2}))[0]);
 }
 
 namespace internal {

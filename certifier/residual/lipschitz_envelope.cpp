@@ -27,7 +27,10 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
     row.floor = std::ranges::max(entries.floors);
     row.negated_ceiling = -std::ranges::min(entries.ceilings);
     uses_hull_distance_ |= row.distance.columns().size() > static_cast<std::size_t>(kMaxExactColumns);
+    constant_.lower[static_cast<std::size_t>(k)] = row.floor;
+    constant_.upper[static_cast<std::size_t>(k)] = -row.negated_ceiling;
     if (row.distance.is_constant()) continue;
+    active_.push_back(k);
     BoundErrors(row, entries, observations, domain_lower, domain_upper);
     row.index = ObservationIndex(entries);
   }
@@ -146,18 +149,23 @@ void LipschitzEnvelope::Enclose(const QuerySet& set, const EnvelopeTail& tail, i
 
 void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count,
                                    ResidualBounds& bounds) const noexcept {
+  std::copy_n(constant_.lower.begin(), rows_.size(), bounds.lower.begin());
+  std::copy_n(constant_.upper.begin(), rows_.size(), bounds.upper.begin());
   bounds.capped = false;
-  for (int k = 0; k < num_states(); ++k) {
+  if (tail)
+    for (int k = 0; k < num_states(); ++k) {
+      if (!row(k).is_constant()) continue;
+      const auto i = static_cast<std::size_t>(k);
+      bounds.lower[i] = std::max(bounds.lower[i], tail->HighestFloor(k, count));
+      bounds.upper[i] = std::min(bounds.upper[i], -tail->HighestNegatedCeiling(k, count));
+    }
+  for (const int k : active_) {
     const auto i = static_cast<std::size_t>(k);
     const Row& row = rows_[i];
     Budget budget{options_.max_leaf_visits, kPatternsPerLeaf * options_.max_leaf_visits};
     Sides best{-kInfinity, -kInfinity};
-    if (row.distance.is_constant()) {
-      best = {row.floor, row.negated_ceiling};
-      if (tail) best = Search::Highest(best, {tail->HighestFloor(k, count), tail->HighestNegatedCeiling(k, count)});
-    } else if (std::isfinite(row.error)) {
+    if (std::isfinite(row.error))
       best = Search{row, options_, budget, tail ? tail->blocks(k) : nullptr, static_cast<std::size_t>(count)}.Best(set);
-    }
     bounds.lower[i] = best.floor - row.error;
     bounds.upper[i] = -(best.negated_ceiling - row.error);
     bounds.capped |= budget.capped;

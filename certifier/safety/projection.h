@@ -21,8 +21,8 @@ class Projection final {
   [[nodiscard]] Hull EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept;
 
   /** A zonotope that contains P X; exactly P X where each row of P copies a coordinate. */
-  void Enclose(const Zonotope& slice, Zonotope& projected) const noexcept {
-    EncloseLinearImage(entries_, slice, dim_, projected);
+  void Enclose(const Zonotope& slice, std::span<const double> half_width, Zonotope& projected) const noexcept {
+    EncloseLinearImage(entries_, slice, half_width, dim_, projected);
   }
 
  private:

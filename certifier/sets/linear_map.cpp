@@ -5,6 +5,9 @@
 
 namespace forereach {
 
+namespace {
+
+// Sets the generators of `image` to fl(mid(M) G) and raises error[k] by a bound on what this leaves out.
 void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
                    int rows, Zonotope& image, std::span<double> error) noexcept {
   const auto m = static_cast<std::size_t>(set.num_generators());
@@ -34,9 +37,11 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
   }
 }
 
-void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set, int rows, Zonotope& image) noexcept {
-  std::array<double, kMaxStates> half_widths, error{};
-  for (int l = 0; l < set.dim(); ++l) half_widths[static_cast<std::size_t>(l)] = set.HalfWidthUpper(l);
+}  // namespace
+
+void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
+                        int rows, Zonotope& image) noexcept {
+  std::array<double, kMaxStates> error{};
   MapGenerators(matrix, set, half_widths, rows, image, error);
 
   std::array<Interval, kMaxStates> center;

@@ -113,7 +113,7 @@ void Zonotope::Resize(int kept, int num_generators) noexcept {
   for (int k = 0; k < dim_; ++k) {
     double* row = mutable_row(k);
     std::size_t j = static_cast<std::size_t>(kept) - rest;
-    if (rest > 0) StoreLanes(FirstLanes(LoadLanes(row + j), rest), row + j), j += kLaneCount;
+    if (rest > 0) StoreLanes(FirstLanes(LoadLanes(row + j), rest, 0), row + j), j += kLaneCount;
     for (; j < end; j += kLaneCount) StoreLanes(AllLanes(0), row + j);
   }
 }
@@ -146,6 +146,7 @@ FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
     }
     scores.Set(j, sum, largest);
   }
+  scores.Finish(static_cast<std::size_t>(set.num_generators()));
 }
 
 // Four lists of eight numbers, one in each lane.
@@ -185,12 +186,6 @@ FOREREACH_INLINE Lists Shuffled(const Lists& x, const LaneMask& from) {
   return shuffled;
 }
 
-// Which of the columns first .. first + 3 there are.
-FOREREACH_INLINE LaneMask Exist(std::size_t first, std::size_t count) {
-  const auto j = static_cast<std::int64_t>(first), end = static_cast<std::int64_t>(count);
-  return LaneMask{j, j + 1, j + 2, j + 3} < LaneMask{end, end, end, end};
-}
-
 // The rank-th smallest of `count` scores, rank = 1 .. 8. Without a branch on a score: they are as good as random.
 FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::size_t rank) {
   Lists smallest;
@@ -200,8 +195,7 @@ FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::s
 #pragma GCC unroll 8
     for (std::size_t i = 0; i < 8; ++i) {
       const std::size_t j = first + i * kLaneCount;
-      next[i] = AllLanes(kInfinity);
-      if (j < count) next[i] = Exist(j, count) ? LoadLanes(&scores[j]) : next[i];
+      next[i] = j < count ? LoadLanes(&scores[j]) : AllLanes(kInfinity);
     }
     Sort(next);
     if (first > 0)
@@ -211,9 +205,7 @@ FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::s
   }
   MergeSmallest(smallest, Shuffled(smallest, LaneMask{1, 0, 3, 2}));
   MergeSmallest(smallest, Shuffled(smallest, LaneMask{2, 3, 0, 1}));
-  alignas(32) std::array<double, 8 * kLaneCount> sorted;
-  for (std::size_t i = 0; i < 8; ++i) StoreLanes(smallest[i], &sorted[i * kLaneCount]);
-  return sorted[(rank - 1) * kLaneCount];
+  return smallest[rank - 1][0];
 }
 
 double SmallestOfMany(const double* scores, std::size_t count, std::size_t rank) {
@@ -225,11 +217,11 @@ double SmallestOfMany(const double* scores, std::size_t count, std::size_t rank)
 }
 
 // Moves all columns but the `drop` of smallest score to the front, in their order, and adds the absolute values of those
-// to `boxed`. Returns how many those in front are; what is behind them is of no meaning.
-FOREREACH_INLINE int Drop(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
-  // Which of four columns are dropped: all bits of the doubles, and one bit each; how many are left.
+// to `boxed`. What is behind those in front is of no meaning.
+FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
+  // Which of four columns are dropped: all bits of their absolute values, and one bit each; how many are left.
   struct Dropped {
-    LaneMask mask;
+    LaneMask absolute;
     unsigned bits;
     std::ptrdiff_t left;
   };
@@ -238,10 +230,9 @@ FOREREACH_INLINE int Drop(Zonotope& set, std::size_t drop, const ColumnScores& s
   const double largest = drop <= 8 ? Smallest(scores.data(), count, drop) : SmallestOfMany(scores.data(), count, drop);
   const std::size_t chunks = set.padded_size() / kLaneCount;
   for (std::size_t c = 0; c < chunks; ++c) {
-    const LaneMask low = LoadLanes(scores.data() + c * kLaneCount) <= AllLanes(largest);
-    const LaneMask mask = low & Exist(c * kLaneCount, count);
+    const LaneMask mask = LoadLanes(scores.data() + c * kLaneCount) <= AllLanes(largest);
     const unsigned bits = BitsOf(mask);
-    dropped[c] = {mask, bits, static_cast<std::ptrdiff_t>(kLaneCount) - std::popcount(bits)};
+    dropped[c] = {mask & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX}, bits, static_cast<std::ptrdiff_t>(kLaneCount) - std::popcount(bits)};
   }
   std::size_t first = 0;
   while (dropped[first].bits == 0) ++first;
@@ -251,49 +242,54 @@ FOREREACH_INLINE int Drop(Zonotope& set, std::size_t drop, const ColumnScores& s
     Lanes sum = AllLanes(0);
     for (std::size_t c = first; c < chunks; ++c) {
       const Lanes four = LoadLanes(row + c * kLaneCount);
-      sum += Abs(std::bit_cast<Lanes>(std::bit_cast<LaneMask>(four) & dropped[c].mask));
+      sum += std::bit_cast<Lanes>(std::bit_cast<LaneMask>(four) & dropped[c].absolute);
       StoreLanes(PackLanes(four, dropped[c].bits), to);
       to += dropped[c].left;
     }
     boxed[k] = (Sum(sum) + boxed[k]) * inflation;
   }
-  return static_cast<int>(count - drop);
 }
 
-FOREREACH_AVX2 int DropAvx2(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
-  return Drop(set, drop, scores, inflation, boxed);
+FOREREACH_AVX2 void DropAvx2(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
+  Drop(set, drop, scores, inflation, boxed);
 }
-FOREREACH_FLATTEN int DropBaseline(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation,
-                                   double* boxed) {
-  return Drop(set, drop, scores, inflation, boxed);
+FOREREACH_FLATTEN void DropBaseline(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation,
+                                    double* boxed) {
+  Drop(set, drop, scores, inflation, boxed);
 }
 
 // Axis-aligned generators.
 class Axes {
  public:
-  void Add(std::span<const double> lengths) {
-    auto size = static_cast<std::size_t>(size_);
+  /** Appends lengths_k e_k, those that are not zero. */
+  void Append(std::span<const double> lengths) {
+    std::size_t size = size_;
     for (std::size_t k = 0; k < lengths.size(); ++k) {
-      list_[size] = {static_cast<int>(k), lengths[k]};
+      list_[size] = {k, lengths[k]};
       size += lengths[k] != 0;
     }
-    size_ = static_cast<int>(size);
+    size_ = size;
   }
-  /** Leaves the first `kept`, adding up the others. */
-  void Box(int kept, double* lengths) {
-    for (; size_ > kept; --size_) lengths[list_[static_cast<std::size_t>(size_ - 1)].coordinate] += list_[static_cast<std::size_t>(size_ - 1)].length;
+  /** Forgets all but the first `kept` and adds their lengths up. */
+  void Take(int kept, double* lengths) {
+    const auto first = static_cast<std::size_t>(kept);
+    for (std::size_t i = first; i < size_; ++i) lengths[list_[i].coordinate] += list_[i].length;
+    size_ = first;
   }
-  [[nodiscard]] int size() const { return size_; }
-  [[nodiscard]] auto begin() const { return list_.begin(); }
-  [[nodiscard]] auto end() const { return list_.begin() + size_; }
+  [[nodiscard]] int size() const { return static_cast<int>(size_); }
+  /** Leaves the first columns of the set and writes these behind them. */
+  void Write(Zonotope& set, int columns) const {
+    set.Resize(columns, columns + size());
+    for (std::size_t i = 0; i < size_; ++i) set.mutable_row(static_cast<int>(list_[i].coordinate))[columns++] = list_[i].length;
+  }
 
  private:
   struct Axis {
-    int coordinate;
+    std::size_t coordinate;
     double length;
   };
-  std::array<Axis, 3 * kMaxStates + 1> list_;  // one more is written, and forgotten if its length is zero
-  int size_ = 0;
+  std::size_t size_ = 0;
+  std::array<Axis, 3 * kMaxStates + 1> list_;  // one more is written, and stays if its length is not zero
 };
 
 }  // namespace
@@ -306,29 +302,26 @@ void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<con
 
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
                      std::span<const double> second, int order) noexcept {
-  const int n = set.dim(), keep = (order - 1) * n;
+  const int n = set.dim(), keep = (order - 1) * n, count = set.num_generators();
   Axes axes;
-  axes.Add(first);
-  axes.Add(second);
-  int kept = set.num_generators();
-  if (kept + axes.size() > order * n) {
-    const int columns = scores.num_nonzero();
-    const bool reduces = columns + axes.size() > order * n;
-    if (reduces || columns < kept) {
-      std::array<double, kMaxStates> boxed;
-      std::fill_n(boxed.begin(), n, 0.0);
-      // The score of an axis-aligned generator is 0, and the new ones come last.
-      if (reduces) axes.Box(std::max(keep - columns, 0), boxed.data());
-      const double inflation = 1 + (2.0 * kept + 8) * kUnitRoundoff;
-      const auto drop = active_instruction_set == InstructionSet::kAvx2 ? DropAvx2 : DropBaseline;
-      const int left = reduces ? std::min(keep, columns) : columns;
-      if (left < kept) kept = drop(set, static_cast<std::size_t>(kept - left), scores, inflation, boxed.data());
-      axes.Add({boxed.data(), static_cast<std::size_t>(n)});
-    }
-  }
-  set.Resize(kept, kept + axes.size());
-  int j = kept;
-  for (const auto& [coordinate, length] : axes) set.mutable_row(coordinate)[j++] = length;
+  axes.Append(first);
+  axes.Append(second);
+  if (count + axes.size() <= order * n) return axes.Write(set, count);
+  const int nonzero = scores.num_nonzero();
+  const bool reduces = nonzero + axes.size() > order * n;
+  const int left = reduces ? std::min(keep, nonzero) : nonzero;
+  std::array<double, kMaxStates> boxed;
+  std::fill_n(boxed.begin(), n, 0.0);
+  // The score of an axis-aligned generator is 0, and the new ones come last: what is left are the first of them.
+  if (reduces) axes.Take(std::min(keep - left, axes.size()), boxed.data());
+  const double inflation = 1 + (2.0 * count + 8) * kUnitRoundoff;
+  const auto drop = active_instruction_set == InstructionSet::kAvx2 ? DropAvx2 : DropBaseline;
+  if (left < count)
+    drop(set, static_cast<std::size_t>(count - left), scores, inflation, boxed.data());
+  else
+    for (int k = 0; k < n; ++k) boxed[static_cast<std::size_t>(k)] *= inflation;
+  axes.Append({boxed.data(), static_cast<std::size_t>(n)});
+  axes.Write(set, left);
 }
 
 }  // namespace forereach

@@ -116,6 +116,14 @@ class ColumnScores {
     StoreLanes(std::bit_cast<Lanes>((bits & nonzero) | (std::bit_cast<LaneMask>(AllLanes(-1)) & ~nonzero)),
                &scores_[first_column]);
   }
+  /** After all are set. */
+  FOREREACH_INLINE void Finish(std::size_t count) {
+    if (const std::size_t rest = count % kLaneCount; rest > 0) {
+      double* last = &scores_[count - rest];
+      StoreLanes(FirstLanes(LoadLanes(last), rest, kInfinity), last);
+    }
+  }
+  /** One for each column; infinity behind the last, up to a multiple of kLaneCount. */
   [[nodiscard]] const double* data() const { return scores_.data(); }
   [[nodiscard]] int num_nonzero() const {
     return static_cast<int>((nonzero_[0] + nonzero_[1]) + (nonzero_[2] + nonzero_[3]));

@@ -144,7 +144,8 @@ Eigen::VectorXd AnyDirection(Random& random, const Zonotope& slice) {
 // An obstacle that a slice of the tube just touches, or just does not.
 Obstacle Touching(Random& random, const Certifier& certifier, const Tube& tube) {
   Zonotope slice;
-  certifier.projection().Enclose(tube.slice(random.Integer(0, tube.length())), slice);
+  const int t = random.Integer(0, tube.length());
+  certifier.projection().Enclose(tube.slice(t), tube.half_width(t), slice);
   const int p = slice.dim();
   const Eigen::VectorXd d = AnyDirection(random, slice);
   const double reach = slice.SupportUpper(View(d));

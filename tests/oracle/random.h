@@ -11,6 +11,7 @@ run on fresh inputs; SCOPED_TRACE(random.trace()) prints what reproduces a failu
 #include <random>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -21,6 +22,13 @@ namespace forereach {
 
 [[nodiscard]] inline std::span<const double> View(const Eigen::VectorXd& vector) {
   return {vector.data(), static_cast<std::size_t>(vector.size())};
+}
+
+/** Upper bounds on the half-widths of a set's hull. */
+[[nodiscard]] inline std::vector<double> HalfWidths(const Zonotope& set) {
+  std::vector<double> half_width;
+  for (int k = 0; k < set.dim(); ++k) half_width.push_back(set.HalfWidthUpper(k));
+  return half_width;
 }
 
 class Random {

@@ -16,9 +16,7 @@ namespace {
 
 void Enclose(const ResidualEnclosure& envelope, const Zonotope& slice, std::span<const double> input,
              ResidualBounds& bounds) {
-  std::vector<double> half_width;
-  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
-  envelope.Enclose({slice, input, half_width}, bounds);
+  envelope.Enclose({slice, input, HalfWidths(slice)}, bounds);
 }
 
 // The smallest box that the envelope may be told of for one query: its hull.

@@ -149,7 +149,7 @@ TEST(LinearMapOracle, ErrorAxesCoverEveryMatrixInside) {
     const Zonotope set = Adversarial(random, n, m);
     const IntervalMatrix matrix = AnyMatrix(random, rows, n);
     Zonotope image;
-    EncloseLinearImage(matrix.entries, set, rows, image);
+    EncloseLinearImage(matrix.entries, set, HalfWidths(set), rows, image);
     for (int sampled = 0; sampled < 3; ++sampled) {
       const std::vector<Rational> exact_matrix = Sample(random, matrix);
       for (int k = 0; k < rows; ++k) {
@@ -176,7 +176,7 @@ TEST(LinearMapOracle, PointMatricesAddOnlyRounding) {
     for (int k = 0; k < 3; ++k)
       for (int l = 0; l < 5; ++l) entries.push_back({k, l, Interval(random.Uniform(-2, 2))});
     Zonotope image;
-    EncloseLinearImage(entries, set, 3, image);
+    EncloseLinearImage(entries, set, HalfWidths(set), 3, image);
     for (int k = 0; k < 3; ++k) ASSERT_LE(image.slack(k), 1e-12);
   }
 }

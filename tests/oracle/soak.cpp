@@ -71,7 +71,7 @@ void CheckCertificate(const Certifier& certifier, const Query& query, const Deci
   Zonotope projected;
   for (int t = 0; t <= tube.length(); ++t) {
     const Hull hull = certifier.projection().EncloseHull(tube.slice(t), tube.half_width(t));
-    certifier.projection().Enclose(tube.slice(t), projected);
+    certifier.projection().Enclose(tube.slice(t), tube.half_width(t), projected);
     for (const Obstacle& obstacle : query.obstacles) {
       const bool proven = Separate(projected, obstacle).IsProven() || SeparateHulls(hull, obstacle).IsProven();
       Promise(proven, "a certificate separates every slice from every obstacle");

@@ -76,9 +76,8 @@ struct Query {
   explicit Query(Random& random)
       : center(random.Vector(kVariables, 0.9)),
         slice(center.head(kStates), random.Matrix(kStates, 4, 0.01)),
-        input(center.tail(2)) {
-    for (int k = 0; k < kStates; ++k) half_width.push_back(slice.HalfWidthUpper(k));
-  }
+        input(center.tail(2)),
+        half_width(HalfWidths(slice)) {}
   [[nodiscard]] QuerySet set() const { return {slice, View(input), half_width}; }
 };
 

@@ -174,7 +174,7 @@ TEST(LinearMap, RowsThatCopyACoordinateAreExact) {
   const Zonotope set = random.AnyZonotope(4, 9);
   const MatrixEntry entries[] = {{0, 2, Interval(1)}, {1, 0, Interval(-1)}};
   Zonotope image;
-  EncloseLinearImage(entries, set, 2, image);
+  EncloseLinearImage(entries, set, HalfWidths(set), 2, image);
   ASSERT_EQ(image.num_generators(), 9) << "no error, so no generator for it";
   EXPECT_EQ(image.center(0), set.center(2));
   EXPECT_EQ(image.center(1), -set.center(0));
@@ -186,7 +186,7 @@ TEST(LinearMap, OfAPointIsAPoint) {
   const Zonotope point(Vec({2, 3}), Eigen::MatrixXd(2, 0));
   const MatrixEntry entries[] = {{0, 0, Interval(0.5)}, {0, 1, Interval(2)}};
   Zonotope image;
-  EncloseLinearImage(entries, point, 1, image);
+  EncloseLinearImage(entries, point, HalfWidths(point), 1, image);
   EXPECT_EQ(image.center(0), 7);
   EXPECT_EQ(image.num_generators(), 0);
 }
