@@ -23,9 +23,9 @@ class EquationsModel final : public NominalModel {
     forereach::Expand<kProgram>(parameters(), z, box, out);
   }
 
-  void Map(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice, const double* half_width,
-           Zonotope& next, ImageSums& sums) const noexcept override {
-    MapGenerators<kProgram>(expansion, error, slice, half_width, next, sums);
+  void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
+           ImageSums& sums) const noexcept override {
+    MapGenerators<kProgram>(expansion, error, slice, next, sums);
   }
 
  private:

@@ -94,59 +94,60 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
   StoreAll({Sum(row_sums[K])...}, sums.row.data());
 }
 
-/** What rounding and the slack before add to row k: an upper bound but for a relative 2^-44 of itself. */
+/** (|J| s)_k + image_k: an upper bound but for a relative 2^-44 of itself. */
 template <const Program& kProgram, std::size_t K>
-FOREREACH_INLINE double RowSlack(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
-                                 const double* half_width) {
+FOREREACH_INLINE double RowSlack(const Expansion& expansion, const StepError& error, const Zonotope& slice) {
+  if constexpr (!kCountsRounding) return 0;
   constexpr RowSpan kRow = RowOf<kProgram>(static_cast<int>(K));
-  constexpr bool kCopies =
-      kRow.count == 1 && kProgram.IsOne(kProgram.jacobian[static_cast<std::size_t>(kRow.first)].node);
-  // A sum of products is off by less than this times the sum of the products' sizes.
-  constexpr double kRounding = kCopies ? 0 : (2.0 * kRow.count + 2) * kUnitRoundoff;
-  double slack = kCopies || kRow.count == 0 ? 0 : 0x1p-1050;
-  for (int e = kRow.first; e < kRow.first + kRow.count; ++e) {
-    const auto i = static_cast<std::size_t>(e);
-    const auto l = static_cast<std::size_t>(kProgram.jacobian[i].column);
-    slack += std::abs(expansion.jacobian[i]) * (slice.slack(static_cast<int>(l)) + kRounding * half_width[l]) +
-             error.jacobian[i] * half_width[l];
-  }
+  double slack = error.image[K];
+  const auto add = [&]<std::size_t E>(std::integral_constant<std::size_t, E>) __attribute__((always_inline)) {
+    constexpr Program::First entry = kProgram.jacobian[static_cast<std::size_t>(kRow.first) + E];
+    const double s = slice.slack(entry.column);
+    if constexpr (kProgram.IsOne(entry.node))
+      slack += s;
+    else
+      slack += std::abs(expansion.jacobian[static_cast<std::size_t>(kRow.first) + E]) * s;
+  };
+  [&]<std::size_t... E>(std::index_sequence<E...>) __attribute__((always_inline)) {
+    (add(std::integral_constant<std::size_t, E>()), ...);
+  }(std::make_index_sequence<static_cast<std::size_t>(kRow.count)>());
   return slack;
 }
 
 template <const Program& kProgram, std::size_t... K>
-FOREREACH_INLINE void Map(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
-                          const double* half_width, Zonotope& next, ImageSums& sums, std::index_sequence<K...> rows) {
+FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice,
+                          Zonotope& next, ImageSums& sums, std::index_sequence<K...> rows) {
   next.Reset(slice.dim(), slice.num_generators());
   MapRows<kProgram>(expansion, slice, next, sums, rows);
-  StoreAll({RowSlack<kProgram, K>(expansion, error, slice, half_width)...}, next.mutable_slacks());
+  StoreAll({RowSlack<kProgram, K>(expansion, error, slice)...}, next.mutable_slacks());
 }
 
 template <const Program& kProgram>
-FOREREACH_AVX2 void MapAvx2(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
-                            const double* half_width, Zonotope& next, ImageSums& sums) noexcept {
-  Map<kProgram>(expansion, error, slice, half_width, next, sums,
+FOREREACH_AVX2 void MapAvx2(const Expansion& expansion, const StepError& error, const Zonotope& slice,
+                            Zonotope& next, ImageSums& sums) noexcept {
+  Map<kProgram>(expansion, error, slice, next, sums,
                 std::make_index_sequence<static_cast<std::size_t>(kProgram.states)>());
 }
 template <const Program& kProgram>
-FOREREACH_FLATTEN void MapBaseline(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
-                                   const double* half_width, Zonotope& next, ImageSums& sums) noexcept {
-  Map<kProgram>(expansion, error, slice, half_width, next, sums,
+FOREREACH_FLATTEN void MapBaseline(const Expansion& expansion, const StepError& error, const Zonotope& slice,
+                                   Zonotope& next, ImageSums& sums) noexcept {
+  Map<kProgram>(expansion, error, slice, next, sums,
                 std::make_index_sequence<static_cast<std::size_t>(kProgram.states)>());
 }
 
 }  // namespace internal
 
-/** Sets the generators of `next` to fl(J G), J = expansion.jacobian, and its slack to a bound, but for a relative 2^-44,
-on what this leaves out: with s the slice's slack, for every matrix J' within `error` of J,
+/** Sets the generators of `next` to fl(J G), J = expansion.jacobian, and its slack to |J| s + error.image, s the slice's
+slack: a bound, but for a relative 2^-44, on what this leaves out, for every slice and matrix J' that `error` is for:
     |J' (G b + diag(s) b') - fl(J G) b| <= slack,   |b|_inf <= 1, |b'|_inf <= 1.
-@param half_width upper bounds on the half-widths of the slice's hull. The center of `next` is left alone. */
+The center of `next` is left alone. */
 template <const Program& kProgram>
-void MapGenerators(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
-                   const double* half_width, Zonotope& next, ImageSums& sums) noexcept {
+void MapGenerators(const Expansion& expansion, const StepError& error, const Zonotope& slice,
+                   Zonotope& next, ImageSums& sums) noexcept {
   if (active_instruction_set == InstructionSet::kAvx2)
-    internal::MapAvx2<kProgram>(expansion, error, slice, half_width, next, sums);
+    internal::MapAvx2<kProgram>(expansion, error, slice, next, sums);
   else
-    internal::MapBaseline<kProgram>(expansion, error, slice, half_width, next, sums);
+    internal::MapBaseline<kProgram>(expansion, error, slice, next, sums);
 }
 
 }  // namespace forereach

@@ -79,8 +79,8 @@ class NominalModel {
   virtual void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out) const noexcept = 0;
 
   /** The image of a slice's generators under the expansion's Jacobian (image.h). */
-  virtual void Map(const Expansion& expansion, const ExpansionError& error, const Zonotope& slice,
-                   const double* half_width, Zonotope& next, ImageSums& sums) const noexcept = 0;
+  virtual void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
+                   ImageSums& sums) const noexcept = 0;
 
  private:
   const Program& program_;

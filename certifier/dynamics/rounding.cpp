@@ -34,9 +34,10 @@ class Analysis {
   }
 
   [[nodiscard]] const Error& error(int node) const { return error_[static_cast<std::size_t>(node)]; }
+  /** The largest exact absolute value over the domain. */
+  [[nodiscard]] double Size(int node) const { return range_[static_cast<std::size_t>(node)].Magnitude(); }
 
  private:
-  [[nodiscard]] double Size(int node) const { return range_[static_cast<std::size_t>(node)].Magnitude(); }
 
   [[nodiscard]] Error ErrorOf(const Operation& n) const {
     const double infinity = kInfinity;
@@ -119,11 +120,42 @@ ExpansionError BoundExpansionError(const Program& program, std::span<const doubl
   ExpansionError error;
   for (std::size_t k = 0; k < static_cast<std::size_t>(program.states); ++k)
     error.value[k] = FiniteOrInfinity(analysis.error(program.value[k]).point);
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e)
+  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
     error.jacobian[e] = FiniteOrInfinity(analysis.error(program.jacobian[e].node).point);
+    error.jacobian_size[e] = AddUp(analysis.Size(program.jacobian[e].node), error.jacobian[e]);
+  }
   for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e)
     error.hessian[e] = FiniteOrInfinity(analysis.error(program.hessian[e].node).box);
   return error;
+}
+
+StepError BoundStepError(const Program& program, const ExpansionError& error,
+                         std::span<const double> half_width) noexcept {
+  constexpr double kUnderflow = 0x1p-1050;
+  StepError step{.value = error.value};
+  std::array<int, kMaxStates> entries{};
+  std::array<bool, kMaxStates> copies{};
+  const auto is_state = [&](const Program::First& entry) { return entry.column < program.states; };
+  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
+    const Program::First& entry = program.jacobian[e];
+    if (!is_state(entry)) continue;
+    const auto k = static_cast<std::size_t>(entry.row);
+    copies[k] = entries[k]++ == 0 && program.IsOne(entry.node);
+  }
+  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
+    const Program::First& entry = program.jacobian[e];
+    const auto k = static_cast<std::size_t>(entry.row);
+    if (!is_state(entry) || copies[k]) continue;
+    const double gamma = (2.0 * entries[k] + 2) * kUnitRoundoff;
+    const double off = AddUp(error.jacobian[e], MulUp(gamma, error.jacobian_size[e]));
+    step.image[k] = AddUp(AddUp(step.image[k], MulUp(off, half_width[static_cast<std::size_t>(entry.column)])), kUnderflow);
+  }
+  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e) {
+    const Program::Second& entry = program.hessian[e];
+    const double product = MulUp(half_width[static_cast<std::size_t>(entry.row)], half_width[static_cast<std::size_t>(entry.column)]);
+    step.remainder[e] = AddUp(MulUp(error.hessian[e], product), kUnderflow);
+  }
+  return step;
 }
 
 }  // namespace forereach

@@ -16,7 +16,23 @@ struct ExpansionError {
   std::array<double, kMaxStates> value{};
   std::array<double, Program::kMaxFirst> jacobian{};
   std::array<double, Program::kMaxSecond> hessian{};
+  std::array<double, Program::kMaxFirst> jacobian_size{};  ///< |Expansion.jacobian_e| at most
 };
+
+/** What a step adds to its slack and its remainder for rounding, other than what depends on the slice. */
+struct StepError {
+  std::array<double, kMaxStates> value{};  ///< as in ExpansionError
+  /** For every slice whose hull has at most these half-widths r, every J' within `jacobian` of J, and |b|_inf <= 1:
+      |(J' G b - fl(J G) b)_k| <= image_k,  image_k = sum_l (jacobian_kl + gamma |J_kl|) r_l,
+  gamma the relative error of a sum of as many products. Zero where row k of J copies one coordinate. */
+  std::array<double, kMaxStates> image{};
+  /** Of each second derivative's term in the remainder: hessian_e r_i r_l, and what underflow takes. */
+  std::array<double, Program::kMaxSecond> remainder{};
+};
+
+/** @param half_width r, one for each variable; zero for an input. Evaluated upward. */
+[[nodiscard]] StepError BoundStepError(const Program& program, const ExpansionError& error,
+                                       std::span<const double> half_width) noexcept;
 
 /** Carries, through every operation, the range of its exact values over the domain and a bound on the error of the
 plain evaluation, at a point and over a box. Cost O(nodes), once for each task. */

@@ -21,6 +21,19 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kMaxDouble = std::numeric_limits<double>::max();
 inline constexpr double kUnitRoundoff = 0x1p-53;
 
+/** Whether the certify step counts its rounding errors. It does; bench/ compiles the library a second time, under another
+name, to measure what that costs. */
+#ifdef FOREREACH_WITHOUT_ROUNDING
+inline constexpr bool kCountsRounding = false;
+#else
+inline constexpr bool kCountsRounding = true;
+#endif
+
+/** What plain operations may be off by whose errors add up to `relative` times `size` at most. */
+[[nodiscard]] inline double RoundingError(double relative, double size) noexcept {
+  return kCountsRounding ? relative * size : 0;
+}
+
 /** The smallest double above x; infinity and NaN stay. */
 [[nodiscard]] inline double NextUp(double x) noexcept {
   if (!(x < kInfinity)) return x;

@@ -87,7 +87,7 @@ bool DomainTest::LiesWellInside(const double* center, const double* half_width) 
   constexpr double kMargin = 0x1p-48;
   bool inside = true;
   for (std::size_t l = 0; l < size_; ++l) {
-    const double reach = half_width[l] + kMargin * (std::abs(center[l]) + half_width[l]);
+    const double reach = half_width[l] + RoundingError(kMargin, std::abs(center[l]) + half_width[l]);
     inside &= (lower_[l] < center[l] - reach) & (center[l] + reach < upper_[l]);
   }
   for (const auto& [coefficients, bound] : domain_.inequalities) {
@@ -97,14 +97,14 @@ bool DomainTest::LiesWellInside(const double* center, const double* half_width) 
       value += c * center[l] + std::abs(c) * half_width[l];
       size += std::abs(c) * (std::abs(center[l]) + half_width[l]);
     }
-    inside &= value + kMargin * size < bound;
+    inside &= value + RoundingError(kMargin, size) < bound;
   }
   for (const auto& [coordinates, ball_center, radius] : domain_.balls) {
     double square = 0;
     for (std::size_t i = 0; i < coordinates.size(); ++i) {
       const auto l = static_cast<std::size_t>(coordinates[i]);
       const double middle = ball_center[static_cast<Eigen::Index>(i)];
-      const double reach = std::abs(center[l] - middle) + half_width[l] + kMargin * (std::abs(center[l]) + std::abs(middle));
+      const double reach = std::abs(center[l] - middle) + half_width[l] + RoundingError(kMargin, std::abs(center[l]) + std::abs(middle));
       square += reach * reach;
     }
     inside &= radius > 0x1p-400 && square * (1 + kMargin) < radius * radius * (1 - kMargin);

@@ -19,14 +19,9 @@ std::vector<Interval> DomainBox(const Domain& domain) {
   return box;
 }
 
-bool IsNegligible(const ExpansionError& error, const Program& program, const std::vector<Interval>& domain) {
-  const auto small = [](double e) { return e <= kLargestError; };
-  bool all = std::all_of(error.value.begin(), error.value.begin() + program.states, small);
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
-    const double reach = domain[static_cast<std::size_t>(program.jacobian[e].column)].Magnitude();
-    all &= error.jacobian[e] == 0 || small(error.jacobian[e] * reach);
-  }
-  return all && std::all_of(error.hessian.begin(), error.hessian.begin() + program.num_second, small);
+bool IsNegligible(const StepError& error) {
+  const auto all_small = [](const auto& errors) { return std::ranges::all_of(errors, [](double e) { return e <= kLargestError; }); };
+  return all_small(error.value) && all_small(error.image) && all_small(error.remainder);
 }
 
 }  // namespace
@@ -35,8 +30,12 @@ Propagator::Propagator(const NominalModel& model, const Domain& domain, const Re
                        int zonotope_order, Method method)
     : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), remainder_(model.program(), method) {
   const std::vector<Interval> box = DomainBox(domain);
-  error_ = BoundExpansionError(model.program(), model.parameters(), box);
-  plain_ = IsNegligible(error_, model.program(), box);
+  // The hull of every slice that passes the domain check has at most half the domain's width.
+  std::vector<double> half_width(box.size(), 0.0);
+  for (std::size_t l = 0; l < static_cast<std::size_t>(domain.state.dim()); ++l)
+    half_width[l] = AddUp(box[l].upper / 2, -box[l].lower / 2);
+  error_ = BoundStepError(model.program(), BoundExpansionError(model.program(), model.parameters(), box), half_width);
+  plain_ = IsNegligible(error_);
 }
 
 void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept {
@@ -60,6 +59,7 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
   for (std::size_t e = 0; e < static_cast<std::size_t>(nominal.count); ++e) {
     expansion.jacobian[e] = nominal.entries[e].value.Middle();
     error.jacobian[e] = nominal.entries[e].value.DistanceUpper(expansion.jacobian[e]);
+    error.jacobian_size[e] = std::abs(expansion.jacobian[e]);
   }
   HessianEnclosure hessian;
   std::array<Interval, kMaxVariables> box;
@@ -104,7 +104,7 @@ namespace {
 
 // Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
 // no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
-FOREREACH_INLINE bool JoinLanes(const Expansion& expansion, const ExpansionError& error, const StepRecord& record,
+FOREREACH_INLINE bool JoinLanes(const Expansion& expansion, const StepError& error, const StepRecord& record,
                                 const ImageSums& sums, Zonotope& next, double* residual_half_width,
                                 double* next_half_width) noexcept {
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
@@ -117,8 +117,9 @@ FOREREACH_INLINE bool JoinLanes(const Expansion& expansion, const ExpansionError
     const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
     const Lanes added = Abs(lower) + Abs(upper) + Abs(moved);
     const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kTiny);
-    const Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
-                         (added > AllLanes(0) ? rounding : AllLanes(0))) * AllLanes(1 + kRelative);
+    Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
+                   (added > AllLanes(0) ? rounding : AllLanes(0))) * AllLanes(1 + kRelative);
+    if constexpr (!kCountsRounding) slack = AllLanes(0);
     const Lanes hull = (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
     StoreLanes(half, residual_half_width + k);
     StoreLanes(center, next.mutable_centers() + k);
@@ -129,12 +130,12 @@ FOREREACH_INLINE bool JoinLanes(const Expansion& expansion, const ExpansionError
   return std::all_of(good.begin(), good.begin() + n, [](double x) { return x == 1; });
 }
 
-FOREREACH_AVX2 bool JoinAvx2(const Expansion& expansion, const ExpansionError& error, const StepRecord& record,
+FOREREACH_AVX2 bool JoinAvx2(const Expansion& expansion, const StepError& error, const StepRecord& record,
                              const ImageSums& sums, Zonotope& next, double* residual_half_width,
                              double* next_half_width) noexcept {
   return JoinLanes(expansion, error, record, sums, next, residual_half_width, next_half_width);
 }
-FOREREACH_FLATTEN bool JoinBaseline(const Expansion& expansion, const ExpansionError& error, const StepRecord& record,
+FOREREACH_FLATTEN bool JoinBaseline(const Expansion& expansion, const StepError& error, const StepRecord& record,
                                     const ImageSums& sums, Zonotope& next, double* residual_half_width,
                                     double* next_half_width) noexcept {
   return JoinLanes(expansion, error, record, sums, next, residual_half_width, next_half_width);
@@ -159,22 +160,24 @@ StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const do
   Expansion expansion;
   ExpansionError error;
   ExpandByIntervals(center, hull, expansion, error);
-  return Advance(slice, input, expansion, error, record, next, next_half_width);
+  std::array<double, kMaxVariables> half_width{};
+  std::copy_n(record.half_width.begin(), slice.dim(), half_width.begin());
+  return Advance(slice, input, expansion, BoundStepError(model_.program(), error, half_width), record, next, next_half_width);
 }
 
 StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
-                               const ExpansionError& error, StepRecord& record, Zonotope& next,
+                               const StepError& error, StepRecord& record, Zonotope& next,
                                double* next_half_width) const noexcept {
   using Status = StepResult::Status;
   const auto n = static_cast<std::size_t>(slice.dim());
   const double* half_width = record.half_width.data();
-  remainder_.Enclose(slice, half_width, expansion.hessian.data(), error.hessian.data(), record.remainder);
+  remainder_.Enclose(slice, half_width, expansion.hessian.data(), error.remainder.data(), record.remainder);
   for (std::size_t k = 0; k < n; ++k)
     if (!std::isfinite(record.remainder.half_width[k])) return {Status::kNoFiniteEnclosure, {}, static_cast<int>(k)};
 
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
   ImageSums sums;
-  model_.Map(expansion, error, slice, half_width, next, sums);
+  model_.Map(expansion, error, slice, next, sums);
   std::array<double, kMaxStates> residual_half_width;
   const auto join = active_instruction_set == InstructionSet::kAvx2 ? JoinAvx2 : JoinBaseline;
   if (!join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))

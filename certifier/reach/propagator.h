@@ -64,14 +64,14 @@ class Propagator final {
                                            std::span<const double> center, std::span<const PlainInterval> hull,
                                            StepRecord& record, Zonotope& next, double* next_half_width) const noexcept;
   [[nodiscard]] StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
-                                   const ExpansionError& error, StepRecord& record, Zonotope& next,
+                                   const StepError& error, StepRecord& record, Zonotope& next,
                                    double* next_half_width) const noexcept;
   const NominalModel& model_;
   DomainTest domain_;
   const ResidualEnclosure& residual_;
   int order_;
   RemainderBound remainder_;
-  ExpansionError error_;
+  StepError error_;
   bool plain_;
 };
 

@@ -9,6 +9,8 @@ namespace {
 // Above all relative rounding of the few operations below, whose results are compared with the sum of their terms' sizes.
 constexpr double kRelative = 0x1p-44, kTiny = 0x1p-1060;
 
+double Margin(double error) { return kCountsRounding ? error : 0; }
+
 double Size(const PlainInterval& x) { return std::max(std::abs(x.lower), std::abs(x.upper)); }
 
 // [lower, upper] of a term, and the sum of the sizes it was made of.
@@ -60,11 +62,6 @@ TermRange Mixed(const PlainInterval& h, const ProductRange& d, double product) {
   return {std::min(std::min(h.lower * d.positive, h.upper * d.positive), std::min(-h.lower * d.negative, -h.upper * d.negative)),
           std::max(std::max(h.lower * d.positive, h.upper * d.positive), std::max(-h.lower * d.negative, -h.upper * d.negative)),
           Size(h) * product};
-}
-
-// What the ends of a term's range may be off by, underflow included.
-double Margin(const PlainInterval& h, double error, double r_i, double r_l) {
-  return error * r_i * r_l + kTiny * (1 + Size(h));
 }
 
 }  // namespace
@@ -119,13 +116,12 @@ void RemainderBound::EncloseSizes(const double* half_width, const PlainInterval*
     const PlainInterval& h = hessian[entry.index];
     const double r = half_width[entry.first], other = half_width[entry.second];
     if (r == 0 || other == 0) continue;  // exactly zero
-    out.half_width[entry.output] +=
-        (entry.weight * Size(h) * (r * other) + Margin(h, error[entry.index], r, other)) * (1 + kRelative);
+    out.half_width[entry.output] += entry.weight * Size(h) * (r * other + kTiny) * (1 + kRelative) + Margin(error[entry.index]);
   }
 }
 
-void RemainderBound::EncloseCentred(const Zonotope& slice, const double* half_width, const PlainInterval* hessian, const double* error,
-                             Remainder& out) const noexcept {
+void RemainderBound::EncloseCentred(const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
+                                    const double* error, Remainder& out) const noexcept {
   struct Sum {
     double lower, upper, size, margin;
   };
@@ -146,7 +142,7 @@ void RemainderBound::EncloseCentred(const Zonotope& slice, const double* half_wi
     if (other != 0) {
       const PlainInterval& h = hessian[term.entry];
       range = term.first == term.second ? Diagonal(h, r) : Mixed(h, products[term.pair], r * other);
-      sum.margin += Margin(h, error[term.entry], r, other);
+      sum.margin += Margin(error[term.entry]) + kTiny * Size(h);
     }
     if (term.has_diagonal) {
       const PlainInterval& a = hessian[term.diagonal];
@@ -154,7 +150,7 @@ void RemainderBound::EncloseCentred(const Zonotope& slice, const double* half_wi
       const double slope = other == 0 ? 0 : Size(hessian[term.entry]) * other;
       range = {std::max(range.lower + diagonal.lower, -Peak(-a.lower, slope, r)),
                std::min(range.upper + diagonal.upper, Peak(a.upper, slope, r)), range.size + diagonal.size};
-      sum.margin += Margin(a, error[term.diagonal], r, r);
+      sum.margin += Margin(error[term.diagonal]) + kTiny * Size(a);
     }
     sum.lower += range.lower;
     sum.upper += range.upper;
@@ -162,7 +158,7 @@ void RemainderBound::EncloseCentred(const Zonotope& slice, const double* half_wi
   }
   for (std::size_t k = 0; k < states_; ++k) {
     const auto& [lower, upper, size, margin] = sums[k];
-    const double rounding = size * kRelative + margin * (1 + kRelative);
+    const double rounding = RoundingError(kRelative, size) + margin * (1 + kRelative);
     out.center[k] = (lower + upper) / 2;
     out.half_width[k] = (upper - lower) / 2 + rounding;
   }

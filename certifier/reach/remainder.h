@@ -29,7 +29,7 @@ class RemainderBound final {
   RemainderBound(const Program& program, Method method);
 
   /** @param half_width r, n entries: inputs are points. @param hessian in the order of the program's.
-  @param error how far inside of the true range each end of `hessian` may lie.
+  @param error of each term, StepError::remainder.
   Rounding is included. An entry that is not finite gives a half-width that is not. Cost O(second derivatives * m). */
   void Enclose(const Zonotope& slice, const double* half_width, const PlainInterval* hessian, const double* error,
                Remainder& out) const noexcept;

@@ -29,7 +29,7 @@ Hull Projection::EncloseHull(const Zonotope& slice, std::span<const double> half
     size[k] += std::abs(middle) + std::abs(weight) * half_width[l];
   }
   for (std::size_t k = 0; k < static_cast<std::size_t>(dim_); ++k)
-    hull.half_width[k] += kMargin * size[k] + std::numeric_limits<double>::min();
+    hull.half_width[k] += RoundingError(kMargin, size[k]) + std::numeric_limits<double>::min();
   return hull;
 }
 

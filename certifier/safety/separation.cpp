@@ -36,7 +36,7 @@ double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const
   Lanes sum = AllLanes(0);
   for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) sum += Abs(LoadLanes(&along[j]));
   spread += Sum(sum);
-  const double gap = core - center - spread - kMargin * size;
+  const double gap = core - center - spread - RoundingError(kMargin, size);
   return gap > 0 && gap < kInfinity ? gap * (1 - kMargin) : -kInfinity;
 }
 
@@ -247,14 +247,14 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
       size += std::abs(d * slice.center[k]) + part;
       square += d * d;
     }
-    const double distance = (gap - kMargin * size) / std::sqrt(square) * (1 - kMargin);
+    const double distance = (gap - RoundingError(kMargin, size)) / std::sqrt(square) * (1 - kMargin);
     return {distance > 0x1p-400 && distance < kInfinity && square > 0x1p-400 ? distance : -kInfinity, 0};
   }
   for (std::size_t k = 0; k < p; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const double below = obstacle.lower()[i] - slice.center[k], above = slice.center[k] - obstacle.upper()[i];
     const double size = std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i]) + std::abs(slice.center[k]) + slice.half_width[k];
-    const double gap = std::max(below, above) - slice.half_width[k] - kMargin * size;
+    const double gap = std::max(below, above) - slice.half_width[k] - RoundingError(kMargin, size);
     square += gap > 0 ? gap * gap : 0;
   }
   const double distance = std::sqrt(square) * (1 - kMargin);

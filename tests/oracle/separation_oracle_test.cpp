@@ -383,7 +383,7 @@ TEST(ProjectionOracle, ContainsTheExactProjection) {
     const Eigen::MatrixXd matrix = random.Matrix(p, n);
     const Zonotope slice = random.AnyZonotope(n, random.Integer(0, 12), std::ldexp(1, random.Integer(-300, 300)));
     Zonotope projected;
-    Projection(matrix, n).Enclose(slice, projected);
+    Projection(matrix, n).Enclose(slice, HalfWidths(slice), projected);
     for (int i = 0; i < 6; ++i) {
       const Eigen::VectorXd d = random.Vector(p);
       Rational support = 0;  // of the exact image: d . P c + sum |d . P g|

@@ -28,7 +28,7 @@ namespace forereach {
   record.generators = slice.GeneratorMatrix();
   record.has_generators = true;
   Zonotope projected;
-  certifier.projection().Enclose(slice, projected);
+  certifier.projection().Enclose(slice, tube.half_width(t), projected);
   for (const Obstacle& obstacle : obstacles)
     record.clearance.push_back(certifier.SeparateSlice(tube, t, obstacle).clearance());
   record.radius = RadiusUpper(projected);
