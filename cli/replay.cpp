@@ -99,29 +99,14 @@ class Replayer {
   ReplayResult result_;
 };
 
-template <class Visit>
-std::int64_t ForEachEvent(const std::string& path, Visit visit) {
-  EventLogReader reader(path);
-  LogEvent event;
-  for (;;) {
-    switch (reader.Next(event)) {
-      case LogStatus::kEvent:
-        visit(event);
-        break;
-      case LogStatus::kCorrupt:
-        break;
-      default:
-        return reader.corruptions();
-    }
-  }
-}
-
 }  // namespace
 
 ReplayResult Replay(const std::string& log_path, const Config& config) {
   Replayer replayer(config);
-  ForEachEvent(log_path, [&](const LogEvent& event) { replayer.Collect(event); });
-  replayer.AddCorruptions(ForEachEvent(log_path, [&](const LogEvent& event) { replayer.Feed(event); }));
+  EventLogReader first(log_path), second(log_path);
+  ForEachEvent(first, [&](const LogEvent& event) { replayer.Collect(event); });
+  ForEachEvent(second, [&](const LogEvent& event) { replayer.Feed(event); });
+  replayer.AddCorruptions(second.corruptions());
   return replayer.Finish();
 }
 
