@@ -5,8 +5,10 @@
 #include <optional>
 
 #include "certifier/gate/gate.h"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
 #include "logger/event_log.h"
 
 namespace forereach {
@@ -52,6 +54,8 @@ class Replayer {
       static_cast<void>(gate_->UpdateObstacles(event.data, event.utime));
     } else if (event.channel == config_.bus.candidate) {
       FeedCandidate(event);
+    } else if (event.channel == config_.bus.certified) {
+      CheckSeal(event);
     }
   }
 
@@ -86,6 +90,14 @@ class Replayer {
       ++result_.agreed;
     else
       Differ(event.number, replayed.plan_id, difference);
+  }
+
+  void CheckSeal(const LogEvent& event) {
+    const auto certified = Decoded<certified_plan_t>(event.data);
+    if (!certified) return Differ(event.number, -1, "not a certified_plan_t");
+    for (const SealFault& fault : FindSealFaults(*certified))
+      Differ(event.number, certified->plan.plan_id,
+             "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
   }
 
   void Differ(std::int64_t event, std::int64_t plan_id, const std::string& what) {
