@@ -123,16 +123,20 @@ class Asker {
     }
     const std::chrono::duration<double, std::micro> elapsed = std::chrono::steady_clock::now() - begin;
     if (!last_ || last_->outcome != expected_) ++unexpected_;
+    if (last_) gate_us_ = last_->elapsed_us;
     return elapsed.count();
   }
 
   [[nodiscard]] int unexpected() const { return unexpected_; }
+  // What the last decision says of the gate's work on it.
+  [[nodiscard]] double gate_us() const { return gate_us_; }
 
  private:
   const BusOptions channels_;
   const std::int16_t expected_;
   std::int64_t plan_id_ = 0;
   int answers_ = 0, unexpected_ = 0;
+  double gate_us_ = 0;
   std::optional<decision_t> last_;
   std::unique_ptr<Bus> bus_;
 };
@@ -143,7 +147,7 @@ std::string PortUrl(int offset) {
 }
 
 struct Results {
-  Latencies echo, certifier;
+  Latencies echo, certifier, gate;
   int lost = 0, unexpected = 0;
 };
 
@@ -155,6 +159,7 @@ void Alternate(int rounds, candidate_plan_t& candidate, Asker& echo, Asker& cert
     } else if (round >= 0) {
       results.echo.Add(bare);
       results.certifier.Add(gated);
+      results.gate.Add(certifier.gate_us());
     }
   }
 }
@@ -173,10 +178,11 @@ nlohmann::json Compare(const Task& task, bool certifies, int rounds, int ports) 
   certifier.Reach(candidate);
 
   const auto expected_rounds = static_cast<std::size_t>(rounds);
-  Results results{Latencies(expected_rounds), Latencies(expected_rounds)};
+  Results results{Latencies(expected_rounds), Latencies(expected_rounds), Latencies(expected_rounds)};
   Alternate(rounds, candidate, echo, certifier, results);
   return {{"echo", results.echo.ToJson()},
           {"certifier", results.certifier.ToJson()},
+          {"gate", results.gate.ToJson()},
           {"added_p50", results.certifier.Percentile(0.5) - results.echo.Percentile(0.5)},
           {"added_p99", results.certifier.Percentile(0.99) - results.echo.Percentile(0.99)},
           {"ratio_p50", results.certifier.Percentile(0.5) / results.echo.Percentile(0.5)},

@@ -145,13 +145,16 @@ class Report:
         return ", ".join(times) or "not measured"
 
     def insertion(self):
-        times = [f"{number(time)} us at N = {n}" for n in SIZES if (time := self.cpu(f"stage/insertion/bicycle/{n}"))]
-        return ", ".join(times) or "not measured, the library cannot do it yet"
+        times = {}
+        for name in self.benchmarks:
+            if match := re.fullmatch(r"stage/insertion/bicycle/(\d+)/iterations:\d+", name):
+                times[int(match[1])] = self.cpu(name)
+        return ", ".join(f"{number(time)} us at N = {n}" for n, time in sorted(times.items())) or "not measured"
 
     def batch_rates(self):
         rates = {}
         for name, benchmark in self.benchmarks.items():
-            if match := re.fullmatch(r"batch/.*/threads:(\d+)", name):
+            if match := re.fullmatch(r"batch/.*/(\d+)/real_time", name):
                 rates[int(match[1])] = benchmark.rate
         return rates
 
@@ -163,7 +166,7 @@ class Report:
     def batch(self):
         rates = self.batch_rates()
         rows = [[str(threads), number(rate, 4), number(ratio(rate, rates[1]))] for threads, rate in sorted(rates.items())]
-        return ("Bicycle, N = 400: threads share one certifier, each with a tube of its own.\n\n"
+        return ("Bicycle, N = 400: `CertifyAll`, threads share one certifier, each with a tube of its own.\n\n"
                 + table(["threads", "plans a second", "over one thread"], rows))
 
     def tail(self):
@@ -180,8 +183,8 @@ class Report:
             "gate/certify_alone": "certify call within it",
             "gate/decode_candidate": "decode the candidate",
             "gate/digest_candidate": "digest of the candidate",
-            "gate/digest_certified": "digest of the certified plan",
-            "gate/encode_certified": "encode the certified plan (twice: for the digest and the bus)",
+            "gate/certificate_digest": "digest of the certificate",
+            "gate/encode_certified": "encode the certified plan",
             "gate/encode_decision": "encode the decision",
         }
         rows = []
@@ -206,6 +209,7 @@ class Report:
             data = self.bus_data[name]
             rows.append([f"{label}: echo"] + [number(data["echo"][p]) for p in ("p50", "p99")])
             rows.append([f"{label}: certifier"] + [number(data["certifier"][p]) for p in ("p50", "p99")])
+            rows.append([f"{label}: the gate's work, as the decisions say"] + [number(data["gate"][p]) for p in ("p50", "p99")])
             rows.append([f"{label}: added"] + [number(data[f"added_{p}"]) for p in ("p50", "p99")])
             rows.append([f"{label}: ratio"] + [number(data[f"ratio_{p}"]) for p in ("p50", "p99")])
         counts = [self.bus_data[name]["certifier"]["count"] for name in ("certified", "abstained")]

@@ -1,5 +1,6 @@
 #include "bench/stages.h"
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/residual/lipschitz_envelope.h"
+#include "certifier/residual/observation_store.h"
 #include "certifier/residual/observations.h"
 #include "certifier/safety/separation.h"
 
@@ -138,6 +140,34 @@ void Register(const char* stage, Scenario scenario, int observations, Run run) {
   })->Unit(benchmark::kMicrosecond);
 }
 
+// The last observations of a task, one after the other, into a store of those before them: as many as its tail takes
+// without an index having to be built. Each is tested against all that are there.
+void RegisterInsertion(int observations) {
+  const int tail = StoreOptions{}.tail_capacity, inserted = std::min(tail, observations / 2);
+  const std::string name = std::string("stage/insertion/").append(NameOf(Scenario::kBicycle, observations));
+  benchmark::RegisterBenchmark(name.c_str(), [=](State& state) {
+    const Midway& midway = CachedMidway(Scenario::kBicycle, observations);
+    const Observations& all = midway.observations;
+    const int before = all.size() - inserted;
+    ObservationStore store(midway.task.problem->declaration,
+                           {all.z.topRows(before), all.lower.topRows(before), all.upper.topRows(before)},
+                           midway.Ends(&Box::lower), midway.Ends(&Box::upper));
+    // A column each, so that one observation's numbers lie together.
+    const Eigen::MatrixXd z = all.z.bottomRows(inserted).transpose(),
+                          lower = all.lower.bottomRows(inserted).transpose(),
+                          upper = all.upper.bottomRows(inserted).transpose();
+    const auto column = [](const Eigen::MatrixXd& matrix, Eigen::Index i) {
+      return std::span(matrix.col(i).data(), static_cast<std::size_t>(matrix.rows()));
+    };
+    Eigen::Index i = 0;
+    for (auto _ : state) {
+      const auto insertion = store.Insert(column(z, i), column(lower, i), column(upper, i));
+      if (insertion.id < 0 || insertion.violation) return state.SkipWithError("an observation was not taken");
+      ++i;
+    }
+  })->Iterations(inserted)->Unit(benchmark::kMicrosecond);
+}
+
 }  // namespace
 
 void RegisterStages(int observations) {
@@ -147,7 +177,7 @@ void RegisterStages(int observations) {
     Register("envelope", scenario, observations, RunEnvelope);
   }
   Register("step", Scenario::kBicycle, observations, RunStep);
-  // Insertion of one observation: register "stage/insertion" here once the envelope can take one.
+  RegisterInsertion(observations);
   if (observations != 400) return;  // the others do not look at observations
   Register("expansion", Scenario::kBicycle, observations, RunExpand);
   Register("reduction", Scenario::kBicycle, observations, RunReduction);

@@ -16,6 +16,7 @@
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
 #include "logger/database.h"
 #include "logger/event_log.h"
 
@@ -29,8 +30,9 @@ void Compare(RecordedCertificate& certificate, const std::string& what, const st
   if (expected != found) certificate.mismatches.push_back({what, expected, found});
 }
 
-constexpr const char* kAltered = "the record was altered after it was made: digest of ";
 constexpr const char* kOtherInput = "another input than the certificate was made of: digest of the ";
+
+std::string Altered(const std::string& what) { return "the record was altered after it was made: " + what; }
 
 // ---- A decision's document.
 
@@ -89,11 +91,12 @@ CertificateFile FromDecision(const std::string& path, const Json& document, cons
   for (const Json& slice : document.at("tube")) recorded.slices.push_back(SliceOf(slice));
 
   const Json& digests = document.at("digests");
-  const auto compare = [&](const char* what, const std::string& name, const Digest& digest) {
+  const auto compare = [&](const std::string& what, const std::string& name, const Digest& digest) {
     Compare(certificate, what + name, ToHex(digest), digests.at(name).get<std::string>());
   };
-  compare(kAltered, "tube", TubeDigest(document["tube"]));
-  compare(kAltered, "plan", PlanDigest(recorded.controls, Box(recorded.initial_set.lower, recorded.initial_set.upper)));
+  compare(Altered("digest of "), "tube", TubeDigest(document["tube"]));
+  compare(Altered("digest of "), "plan",
+          PlanDigest(recorded.controls, Box(recorded.initial_set.lower, recorded.initial_set.upper)));
   compare(kOtherInput, "config", file.config.digest);
   compare(kOtherInput, "model", file.config.model_digest);
   compare(kOtherInput, "declaration", file.config.declaration_digest);
@@ -175,10 +178,7 @@ class LogReading {
   LogReading(const std::string& path, const Config& config, std::vector<RecordedCertificate>& certificates)
       : config_(config), obstacles_(config), certificates_(certificates) {
     EventLogReader reader(path);
-    LogEvent event;
-    for (LogStatus status = reader.Next(event); status != LogStatus::kEnd && status != LogStatus::kCutTail;
-         status = reader.Next(event))
-      if (status == LogStatus::kEvent) Take(event);
+    ForEachEvent(reader, [this](const LogEvent& event) { Take(event); });
     if (reader.corruptions() > 0)
       certificates_.push_back(
           {path, {}, "the log is damaged in " + std::to_string(reader.corruptions()) + " places", {}});
@@ -254,8 +254,8 @@ class LogReading {
     const auto compare = [&](const char* what, const char* name, const Digest& expected, const Digest& found) {
       Compare(certificate, std::string(what) + name, ToHex(expected), ToHex(found));
     };
-    compare(kAltered, "certificate", CertificateDigest(certified), GetDigest(certified.certificate_digest));
-    compare(kAltered, "plan", plan, GetDigest(certified.plan_digest));
+    for (const SealFault& fault : FindSealFaults(certified))
+      certificate.mismatches.push_back({Altered(fault.field), fault.expected, fault.found});
     compare(kOtherInput, "config", config_.digest, GetDigest(certified.config_digest));
     compare(kOtherInput, "model", config_.model_digest, GetDigest(certified.model_digest));
     compare(kOtherInput, "declaration", config_.declaration_digest, GetDigest(certified.declaration_digest));
@@ -357,10 +357,6 @@ CertificateFile ReadCertificates(const std::string& path, const std::string& con
     }
   } catch (const Json::exception& error) {
     throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());
-  } catch (const LogError& error) {
-    throw ConfigError(error.what());
-  } catch (const DatabaseError& error) {
-    throw ConfigError(error.what());
   } catch (const std::invalid_argument& error) {
     throw ConfigError(path + ": " + error.what());
   }

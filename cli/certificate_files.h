@@ -31,7 +31,7 @@ struct CertificateFile {
 
 /** Reads any of the three; which one it is, is told from its first bytes.
 @param config_path the task; may be empty for a decision, which names its own.
-@throws ConfigError if the file is none of the three, cannot be read, or needs a task file and has none. */
+@throws BadInput if the file is none of the three, cannot be read, or needs a task file and has none. */
 [[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path);
 
 }  // namespace forereach

@@ -5,8 +5,10 @@
 #include <optional>
 
 #include "certifier/gate/gate.h"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
 #include "logger/event_log.h"
 
 namespace forereach {
@@ -52,6 +54,8 @@ class Replayer {
       static_cast<void>(gate_->UpdateObstacles(event.data, event.utime));
     } else if (event.channel == config_.bus.candidate) {
       FeedCandidate(event);
+    } else if (event.channel == config_.bus.certified) {
+      CheckSeal(event);
     }
   }
 
@@ -88,6 +92,14 @@ class Replayer {
       Differ(event.number, replayed.plan_id, difference);
   }
 
+  void CheckSeal(const LogEvent& event) {
+    const auto certified = Decoded<certified_plan_t>(event.data);
+    if (!certified) return Differ(event.number, -1, "not a certified_plan_t");
+    for (const SealFault& fault : FindSealFaults(*certified))
+      Differ(event.number, certified->plan.plan_id,
+             "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
+  }
+
   void Differ(std::int64_t event, std::int64_t plan_id, const std::string& what) {
     result_.differences.push_back("event " + std::to_string(event) + ", plan " + std::to_string(plan_id) + ": " + what);
   }
@@ -99,29 +111,14 @@ class Replayer {
   ReplayResult result_;
 };
 
-template <class Visit>
-std::int64_t ForEachEvent(const std::string& path, Visit visit) {
-  EventLogReader reader(path);
-  LogEvent event;
-  for (;;) {
-    switch (reader.Next(event)) {
-      case LogStatus::kEvent:
-        visit(event);
-        break;
-      case LogStatus::kCorrupt:
-        break;
-      default:
-        return reader.corruptions();
-    }
-  }
-}
-
 }  // namespace
 
 ReplayResult Replay(const std::string& log_path, const Config& config) {
   Replayer replayer(config);
-  ForEachEvent(log_path, [&](const LogEvent& event) { replayer.Collect(event); });
-  replayer.AddCorruptions(ForEachEvent(log_path, [&](const LogEvent& event) { replayer.Feed(event); }));
+  EventLogReader first(log_path), second(log_path);
+  ForEachEvent(first, [&](const LogEvent& event) { replayer.Collect(event); });
+  ForEachEvent(second, [&](const LogEvent& event) { replayer.Feed(event); });
+  replayer.AddCorruptions(second.corruptions());
   return replayer.Finish();
 }
 

@@ -3,10 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "cli/replay.h"
-#include "logger/event_log.h"
 
 namespace forereach {
 namespace {
@@ -18,12 +16,7 @@ struct Options {
 
 int RunReplay(const Options& options) {
   const Config config = LoadConfig(options.config);
-  ReplayResult result;
-  try {
-    result = Replay(options.log, config);
-  } catch (const LogError& error) {
-    throw ConfigError(error.what());
-  }
+  const ReplayResult result = Replay(options.log, config);
   if (options.json) {
     std::cout << nlohmann::json{{"candidates", result.candidates},
                                 {"agreed", result.agreed},

@@ -17,7 +17,12 @@ void AddReportCommand(CLI::App& app, Action& action) {
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->footer("Example:\n  forereach report run/log/events-20260101-120000.lcmlog --config config/demo.yaml "
                   "--picture run/demo");
-  command->callback([options, &action] { action = [options] { return ReportCommand(*options, std::cout, std::cerr); }; });
+  command->callback([options, &action] {
+    action = [options] {
+      Report(*options, std::cout);
+      return 0;
+    };
+  });
 }
 
 }  // namespace forereach

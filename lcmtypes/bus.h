@@ -6,9 +6,9 @@ Handlers run in the thread that calls Dispatch, never in a receive thread, so a 
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <stdexcept>
 #include <string>
 
+#include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -18,9 +18,9 @@ using Clock = std::function<std::int64_t()>;
 [[nodiscard]] std::int64_t WallClockUs();
 
 /** The bus cannot be opened; the text says what to do about it. */
-class BusError : public std::runtime_error {
+class BusError : public BadInput {
  public:
-  using std::runtime_error::runtime_error;
+  using BadInput::BadInput;
 };
 
 struct Received {

@@ -2,11 +2,11 @@
 
 #include <sodium.h>
 
-#include "forereach/certified_plan_t.hpp"
-
 namespace forereach {
 
 Digest DigestOf(Bytes bytes) {
+  // Lets libsodium take the code for this processor, two thirds of the time; without it digests are the same.
+  [[maybe_unused]] static const int initialised = sodium_init();
   Digest digest;
   crypto_generichash(digest.data(), digest.size(), bytes.data(), bytes.size(), nullptr, 0);
   return digest;
@@ -21,12 +21,6 @@ std::string ToHex(const Digest& digest) {
   sodium_bin2hex(hex.data(), hex.size(), digest.data(), digest.size());
   hex.pop_back();
   return hex;
-}
-
-Digest CertificateDigest(const certified_plan_t& certified) {
-  certified_plan_t blank = certified;
-  SetDigest(blank.certificate_digest, Digest{});
-  return DigestOf(Encode(blank));
 }
 
 }  // namespace forereach

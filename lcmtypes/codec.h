@@ -94,8 +94,4 @@ inline void SetDigest(std::uint8_t (&field)[32], const Digest& digest) {
   return digest;
 }
 
-class certified_plan_t;
-/** What `certificate_digest` has to be: the digest of the message's bytes with that field zero. */
-[[nodiscard]] Digest CertificateDigest(const certified_plan_t& certified);
-
 }  // namespace forereach

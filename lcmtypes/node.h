@@ -25,6 +25,26 @@ class Node {
   virtual void Stop() {}
 };
 
+/** A node's way out: sends, and counts what the bus refused. */
+class Sender final {
+ public:
+  explicit Sender(Bus& bus) : bus_(bus) {}
+
+  /** False if the bus refused the message; it is then lost. */
+  template <class Message>
+  bool Send(const std::string& channel, const Message& message) {
+    const bool sent = bus_.Publish(channel, message);
+    if (!sent) ++refused_;
+    return sent;
+  }
+
+  [[nodiscard]] std::int64_t refused() const { return refused_; }
+
+ private:
+  Bus& bus_;
+  std::int64_t refused_ = 0;
+};
+
 inline constexpr int kTickMs = 2;
 
 /** From here on SIGTERM and SIGINT end RunNode instead of the process. RunNode does it too; a process that calls it

@@ -8,10 +8,10 @@ always written first, so rows that a cut took are made again from it. */
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "lcmtypes/bad_input.h"
 #include "logger/rows.h"
 
 struct sqlite3;
@@ -19,9 +19,9 @@ struct sqlite3;
 namespace forereach {
 
 /** The database cannot be opened, or is not ours to write; the text names the file and the reason. */
-class DatabaseError : public std::runtime_error {
+class DatabaseError : public BadInput {
  public:
-  using std::runtime_error::runtime_error;
+  using BadInput::BadInput;
 };
 
 /** One run of the logger. */

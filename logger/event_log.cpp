@@ -116,6 +116,22 @@ LogStatus EventLogReader::Next(LogEvent& event) {
   return LogStatus::kCorrupt;
 }
 
+void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEvent&)>& visit) {
+  LogEvent event;
+  for (;;) {
+    switch (reader.Next(event)) {
+      case LogStatus::kEvent:
+        visit(event);
+        break;
+      case LogStatus::kCorrupt:
+        break;
+      case LogStatus::kEnd:
+      case LogStatus::kCutTail:
+        return;
+    }
+  }
+}
+
 EventLogWriter::EventLogWriter(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
   if (file_ < 0) throw LogError(Reason("log: cannot write ", path));
   try {
@@ -131,14 +147,11 @@ EventLogWriter::~EventLogWriter() { ::close(file_); }
 
 void EventLogWriter::Recover(const std::string& path) {
   EventLogReader reader(path);
-  LogEvent event;
-  LogStatus status;
-  while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt) {
-    if (status == LogStatus::kCorrupt) continue;
+  ForEachEvent(reader, [this](const LogEvent& event) {
     ++recovery_.events;
     recovery_.last_utime = event.utime;
     next_number_ = std::max(next_number_, event.number + 1);
-  }
+  });
   offset_ = reader.offset();
   recovery_.cut_bytes = reader.size() - offset_;
   recovery_.corruptions = reader.corruptions();

@@ -10,19 +10,20 @@ every length before it allocates, tells the end, a cut tail and damage apart, an
 
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
 
 /** A log cannot be opened, locked or created; the text names the file and the reason. */
-class LogError : public std::runtime_error {
+class LogError : public BadInput {
  public:
-  using std::runtime_error::runtime_error;
+  using BadInput::BadInput;
 };
 
 struct LogEvent {
@@ -76,6 +77,10 @@ class EventLogReader final {
   std::int64_t position_ = 0;  // of file_, so that reading on needs no seek
   std::int64_t offset_ = 0, size_ = 0, corruptions_ = 0, skipped_bytes_ = 0;
 };
+
+/** Calls `visit` for each event from where the reader stands to the end of the log; passes over damage, which the reader
+counts. */
+void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEvent&)>& visit);
 
 /** What a writer found in a file that existed already. */
 struct LogRecovery {

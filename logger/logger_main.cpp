@@ -20,9 +20,7 @@ int main(int argc, char** argv) {
     if (!directory.empty()) chosen.logger.directory = directory;
     try {
       return std::make_unique<LoggerNode>(chosen, bus, std::cout);
-    } catch (const LogError& error) {
-      throw ConfigError(std::string("logger.directory: ") + error.what());
-    } catch (const DatabaseError& error) {
+    } catch (const BadInput& error) {
       throw ConfigError(std::string("logger.directory: ") + error.what());
     }
   };

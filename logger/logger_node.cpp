@@ -64,22 +64,20 @@ void LoggerNode::Recover(const RunRow& run) {
       EventLogReader reader(path);
       Interpreter interpreter(channels_, run.log_file);
       Rows rows;
-      LogEvent event;
-      LogStatus status;
-      std::int64_t new_rows = 0, unwritten = 0;
+      std::int64_t new_rows = 0, unwritten = 0, events = run.events;
       const auto write = [&] {
-        const auto written = database_.Write(rows, run.log_file, std::max(run.events, event.number + 1));
+        const auto written = database_.Write(rows, run.log_file, events);
         if (!written) throw DatabaseError(database_.problem());
         new_rows += *written;
         unwritten = 0;
         rows = {};
       };
-      while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt) {
-        if (status == LogStatus::kCorrupt) continue;
+      ForEachEvent(reader, [&](const LogEvent& event) {
         interpreter.Observe(event, rows);
         if (event.number < run.events) rows = {};
+        events = std::max(run.events, event.number + 1);
         if (++unwritten >= kEventsPerTransaction) write();
-      }
+      });
       if (unwritten > 0) write();
       const LogRecovery& found = mended.recovery();
       text = fmt::format("{} events kept, a cut tail of {} bytes removed, {} damaged places of {} bytes left, {} rows written",

@@ -2,18 +2,19 @@
 #pragma once
 
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "lcmtypes/bad_input.h"
+
 namespace forereach {
 
 /** A picture cannot be written; the text names the file and the reason. */
-class PictureError : public std::runtime_error {
+class PictureError : public BadInput {
  public:
-  using std::runtime_error::runtime_error;
+  using BadInput::BadInput;
 };
 
 /** Everything in metres, x to the right and y up, to one scale. A polygon is convex, its corners in order. */

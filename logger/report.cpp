@@ -8,11 +8,14 @@
 #include <optional>
 #include <ostream>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "certifier/certify/batch.h"
 #include "certifier/certify/certifier.h"
+#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/sets/zonogon.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -26,6 +29,7 @@ namespace forereach {
 namespace {
 
 constexpr std::size_t kMaxUndecided = 1024;
+constexpr std::size_t kBatch = 256;
 
 class PictureMaker final {
  public:
@@ -54,6 +58,7 @@ class PictureMaker final {
   }
 
   LogPicture Finish() {
+    CertifyAgain();
     Picture& picture = result_.picture;
     for (auto& [plan_id, tube] : tubes_)
       for (std::size_t t = 0; t < tube.size(); ++t)
@@ -64,9 +69,16 @@ class PictureMaker final {
   }
 
  private:
+  struct Decided {
+    candidate_plan_t candidate;
+    int outcome, step;
+  };
+
   void SetObstacles(const obstacles_t& message) {
     try {
-      obstacles_ = FromMessage(message, certifier_.projection().dim());
+      std::vector<Obstacle> obstacles = FromMessage(message, certifier_.projection().dim());
+      CertifyAgain();
+      obstacles_ = std::move(obstacles);
     } catch (const std::invalid_argument&) {
       // The gate kept its obstacles too.
     }
@@ -80,36 +92,47 @@ class PictureMaker final {
     candidates_.erase(found);
     const bool certified = decision.outcome == decision_t::CERTIFIED;
     if (!candidate || (!certified && decision.outcome != decision_t::ABSTAIN_SAFETY)) return;
-    if (!CertifyAgain(*candidate, decision)) {
-      ++result_.disagreements;
-    } else if (certified) {
-      tubes_[candidate->plan_id] = Outlines(tube_.length());
-    } else {
-      result_.picture.abstained.push_back(Outlines(decision.step));
-    }
+    decided_.push_back({*candidate, decision.outcome, decision.step});
+    if (decided_.size() >= kBatch) CertifyAgain();
   }
 
-  // Fills tube_; false if the answer is not the recorded one.
-  bool CertifyAgain(const candidate_plan_t& candidate, const decision_t& decision) {
-    const int n = candidate.num_states;
-    if (n != certifier_.problem().model->num_states()) return false;
-    try {
-      const auto initial_set = Zonotope::FromBox(Eigen::Map<const Eigen::VectorXd>(candidate.initial_center, n),
-                                                 Eigen::Map<const Eigen::VectorXd>(candidate.initial_half_width, n));
-      const Plan plan{candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs};
-      certifier_.Require(plan, initial_set, obstacles_);
-      const Decision again = certifier_.Certify(plan, initial_set, obstacles_, tube_);
-      return static_cast<int>(again.outcome) == decision.outcome && again.step == decision.step;
-    } catch (const std::invalid_argument&) {
-      return false;
+  // All that were decided on under the obstacles in force; leaves out those whose answer is not the recorded one.
+  void CertifyAgain() {
+    std::vector<Plan> plans;
+    std::vector<Zonotope> initial_sets;
+    std::vector<const Decided*> asked;
+    for (const Decided& decided : decided_) try {
+        const Zonotope initial_set = InitialSetOf(decided.candidate);
+        const Plan plan = PlanOf(decided.candidate);
+        certifier_.Require(plan, initial_set, obstacles_);
+        plans.push_back(plan);
+        initial_sets.push_back(initial_set);
+        asked.push_back(&decided);
+      } catch (const std::invalid_argument&) {
+        ++result_.disagreements;
+      }
+    std::vector<std::vector<Picture::Polygon>> outlines(asked.size());
+    const auto draw = [&](std::size_t i, const Decision& again, const Tube& tube) {
+      if (static_cast<int>(again.outcome) == asked[i]->outcome && again.step == asked[i]->step)
+        outlines[i] = Outlines(tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
+    };
+    (void)CertifyAll(certifier_, plans, initial_sets, obstacles_, std::max(1u, std::thread::hardware_concurrency()), draw);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      if (outlines[i].empty())
+        ++result_.disagreements;
+      else if (asked[i]->outcome == decision_t::CERTIFIED)
+        tubes_[asked[i]->candidate.plan_id] = std::move(outlines[i]);
+      else
+        result_.picture.abstained.push_back(std::move(outlines[i]));
     }
+    decided_.clear();
   }
 
-  std::vector<Picture::Polygon> Outlines(int last_step) const {
+  std::vector<Picture::Polygon> Outlines(const Tube& tube, int last_step) const {
     std::vector<Picture::Polygon> outlines;
     Zonotope projected;
-    for (int t = 0; t <= std::min(last_step, tube_.length()); ++t) {
-      certifier_.projection().Enclose(tube_.slice(t), tube_.half_width(t), projected);
+    for (int t = 0; t <= std::min(last_step, tube.length()); ++t) {
+      certifier_.projection().Enclose(tube.slice(t), tube.half_width(t), projected);
       outlines.push_back(Outline(projected));
     }
     return outlines;
@@ -175,8 +198,8 @@ class PictureMaker final {
 
   BusOptions channels_;
   Certifier certifier_;
-  Tube tube_;
   std::vector<Obstacle> obstacles_;
+  std::vector<Decided> decided_;  // under the obstacles in force, and not yet certified again
   std::deque<std::pair<Digest, std::vector<std::uint8_t>>> candidates_;  // received and not yet decided
   std::map<std::int64_t, std::vector<Picture::Polygon>> tubes_;          // of certified plans, by plan_id
   std::set<std::pair<std::int64_t, int>> executed_;                      // plan_id and step
@@ -226,10 +249,7 @@ std::vector<std::string> PictureFiles(const std::string& name) {
 LogPicture PictureFromLog(const std::string& log_path, const Config& config) {
   EventLogReader reader(log_path);
   PictureMaker maker(config);
-  LogEvent event;
-  LogStatus status;
-  while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt)
-    if (status == LogStatus::kEvent) maker.Add(event);
+  ForEachEvent(reader, [&maker](const LogEvent& event) { maker.Add(event); });
   return maker.Finish();
 }
 
@@ -257,16 +277,6 @@ void Report(const ReportOptions& options, std::ostream& out) {
   for (const std::string& file : files) out << fmt::format("{:<26}{}\n", "picture", file);
   if (drawn.disagreements > 0)
     out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out", drawn.disagreements);
-}
-
-int ReportCommand(const ReportOptions& options, std::ostream& out, std::ostream& err) {
-  try {
-    Report(options, out);
-    return 0;
-  } catch (const std::exception& error) {
-    err << "forereach report: " << error.what() << "\n";
-    return 2;
-  }
 }
 
 }  // namespace forereach

@@ -32,10 +32,7 @@ struct ReportOptions {
 };
 
 /** Prints the summary of a log to `out`, as text or as one JSON document, and writes its picture.
-@throws ConfigError, LogError, PictureError; nothing has been printed then. */
+@throws BadInput; nothing has been printed then. */
 void Report(const ReportOptions& options, std::ostream& out);
-
-/** The same as a command: prints one line to `err` for an error. @return 0, or 2 for bad input. */
-int ReportCommand(const ReportOptions& options, std::ostream& out, std::ostream& err);
 
 }  // namespace forereach

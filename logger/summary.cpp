@@ -191,15 +191,12 @@ Summary SummarizeLog(const std::string& path, const Config& config) {
   EventLogReader reader(path);
   Interpreter interpreter(config.bus, std::filesystem::path(path).filename().string());
   SummaryBuilder builder(config);
-  LogEvent event;
-  LogStatus status;
-  while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt) {
-    if (status == LogStatus::kCorrupt) continue;
+  ForEachEvent(reader, [&](const LogEvent& event) {
     Rows rows;
     interpreter.Observe(event, rows);
     builder.Add(event);
     builder.Add(rows);
-  }
+  });
   builder.AddDamage(reader.corruptions(), reader.skipped_bytes());
   return builder.Finish();
 }

@@ -41,15 +41,15 @@ nlohmann::ordered_json ByName(const Map& counts) {
 
 PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
     : config_(config),
-      bus_(bus),
+      sender_(bus),
       out_(out),
       period_us_(std::llround(config.robot.step_period_ms * 1e3)),
       half_width_(HalfWidth(config)),
       residual_(config.problem),
       planner_(MakePlanner(config)) {
-  bus_.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
-  bus_.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
-  bus_.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
+  bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
+  bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
+  bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
 }
 
 void PlannerNode::Tick(std::int64_t now_us) {
@@ -147,10 +147,7 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
     return;
   }
   const candidate_plan_t candidate = MakeCandidate(*proposal, *round_, now_us);
-  if (!bus_.Publish(config_.bus.candidate, candidate)) {
-    ++not_sent_;
-    return;
-  }
+  if (!sender_.Send(config_.bus.candidate, candidate)) return;
   ++proposed_;
   round_->awaited_plan = candidate.plan_id;
   plans_[candidate.plan_id] = candidate;
@@ -252,7 +249,7 @@ std::string PlannerNode::Summary() const {
   summary["rounds_without_certificate"] = fruitless_rounds_;
   summary["searches_without_result"] = fruitless_searches_;
   summary["messages_ignored"] = ignored_;
-  summary["messages_not_sent"] = not_sent_;
+  summary["messages_not_sent"] = sender_.refused();
   return summary.dump();
 }
 

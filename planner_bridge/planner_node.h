@@ -77,7 +77,7 @@ class PlannerNode final : public Node {
   void Learn(const decision_t& decision);
 
   const Config config_;
-  Bus& bus_;
+  Sender sender_;
   std::ostream& out_;
   const std::int64_t period_us_;
   const Eigen::VectorXd half_width_;  // of X_0
@@ -92,7 +92,7 @@ class PlannerNode final : public Node {
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
-               fruitless_rounds_ = 0, ignored_ = 0, not_sent_ = 0;
+               fruitless_rounds_ = 0, ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
 };
 

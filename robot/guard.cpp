@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "lcmtypes/seal.h"
+
 namespace forereach {
 namespace {
 
@@ -87,10 +89,30 @@ GuardVerdict CheckExpiry(const certified_plan_t& certified, std::int64_t now_us)
                          certified.expires_utime, now_us));
 }
 
+GuardVerdict RefuseDigest(GuardCause cause, const char* name, const std::string& carried, const std::string& expected) {
+  return Refuse(cause, Sentence("%s is %.16s.., it has to be %.16s..", name, carried.c_str(), expected.c_str()));
+}
+
 GuardVerdict CheckDigest(GuardCause cause, const char* name, const Digest& carried, const Digest& expected) {
   if (carried == expected) return {};
-  return Refuse(cause, Sentence("%s is %.16s.., it has to be %.16s..", name, ToHex(carried).c_str(),
-                                ToHex(expected).c_str()));
+  return RefuseDigest(cause, name, ToHex(carried), ToHex(expected));
+}
+
+GuardVerdict CheckSeal(const certified_plan_t& certified) {
+  const std::vector<SealFault> faults = FindSealFaults(certified);
+  if (faults.empty()) return {};
+  const SealFault& fault = faults.front();
+  const char* field = fault.field.c_str();
+  switch (fault.kind) {
+    case SealFault::Kind::kPlanDigest:
+      return RefuseDigest(GuardCause::kPlanDigest, field, fault.found, fault.expected);
+    case SealFault::Kind::kCertificateDigest:
+      return RefuseDigest(GuardCause::kCertificateDigest, field, fault.found, fault.expected);
+    case SealFault::Kind::kUnusedEntry:
+      break;
+  }
+  return RefuseAt(GuardCause::kUnusedEntry, fault.step, fault.coordinate, fault.value, 0,
+                  Sentence("%s is %s, it has to be %s", field, fault.found.c_str(), fault.expected.c_str()));
 }
 
 std::uint64_t Apart(std::int64_t a, std::int64_t b) {
@@ -110,6 +132,7 @@ std::string_view GuardCauseName(GuardCause cause) {
     case GuardCause::kWrongStepPeriod: return "wrong_step_period";
     case GuardCause::kPlanDigest: return "plan_digest";
     case GuardCause::kCertificateDigest: return "certificate_digest";
+    case GuardCause::kUnusedEntry: return "unused_entry";
     case GuardCause::kNonFinite: return "non_finite";
     case GuardCause::kEmptySlice: return "empty_slice";
     case GuardCause::kExpired: return "expired";
@@ -177,12 +200,7 @@ GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
 GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_us) const {
   const candidate_plan_t& plan = certified.plan;
   GuardVerdict verdict = ExamineSizes(plan);
-  if (verdict.ok())
-    verdict = CheckDigest(GuardCause::kPlanDigest, "plan_digest", GetDigest(certified.plan_digest),
-                          DigestOf(Encode(plan)));
-  if (verdict.ok())
-    verdict = CheckDigest(GuardCause::kCertificateDigest, "certificate_digest", GetDigest(certified.certificate_digest),
-                          CertificateDigest(certified));
+  if (verdict.ok()) verdict = CheckSeal(certified);
   if (verdict.ok()) verdict = ExamineNumbers(certified);
   if (verdict.ok()) verdict = CheckExpiry(certified, now_us);
   if (verdict.ok() && options_.config_digest)

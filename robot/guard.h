@@ -42,6 +42,7 @@ enum class GuardCause {
   kWrongStepPeriod,    ///< step_us is not this robot's.
   kPlanDigest,         ///< plan_digest is not that of the embedded candidate.
   kCertificateDigest,  ///< certificate_digest is not that of the message.
+  kUnusedEntry,        ///< A slice entry beyond those in use is not zero, so no digest covers it.
   kNonFinite,          ///< NaN or infinity in a control, X_0 or a slice, or a negative half-width.
   kEmptySlice,         ///< lower <= upper fails.
   kExpired,            ///< Also from TryStart.
@@ -69,7 +70,7 @@ enum class GuardCause {
 struct GuardVerdict {
   GuardCause cause = GuardCause::kNone;
   std::int64_t plan_id = -1;  ///< The plan concerned, -1 if none or not decoded.
-  int step = -1;              ///< Witness of kOutsideSlice, kNonFinite and kEmptySlice in a slice or control.
+  int step = -1;              ///< Witness of kOutsideSlice, kUnusedEntry, kNonFinite and kEmptySlice.
   int coordinate = -1;        ///< Witness: the coordinate of state, X_0, slice or control, ...
   double value = 0;           ///< ... the value found there, ...
   double bound = 0;           ///< ... and the bound it broke, rounded to double.
@@ -92,9 +93,10 @@ class Guard final {
   explicit Guard(GuardOptions options);
 
   /** Checks one message of PLAN_CERTIFIED; if it passes, it becomes the pending plan.
-  In this order: decoded whole and nothing left over, dimensions, step period, plan digest, certificate digest, finite
-  numbers, lower <= upper in every slice, not expired (now_us <= expires_utime), expected config and model digest,
-  plan_id newer than the last accepted. Cost: two digests of the message, under 0.1 ms. @param now_us robot's clock. */
+  In this order: decoded whole and nothing left over, dimensions, step period, the seal (lcmtypes/seal.h: plan digest,
+  certificate digest, nothing in what is not in use), finite numbers, lower <= upper in every slice, not expired (now_us
+  <= expires_utime), expected config and model digest, plan_id newer than the last accepted. The seal covers every bit of
+  the message. Cost: that of the seal, under 0.1 ms. @param now_us robot's clock. */
   [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
 
   /** Starts the pending plan at a step boundary if |start_utime - boundary_utime| <= step_us / 2, it has not expired

@@ -44,7 +44,7 @@ void RequireSize(const Config& config, const char* key, std::size_t size, std::i
 
 RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
     : config_(config),
-      bus_(bus),
+      sender_(bus),
       out_(out),
       target_(MakeTarget(config)),
       period_us_(PeriodUs(config)),
@@ -54,7 +54,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
     RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
-  bus_.Subscribe(config_.bus.certified, [this](const Received& received) { OnCertified(received); });
+  bus.Subscribe(config_.bus.certified, [this](const Received& received) { OnCertified(received); });
 }
 
 void RobotSimNode::Tick(std::int64_t now_us) {
@@ -163,7 +163,7 @@ void RobotSimNode::PublishState(std::int64_t utime) {
   message.mode = executing() ? robot_state_t::EXECUTING : ending_ ? robot_state_t::FINISHED : robot_state_t::STANDING;
   message.num_states = static_cast<std::int16_t>(state_.size());
   std::copy(state_.begin(), state_.end(), message.state);
-  Send(config_.bus.robot_state, message);
+  sender_.Send(config_.bus.robot_state, message);
   if (message.mode == robot_state_t::FINISHED) ++finished_boundaries_;
 }
 
@@ -177,7 +177,7 @@ void RobotSimNode::PublishTransition(std::int64_t utime, std::span<const double>
   std::copy(state_.begin(), state_.end(), message.state);
   std::copy(control.begin(), control.end(), message.input);
   std::copy(next.begin(), next.end(), message.next_state);
-  Send(config_.bus.transition, message);
+  sender_.Send(config_.bus.transition, message);
 }
 
 void RobotSimNode::PublishRefusal(std::int64_t utime, const GuardVerdict& verdict) {
@@ -200,12 +200,7 @@ void RobotSimNode::PublishEvent(std::int64_t utime, std::int16_t kind, std::int6
   std::copy(state_.begin(), state_.end(), message.state);
   message.value = value;
   SetText(message.message, text);
-  Send(config_.bus.event, message);
-}
-
-template <class Message>
-void RobotSimNode::Send(const std::string& channel, const Message& message) {
-  if (!bus_.Publish(channel, message)) ++not_sent_;
+  sender_.Send(config_.bus.event, message);
 }
 
 Eigen::VectorXd RobotSimNode::Position() const {
@@ -234,7 +229,7 @@ std::string RobotSimNode::Summary() const {
   summary["plans_accepted"] = accepted_;
   summary["plans_started"] = started_;
   summary["plans_refused"] = refused_;
-  summary["messages_not_sent"] = not_sent_;
+  summary["messages_not_sent"] = sender_.refused();
   return summary.dump();
 }
 

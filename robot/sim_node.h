@@ -73,8 +73,6 @@ class RobotSimNode final : public Node {
   void PublishRefusal(std::int64_t utime, const GuardVerdict& verdict);
   void PublishEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
                     std::string_view text, int coordinate = -1);
-  template <class Message>
-  void Send(const std::string& channel, const Message& message);
 
   [[nodiscard]] Eigen::VectorXd Position() const;
   [[nodiscard]] double DistanceToGoal() const;
@@ -83,7 +81,7 @@ class RobotSimNode final : public Node {
   [[nodiscard]] int executing_step() const { return executing() ? step_ : -1; }
 
   const Config config_;
-  Bus& bus_;
+  Sender sender_;
   std::ostream& out_;
   const std::unique_ptr<Target> target_;
   const std::int64_t period_us_;
@@ -98,7 +96,7 @@ class RobotSimNode final : public Node {
   bool goal_reached_ = false, ending_ = false;
   int finished_boundaries_ = 0;
 
-  std::int64_t steps_inside_ = 0, contacts_ = 0, stops_ = 0, accepted_ = 0, started_ = 0, not_sent_ = 0;
+  std::int64_t steps_inside_ = 0, contacts_ = 0, stops_ = 0, accepted_ = 0, started_ = 0;
   std::map<std::string, std::int64_t> refused_;
 };
 

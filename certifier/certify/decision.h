@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "certifier/numerics/directed.h"
+#include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/consistency.h"
@@ -59,6 +61,11 @@ class Tube final {
   /** Upper bounds on the half-widths of the hull of X_t, t <= length(). */
   [[nodiscard]] std::span<const double> half_width(int t) const {
     return {step(t).half_width.data(), static_cast<std::size_t>(slice(t).dim())};
+  }
+  /** An interval that contains coordinate k of X_t, rounded outward. Cost O(1): the half-widths are those of the step. */
+  [[nodiscard]] Interval hull(int t, int k) const {
+    const double center = slice(t).center(k), r = half_width(t)[static_cast<std::size_t>(k)];
+    return {SubDown(center, r), AddUp(center, r)};
   }
   /** Completed steps; X_0 .. X_length() are valid. */
   [[nodiscard]] int length() const { return length_; }

@@ -5,8 +5,10 @@
 #include <exception>
 
 #include "certifier/certify/explain.h"
+#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/numerics/text.h"
+#include "lcmtypes/seal.h"
 
 namespace forereach {
 namespace {
@@ -158,10 +160,8 @@ std::optional<Gate::Rejection> Gate::CheckSource(const candidate_plan_t& candida
 }
 
 void Gate::Certify(const candidate_plan_t& candidate, GateAnswer& answer) {
-  const int n = candidate.num_states;
-  const auto initial_set = Zonotope::FromBox(Eigen::Map<const Eigen::VectorXd>(candidate.initial_center, n),
-                                             Eigen::Map<const Eigen::VectorXd>(candidate.initial_half_width, n));
-  const Plan plan{candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs};
+  const Zonotope initial_set = InitialSetOf(candidate);
+  const Plan plan = PlanOf(candidate);
   certifier_.Require(plan, initial_set, obstacles_);
   const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_, tube_);
 
@@ -176,18 +176,17 @@ void Gate::Certify(const candidate_plan_t& candidate, GateAnswer& answer) {
   decision.margin = verdict.margin;
   decision.threshold = verdict.threshold;
   SetText(decision.message, Explain(verdict, certifier_.problem()));
-  if (verdict.outcome == Outcome::kCertified) answer.certified = MakeCertified(candidate, decision);
+  if (verdict.outcome == Outcome::kCertified) Attest(candidate, decision, answer.certified.emplace());
 }
 
-certified_plan_t Gate::MakeCertified(const candidate_plan_t& candidate, const decision_t& decision) {
-  certified_plan_t certified{};
+void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified) {
   certified.utime = decision.utime;
   certified.sequence = certificates_++;
   certified.expires_utime = decision.utime + Microseconds(options_.certificate_lifetime_ms);
   certified.plan = candidate;
   for (int t = 0; t <= candidate.num_steps; ++t) {
     for (int k = 0; k < candidate.num_states; ++k) {
-      const Interval hull = tube_.slice(t).Hull(k);
+      const Interval hull = tube_.hull(t, k);
       certified.slice_lower[t][k] = hull.lower;
       certified.slice_upper[t][k] = hull.upper;
     }
@@ -195,7 +194,6 @@ certified_plan_t Gate::MakeCertified(const candidate_plan_t& candidate, const de
   std::ranges::copy(decision.plan_digest, certified.plan_digest);
   SetDigests(certified);
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
-  return certified;
 }
 
 std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) {

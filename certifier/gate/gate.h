@@ -66,7 +66,8 @@ class Gate final {
   [[nodiscard]] std::optional<Rejection> CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const;
   [[nodiscard]] std::optional<Rejection> CheckSource(const candidate_plan_t& candidate);
   void Certify(const candidate_plan_t& candidate, GateAnswer& answer);
-  [[nodiscard]] certified_plan_t MakeCertified(const candidate_plan_t& candidate, const decision_t& decision);
+  /** Fills and seals a message of zeros. */
+  void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
   void Count(std::int16_t outcome);
 
   template <class Message>

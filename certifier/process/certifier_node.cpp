@@ -10,18 +10,18 @@
 namespace forereach {
 
 CertifierNode::CertifierNode(const Config& config, Bus& bus)
-    : channels_(config.bus), queue_size_(static_cast<std::size_t>(config.gate.queue)), bus_(bus), gate_(config) {
+    : channels_(config.bus), queue_size_(static_cast<std::size_t>(config.gate.queue)), sender_(bus), gate_(config) {
   if (const auto& violation = gate_.certifier().violation())
     spdlog::warn("observations {} and {} contradict the declaration: every candidate will be abstained from (F)",
                  violation->first, violation->second);
   if (gate_.certifier().uses_hull_distance())
     spdlog::warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
                  LipschitzEnvelope::kMaxExactColumns);
-  bus_.Subscribe(channels_.candidate, [this](const Received& received) {
+  bus.Subscribe(channels_.candidate, [this](const Received& received) {
     queue_.push_back({true, {received.bytes.begin(), received.bytes.end()}});
     ++waiting_candidates_;
   });
-  bus_.Subscribe(channels_.obstacles, [this](const Received& received) {
+  bus.Subscribe(channels_.obstacles, [this](const Received& received) {
     queue_.push_back({false, {received.bytes.begin(), received.bytes.end()}});
   });
 }
@@ -49,10 +49,10 @@ void CertifierNode::Work(const Pending& pending, std::int64_t now_us, bool displ
   GateAnswer answer = displaced ? gate_.Displace(pending.bytes, now_us) : gate_.Decide(pending.bytes, now_us);
   const std::chrono::duration<double, std::micro> elapsed = std::chrono::steady_clock::now() - begin;
   answer.decision.elapsed_us = elapsed.count();
-  elapsed_us_[decided_++ % elapsed_us_.size()] = elapsed.count();
 
-  if (answer.certified) bus_.Publish(channels_.certified, *answer.certified);
-  bus_.Publish(channels_.decision, answer.decision);
+  if (answer.certified) sender_.Send(channels_.certified, *answer.certified);
+  sender_.Send(channels_.decision, answer.decision);
+  elapsed_us_[decided_++ % elapsed_us_.size()] = elapsed.count();
 }
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
@@ -61,7 +61,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.sequence = heartbeats_++;
   status.elapsed_p50_us = ElapsedPercentile(0.5);
   status.elapsed_p99_us = ElapsedPercentile(0.99);
-  bus_.Publish(channels_.status, status);
+  sender_.Send(channels_.status, status);
 }
 
 double CertifierNode::ElapsedPercentile(double fraction) const {
@@ -82,6 +82,7 @@ void CertifierNode::Stop() {
                                              {"safety", status.abstained_safety}}},
                               {"rejected", status.rejected},
                               {"refused_obstacles", refused_obstacles_},
+                              {"messages_not_sent", sender_.refused()},
                               {"elapsed_us", {{"p50", ElapsedPercentile(0.5)}, {"p99", ElapsedPercentile(0.99)}}}}
             << std::endl;
 }

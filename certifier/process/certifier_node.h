@@ -1,7 +1,10 @@
 /** The certifier on a bus: candidates and obstacles in; decisions, certified plans and a heartbeat out.
 
 Messages are queued as they arrive and worked off in order by Tick. At most `gate.queue` candidates are certified in one
-go: where more have arrived, the oldest are answered with a rejection, so that the newest are not kept waiting. */
+go: where more have arrived, the oldest are answered with a rejection, so that the newest are not kept waiting.
+
+An answer goes out before anything is counted or logged: first the certified plan, which the robot waits for, then the
+decision, so a planner that hears of a certificate knows that the plan was handed to the bus before. */
 #pragma once
 
 #include <array>
@@ -37,7 +40,7 @@ class CertifierNode final : public Node {
 
   const BusOptions channels_;
   const std::size_t queue_size_;
-  Bus& bus_;
+  Sender sender_;
   Gate gate_;
   std::deque<Pending> queue_;
   std::size_t waiting_candidates_ = 0;

@@ -4,20 +4,20 @@ and, made from it, in config/README.md. */
 
 #include <map>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "certifier/certify/problem.h"
 #include "certifier/task/canonical.h"
+#include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
 
-/** Bad input: the text names file, line, key, value and bound. A process that gets it exits with 2. */
-class ConfigError : public std::runtime_error {
+/** A file that a person wrote: the text names file, line, key, value and bound. */
+class ConfigError : public BadInput {
  public:
-  using std::runtime_error::runtime_error;
+  using BadInput::BadInput;
 };
 
 struct GateOptions {

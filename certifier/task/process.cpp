@@ -11,10 +11,7 @@ namespace forereach {
 int Guarded(const std::string& name, const std::function<int()>& body) {
   try {
     return body();
-  } catch (const ConfigError& error) {
-    std::cerr << name << ": " << error.what() << std::endl;
-    return kExitBadInput;
-  } catch (const BusError& error) {
+  } catch (const BadInput& error) {
     std::cerr << name << ": " << error.what() << std::endl;
     return kExitBadInput;
   } catch (const std::exception& error) {

@@ -31,7 +31,7 @@ error. */
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
                const std::function<void(CLI::App&)>& add_options = {});
 
-/** Runs `body` and turns its exceptions into exit codes: 2 after one line for ConfigError and BusError, 1 for others. */
+/** Runs `body` and turns its exceptions into exit codes, after one line: 2 for BadInput, 1 for others. */
 int Guarded(const std::string& name, const std::function<int()>& body);
 
 }  // namespace forereach

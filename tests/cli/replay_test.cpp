@@ -1,18 +1,23 @@
 // A recorded log through the same gate gives the same decisions, and a changed one does not.
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
 #include <unistd.h>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "cli/replay.h"
+#include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "logger/event_log.h"
 
 namespace forereach {
 namespace {
+
+using testing::HasSubstr;
 
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
@@ -84,6 +89,30 @@ TEST(Replay, MissingDecisionAndMissingCandidateAreListed) {
     EXPECT_EQ(Replay(path, LoadConfig(kConfig)).differences.size(), 1u) << drop_decision;
     std::filesystem::remove(path);
   }
+}
+
+TEST(Replay, ACertifiedPlanThatWasAlteredIsListed) {
+  const auto difference = [](auto alter) {
+    bool altered = false;
+    const std::string path = Edited([&](LogEvent& event) {
+      auto certified = Decoded<certified_plan_t>(event.data);
+      if (!certified || altered) return true;
+      altered = true;
+      alter(*certified);
+      event.data = Encode(*certified);
+      return true;
+    });
+    const ReplayResult result = Replay(path, LoadConfig(kConfig));
+    std::filesystem::remove(path);
+    EXPECT_EQ(result.differences.size(), 1u);
+    return result.differences.empty() ? std::string() : result.differences.front();
+  };
+  EXPECT_THAT(difference([](auto& c) { c.slice_upper[3][0] = std::nextafter(c.slice_upper[3][0], 0); }),
+              HasSubstr("seal does not hold: certificate_digest"));
+  EXPECT_THAT(difference([](auto& c) { c.slice_upper[100][0] = 0.5; }),
+              HasSubstr("slice_upper[100][0] is 0.5, it has to be 0"));
+  EXPECT_THAT(difference([](auto& c) { c.plan.control[0][0] += 1; }), HasSubstr("plan_digest"));
+  EXPECT_THAT(difference([](auto& c) { c.expires_utime += 1; }), HasSubstr("certificate_digest"));
 }
 
 TEST(Replay, AnotherTaskIsNoticed) {

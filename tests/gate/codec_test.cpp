@@ -139,13 +139,5 @@ TEST(DigestTest, GoesIntoAFieldAndBack) {
   EXPECT_EQ(GetDigest(decision.plan_digest), digest);
 }
 
-TEST(CertificateDigestTest, IsOfTheMessageWithThatFieldZero) {
-  certified_plan_t certified{};
-  certified.sequence = 7;
-  const Digest digest = DigestOf(Encode(certified));
-  SetDigest(certified.certificate_digest, DigestOf(std::string_view("anything")));
-  EXPECT_EQ(CertificateDigest(certified), digest);
-}
-
 }  // namespace
 }  // namespace forereach

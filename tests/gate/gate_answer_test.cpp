@@ -9,12 +9,15 @@
 #include <gtest/gtest.h>
 
 #include "certifier/gate/gate.h"
+#include "lcmtypes/seal.h"
 #include "tests/gate/small_task.h"
 
 namespace forereach {
 namespace {
 
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
 
 class GateAnswerTest : public testing::Test {
  protected:
@@ -58,7 +61,7 @@ TEST_F(GateAnswerTest, Certificate) {
   EXPECT_EQ(certified.expires_utime, kNow + 2'000'000);
   EXPECT_EQ(Encode(certified.plan), Encode(candidate));
   EXPECT_EQ(GetDigest(certified.plan_digest), DigestOf(Encode(candidate)));
-  EXPECT_EQ(GetDigest(certified.certificate_digest), CertificateDigest(certified));
+  EXPECT_THAT(FindSealFaults(certified), IsEmpty());
   ExpectDigestsOf(config_, certified);
 }
 
@@ -151,8 +154,8 @@ TEST_F(GateAnswerTest, FirstSliceContainsTheInitialSetAndAllAreTheTubesHulls) {
     EXPECT_GE(answer.certified->slice_upper[0][k], center + half_width);
     EXPECT_NEAR(answer.certified->slice_upper[0][k], static_cast<double>(center + half_width), 1e-15);
     for (int t = 0; t <= 10; ++t) {
-      EXPECT_EQ(answer.certified->slice_lower[t][k], gate_.tube().slice(t).Hull(k).lower);
-      EXPECT_EQ(answer.certified->slice_upper[t][k], gate_.tube().slice(t).Hull(k).upper);
+      EXPECT_EQ(answer.certified->slice_lower[t][k], gate_.tube().hull(t, k).lower);
+      EXPECT_EQ(answer.certified->slice_upper[t][k], gate_.tube().hull(t, k).upper);
     }
   }
 }
@@ -193,7 +196,7 @@ TEST_F(GateAnswerTest, UnusedSliceEntriesAreZeroEvenAfterALongerPlan) {
   }
 }
 
-TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheCertificate) {
+TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheSeal) {
   const GateAnswer answer = Decide(Candidate(1));
   ASSERT_TRUE(answer.certified);
   const std::vector<std::uint8_t> good = Encode(*answer.certified);
@@ -206,7 +209,7 @@ TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheCertificate) {
     const auto tampered = Decoded<certified_plan_t>(bytes);
     ASSERT_EQ(tampered.has_value(), i >= 8) << i;
     if (tampered) {
-      ASSERT_NE(CertificateDigest(*tampered), GetDigest(tampered->certificate_digest)) << i;
+      ASSERT_THAT(FindSealFaults(*tampered), Not(IsEmpty())) << i;
     }
   }
 }

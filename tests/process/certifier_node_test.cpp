@@ -67,6 +67,30 @@ TEST_F(CertifierNodeTest, ACertificateComesBeforeItsDecision) {
   EXPECT_EQ(certified_[0].plan.plan_id, 1);
 }
 
+class RefusingBus final : public Bus {
+ public:
+  using Bus::Publish;
+  void Subscribe(const std::string& channel, Handler handler) override { handlers_[channel] = std::move(handler); }
+  bool Publish(const std::string&, Bytes) override { return false; }
+  int Dispatch(int) override { return 0; }
+  [[nodiscard]] std::int64_t dropped() const override { return 0; }
+  void Deliver(const std::string& channel, Bytes bytes) { handlers_.at(channel)(Received{channel, bytes, kNow}); }
+
+ private:
+  std::map<std::string, Handler> handlers_;
+};
+
+TEST_F(CertifierNodeTest, WhatTheBusRefusesIsCounted) {
+  RefusingBus bus;
+  CertifierNode node(config_, bus);
+  bus.Deliver("PLAN_CANDIDATE", Encode(Candidate(1)));
+  node.Tick(kNow);
+  testing::internal::CaptureStdout();
+  node.Stop();
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), testing::HasSubstr("\"messages_not_sent\":3"))
+      << "the certified plan, its decision, a heartbeat";
+}
+
 TEST_F(CertifierNodeTest, WhereMoreWaitThanItsQueueHoldsTheOldestAreAnsweredWithARejection) {
   for (int i = 1; i <= 7; ++i) bus_->Publish("PLAN_CANDIDATE", Candidate(i));
   Run();

@@ -10,6 +10,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/seal.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

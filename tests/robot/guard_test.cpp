@@ -155,6 +155,29 @@ TEST(GuardAccept, RefusesWrongDigests) {
   EXPECT_TRUE(Guard(anything).Accept(Sealed(certified), kNow).ok());
 }
 
+TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
+  const auto altered = [](auto change) {
+    certified_plan_t certified = Plan();
+    Seal(certified);
+    change(certified);
+    return Guard(TwoStates()).Accept(Encode(certified), kNow);
+  };
+  EXPECT_EQ(altered([](auto& c) { c.slice_upper[3][1] = Below(5); }).cause, GuardCause::kCertificateDigest);
+  EXPECT_EQ(altered([](auto& c) { c.plan.control[2][0] = Above(0); }).cause, GuardCause::kPlanDigest);
+  EXPECT_EQ(altered([](auto& c) { c.plan.control[90][5] = 1; }).cause, GuardCause::kPlanDigest) << "not in use";
+  EXPECT_EQ(altered([](auto& c) { ++c.expires_utime; }).cause, GuardCause::kCertificateDigest);
+
+  const GuardVerdict verdict = altered([](auto& c) { c.slice_upper[4][1] = 5; });
+  EXPECT_EQ(verdict.cause, GuardCause::kUnusedEntry);
+  EXPECT_EQ(GuardCauseName(verdict.cause), "unused_entry");
+  EXPECT_EQ(verdict.step, 4);
+  EXPECT_EQ(verdict.coordinate, 1);
+  EXPECT_EQ(verdict.value, 5);
+  EXPECT_EQ(verdict.message, "slice_upper[4][1] is 5, it has to be 0, as it is not in use");
+  EXPECT_EQ(altered([](auto& c) { c.slice_lower[0][2] = -0.0; }).cause, GuardCause::kUnusedEntry);
+  EXPECT_EQ(altered([](auto& c) { c.slice_lower[128][15] = kNaN; }).cause, GuardCause::kUnusedEntry);
+}
+
 TEST(GuardAccept, RefusesNumbersThatBoundNothing) {
   for (const double bad : {kNaN, kInf, -kInf}) {
     for (const auto change : {+[](certified_plan_t& c, double x) { c.plan.initial_center[1] = x; },

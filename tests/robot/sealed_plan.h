@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "forereach/certified_plan_t.hpp"
-#include "lcmtypes/codec.h"
+#include "lcmtypes/seal.h"
 
 namespace forereach {
 

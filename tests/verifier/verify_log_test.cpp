@@ -11,11 +11,13 @@
 #include "certifier/gate/obstacle_message.h"
 #include "cli/certificate_files.h"
 #include "forereach/certified_plan_t.hpp"
+#include "lcmtypes/seal.h"
 #include "tests/logger/scratch.h"
 
 namespace forereach {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using verifier::Status;
 using verifier::Verdict;
@@ -75,6 +77,28 @@ TEST(VerifyLog, SliceShrunkenByOneUlp) {
   ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
   EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("altered"));
   EXPECT_TRUE(file.certificates[1].mismatches.empty());
+}
+
+// The seal made good again covers no entry beyond those in use: these have to be zero.
+TEST(VerifyLog, AnEntryBeyondThoseInUse) {
+  Scratch scratch;
+  const auto path = EditedCertificate(scratch, true, [](certified_plan_t& certified) {
+    certified.slice_lower[certified.plan.num_steps + 1][2] = 0.5;
+  });
+  const auto file = ReadCertificates(path, kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, AllOf(HasSubstr("altered"), HasSubstr("slice_lower[")));
+  EXPECT_EQ(file.certificates[0].mismatches[0].found, "0.5");
+  EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed) << "the mathematics does not see it";
+}
+
+TEST(VerifyLog, ALaterExpiry) {
+  Scratch scratch;
+  const auto path =
+      EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1'000'000; });
+  const auto file = ReadCertificates(path, kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("certificate_digest"));
 }
 
 TEST(VerifyLog, SliceShrunkenAndResealed) {

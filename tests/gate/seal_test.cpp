@@ -1,0 +1,168 @@
+// The seal of a certified plan: what it is made of, and that nothing in the message can change without breaking it.
+#include "lcmtypes/seal.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/robot/sealed_plan.h"
+
+namespace forereach {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using Kind = SealFault::Kind;
+
+constexpr int kAllStates = 16, kAllSlices = 129;
+constexpr std::size_t kFingerprint = 8, kRow = kAllStates * sizeof(double);
+
+certified_plan_t Plan(int states, int steps) {
+  certified_plan_t certified{};
+  certified.utime = 1'700'000'000'000'000;
+  certified.sequence = 3;
+  certified.expires_utime = certified.utime + 2'000'000;
+  certified.plan.plan_id = 7;
+  certified.plan.num_states = static_cast<std::int16_t>(states);
+  certified.plan.num_inputs = 2;
+  certified.plan.num_steps = static_cast<std::int16_t>(steps);
+  certified.plan.control[steps - 1][1] = 0.25;
+  for (int t = 0; t <= steps; ++t)
+    for (int k = 0; k < states; ++k) {
+      certified.slice_lower[t][k] = -1 - t - 0.1 * k;
+      certified.slice_upper[t][k] = 1 + t + 0.1 * k;
+    }
+  SetDigest(certified.config_digest, DigestOf("config"));
+  SetDigest(certified.model_digest, DigestOf("model"));
+  SetDigest(certified.declaration_digest, DigestOf("declaration"));
+  SetDigest(certified.observations_digest, DigestOf("observations"));
+  SetDigest(certified.obstacles_digest, DigestOf("obstacles"));
+  Seal(certified);
+  return certified;
+}
+
+std::vector<Kind> FaultsAfter(const auto& change) {
+  certified_plan_t certified = Plan(6, 12);
+  change(certified);
+  std::vector<Kind> kinds;
+  for (const SealFault& fault : FindSealFaults(certified)) kinds.push_back(fault.kind);
+  return kinds;
+}
+
+TEST(Seal, HoldsFromTheSmallestPlanToTheLargest) {
+  for (const auto& [states, steps] : {std::pair(1, 1), {6, 12}, {16, 1}, {1, 128}, {16, 128}})
+    EXPECT_THAT(FindSealFaults(Plan(states, steps)), IsEmpty()) << states << " " << steps;
+}
+
+// The definition, read off the message as it is on the bus.
+TEST(Seal, DigestIsOfTheBytesOnTheBusThatAreInUse) {
+  for (const auto& [states, steps] : {std::pair(1, 1), {6, 12}, {16, 128}}) {
+    const certified_plan_t certified = Plan(states, steps);
+    const std::vector<std::uint8_t> message = Encode(certified);
+    std::vector<std::uint8_t> covered;
+    const auto cover = [&](std::size_t offset, std::size_t size) {
+      covered.insert(covered.end(), message.begin() + static_cast<std::ptrdiff_t>(offset),
+                     message.begin() + static_cast<std::ptrdiff_t>(offset + size));
+    };
+    cover(0, kFingerprint + 3 * sizeof(std::int64_t));
+    std::size_t slices = covered.size() + EncodedSize<candidate_plan_t>() - kFingerprint;
+    for (int bound = 0; bound < 2; ++bound, slices += kAllSlices * kRow)
+      for (std::size_t t = 0; t <= static_cast<std::size_t>(steps); ++t)
+        cover(slices + t * kRow, static_cast<std::size_t>(states) * sizeof(double));
+    cover(slices, 6 * sizeof(Digest));
+    EXPECT_EQ(CertificateDigest(certified), DigestOf(covered));
+    EXPECT_EQ(covered.size(), 224u + 16u * static_cast<unsigned>(states * (steps + 1)));
+  }
+}
+
+// Fast for good: other implementations have to come to the same.
+TEST(Seal, DigestOfAnExample) {
+  EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "2b4840076cfe98bd996951ae451cd5eaac7b9e3b0313de4caea5cf294273f184");
+}
+
+TEST(Seal, BreaksWithAnyBit) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  for (const auto& [states, steps] : {std::pair(6, 12), {16, 128}}) {
+    const std::vector<std::uint8_t> good = Encode(Plan(states, steps));
+    std::vector<std::uint8_t> bad = good;
+    for (std::size_t i = kFingerprint; i < good.size(); ++i) {
+      bad[i] ^= static_cast<std::uint8_t>(1u << random() % 8);
+      const auto certified = Decoded<certified_plan_t>(bad);
+      ASSERT_TRUE(certified);
+      ASSERT_FALSE(FindSealFaults(*certified).empty()) << "byte " << i << " of " << states << " states";
+      bad[i] = good[i];
+    }
+  }
+}
+
+TEST(Seal, OneUlpOfASliceInUse) {
+  const auto nudge = [](double& x) { x = std::nextafter(x, 0); };
+  EXPECT_THAT(FaultsAfter([&](auto& c) { nudge(c.slice_upper[12][5]); }), ElementsAre(Kind::kCertificateDigest));
+  EXPECT_THAT(FaultsAfter([&](auto& c) { nudge(c.slice_lower[0][0]); }), ElementsAre(Kind::kCertificateDigest));
+}
+
+TEST(Seal, AnEntryBeyondThoseInUse) {
+  for (const double stray : {1.0, -0.0, std::numeric_limits<double>::denorm_min(),
+                             std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_lower[12][6] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
+    EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_upper[13][0] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
+    EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_upper[128][15] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
+  }
+}
+
+TEST(Seal, TheFirstStrayEntryIsNamed) {
+  certified_plan_t certified = Plan(6, 12);
+  certified.slice_upper[3][7] = 2;
+  certified.slice_lower[40][3] = 1e-300;
+  Seal(certified);  // no digest covers it
+  const std::vector<SealFault> faults = FindSealFaults(certified);
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_EQ(faults[0].field, "slice_lower[40][3]");
+  EXPECT_EQ(faults[0].step, 40);
+  EXPECT_EQ(faults[0].coordinate, 3);
+  EXPECT_EQ(faults[0].value, 1e-300);
+  EXPECT_EQ(faults[0].found, "1e-300");
+}
+
+TEST(Seal, ThePlansBytes) {
+  EXPECT_THAT(FaultsAfter([](auto& c) { c.plan.control[4][0] = 1; }), ElementsAre(Kind::kPlanDigest));
+  EXPECT_THAT(FaultsAfter([](auto& c) { c.plan.control[100][7] = 1; }), ElementsAre(Kind::kPlanDigest)) << "unused";
+  const auto with_its_digest = [](auto& c) {
+    c.plan.control[4][0] = 1;
+    SetDigest(c.plan_digest, DigestOf(Encode(c.plan)));
+  };
+  EXPECT_THAT(FaultsAfter(with_its_digest), ElementsAre(Kind::kCertificateDigest));
+}
+
+TEST(Seal, TimesAndDigests) {
+  EXPECT_THAT(FaultsAfter([](auto& c) { ++c.utime; }), ElementsAre(Kind::kCertificateDigest));
+  EXPECT_THAT(FaultsAfter([](auto& c) { ++c.sequence; }), ElementsAre(Kind::kCertificateDigest));
+  EXPECT_THAT(FaultsAfter([](auto& c) { ++c.expires_utime; }), ElementsAre(Kind::kCertificateDigest));
+  EXPECT_THAT(FaultsAfter([](auto& c) { std::swap(c.config_digest, c.model_digest); }),
+              ElementsAre(Kind::kCertificateDigest));
+}
+
+// Fewer slices in use, or the same numbers as more slices of fewer states: the plan says otherwise.
+TEST(Seal, Counts) {
+  const auto with = [](int states, int steps) {
+    return FaultsAfter([=](certified_plan_t& c) {
+      c.plan.num_states = static_cast<std::int16_t>(states);
+      c.plan.num_steps = static_cast<std::int16_t>(steps);
+      SetDigest(c.certificate_digest, CertificateDigest(c));
+    });
+  };
+  EXPECT_THAT(with(6, 11), ElementsAre(Kind::kPlanDigest, Kind::kUnusedEntry));
+  EXPECT_THAT(with(6, 13), ElementsAre(Kind::kPlanDigest));
+  for (const auto& [states, steps] : {std::pair(0, 12), {-1, 12}, {17, 12}, {32767, 12}, {6, 0}, {6, -5}, {6, 129}})
+    EXPECT_THAT(with(states, steps), ElementsAre(Kind::kPlanDigest, Kind::kUnusedEntry)) << states << " " << steps;
+}
+
+}  // namespace
+}  // namespace forereach
