@@ -12,7 +12,7 @@ import subprocess
 from datetime import date
 from pathlib import Path
 
-SIZES = [25, 400, 10_000, 1_000_000]
+SIZES = [25, 400, 10_000, 1_000_000, 10_000_000]
 SCENARIOS = ["bicycle", "point_mass", "dense"]
 TO_MICROSECONDS = {"ns": 1e-3, "us": 1, "ms": 1e3, "s": 1e6}
 
@@ -130,14 +130,15 @@ class Report:
             if match := re.fullmatch(r"stage/(\w+)/(\w+)/(\d+)", name):
                 by_stage.setdefault(match[1], {}).setdefault(match[2], {})[int(match[3])] = self.cpu(name)
         rows = []
+        sizes = [n for n in SIZES if any(n in times for scenarios in by_stage.values() for times in scenarios.values())]
         for stage, scenarios in by_stage.items():
             for scenario, times in scenarios.items():
                 if list(times) == [400]:  # does not depend on N
-                    rows.append([stage.replace("_", ", "), number(times[400]), "", "", ""])
+                    rows.append([stage.replace("_", ", "), number(times[400])] + [""] * (len(sizes) - 1))
                 else:
-                    rows.append([f"{stage.replace('_', ', ')}, {scenario}"] + [number(times.get(n)) for n in SIZES])
+                    rows.append([f"{stage.replace('_', ', ')}, {scenario}"] + [number(times.get(n)) for n in sizes])
         rows.sort(key=lambda row: (row[2] == "", row[0]))
-        return table(["", *("N = " + size_name(n) for n in SIZES)], rows)
+        return table(["", *("N = " + size_name(n) for n in sizes)], rows)
 
     def plain_pairwise(self):
         times = [f"{number(time)} us at N = {n}" for n in SIZES

@@ -153,7 +153,7 @@ StepError BoundStepError(const Program& program, const ExpansionError& error,
   for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e) {
     const Program::Second& entry = program.hessian[e];
     const double product = MulUp(half_width[static_cast<std::size_t>(entry.row)], half_width[static_cast<std::size_t>(entry.column)]);
-    step.remainder[e] = AddUp(MulUp(error.hessian[e], product), kUnderflow);
+    step.remainder[e] = MulUp(1 + 0x1p-44, AddUp(MulUp(error.hessian[e], product), kUnderflow));
   }
   return step;
 }

@@ -26,7 +26,8 @@ struct StepError {
       |(J' G b - fl(J G) b)_k| <= image_k,  image_k = sum_l (jacobian_kl + gamma |J_kl|) r_l,
   gamma the relative error of a sum of as many products. Zero where row k of J copies one coordinate. */
   std::array<double, kMaxStates> image{};
-  /** Of each second derivative's term in the remainder: hessian_e r_i r_l, and what underflow takes. */
+  /** Of each second derivative's term in the remainder: hessian_e r_i r_l, what underflow takes, and 2^-44 of both for
+  the sum. */
   std::array<double, Program::kMaxSecond> remainder{};
 };
 

@@ -1,6 +1,7 @@
 // The remainder's bound against exact rationals: no quadratic form over the slice leaves it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -40,7 +41,12 @@ struct Case {
 
   [[nodiscard]] Remainder Bound(const Program& program, Method method) const {
     Remainder remainder;
-    RemainderBound(program, method).Enclose(slice, half_width.data(), hessian.data(), error.data(), remainder);
+    ExpansionError off;
+    std::ranges::copy(error, off.hessian.begin());
+    std::array<double, kMaxVariables> reach{};
+    std::copy_n(half_width.begin(), program.states, reach.begin());
+    const StepError step = BoundStepError(program, off, reach);
+    RemainderBound(program, method).Enclose(slice, half_width.data(), hessian.data(), step.remainder.data(), remainder);
     return remainder;
   }
 };
