@@ -11,7 +11,7 @@
 #include <mpfr.h>
 
 #include "certifier/dynamics/models.h"
-#include "robot/residuals.h"
+#include "certifier/dynamics/residuals.h"
 
 namespace forereach {
 namespace {
