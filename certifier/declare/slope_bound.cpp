@@ -163,47 +163,70 @@ class Search {
     ++result_.boxes;
     const bool inside =
         FindExit(domain_, std::span(box).first(Place(slopes_.num_variables()))).kind == DomainExit::Kind::kNone;
-    const Jet jet = slopes_.Enclose(result_.row, result_.column, box, active_);
-    leaf.number = std::min(bound, Bound(jet, box, inside));
+    cut_ = -1;
+    cut_score_ = 0;
+    leaf.number = std::min(bound, std::max(SignedBound(box, inside, 1), SignedBound(box, inside, -1)));
     if (leaf.number <= Enough())
       result_.upper = std::max(result_.upper, leaf.number);
     else
-      parts_.push({leaf.number, node, Cut(jet, box, inside), box});
+      parts_.push({leaf.number, node, cut_ < 0 && !inside ? WidestCut(box, inside) : cut_, box});
   }
 
-  // An upper bound on |slope| over the box; the points looked at on the way may raise the lower one.
-  double Bound(const Jet& jet, const Arguments& box, bool inside) {
-    const auto entries = std::span(jet.curvature).first(active_.size());
-    const bool smooth = std::ranges::all_of(entries, [](const Interval& c) { return c.IsFinite(); });
-    double bound = 0;
-    for (const double sign : {1.0, -1.0}) {
-      double natural = sign > 0 ? jet.slope.upper : -jet.slope.lower;
-      if (natural > Enough()) natural = std::min(natural, MeanValueBound(jet, box, inside, sign, smooth));
-      bound = std::max(bound, natural);
-    }
-    return bound;
-  }
-
-  double MeanValueBound(const Jet& jet, const Arguments& box, bool inside, double sign, bool smooth) {
-    std::vector<double> point(box.size());
-    for (std::size_t i = 0; i < box.size(); ++i) point[i] = box[i].Middle();
-    double excess = smooth ? 0 : kInfinity;
-    for (std::size_t i = 0; smooth && i < active_.size(); ++i) {
-      const std::size_t argument = Place(active_[i]);
-      const Interval& range = box[argument];
-      const Interval rise = sign > 0 ? jet.curvature[i] : -jet.curvature[i];
-      double& w = point[argument];
-      if (rise.lower >= 0) {
-        w = range.upper;
-      } else if (rise.upper <= 0) {
-        w = range.lower;
-      } else {
-        excess = AddUp(excess, std::max(MulUp(rise.upper, SubUp(range.upper, w)),
-                                        MulUp(-rise.lower, SubUp(w, range.lower))));
+  // An upper bound on sign * slope over the box, at least 0. What remains of the box shrinks to the ends at which the
+  // slope is largest, as far as it is monotone there; then the mean-value form takes the rest. The point looked at may
+  // raise the lower bound, and cut_ becomes the argument that cost most.
+  double SignedBound(const Arguments& box, bool inside, double sign) {
+    Arguments rest = box;
+    double bound = kInfinity;
+    while (true) {
+      const Jet jet = slopes_.Enclose(result_.row, result_.column, rest, active_);
+      bound = std::min(bound, std::max(0.0, sign > 0 ? jet.slope.upper : -jet.slope.lower));
+      if (bound <= Enough()) return bound;
+      const auto rises = std::span(jet.curvature).first(active_.size());
+      if (!std::ranges::all_of(rises, [](const Interval& c) { return c.IsFinite(); })) {
+        cut_ = WidestCut(box, inside);
+        (void)At(Middle(box), inside, sign);
+        return bound;
       }
+      if (!ShrinkToLargest(rises, sign, box, inside, rest))
+        return std::min(bound, std::max(0.0, MeanValueBound(rises, sign, rest, inside)));
     }
-    const Interval there = At(point, inside, sign);
-    return AddUp(there.upper, excess);
+  }
+
+  // Moves the arguments in which the slope is monotone to their better ends. Whether there were any.
+  bool ShrinkToLargest(std::span<const Interval> rises, double sign, const Arguments& box, bool inside,
+                       Arguments& rest) {
+    bool moved = false;
+    for (std::size_t i = 0; i < active_.size(); ++i) {
+      const Interval rise = sign > 0 ? rises[i] : -rises[i];
+      Interval& range = rest[Place(active_[i])];
+      if (!(range.lower < range.upper) || (rise.lower < 0 && rise.upper > 0)) continue;
+      range = rise.lower >= 0 ? range.upper : range.lower;
+      moved = true;
+      // The better end may lie outside the domain: then cutting helps all the same.
+      if (!inside && constrained_[Place(active_[i])])
+        Prefer(active_[i], rise.Magnitude() * Width(box[Place(active_[i])]), box, cut_, cut_score_);
+    }
+    return moved;
+  }
+
+  // Expanded around the point for which the bound is least: with slopes in [-l, u] over a width w the excess l u w /
+  // (l + u).
+  double MeanValueBound(std::span<const Interval> rises, double sign, const Arguments& rest, bool inside) {
+    std::vector<double> point = Middle(rest);
+    double excess = 0;
+    for (std::size_t i = 0; i < active_.size(); ++i) {
+      const Interval& range = rest[Place(active_[i])];
+      if (!(range.lower < range.upper)) continue;
+      const Interval rise = sign > 0 ? rises[i] : -rises[i];
+      double& w = point[Place(active_[i])];
+      const double share = rise.upper / (rise.upper - rise.lower);
+      w = std::clamp(range.lower + share * (range.upper - range.lower), range.lower, range.upper);
+      const double cost = std::max(MulUp(rise.upper, SubUp(range.upper, w)), MulUp(-rise.lower, SubUp(w, range.lower)));
+      excess = AddUp(excess, cost);
+      Prefer(active_[i], cost, rest, cut_, cut_score_);
+    }
+    return AddUp(At(point, inside, sign).upper, excess);
   }
 
   // sign * slope at a point, which counts if it is in the domain, or else one near it.
@@ -235,29 +258,12 @@ class Search {
     return sign > 0 ? slope : -slope;
   }
 
-  // The argument across which to cut: the one that the bound changes most with. An argument in which the slope is
-  // monotone counts only where its best end may lie outside the domain. -1 if cutting cannot help.
-  int Cut(const Jet& jet, const Arguments& box, bool inside) const {
-    int best = -1;
-    double best_score = 0;
-    for (std::size_t i = 0; i < active_.size(); ++i) {
-      const Interval& rise = jet.curvature[i];
-      const bool monotone = rise.lower >= 0 || rise.upper <= 0;
-      if (!rise.IsFinite()) return WidestCut(box, inside);
-      if (!monotone || (!inside && constrained_[Place(active_[i])]))
-        Prefer(active_[i], rise.Magnitude() * (box[Place(active_[i])].upper - box[Place(active_[i])].lower), box, best,
-               best_score);
-    }
-    return best >= 0 || inside ? best : WidestCut(box, inside);
-  }
-
   int WidestCut(const Arguments& box, bool inside) const {
     int best = -1;
     double best_score = 0;
     for (int i = 0; i < static_cast<int>(box.size()); ++i)
       if (std::ranges::count(active_, i) > 0 || (!inside && constrained_[Place(i)]))
-        Prefer(i, (box[Place(i)].upper - box[Place(i)].lower) / (root_[Place(i)].upper - root_[Place(i)].lower), box,
-               best, best_score);
+        Prefer(i, Width(box[Place(i)]) / Width(root_[Place(i)]), box, best, best_score);
     return best;
   }
 
@@ -269,6 +275,14 @@ class Search {
     best_score = score;
   }
 
+  static double Width(const Interval& range) { return range.upper - range.lower; }
+
+  static std::vector<double> Middle(const Arguments& box) {
+    std::vector<double> point(box.size());
+    std::ranges::transform(box, point.begin(), [](const Interval& range) { return range.Middle(); });
+    return point;
+  }
+
   const ResidualSlopes& slopes_;
   const Domain& domain_;
   const SlopeBoundOptions options_;
@@ -277,6 +291,8 @@ class Search {
   std::vector<bool> constrained_;  // by an inequality or a ball
   std::priority_queue<Part> parts_;
   SlopeBound result_;
+  int cut_ = -1;  // of the box that is being bounded
+  double cut_score_ = 0;
   double first_gap_ = 0, closed_ = 0;
 };
 
