@@ -140,6 +140,22 @@ Jet tan(const Jet& a) {
 }
 
 Jet SmoothGate(const Jet& a) { return Composed(a, SmoothGateRanges(a.value)); }
-Jet Softplus(const Jet& a) { return Composed(a, SoftplusRanges(a.value)); }
+
+Jet Softplus(const Jet& x, const Jet& temperature) {
+  const SoftplusRanges f(x.value, temperature.value);
+  Jet result(f.value);
+  result.size = std::max(x.size, temperature.size);
+  result.slope = Plus(Times(f.by_x, x.slope), Times(f.by_temperature, temperature.slope));
+  // d f_x and d f_t along the coordinate
+  const Interval bend_x = Plus(Times(f.by_xx, x.slope), Times(f.by_xt, temperature.slope));
+  const Interval bend_t = Plus(Times(f.by_xt, x.slope), Times(f.by_tt, temperature.slope));
+  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+    const Interval &dx = x.gradient[i], &dt = temperature.gradient[i];
+    result.gradient[i] = Plus(Times(f.by_x, dx), Times(f.by_temperature, dt));
+    result.curvature[i] = Plus(Plus(Times(bend_x, dx), Times(bend_t, dt)),
+                               Plus(Times(f.by_x, x.curvature[i]), Times(f.by_temperature, temperature.curvature[i])));
+  }
+  return result;
+}
 
 }  // namespace forereach

@@ -49,6 +49,6 @@ struct Jet {
 [[nodiscard]] Jet tan(const Jet& a);
 /** Of residuals.h. */
 [[nodiscard]] Jet SmoothGate(const Jet& a);
-[[nodiscard]] Jet Softplus(const Jet& a);
+[[nodiscard]] Jet Softplus(const Jet& x, const Jet& temperature);
 
 }  // namespace forereach

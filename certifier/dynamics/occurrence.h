@@ -20,10 +20,10 @@ class Occurrence final {
 
   [[nodiscard]] constexpr bool Of(int index) const { return (mask_ >> index & 1) != 0; }
 
-#define FOREREACH_BOTH(name)                                         \
+#define FOREREACH_BOTH(name)                                     \
   friend constexpr Occurrence name(Occurrence a, Occurrence b) { \
-    a.mask_ |= b.mask_;                                              \
-    return a;                                                        \
+    a.mask_ |= b.mask_;                                          \
+    return a;                                                    \
   }
 #define FOREREACH_ONE(name) \
   friend constexpr Occurrence name(Occurrence a) { return a; }
@@ -33,6 +33,7 @@ class Occurrence final {
   FOREREACH_BOTH(operator/)
   FOREREACH_BOTH(min)
   FOREREACH_BOTH(max)
+  FOREREACH_BOTH(Softplus)
   FOREREACH_ONE(operator-)
   FOREREACH_ONE(abs)
   FOREREACH_ONE(sqrt)
@@ -41,7 +42,6 @@ class Occurrence final {
   FOREREACH_ONE(cos)
   FOREREACH_ONE(tan)
   FOREREACH_ONE(SmoothGate)
-  FOREREACH_ONE(Softplus)
 #undef FOREREACH_BOTH
 #undef FOREREACH_ONE
 

@@ -21,11 +21,12 @@ T SmoothGate(const T& e) {
   return e > T(0) ? exp(T(-1) / e) : T(0);
 }
 
-/** log(1 + exp(x)), without overflow. */
+/** temperature log(1 + exp(x / temperature)), a smooth max(x, 0), without overflow. temperature > 0. */
 template <class T>
-T Softplus(const T& x) {
+T Softplus(const T& x, const T& temperature) {
   using std::exp, std::log1p;
-  return x > T(0) ? x + log1p(exp(-x)) : log1p(exp(x));
+  const T u = x / temperature;
+  return temperature * (u > T(0) ? u + log1p(exp(-u)) : log1p(exp(u)));
 }
 
 /** Lateral forces saturate: the car turns less than the kinematic bicycle. Over z = (x, y, theta, v, a, delta, jerk,
@@ -72,7 +73,7 @@ struct HeadingSaturation {
 /** Drag and a sideways force that set in above a speed. Over z = (px, py, vx, vy, ax, ay),
 Eqs. (pointmass-residual-accel), (pointmass-discrete-residual):
     s = sqrt(|v|^2 + smoothing),
-    g = softplus_temperature Softplus((s - knee) / softplus_temperature) / (s + regularizer),
+    g = Softplus(s - knee, softplus_temperature) / (s + regularizer),
     a_r = g M v,  M = [-damping, -cross; cross, -damping],  r = (dt^2/2 a_r, dt a_r).
 Odd in v; small below the knee, but not zero. */
 struct VelocityKnee {
@@ -100,8 +101,7 @@ struct VelocityKnee {
             &softplus_temperature = parameters[4], &regularizer = parameters[5], &smoothing = parameters[6];
     const T &vx = z[2], &vy = z[3];
     const T speed = sqrt(vx * vx + vy * vy + smoothing);
-    const T excess = softplus_temperature * Softplus((speed - knee) / softplus_temperature);
-    const T gain = excess / (speed + regularizer);
+    const T gain = Softplus(speed - knee, softplus_temperature) / (speed + regularizer);
     const std::array<T, 2> acceleration{gain * (-(damping * vx) - cross * vy), gain * (cross * vx - damping * vy)};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       residual[axis] = step * step / T(2) * acceleration[axis];

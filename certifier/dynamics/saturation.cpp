@@ -45,18 +45,22 @@ Interval GateSecond(const Interval& e) {
   return FromZero(at, e);
 }
 
-// ---- log(1 + exp(x)): its derivative is p = 1 / (1 + exp(-x)), the next p (1 - p).
+// ---- t log(1 + exp(x / t)), at points.
 
-Interval SoftplusAt(const Interval& x) {
-  return x.lower > 0 ? x + log1p(exp(-x)) : log1p(exp(x));
+Interval LogOnePlusExp(const Interval& u) { return u.lower > 0 ? u + log1p(exp(-u)) : log1p(exp(u)); }
+Interval Logistic(const Interval& u) {
+  const Interval small = exp(u.lower > 0 ? -u : u);
+  return (u.lower > 0 ? Interval(1) : small) / (Interval(1) + small);
 }
-Interval Logistic(const Interval& x) {
-  const Interval small = exp(x.lower > 0 ? -x : x);
-  return (x.lower > 0 ? Interval(1) : small) / (Interval(1) + small);
-}
-Interval LogisticSlope(const Interval& x) {
-  const Interval small = exp(x.lower > 0 ? -x : x);
+Interval LogisticSlope(const Interval& u) {
+  const Interval small = exp(u.lower > 0 ? -u : u);
   return small / sqr(Interval(1) + small);
+}
+// log(1 + exp(u)) - u p: even, falls with |u|, never negative.
+Interval Entropy(const Interval& u) {
+  const Interval positive = u.lower > 0 ? u : -u, small = exp(-positive);
+  const Interval entropy = log1p(small) + positive * small / (Interval(1) + small);
+  return {std::max(0.0, entropy.lower), entropy.upper};
 }
 
 }  // namespace
@@ -70,9 +74,20 @@ DerivativeRanges SmoothGateRanges(const Interval& e) {
   return {RangeOf(Gate, e, {}), RangeOf(GateFirst, e, {0.5}), RangeOf(GateSecond, e, {kBend, kOtherBend})};
 }
 
-DerivativeRanges SoftplusRanges(const Interval& x) {
-  if (!x.IsFinite()) return {Interval::Entire(), {0, 1}, {0, 0.25}};
-  return {RangeOf(SoftplusAt, x, {}), RangeOf(Logistic, x, {}), RangeOf(LogisticSlope, x, {0.0})};
+SoftplusRanges::SoftplusRanges(const Interval& x, const Interval& temperature)
+    : value(Interval::Entire()), by_x(0, 1), by_temperature(0, 1), by_xx(value), by_xt(value), by_tt(value) {
+  const Interval u = x / temperature;
+  if (!u.IsFinite() || !(temperature.lower > 0)) return;
+  const auto at = [](double x_end, double t_end) {
+    const Interval t(t_end);
+    return t * LogOnePlusExp(Interval(x_end) / t);
+  };
+  value = {at(x.lower, temperature.lower).lower, at(x.upper, temperature.upper).upper};
+  by_x = RangeOf(Logistic, u, {});
+  by_temperature = RangeOf(Entropy, u, {0.0});
+  by_xx = RangeOf(LogisticSlope, u, {0.0}) / temperature;
+  by_xt = -(u * by_xx);
+  by_tt = sqr(u) * by_xx;
 }
 
 }  // namespace forereach

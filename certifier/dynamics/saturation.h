@@ -14,7 +14,13 @@ struct DerivativeRanges {
 /** exp(-1/e) for e > 0, else 0. Where e <= 0 all three are exactly zero. */
 [[nodiscard]] DerivativeRanges SmoothGateRanges(const Interval& e);
 
-/** log(1 + exp(x)). */
-[[nodiscard]] DerivativeRanges SoftplusRanges(const Interval& x);
+/** u = x / temperature against f = temperature log(1 + exp(u)), temperature > 0:
+    f_x = p = 1 / (1 + exp(-u)),  f_t = log(1 + exp(u)) - u p,  (f_xx, f_xt, f_tt) = (1, -u, u^2) p (1 - p) / temperature.
+f increases in both. */
+struct SoftplusRanges {
+  Interval value, by_x, by_temperature, by_xx, by_xt, by_tt;
+
+  SoftplusRanges(const Interval& x, const Interval& temperature);
+};
 
 }  // namespace forereach
