@@ -224,7 +224,7 @@ class Search {
       w = std::clamp(range.lower + share * (range.upper - range.lower), range.lower, range.upper);
       const double cost = std::max(MulUp(rise.upper, SubUp(range.upper, w)), MulUp(-rise.lower, SubUp(w, range.lower)));
       excess = AddUp(excess, cost);
-      Prefer(active_[i], cost, rest, cut_, cut_score_);
+      Prefer(active_[i], rise.Magnitude() * Width(range), rest, cut_, cut_score_);
     }
     return AddUp(At(point, inside, sign).upper, excess);
   }

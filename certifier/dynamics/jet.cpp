@@ -134,8 +134,13 @@ Jet cos(const Jet& a) {
   return Composed(a, {value, -sin(a.value), -value});
 }
 
+// Within a quarter turn the tangent has its argument's sign: widening past zero would show a kink that is not there to
+// whoever takes the absolute value.
 Jet tan(const Jet& a) {
-  const Interval t = tan(a.value), slope = Interval(1) + sqr(t);
+  Interval t = tan(a.value);
+  if (t.IsFinite() && 0 <= a.value.lower && a.value.upper <= 1.5) t.lower = std::max(t.lower, 0.0);
+  if (t.IsFinite() && -1.5 <= a.value.lower && a.value.upper <= 0) t.upper = std::min(t.upper, 0.0);
+  const Interval slope = Interval(1) + sqr(t);
   return Composed(a, {t, slope, Interval(2) * t * slope});
 }
 
