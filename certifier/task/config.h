@@ -4,11 +4,13 @@ and, made from it, in config/README.md. */
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "certifier/certify/problem.h"
+#include "certifier/dynamics/parametric_residual.h"
 #include "certifier/task/canonical.h"
 #include "lcmtypes/codec.h"
 
@@ -78,6 +80,7 @@ struct Config {
   std::vector<Obstacle> obstacles;
   Digest obstacles_digest{};
   Box initial_set;  ///< X0, rounded outward.
+  std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds; dt and wheelbase are the model's.
   GateOptions gate;
   BusOptions bus;
   PlannerOptions planner;
