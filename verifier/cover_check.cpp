@@ -78,7 +78,8 @@ class ClaimCheck {
   [[nodiscard]] CoverVerdict Holds(double bound, const Box& box, int cuts) const {
     if (LiesOutside(box)) return {};
     Trial trial{-1, box};
-    if (IsAtMostOver(box, bound, 1, trial) && IsAtMostOver(box, bound, -1, trial)) return {};
+    const Dual slope = Slope(box, true);
+    if (IsAtMostOver(box, slope, bound, 1, trial) && IsAtMostOver(box, slope, bound, -1, trial)) return {};
     for (const Box& near : {trial.point, box})
       if (const auto witness = CounterExample(bound, near)) return *witness;
     if (cuts == 0 || trial.cut < 0) return {Answer::kUnknown, "a box's bound " + Text(bound) + " could not be shown"};
@@ -98,11 +99,10 @@ class ClaimCheck {
   };
 
   // Whether sign * slope <= bound over the box, by its range, or after the arguments in which it is monotone have moved
-  // to where it is largest, or expanded around the middle of the others.
-  [[nodiscard]] bool IsAtMostOver(const Box& box, double bound, double sign, Trial& trial) const {
+  // to where it is largest, or expanded around a point of the others. @param slope over the box.
+  [[nodiscard]] bool IsAtMostOver(const Box& box, Dual slope, double bound, double sign, Trial& trial) const {
     Box rest = box;
     while (true) {
-      const Dual slope = Slope(rest, true);
       if (CertainlyAtMost(Real(sign) * slope.value, bound)) return true;
       bool moved = false;
       for (std::size_t i = 0; i < rest.size(); ++i) {
@@ -114,23 +114,30 @@ class ClaimCheck {
         moved = true;
       }
       if (!moved) return ExpandsTo(rest, slope, bound, sign, trial);
+      slope = Slope(rest, true);
     }
   }
 
   [[nodiscard]] bool ExpandsTo(const Box& rest, const Dual& slope, double bound, double sign, Trial& trial) const {
-    Box& middle = trial.point = rest;
+    Box& point = trial.point = rest;
     Real excess(0.0), most(-1.0);
     for (std::size_t i = 0; i < rest.size(); ++i) {
       if (IsPoint(rest[i])) continue;
-      middle[i] = rest[i].middle();
-      const Real rise = i < slope.gradient.size() ? slope.gradient[i].magnitude() : Real(0.0);
-      const Real cost = (rise * Width(rest[i])).upper();
-      excess += cost * Real(0.5);
+      point[i] = rest[i].middle();
+      if (i >= slope.gradient.size() || slope.gradient[i].IsZero()) continue;
+      // Rises of at most up to the right and down to the left; the point where both cost the same costs least.
+      const Real rise = Real(sign) * slope.gradient[i];
+      const Real up = rise.upper(), down = (-rise).upper();
+      if (rise.IsFinite()) point[i] = (rest[i].lower() + Width(rest[i]) * (up / (up + down))).middle();
+      if (!CertainlyAtMost(rest[i].lower(), point[i]) || !CertainlyAtMost(point[i], rest[i].upper()))
+        point[i] = rest[i].middle();
+      const Real cost = max(up * (rest[i].upper() - point[i]), down * (point[i] - rest[i].lower())).upper();
+      excess += cost;
       if (trial.cut >= 0 && !CertainlyBelow(most, cost)) continue;
       trial.cut = static_cast<int>(i);
       most = cost;
     }
-    return CertainlyAtMost(Real(sign) * Slope(middle, false).value + excess, bound);
+    return CertainlyAtMost(Real(sign) * Slope(point, false).value + excess, bound);
   }
 
   // The middle of a box, if it is in the domain and the slope there is above the bound.

@@ -17,8 +17,8 @@ Dual Chain(Real value, const Real& by_a, const Dual& a, const Real& by_b, const 
   Dual result(std::move(value));
   result.gradient.resize(std::max(a.gradient.size(), b.gradient.size()));
   for (std::size_t i = 0; i < result.gradient.size(); ++i) {
-    if (i < a.gradient.size()) result.gradient[i] += by_a * Entry(a, i);
-    if (i < b.gradient.size()) result.gradient[i] += by_b * Entry(b, i);
+    if (!Entry(a, i).IsZero()) result.gradient[i] += by_a * Entry(a, i);
+    if (!Entry(b, i).IsZero()) result.gradient[i] += by_b * Entry(b, i);
   }
   return result;
 }
@@ -28,6 +28,9 @@ Dual Chain(Real value, const Real& slope, const Dual& a) {
   return Chain(std::move(value), slope, a, Real(0.0), none);
 }
 
+// Derivatives cost as much as values: none where nobody asks for them.
+bool Varies(const Dual& a) { return !a.gradient.empty(); }
+
 Real Hull(const Real& a, const Real& b) { return Real::FromTo(min(a, b), max(a, b)); }
 
 bool MayMeet(const Real& x, const Real& point) { return !CertainlyBelow(x, point) && !CertainlyBelow(point, x); }
@@ -35,6 +38,7 @@ bool MayMeet(const Real& x, const Real& point) { return !CertainlyBelow(x, point
 // The range of a function that is monotone but for extrema.
 template <class Function>
 Real RangeOf(const Function& at, const Real& x, std::initializer_list<Real> extrema) {
+  if (CertainlyAtMost(x.upper(), x.lower())) return at(x);
   Real range = Hull(at(x.lower()), at(x.upper()));
   for (const Real& extremum : extrema)
     if (MayMeet(x, extremum)) range = Hull(range, at(extremum));
@@ -96,17 +100,23 @@ Dual tan(const Dual& a) {
   return Chain(t, Real(1.0) + sqr(t), a);
 }
 
-Dual Gate(const Dual& e) { return Chain(RangeOf(GateAt, e.value, {}), GateSlopeRange(e.value), e); }
-Dual GateSlope(const Dual& e) { return Chain(GateSlopeRange(e.value), GateBendRange(e.value), e); }
+Dual Gate(const Dual& e) {
+  return Chain(RangeOf(GateAt, e.value, {}), Varies(e) ? GateSlopeRange(e.value) : 0.0, e);
+}
+Dual GateSlope(const Dual& e) {
+  return Chain(GateSlopeRange(e.value), Varies(e) ? GateBendRange(e.value) : 0.0, e);
+}
 
 Dual SoftRamp(const Dual& x, const Dual& t) {
   const auto at = [](const Real& x_end, const Real& t_end) { return t_end * LogAt(x_end / t_end); };
   const Real value = Hull(at(x.value.lower(), t.value.lower()), at(x.value.upper(), t.value.upper()));
   const Real u = x.value / t.value;
-  return Chain(value, RangeOf(LogisticAt, u, {}), x, RangeOf(EntropyAt, u, {0.0}), t);
+  return Chain(value, Varies(x) ? RangeOf(LogisticAt, u, {}) : 0.0, x,
+               Varies(t) ? RangeOf(EntropyAt, u, {0.0}) : 0.0, t);
 }
 Dual SoftStep(const Dual& x, const Dual& t) {
-  const Real u = x.value / t.value, bend = RangeOf(LogisticSlopeAt, u, {0.0}) / t.value;
+  const Real u = x.value / t.value;
+  const Real bend = Varies(x) || Varies(t) ? RangeOf(LogisticSlopeAt, u, {0.0}) / t.value : 0.0;
   return Chain(RangeOf(LogisticAt, u, {}), bend, x, -(u * bend), t);
 }
 
