@@ -90,10 +90,10 @@ TEST(SlopeBound, OverABallItsBoundaryCounts) {
 TEST(SlopeBound, OverAnInequality) {
   Domain domain = Square(2);
   Eigen::VectorXd coefficients(3);
-  coefficients << 1, 1, 0;
+  coefficients << 2, 1, 0;
   domain.inequalities.push_back({coefficients, 1});
   domain.inequalities.push_back({-coefficients, 1});
-  ExpectSupremum(Bound<Wave>(domain, 1, 0), 1);  // |z0 + z1| <= 1
+  ExpectSupremum(Bound<Wave>(domain, 1, 0), 1.5);  // |z0 + z1| where |2 z0 + z1| <= 1
 }
 
 TEST(SlopeBound, OfWhatDoesNotOccurIsZero) {
