@@ -131,9 +131,10 @@ void SaveCover(const std::string& path, const Config& config, const std::vector<
                        {"column", names[static_cast<std::size_t>(claim.column)]},
                        {"bound", claim.bound},
                        {"cover", TreeJson(claim.cover, 0, names)}});
-  const Json document{{"residual", {{"name", config.residual->name}, {"parameters", parameters}}},
-                      {"entries", entries},
-                      {"digests", {{"residual", ToHex(ResidualDigest(config))}, {"cover", ToHex(CoverDigest(claims))}}}};
+  const Json document{
+      {"residual", {{"name", config.residual->name}, {"parameters", parameters}}},
+      {"entries", entries},
+      {"digests", {{"residual", ToHex(ResidualDigest(config))}, {"cover", ToHex(CoverDigest(claims))}}}};
   std::ofstream file(path, std::ios::binary);
   if (!(file << document.dump() << "\n") || !file.flush()) throw ConfigError(path + ": cannot be written");
 }

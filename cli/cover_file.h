@@ -1,5 +1,5 @@
-/** The file in which `forereach declare --cover` leaves the proof of its bounds. JSON: `residual` (its name, the range of
-each parameter), `entries` (row, column, bound, cover), `digests` (residual, cover). A cover is a tree: a leaf is a
+/** The file in which `forereach declare --cover` leaves the proof of its bounds. JSON: `residual` (its name, the range
+of each parameter), `entries` (row, column, bound, cover), `digests` (residual, cover). A cover is a tree: a leaf is a
 number, the bound over its box, or null where that lies outside the domain; else it is [name, at, below, above], the
 argument that is cut, where, and the two parts. */
 #pragma once

@@ -1,12 +1,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
-#include <map>
 #include <sstream>
 #include <thread>
 
@@ -14,7 +11,6 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/declare/slope_bound.h"
-#include "certifier/numerics/text.h"
 #include "certifier/task/number.h"
 #include "cli/commands.h"
 #include "cli/cover_file.h"
@@ -47,8 +43,9 @@ void InParallel(std::size_t count, unsigned jobs, const Work& work) {
 Config LoadWithResidual(const std::string& path) {
   Config config = LoadConfig(path, TransitionsFile::kIgnore);
   if (!config.residual)
-    throw ConfigError(path + ":1: residual: missing: its equations by name, with a number or [least, largest] for each "
-                             "parameter that is not the paper's; for example  residual: {name: " +
+    throw ConfigError(path +
+                      ":1: residual: missing: its equations by name, with a number or [least, largest] for each "
+                      "parameter that is not the paper's; for example  residual: {name: " +
                       (config.problem->model->name() == "point_mass" ? "velocity_knee, damping: [0.38, 0.42]"
                                                                      : "heading_saturation, friction: [0.8, 1.0]") +
                       "}");
@@ -96,8 +93,8 @@ std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::s
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     const bool same_row = i > 0 && bounds[i - 1].row == bounds[i].row;
     if (!same_row) text += (i > 0 ? "}, " : "") + names[static_cast<std::size_t>(bounds[i].row)] + ": {";
-    text += (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " +
-            RoundedUp(bounds[i].upper);
+    text +=
+        (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " + RoundedUp(bounds[i].upper);
   }
   return text + (bounds.empty() ? "}" : "}}");
 }
@@ -149,27 +146,34 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
           {"seconds", seconds},
           {"yaml", Yaml(bounds, names)},
           {"digests",
-           {{"config", ToHex(config.digest)}, {"model", ToHex(config.model_digest)}, {"residual", ToHex(ResidualDigest(config))}}}};
+           {{"config", ToHex(config.digest)},
+            {"model", ToHex(config.model_digest)},
+            {"residual", ToHex(ResidualDigest(config))}}}};
+}
+
+bool IsFree(const Config& config, std::size_t parameter) {
+  return config.residual->parameters[parameter].lower < config.residual->parameters[parameter].upper;
 }
 
 void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
+  const auto slopes = MakeResidualSlopes(config.residual->name);
   const std::vector<std::string> names = ArgumentNames(config);
+  const std::size_t parameters_begin = names.size() - config.residual->parameters.size();
   const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
   std::ostringstream text;
   text << std::left << "declare: " << config.residual->name << " over the domain, "
        << (AllReached(bounds) ? "to a gap of " : "stopped at a gap of ") << std::setprecision(2) << LargestGap(bounds)
        << "\n  " << std::setw(8) << "row" << std::setw(8) << "column" << std::setw(18) << "certified bound"
-       << std::setw(18) << "largest found" << std::setw(10) << "gap" << std::setw(10) << "boxes" << "at\n";
+       << std::setw(18) << "largest found" << std::setw(10) << "gap" << std::setw(9) << "boxes"
+       << " at\n";
   for (const SlopeBound& bound : bounds) {
     text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)
          << RoundedUp(bound.upper) << std::setprecision(10) << std::setw(18) << bound.lower << std::setprecision(2)
-         << std::setw(10) << bound.gap() << std::setw(10) << bound.boxes << std::setprecision(6);
-    for (std::size_t i = 0; i < bound.point.size(); ++i) {
-      const bool fixed = i >= names.size() - config.residual->parameters.size() &&
-                         config.residual->parameters[i + config.residual->parameters.size() - names.size()].lower ==
-                             config.residual->parameters[i + config.residual->parameters.size() - names.size()].upper;
-      if (!fixed) text << (i == 0 ? "" : " ") << names[i] << " " << bound.point[i];
-    }
+         << std::setw(10) << bound.gap() << std::setw(9) << bound.boxes << std::setprecision(6);
+    for (std::size_t i = 0; i < bound.point.size(); ++i)
+      if (slopes->Occurs(bound.row, static_cast<int>(i)) &&
+          (i < parameters_begin || IsFree(config, i - parameters_begin)))
+        text << " " << names[i] << " " << bound.point[i];
     text << "\n";
   }
   std::cout << text.str() << "  all other entries are zero\n  took " << seconds << " s\n\ndeclaration:\n  "
@@ -233,8 +237,8 @@ std::vector<Finding> CheckClaims(const CoverFile& file, const Config& config, co
   InParallel(file.claims.size(), jobs, [&](std::size_t i) {
     const verifier::SlopeClaim& claim = file.claims[i];
     const verifier::CoverVerdict verdict = checker.Check(claim, [&] { progress.Advance(); });
-    findings[i] = {verdict.answer, names[static_cast<std::size_t>(claim.row)] + " by " +
-                                       names[static_cast<std::size_t>(claim.column)],
+    findings[i] = {verdict.answer,
+                   names[static_cast<std::size_t>(claim.row)] + " by " + names[static_cast<std::size_t>(claim.column)],
                    verdict.what};
   });
   return findings;
@@ -252,7 +256,9 @@ int CheckCover(const Options& options) {
       std::ranges::any_of(findings, [](const Finding& finding) { return finding.answer == verifier::Answer::kNo; });
   const std::string verdict = refuted ? "refuted" : findings.empty() ? "confirmed" : "cannot verify";
   if (options.json) {
-    Json document{{"verdict", refuted ? "refuted" : findings.empty() ? "confirmed" : "cannot_verify"},
+    Json document{{"verdict", refuted            ? "refuted"
+                              : findings.empty() ? "confirmed"
+                                                 : "cannot_verify"},
                   {"entries", file.claims.size()},
                   {"failures", Json::array()}};
     for (const Finding& finding : findings)
@@ -279,7 +285,8 @@ void AddDeclareCommand(CLI::App& app, Action& action) {
       ->required()
       ->type_name("FILE");
   command
-      ->add_option("--gap", options->search.gap, "Ends when no bound is above the largest slope found by more than this part")
+      ->add_option("--gap", options->search.gap,
+                   "Ends when no bound is above the largest slope found by more than this part")
       ->check(CLI::Range(1e-12, 1e3))
       ->capture_default_str();
   command->add_option("--max-boxes", options->search.max_boxes, "Ends here too, for each bound; what it has then holds")

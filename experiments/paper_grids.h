@@ -1,6 +1,6 @@
-/** The paper's own certified declarations, by its own fixed grids: on each cell every factor of a derivative is replaced
-by its largest value there. In plain double arithmetic, so figures to compare with, not bounds to rely on; those are
-`forereach declare`'s, and lie a little below. */
+/** The paper's own certified declarations, by its own fixed grids: on each cell every factor of a derivative is
+replaced by its largest value there. In plain double arithmetic, so figures to compare with, not bounds to rely on;
+those are `forereach declare`'s, and lie a little below. */
 #pragma once
 
 #include "certifier/dynamics/residuals.h"

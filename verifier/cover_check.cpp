@@ -92,7 +92,8 @@ class ClaimCheck {
     return Holds(bound, half, cuts - 1);
   }
 
-  // What was learnt where a bound could not be shown: the argument that cost most, and a point where the slope is large.
+  // What was learnt where a bound could not be shown: the argument that cost most, and a point where the slope is
+  // large.
   struct Trial {
     int cut;
     Box point;
@@ -146,8 +147,8 @@ class ClaimCheck {
     for (Real& w : point) w = w.middle();
     const Real size = abs(Slope(point, false).value);
     if (!CertainlyBelow(bound, size) || !LiesInside(point)) return std::nullopt;
-    return CoverVerdict{Answer::kNo, "a box's bound is " + Text(bound) + ", but the slope is " + Text(size) +
-                                         " at a point of it"};
+    return CoverVerdict{Answer::kNo,
+                        "a box's bound is " + Text(bound) + ", but the slope is " + Text(size) + " at a point of it"};
   }
 
   [[nodiscard]] Dual Slope(const Box& w, bool with_gradient) const {
@@ -175,13 +176,15 @@ class ClaimCheck {
   }
 
   [[nodiscard]] bool LiesOutside(const Box& box) const {
-    return std::ranges::any_of(domain_.inequalities, [&](const auto& i) { return CertainlyBelow(i.bound, ValueOver(i, box)); }) ||
+    return std::ranges::any_of(domain_.inequalities,
+                               [&](const auto& i) { return CertainlyBelow(i.bound, ValueOver(i, box)); }) ||
            std::ranges::any_of(domain_.balls, [&](const auto& ball) {
              return CertainlyBelow(sqr(Real(ball.radius)), SquaredDistanceOver(ball, box));
            });
   }
   [[nodiscard]] bool LiesInside(const Box& point) const {
-    return std::ranges::all_of(domain_.inequalities, [&](const auto& i) { return CertainlyAtMost(ValueOver(i, point), i.bound); }) &&
+    return std::ranges::all_of(domain_.inequalities,
+                               [&](const auto& i) { return CertainlyAtMost(ValueOver(i, point), i.bound); }) &&
            std::ranges::all_of(domain_.balls, [&](const auto& ball) {
              return CertainlyAtMost(SquaredDistanceOver(ball, point), sqr(Real(ball.radius)));
            });
@@ -209,8 +212,7 @@ CoverVerdict CoverChecker::Check(const SlopeClaim& claim, const std::function<vo
   const Precision precision(kBits);
   Box whole;
   for (const forereach::Box* part : {&domain_.state, &domain_.input})
-    for (Eigen::Index l = 0; l < part->dim(); ++l)
-      whole.push_back(Real::FromTo(part->lower()[l], part->upper()[l]));
+    for (Eigen::Index l = 0; l < part->dim(); ++l) whole.push_back(Real::FromTo(part->lower()[l], part->upper()[l]));
   const std::size_t num_variables = whole.size();
   for (const auto& [name, lower, upper] : residual_.parameters) whole.push_back(Real::FromTo(lower, upper));
   return ClaimCheck(domain_, *slopes_, claim, num_variables).Walk(whole, checked);

@@ -49,9 +49,7 @@ Real RangeOf(const Function& at, const Real& x, std::initializer_list<Real> extr
 bool IsOff(const Real& e) { return CertainlyAtMost(e, 0.0); }
 Real GateAt(const Real& e) { return IsOff(e) ? Real(0.0) : exp(Real(-1.0) / e); }
 Real GateSlopeAt(const Real& e) { return IsOff(e) ? Real(0.0) : GateAt(e) / sqr(e); }
-Real GateBendAt(const Real& e) {
-  return IsOff(e) ? Real(0.0) : GateAt(e) * (Real(1.0) - Real(2.0) * e) / sqr(sqr(e));
-}
+Real GateBendAt(const Real& e) { return IsOff(e) ? Real(0.0) : GateAt(e) * (Real(1.0) - Real(2.0) * e) / sqr(sqr(e)); }
 
 Real GateSlopeRange(const Real& e) { return RangeOf(GateSlopeAt, e, {0.5}); }
 
@@ -100,19 +98,15 @@ Dual tan(const Dual& a) {
   return Chain(t, Real(1.0) + sqr(t), a);
 }
 
-Dual Gate(const Dual& e) {
-  return Chain(RangeOf(GateAt, e.value, {}), Varies(e) ? GateSlopeRange(e.value) : 0.0, e);
-}
-Dual GateSlope(const Dual& e) {
-  return Chain(GateSlopeRange(e.value), Varies(e) ? GateBendRange(e.value) : 0.0, e);
-}
+Dual Gate(const Dual& e) { return Chain(RangeOf(GateAt, e.value, {}), Varies(e) ? GateSlopeRange(e.value) : 0.0, e); }
+Dual GateSlope(const Dual& e) { return Chain(GateSlopeRange(e.value), Varies(e) ? GateBendRange(e.value) : 0.0, e); }
 
 Dual SoftRamp(const Dual& x, const Dual& t) {
   const auto at = [](const Real& x_end, const Real& t_end) { return t_end * LogAt(x_end / t_end); };
   const Real value = Hull(at(x.value.lower(), t.value.lower()), at(x.value.upper(), t.value.upper()));
   const Real u = x.value / t.value;
-  return Chain(value, Varies(x) ? RangeOf(LogisticAt, u, {}) : 0.0, x,
-               Varies(t) ? RangeOf(EntropyAt, u, {0.0}) : 0.0, t);
+  return Chain(value, Varies(x) ? RangeOf(LogisticAt, u, {}) : 0.0, x, Varies(t) ? RangeOf(EntropyAt, u, {0.0}) : 0.0,
+               t);
 }
 Dual SoftStep(const Dual& x, const Dual& t) {
   const Real u = x.value / t.value;

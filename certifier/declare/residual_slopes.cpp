@@ -21,7 +21,8 @@ std::vector<Interval> ParameterRanges(const ResidualSlopes& slopes, const Parame
   std::vector<Interval> ranges;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto& [name, lower, upper] = residual.parameters[i];
-    if (name != names[i]) throw std::invalid_argument("residual: parameter " + name + " stands where " + names[i] + " has to");
+    if (name != names[i])
+      throw std::invalid_argument("residual: parameter " + name + " stands where " + names[i] + " has to");
     if (!(-kInfinity < lower && lower <= upper && upper < kInfinity))
       throw std::invalid_argument("residual: " + name + " in [" + ToText(lower) + ", " + ToText(upper) +
                                   "] is empty or not finite");

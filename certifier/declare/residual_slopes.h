@@ -35,8 +35,8 @@ class ResidualSlopes {
 
   /** @param w num_arguments() ranges. @param active the arguments that gradient entries are wanted for, at most
   Jet::kMaxArguments; `column` among them.
-  @return r_row: `slope` encloses its generalised partial derivative by z_column over w, `curvature[i]` the derivative of
-  that by active[i], unbounded where there is none. */
+  @return r_row: `slope` encloses its generalised partial derivative by z_column over w, `curvature[i]` the derivative
+  of that by active[i], unbounded where there is none. */
   [[nodiscard]] virtual Jet Enclose(int row, int column, std::span<const Interval> w,
                                     std::span<const int> active) const = 0;
 

@@ -49,8 +49,9 @@ double SmallestSquaredDistance(const Domain::Ball& ball, const Arguments& box) {
 }
 
 bool LiesOutside(const Domain& domain, const Arguments& box) {
-  return std::ranges::any_of(domain.inequalities,
-                             [&](const auto& inequality) { return SmallestValue(inequality, box) > inequality.bound; }) ||
+  return std::ranges::any_of(
+             domain.inequalities,
+             [&](const auto& inequality) { return SmallestValue(inequality, box) > inequality.bound; }) ||
          std::ranges::any_of(domain.balls, [&](const auto& ball) {
            return SmallestSquaredDistance(ball, box) > MulUp(ball.radius, ball.radius);
          });
@@ -73,8 +74,9 @@ void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z)
     for (const auto& [coefficients, bound] : domain.inequalities) {
       const Eigen::Map<Eigen::VectorXd> point(z.data(), coefficients.size());
       const double excess = coefficients.dot(point) - bound;
-      if (excess > 0) Eigen::Map<Eigen::VectorXd>(z.data(), coefficients.size()) -=
-          excess / kInward / coefficients.squaredNorm() * coefficients;
+      if (excess > 0)
+        Eigen::Map<Eigen::VectorXd>(z.data(), coefficients.size()) -=
+            excess / kInward / coefficients.squaredNorm() * coefficients;
     }
     for (std::size_t l = 0; l < z.size(); ++l) z[l] = std::clamp(z[l], box[l].lower, box[l].upper);
   }
@@ -307,8 +309,8 @@ double SlopeBound::gap() const {
   return lower > 0 ? DivUp(SubUp(upper, lower), lower) : kInfinity;
 }
 
-SlopeBound BoundSlope(const ResidualSlopes& slopes, const Domain& domain, std::span<const Interval> parameters,
-                      int row, int column, const SlopeBoundOptions& options, const SlopeProgress& progress) {
+SlopeBound BoundSlope(const ResidualSlopes& slopes, const Domain& domain, std::span<const Interval> parameters, int row,
+                      int column, const SlopeBoundOptions& options, const SlopeProgress& progress) {
   domain.Validate(slopes.num_states(), slopes.num_variables() - slopes.num_states());
   Require(parameters.size() == slopes.parameter_names().size(),
           std::to_string(parameters.size()) + " parameter ranges for " +

@@ -4,7 +4,8 @@ branch and bound.
 A box is bounded by the better of two enclosures. The natural one evaluates the derivative over the box. The mean-value
 form first moves every argument in which the derivative is monotone over the box to the end where it is largest, then
 expands around the middle of the others: its error shrinks with the square of the box. The box of largest bound is cut
-next, across the argument that contributes most to it. Arguments that the derivative does not depend on are never cut. */
+next, across the argument that contributes most to it. Arguments that the derivative does not depend on are never cut.
+*/
 #pragma once
 
 #include <cstddef>
@@ -19,7 +20,7 @@ next, across the argument that contributes most to it. Arguments that the deriva
 namespace forereach {
 
 struct SlopeBoundOptions {
-  double gap = 1e-7;                    ///< Ends when upper <= (1 + gap) lower.
+  double gap = 1e-7;                  ///< Ends when upper <= (1 + gap) lower.
   std::size_t max_boxes = 1'000'000;  ///< Ends here too, with the bound it has by then.
 };
 
@@ -41,8 +42,8 @@ struct SlopeBound {
 using SlopeProgress = std::function<void(double)>;
 
 /** @param domain of the residual's sizes, valid. @param parameters the range of each.
-@throws std::invalid_argument if a size or an index does not fit, an option is not positive, or the derivative depends on
-more than Jet::kMaxArguments arguments. */
+@throws std::invalid_argument if a size or an index does not fit, an option is not positive, or the derivative depends
+on more than Jet::kMaxArguments arguments. */
 [[nodiscard]] SlopeBound BoundSlope(const ResidualSlopes& slopes, const Domain& domain,
                                     std::span<const Interval> parameters, int row, int column,
                                     const SlopeBoundOptions& options = {}, const SlopeProgress& progress = {});

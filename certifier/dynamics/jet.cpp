@@ -17,9 +17,7 @@ Interval Times(const Interval& a, const Interval& b) { return IsZero(a) || IsZer
 Interval Plus(const Interval& a, const Interval& b) { return IsZero(a) ? b : IsZero(b) ? a : a + b; }
 Interval Over(const Interval& a, const Interval& b) { return IsZero(a) ? kZero : a / b; }
 
-Interval Hull(const Interval& a, const Interval& b) {
-  return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)};
-}
+Interval Hull(const Interval& a, const Interval& b) { return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)}; }
 
 // f(a) from the ranges of f and its derivatives over a.
 Jet Composed(const Jet& a, const DerivativeRanges& f) {
@@ -92,8 +90,8 @@ Jet operator/(const Jet& a, const Jet& b) {
   q.slope = Over(Plus(a.slope, -Times(q.value, b.slope)), b.value);
   for (std::size_t i = 0; i < static_cast<std::size_t>(q.size); ++i) {
     q.gradient[i] = Over(Plus(a.gradient[i], -Times(q.value, b.gradient[i])), b.value);
-    const Interval rest = Plus(Plus(Times(q.gradient[i], b.slope), Times(q.slope, b.gradient[i])),
-                               Times(q.value, b.curvature[i]));
+    const Interval rest =
+        Plus(Plus(Times(q.gradient[i], b.slope), Times(q.slope, b.gradient[i])), Times(q.value, b.curvature[i]));
     q.curvature[i] = Over(Plus(a.curvature[i], -rest), b.value);
   }
   return q;

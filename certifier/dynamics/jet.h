@@ -16,7 +16,7 @@ struct Jet {
   static constexpr int kMaxArguments = 16;
   using Row = std::array<Interval, kMaxArguments>;
 
-  Interval value{0.0}, slope{0.0};   ///< f and df/dc, c the coordinate.
+  Interval value{0.0}, slope{0.0};    ///< f and df/dc, c the coordinate.
   Row gradient = {}, curvature = {};  ///< df/dw_i and d(df/dc)/dw_i for the first `size` arguments; else zero.
   int size = 0;
 

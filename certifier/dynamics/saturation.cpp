@@ -8,9 +8,7 @@
 namespace forereach {
 namespace {
 
-Interval Hull(const Interval& a, const Interval& b) {
-  return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)};
-}
+Interval Hull(const Interval& a, const Interval& b) { return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)}; }
 
 // The range of a function over x: its values at the ends and at those of its extrema that x may meet.
 template <class Function>

@@ -15,8 +15,8 @@ struct DerivativeRanges {
 [[nodiscard]] DerivativeRanges SmoothGateRanges(const Interval& e);
 
 /** u = x / temperature against f = temperature log(1 + exp(u)), temperature > 0:
-    f_x = p = 1 / (1 + exp(-u)),  f_t = log(1 + exp(u)) - u p,  (f_xx, f_xt, f_tt) = (1, -u, u^2) p (1 - p) / temperature.
-f increases in both. */
+    f_x = p = 1 / (1 + exp(-u)),  f_t = log(1 + exp(u)) - u p,  (f_xx, f_xt, f_tt) = (1, -u, u^2) p (1 - p) /
+temperature. f increases in both. */
 struct SoftplusRanges {
   Interval value, by_x, by_temperature, by_xx, by_xt, by_tt;
 

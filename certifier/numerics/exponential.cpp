@@ -13,9 +13,7 @@ double WidenDown(double x) { return NextDown(NextDown(x)); }
 
 }  // namespace
 
-Interval exp(const Interval& x) {
-  return {std::max(0.0, WidenDown(std::exp(x.lower))), WidenUp(std::exp(x.upper))};
-}
+Interval exp(const Interval& x) { return {std::max(0.0, WidenDown(std::exp(x.lower))), WidenUp(std::exp(x.upper))}; }
 
 Interval log1p(const Interval& x) {
   if (!(x.lower > -1)) return Interval::Entire();

@@ -62,7 +62,8 @@ class DeclareTest : public testing::Test {
   }
   // As somebody would who knows how digests are made.
   void Reseal() const {
-    const std::string digest = ToHex(CoverDigest(LoadCover(cover_, LoadConfig(task_, TransitionsFile::kIgnore)).claims));
+    const std::string digest =
+        ToHex(CoverDigest(LoadCover(cover_, LoadConfig(task_, TransitionsFile::kIgnore)).claims));
     Tamper([&](Json& document) { document["digests"]["cover"] = digest; });
   }
   void ExpectRefuted(const char* text) const {
@@ -95,14 +96,15 @@ TEST(Declare, GivesTheMatrixOfTheShippedTask) {
   EXPECT_TRUE(document["reached"]);
   EXPECT_EQ(document["entries"][1]["point"]["v"], 25);
   EXPECT_GT(document["boxes"], 2);
-  for (const char* digest : {"config", "model", "residual"}) EXPECT_EQ(document["digests"][digest].get<std::string>().size(), 64u);
+  for (const char* digest : {"config", "model", "residual"})
+    EXPECT_EQ(document["digests"][digest].get<std::string>().size(), 64u);
 }
 
 TEST_F(DeclareTest, ItsLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
   WriteTask("residual: {name: heading_saturation, understeer: [0.3, 0.34], friction: [0.85, 0.95]}\n");
   const Json document = Json::parse(Declare("--json").text);
-  const std::string text = std::regex_replace(Read(task_), std::regex("\n  lipschitz: .*"),
-                                              "\n  " + document["yaml"].get<std::string>());
+  const std::string text =
+      std::regex_replace(Read(task_), std::regex("\n  lipschitz: .*"), "\n  " + document["yaml"].get<std::string>());
   std::ofstream(task_) << text;
   const Eigen::MatrixXd lipschitz = LoadConfig(task_, TransitionsFile::kIgnore).problem->declaration.lipschitz;
   for (const int l : {3, 5}) {
@@ -166,7 +168,8 @@ TEST_F(DeclareTest, BadInputExitsWithTwoAndOneLine) {
   expect("residual: {name: velocity_knee}\n", "residual.name: velocity_knee is for point_mass");
   expect("residual: {name: heading_saturation, knee: 1}\n", "residual.knee: is for velocity_knee");
   expect("residual: {name: heading_saturation, mu: 1}\n", "residual.mu: unknown key");
-  expect("residual: {name: heading_saturation, friction: [0.9, 0.8]}\n", "residual.friction[1]: 0.8 is outside [0.9, inf)");
+  expect("residual: {name: heading_saturation, friction: [0.9, 0.8]}\n",
+         "residual.friction[1]: 0.8 is outside [0.9, inf)");
   expect("residual: {name: heading_saturation, friction: [0.9]}\n", "residual.friction: has 1 entries");
   expect("residual: {name: heading_saturation, friction: [-1, 1]}\n", "residual.friction[0]: -1 is outside [0, inf)");
   EXPECT_EQ(Forereach("declare --config config/bicycle.yaml --check README.md 2>/dev/null").code, 2);

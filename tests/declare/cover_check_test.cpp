@@ -20,9 +20,8 @@ SlopeClaim ClaimOf(const Family& family, int row, int column, double gap = 1e-7)
 
 // The leaf with the largest bound, close to the largest slope.
 Cover::Node& Largest(Cover& cover) {
-  return *std::ranges::max_element(cover.nodes, {}, [](const Cover::Node& node) {
-    return node.argument < 0 && !node.outside ? node.number : 0;
-  });
+  return *std::ranges::max_element(
+      cover.nodes, {}, [](const Cover::Node& node) { return node.argument < 0 && !node.outside ? node.number : 0; });
 }
 
 class Covers : public testing::Test {

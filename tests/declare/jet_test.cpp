@@ -25,8 +25,8 @@ TEST(Jet, EnclosesWhatDifferencesShow) {
   constexpr long double kStep = 1e-5L;
   for (int i = 0; i < 2000; ++i) {
     const double x = uniform(random), y = uniform(random), width = std::ldexp(1.0, -2 - i % 20);
-    const Jet jet = Expression(Jet::Argument({x - width, x + width}, 0, true),
-                               Jet::Argument({y - width, y + width}, 1, false));
+    const Jet jet =
+        Expression(Jet::Argument({x - width, x + width}, 0, true), Jet::Argument({y - width, y + width}, 1, false));
     const auto at = [&](long double a, long double b) { return Expression<long double>(x + a, y + b); };
     const auto inside = [](long double value, const Interval& range, double slack) {
       return range.lower - slack <= value && value <= range.upper + slack;

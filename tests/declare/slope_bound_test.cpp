@@ -83,8 +83,8 @@ TEST(SlopeBound, InsideAnInterval) { ExpectSupremum(Bound<Wave>(Square(2), 0, 0)
 TEST(SlopeBound, OverABallItsBoundaryCounts) {
   Domain domain = Square(2);
   domain.balls.push_back({{0, 1}, Eigen::Vector2d::Zero(), 2});
-  ExpectSupremum(Bound<Cubic>(domain, 0, 1), 12);                    // 6 z0 z1 on |z| <= 2
-  ExpectSupremum(Bound<Wave>(domain, 1, 0), 2 * std::sqrt(2.0));     // z0 + z1
+  ExpectSupremum(Bound<Cubic>(domain, 0, 1), 12);                 // 6 z0 z1 on |z| <= 2
+  ExpectSupremum(Bound<Wave>(domain, 1, 0), 2 * std::sqrt(2.0));  // z0 + z1
 }
 
 TEST(SlopeBound, OverAnInequality) {
@@ -137,7 +137,8 @@ void ExpectBetterThanTheGrid(const Family& family, const Entry& entry) {
   EXPECT_LE(bound.gap(), 1e-6);
   EXPECT_NEAR(bound.upper, entry.supremum, entry.digit);
   EXPECT_LT(bound.upper, entry.grid);
-  EXPECT_TRUE(family.domain.Contains(std::span(bound.point).first(static_cast<std::size_t>(family.slopes->num_variables()))));
+  EXPECT_TRUE(
+      family.domain.Contains(std::span(bound.point).first(static_cast<std::size_t>(family.slopes->num_variables()))));
 }
 
 TEST(SlopeBound, BicycleIsBelowThePapersGrid) {
@@ -146,9 +147,9 @@ TEST(SlopeBound, BicycleIsBelowThePapersGrid) {
 }
 
 TEST(SlopeBound, PointMassIsBelowThePapersGrid) {
-  for (const Entry& entry : {Entry{2, 2, 0.06145786, 1e-8, 0.061460184}, Entry{3, 2, 0.05057370, 1e-8, 0.050577964},
-                             Entry{0, 2, 0.06145786 * 0.075, 1e-9, 0.004609514},
-                             Entry{1, 2, 0.05057370 * 0.075, 1e-9, 0.003793347}})
+  for (const Entry& entry :
+       {Entry{2, 2, 0.06145786, 1e-8, 0.061460184}, Entry{3, 2, 0.05057370, 1e-8, 0.050577964},
+        Entry{0, 2, 0.06145786 * 0.075, 1e-9, 0.004609514}, Entry{1, 2, 0.05057370 * 0.075, 1e-9, 0.003793347}})
     ExpectBetterThanTheGrid(PointMassInBall(), entry);
 }
 
@@ -178,7 +179,8 @@ double SampledMaximum(const Family& family, int row, int column, int count) {
       z[l] = uniform(box.lower()[k], box.upper()[k]);
     }
     if (!family.domain.Contains(z)) continue;
-    std::vector<long double> p, w(z.begin(), z.end()), ahead(static_cast<std::size_t>(family.slopes->num_states())), behind = ahead;
+    std::vector<long double> p, w(z.begin(), z.end()), ahead(static_cast<std::size_t>(family.slopes->num_states())),
+        behind = ahead;
     for (const Interval& range : family.parameters) p.push_back(uniform(range.lower, range.upper));
     constexpr long double kStep = 1e-6L;
     const auto at = [&](long double shift, std::vector<long double>& out) {
