@@ -40,7 +40,7 @@ class CoverChecker final {
   /** The derivatives that are not zero everywhere: each needs a claim. */
   [[nodiscard]] std::vector<std::pair<int, int>> Entries() const { return slopes_->Entries(); }
 
-  /** Some 0.2 ms a box. @param checked is called after each leaf. */
+  /** About 1 ms a box of the point mass. @param checked is called after each leaf. */
   [[nodiscard]] CoverVerdict Check(const SlopeClaim& claim, const std::function<void()>& checked = {}) const;
 
  private:
