@@ -12,7 +12,7 @@
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
 #include "certifier/dynamics/point_mass.h"
-#include "robot/residuals.h"
+#include "certifier/dynamics/residuals.h"
 
 namespace forereach::bench {
 namespace {

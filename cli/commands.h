@@ -14,6 +14,7 @@ using Action = std::function<int()>;
 
 void AddCertifyCommand(CLI::App& app, Action& action);
 void AddPlanCommand(CLI::App& app, Action& action);
+void AddDeclareCommand(CLI::App& app, Action& action);
 void AddVerifyCommand(CLI::App& app, Action& action);
 void AddReplayCommand(CLI::App& app, Action& action);
 void AddReportCommand(CLI::App& app, Action& action);

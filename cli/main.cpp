@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   Action action;
   AddCertifyCommand(app, action);
   AddPlanCommand(app, action);
+  AddDeclareCommand(app, action);
   AddVerifyCommand(app, action);
   AddReplayCommand(app, action);
   AddReportCommand(app, action);

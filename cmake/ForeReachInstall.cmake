@@ -11,7 +11,7 @@ install(TARGETS forereach_options forereach_certifier forereach_lcmtypes forerea
 install(EXPORT ForeReachTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
 
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/forereach)
-foreach(floor numerics sets dynamics residual safety reach certify)
+foreach(floor numerics sets dynamics residual safety reach declare certify)
   install(DIRECTORY certifier/${floor} DESTINATION ${headers}/certifier FILES_MATCHING PATTERN "*.h")
 endforeach()
 install(FILES lcmtypes/codec.h lcmtypes/names.h lcmtypes/seal.h DESTINATION ${headers}/lcmtypes)

@@ -11,7 +11,7 @@
 #include "certifier/dynamics/point_mass.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/text.h"
-#include "robot/residuals.h"
+#include "certifier/dynamics/residuals.h"
 
 namespace forereach {
 namespace {

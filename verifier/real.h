@@ -73,6 +73,9 @@ class Real final {
   friend Real sqr(const Real& a);
   friend Real sqrt(const Real& a);
   friend Real abs(const Real& a);
+  friend Real exp(const Real& a);
+  /** log(1 + a). */
+  friend Real log1p(const Real& a);
   friend Real sin(const Real& a);
   friend Real cos(const Real& a);
   /** Unbounded over a pole. */

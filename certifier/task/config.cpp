@@ -10,6 +10,7 @@
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/residuals.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/csv.h"
 #include "certifier/task/document.h"
@@ -220,7 +221,7 @@ std::map<std::string, double> ReadResidualParameters(const Document& file, const
   parameters["dt"] = file.Number("model.dt");
   if (file.Has("model.wheelbase")) parameters["wheelbase"] = file.Number("model.wheelbase");
   for (const Key& key : Schema()) {
-    if (key.only != residual) continue;
+    if (key.only != residual || !key.path.starts_with("robot.")) continue;
     double& value = parameters[key.path.substr(key.path.rfind('.') + 1)];
     value = file.Has(key.path) ? file.Number(key.path) : ParseNumber(key.fallback).value;
   }
@@ -231,6 +232,44 @@ std::string ModelOfResidual(const std::string& residual) {
   return residual == "heading_saturation" ? KinematicBicycle::kName : PointMass::kName;
 }
 
+void RequireItsModel(const Document& file, const std::string& key, const std::string& residual,
+                     const NominalModel& model) {
+  if (ModelOfResidual(residual) != model.name())
+    file.Fail(key, residual + " is for " + ModelOfResidual(residual) + ", the model is " + model.name());
+}
+
+ParametricResidual::Parameter ReadParameter(const Document& file, const std::string& name) {
+  const std::string key = "residual." + name;
+  if (file.Has("model." + name)) {  // the model's own
+    const double value = file.Number("model." + name);
+    return {name, value, value};
+  }
+  if (file.Has(key) && file.IsList(key)) {
+    const Eigen::VectorXd ends = file.Vector(key);
+    if (!(ends[0] <= ends[1]))
+      file.Fail(Entry(key, 1), ToText(ends[1]) + " is outside " + Range{ends[0], HUGE_VAL, false, true}.text() +
+                                   ", below " + Entry(key, 0));
+    return {name, ends[0], ends[1]};
+  }
+  const auto row = std::ranges::find(Schema(), key, &Key::path);
+  const double value = file.Has(key) ? file.Number(key) : ParseNumber(row->fallback).value;
+  return {name, value, value};
+}
+
+std::optional<ParametricResidual> ReadResidual(const Document& file, const NominalModel& model) {
+  if (!file.Has("residual")) return std::nullopt;
+  ParametricResidual residual{file.Text("residual.name"), {}};
+  RequireItsModel(file, "residual.name", residual.name, model);
+  const auto read = [&](const auto& names) {
+    for (const char* name : names) residual.parameters.push_back(ReadParameter(file, name));
+  };
+  if (residual.name == HeadingSaturation::kName)
+    read(HeadingSaturation::kParameterNames);
+  else
+    read(VelocityKnee::kParameterNames);
+  return residual;
+}
+
 RobotOptions ReadRobot(const Document& file, const NominalModel& model) {
   RobotOptions robot;
   file.Read("task.initial_set.center", robot.start);
@@ -239,8 +278,7 @@ RobotOptions ReadRobot(const Document& file, const NominalModel& model) {
   file.Read("robot.time_limit_s", robot.time_limit_s);
   const std::string key = file.Has("robot.residual.name") ? "robot.residual.name" : "robot.residual";
   file.Read(key, robot.residual);
-  if (robot.residual != "none" && ModelOfResidual(robot.residual) != model.name())
-    file.Fail(key, robot.residual + " is for " + ModelOfResidual(robot.residual) + ", the model is " + model.name());
+  if (robot.residual != "none") RequireItsModel(file, key, robot.residual, model);
   robot.residual_parameters = ReadResidualParameters(file, robot.residual);
   return robot;
 }
@@ -345,6 +383,7 @@ Config LoadConfig(const std::string& path, TransitionsFile transitions) {
   config.obstacles = ReadObstacles(file);
   config.obstacles_digest = ObstaclesDigest(config.obstacles);
   config.initial_set = ReadInitialSet(file);
+  config.residual = ReadResidual(file, *problem.model);
   config.gate = ReadGate(file);
   config.bus = ReadBus(file);
   config.planner = ReadPlanner(file);

@@ -4,10 +4,16 @@ and, made from it, in config/README.md. */
 
 #include <map>
 #include <memory>
+<<<<<<< HEAD
+=======
+#include <optional>
+#include <stdexcept>
+>>>>>>> declare
 #include <string>
 #include <vector>
 
 #include "certifier/certify/problem.h"
+#include "certifier/dynamics/parametric_residual.h"
 #include "certifier/task/canonical.h"
 #include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
@@ -78,6 +84,7 @@ struct Config {
   std::vector<Obstacle> obstacles;
   Digest obstacles_digest{};
   Box initial_set;  ///< X0, rounded outward.
+  std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds; dt and wheelbase are the model's.
   GateOptions gate;
   BusOptions bus;
   PlannerOptions planner;

@@ -113,15 +113,27 @@ Key Channel(std::string name, std::string fallback, std::string meaning) {
   return Optional(Of(Type::kChannel, "bus.channels." + name, "", kReal, std::move(meaning)), std::move(fallback));
 }
 
-// Parameters of one residual.
-Key Heading(const char* name, std::string unit, Range range, double fallback, std::string meaning) {
-  return OnlyFor("heading_saturation",
-                 Number(std::string("robot.residual.") + name, std::move(unit), range, fallback, std::move(meaning)));
-}
-
-Key Knee(const char* name, std::string unit, Range range, double fallback, std::string meaning) {
-  return OnlyFor("velocity_knee",
-                 Number(std::string("robot.residual.") + name, std::move(unit), range, fallback, std::move(meaning)));
+// The parameters of the residuals (dynamics/residuals.h), in the map `path`.
+std::vector<Key> ParameterKeys(const std::string& path) {
+  const auto heading = [&](const char* name, std::string unit, Range range, double fallback, std::string meaning) {
+    return OnlyFor("heading_saturation",
+                   Number(path + "." + name, std::move(unit), range, fallback, std::move(meaning)));
+  };
+  const auto knee = [&](const char* name, std::string unit, Range range, double fallback, std::string meaning) {
+    return OnlyFor("velocity_knee", Number(path + "." + name, std::move(unit), range, fallback, std::move(meaning)));
+  };
+  return {
+      heading("understeer", "", kReal, 0.32, "Fraction of the heading rate lost in full saturation."),
+      heading("friction", "", kNotNegative, 0.9, "Friction coefficient; saturation sets in at friction times gravity."),
+      heading("gravity", "m/s^2", kPositive, 9.81, "Gravity."),
+      heading("gate_temperature", "s^2/m", kPositive, 0.1, "How fast it sets in."),
+      knee("damping", "1/s", kReal, 0.4, "Drag along the velocity."),
+      knee("cross", "1/s", kReal, 0.3, "Force across the velocity."),
+      knee("knee", "m/s", kNotNegative, 0.9, "The speed above which they act."),
+      knee("softplus_temperature", "m/s", kPositive, 0.14, "How fast they set in."),
+      knee("regularizer", "m/s", kPositive, 0.15, "Keeps the gain finite at rest."),
+      knee("smoothing", "m^2/s^2", kPositive, 1e-12, "Makes the speed differentiable at rest."),
+  };
 }
 
 std::vector<Key> ModelKeys() {
@@ -285,7 +297,7 @@ std::vector<Key> PlannerKeys() {
 
 std::vector<Key> RobotKeys() {
   const RobotOptions robot;
-  return {
+  std::vector<Key> keys{
       Optional(Map("robot", "The simulated robot."), "all defaults"),
       Optional(Vector("robot.start", "of the state", kReal, Size::kStates, "Its state when a run begins."),
                "the center of task.initial_set"),
@@ -296,17 +308,27 @@ std::vector<Key> RobotKeys() {
       Optional(Map("robot.residual", "How the real robot differs from the nominal model."), "none"),
       Required(Word("robot.residual.name", {"none", "heading_saturation", "velocity_knee"},
                     "heading_saturation is for kinematic_bicycle, velocity_knee for point_mass.")),
-      Heading("understeer", "", kReal, 0.32, "Fraction of the heading rate lost in full saturation."),
-      Heading("friction", "", kNotNegative, 0.9, "Friction coefficient; saturation sets in at friction times gravity."),
-      Heading("gravity", "m/s^2", kPositive, 9.81, "Gravity."),
-      Heading("gate_temperature", "s^2/m", kPositive, 0.1, "How fast it sets in."),
-      Knee("damping", "1/s", kReal, 0.4, "Drag along the velocity."),
-      Knee("cross", "1/s", kReal, 0.3, "Force across the velocity."),
-      Knee("knee", "m/s", kNotNegative, 0.9, "The speed above which they act."),
-      Knee("softplus_temperature", "m/s", kPositive, 0.14, "How fast they set in."),
-      Knee("regularizer", "m/s", kPositive, 0.15, "Keeps the gain finite at rest."),
-      Knee("smoothing", "m^2/s^2", kPositive, 1e-12, "Makes the speed differentiable at rest."),
   };
+  std::ranges::move(ParameterKeys("robot.residual"), std::back_inserter(keys));
+  return keys;
+}
+
+// What is assumed of the residual, each parameter a number or an interval.
+std::vector<Key> ResidualKeys() {
+  std::vector<Key> keys{
+      Map("residual", "Equations of the residual with parameters known within intervals: `forereach declare` makes the "
+                      "declaration from them. The certifier does not read it."),
+      Required(Word("residual.name", {"heading_saturation", "velocity_knee"},
+                    "heading_saturation is for kinematic_bicycle, velocity_knee for point_mass.")),
+  };
+  for (const Key& number : ParameterKeys("residual")) {
+    keys.push_back(number);
+    Key range = Vector(number.path, number.unit, number.range, Size::kAny, "Its least and its largest value.");
+    range.count = Between(2, 2);
+    range.only = number.only;
+    keys.push_back(std::move(range));
+  }
+  return keys;
 }
 
 std::vector<Key> LoggerKeys() {
@@ -324,7 +346,7 @@ std::vector<Key> LoggerKeys() {
 std::vector<Key> MakeSchema() {
   std::vector<Key> keys{Map("", "The task file.")};
   for (const auto part :
-       {ModelKeys, DomainKeys, DeclarationKeys, TaskKeys, CertifierKeys, BusKeys, PlannerKeys, RobotKeys, LoggerKeys})
+       {ModelKeys, DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys, BusKeys, PlannerKeys, RobotKeys, LoggerKeys})
     std::ranges::move(part(), std::back_inserter(keys));
   return keys;
 }

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/task/schema.h"
-#include "robot/residuals.h"
+#include "certifier/dynamics/residuals.h"
 #include "scratch.h"
 
 namespace forereach {

@@ -11,7 +11,7 @@
 #include <mpfr.h>
 
 #include "certifier/dynamics/models.h"
-#include "robot/residuals.h"
+#include "certifier/dynamics/residuals.h"
 
 namespace forereach {
 namespace {
@@ -256,9 +256,9 @@ TEST(Residuals, TheBuildingBlocksDoNotOverflow) {
   EXPECT_EQ(SmoothGate(-1.0), 0);
   EXPECT_EQ(SmoothGate(std::numeric_limits<double>::denorm_min()), 0);
   EXPECT_EQ(SmoothGate(1.0), std::exp(-1.0));
-  EXPECT_EQ(Softplus(1000.0), 1000);
-  EXPECT_EQ(Softplus(-1000.0), 0);
-  EXPECT_DOUBLE_EQ(Softplus(0.0), std::log(2.0));
+  EXPECT_EQ(Softplus(1000.0, 1.0), 1000);
+  EXPECT_EQ(Softplus(-1000.0, 1.0), 0);
+  EXPECT_DOUBLE_EQ(Softplus(0.0, 0.5), std::log(2.0) / 2);
 }
 
 TEST(MakeTargetTest, SaysWhatIsWrongWithTheConfig) {

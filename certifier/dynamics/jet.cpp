@@ -1,0 +1,164 @@
+#include "certifier/dynamics/jet.h"
+
+#include <algorithm>
+
+#include "certifier/dynamics/saturation.h"
+#include "certifier/numerics/exponential.h"
+
+namespace forereach {
+namespace {
+
+constexpr Interval kZero(0.0), kAnySign(-1.0, 1.0);
+
+bool IsZero(const Interval& x) { return x == kZero; }
+
+// What is zero over the whole box stays so whatever the other factor's bound: every value of that is a number.
+Interval Times(const Interval& a, const Interval& b) { return IsZero(a) || IsZero(b) ? kZero : a * b; }
+Interval Plus(const Interval& a, const Interval& b) { return IsZero(a) ? b : IsZero(b) ? a : a + b; }
+Interval Over(const Interval& a, const Interval& b) { return IsZero(a) ? kZero : a / b; }
+
+Interval Hull(const Interval& a, const Interval& b) { return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)}; }
+
+// f(a) from the ranges of f and its derivatives over a.
+Jet Composed(const Jet& a, const DerivativeRanges& f) {
+  Jet result(f.value);
+  result.size = a.size;
+  result.slope = Times(f.first, a.slope);
+  const Interval bend = Times(f.second, a.slope);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(a.size); ++i) {
+    result.gradient[i] = Times(f.first, a.gradient[i]);
+    result.curvature[i] = Plus(Times(bend, a.gradient[i]), Times(f.first, a.curvature[i]));
+  }
+  return result;
+}
+
+// Either of two expressions at each point, as at the kink where they meet.
+Jet Either(const Jet& a, const Jet& b, const Interval& value) {
+  Jet result(value);
+  result.size = std::max(a.size, b.size);
+  result.slope = Hull(a.slope, b.slope);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+    result.gradient[i] = Hull(a.gradient[i], b.gradient[i]);
+    result.curvature[i] = Interval::Entire();
+  }
+  return result;
+}
+
+}  // namespace
+
+Jet operator+(const Jet& a, const Jet& b) {
+  Jet result(a.value + b.value);
+  result.size = std::max(a.size, b.size);
+  result.slope = Plus(a.slope, b.slope);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+    result.gradient[i] = Plus(a.gradient[i], b.gradient[i]);
+    result.curvature[i] = Plus(a.curvature[i], b.curvature[i]);
+  }
+  return result;
+}
+
+Jet operator-(const Jet& a) {
+  Jet result(-a.value);
+  result.size = a.size;
+  result.slope = -a.slope;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(a.size); ++i) {
+    result.gradient[i] = -a.gradient[i];
+    result.curvature[i] = -a.curvature[i];
+  }
+  return result;
+}
+
+Jet operator-(const Jet& a, const Jet& b) { return a + -b; }
+
+Jet operator*(const Jet& a, const Jet& b) {
+  if (&a == &b) return Composed(a, {sqr(a.value), Interval(2) * a.value, Interval(2)});
+  Jet result(Times(a.value, b.value));
+  result.size = std::max(a.size, b.size);
+  result.slope = Plus(Times(a.value, b.slope), Times(a.slope, b.value));
+  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+    result.gradient[i] = Plus(Times(a.value, b.gradient[i]), Times(a.gradient[i], b.value));
+    result.curvature[i] = Plus(Plus(Times(a.value, b.curvature[i]), Times(a.curvature[i], b.value)),
+                               Plus(Times(a.gradient[i], b.slope), Times(a.slope, b.gradient[i])));
+  }
+  return result;
+}
+
+// With q = a / b: dq = (da - q db) / b, and once more.
+Jet operator/(const Jet& a, const Jet& b) {
+  Jet q(Over(a.value, b.value));
+  q.size = std::max(a.size, b.size);
+  q.slope = Over(Plus(a.slope, -Times(q.value, b.slope)), b.value);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(q.size); ++i) {
+    q.gradient[i] = Over(Plus(a.gradient[i], -Times(q.value, b.gradient[i])), b.value);
+    const Interval rest =
+        Plus(Plus(Times(q.gradient[i], b.slope), Times(q.slope, b.gradient[i])), Times(q.value, b.curvature[i]));
+    q.curvature[i] = Over(Plus(a.curvature[i], -rest), b.value);
+  }
+  return q;
+}
+
+// A box that only touches the kink lies on one side of it.
+Jet abs(const Jet& a) {
+  if (a.value.lower >= 0 && a.value.upper > 0) return a;
+  if (a.value.upper <= 0 && a.value.lower < 0) return -a;
+  return Composed(a, {{0, a.value.Magnitude()}, kAnySign, Interval::Entire()});
+}
+
+Jet max(const Jet& a, const Jet& b) {
+  if (a.value.lower > b.value.upper) return a;
+  if (b.value.lower > a.value.upper) return b;
+  return Either(a, b, {std::max(a.value.lower, b.value.lower), std::max(a.value.upper, b.value.upper)});
+}
+
+Jet min(const Jet& a, const Jet& b) { return -max(-a, -b); }
+
+Jet sqrt(const Jet& a) {
+  const Interval root = sqrt(a.value), slope = Interval(0.5) / root;
+  return Composed(a, {root, slope, -slope / (Interval(2) * a.value)});
+}
+
+Jet exp(const Jet& a) {
+  const Interval value = exp(a.value);
+  return Composed(a, {value, value, value});
+}
+
+Jet sin(const Jet& a) {
+  const Interval value = sin(a.value);
+  return Composed(a, {value, cos(a.value), -value});
+}
+
+Jet cos(const Jet& a) {
+  const Interval value = cos(a.value);
+  return Composed(a, {value, -sin(a.value), -value});
+}
+
+// Within a quarter turn the tangent has its argument's sign: widening past zero would show a kink that is not there to
+// whoever takes the absolute value.
+Jet tan(const Jet& a) {
+  Interval t = tan(a.value);
+  if (t.IsFinite() && 0 <= a.value.lower && a.value.upper <= 1.5) t.lower = std::max(t.lower, 0.0);
+  if (t.IsFinite() && -1.5 <= a.value.lower && a.value.upper <= 0) t.upper = std::min(t.upper, 0.0);
+  const Interval slope = Interval(1) + sqr(t);
+  return Composed(a, {t, slope, Interval(2) * t * slope});
+}
+
+Jet SmoothGate(const Jet& a) { return Composed(a, SmoothGateRanges(a.value)); }
+
+Jet Softplus(const Jet& x, const Jet& temperature) {
+  const SoftplusRanges f(x.value, temperature.value);
+  Jet result(f.value);
+  result.size = std::max(x.size, temperature.size);
+  result.slope = Plus(Times(f.by_x, x.slope), Times(f.by_temperature, temperature.slope));
+  // d f_x and d f_t along the coordinate
+  const Interval bend_x = Plus(Times(f.by_xx, x.slope), Times(f.by_xt, temperature.slope));
+  const Interval bend_t = Plus(Times(f.by_xt, x.slope), Times(f.by_tt, temperature.slope));
+  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+    const Interval &dx = x.gradient[i], &dt = temperature.gradient[i];
+    result.gradient[i] = Plus(Times(f.by_x, dx), Times(f.by_temperature, dt));
+    result.curvature[i] = Plus(Plus(Times(bend_x, dx), Times(bend_t, dt)),
+                               Plus(Times(f.by_x, x.curvature[i]), Times(f.by_temperature, temperature.curvature[i])));
+  }
+  return result;
+}
+
+}  // namespace forereach

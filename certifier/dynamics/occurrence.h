@@ -1,0 +1,52 @@
+/** A scalar that knows only which arguments it was computed from. Equations called with it tell which arguments each
+of their outputs may depend on; the others' derivatives are zero by construction. */
+#pragma once
+
+#include <cstdint>
+
+namespace forereach {
+
+class Occurrence final {
+ public:
+  constexpr Occurrence() = default;
+  constexpr explicit Occurrence(double) {}
+
+  /** @param index below 64. */
+  [[nodiscard]] static constexpr Occurrence Argument(int index) {
+    Occurrence result;
+    result.mask_ = std::uint64_t{1} << index;
+    return result;
+  }
+
+  [[nodiscard]] constexpr bool Of(int index) const { return (mask_ >> index & 1) != 0; }
+
+#define FOREREACH_BOTH(name)                                     \
+  friend constexpr Occurrence name(Occurrence a, Occurrence b) { \
+    a.mask_ |= b.mask_;                                          \
+    return a;                                                    \
+  }
+#define FOREREACH_ONE(name) \
+  friend constexpr Occurrence name(Occurrence a) { return a; }
+  FOREREACH_BOTH(operator+)
+  FOREREACH_BOTH(operator-)
+  FOREREACH_BOTH(operator*)
+  FOREREACH_BOTH(operator/)
+  FOREREACH_BOTH(min)
+  FOREREACH_BOTH(max)
+  FOREREACH_BOTH(Softplus)
+  FOREREACH_ONE(operator-)
+  FOREREACH_ONE(abs)
+  FOREREACH_ONE(sqrt)
+  FOREREACH_ONE(exp)
+  FOREREACH_ONE(sin)
+  FOREREACH_ONE(cos)
+  FOREREACH_ONE(tan)
+  FOREREACH_ONE(SmoothGate)
+#undef FOREREACH_BOTH
+#undef FOREREACH_ONE
+
+ private:
+  std::uint64_t mask_ = 0;
+};
+
+}  // namespace forereach

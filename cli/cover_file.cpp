@@ -1,0 +1,162 @@
+#include "cli/cover_file.h"
+
+#include <algorithm>
+#include <fstream>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/canonical.h"
+#include "certifier/task/files.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+using verifier::SlopeClaim;
+
+Json TreeJson(const Cover& cover, int index, const std::vector<std::string>& names) {
+  const Cover::Node& node = cover.nodes[static_cast<std::size_t>(index)];
+  if (node.outside) return nullptr;
+  if (node.argument < 0) return node.number;
+  return Json::array({names[static_cast<std::size_t>(node.argument)], node.number, TreeJson(cover, node.below, names),
+                      TreeJson(cover, node.above, names)});
+}
+
+int IndexOf(const std::vector<std::string>& names, const std::string& name) {
+  const auto found = std::ranges::find(names, name);
+  if (found == names.end()) throw ConfigError("the task has no " + name);
+  return static_cast<int>(found - names.begin());
+}
+
+Cover CoverOf(const Json& tree, const std::vector<std::string>& names) {
+  Cover cover;
+  cover.nodes.resize(1);
+  std::vector<std::pair<int, const Json*>> open{{0, &tree}};
+  while (!open.empty()) {
+    const auto [index, json] = open.back();
+    open.pop_back();
+    Cover::Node node;
+    if (json->is_null()) {
+      node.outside = true;
+    } else if (json->is_number()) {
+      node.number = json->get<double>();
+    } else {
+      node.argument = IndexOf(names, json->at(0).get<std::string>());
+      node.number = json->at(1).get<double>();
+      for (std::size_t part : {2, 3}) {
+        if (part >= json->size()) continue;
+        (part == 2 ? node.below : node.above) = static_cast<int>(cover.nodes.size());
+        open.emplace_back(static_cast<int>(cover.nodes.size()), &json->at(part));
+        cover.nodes.emplace_back();
+      }
+    }
+    cover.nodes[static_cast<std::size_t>(index)] = node;
+  }
+  return cover;
+}
+
+void Append(CanonicalBytes& bytes, const Cover& cover) {
+  std::vector<int> open{0};
+  while (!open.empty()) {
+    const int index = open.back();
+    open.pop_back();
+    if (index < 0) {
+      bytes.Text("missing");
+      continue;
+    }
+    const Cover::Node& node = cover.nodes[static_cast<std::size_t>(index)];
+    bytes.Count(node.argument);
+    bytes.Text(node.outside ? "outside" : "inside");
+    bytes.Number(node.number);
+    if (node.argument >= 0) open.insert(open.end(), {node.above, node.below});
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> ArgumentNames(const Config& config) {
+  std::vector<std::string> names = config.problem->model->state_names();
+  const auto& inputs = config.problem->model->input_names();
+  names.insert(names.end(), inputs.begin(), inputs.end());
+  for (const auto& parameter : config.residual->parameters) names.push_back(parameter.name);
+  return names;
+}
+
+Digest ResidualDigest(const Config& config) {
+  CanonicalBytes bytes("forereach residual");
+  bytes.Texts(ArgumentNames(config));
+  const Domain& domain = config.problem->domain;
+  for (const Box* box : {&domain.state, &domain.input}) {
+    bytes.Numbers(box->lower());
+    bytes.Numbers(box->upper());
+  }
+  bytes.Count(static_cast<std::int64_t>(domain.inequalities.size()));
+  for (const auto& [coefficients, bound] : domain.inequalities) {
+    bytes.Numbers(coefficients);
+    bytes.Number(bound);
+  }
+  bytes.Count(static_cast<std::int64_t>(domain.balls.size()));
+  for (const auto& [coordinates, center, radius] : domain.balls) {
+    for (const int l : coordinates) bytes.Count(l);
+    bytes.Numbers(center);
+    bytes.Number(radius);
+  }
+  bytes.Text(config.residual->name);
+  for (const auto& [name, lower, upper] : config.residual->parameters) {
+    bytes.Number(lower);
+    bytes.Number(upper);
+  }
+  return bytes.digest();
+}
+
+Digest CoverDigest(const std::vector<SlopeClaim>& claims) {
+  CanonicalBytes bytes("forereach cover");
+  bytes.Count(static_cast<std::int64_t>(claims.size()));
+  for (const SlopeClaim& claim : claims) {
+    bytes.Count(claim.row);
+    bytes.Count(claim.column);
+    bytes.Number(claim.bound);
+    Append(bytes, claim.cover);
+  }
+  return bytes.digest();
+}
+
+void SaveCover(const std::string& path, const Config& config, const std::vector<SlopeClaim>& claims) {
+  const std::vector<std::string> names = ArgumentNames(config);
+  Json parameters = Json::object(), entries = Json::array();
+  for (const auto& [name, lower, upper] : config.residual->parameters) parameters[name] = {lower, upper};
+  for (const SlopeClaim& claim : claims)
+    entries.push_back({{"row", names[static_cast<std::size_t>(claim.row)]},
+                       {"column", names[static_cast<std::size_t>(claim.column)]},
+                       {"bound", claim.bound},
+                       {"cover", TreeJson(claim.cover, 0, names)}});
+  const Json document{
+      {"residual", {{"name", config.residual->name}, {"parameters", parameters}}},
+      {"entries", entries},
+      {"digests", {{"residual", ToHex(ResidualDigest(config))}, {"cover", ToHex(CoverDigest(claims))}}}};
+  std::ofstream file(path, std::ios::binary);
+  if (!(file << document.dump() << "\n") || !file.flush()) throw ConfigError(path + ": cannot be written");
+}
+
+CoverFile LoadCover(const std::string& path, const Config& config) {
+  std::ifstream stream = OpenForReading(path);
+  const std::vector<std::string> names = ArgumentNames(config);
+  CoverFile file;
+  try {
+    const Json document = Json::parse(stream);
+    for (const Json& entry : document.at("entries"))
+      file.claims.push_back({IndexOf(names, entry.at("row").get<std::string>()),
+                             IndexOf(names, entry.at("column").get<std::string>()), entry.at("bound").get<double>(),
+                             CoverOf(entry.at("cover"), names)});
+    file.residual_digest = document.at("digests").at("residual").get<std::string>();
+    file.cover_digest = document.at("digests").at("cover").get<std::string>();
+  } catch (const Json::exception& error) {
+    throw ConfigError(path + ": not a cover of `forereach declare --cover`: " + error.what());
+  } catch (const ConfigError& error) {
+    throw ConfigError(path + ": not a cover for this task: " + error.what());
+  }
+  return file;
+}
+
+}  // namespace forereach

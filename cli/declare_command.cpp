@@ -1,0 +1,319 @@
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "certifier/declare/slope_bound.h"
+#include "certifier/task/number.h"
+#include "cli/commands.h"
+#include "cli/cover_file.h"
+#include "cli/progress.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+struct Options {
+  std::string config, cover, check;
+  bool json = false;
+  SlopeBoundOptions search;
+  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+};
+
+// Calls work(i) for all i below `count`, from several threads.
+template <class Work>
+void InParallel(std::size_t count, unsigned jobs, const Work& work) {
+  std::atomic<std::size_t> next = 0;
+  std::vector<std::thread> threads;
+  for (unsigned j = 0; j < std::min<std::size_t>(jobs, count); ++j)
+    threads.emplace_back([&] {
+      for (std::size_t i = next++; i < count; i = next++) work(i);
+    });
+  for (std::thread& thread : threads) thread.join();
+}
+
+Config LoadWithResidual(const std::string& path) {
+  Config config = LoadConfig(path, TransitionsFile::kIgnore);
+  if (!config.residual)
+    throw ConfigError(path +
+                      ":1: residual: missing: its equations by name, with a number or [least, largest] for each "
+                      "parameter that is not the paper's; for example  residual: {name: " +
+                      (config.problem->model->name() == "point_mass" ? "velocity_knee, damping: [0.38, 0.42]"
+                                                                     : "heading_saturation, friction: [0.8, 1.0]") +
+                      "}");
+  return config;
+}
+
+// ---- declare
+
+constexpr std::size_t kSteps = 100;  // of the progress bar, for each derivative
+
+std::vector<SlopeBound> BoundAll(const Config& config, const Options& options) {
+  const auto slopes = MakeResidualSlopes(config.residual->name);
+  const std::vector<Interval> parameters = ParameterRanges(*slopes, *config.residual);
+  std::vector<SlopeBound> bounds;
+  for (int k = 0; k < slopes->num_states(); ++k)
+    for (int l = 0; l < slopes->num_variables(); ++l)
+      if (slopes->Occurs(k, l)) bounds.emplace_back().row = k, bounds.back().column = l;
+  Progress progress("hundredths of a bound", kSteps * bounds.size());
+  InParallel(bounds.size(), options.jobs, [&](std::size_t i) {
+    std::size_t shown = 0;
+    const auto show = [&](double closed) {
+      for (const auto now = static_cast<std::size_t>(closed * static_cast<double>(kSteps)); shown < now; ++shown)
+        progress.Advance();
+    };
+    bounds[i] =
+        BoundSlope(*slopes, config.problem->domain, parameters, bounds[i].row, bounds[i].column, options.search, show);
+  });
+  return bounds;
+}
+
+// In decimal with ten digits, no less than x when it is read back.
+std::string RoundedUp(double x) {
+  std::string text;
+  for (double y = x; text.empty() || ParseNumber(text).value < x; y *= 1 + 5e-11) {
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%.10g", y);
+    text = digits;
+  }
+  return text;
+}
+
+// What goes into a task file's `declaration`.
+std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::string>& names) {
+  std::string text = "lipschitz: {";
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    const bool same_row = i > 0 && bounds[i - 1].row == bounds[i].row;
+    if (!same_row) text += (i > 0 ? "}, " : "") + names[static_cast<std::size_t>(bounds[i].row)] + ": {";
+    text +=
+        (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " + RoundedUp(bounds[i].upper);
+  }
+  return text + (bounds.empty() ? "}" : "}}");
+}
+
+double LargestGap(const std::vector<SlopeBound>& bounds) {
+  double gap = 0;
+  for (const SlopeBound& bound : bounds) gap = std::max(gap, bound.gap());
+  return gap;
+}
+
+bool AllReached(const std::vector<SlopeBound>& bounds) {
+  return std::ranges::all_of(bounds, [](const SlopeBound& bound) { return bound.reached; });
+}
+
+Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
+  const std::vector<std::string> names = ArgumentNames(config);
+  const NominalModel& model = *config.problem->model;
+  const auto columns = static_cast<std::size_t>(model.num_variables());
+  Json zero = Json::array();
+  for (int k = 0; k < model.num_states(); ++k) zero.push_back(std::vector<double>(columns, 0.0));
+  Json lipschitz = zero, lower = zero, entries = Json::array(), parameters = Json::object();
+  std::size_t boxes = 0;
+  for (const SlopeBound& bound : bounds) {
+    const auto row = static_cast<std::size_t>(bound.row), column = static_cast<std::size_t>(bound.column);
+    lipschitz[row][column] = bound.upper;
+    lower[row][column] = bound.lower;
+    Json point = Json::object();
+    for (std::size_t i = 0; i < bound.point.size(); ++i) point[names[i]] = bound.point[i];
+    entries.push_back({{"row", names[row]},
+                       {"column", names[column]},
+                       {"upper", bound.upper},
+                       {"lower", bound.lower},
+                       {"gap", bound.gap()},
+                       {"point", point},
+                       {"boxes", bound.boxes},
+                       {"reached", bound.reached}});
+    boxes += bound.boxes;
+  }
+  for (const auto& [name, least, largest] : config.residual->parameters) parameters[name] = {least, largest};
+  return {{"residual", {{"name", config.residual->name}, {"parameters", parameters}}},
+          {"rows", model.state_names()},
+          {"columns", std::vector(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(columns))},
+          {"lipschitz", lipschitz},
+          {"lower", lower},
+          {"gap", LargestGap(bounds)},
+          {"reached", AllReached(bounds)},
+          {"entries", entries},
+          {"boxes", boxes},
+          {"seconds", seconds},
+          {"yaml", Yaml(bounds, names)},
+          {"digests",
+           {{"config", ToHex(config.digest)},
+            {"model", ToHex(config.model_digest)},
+            {"residual", ToHex(ResidualDigest(config))}}}};
+}
+
+bool IsFree(const Config& config, std::size_t parameter) {
+  return config.residual->parameters[parameter].lower < config.residual->parameters[parameter].upper;
+}
+
+void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
+  const auto slopes = MakeResidualSlopes(config.residual->name);
+  const std::vector<std::string> names = ArgumentNames(config);
+  const std::size_t parameters_begin = names.size() - config.residual->parameters.size();
+  const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
+  std::ostringstream text;
+  text << std::left << "declare: " << config.residual->name << " over the domain, "
+       << (AllReached(bounds) ? "to a gap of " : "stopped at a gap of ") << std::setprecision(2) << LargestGap(bounds)
+       << "\n  " << std::setw(8) << "row" << std::setw(8) << "column" << std::setw(18) << "certified bound"
+       << std::setw(18) << "largest found" << std::setw(10) << "gap" << std::setw(9) << "boxes"
+       << " at\n";
+  for (const SlopeBound& bound : bounds) {
+    text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)
+         << RoundedUp(bound.upper) << std::setprecision(10) << std::setw(18) << bound.lower << std::setprecision(2)
+         << std::setw(10) << bound.gap() << std::setw(9) << bound.boxes << std::setprecision(6);
+    for (std::size_t i = 0; i < bound.point.size(); ++i)
+      if (slopes->Occurs(bound.row, static_cast<int>(i)) &&
+          (i < parameters_begin || IsFree(config, i - parameters_begin)))
+        text << " " << names[i] << " " << bound.point[i];
+    text << "\n";
+  }
+  std::cout << text.str() << "  all other entries are zero\n  took " << seconds << " s\n\ndeclaration:\n  "
+            << Yaml(bounds, names) << std::endl;
+}
+
+int Declare(const Options& options) {
+  const Config config = LoadWithResidual(options.config);
+  const auto begin = std::chrono::steady_clock::now();
+  const std::vector<SlopeBound> bounds = BoundAll(config, options);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (!options.cover.empty()) {
+    std::vector<verifier::SlopeClaim> claims;
+    for (const SlopeBound& bound : bounds) claims.push_back({bound.row, bound.column, bound.upper, bound.cover});
+    SaveCover(options.cover, config, claims);
+  }
+  if (options.json)
+    std::cout << ToJson(bounds, config, seconds).dump() << std::endl;
+  else
+    PrintForPeople(bounds, config, seconds);
+  return AllReached(bounds) ? 0 : 1;
+}
+
+// ---- declare --check
+
+struct Finding {
+  verifier::Answer answer = verifier::Answer::kYes;
+  std::string entry, what;
+};
+
+// What needs no mathematics: that the record is whole, this task's, and has each entry once.
+std::vector<Finding> CheckRecord(const CoverFile& file, const Config& config, const verifier::CoverChecker& checker) {
+  std::vector<Finding> findings;
+  const auto refute = [&](std::string entry, std::string what) {
+    findings.push_back({verifier::Answer::kNo, std::move(entry), std::move(what)});
+  };
+  if (file.cover_digest != ToHex(CoverDigest(file.claims)))
+    refute("", "the cover was altered after it was made: its digest is another");
+  if (file.residual_digest != ToHex(ResidualDigest(config)))
+    refute("", "the cover was made for another domain, residual or parameters than the task's");
+  const std::vector<std::string> names = ArgumentNames(config);
+  for (const auto& [row, column] : checker.Entries()) {
+    const auto count = std::ranges::count_if(
+        file.claims, [&, k = row, l = column](const auto& claim) { return claim.row == k && claim.column == l; });
+    if (count != 1)
+      refute(names[static_cast<std::size_t>(row)] + " by " + names[static_cast<std::size_t>(column)],
+             "stands " + std::to_string(count) + " times in the cover, has to stand once");
+  }
+  return findings;
+}
+
+std::vector<Finding> CheckClaims(const CoverFile& file, const Config& config, const verifier::CoverChecker& checker,
+                                 unsigned jobs) {
+  const std::vector<std::string> names = ArgumentNames(config);
+  std::vector<Finding> findings(file.claims.size());
+  std::size_t leaves = 0;
+  for (const auto& claim : file.claims)
+    leaves += static_cast<std::size_t>(
+        std::ranges::count_if(claim.cover.nodes, [](const Cover::Node& node) { return node.argument < 0; }));
+  Progress progress("boxes checked", leaves);
+  InParallel(file.claims.size(), jobs, [&](std::size_t i) {
+    const verifier::SlopeClaim& claim = file.claims[i];
+    const verifier::CoverVerdict verdict = checker.Check(claim, [&] { progress.Advance(); });
+    findings[i] = {verdict.answer,
+                   names[static_cast<std::size_t>(claim.row)] + " by " + names[static_cast<std::size_t>(claim.column)],
+                   verdict.what};
+  });
+  return findings;
+}
+
+int CheckCover(const Options& options) {
+  const Config config = LoadWithResidual(options.config);
+  const CoverFile file = LoadCover(options.check, config);
+  const verifier::CoverChecker checker(config.problem->domain, *config.residual);
+  std::vector<Finding> findings = CheckRecord(file, config, checker);
+  std::ranges::move(CheckClaims(file, config, checker, options.jobs), std::back_inserter(findings));
+  std::erase_if(findings, [](const Finding& finding) { return finding.answer == verifier::Answer::kYes; });
+
+  const bool refuted =
+      std::ranges::any_of(findings, [](const Finding& finding) { return finding.answer == verifier::Answer::kNo; });
+  const std::string verdict = refuted ? "refuted" : findings.empty() ? "confirmed" : "cannot verify";
+  if (options.json) {
+    Json document{{"verdict", refuted            ? "refuted"
+                              : findings.empty() ? "confirmed"
+                                                 : "cannot_verify"},
+                  {"entries", file.claims.size()},
+                  {"failures", Json::array()}};
+    for (const Finding& finding : findings)
+      document["failures"].push_back({{"entry", finding.entry}, {"claim", finding.what}});
+    std::cout << document.dump() << std::endl;
+  } else {
+    for (const Finding& finding : findings)
+      std::cout << "  " << finding.entry << (finding.entry.empty() ? "" : ": ") << finding.what << "\n";
+    std::cout << "check: " << verdict << ": " << file.claims.size() << " bounds of " << config.residual->name
+              << std::endl;
+  }
+  return findings.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+void AddDeclareCommand(CLI::App& app, Action& action) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "declare",
+      "Bound how fast an analytic residual changes, over the whole domain and all its parameters: a declaration that "
+      "is proved. Exit 0 if every bound is within --gap of a point found, 1 if --max-boxes came first, 2 bad input");
+  command->add_option("--config", options->config, "Task file (YAML) with a section `residual`")
+      ->required()
+      ->type_name("FILE");
+  command
+      ->add_option("--gap", options->search.gap,
+                   "Ends when no bound is above the largest slope found by more than this part")
+      ->check(CLI::Range(1e-12, 1e3))
+      ->capture_default_str();
+  command->add_option("--max-boxes", options->search.max_boxes, "Ends here too, for each bound; what it has then holds")
+      ->check(CLI::Range(1u, 100'000'000u))
+      ->capture_default_str();
+  command->add_option("--cover", options->cover, "Where to leave the proof: the boxes, and a bound for each")
+      ->type_name("FILE.json");
+  CLI::Option* check = command
+                           ->add_option("--check", options->check,
+                                        "Check such a file instead, in 128 bits and with formulas of its own: exit 0 "
+                                        "confirmed, 1 not")
+                           ->type_name("FILE.json");
+  check->excludes("--cover");
+  command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON document on standard output; the matrix is `lipschitz`");
+  command->footer(
+      "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
+      "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
+      "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope found.\n"
+      "The last line of the output goes into the task file.\n\n"
+      "Examples:\n"
+      "  forereach declare --config config/bicycle.yaml\n"
+      "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
+      "  forereach declare --config config/point_mass.yaml --check cover.json");
+  command->callback([options, &action] {
+    action = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); };
+  });
+}
+
+}  // namespace forereach

@@ -1,0 +1,30 @@
+/** The paper's own certified declarations, by its own fixed grids: on each cell every factor of a derivative is
+replaced by its largest value there. In plain double arithmetic, so figures to compare with, not bounds to rely on;
+those are `forereach declare`'s, and lie a little below. */
+#pragma once
+
+#include "certifier/dynamics/residuals.h"
+
+namespace forereach::experiments {
+
+/** The four different entries of the point mass's matrix, Eq. (pointmass-certified-matrix). */
+struct PointMassGrid {
+  double position_diagonal, position_cross, velocity_diagonal, velocity_cross;
+};
+
+/** Maxima of Eq. (pointmass-angle-maxima) over radial cells of 0 <= |v| <= largest_speed. */
+[[nodiscard]] PointMassGrid PaperPointMassGrid(const VelocityKnee& residual, double largest_speed = 5.4,
+                                               int cells = 20000);
+
+/** The two entries of the bicycle's. */
+struct BicycleGrid {
+  double by_speed, by_steering;
+};
+
+/** Maxima of Eq. (bicycle-certified-partials) over cells of [0, largest_speed] x [0, largest_steering]. Cost: an
+exponential for every cell, some seconds. */
+[[nodiscard]] BicycleGrid PaperBicycleGrid(const HeadingSaturation& residual, double largest_speed = 25,
+                                           double largest_steering = 0.48, int speed_cells = 16000,
+                                           int steering_cells = 8000);
+
+}  // namespace forereach::experiments

@@ -1,0 +1,187 @@
+// `forereach declare`: its matrix, its cover, and what --check says of covers whole and tampered with.
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/config.h"
+#include "cli/cover_file.h"
+#include "tests/logger/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+struct Output {
+  int code;
+  std::string text;
+};
+
+Output Forereach(const std::string& what) {
+  const std::string command = "cd '" FOREREACH_SOURCE_DIR "' && '" FOREREACH_PROGRAM "' " + what;
+  std::FILE* pipe = popen(command.c_str(), "r");
+  Output output{-1, {}};
+  std::array<char, 4096> buffer;
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe))
+    output.text.append(buffer.data(), size);
+  output.code = WEXITSTATUS(pclose(pipe));
+  return output;
+}
+
+std::string Read(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+// The bicycle's task with another residual section.
+class DeclareTest : public testing::Test {
+ protected:
+  void WriteTask(const std::string& residual) {
+    const std::string text = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+    std::ofstream(task_) << std::regex_replace(text, std::regex("\nresidual: .*"), "\n" + residual);
+  }
+  Output Declare(const std::string& options = "") const {
+    return Forereach("declare --config " + task_ + " " + options + " 2>&1");
+  }
+  Output Check() const { return Declare("--check " + cover_); }
+
+  // Writes the cover with one thing changed.
+  template <class Change>
+  void Tamper(const Change& change) const {
+    Json document = Json::parse(Read(cover_));
+    change(document);
+    std::ofstream(cover_) << document;
+  }
+  // As somebody would who knows how digests are made.
+  void Reseal() const {
+    const std::string digest =
+        ToHex(CoverDigest(LoadCover(cover_, LoadConfig(task_, TransitionsFile::kIgnore)).claims));
+    Tamper([&](Json& document) { document["digests"]["cover"] = digest; });
+  }
+  void ExpectRefuted(const char* text) const {
+    const Output output = Check();
+    EXPECT_EQ(output.code, 1);
+    EXPECT_THAT(output.text, HasSubstr(text));
+    EXPECT_THAT(output.text, HasSubstr("check: refuted"));
+  }
+
+  Scratch scratch_;
+  const std::string task_ = scratch_ / "task.yaml", cover_ = scratch_ / "cover.json";
+};
+
+TEST(Declare, GivesTheMatrixOfTheShippedTask) {
+  const Output output = Forereach("declare --config config/bicycle.yaml --json");
+  EXPECT_EQ(output.code, 0);
+  const Json document = Json::parse(output.text);
+  const Json& lipschitz = document["lipschitz"];
+  ASSERT_EQ(lipschitz.size(), 6u);
+  double sum = 0;
+  for (const Json& row : lipschitz) {
+    ASSERT_EQ(row.size(), 8u);
+    for (const Json& entry : row) sum += entry.get<double>();
+  }
+  EXPECT_NEAR(lipschitz[2][3], 0.01195760, 1e-8);
+  EXPECT_NEAR(lipschitz[2][5], 0.40767005, 1e-8);
+  EXPECT_EQ(sum, lipschitz[2][3].get<double>() + lipschitz[2][5].get<double>());
+  EXPECT_LE(document["lower"][2][3], lipschitz[2][3]);
+  EXPECT_LE(document["gap"], 1e-7);
+  EXPECT_TRUE(document["reached"]);
+  EXPECT_EQ(document["entries"][1]["point"]["v"], 25);
+  EXPECT_GT(document["boxes"], 2);
+  for (const char* digest : {"config", "model", "residual"})
+    EXPECT_EQ(document["digests"][digest].get<std::string>().size(), 64u);
+}
+
+TEST_F(DeclareTest, ItsLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
+  WriteTask("residual: {name: heading_saturation, understeer: [0.3, 0.34], friction: [0.85, 0.95]}\n");
+  const Json document = Json::parse(Declare("--json").text);
+  const std::string text =
+      std::regex_replace(Read(task_), std::regex("\n  lipschitz: .*"), "\n  " + document["yaml"].get<std::string>());
+  std::ofstream(task_) << text;
+  const Eigen::MatrixXd lipschitz = LoadConfig(task_, TransitionsFile::kIgnore).problem->declaration.lipschitz;
+  for (const int l : {3, 5}) {
+    const double bound = document["lipschitz"][2][static_cast<std::size_t>(l)];
+    EXPECT_GE(lipschitz(2, l), bound);
+    EXPECT_LE(lipschitz(2, l), bound * (1 + 1e-9));
+  }
+  EXPECT_GT(lipschitz(2, 5), 0.4077);
+  EXPECT_THAT(Declare().text, HasSubstr("declaration:\n  " + document["yaml"].get<std::string>()));
+}
+
+TEST_F(DeclareTest, StopsAtTheWorkLimitWithABoundAndSaysSo) {
+  WriteTask("residual: {name: heading_saturation}\n");
+  const Output output = Declare("--max-boxes 20 --cover " + cover_);
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("stopped at a gap of"));
+  EXPECT_EQ(Check().code, 0) << Check().text;
+}
+
+TEST_F(DeclareTest, CoverIsConfirmed) {
+  WriteTask("residual: {name: heading_saturation, gravity: [9.78, 9.84]}\n");
+  EXPECT_EQ(Declare("--cover " + cover_).code, 0);
+  EXPECT_EQ(Check().code, 0) << Check().text;
+  EXPECT_EQ(Json::parse(Declare("--json --check " + cover_).text)["verdict"], "confirmed");
+}
+
+TEST_F(DeclareTest, TamperedCoversAreRefused) {
+  WriteTask("residual: {name: heading_saturation}\n");
+  Declare("--cover " + cover_);
+  const std::string whole = Read(cover_);
+  const auto each_time = [&](const auto& change, const char* claim) {
+    Tamper(change);
+    ExpectRefuted("altered");
+    Reseal();
+    ExpectRefuted(claim);
+    std::ofstream(cover_) << whole;
+  };
+  each_time([](Json& document) { document["entries"][0]["cover"].erase(3); }, "a part of the domain is missing");
+  each_time([](Json& document) { document["entries"].erase(1); }, "theta by delta: stands 0 times");
+  each_time([](Json& document) { document["entries"][1]["bound"] = 0.4; }, "above the declared");
+  each_time([](Json& document) { document["entries"][0]["cover"] = 0.0119; }, "but the slope is");
+  EXPECT_EQ(Check().code, 0);
+}
+
+TEST_F(DeclareTest, CoverOfAnotherTaskIsRefused) {
+  WriteTask("residual: {name: heading_saturation}\n");
+  Declare("--cover " + cover_);
+  WriteTask("residual: {name: heading_saturation, understeer: 0.33}\n");
+  ExpectRefuted("another domain, residual or parameters");
+}
+
+TEST_F(DeclareTest, BadInputExitsWithTwoAndOneLine) {
+  const auto expect = [&](const std::string& residual, const char* text) {
+    WriteTask(residual);
+    const Output output = Declare();
+    EXPECT_EQ(output.code, 2) << residual;
+    EXPECT_THAT(output.text, HasSubstr(text));
+    EXPECT_EQ(std::count(output.text.begin(), output.text.end(), '\n'), 1) << output.text;
+  };
+  expect("", "residual: missing");
+  expect("residual: {name: velocity_knee}\n", "residual.name: velocity_knee is for point_mass");
+  expect("residual: {name: heading_saturation, knee: 1}\n", "residual.knee: is for velocity_knee");
+  expect("residual: {name: heading_saturation, mu: 1}\n", "residual.mu: unknown key");
+  expect("residual: {name: heading_saturation, friction: [0.9, 0.8]}\n",
+         "residual.friction[1]: 0.8 is outside [0.9, inf)");
+  expect("residual: {name: heading_saturation, friction: [0.9]}\n", "residual.friction: has 1 entries");
+  expect("residual: {name: heading_saturation, friction: [-1, 1]}\n", "residual.friction[0]: -1 is outside [0, inf)");
+  EXPECT_EQ(Forereach("declare --config config/bicycle.yaml --check README.md 2>/dev/null").code, 2);
+  EXPECT_EQ(Forereach("declare --config config/bicycle.yaml --gap 0 2>/dev/null").code, 2);
+}
+
+TEST(DeclareHelp, Teaches) {
+  const Output output = Forereach("declare --help");
+  EXPECT_EQ(output.code, 0);
+  for (const char* text : {"--check", "exit 0", "residual: {name:", "forereach declare --config config/bicycle.yaml"})
+    EXPECT_THAT(output.text, HasSubstr(text));
+}
+
+}  // namespace
+}  // namespace forereach

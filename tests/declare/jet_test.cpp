@@ -1,0 +1,70 @@
+// Jets: derivatives against difference quotients in extended precision, kinks, zeros that stay zero.
+#include "certifier/dynamics/jet.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/residuals.h"
+
+namespace forereach {
+namespace {
+
+// One expression with every smooth operation of two arguments.
+template <class T>
+T Expression(const T& x, const T& y) {
+  using std::cos, std::exp, std::sin, std::sqrt, std::tan;
+  return sin(x * y) / (T(2) + cos(y)) + exp(-x) * tan(y / T(2)) - sqrt(x * x + y * y) +
+         SmoothGate(x + y) * Softplus(x - y, T(1) + x * x);
+}
+
+TEST(Jet, EnclosesWhatDifferencesShow) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(-1.2, 1.2);
+  constexpr long double kStep = 1e-5L;
+  for (int i = 0; i < 2000; ++i) {
+    const double x = uniform(random), y = uniform(random), width = std::ldexp(1.0, -2 - i % 20);
+    const Jet jet =
+        Expression(Jet::Argument({x - width, x + width}, 0, true), Jet::Argument({y - width, y + width}, 1, false));
+    const auto at = [&](long double a, long double b) { return Expression<long double>(x + a, y + b); };
+    const auto inside = [](long double value, const Interval& range, double slack) {
+      return range.lower - slack <= value && value <= range.upper + slack;
+    };
+    if (!jet.slope.IsFinite()) continue;  // where the root's argument meets zero
+    EXPECT_TRUE(inside(at(0, 0), jet.value, 1e-15));
+    EXPECT_TRUE(inside((at(kStep, 0) - at(-kStep, 0)) / (2 * kStep), jet.slope, 1e-6));
+    EXPECT_TRUE(inside((at(0, kStep) - at(0, -kStep)) / (2 * kStep), jet.gradient[1], 1e-6));
+    EXPECT_TRUE(inside((at(kStep, 0) - 2 * at(0, 0) + at(-kStep, 0)) / (kStep * kStep), jet.curvature[0], 1e-3));
+    const long double mixed =
+        (at(kStep, kStep) - at(kStep, -kStep) - at(-kStep, kStep) + at(-kStep, -kStep)) / (4 * kStep * kStep);
+    EXPECT_TRUE(inside(mixed, jet.curvature[1], 1e-3)) << x << " " << y << " " << width;
+  }
+}
+
+TEST(Jet, KinkHasBothSidesAndNoCurvature) {
+  const Jet across = abs(Jet::Argument({-1, 2}, 0, true)), beside = abs(Jet::Argument({0, 2}, 0, true));
+  EXPECT_EQ(across.slope, Interval(-1, 1));
+  EXPECT_FALSE(across.curvature[0].IsFinite());
+  EXPECT_EQ(beside.slope, Interval(1, 1));
+  EXPECT_EQ(beside.curvature[0], Interval(0, 0));
+  const Jet larger = max(Jet::Argument({0, 2}, 0, true), Jet(1.0));
+  EXPECT_EQ(larger.value, Interval(1, 2));
+  EXPECT_EQ(larger.slope, Interval(0, 1));
+}
+
+TEST(Jet, WhatIsOffIsExactlyZero) {
+  const Jet off = SmoothGate(Jet::Argument({-3, 0}, 0, true));
+  EXPECT_EQ(off.value, Interval(0, 0));
+  EXPECT_EQ(off.slope, Interval(0, 0));
+  EXPECT_EQ((off * abs(Jet::Argument({-1, 1}, 0, true))).curvature[0], Interval(0, 0));
+}
+
+TEST(Jet, SquareIsNotNegative) {
+  const Jet x = Jet::Argument({-2, 3}, 0, true);
+  EXPECT_EQ((x * x).value, Interval(0, 9));
+  EXPECT_EQ((x * x).slope, Interval(-4, 6));
+}
+
+}  // namespace
+}  // namespace forereach

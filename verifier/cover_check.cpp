@@ -1,0 +1,221 @@
+#include "verifier/cover_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace forereach::verifier {
+namespace {
+
+constexpr int kBits = 128;
+// A leaf's bound may take finer boxes here than it took there: at most so many halvings.
+constexpr int kMostCuts = 24;
+
+using Box = std::vector<Real>;
+
+bool IsPoint(const Real& range) { return CertainlyAtMost(range.upper(), range.lower()); }
+Real Width(const Real& range) { return range.upper() - range.lower(); }
+
+std::size_t Place(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
+std::string Text(const Real& x) { return x.text(); }
+
+// One claim's derivative, its domain and its arguments w = (z, theta).
+class ClaimCheck {
+ public:
+  ClaimCheck(const Domain& domain, const Slopes& slopes, const SlopeClaim& claim, std::size_t num_variables)
+      : domain_(domain), slopes_(slopes), claim_(claim), num_variables_(num_variables) {}
+
+  [[nodiscard]] CoverVerdict Walk(const Box& whole, const std::function<void()>& checked) const {
+    std::vector<std::pair<int, Box>> open{{0, whole}};
+    while (!open.empty()) {
+      const auto [index, box] = std::move(open.back());
+      open.pop_back();
+      const Cover::Node& node = claim_.cover.nodes[static_cast<std::size_t>(index)];
+      if (node.argument >= 0) {
+        if (const std::string fault = FaultOf(node, index, box); !fault.empty()) return {Answer::kNo, fault};
+        const auto argument = static_cast<std::size_t>(node.argument);
+        const Real at(node.number);
+        open.emplace_back(node.below, box).second[argument] = Real::FromTo(box[argument].lower(), at);
+        open.emplace_back(node.above, box).second[argument] = Real::FromTo(at, box[argument].upper());
+      } else {
+        const CoverVerdict verdict = Leaf(node, box);
+        if (verdict.answer != Answer::kYes) return verdict;
+        if (checked) checked();
+      }
+    }
+    return {};
+  }
+
+ private:
+  [[nodiscard]] std::string FaultOf(const Cover::Node& node, int index, const Box& box) const {
+    const int size = static_cast<int>(claim_.cover.nodes.size());
+    if (node.argument >= static_cast<int>(box.size())) return "a cut across an argument that there is not";
+    const auto is_part = [&](int part) { return index < part && part < size; };
+    if (!is_part(node.below) || !is_part(node.above)) return "a part of the domain is missing";
+    const Real& range = box[static_cast<std::size_t>(node.argument)];
+    if (!std::isfinite(node.number) || !CertainlyAtMost(range.lower(), node.number) ||
+        !CertainlyAtMost(node.number, range.upper()))
+      return "a cut at " + Text(node.number) + ", outside of its box from " + Text(range.lower()) + " to " +
+             Text(range.upper());
+    return {};
+  }
+
+  [[nodiscard]] CoverVerdict Leaf(const Cover::Node& node, const Box& box) const {
+    if (node.outside) {
+      if (LiesOutside(box)) return {};
+      return {Answer::kNo, "a box said to lie outside the domain was not shown to"};
+    }
+    if (!(node.number <= claim_.bound))
+      return {Answer::kNo, "a box has the bound " + Text(node.number) + ", above the declared " + Text(claim_.bound)};
+    return Holds(node.number, box, kMostCuts);
+  }
+
+  // Whether |slope| <= bound over the box, which is cut further where that cannot be told at once.
+  [[nodiscard]] CoverVerdict Holds(double bound, const Box& box, int cuts) const {
+    if (LiesOutside(box)) return {};
+    Trial trial{-1, box};
+    const Dual slope = Slope(box, true);
+    if (IsAtMostOver(box, slope, bound, 1, trial) && IsAtMostOver(box, slope, bound, -1, trial)) return {};
+    for (const Box& near : {trial.point, box})
+      if (const auto witness = CounterExample(bound, near)) return *witness;
+    if (cuts == 0 || trial.cut < 0) return {Answer::kUnknown, "a box's bound " + Text(bound) + " could not be shown"};
+    const auto argument = static_cast<std::size_t>(trial.cut);
+    const Real middle = box[argument].middle();
+    Box half = box;
+    half[argument] = Real::FromTo(box[argument].lower(), middle);
+    if (const CoverVerdict verdict = Holds(bound, half, cuts - 1); verdict.answer != Answer::kYes) return verdict;
+    half[argument] = Real::FromTo(middle, box[argument].upper());
+    return Holds(bound, half, cuts - 1);
+  }
+
+  // What was learnt where a bound could not be shown: the argument that cost most, and a point where the slope is
+  // large.
+  struct Trial {
+    int cut;
+    Box point;
+  };
+
+  // Whether sign * slope <= bound over the box, by its range, or after the arguments in which it is monotone have moved
+  // to where it is largest, or expanded around a point of the others. @param slope over the box.
+  [[nodiscard]] bool IsAtMostOver(const Box& box, Dual slope, double bound, double sign, Trial& trial) const {
+    Box rest = box;
+    while (true) {
+      if (CertainlyAtMost(Real(sign) * slope.value, bound)) return true;
+      bool moved = false;
+      for (std::size_t i = 0; i < rest.size(); ++i) {
+        if (IsPoint(rest[i]) || i >= slope.gradient.size()) continue;
+        const Real rise = Real(sign) * slope.gradient[i];
+        const bool up = CertainlyAtMost(0.0, rise), down = CertainlyAtMost(rise, 0.0);
+        if (!up && !down) continue;
+        rest[i] = up ? rest[i].upper() : rest[i].lower();
+        moved = true;
+      }
+      if (!moved) return ExpandsTo(rest, slope, bound, sign, trial);
+      slope = Slope(rest, true);
+    }
+  }
+
+  [[nodiscard]] bool ExpandsTo(const Box& rest, const Dual& slope, double bound, double sign, Trial& trial) const {
+    Box& point = trial.point = rest;
+    Real excess(0.0), most(-1.0);
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+      if (IsPoint(rest[i])) continue;
+      point[i] = rest[i].middle();
+      if (i >= slope.gradient.size() || slope.gradient[i].IsZero()) continue;
+      // Rises of at most up to the right and down to the left; the point where both cost the same costs least.
+      const Real rise = Real(sign) * slope.gradient[i];
+      const Real up = rise.upper(), down = (-rise).upper();
+      if (rise.IsFinite()) point[i] = (rest[i].lower() + Width(rest[i]) * (up / (up + down))).middle();
+      if (!CertainlyAtMost(rest[i].lower(), point[i]) || !CertainlyAtMost(point[i], rest[i].upper()))
+        point[i] = rest[i].middle();
+      const Real cost = max(up * (rest[i].upper() - point[i]), down * (point[i] - rest[i].lower())).upper();
+      excess += cost;
+      if (trial.cut >= 0 && !CertainlyBelow(most, cost)) continue;
+      trial.cut = static_cast<int>(i);
+      most = cost;
+    }
+    return CertainlyAtMost(Real(sign) * Slope(point, false).value + excess, bound);
+  }
+
+  // The middle of a box, if it is in the domain and the slope there is above the bound.
+  [[nodiscard]] std::optional<CoverVerdict> CounterExample(double bound, const Box& box) const {
+    Box point = box;
+    for (Real& w : point) w = w.middle();
+    const Real size = abs(Slope(point, false).value);
+    if (!CertainlyBelow(bound, size) || !LiesInside(point)) return std::nullopt;
+    return CoverVerdict{Answer::kNo,
+                        "a box's bound is " + Text(bound) + ", but the slope is " + Text(size) + " at a point of it"};
+  }
+
+  [[nodiscard]] Dual Slope(const Box& w, bool with_gradient) const {
+    std::vector<Dual> arguments;
+    arguments.reserve(w.size());
+    for (std::size_t i = 0; i < w.size(); ++i)
+      arguments.push_back(with_gradient && !IsPoint(w[i]) ? Dual::Variable(w[i], i) : Dual(w[i]));
+    const std::span<const Dual> all(arguments);
+    return slopes_.At(claim_.row, claim_.column, all.first(num_variables_), all.subspan(num_variables_));
+  }
+
+  // ---- The domain's inequalities and balls.
+
+  [[nodiscard]] Real ValueOver(const Domain::Inequality& inequality, const Box& box) const {
+    Real sum(0.0);
+    for (Eigen::Index l = 0; l < inequality.coefficients.size(); ++l)
+      sum += Real(inequality.coefficients[l]) * box[Place(l)];
+    return sum;
+  }
+  [[nodiscard]] Real SquaredDistanceOver(const Domain::Ball& ball, const Box& box) const {
+    Real sum(0.0);
+    for (std::size_t i = 0; i < ball.coordinates.size(); ++i)
+      sum += sqr(box[Place(ball.coordinates[i])] - Real(ball.center[static_cast<Eigen::Index>(i)]));
+    return sum;
+  }
+
+  [[nodiscard]] bool LiesOutside(const Box& box) const {
+    return std::ranges::any_of(domain_.inequalities,
+                               [&](const auto& i) { return CertainlyBelow(i.bound, ValueOver(i, box)); }) ||
+           std::ranges::any_of(domain_.balls, [&](const auto& ball) {
+             return CertainlyBelow(sqr(Real(ball.radius)), SquaredDistanceOver(ball, box));
+           });
+  }
+  [[nodiscard]] bool LiesInside(const Box& point) const {
+    return std::ranges::all_of(domain_.inequalities,
+                               [&](const auto& i) { return CertainlyAtMost(ValueOver(i, point), i.bound); }) &&
+           std::ranges::all_of(domain_.balls, [&](const auto& ball) {
+             return CertainlyAtMost(SquaredDistanceOver(ball, point), sqr(Real(ball.radius)));
+           });
+  }
+
+  const Domain& domain_;
+  const Slopes& slopes_;
+  const SlopeClaim& claim_;
+  std::size_t num_variables_;
+};
+
+}  // namespace
+
+CoverChecker::CoverChecker(const Domain& domain, const ParametricResidual& residual)
+    : domain_(domain), residual_(residual), slopes_(SlopesOf(residual)) {
+  if (!slopes_) throw std::invalid_argument("the verifier does not know the residual " + residual.name);
+}
+
+CoverVerdict CoverChecker::Check(const SlopeClaim& claim, const std::function<void()>& checked) const {
+  const auto known = Entries();
+  if (std::ranges::count(known, std::pair(claim.row, claim.column)) == 0)
+    return {Answer::kNo, "a claim on a derivative that is zero"};
+  if (!std::isfinite(claim.bound)) return {Answer::kNo, "the declared bound is not finite"};
+  if (claim.cover.nodes.empty()) return {Answer::kNo, "a part of the domain is missing"};
+  const Precision precision(kBits);
+  Box whole;
+  for (const forereach::Box* part : {&domain_.state, &domain_.input})
+    for (Eigen::Index l = 0; l < part->dim(); ++l) whole.push_back(Real::FromTo(part->lower()[l], part->upper()[l]));
+  const std::size_t num_variables = whole.size();
+  for (const auto& [name, lower, upper] : residual_.parameters) whole.push_back(Real::FromTo(lower, upper));
+  return ClaimCheck(domain_, *slopes_, claim, num_variables).Walk(whole, checked);
+}
+
+}  // namespace forereach::verifier
