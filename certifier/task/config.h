@@ -4,11 +4,7 @@ and, made from it, in config/README.md. */
 
 #include <map>
 #include <memory>
-<<<<<<< HEAD
-=======
 #include <optional>
-#include <stdexcept>
->>>>>>> declare
 #include <string>
 #include <vector>
 
