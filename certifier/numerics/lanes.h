@@ -37,6 +37,8 @@ FOREREACH_INLINE Lanes Abs(const Lanes& x) {
   return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
+/** b where a is NaN. */
+FOREREACH_INLINE Lanes Min(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
 /** The first `count` of four, `other` behind them. */
 FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count, double other) {
   const auto end = static_cast<std::int64_t>(count);

@@ -153,8 +153,8 @@ FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
 using Lists = std::array<Lanes, 8>;
 
 FOREREACH_INLINE void Order(Lists& x, std::size_t i, std::size_t j) {
-  const Lanes low = x[j] < x[i] ? x[j] : x[i];
-  x[j] = x[j] < x[i] ? x[i] : x[j];
+  const Lanes low = Min(x[j], x[i]);
+  x[j] = Max(x[i], x[j]);
   x[i] = low;
 }
 
@@ -170,7 +170,7 @@ FOREREACH_INLINE void Sort(Lists& x) {
 FOREREACH_INLINE void MergeSmallest(Lists& x, const Lists& partner) {
   Lists smallest;
 #pragma GCC unroll 8
-  for (std::size_t i = 0; i < 8; ++i) smallest[i] = partner[7 - i] < x[i] ? partner[7 - i] : x[i];
+  for (std::size_t i = 0; i < 8; ++i) smallest[i] = Min(partner[7 - i], x[i]);
   x = smallest;  // rises, then falls, in a circle
 #pragma GCC unroll 3
   for (std::size_t distance = 4; distance > 0; distance /= 2)

@@ -109,7 +109,8 @@ class ColumnScores {
   /** Sets four, from the sums and the largest of the columns' absolute values. */
   FOREREACH_INLINE void Set(std::size_t first_column, const Lanes& sum, const Lanes& largest) {
     const auto index = static_cast<std::int64_t>(kMaxGenerators - first_column);
-    const LaneMask bits = (std::bit_cast<LaneMask>(sum - largest) & ~LaneMask{127, 127, 127, 127}) |
+    const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so that bits of it are no NaN
+    const LaneMask bits = (std::bit_cast<LaneMask>(score) & ~LaneMask{127, 127, 127, 127}) |
                           LaneMask{index, index - 1, index - 2, index - 3};
     const LaneMask nonzero = largest > AllLanes(0);
     nonzero_ -= nonzero;

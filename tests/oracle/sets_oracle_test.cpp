@@ -111,6 +111,24 @@ TEST(ZonotopeOracle, ReducedSetsContainTheOriginal) {
   }
 }
 
+// The size of such a column is infinite, that of the set is not.
+TEST(ZonotopeOracle, ReducesColumnsWhoseSizesOverflow) {
+  Random random(405);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 200; ++trial) {
+    Eigen::MatrixXd generators = random.Matrix(6, 13);
+    for (int huge = 0; huge < 4; ++huge)
+      generators.col(3 * huge + random.Below(3)) = 0.4e308 * Eigen::VectorXd::NullaryExpr(6, [&] { return random.Sign(); });
+    const Zonotope set(Eigen::VectorXd::Zero(6), generators);
+    for (int order = 1; order <= 2; ++order) {
+      Zonotope reduced = set;
+      ReduceOrder(reduced, order);
+      ASSERT_LE(reduced.num_generators(), order * 6);
+      for (const Eigen::VectorXd& d : Directions(random, set)) ASSERT_GE(exact::Support(reduced, View(d)), exact::Support(set, View(d)));
+    }
+  }
+}
+
 struct IntervalMatrix {
   std::vector<MatrixEntry> entries;
   int rows, columns;
