@@ -133,12 +133,13 @@ class Report:
         sizes = [n for n in SIZES if any(n in times for scenarios in by_stage.values() for times in scenarios.values())]
         for stage, scenarios in by_stage.items():
             for scenario, times in scenarios.items():
-                if list(times) == [400]:  # does not depend on N
-                    rows.append([stage.replace("_", ", "), number(times[400])] + [""] * (len(sizes) - 1))
+                if list(times) == [400]:  # does not depend on N: goes last
+                    cells = [stage.replace("_", ", "), number(times[400])] + [""] * (len(sizes) - 1)
+                    rows.append((1, cells))
                 else:
-                    rows.append([f"{stage.replace('_', ', ')}, {scenario}"] + [number(times.get(n)) for n in sizes])
-        rows.sort(key=lambda row: (row[2] == "", row[0]))
-        return table(["", *("N = " + size_name(n) for n in sizes)], rows)
+                    cells = [f"{stage.replace('_', ', ')}, {scenario}"] + [number(times.get(n)) for n in sizes]
+                    rows.append((0, cells))
+        return table(["", *("N = " + size_name(n) for n in sizes)], [cells for _, cells in sorted(rows)])
 
     def plain_pairwise(self):
         times = [f"{number(time)} us at N = {n}" for n in SIZES
