@@ -18,7 +18,7 @@ TO_MICROSECONDS = {"ns": 1e-3, "us": 1, "ms": 1e3, "s": 1e6}
 
 
 class Benchmark:
-    """The median of one benchmark's repetitions; times in microseconds."""
+    """One repetition of a benchmark; times in microseconds."""
 
     def __init__(self, entry):
         scale = TO_MICROSECONDS[entry["time_unit"]]
@@ -26,12 +26,19 @@ class Benchmark:
         self.rate = entry.get("items_per_second")
         self.widths = [entry.get("width_" + name) for name in ("x", "y", "theta")]
 
+    # Others' work on the machine disturbs the fastest repetition least.
+    def is_faster_than(self, other):
+        return self.rate > other.rate if self.rate else self.cpu < other.cpu
+
 
 def read_benchmarks(path):
     found = {}
     for entry in json.loads(path.read_text())["benchmarks"]:
-        if not entry.get("error_occurred") and entry.get("aggregate_name", "median") == "median":
-            found[entry["run_name"]] = Benchmark(entry)
+        if entry.get("error_occurred") or entry["run_type"] != "iteration":
+            continue
+        name, repetition = entry["run_name"], Benchmark(entry)
+        if name not in found or repetition.is_faster_than(found[name]):
+            found[name] = repetition
     return found
 
 
@@ -231,7 +238,7 @@ class Report:
             if benchmark := self.benchmarks.get("nominal_tube/" + name):
                 time = "-" if "sampled" in name else number(benchmark.cpu)
                 rows.append([label, time, *(f"{width:.5f}" for width in benchmark.widths), rigorous])
-        return table(["tool", "median us", "x", "y", "theta", "rigorous"], rows)
+        return table(["tool", "us", "x", "y", "theta", "rigorous"], rows)
 
 
 def output(*command):
