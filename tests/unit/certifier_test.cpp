@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -300,34 +301,62 @@ TEST(ReferenceTube, CentredIsWithinTwoPercentOfTheSampledInnerHull) {
   }
 }
 
-TEST(Certifier, AnswersBitForBitTheSameOnEveryThread) {
-  Problem problem = BicycleProblem();
-  problem.declaration.lipschitz(kTheta, kV) = 0.01;
-  problem.declaration.lipschitz(kTheta, kDelta) = 0.5;
-  for (const double delta : {-0.3, -0.1, 0.1, 0.3}) AddNominalTransition(problem, Vec({0, 0, 0, 8, 0, delta, 0, 0}));
-  const Certifier certifier(std::make_shared<Problem>(problem));
-  const Zonotope start = Zonotope::FromBox(Vec({0, 0, 0, 8, 0, 0.05}), Vec({0.1, 0.1, 0.02, 0.2, 0.02, 0.005}));
-  const Eigen::MatrixXd controls = Eigen::Vector2d(0.5, 0.1).replicate(1, 12);
-  const Plan plan{controls.data(), 2, 12, 2};
-  const std::vector<Obstacle> obstacles{Obstacle::Circle(Vec({6, 6}), 1)};
+// A task with a residual, whose slices reach the largest order.
+class Reproducible : public testing::TestWithParam<Method> {
+ protected:
+  Reproducible() {
+    Problem problem = BicycleProblem();
+    problem.method = GetParam();
+    problem.declaration.lipschitz(kTheta, kV) = 0.01;
+    problem.declaration.lipschitz(kTheta, kDelta) = 0.5;
+    for (const double delta : {-0.3, -0.1, 0.1, 0.3}) AddNominalTransition(problem, Vec({0, 0, 0, 8, 0, delta, 0, 0}));
+    certifier_.emplace(std::make_shared<Problem>(problem));
+  }
+
+  Decision Certify(Tube& tube) const { return certifier_->Certify({controls_.data(), 2, 12, 2}, start_, obstacles_, tube); }
+
+  static void ExpectSame(const Decision& a, const Tube& tube_a, const Decision& b, const Tube& tube_b) {
+    EXPECT_EQ(a.outcome, b.outcome);
+    EXPECT_EQ(a.margin, b.margin);
+    EXPECT_EQ(a.closest_step, b.closest_step);
+    ASSERT_EQ(tube_a.length(), 12);
+    ASSERT_EQ(tube_b.length(), 12);
+    for (int t = 0; t <= 12; ++t) {
+      EXPECT_EQ(tube_a.slice(t).CenterVector(), tube_b.slice(t).CenterVector());
+      EXPECT_EQ(tube_a.slice(t).GeneratorMatrix(), tube_b.slice(t).GeneratorMatrix());
+    }
+  }
+
+  std::optional<Certifier> certifier_;
+  Zonotope start_ = Zonotope::FromBox(Vec({0, 0, 0, 8, 0, 0.05}), Vec({0.1, 0.1, 0.02, 0.2, 0.02, 0.005}));
+  Eigen::MatrixXd controls_ = Eigen::Vector2d(0.5, 0.1).replicate(1, 12);
+  std::vector<Obstacle> obstacles_{Obstacle::Circle(Vec({6, 6}), 1)};
+};
+
+TEST_P(Reproducible, BitForBitOnEveryThread) {
   std::vector<Tube> tubes(4);
   std::vector<Decision> decisions(4);
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < 4; ++i)
     threads.emplace_back([&, i] {
-      for (int repeat = 0; repeat < 50; ++repeat) decisions[i] = certifier.Certify(plan, start, obstacles, tubes[i]);
+      for (int repeat = 0; repeat < 50; ++repeat) decisions[i] = Certify(tubes[i]);
     });
   for (std::thread& thread : threads) thread.join();
-  for (std::size_t i = 1; i < 4; ++i) {
-    EXPECT_EQ(decisions[i].outcome, decisions[0].outcome);
-    EXPECT_EQ(decisions[i].margin, decisions[0].margin);
-    EXPECT_EQ(decisions[i].closest_step, decisions[0].closest_step);
-    for (int t = 0; t <= 12; ++t) {
-      EXPECT_EQ(tubes[i].slice(t).CenterVector(), tubes[0].slice(t).CenterVector());
-      EXPECT_EQ(tubes[i].slice(t).GeneratorMatrix(), tubes[0].slice(t).GeneratorMatrix());
-    }
-  }
+  for (std::size_t i = 1; i < 4; ++i) ExpectSame(decisions[i], tubes[i], decisions[0], tubes[0]);
 }
+
+TEST_P(Reproducible, BitForBitOnEveryInstructionSet) {
+  const InstructionSet best = active_instruction_set;
+  Tube tube, baseline;
+  const Decision decision = Certify(tube);
+  active_instruction_set = InstructionSet::kBaseline;
+  const Decision again = Certify(baseline);
+  active_instruction_set = best;
+  ExpectSame(decision, tube, again, baseline);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, Reproducible, testing::Values(Method::kPaper, Method::kCentred),
+                         [](const auto& test) { return test.param == Method::kPaper ? "paper" : "centred"; });
 
 void ExpectRefused(const Problem& problem, const std::string& part) {
   EXPECT_THAT([&] { Certifier certifier(std::make_shared<Problem>(problem)); },
