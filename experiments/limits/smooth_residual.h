@@ -42,7 +42,7 @@ met. Cost: cells^a jets for each derivative, a coordinates that matter. */
 
 /** A residual of dynamics/residuals.h over the box. */
 template <class Residual>
-SmoothResidual Describe(const Residual& residual, std::span<const Interval> box, int cells = 128) {
+SmoothResidual Describe(const Residual& residual, std::span<const Interval> box, int cells = 256) {
   const auto exact = residual.parameters();
   const std::vector<double> parameters(exact.begin(), exact.end());
   return {[residual](std::span<const long double> z, std::span<long double> r) { residual(z, r); },
