@@ -1,0 +1,56 @@
+/** A smooth residual r0 with what the information limits ask of it: its values, its Jacobian, and how large it and its
+first two derivatives get. */
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/declare/residual_slopes.h"
+
+namespace forereach::experiments {
+
+/** sup over a domain of |r0|_inf, |D_z r0|_{2->2} and |D_z^2 r0|_{2->2}, each an upper bound. */
+struct SmoothBounds {
+  double value = 0, slope = 0, curvature = 0;
+};
+
+struct SmoothResidual {
+  /** r0(z): d_z numbers in, n out. */
+  std::function<void(std::span<const long double> z, std::span<long double> residual)> evaluate;
+  /** D_z r0(z), n-by-d_z. */
+  std::function<Eigen::MatrixXd(std::span<const double> z)> jacobian;
+  SmoothBounds bounds;
+};
+
+/** Upper bounds over a box of d_z intervals, by interval jets over cells: each coordinate that the residual depends on
+is cut into `cells` parts. Operator norms are bounded by Frobenius norms, sqrt(sum_k |.|_F^2). Infinite where a kink is
+met. Cost: cells^a jets for each derivative, a coordinates that matter. */
+[[nodiscard]] SmoothBounds BoundSmoothness(const ResidualSlopes& slopes, std::span<const double> parameters,
+                                           std::span<const Interval> box, int cells);
+
+/** D_z r(z) by jets at a point. */
+[[nodiscard]] Eigen::MatrixXd JacobianAt(const ResidualSlopes& slopes, std::span<const double> parameters,
+                                         std::span<const double> z);
+
+/** r0 = 0 for a model of these sizes. */
+[[nodiscard]] SmoothResidual ZeroResidual(int num_states, int num_variables);
+
+/** A residual of dynamics/residuals.h over the box. */
+template <class Residual>
+SmoothResidual Describe(const Residual& residual, std::span<const Interval> box, int cells = 256) {
+  const auto exact = residual.parameters();
+  const std::vector<double> parameters(exact.begin(), exact.end());
+  return {[residual](std::span<const long double> z, std::span<long double> r) { residual(z, r); },
+          [parameters](std::span<const double> z) {
+            static const EquationsSlopes<Residual> slopes;
+            return JacobianAt(slopes, parameters, z);
+          },
+          BoundSmoothness(EquationsSlopes<Residual>(), parameters, box, cells)};
+}
+
+}  // namespace forereach::experiments

@@ -1,0 +1,32 @@
+#include "experiments/methods/envelope.h"
+
+#include <vector>
+
+#include "certifier/residual/lipschitz_envelope.h"
+#include "certifier/residual/observations.h"
+#include "experiments/methods/samples.h"
+
+namespace forereach::experiments {
+
+std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting, const Declaration& declaration) {
+  std::vector<double> lower, upper;
+  for (int l = 0; l < setting.model.num_variables(); ++l) {
+    const Interval range = DomainRange(setting.domain, l);
+    lower.push_back(range.lower);
+    upper.push_back(range.upper);
+  }
+  declaration.Validate(setting.model.num_states(), setting.model.num_variables());
+  return std::make_unique<LipschitzEnvelope>(declaration, Observe(setting.model, setting.data), lower, upper);
+}
+
+std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting) {
+  return MakeForeReach(setting, setting.declaration);
+}
+
+std::unique_ptr<ResidualEnclosure> MakeScalarEnvelope(const Setting& setting) {
+  Declaration scalar = setting.declaration;
+  scalar.lipschitz.setConstant(setting.declaration.lipschitz.maxCoeff());
+  return MakeForeReach(setting, scalar);
+}
+
+}  // namespace forereach::experiments

@@ -1,0 +1,20 @@
+#include "experiments/methods/plug_in_gaussian.h"
+
+#include <algorithm>
+
+#include "experiments/methods/samples.h"
+
+namespace forereach::experiments {
+
+std::unique_ptr<ResidualEnclosure> MakePlugInGaussian(const Setting& setting) {
+  const Observations observations = Observe(setting.model, setting.data);
+  const Eigen::MatrixXd residuals = ObservedResiduals(observations);
+  ResidualBox box;
+  box.center = residuals.colwise().mean().transpose();
+  const Eigen::VectorXd squares = (residuals.rowwise() - box.center.transpose()).colwise().squaredNorm().transpose();
+  const double freedom = std::max(1.0, static_cast<double>(residuals.rows()) - 1);
+  box.radius = kGaussianScale * (squares / freedom).cwiseSqrt() + RecordingError(observations);
+  return std::make_unique<ConstantEnclosure>(std::move(box));
+}
+
+}  // namespace forereach::experiments
