@@ -1,0 +1,67 @@
+/** The unit of work: all plans of one system and seed, under one method, declaration and data set. */
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "experiments/methods/method.h"
+#include "experiments/scenarios.h"
+
+namespace forereach::experiments {
+
+/** A declared L, and what it is called in tables. The valid ones bound the slopes of r*. */
+struct NamedLipschitz {
+  std::string name;  ///< "deployed", ...: letters, digits, '.', '-' and '_'
+  Eigen::MatrixXd matrix;
+};
+
+struct Cell {
+  const System* system = nullptr;
+  Method method;
+  NamedLipschitz declared;
+  int observations = 0;  ///< N
+  double noise = 0;      ///< s; sigma_k = NoiseBound(s)
+  int seed = 0;          ///< From 0
+  int zonotope_order = 5;
+  Layout layout = Layout::kCorridor;
+
+  /** What it is, in one word that is a file name: "bicycle-ForeReach-deployed-N400-s0-order5-corridor-seed0". */
+  [[nodiscard]] std::string key() const;
+};
+
+/** ForeReach as the paper runs it: the deployed matrix, order 5, data in the corridor. */
+[[nodiscard]] Cell PaperCell(const System& system, int observations, double noise, int seed);
+
+/** How much is done in each cell. */
+struct Effort {
+  int scenarios, rollouts;  ///< At most so many as the system's own
+};
+
+/** What came of the plans of one group. */
+struct Tally {
+  char group = 'A';
+  int plans = 0;
+  int safe = 0;                                              ///< Target-safe: no rollout touches the obstacle
+  int certified = 0, falsified = 0, domain = 0, safety = 0;  ///< Add up to plans
+  int certified_safe = 0;
+  int covered = 0;         ///< Of the complete tubes, certified + safety
+  int prefix_covered = 0;  ///< Of the tubes that D ended
+  int undecided = 0;       ///< Tubes that count as not covered because membership could not be decided
+  std::vector<int> domain_steps, safety_steps;  ///< By step, 0..T
+  std::vector<double> areas;  ///< Of P X_T of each plan in turn, m^2; -1 where the tube is not complete
+
+  [[nodiscard]] int complete() const { return certified + safety; }
+  [[nodiscard]] int false_certificates() const { return certified - certified_safe; }
+};
+
+/** In the order of kGroups. */
+using CellResult = std::array<Tally, 3>;
+
+/** Runs the pairwise test once, if the method is ForeReach: a violation makes every plan F. Then each plan in
+turn. Deterministic. Cost: for each plan its rollouts and one certify call, some 0.3 ms for the bicycle. */
+[[nodiscard]] CellResult RunCell(const Cell& cell, const Effort& effort);
+
+}  // namespace forereach::experiments

@@ -1,0 +1,13 @@
+/** How much of the dynamics the nominal model takes off the residual's declaration. */
+#pragma once
+
+#include "experiments/systems.h"
+
+namespace forereach::experiments {
+
+/** |L_f|_F / |L_r|_F with L_f = sup |D_z f0| + L_r, entry by entry. The supremum is the largest value on a grid of five
+points a coordinate over the domain's box, which has the corners and theta = +-pi/2, where both systems attain it. In
+plain arithmetic: a figure, not a bound. Cost 5^d_z linearizations. */
+[[nodiscard]] double NormRatio(const System& system, const Eigen::MatrixXd& lipschitz);
+
+}  // namespace forereach::experiments

@@ -1,0 +1,166 @@
+// What ForeReach answers: the main table, recall by N, where plans leave the domain, where certification first stops.
+#include <string>
+
+#include "experiments/experiment.h"
+
+namespace forereach::experiments {
+namespace {
+
+Cell Largest(const System& system) { return PaperCell(system, system.sample_sizes.back(), 0, 0); }
+
+void AddBothChannels(const Scope& scope, const System& system, std::vector<Cell>& cells) {
+  for (const int observations : scope.SizesOf(system))
+    for (const double noise : {0.0, system.noise_scale})
+      AddSeeds(scope, PaperCell(system, observations, noise, 0), cells);
+}
+
+std::vector<Cell> BothChannels(const Scope& scope) {
+  std::vector<Cell> cells;
+  for (const System* system : Systems()) AddBothChannels(scope, *system, cells);
+  return cells;
+}
+
+// ---- main
+
+std::vector<Cell> MainCells(const Scope& scope) {
+  std::vector<Cell> cells;
+  for (const System* system : Systems()) AddSeeds(scope, Largest(*system), cells);
+  return cells;
+}
+
+std::vector<Table> MainTables(const Scope& scope, const Results& results) {
+  Table table{"Main results", "Noiseless. Point mass N = 100, bicycle N = 400. Coverage is of complete tubes.", {}};
+  for (const System* system : Systems()) {
+    const Cell cell = Largest(*system);
+    const auto row = [&](const char* what, const char* key, Group group, Statistic statistic) {
+      Row& added = table.rows.emplace_back();
+      added.what = system->name + ", " + NameOf(group) + ": " + what;
+      if (*key) added.paper = Paper(system->name + "." + key);
+      added.ours = OverSeeds(scope, results, cell, group, statistic);
+    };
+    const bool is_point_mass = system == &PointMassSystem();
+    row("coverage", "B.coverage", Group::kB, Coverage);
+    row("D", "B.domain", Group::kB, DomainRate);
+    row("S", "B.safety", Group::kB, SafetyRate);
+    row("certified", is_point_mass ? "B.certified" : "", Group::kB, CertificateRate);
+    row("coverage", is_point_mass ? "C.coverage" : "", Group::kC, Coverage);
+    row("recall", "C.recall", Group::kC, Recall);
+    row("recall", "", Group::kA, Recall);
+    table.rows.push_back({system->name + ": false certificates, all groups", Paper("false_certificates"),
+                          Exactly(FalseCertificates(scope, results, cell)), 0, ""});
+  }
+  return {table};
+}
+
+// ---- recall
+
+std::vector<Cell> RecallCells(const Scope& scope) {
+  std::vector<Cell> cells;
+  AddBothChannels(scope, BicycleSystem(), cells);
+  return cells;
+}
+
+std::vector<Table> RecallTables(const Scope& scope, const Results& results) {
+  const System& bicycle = BicycleSystem();
+  Table quiet{"Recall by N", "Bicycle, noiseless; mean ± sample standard deviation over the seeds.", {}};
+  Table noisy{"Recall by N, sub-Gaussian channel",
+              "Bicycle, s = 4.16e-6, cut at sigma = 3 s. The paper: as its noiseless rows.",
+              {}};
+  for (const int observations : scope.SizesOf(bicycle)) {
+    const std::string n = std::to_string(observations);
+    for (const double noise : {0.0, bicycle.noise_scale}) {
+      const Cell cell = PaperCell(bicycle, observations, noise, 0);
+      std::vector<Row>& rows = (noise == 0 ? quiet : noisy).rows;
+      rows.push_back({"C: recall, N = " + n, Paper("bicycle.C.recall." + n),
+                      OverSeeds(scope, results, cell, Group::kC, Recall), 4, ""});
+      rows.push_back({"B: coverage, N = " + n, Paper("bicycle.B.coverage." + n),
+                      OverSeeds(scope, results, cell, Group::kB, Coverage), 4, ""});
+      rows.push_back({"A: recall, N = " + n, {}, OverSeeds(scope, results, cell, Group::kA, Recall), 4, ""});
+      rows.push_back({"B: D, N = " + n, {}, OverSeeds(scope, results, cell, Group::kB, DomainRate), 4, ""});
+    }
+  }
+  return {quiet, noisy};
+}
+
+// ---- exits
+
+std::vector<Table> ExitTables(const Scope& scope, const Results& results) {
+  double plans = 0, exits = 0, prefixes = 0, complete = 0, covered = 0, undecided = 0, wrong = 0;
+  int decisions = 0, rejections = 0;
+  for (const Cell& cell : BothChannels(scope)) {
+    const CellResult& result = results.Of(cell);
+    ++decisions;
+    rejections += result[0].falsified == result[0].plans;
+    for (const Tally& tally : result) {
+      plans += tally.plans, exits += tally.domain, prefixes += tally.prefix_covered, undecided += tally.undecided;
+      complete += tally.complete(), covered += tally.covered, wrong += tally.false_certificates();
+    }
+  }
+  const std::string why = "the paper's queries include systems or layouts that its text does not list";
+  return {{"Domain exits and pairwise tests",
+           "Both systems, every N, both channels, groups A to C.",
+           {{"plans", Paper("exits.queries"), Exactly(plans), 0, why},
+            {"of these D", Paper("exits.domain"), Exactly(exits), 0, why},
+            {"D / plans", Paper("exits.fraction"), Exactly(exits / plans), 3, why},
+            {"prefixes of D that contain every rollout", {}, Exactly(prefixes), 0, ""},
+            {"complete tubes", {}, Exactly(complete), 0, ""},
+            {"of these contain every rollout", {}, Exactly(covered), 0, ""},
+            {"membership undecided", {}, Exactly(undecided), 0, ""},
+            {"false certificates", Paper("false_certificates"), Exactly(wrong), 0, ""},
+            {"pairwise tests", Paper("pairwise.decisions"), Exactly(decisions), 0, "this run has fewer cells"},
+            {"of these rejected", Paper("pairwise.rejections"), Exactly(rejections), 0, ""}}}};
+}
+
+// ---- steps
+
+std::vector<Table> StepTables(const Scope& scope, const Results& results) {
+  std::vector<Table> tables;
+  for (const int observations : {BicycleSystem().sample_sizes.front(), BicycleSystem().sample_sizes.back()}) {
+    Table table{"First abstention, N = " + std::to_string(observations),
+                "Bicycle, noiseless: the part of a group's plans that abstains first at a step. The paper shows these "
+                "as a picture.",
+                {}};
+    for (const Group group : {Group::kB, Group::kC})
+      for (const bool is_domain : {true, false})
+        for (std::size_t t = 0; t <= static_cast<std::size_t>(BicycleSystem().horizon); ++t) {
+          std::vector<std::optional<double>> parts;
+          Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
+          for (; cell.seed < scope.seeds; ++cell.seed) {
+            const Tally& tally = results.Of(cell, group);
+            parts.push_back(static_cast<double>((is_domain ? tally.domain_steps : tally.safety_steps)[t]) /
+                            tally.plans);
+          }
+          const Estimate part = EstimateOf(parts);
+          if (*part.mean == 0) continue;
+          const std::string what = std::string(1, NameOf(group)) + (is_domain ? ": D at step " : ": S at step ");
+          table.rows.push_back({what + std::to_string(t), {}, part, 4, ""});
+        }
+    tables.push_back(table);
+  }
+  return tables;
+}
+
+std::vector<Cell> StepCells(const Scope& scope) {
+  std::vector<Cell> cells;
+  for (const int observations : {BicycleSystem().sample_sizes.front(), BicycleSystem().sample_sizes.back()})
+    AddSeeds(scope, PaperCell(BicycleSystem(), observations, 0, 0), cells);
+  return cells;
+}
+
+}  // namespace
+
+Experiment MainResults() { return {"main", "outcomes of both systems, Table 1", MainCells, MainTables}; }
+
+Experiment RecallByN() {
+  return {"recall", "the bicycle's recall and coverage by N, both channels", RecallCells, RecallTables};
+}
+
+Experiment DomainExits() {
+  return {"exits", "domain exits, coverage and pairwise tests over every cell", BothChannels, ExitTables};
+}
+
+Experiment FirstAbstentions() {
+  return {"steps", "the step at which certification first stops", StepCells, StepTables};
+}
+
+}  // namespace forereach::experiments

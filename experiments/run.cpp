@@ -1,0 +1,77 @@
+#include "experiments/run.h"
+
+#include <algorithm>
+#include <ostream>
+#include <set>
+#include <stdexcept>
+
+#include "experiments/run_directory.h"
+
+namespace forereach::experiments {
+namespace {
+
+const Experiment& ExperimentNamed(const std::string& name) {
+  const auto found = std::ranges::find(Experiments(), name, &Experiment::name);
+  if (found == Experiments().end()) throw std::invalid_argument("experiment: there is no " + name);
+  return *found;
+}
+
+// Each once, in the order in which they are first asked for.
+std::vector<Cell> CellsOf(const std::vector<const Experiment*>& experiments, const Scope& scope) {
+  std::vector<Cell> all;
+  std::set<std::string> keys;
+  for (const Experiment* experiment : experiments)
+    for (Cell& cell : experiment->cells(scope))
+      if (keys.insert(cell.key()).second) all.push_back(std::move(cell));
+  return all;
+}
+
+std::string Preamble(const RunOptions& options) {
+  std::string text = "# The paper's figures, done again\n\nMade by `" + options.command +
+                     "`: " + std::to_string(options.scope.seeds) + " seeds";
+  for (const System* system : Systems())
+    text += "; " + system->name + ": " + std::to_string(std::min(options.effort.scenarios, system->scenarios)) +
+            " plans a group and seed, " + std::to_string(std::min(options.effort.rollouts, system->rollouts)) +
+            " rollouts of the target a plan";
+  return text + R"(.
+
+Models, residuals, horizons, the deployed declarations, sample sizes, noise scales and the order of zonotopes are the
+paper's. The bounds of its scenarios, its data regions and the sizes of its initial sets are not in its text: **those
+are ours**, in `experiments/scenarios.h` and `experiments/systems.h`. So are its seeds. Nothing in the certifier was
+fitted to a figure; `method: paper` is used throughout.
+
+A plan is *target-safe* if no rollout from its initial set, corners included, touches the obstacle. *Recall* is the part
+of the target-safe plans that get a certificate; a certificate for another is *false*. *Coverage* is the part of the
+complete tubes that contain every rollout. With more than one seed: mean ± sample standard deviation. "Within the
+seeds' spread": the means differ by at most twice the standard error that both spreads give.
+)";
+}
+
+}  // namespace
+
+void RunExperiments(const RunOptions& options, std::ostream& out) {
+  std::vector<const Experiment*> experiments;
+  for (const std::string& name : options.names) experiments.push_back(&ExperimentNamed(name));
+  const RunDirectory directory(options.directory, options.effort);
+  const std::vector<Cell> cells = CellsOf(experiments, options.scope);
+  const Results results(cells, RunAll(cells, directory, options.threads));
+
+  std::vector<Table> tables;
+  std::string report = Preamble(options);
+  for (const Experiment* experiment : experiments) {
+    const std::vector<Cell> own = experiment->cells(options.scope);
+    std::vector<CellResult> of_own;
+    for (const Cell& cell : own) of_own.push_back(results.Of(cell));
+    if (!own.empty()) WriteFile(directory.path() / (experiment->name + ".csv"), ToCsv(own, of_own));
+    for (const Table& table : experiment->tables(options.scope, results)) {
+      const std::string text = std::string(1, '\n').append(ToMarkdown(table));
+      out << text << std::flush;
+      report += text;
+      tables.push_back(table);
+    }
+  }
+  WriteFile(directory.path() / "tables.csv", ToCsv(tables));
+  WriteFile(options.report.empty() ? directory.path() / "report.md" : options.report, report);
+}
+
+}  // namespace forereach::experiments

@@ -1,0 +1,31 @@
+/** Runs experiments into a run directory and reports on them. */
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "experiments/experiment.h"
+
+namespace forereach::experiments {
+
+struct RunOptions {
+  std::vector<std::string> names;  ///< Of experiments, in the order of the report
+  Scope scope;
+  Effort effort{600, 300};  ///< The paper's: each system takes at most its own
+  unsigned threads = 1;
+  std::filesystem::path directory;  ///< Results; see RunDirectory
+  std::filesystem::path report;     ///< The report in Markdown; empty: directory/report.md
+  std::string command;              ///< What the report says it was made by
+};
+
+/** Every cell of the experiments that is not finished is run, then written:
+    DIR/NAME.csv    of each experiment with cells: a line for each cell and group
+    DIR/tables.csv  all tables
+    DIR/report.md   the same for people; also printed to `out`
+The CSV files are the same for any number of threads.
+@throws std::invalid_argument for an unknown name, std::runtime_error as RunDirectory does. */
+void RunExperiments(const RunOptions& options, std::ostream& out);
+
+}  // namespace forereach::experiments

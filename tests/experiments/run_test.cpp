@@ -1,0 +1,185 @@
+// Runs: quick figures in bands that a broken method would miss, the same files for any number of threads, resuming.
+#include "experiments/run.h"
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <nlohmann/json.hpp>
+
+#include "experiments/run_directory.h"
+
+namespace forereach::experiments {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+std::string Read(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+class RunTest : public testing::Test {
+ protected:
+  RunTest() {
+    std::string path = testing::TempDir() + "/forereach-experiments-XXXXXX";
+    root_ = mkdtemp(path.data());
+  }
+  ~RunTest() override { fs::remove_all(root_); }
+
+  [[nodiscard]] RunOptions Quick(std::vector<std::string> names, const std::string& directory) const {
+    return {std::move(names), {2, true}, {30, 24}, 1, root_ / directory, "", "experiments/run"};
+  }
+
+  fs::path root_;
+};
+
+TEST_F(RunTest, QuickFiguresAreInTheirBands) {
+  const RunDirectory directory(root_, {30, 24});
+  const Scope scope{2, true};
+  const auto estimate = [&](const Cell& cell, Group group, Statistic statistic) {
+    std::vector<Cell> cells;
+    AddSeeds(scope, cell, cells);
+    return *OverSeeds(scope, Results(cells, RunAll(cells, directory, 1)), cell, group, statistic).mean;
+  };
+  const Cell many = PaperCell(BicycleSystem(), 400, 0, 0), few = PaperCell(BicycleSystem(), 25, 0, 0);
+  EXPECT_GT(estimate(many, Group::kC, Recall), 0.9);
+  EXPECT_GT(estimate(few, Group::kC, Recall), 0.1);
+  EXPECT_LT(estimate(few, Group::kC, Recall), 0.8);
+  EXPECT_GT(estimate(many, Group::kB, DomainRate), 0.85);
+  EXPECT_EQ(estimate(many, Group::kB, CertificateRate), 0);
+  for (const Group group : kGroups) EXPECT_EQ(estimate(many, group, Coverage), 1) << NameOf(group);
+
+  const Cell point_mass = PaperCell(PointMassSystem(), 100, 0, 0);
+  EXPECT_GT(estimate(point_mass, Group::kC, Recall), 0.95);
+  EXPECT_LT(estimate(point_mass, Group::kB, CertificateRate), 0.1);
+  EXPECT_GT(estimate(point_mass, Group::kB, DomainRate), 0.5);
+  EXPECT_LT(estimate(point_mass, Group::kB, DomainRate), 0.95);
+}
+
+TEST_F(RunTest, FilesAreTheSameForAnyNumberOfThreads) {
+  RunOptions one = Quick({"main", "steps"}, "one"), two = Quick({"main", "steps"}, "two");
+  two.threads = 2;
+  std::ostringstream out_one, out_two;
+  RunExperiments(one, out_one);
+  RunExperiments(two, out_two);
+  for (const char* name : {"main.csv", "steps.csv", "tables.csv", "report.md"}) {
+    EXPECT_FALSE(Read(root_ / "one" / name).empty());
+    EXPECT_EQ(Read(root_ / "one" / name), Read(root_ / "two" / name)) << name;
+  }
+  EXPECT_EQ(out_one.str(), out_two.str());
+  EXPECT_THAT(out_one.str(), HasSubstr("| bicycle, C: recall | 0.983 |"));
+}
+
+TEST_F(RunTest, AFinishedCellIsNotRunAgain) {
+  const Cell cell = PaperCell(PointMassSystem(), 100, 0, 0);
+  const RunDirectory directory(root_, {4, 10});
+  const std::vector<CellResult> first = RunAll({cell}, directory, 1);
+  // What is on file counts, not what a run would give.
+  const fs::path file = root_ / "cells" / (cell.key() + ".json");
+  auto json = nlohmann::json::parse(Read(file));
+  EXPECT_EQ(json["groups"]["C"]["plans"], 4);
+  json["groups"]["C"]["plans"] = 77;
+  std::ofstream(file) << json;
+  EXPECT_EQ(RunAll({cell}, directory, 2)[0][2].plans, 77);
+  // One that was being written when the run was stopped does not.
+  fs::rename(file, file.string() + ".part");
+  EXPECT_EQ(RunAll({cell}, directory, 2)[0][2].plans, 4);
+  EXPECT_EQ(ToCsv({cell}, RunAll({cell}, directory, 1)), ToCsv({cell}, first));
+}
+
+TEST_F(RunTest, AnotherEffortOrADamagedFileIsRefusedByName) {
+  const Cell cell = PaperCell(PointMassSystem(), 100, 0, 0);
+  const RunDirectory directory(root_, {2, 2});
+  (void)RunAll({cell}, directory, 1);
+  try {
+    const RunDirectory other(root_, {3, 2});
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("run.json: scenarios: begun with 2, this run has 3"));
+  }
+  std::ofstream(root_ / "cells" / (cell.key() + ".json")) << "{\"groups\": {\"A\"";
+  try {
+    (void)RunAll({cell}, directory, 1);
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(cell.key() + ".json: "));
+    EXPECT_THAT(error.what(), HasSubstr("delete it"));
+  }
+}
+
+TEST_F(RunTest, TooSmallADeclarationIsSeenByTheTestOrByTheTruth) {
+  std::ostringstream out;
+  RunExperiments(Quick({"incorrect"}, "incorrect"), out);
+  // 12 data sets: 2 seeds, 2 channels; N = 100 of the point mass, N = 25 and 400 of the bicycle.
+  EXPECT_THAT(out.str(), HasSubstr("| L times 1: corridor |  |  | 0 |"));
+  EXPECT_THAT(out.str(), HasSubstr("| L times 0.03154: corridor |  |  | 12 |"));
+  EXPECT_THAT(out.str(), HasSubstr("| L times 0.03154: below the knee |  |  | 0 |"));
+  EXPECT_THAT(out.str(),
+              HasSubstr("L times 1: false certificates, all groups | 0 | Experiments, text | 0 | 0 | same |"));
+  const auto false_certificates = [&](const std::string& system) {
+    const std::string row = "| " + system + ", L times 0.03154: false certificates, all groups |  |  | ";
+    const std::size_t at = out.str().find(row);
+    return at == std::string::npos ? -1 : std::atoi(out.str().c_str() + at + row.size());
+  };
+  EXPECT_GT(false_certificates("bicycle"), 5);
+  EXPECT_GT(false_certificates("point_mass"), 0);
+}
+
+TEST(Cell, KeysTellCellsApart) {
+  const Cell cell = PaperCell(BicycleSystem(), 400, 0, 0);
+  EXPECT_EQ(cell.key(), "bicycle-ForeReach-deployed-N400-s0-order5-corridor-seed0");
+  for (const auto& change : std::initializer_list<void (*)(Cell&)>{
+           [](Cell& c) { c.system = &PointMassSystem(); }, [](Cell& c) { c.method.name = "GP (k=2)"; },
+           [](Cell& c) { c.declared.name = "scalar"; }, [](Cell& c) { c.observations = 25; },
+           [](Cell& c) { c.noise = 1e-5; }, [](Cell& c) { c.zonotope_order = 1; }, [](Cell& c) { c.seed = 1; },
+           [](Cell& c) { c.layout = Layout::kBelowKnee; }}) {
+    Cell other = cell;
+    change(other);
+    EXPECT_NE(other.key(), cell.key());
+    EXPECT_EQ(other.key().find_first_of(" ()/="), std::string::npos) << other.key();
+  }
+}
+
+struct Result {
+  int exit_code;
+  std::string output;  // standard output and error
+};
+
+Result Command(const std::string& arguments) {
+  std::FILE* pipe = popen((FOREREACH_EXPERIMENTS_PROGRAM " " + arguments + " 2>&1").c_str(), "r");
+  if (!pipe) return {-1, "cannot run the program"};
+  std::string output;
+  std::array<char, 4096> buffer;
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), size);
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
+}
+
+TEST_F(RunTest, TheCommandTeachesRunsAndRefuses) {
+  const Result help = Command("--help");
+  EXPECT_EQ(help.exit_code, 0);
+  for (const Experiment& experiment : Experiments()) EXPECT_THAT(help.output, HasSubstr(experiment.name));
+  EXPECT_EQ(Command("").exit_code, 2);
+  EXPECT_EQ(Command("nothing").exit_code, 2);
+  EXPECT_EQ(Command("norms --seeds 0").exit_code, 2);
+
+  const std::string out = " --out " + (root_ / "run").string();
+  const Result norms = Command("norms" + out);
+  EXPECT_EQ(norms.exit_code, 0) << norms.output;
+  EXPECT_THAT(norms.output, HasSubstr("| bicycle | 11.368 | Norm ratios | 11.368 | 0.000 | same |"));
+  const Result quick = Command("norms --quick" + out);
+  EXPECT_EQ(quick.exit_code, 2);
+  EXPECT_THAT(quick.output, HasSubstr("run.json: scenarios: begun with 600, this run has 30"));
+}
+
+}  // namespace
+}  // namespace forereach::experiments
