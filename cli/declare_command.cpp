@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <iomanip>
@@ -11,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/declare/slope_bound.h"
+#include "certifier/numerics/parallel.h"
 #include "certifier/task/number.h"
 #include "cli/commands.h"
 #include "cli/cover_file.h"
@@ -27,18 +27,6 @@ struct Options {
   SlopeBoundOptions search;
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
-
-// Calls work(i) for all i below `count`, from several threads.
-template <class Work>
-void InParallel(std::size_t count, unsigned jobs, const Work& work) {
-  std::atomic<std::size_t> next = 0;
-  std::vector<std::thread> threads;
-  for (unsigned j = 0; j < std::min<std::size_t>(jobs, count); ++j)
-    threads.emplace_back([&] {
-      for (std::size_t i = next++; i < count; i = next++) work(i);
-    });
-  for (std::thread& thread : threads) thread.join();
-}
 
 Config LoadWithResidual(const std::string& path) {
   Config config = LoadConfig(path, TransitionsFile::kIgnore);
@@ -64,7 +52,7 @@ std::vector<SlopeBound> BoundAll(const Config& config, const Options& options) {
     for (int l = 0; l < slopes->num_variables(); ++l)
       if (slopes->Occurs(k, l)) bounds.emplace_back().row = k, bounds.back().column = l;
   Progress progress("hundredths of a bound", kSteps * bounds.size());
-  InParallel(bounds.size(), options.jobs, [&](std::size_t i) {
+  ForEachInParallel(bounds.size(), options.jobs, [&](std::size_t i, std::size_t) {
     std::size_t shown = 0;
     const auto show = [&](double closed) {
       for (const auto now = static_cast<std::size_t>(closed * static_cast<double>(kSteps)); shown < now; ++shown)
@@ -234,7 +222,7 @@ std::vector<Finding> CheckClaims(const CoverFile& file, const Config& config, co
     leaves += static_cast<std::size_t>(
         std::ranges::count_if(claim.cover.nodes, [](const Cover::Node& node) { return node.argument < 0; }));
   Progress progress("boxes checked", leaves);
-  InParallel(file.claims.size(), jobs, [&](std::size_t i) {
+  ForEachInParallel(file.claims.size(), jobs, [&](std::size_t i, std::size_t) {
     const verifier::SlopeClaim& claim = file.claims[i];
     const verifier::CoverVerdict verdict = checker.Check(claim, [&] { progress.Advance(); });
     findings[i] = {verdict.answer,

@@ -1,4 +1,3 @@
-#include <atomic>
 #include <iostream>
 #include <sstream>
 #include <thread>
@@ -7,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/certify/certifier.h"
+#include "certifier/numerics/parallel.h"
 #include "cli/certificate_files.h"
 #include "cli/commands.h"
 #include "cli/progress.h"
@@ -36,20 +36,13 @@ std::vector<Verdict> VerifyAll(const CertificateFile& file, unsigned jobs) {
   const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
   std::vector<Verdict> verdicts(file.certificates.size());
   Progress progress("certificates verified", verdicts.size());
-  std::atomic<std::size_t> next = 0;
-  const auto work = [&] {
-    for (std::size_t i = next++; i < verdicts.size(); i = next++) {
-      const RecordedCertificate& recorded = file.certificates[i];
-      verdicts[i] = recorded.missing.empty() ? verifier.Verify(recorded.certificate)
-                                             : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
-      if (!recorded.mismatches.empty() && verdicts[i].status == Status::kConfirmed)
-        verdicts[i].status = Status::kRefuted;
-      progress.Advance();
-    }
-  };
-  std::vector<std::thread> threads;
-  for (unsigned j = 0; j < std::min<std::size_t>(jobs, verdicts.size()); ++j) threads.emplace_back(work);
-  for (std::thread& thread : threads) thread.join();
+  ForEachInParallel(verdicts.size(), jobs, [&](std::size_t i, std::size_t) {
+    const RecordedCertificate& recorded = file.certificates[i];
+    verdicts[i] = recorded.missing.empty() ? verifier.Verify(recorded.certificate)
+                                           : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
+    if (!recorded.mismatches.empty() && verdicts[i].status == Status::kConfirmed) verdicts[i].status = Status::kRefuted;
+    progress.Advance();
+  });
   return verdicts;
 }
 

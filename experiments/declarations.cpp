@@ -2,6 +2,7 @@
 // paper's own certified matrices.
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <string>
 
 #include "certifier/declare/slope_bound.h"
@@ -101,7 +102,7 @@ constexpr int kPercents[] = {5, 10, 20};
 
 // A bound on the slopes of the bicycle's residual for all understeer, friction, gravity and gate temperature within
 // some per cent of the paper's. The paper does not say which parameters its boxes hold.
-Eigen::MatrixXd BoundOverBox(int percent) {
+Eigen::MatrixXd BoundAnew(int percent) {
   const System& bicycle = BicycleSystem();
   const auto slopes = MakeResidualSlopes(HeadingSaturation::kName);
   std::vector<Interval> parameters;
@@ -115,6 +116,13 @@ Eigen::MatrixXd BoundOverBox(int percent) {
     for (int l = 0; l < lipschitz.cols(); ++l)
       if (slopes->Occurs(k, l)) lipschitz(k, l) = BoundSlope(*slopes, bicycle.domain, parameters, k, l).upper;
   return lipschitz;
+}
+
+// The same, bounded when it is first asked for. Not for several threads at once.
+const Eigen::MatrixXd& BoundOverBox(int percent) {
+  static std::map<int, Eigen::MatrixXd> known;
+  const auto at = known.find(percent);
+  return at != known.end() ? at->second : known.emplace(percent, BoundAnew(percent)).first->second;
 }
 
 Cell BoxCell(int percent) {

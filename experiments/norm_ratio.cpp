@@ -8,18 +8,14 @@ namespace forereach::experiments {
 
 double NormRatio(const System& system, const Eigen::MatrixXd& lipschitz) {
   constexpr int kPoints = 5;
-  Eigen::VectorXd lower(system.model->num_variables()), upper(lower.size());
-  lower << system.domain.state.lower(), system.domain.input.lower();
-  upper << system.domain.state.upper(), system.domain.input.upper();
+  const std::vector<Interval> ranges = system.domain.Ranges();
   Eigen::MatrixXd largest = Eigen::MatrixXd::Zero(lipschitz.rows(), lipschitz.cols());
-  std::vector<int> digits(static_cast<std::size_t>(lower.size()), 0);
+  std::vector<int> digits(ranges.size(), 0);
   std::vector<double> z(digits.size());
   Linearization linearization;
   for (bool done = false; !done;) {
-    for (std::size_t l = 0; l < z.size(); ++l) {
-      const auto i = static_cast<Eigen::Index>(l);
-      z[l] = lower[i] + (upper[i] - lower[i]) * digits[l] / (kPoints - 1);
-    }
+    for (std::size_t l = 0; l < z.size(); ++l)
+      z[l] = ranges[l].lower + (ranges[l].upper - ranges[l].lower) * digits[l] / (kPoints - 1);
     system.model->Linearize(z, linearization);
     for (const MatrixEntry& entry : linearization.jacobian()) {
       double& known = largest(entry.row, entry.column);

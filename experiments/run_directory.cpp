@@ -1,15 +1,12 @@
 #include "experiments/run_directory.h"
 
-#include <atomic>
-#include <exception>
 #include <fstream>
-#include <mutex>
 #include <sstream>
 #include <stdexcept>
-#include <thread>
 
 #include <nlohmann/json.hpp>
 
+#include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
 #include "cli/progress.h"
 
@@ -136,28 +133,12 @@ std::vector<CellResult> RunAll(const std::vector<Cell>& cells, const RunDirector
       missing.push_back(i);
   }
   Progress progress("cells", missing.size());
-  std::atomic<std::size_t> next = 0;
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    try {
-      for (std::size_t i = next++; i < missing.size(); i = next++) {
-        const Cell& cell = cells[missing[i]];
-        results[missing[i]] = RunCell(cell, directory.effort());
-        directory.Store(cell, results[missing[i]]);
-        progress.Advance();
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      failure = std::current_exception();
-      next = missing.size();
-    }
-  };
-  std::vector<std::thread> others;
-  for (std::size_t j = 1; j < std::min<std::size_t>(threads, missing.size()); ++j) others.emplace_back(work);
-  work();
-  for (std::thread& thread : others) thread.join();
-  if (failure) std::rethrow_exception(failure);
+  ForEachInParallel(missing.size(), threads, [&](std::size_t i, std::size_t) {
+    const Cell& cell = cells[missing[i]];
+    results[missing[i]] = RunCell(cell, directory.effort());
+    directory.Store(cell, results[missing[i]]);
+    progress.Advance();
+  });
   return results;
 }
 

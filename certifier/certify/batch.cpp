@@ -1,10 +1,10 @@
 #include "certifier/certify/batch.h"
 
 #include <algorithm>
-#include <atomic>
 #include <stdexcept>
 #include <string>
-#include <thread>
+
+#include "certifier/numerics/parallel.h"
 
 namespace forereach {
 
@@ -18,18 +18,11 @@ std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Pla
                                 std::to_string(plans.size()));
   std::vector<Decision> decisions(plans.size());
   std::vector<Tube> tubes(std::clamp<std::size_t>(plans.size(), 1, threads));
-  std::atomic<std::size_t> next = 0;
-  const auto work = [&](Tube& tube) {
-    for (std::size_t i = next++; i < plans.size(); i = next++) {
-      decisions[i] = certifier.Certify(plans[i], initial_sets[one_for_all ? 0 : i], obstacles, tube);
-      if (listener) listener(i, decisions[i], tube);
-    }
-  };
-  {
-    std::vector<std::jthread> others;  // joined at the end of this block
-    for (std::size_t t = 1; t < tubes.size(); ++t) others.emplace_back([&work, &tube = tubes[t]] { work(tube); });
-    work(tubes.front());
-  }
+  ForEachInParallel(plans.size(), threads, [&](std::size_t i, std::size_t thread) {
+    Tube& tube = tubes[thread];
+    decisions[i] = certifier.Certify(plans[i], initial_sets[one_for_all ? 0 : i], obstacles, tube);
+    if (listener) listener(i, decisions[i], tube);
+  });
   return decisions;
 }
 

@@ -176,10 +176,14 @@ Decision Judged(Outcome outcome, const Closest& closest) {
 }  // namespace
 
 Separation Certifier::SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept {
+  return BetterOf(SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacle), tube, t, obstacle);
+}
+
+Separation Certifier::BetterOf(const Separation& by_hulls, const Tube& tube, int t,
+                               const Obstacle& obstacle) const noexcept {
   Zonotope projected;
   projection_.Enclose(tube.slice(t), tube.half_width(t), projected);
   const Separation best = Separate(projected, obstacle);
-  const Separation by_hulls = SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacle);
   return best.distance > by_hulls.distance ? best : by_hulls;
 }
 
@@ -188,7 +192,9 @@ Separation Certifier::SeparateSlice(const Tube& tube, int t, const Obstacle& obs
 Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept {
   Closest by_hull, closest;
   double next_by_hull = kInfinity;  // the second smallest clearance by hulls
-  const auto separate = [&](int t, int o) { return SeparateSlice(tube, t, obstacles[static_cast<std::size_t>(o)]); };
+  const auto separate = [&](int t, int o, const Separation& by_hulls) {
+    return BetterOf(by_hulls, tube, t, obstacles[static_cast<std::size_t>(o)]);
+  };
   const int count = static_cast<int>(obstacles.size());
   for (int t = 0; t <= tube.length(); ++t) {
     const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
@@ -199,19 +205,19 @@ Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube&
         by_hull.Consider(by_hulls, t, o);
         continue;
       }
-      const Separation best = separate(t, o);
+      const Separation best = separate(t, o, by_hulls);
       if (!best.IsProven()) return Judged(Outcome::kSafety, {best.clearance(), t, o, best});
       closest.Consider(best, t, o);
     }
   }
   if (by_hull.clearance < closest.clearance)
-    closest.Consider(separate(by_hull.step, by_hull.obstacle), by_hull.step, by_hull.obstacle);
+    closest.Consider(separate(by_hull.step, by_hull.obstacle, by_hull.separation), by_hull.step, by_hull.obstacle);
   for (int t = 0; t <= tube.length() && next_by_hull < closest.clearance; ++t) {
     const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
     for (int o = 0; o < count; ++o) {
       const Separation by_hulls = SeparateHulls(hull, obstacles[static_cast<std::size_t>(o)]);
       if (!by_hulls.IsProven() || by_hulls.clearance() >= closest.clearance) continue;
-      if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o), t, o);
+      if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o, by_hulls), t, o);
     }
   }
   return Judged(Outcome::kCertified, closest);

@@ -50,6 +50,9 @@ class Certifier final {
 
  private:
   [[nodiscard]] Decision Propagate(const Plan& plan, Tube& tube) const noexcept;
+  /** SeparateSlice, where what the hulls prove is known. */
+  [[nodiscard]] Separation BetterOf(const Separation& by_hulls, const Tube& tube, int t,
+                                    const Obstacle& obstacle) const noexcept;
   [[nodiscard]] Decision JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept;
 
   std::shared_ptr<const Problem> problem_;

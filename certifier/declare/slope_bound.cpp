@@ -17,13 +17,6 @@ constexpr std::size_t kBetweenReports = 256;
 
 std::size_t Place(int i) { return static_cast<std::size_t>(i); }
 
-Arguments DomainBox(const Domain& domain) {
-  Arguments box;
-  for (const Box* part : {&domain.state, &domain.input})
-    for (Eigen::Index l = 0; l < part->dim(); ++l) box.emplace_back(part->lower()[l], part->upper()[l]);
-  return box;
-}
-
 // ---- Where a box lies to the domain's inequalities and balls.
 
 double SmallestValue(const Domain::Inequality& inequality, const Arguments& box) {
@@ -95,7 +88,7 @@ class Search {
  public:
   Search(const ResidualSlopes& slopes, const Domain& domain, std::span<const Interval> parameters, int row, int column,
          const SlopeBoundOptions& options)
-      : slopes_(slopes), domain_(domain), options_(options), root_(DomainBox(domain)) {
+      : slopes_(slopes), domain_(domain), options_(options), root_(domain.Ranges()) {
     result_.row = row;
     result_.column = column;
     root_.insert(root_.end(), parameters.begin(), parameters.end());

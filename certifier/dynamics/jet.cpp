@@ -17,8 +17,6 @@ Interval Times(const Interval& a, const Interval& b) { return IsZero(a) || IsZer
 Interval Plus(const Interval& a, const Interval& b) { return IsZero(a) ? b : IsZero(b) ? a : a + b; }
 Interval Over(const Interval& a, const Interval& b) { return IsZero(a) ? kZero : a / b; }
 
-Interval Hull(const Interval& a, const Interval& b) { return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)}; }
-
 // f(a) from the ranges of f and its derivatives over a.
 Jet Composed(const Jet& a, const DerivativeRanges& f) {
   Jet result(f.value);
@@ -36,9 +34,9 @@ Jet Composed(const Jet& a, const DerivativeRanges& f) {
 Jet Either(const Jet& a, const Jet& b, const Interval& value) {
   Jet result(value);
   result.size = std::max(a.size, b.size);
-  result.slope = Hull(a.slope, b.slope);
+  result.slope = Join(a.slope, b.slope);
   for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
-    result.gradient[i] = Hull(a.gradient[i], b.gradient[i]);
+    result.gradient[i] = Join(a.gradient[i], b.gradient[i]);
     result.curvature[i] = Interval::Entire();
   }
   return result;

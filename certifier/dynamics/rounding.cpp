@@ -38,7 +38,6 @@ class Analysis {
   [[nodiscard]] double Size(int node) const { return range_[static_cast<std::size_t>(node)].Magnitude(); }
 
  private:
-
   [[nodiscard]] Error ErrorOf(const Operation& n) const {
     const double infinity = kInfinity;
     switch (n.op) {

@@ -8,14 +8,12 @@
 namespace forereach {
 namespace {
 
-Interval Hull(const Interval& a, const Interval& b) { return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)}; }
-
 // The range of a function over x: its values at the ends and at those of its extrema that x may meet.
 template <class Function>
 Interval RangeOf(const Function& at, const Interval& x, std::initializer_list<Interval> extrema) {
-  Interval range = Hull(at(Interval(x.lower)), at(Interval(x.upper)));
+  Interval range = Join(at(Interval(x.lower)), at(Interval(x.upper)));
   for (const Interval& e : extrema)
-    if (e.lower <= x.upper && x.lower <= e.upper) range = Hull(range, at(e));
+    if (e.lower <= x.upper && x.lower <= e.upper) range = Join(range, at(e));
   return range;
 }
 
@@ -27,7 +25,7 @@ template <class Function>
 Interval FromZero(const Function& at, const Interval& e) {
   if (e.upper <= 0) return 0.0;
   if (e.lower >= kFirst) return at(e);
-  return Hull(0.0, at(Interval(kFirst, std::max(kFirst, e.upper))));
+  return Join(0.0, at(Interval(kFirst, std::max(kFirst, e.upper))));
 }
 
 Interval Gate(const Interval& e) {

@@ -12,9 +12,6 @@ namespace {
 constexpr Interval kPi(0x1.921fb54442d18p+1, 0x1.921fb54442d19p+1);
 constexpr double kLargestArgument = 0x1p20;
 
-double WidenUp(double x) { return NextUp(NextUp(x)); }
-double WidenDown(double x) { return NextDown(NextDown(x)); }
-
 // Whether x may contain (offset + j * period) * pi / 2 for some integer j.
 bool MayContain(const Interval& x, double offset, double period) {
   const Interval turns = (x - Interval(offset / 2) * kPi) / (Interval(period / 2) * kPi);

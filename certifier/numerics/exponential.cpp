@@ -6,13 +6,6 @@
 #include <cmath>
 
 namespace forereach {
-namespace {
-
-double WidenUp(double x) { return NextUp(NextUp(x)); }
-double WidenDown(double x) { return NextDown(NextDown(x)); }
-
-}  // namespace
-
 Interval exp(const Interval& x) { return {std::max(0.0, WidenDown(std::exp(x.lower))), WidenUp(std::exp(x.upper))}; }
 
 Interval log1p(const Interval& x) {

@@ -30,6 +30,8 @@ struct Interval {
   }
   /** An upper bound on |x - y| over x inside, for a given double y. */
   [[nodiscard]] double DistanceUpper(double y) const { return std::max(SubUp(upper, y), SubUp(y, lower)); }
+  /** An upper bound on half the width. */
+  [[nodiscard]] double HalfWidthUpper() const { return AddUp(upper / 2, -lower / 2); }
   /** The largest |x| over x inside. */
   [[nodiscard]] double Magnitude() const { return std::max(std::abs(lower), std::abs(upper)); }
 
@@ -67,6 +69,16 @@ struct Interval {
     return lower_bound <= upper_bound ? result : Entire();
   }
 };
+
+/** The least interval that contains both. */
+[[nodiscard]] inline Interval Join(const Interval& a, const Interval& b) {
+  return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)};
+}
+
+/** A result of the C library's, moved outward by two doubles: the exact one is within one unit in the last place of it
+(glibc's manual, "Known Maximum Errors"). */
+[[nodiscard]] inline double WidenUp(double x) { return NextUp(NextUp(x)); }
+[[nodiscard]] inline double WidenDown(double x) { return NextDown(NextDown(x)); }
 
 /** {x^2}. */
 [[nodiscard]] inline Interval sqr(const Interval& x) {

@@ -68,6 +68,13 @@ void Domain::Validate(int num_states, int num_inputs) const {
   }
 }
 
+std::vector<Interval> Domain::Ranges() const {
+  std::vector<Interval> ranges;
+  for (const Box* part : {&state, &input})
+    for (int l = 0; l < part->dim(); ++l) ranges.emplace_back(part->lower()[l], part->upper()[l]);
+  return ranges;
+}
+
 bool Domain::Contains(std::span<const double> z) const noexcept {
   std::array<Interval, kMaxVariables> point;
   for (std::size_t l = 0; l < z.size(); ++l) point[l] = Interval(z[l]);

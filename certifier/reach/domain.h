@@ -34,6 +34,9 @@ struct Domain {
   /** @throws std::invalid_argument naming the constraint if a size does not fit d_z or a number is not finite. */
   void Validate(int num_states, int num_inputs) const;
 
+  /** The range of each coordinate of z, the state's and then the input's. */
+  [[nodiscard]] std::vector<Interval> Ranges() const;
+
   /** True only if z provably lies inside. */
   [[nodiscard]] bool Contains(std::span<const double> z) const noexcept;
 };

@@ -12,13 +12,6 @@ constexpr double kRelative = 0x1p-43, kTiny = 0x1p-1050;
 // The plain expansion is used where its error, in the units of the state, is negligible everywhere in the domain.
 constexpr double kLargestError = 1e-6;
 
-std::vector<Interval> DomainBox(const Domain& domain) {
-  std::vector<Interval> box;
-  for (const Box* part : {&domain.state, &domain.input})
-    for (int l = 0; l < part->dim(); ++l) box.emplace_back(part->lower()[l], part->upper()[l]);
-  return box;
-}
-
 bool IsNegligible(const StepError& error) {
   const auto all_small = [](const auto& errors) { return std::ranges::all_of(errors, [](double e) { return e <= kLargestError; }); };
   return all_small(error.value) && all_small(error.image) && all_small(error.remainder);
@@ -29,11 +22,11 @@ bool IsNegligible(const StepError& error) {
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        int zonotope_order, Method method)
     : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), remainder_(model.program(), method) {
-  const std::vector<Interval> box = DomainBox(domain);
+  const std::vector<Interval> box = domain.Ranges();
   // The hull of every slice that passes the domain check has at most half the domain's width.
   std::vector<double> half_width(box.size(), 0.0);
   for (std::size_t l = 0; l < static_cast<std::size_t>(domain.state.dim()); ++l)
-    half_width[l] = AddUp(box[l].upper / 2, -box[l].lower / 2);
+    half_width[l] = box[l].HalfWidthUpper();
   error_ = BoundStepError(model.program(), BoundExpansionError(model.program(), model.parameters(), box), half_width);
   plain_ = IsNegligible(error_);
 }

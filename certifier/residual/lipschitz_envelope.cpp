@@ -12,9 +12,6 @@ namespace {
 constexpr int kPatternsPerLeaf = 64;
 constexpr double kHuge = 0x1p960;  // far from overflow, and nothing next to the largest double
 
-// Half of an interval's width, rounded up.
-double HalfWidthUpper(double lower, double upper) { return AddUp(upper / 2, -lower / 2); }
-
 }  // namespace
 
 LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Observations& observations,
@@ -47,7 +44,7 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
     const auto l = static_cast<std::size_t>(column.variable);
     const double farthest = std::max({observations.z.col(column.variable).cwiseAbs().maxCoeff(),
                                       std::abs(domain_lower[l]), std::abs(domain_upper[l])});
-    const double width = HalfWidthUpper(domain_lower[l], domain_upper[l]);
+    const double width = Interval(domain_lower[l], domain_upper[l]).HalfWidthUpper();
     locations = AddUp(locations, MulUp(column.slope, farthest));
     if (column.variable < observations.num_states()) widths = AddUp(widths, MulUp(column.slope, width));
     // L c and L z are rounded products, v their rounded difference; L r <= 2 L farthest is a rounded product.

@@ -31,8 +31,7 @@ AlanwarEnclosure::AlanwarEnclosure(const Setting& setting) {
   const Observations observations = Observe(setting.model, setting.data);
   const Eigen::MatrixXd residuals = ObservedResiduals(observations);
   const Eigen::MatrixXd& lipschitz = setting.declaration.lipschitz;
-  std::vector<Interval> box;
-  for (int l = 0; l < setting.model.num_variables(); ++l) box.push_back(DomainRange(setting.domain, l));
+  const std::vector<Interval> box = setting.domain.Ranges();
 
   for (int k = 0; k < observations.num_states(); ++k) {
     std::vector<int> columns;

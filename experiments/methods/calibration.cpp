@@ -42,7 +42,8 @@ int RegionalCalibration::Axis::CellOf(double z) const noexcept {
 }
 
 RegionalCalibration::RegionalCalibration(const Setting& setting) {
-  for (const int l : ActiveCoordinates(setting.declaration)) axes_.push_back({l, DomainRange(setting.domain, l)});
+  const std::vector<Interval> ranges = setting.domain.Ranges();
+  for (const int l : ActiveCoordinates(setting.declaration)) axes_.push_back({l, ranges[static_cast<std::size_t>(l)]});
   if (axes_.size() > 12)
     throw std::invalid_argument("regional calibration: " + std::to_string(axes_.size()) +
                                 " coordinates to cut, must be at most 12");

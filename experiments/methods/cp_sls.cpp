@@ -48,9 +48,10 @@ CpSls::CpSls(const Setting& setting, const CpSlsOptions& options) : options_(opt
   const Observations observations = Observe(setting.model, setting.data);
   residuals_ = ObservedResiduals(observations);
   recording_ = RecordingError(observations);
-  reach_.resize(setting.model.num_variables());
-  for (int l = 0; l < reach_.size(); ++l) {
-    const Interval range = DomainRange(setting.domain, l);
+  const std::vector<Interval> ranges = setting.domain.Ranges();
+  reach_.resize(static_cast<Eigen::Index>(ranges.size()));
+  for (Eigen::Index l = 0; l < reach_.size(); ++l) {
+    const Interval& range = ranges[static_cast<std::size_t>(l)];
     reach_[l] = range.upper > range.lower ? (range.upper - range.lower) / 2 : 1;
   }
   locations_ = observations.z * reach_.cwiseInverse().asDiagonal();

@@ -10,8 +10,7 @@ namespace forereach::experiments {
 
 std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting, const Declaration& declaration) {
   std::vector<double> lower, upper;
-  for (int l = 0; l < setting.model.num_variables(); ++l) {
-    const Interval range = DomainRange(setting.domain, l);
+  for (const Interval& range : setting.domain.Ranges()) {
     lower.push_back(range.lower);
     upper.push_back(range.upper);
   }

@@ -17,12 +17,6 @@ std::vector<int> ActiveCoordinates(const Declaration& declaration) {
   return active;
 }
 
-Interval DomainRange(const Domain& domain, int l) {
-  const int n = domain.state.dim();
-  return l < n ? Interval(domain.state.lower()[l], domain.state.upper()[l])
-               : Interval(domain.input.lower()[l - n], domain.input.upper()[l - n]);
-}
-
 Interval HullOf(const QuerySet& query, int l) noexcept {
   const int n = query.slice.dim();
   if (l >= n) return query.input[static_cast<std::size_t>(l - n)];

@@ -26,9 +26,6 @@ to every bound, so that no method fails by 1e-16. */
 much, as ForeReach is; the rest would only blur it. */
 [[nodiscard]] std::vector<int> ActiveCoordinates(const Declaration& declaration);
 
-/** Coordinate l of the domain's box over z = (x, u). */
-[[nodiscard]] Interval DomainRange(const Domain& domain, int l);
-
 /** Coordinate l of Box(Z), rounded outward. */
 [[nodiscard]] Interval HullOf(const QuerySet& query, int l) noexcept;
 

@@ -1,6 +1,5 @@
 // The `forereach` program as a person or a script calls it.
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <fstream>
 #include <regex>
@@ -13,26 +12,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/cli/program.h"
+
 namespace {
 
+using forereach::Forereach, forereach::Output, forereach::Read;
 using testing::HasSubstr;
 using Json = nlohmann::json;
-
-struct Output {
-  int code;
-  std::string text;
-};
-
-// Runs in the repository's root; `what` may use the shell's redirections.
-Output Forereach(const std::string& what) {
-  const std::string command = "cd '" FOREREACH_SOURCE_DIR "' && '" FOREREACH_PROGRAM "' " + what;
-  std::FILE* pipe = popen(command.c_str(), "r");
-  Output output{-1, {}};
-  std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.text.append(buffer.data(), size);
-  output.code = WEXITSTATUS(pclose(pipe));
-  return output;
-}
 
 Json CertifyJson(const std::string& config, const std::string& plan) {
   return Json::parse(Forereach("certify --json --config config/" + config + ".yaml --plan config/plans/" + plan + ".csv").text);
@@ -156,13 +142,6 @@ TEST(Doctor, PrintsOneJsonDocument) {
 
 // ---- README: its commands are run and its code is the code of tests/install.
 
-std::string Read(const std::string& path) {
-  std::ifstream file(FOREREACH_SOURCE_DIR "/" + path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 // The contents of all fenced blocks of a language.
 std::vector<std::string> Blocks(const std::string& markdown, const std::string& language) {
   std::vector<std::string> blocks;
@@ -180,7 +159,7 @@ std::string WithoutTimes(const std::string& text) {
 
 TEST(Readme, CommandsPrintWhatItSays) {
   int commands = 0;
-  for (const std::string& block : Blocks(Read("README.md"), "console")) {
+  for (const std::string& block : Blocks(Read(FOREREACH_SOURCE_DIR "/README.md"), "console")) {
     std::istringstream lines(block);
     std::string line, expected, command;
     const auto check = [&] {
@@ -204,9 +183,9 @@ TEST(Readme, CommandsPrintWhatItSays) {
 }
 
 TEST(Readme, CodeIsTheInstalledExample) {
-  const std::vector<std::string> blocks = Blocks(Read("README.md"), "cpp");
+  const std::vector<std::string> blocks = Blocks(Read(FOREREACH_SOURCE_DIR "/README.md"), "cpp");
   ASSERT_EQ(blocks.size(), 1u);
-  EXPECT_EQ(blocks[0], Read("tests/install/main.cpp"));
+  EXPECT_EQ(blocks[0], Read(FOREREACH_SOURCE_DIR "/tests/install/main.cpp"));
 }
 
 }  // namespace

@@ -1,9 +1,6 @@
 // `forereach declare`: its matrix, its cover, and what --check says of covers whole and tampered with.
-#include <array>
-#include <cstdio>
 #include <fstream>
 #include <regex>
-#include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +8,7 @@
 
 #include "certifier/task/config.h"
 #include "cli/cover_file.h"
+#include "tests/cli/program.h"
 #include "tests/logger/scratch.h"
 
 namespace forereach {
@@ -18,28 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 using Json = nlohmann::json;
-
-struct Output {
-  int code;
-  std::string text;
-};
-
-Output Forereach(const std::string& what) {
-  const std::string command = "cd '" FOREREACH_SOURCE_DIR "' && '" FOREREACH_PROGRAM "' " + what;
-  std::FILE* pipe = popen(command.c_str(), "r");
-  Output output{-1, {}};
-  std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe))
-    output.text.append(buffer.data(), size);
-  output.code = WEXITSTATUS(pclose(pipe));
-  return output;
-}
-
-std::string Read(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
 
 // The bicycle's task with another residual section.
 class DeclareTest : public testing::Test {

@@ -1,7 +1,5 @@
 // `forereach verify` on a decision: confirmed as it is, refuted with one thing changed, digests made good again or not.
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <regex>
@@ -13,6 +11,7 @@
 
 #include "cli/decision_json.h"
 #include "cli/progress.h"
+#include "tests/cli/program.h"
 #include "tests/logger/scratch.h"
 
 namespace forereach {
@@ -21,29 +20,6 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 using Json = nlohmann::json;
-
-struct Output {
-  int code;
-  std::string text;
-};
-
-Output Forereach(const std::string& what) {
-  const std::string command = "cd '" FOREREACH_SOURCE_DIR "' && '" FOREREACH_PROGRAM "' " + what;
-  std::FILE* pipe = popen(command.c_str(), "r");
-  Output output{-1, {}};
-  std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe))
-    output.text.append(buffer.data(), size);
-  output.code = WEXITSTATUS(pclose(pipe));
-  return output;
-}
-
-std::string Read(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 // A task of its own beside its transitions, and the decision on a plan of it.
 class VerifyDecision : public testing::Test {
