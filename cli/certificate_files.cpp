@@ -10,10 +10,12 @@
 
 #include "certifier/gate/freshness.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/transition_message.h"
 #include "certifier/task/files.h"
 #include "cli/decision_json.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -119,7 +121,7 @@ class ObstacleHistory {
 
   // As the gate takes them: fresh, in order, whole or not at all.
   void Update(const LogEvent& event) {
-    const auto message = Decoded<obstacles_t>(event.data);
+    const auto message = Decoded<obstacles_t>(event.message());
     const auto us = [](double ms) { return static_cast<std::int64_t>(std::llround(ms * 1e3)); };
     if (!message || message->sequence <= last_sequence_ ||
         FreshnessOf(message->utime, event.utime, us(config_.gate.max_age_ms), us(config_.gate.max_ahead_ms)) !=
@@ -155,6 +157,66 @@ class ObstacleHistory {
   std::int64_t last_sequence_ = -1;
 };
 
+// The transitions that were learned on the way, and what the certifier knew at each digest of its observations.
+class LearnedHistory {
+ public:
+  explicit LearnedHistory(const Config& config) : config_(config), digest_(config.observations_digest) { Note(); }
+
+  // The certifier knows the file's transitions only, again.
+  void Restart() {
+    begin_ = rows_.size();
+    digest_ = config_.observations_digest;
+    Note();
+  }
+
+  // As the gate takes them.
+  void Learn(const LogEvent& event) {
+    const auto message = Decoded<transition_t>(event.message());
+    if (!config_.gate.learns || !message) return;
+    ExecutedTransition transition = FromMessage(*message, *config_.problem);
+    if (!transition.refusal.empty()) return;
+    rows_.push_back(std::move(transition));
+    digest_ = ChainedDigest(digest_, event.message());
+    Note();
+  }
+
+  [[nodiscard]] std::optional<verifier::KnownRows> Find(const Digest& digest) const {
+    const auto known = known_.find(digest);
+    return known == known_.end() ? std::nullopt : std::optional(known->second);
+  }
+
+  [[nodiscard]] bool Knows(const std::string& hex_digest) const {
+    return std::ranges::any_of(known_, [&](const auto& entry) { return ToHex(entry.first) == hex_digest; });
+  }
+
+  // The task's problem with all of them behind its own transitions.
+  [[nodiscard]] std::shared_ptr<const Problem> WithAll() const {
+    auto problem = std::make_shared<Problem>(*config_.problem);
+    Transitions& all = problem->transitions;
+    const int base = all.size();
+    all.z.conservativeResize(base + std::ssize(rows_), Eigen::NoChange);
+    all.x_next.conservativeResize(base + std::ssize(rows_), Eigen::NoChange);
+    for (Eigen::Index i = 0; i < std::ssize(rows_); ++i) {
+      const ExecutedTransition& row = rows_[static_cast<std::size_t>(i)];
+      all.z.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.z.data(), std::ssize(row.z));
+      all.x_next.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.next.data(), std::ssize(row.next));
+    }
+    return problem;
+  }
+
+ private:
+  void Note() {
+    const int base = config_.problem->transitions.size();
+    known_[digest_] = {base, base + static_cast<int>(begin_), base + static_cast<int>(rows_.size())};
+  }
+
+  const Config& config_;
+  std::vector<ExecutedTransition> rows_;
+  std::size_t begin_ = 0;  // of those learned since the certifier began
+  Digest digest_;
+  std::map<Digest, verifier::KnownRows> known_;
+};
+
 verifier::Certificate CertificateOf(const certified_plan_t& certified, const std::vector<Obstacle>& obstacles) {
   const candidate_plan_t& plan = certified.plan;
   const int n = plan.num_states;
@@ -175,8 +237,9 @@ verifier::Certificate CertificateOf(const certified_plan_t& certified, const std
 
 class LogReading {
  public:
-  LogReading(const std::string& path, const Config& config, std::vector<RecordedCertificate>& certificates)
-      : config_(config), obstacles_(config), certificates_(certificates) {
+  LogReading(const std::string& path, const Config& config, LearnedHistory& learned,
+             std::vector<RecordedCertificate>& certificates)
+      : config_(config), obstacles_(config), learned_(learned), certificates_(certificates) {
     EventLogReader reader(path);
     ForEachEvent(reader, [this](const LogEvent& event) { Take(event); });
     if (reader.corruptions() > 0)
@@ -199,8 +262,12 @@ class LogReading {
   void Take(const LogEvent& event) {
     if (event.channel == config_.bus.obstacles) {
       obstacles_.Update(event);
+    } else if (event.channel == config_.bus.transition) {
+      learned_.Learn(event);
+    } else if (event.channel == config_.bus.status) {
+      TakeStatus(event);
     } else if (event.channel == config_.bus.candidate) {
-      in_force_.insert_or_assign(DigestOf(event.data), obstacles_.now());
+      in_force_.insert_or_assign(DigestOf(event.message()), obstacles_.now());
     } else if (event.channel == config_.bus.decision) {
       TakeDecision(event);
     } else if (event.channel == config_.bus.certified) {
@@ -214,8 +281,16 @@ class LogReading {
     last = sequence;
   }
 
+  // Nor does it know what it had learned; a reload forgets it too.
+  void TakeStatus(const LogEvent& event) {
+    const auto status = Decoded<certifier_status_v2_t>(event.message());
+    if (!status) return;
+    if (status->sequence < last_status_.sequence || status->version != last_status_.version) learned_.Restart();
+    last_status_ = *status;
+  }
+
   void TakeDecision(const LogEvent& event) {
-    const auto decision = Decoded<decision_t>(event.data);
+    const auto decision = Decoded<decision_t>(event.message());
     if (!decision) return;
     NoticeRestart(decision->sequence, last_decision_);
     // A candidate that comes twice is rejected the second time: the certificate is the first's.
@@ -225,7 +300,7 @@ class LogReading {
 
   void TakeCertified(const LogEvent& event) {
     RecordedCertificate certificate;
-    const auto certified = Decoded<certified_plan_t>(event.data);
+    const auto certified = Decoded<certified_plan_t>(event.message());
     certificate.name = "event " + std::to_string(event.number);
     if (!certified || !HasSizes(certified->plan)) {
       certificate.missing = "not a certified_plan_t of this task's sizes";
@@ -259,7 +334,10 @@ class LogReading {
     compare(kOtherInput, "config", config_.digest, GetDigest(certified.config_digest));
     compare(kOtherInput, "model", config_.model_digest, GetDigest(certified.model_digest));
     compare(kOtherInput, "declaration", config_.declaration_digest, GetDigest(certified.declaration_digest));
-    compare(kOtherInput, "observations", config_.observations_digest, GetDigest(certified.observations_digest));
+    if (const auto known = learned_.Find(GetDigest(certified.observations_digest)))
+      certificate.certificate.known = *known;
+    else
+      compare(kOtherInput, "observations", config_.observations_digest, GetDigest(certified.observations_digest));
     compare(kOtherInput, "obstacles in force", version.digest, named);
     if (sent == in_force_.end())
       certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
@@ -267,6 +345,8 @@ class LogReading {
 
   const Config& config_;
   ObstacleHistory obstacles_;
+  LearnedHistory& learned_;
+  certifier_status_v2_t last_status_{};
   std::vector<RecordedCertificate>& certificates_;
   std::map<Digest, std::size_t> in_force_;  // when a candidate was sent
   std::map<Digest, std::int16_t> outcomes_;
@@ -277,13 +357,15 @@ class LogReading {
 CertificateFile FromLog(const std::string& path, Config config) {
   CertificateFile file;
   file.config = std::move(config);
-  file.not_certificates = LogReading(path, file.config, file.certificates).abstentions();
+  LearnedHistory learned(file.config);
+  file.not_certificates = LogReading(path, file.config, learned, file.certificates).abstentions();
+  file.config.problem = learned.WithAll();
   return file;
 }
 
 // ---- A decision database: its logs lie beside it, and its rows have to say what they say.
 
-void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const Config& config,
+void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const LearnedHistory& learned, const Config& config,
                std::vector<RecordedCertificate>& certificates) {
   std::set<std::string> certified;
   for (const auto& [digest, outcome] : log.outcomes())
@@ -297,8 +379,9 @@ void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, cons
     Compare(certificate, std::string(kOtherInput) + "model", ToHex(config.model_digest), row.model_digest);
     Compare(certificate, std::string(kOtherInput) + "declaration", ToHex(config.declaration_digest),
             row.declaration_digest);
-    Compare(certificate, std::string(kOtherInput) + "observations", ToHex(config.observations_digest),
-            row.observations_digest);
+    if (!learned.Knows(row.observations_digest))
+      Compare(certificate, std::string(kOtherInput) + "observations", ToHex(config.observations_digest),
+              row.observations_digest);
     if (!certificate.missing.empty() || !certificate.mismatches.empty()) {
       if (certificate.missing.empty()) certificate.missing = "the row disagrees with the log";
       certificates.push_back(std::move(certificate));
@@ -312,6 +395,7 @@ CertificateFile FromDatabase(const std::string& path, Config config) {
   CertificateFile file;
   file.config = std::move(config);
   Database database(path);
+  LearnedHistory learned(file.config);
   for (const RunRow& run : database.Runs()) {
     const std::string log = (std::filesystem::path(path).parent_path() / run.log_file).string();
     if (!std::filesystem::exists(log)) {
@@ -319,12 +403,13 @@ CertificateFile FromDatabase(const std::string& path, Config config) {
       continue;
     }
     const std::size_t before = file.certificates.size();
-    const LogReading reading(log, file.config, file.certificates);
+    const LogReading reading(log, file.config, learned, file.certificates);
     for (std::size_t i = before; i < file.certificates.size(); ++i)
       file.certificates[i].name = run.log_file + " " + file.certificates[i].name;
     file.not_certificates += reading.abstentions();
-    CheckRows(database.Read(run.log_file).decisions, reading, file.config, file.certificates);
+    CheckRows(database.Read(run.log_file).decisions, reading, learned, file.config, file.certificates);
   }
+  file.config.problem = learned.WithAll();
   return file;
 }
 

@@ -21,5 +21,7 @@ void AddReportCommand(CLI::App& app, Action& action);
 void AddRunCommand(CLI::App& app, Action& action);
 void AddDoctorCommand(CLI::App& app, Action& action);
 void AddKeysCommand(CLI::App& app, Action& action);
+/** status, reset, reload and keygen. */
+void AddBusCommands(CLI::App& app, Action& action);
 
 }  // namespace forereach

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   AddRunCommand(app, action);
   AddDoctorCommand(app, action);
   AddKeysCommand(app, action);
+  AddBusCommands(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -6,6 +6,7 @@
 
 #include "certifier/gate/gate.h"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -13,11 +14,6 @@
 
 namespace forereach {
 namespace {
-
-struct Recorded {
-  decision_t decision;
-  std::int64_t event;
-};
 
 std::string InWords(const decision_t& decision) {
   std::string text(OutcomeName(decision.outcome));
@@ -38,62 +34,109 @@ std::string Difference(const decision_t& recorded, const decision_t& replayed) {
   return {};
 }
 
+// What no replay can give again.
+bool IsCircumstance(std::int16_t cause) {
+  switch (cause) {
+    case decision_t::CAUSE_QUEUE_FULL:
+    case decision_t::CAUSE_OVERRUN:
+    case decision_t::CAUSE_NOT_ARMED:
+    case decision_t::CAUSE_FAULT:
+      return true;
+    default:
+      return false;
+  }
+}
+
 class Replayer {
  public:
-  explicit Replayer(const Config& config) : config_(config) { gate_.emplace(config); }
-
-  // A first pass: which decision each candidate's bytes were given, in order.
-  void Collect(const LogEvent& event) {
-    if (event.channel != config_.bus.decision) return;
-    if (const auto decision = Decoded<decision_t>(event.data))
-      recorded_[GetDigest(decision->plan_digest)].push_back({*decision, event.number});
-  }
+  explicit Replayer(const Config& config) : config_(config) { Restart(); }
 
   void Feed(const LogEvent& event) {
-    if (event.channel == config_.bus.obstacles) {
-      static_cast<void>(gate_->UpdateObstacles(event.data, event.utime));
+    if (event.channel == config_.bus.obstacles || event.channel == config_.bus.transition) {
+      changes_.push_back({event.channel, {event.message().begin(), event.message().end()}, event.utime});
     } else if (event.channel == config_.bus.candidate) {
-      FeedCandidate(event);
+      ++result_.candidates;
+      candidates_[DigestOf(event.message())].push_back(
+          {{event.message().begin(), event.message().end()}, event.number});
+    } else if (event.channel == config_.bus.decision) {
+      FeedDecision(event);
+    } else if (event.channel == config_.bus.status) {
+      FeedStatus(event);
     } else if (event.channel == config_.bus.certified) {
       CheckSeal(event);
     }
   }
 
   ReplayResult Finish() {
-    for (const auto& [digest, decisions] : recorded_)
-      for (const Recorded& recorded : decisions)
-        Differ(recorded.event, recorded.decision.plan_id, "decided, but its candidate is not in the log");
+    for (const auto& [digest, waiting] : candidates_)
+      for (const Candidate& candidate : waiting) Differ(candidate.event, -1, "no decision recorded");
     return std::move(result_);
   }
 
   void AddCorruptions(std::int64_t count) { result_.corruptions = count; }
 
  private:
-  void FeedCandidate(const LogEvent& event) {
-    ++result_.candidates;
-    auto& waiting = recorded_[DigestOf(event.data)];
-    std::optional<Recorded> recorded;
-    if (!waiting.empty()) {
-      recorded = waiting.front();
-      waiting.pop_front();
-      if (recorded->decision.sequence < last_sequence_) gate_.emplace(config_);  // the certifier was started again
-      last_sequence_ = recorded->decision.sequence;
-    }
-    const decision_t replayed = gate_->Decide(event.data, event.utime).decision;
-    if (!recorded) return Differ(event.number, replayed.plan_id, "no decision recorded; replayed " + InWords(replayed));
-    if (recorded->decision.cause == decision_t::CAUSE_QUEUE_FULL) {
-      ++result_.displaced;
+  struct Candidate {
+    std::vector<std::uint8_t> bytes;
+    std::int64_t event;
+  };
+  struct Change {
+    std::string channel;
+    std::vector<std::uint8_t> bytes;
+    std::int64_t utime;
+  };
+
+  void Restart() {
+    gate_.emplace(config_);
+    changes_.clear();
+    last_sequence_ = -1;
+  }
+
+  // The first heartbeat comes before anything is decided on or learned.
+  void FeedStatus(const LogEvent& event) {
+    const auto status = Decoded<certifier_status_v2_t>(event.message());
+    if (!status) return;
+    if (status->sequence < last_status_.sequence || status->version != last_status_.version) Restart();
+    last_status_ = *status;
+  }
+
+  void FeedDecision(const LogEvent& event) {
+    const auto recorded = Decoded<decision_t>(event.message());
+    if (!recorded) return;
+    if (recorded->sequence < last_sequence_) Restart();
+    last_sequence_ = recorded->sequence;
+    auto& waiting = candidates_[GetDigest(recorded->plan_digest)];
+    if (waiting.empty()) return Differ(event.number, recorded->plan_id, "decided, but its candidate is not in the log");
+    const Candidate candidate = std::move(waiting.front());
+    waiting.pop_front();
+    CatchUp(*recorded);
+    if (IsCircumstance(recorded->cause)) {
+      static_cast<void>(gate_->Refuse(candidate.bytes, recorded->utime, recorded->cause, ""));
+      ++result_.circumstances;
       return;
     }
-    const std::string difference = Difference(recorded->decision, replayed);
+    const std::string difference = Difference(*recorded, gate_->Decide(candidate.bytes, recorded->utime).decision);
     if (difference.empty())
       ++result_.agreed;
     else
-      Differ(event.number, replayed.plan_id, difference);
+      Differ(candidate.event, recorded->plan_id, difference);
+  }
+
+  // What had changed before the decision was made, which is at most what is logged before it.
+  void CatchUp(const decision_t& recorded) {
+    const Digest obstacles = GetDigest(recorded.obstacles_digest), observations = GetDigest(recorded.observations_digest);
+    while (!changes_.empty() && (gate_->obstacles_digest() != obstacles || gate_->observations_digest() != observations)) {
+      const Change& change = changes_.front();
+      if (change.channel == config_.bus.obstacles)
+        static_cast<void>(gate_->UpdateObstacles(change.bytes, change.utime));
+      else
+        static_cast<void>(gate_->Learn(change.bytes));
+      changes_.pop_front();
+    }
   }
 
   void CheckSeal(const LogEvent& event) {
-    const auto certified = Decoded<certified_plan_t>(event.data);
+    const auto certified = Decoded<certified_plan_t>(event.message());
     if (!certified) return Differ(event.number, -1, "not a certified_plan_t");
     for (const SealFault& fault : FindSealFaults(*certified))
       Differ(event.number, certified->plan.plan_id,
@@ -106,7 +149,9 @@ class Replayer {
 
   const Config& config_;
   std::optional<Gate> gate_;
-  std::map<Digest, std::deque<Recorded>> recorded_;
+  std::map<Digest, std::deque<Candidate>> candidates_;  // not decided yet
+  std::deque<Change> changes_;                          // logged, and perhaps not yet seen by the certifier
+  certifier_status_v2_t last_status_{};
   std::int64_t last_sequence_ = -1;
   ReplayResult result_;
 };
@@ -115,10 +160,9 @@ class Replayer {
 
 ReplayResult Replay(const std::string& log_path, const Config& config) {
   Replayer replayer(config);
-  EventLogReader first(log_path), second(log_path);
-  ForEachEvent(first, [&](const LogEvent& event) { replayer.Collect(event); });
-  ForEachEvent(second, [&](const LogEvent& event) { replayer.Feed(event); });
-  replayer.AddCorruptions(second.corruptions());
+  EventLogReader reader(log_path);
+  ForEachEvent(reader, [&](const LogEvent& event) { replayer.Feed(event); });
+  replayer.AddCorruptions(reader.corruptions());
   return replayer.Finish();
 }
 

@@ -10,18 +10,19 @@
 namespace forereach {
 
 struct ReplayResult {
-  std::int64_t candidates = 0;   ///< Fed to the gate.
-  std::int64_t agreed = 0;       ///< Same outcome, step, cause and digests as recorded.
-  std::int64_t displaced = 0;    ///< Recorded as displaced from a full queue: a matter of timing, not compared.
-  std::int64_t corruptions = 0;  ///< Damaged places in the log.
+  std::int64_t candidates = 0;      ///< In the log.
+  std::int64_t agreed = 0;          ///< Same outcome, step, cause and digests as recorded.
+  /** Recorded as displaced, out of time, not armed, in fault: a matter of the moment and not of the plan, not compared. */
+  std::int64_t circumstances = 0;
+  std::int64_t corruptions = 0;     ///< Damaged places in the log.
   /** One line for each decision that differs, each candidate without a recorded decision, each recorded decision
   without a candidate, and each way in which the seal of a certified plan does not hold. */
   std::vector<std::string> differences;
 };
 
-/** Feeds candidates and obstacles of a log, in its order and at the times it recorded them, to a new gate, and compares
-each decision with the recorded one of the same bytes; certified plans have to be sealed (lcmtypes/seal.h). A certifier that
-was started again within the log begins with a new gate here too.
+/** Feeds the candidates of a log to a new gate, each at the time of its recorded decision and with the obstacles and
+executed transitions that the decision names by their digests, and compares what it says; certified plans have to be sealed
+(lcmtypes/seal.h). A certifier that was started again, or reloaded, within the log begins with a new gate here too.
 @throws LogError if the log cannot be read, std::invalid_argument as Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::string& log_path, const Config& config);
 

@@ -20,7 +20,7 @@ int RunReplay(const Options& options) {
   if (options.json) {
     std::cout << nlohmann::json{{"candidates", result.candidates},
                                 {"agreed", result.agreed},
-                                {"displaced", result.displaced},
+                                {"circumstances", result.circumstances},
                                 {"corruptions", result.corruptions},
                                 {"differences", result.differences}}
               << std::endl;
@@ -28,7 +28,8 @@ int RunReplay(const Options& options) {
     for (const std::string& difference : result.differences) std::cout << difference << "\n";
     std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
               << result.differences.size() << " differ";
-    if (result.displaced > 0) std::cout << ", " << result.displaced << " were displaced from a full queue";
+    if (result.circumstances > 0)
+      std::cout << ", " << result.circumstances << " were refused for what no replay gives again (queue, time, not armed, fault)";
     if (result.corruptions > 0) std::cout << "; the log is damaged in " << result.corruptions << " places";
     std::cout << std::endl;
   }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include "certifier/process/certifier_node.h"
+#include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "logger/logger_node.h"
 #include "planner_bridge/planner_node.h"
@@ -14,7 +15,7 @@ namespace {
 constexpr std::int64_t kClockStepUs = 1000;
 
 struct Options {
-  std::string config, directory;
+  std::string config, directory, key;
 };
 
 void Deliver(Bus& bus) {
@@ -27,10 +28,13 @@ void Deliver(Bus& bus) {
 int Run(const Options& options) {
   Config config = LoadConfig(options.config);
   if (!options.directory.empty()) config.logger.directory = options.directory;
+  if (!options.key.empty()) config.bus.key = options.key;
+  config.bus.url = "memq://";
   std::int64_t now = WallClockUs();
-  const auto bus = OpenBus("memq://", [&now] { return now; });
+  const Clock clock = [&now] { return now; };
+  const auto bus = OpenBus(config.bus, "forereach", clock);
   LoggerNode logger(config, *bus, std::cout);
-  CertifierNode certifier(config, *bus);
+  CertifierNode certifier(config, *bus, {clock, clock});
   PlannerNode planner(config, *bus);
   RobotSimNode robot(config, *bus);
   const auto last = now + static_cast<std::int64_t>((config.robot.time_limit_s + 60) * 1e6);
@@ -52,6 +56,7 @@ void AddRunCommand(CLI::App& app, Action& action) {
       "run", "Planner, certifier, robot and logger in this one process, on LCM's in-memory bus and a simulated clock");
   command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
   command->add_option("--directory", options->directory, "Where the logger writes")->type_name("DIR");
+  command->add_option("--key", options->key, "Key file; by default the task file's bus.key")->type_name("FILE");
   command->footer("Example:\n  forereach run --config config/demo.yaml --directory run/log");
   command->callback([options, &action] { action = [options] { return Run(*options); }; });
 }

@@ -121,6 +121,11 @@ std::int64_t WallClockUs() {
   return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
 }
 
+std::int64_t SteadyClockUs() {
+  using namespace std::chrono;
+  return duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
 std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock) {
   if (!url.starts_with("udpm://") && !url.starts_with("memq://"))
     throw BusError("bus: " + url + " has to begin with udpm:// or memq://, as in udpm://239.255.76.67:7667?ttl=0");

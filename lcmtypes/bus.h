@@ -8,6 +8,7 @@ Handlers run in the thread that calls Dispatch, never in a receive thread, so a 
 #include <memory>
 #include <string>
 
+#include "lcmtypes/authentic.h"
 #include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 
@@ -16,6 +17,8 @@ namespace forereach {
 /** Microseconds since the Unix epoch. */
 using Clock = std::function<std::int64_t()>;
 [[nodiscard]] std::int64_t WallClockUs();
+/** Microseconds since some time, by a clock that nobody sets. */
+[[nodiscard]] std::int64_t SteadyClockUs();
 
 /** The bus cannot be opened; the text says what to do about it. */
 class BusError : public BadInput {
@@ -38,6 +41,10 @@ class Bus {
   /** Calls `handler` for each message on a channel that matches the regular expression as a whole. */
   virtual void Subscribe(const std::string& channel, Handler handler) = 0;
 
+  /** The same, but hands out messages as they came, signature and all, on a bus that else takes authentic ones only
+  (authentic_bus.h): for who records, or checks by itself. */
+  virtual void SubscribeUnchecked(const std::string& channel, Handler handler) { Subscribe(channel, std::move(handler)); }
+
   /** Sends; returns false if the bus refused. May be called from any thread. */
   virtual bool Publish(const std::string& channel, Bytes bytes) = 0;
 
@@ -47,6 +54,9 @@ class Bus {
 
   /** Messages discarded here because more than the bounded queue holds had arrived undispatched. */
   [[nodiscard]] virtual std::int64_t dropped() const = 0;
+
+  /** Messages that were not authentic, on a bus that looks. */
+  [[nodiscard]] virtual Refusals refusals() const { return {}; }
 
   template <class Message>
   bool Publish(const std::string& channel, const Message& message) {

@@ -16,6 +16,12 @@ Digest DigestOf(std::string_view text) {
   return DigestOf(Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
+Digest ChainedDigest(const Digest& before, Bytes bytes) {
+  std::vector<std::uint8_t> chained(before.begin(), before.end());
+  chained.insert(chained.end(), bytes.begin(), bytes.end());
+  return DigestOf(chained);
+}
+
 std::string ToHex(const Digest& digest) {
   std::string hex(2 * digest.size() + 1, '\0');
   sodium_bin2hex(hex.data(), hex.size(), digest.data(), digest.size());

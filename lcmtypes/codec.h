@@ -23,6 +23,8 @@ using Digest = std::array<std::uint8_t, 32>;
 
 [[nodiscard]] Digest DigestOf(Bytes bytes);
 [[nodiscard]] Digest DigestOf(std::string_view text);
+/** Of a digest and some bytes behind it: of data that grows. */
+[[nodiscard]] Digest ChainedDigest(const Digest& before, Bytes bytes);
 /** Lower-case hexadecimal, 64 characters. */
 [[nodiscard]] std::string ToHex(const Digest& digest);
 

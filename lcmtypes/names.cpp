@@ -2,6 +2,7 @@
 
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
+#include "forereach/fault_t.hpp"
 
 namespace forereach {
 
@@ -12,6 +13,7 @@ std::string_view OutcomeName(std::int16_t outcome) {
     case decision_t::ABSTAIN_DOMAIN: return "abstain_domain";
     case decision_t::ABSTAIN_SAFETY: return "abstain_safety";
     case decision_t::REJECTED: return "rejected";
+    case decision_t::ABSTAIN_DEADLINE: return "abstain_deadline";
     default: return "unknown";
   }
 }
@@ -35,6 +37,11 @@ std::string_view CauseName(std::int16_t cause) {
     case decision_t::CAUSE_TOO_LATE: return "too_late";
     case decision_t::CAUSE_QUEUE_FULL: return "queue_full";
     case decision_t::CAUSE_INTERNAL_ERROR: return "internal_error";
+    case decision_t::CAUSE_DEADLINE: return "deadline";
+    case decision_t::CAUSE_OVERRUN: return "overrun";
+    case decision_t::CAUSE_NOT_ARMED: return "not_armed";
+    case decision_t::CAUSE_FAULT: return "fault";
+    case decision_t::CAUSE_SHADOW: return "shadow";
     default: return "unknown";
   }
 }
@@ -50,6 +57,18 @@ std::string_view EventName(std::int16_t kind) {
     case execution_event_t::STANDING: return "standing";
     case execution_event_t::GOAL_REACHED: return "goal_reached";
     case execution_event_t::CONTACT: return "contact";
+    case execution_event_t::HALTED: return "halted";
+    case execution_event_t::RESET: return "reset";
+    default: return "unknown";
+  }
+}
+
+std::string_view FaultName(std::int16_t cause) {
+  switch (cause) {
+    case fault_t::ROBOT_STATE_LOST: return "robot_state_lost";
+    case fault_t::CLOCK_JUMP: return "clock_jump";
+    case fault_t::SLICE_LEFT: return "slice_left";
+    case fault_t::DECLARATION_FALSIFIED: return "declaration_falsified";
     default: return "unknown";
   }
 }

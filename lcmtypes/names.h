@@ -6,7 +6,7 @@
 
 namespace forereach {
 
-/** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected"; "unknown" for any other number. */
+/** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected", "abstain_deadline"; "unknown" for any other number. */
 [[nodiscard]] std::string_view OutcomeName(std::int16_t outcome);
 
 /** "none", "pairwise", "domain_exit", ... as decision_t's CAUSE_ constants; "unknown" for any other number. */
@@ -14,5 +14,8 @@ namespace forereach {
 
 /** "accepted", "refused", "started", ... as execution_event_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view EventName(std::int16_t kind);
+
+/** "robot_state_lost", ... as fault_t's constants; "unknown" for any other number. */
+[[nodiscard]] std::string_view FaultName(std::int16_t cause);
 
 }  // namespace forereach

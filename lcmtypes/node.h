@@ -18,6 +18,12 @@ class Node {
   /** Called at least every `kTickMs` milliseconds. `now_us`: microseconds since the Unix epoch, or a simulated clock. */
   virtual void Tick(std::int64_t now_us) = 0;
 
+  /** True while work waits: Tick is then called again at once. */
+  [[nodiscard]] virtual bool busy() const { return false; }
+
+  /** The process got SIGHUP: read again what can change while it runs. */
+  virtual void Reload() {}
+
   /** True once the node has nothing left to do; its process then ends. */
   [[nodiscard]] virtual bool done() const { return false; }
 
@@ -47,7 +53,7 @@ class Sender final {
 
 inline constexpr int kTickMs = 2;
 
-/** From here on SIGTERM and SIGINT end RunNode instead of the process. RunNode does it too; a process that calls it
+/** From here on SIGTERM and SIGINT end RunNode instead of the process, and SIGHUP reloads. RunNode does it too; a process that calls it
 first also ends cleanly if the signal comes while it starts. */
 void CatchStopSignals();
 

@@ -15,6 +15,7 @@ every length before it allocates, tells the end, a cut tail and damage apart, an
 #include <string>
 #include <vector>
 
+#include "lcmtypes/authentic.h"
 #include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 
@@ -30,7 +31,10 @@ struct LogEvent {
   std::int64_t number = 0;  ///< Counts the events of a file from 0. A number that is missing was lost to a full disk.
   std::int64_t utime = 0;   ///< Microseconds since the Unix epoch at which it was received.
   std::string channel;
-  std::vector<std::uint8_t> data;
+  std::vector<std::uint8_t> data;  ///< As it was on the bus.
+
+  /** The data without the signature, if there is one (lcmtypes/authentic.h). */
+  [[nodiscard]] Bytes message() const { return WithoutSignature(data); }
 };
 
 inline constexpr std::int32_t kMaxLogChannelBytes = 63;  ///< LCM's own limit.

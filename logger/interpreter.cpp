@@ -4,9 +4,10 @@
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
+#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
+#include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/names.h"
@@ -79,7 +80,8 @@ std::pair<Stream, std::optional<std::int64_t>> Interpreter::Identify(const std::
   if (channel == channels_.certified) return {plain, SequenceOf<certified_plan_t>(bytes)};
   if (channel == channels_.robot_state) return {plain, SequenceOf<robot_state_t>(bytes)};
   if (channel == channels_.transition) return {plain, SequenceOf<transition_t>(bytes)};
-  if (channel == channels_.status) return {plain, SequenceOf<certifier_status_t>(bytes)};
+  if (channel == channels_.status) return {plain, SequenceOf<certifier_status_v2_t>(bytes)};
+  if (channel == channels_.fault) return {plain, SequenceOf<fault_t>(bytes)};
   if (channel == channels_.event) return {plain, SequenceOf<execution_event_t>(bytes)};
   return {plain, std::nullopt};  // obstacles_t's sequence only has to grow
 }
@@ -87,16 +89,16 @@ std::pair<Stream, std::optional<std::int64_t>> Interpreter::Identify(const std::
 void Interpreter::Observe(const LogEvent& event, Rows& rows) {
   CheckSequence(event, rows);
   if (event.channel == channels_.candidate) {
-    candidates_.emplace_back(DigestOf(event.data), event.utime);
+    candidates_.emplace_back(DigestOf(event.message()), event.utime);
     if (candidates_.size() > kMaxCandidates) candidates_.pop_front();
   } else if (event.channel == channels_.decision) {
-    if (const auto decision = Decoded<decision_t>(event.data)) {
+    if (const auto decision = Decoded<decision_t>(event.message())) {
       DecisionRow row = MakeRow(*decision, {log_file_, event.number});
       row.latency_us = LatencyUs(GetDigest(decision->plan_digest), event.utime);
       rows.decisions.push_back(std::move(row));
     }
   } else if (event.channel == channels_.event) {
-    if (const auto execution = Decoded<execution_event_t>(event.data))
+    if (const auto execution = Decoded<execution_event_t>(event.message()))
       rows.events.push_back(MakeRow(*execution, {log_file_, event.number}));
   }
 }
@@ -107,7 +109,7 @@ void Interpreter::Forgive(const Stream& stream, std::int64_t lost) {
 }
 
 void Interpreter::CheckSequence(const LogEvent& event, Rows& rows) {
-  const auto [stream, sequence] = Identify(event.channel, event.data);
+  const auto [stream, sequence] = Identify(event.channel, event.message());
   if (!sequence || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return;
   Count& count = streams_[stream];
   const std::int64_t got = *sequence, expected = count.next.value_or(got), forgiven = count.forgiven;

@@ -52,7 +52,7 @@ LoggerNode::LoggerNode(const Config& config, Bus& bus, std::ostream& out)
       bus_dropped_(bus.dropped()) {
   for (const RunRow& run : database_.Runs())
     if (!run.end_utime) Recover(run);
-  bus.Subscribe(".*", [this](const Received& received) { Receive(received); });
+  bus.SubscribeUnchecked(".*", [this](const Received& received) { Receive(received); });
 }
 
 void LoggerNode::Recover(const RunRow& run) {
@@ -98,7 +98,7 @@ void LoggerNode::Receive(const Received& received) {
     return;
   }
   Stream stream{received.channel, ""};
-  if (interpreter_) stream = interpreter_->Identify(received.channel, received.bytes).first;
+  if (interpreter_) stream = interpreter_->Identify(received.channel, WithoutSignature(received.bytes)).first;
   if (overflow_.size() >= kMaxStreamsInOverflow && !overflow_.contains(stream)) stream = {"*", ""};
   ++overflow_[stream];
 }

@@ -44,16 +44,17 @@ class PictureMaker final {
 
   void Add(const LogEvent& event) {
     if (event.channel == channels_.candidate) {
-      candidates_.emplace_back(DigestOf(event.data), event.data);
+      candidates_.emplace_back(DigestOf(event.message()),
+                               std::vector<std::uint8_t>(event.message().begin(), event.message().end()));
       if (candidates_.size() > kMaxUndecided) candidates_.pop_front();
     } else if (event.channel == channels_.decision) {
-      if (const auto decision = Decoded<decision_t>(event.data)) AddDecision(*decision);
+      if (const auto decision = Decoded<decision_t>(event.message())) AddDecision(*decision);
     } else if (event.channel == channels_.obstacles) {
-      if (const auto obstacles = Decoded<obstacles_t>(event.data)) SetObstacles(*obstacles);
+      if (const auto obstacles = Decoded<obstacles_t>(event.message())) SetObstacles(*obstacles);
     } else if (event.channel == channels_.robot_state) {
-      if (const auto state = Decoded<robot_state_t>(event.data)) AddState(*state);
+      if (const auto state = Decoded<robot_state_t>(event.message())) AddState(*state);
     } else if (event.channel == channels_.event) {
-      if (const auto execution = Decoded<execution_event_t>(event.data)) AddExecution(*execution);
+      if (const auto execution = Decoded<execution_event_t>(event.message())) AddExecution(*execution);
     }
   }
 

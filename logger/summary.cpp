@@ -124,7 +124,7 @@ void SummaryBuilder::Add(const LogEvent& event) {
   SetTime(event.utime);
   ++summary_.messages[event.channel];
   if (event.channel != channels_.robot_state) return;
-  if (const auto state = Decoded<robot_state_t>(event.data))
+  if (const auto state = Decoded<robot_state_t>(event.message()))
     SetState({state->state, state->state + std::clamp<int>(state->num_states, 0, 16)});
 }
 

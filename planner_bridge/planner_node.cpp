@@ -207,6 +207,8 @@ void PlannerNode::Learn(const decision_t& decision) {
   plans_.erase(decision.plan_id);
   auto& counts = decision.outcome == decision_t::REJECTED ? rejected_ : abstained_;
   ++counts[std::string(CauseName(decision.cause))];
+  // No candidate can pass before the world has changed.
+  if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_FAULT) return EndRound(false);
   switch (decision.outcome) {
     case decision_t::ABSTAIN_SAFETY:
       round_->clearance += config_.planner.clearance_step;

@@ -8,7 +8,8 @@ candidate at a time and waits for its decision:
     abstention S       -> the next candidate keeps clearance_step more from obstacles
     abstention D       -> the next candidate keeps further inside the domain's bounds
     abstention F       -> the round ends: no candidate can pass
-    rejected           -> the next candidate
+    rejected           -> the next candidate; the round ends where the certifier is not armed or has latched a fault
+    abstained, no time -> the next candidate
 It ends without a certificate after `candidates` searches, or when too little time is left until its start; the next
 state begins another. All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has
 said FINISHED, no round begins any more.

@@ -125,6 +125,9 @@ std::uint64_t Apart(std::int64_t a, std::int64_t b) {
 std::string_view GuardCauseName(GuardCause cause) {
   switch (cause) {
     case GuardCause::kNone: return "none";
+    case GuardCause::kUnsigned: return "unsigned";
+    case GuardCause::kForged: return "forged";
+    case GuardCause::kSignatureReplayed: return "signature_replayed";
     case GuardCause::kWrongLength: return "wrong_length";
     case GuardCause::kTrailingBytes: return "trailing_bytes";
     case GuardCause::kUnknownFingerprint: return "unknown_fingerprint";
@@ -139,6 +142,7 @@ std::string_view GuardCauseName(GuardCause cause) {
     case GuardCause::kConfigDigest: return "config_digest";
     case GuardCause::kModelDigest: return "model_digest";
     case GuardCause::kReplayed: return "replayed";
+    case GuardCause::kHalted: return "halted";
     case GuardCause::kNothingPending: return "nothing_pending";
     case GuardCause::kTooEarly: return "too_early";
     case GuardCause::kTooLate: return "too_late";
@@ -161,11 +165,36 @@ Guard::Guard(GuardOptions options) : options_(options) {
   require("num_states", options_.num_states, kMaxPlanStates);
   require("num_inputs", options_.num_inputs, kMaxPlanInputs);
   require("step_us", options_.step_us, INT64_MAX);
+  // A plan expires and its plan_id has to be new, so one from before the guard began does no more harm than a late one.
+  if (options_.key) authenticator_.emplace(*options_.key, 0);
+}
+
+void Guard::Halt() noexcept {
+  halted_ = true;
+  pending_.reset();
+  executing_.reset();
+}
+
+// Takes the signature off.
+GuardVerdict Guard::Authenticated(Bytes& bytes) {
+  if (!authenticator_) return {};
+  const auto [authenticity, message] = authenticator_->Check(options_.channel, bytes);
+  bytes = message;
+  switch (authenticity) {
+    case Authenticity::kAuthentic: return {};
+    case Authenticity::kUnsigned: return Refuse(GuardCause::kUnsigned, "the plan is not signed");
+    case Authenticity::kForged: return Refuse(GuardCause::kForged, "the plan is not signed with this robot's key");
+    case Authenticity::kReplayed: break;
+  }
+  return Refuse(GuardCause::kSignatureReplayed, "the plan's signature was used before");
 }
 
 GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept {
   GuardVerdict verdict;
   try {
+    if (halted_) return Refuse(GuardCause::kHalted, "halted until a person resets it");
+    verdict = Authenticated(certified_plan_bytes);
+    if (!verdict.ok()) return verdict;
     auto certified = std::make_unique<certified_plan_t>();
     const DecodeStatus status = Decode(certified_plan_bytes, *certified);
     if (status != DecodeStatus::kOk) return RefuseDecode(status, certified_plan_bytes.size());
@@ -247,7 +276,9 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::span<const double
     verdict.cause = GuardCause::kInternalError;
   }
   if (pending_) verdict.plan_id = pending_->plan.plan_id;
-  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kTooEarly) return verdict;
+  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kHalted ||
+      verdict.cause == GuardCause::kTooEarly)
+    return verdict;
   if (verdict.ok()) {
     executing_ = std::move(pending_);
     last_step_ = 0;
@@ -257,7 +288,7 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::span<const double
 }
 
 GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::span<const double> state) const {
-  if (!pending_) return Refuse(GuardCause::kNothingPending, {});
+  if (!pending_) return Refuse(halted_ ? GuardCause::kHalted : GuardCause::kNothingPending, {});
   const candidate_plan_t& plan = pending_->plan;
   if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(options_.step_us / 2)) {
     const bool early = boundary_utime < plan.start_utime;
@@ -296,6 +327,7 @@ GuardVerdict Guard::Check(int step, std::span<const double> measured_state) noex
   }
   if (executing_) verdict.plan_id = executing_->plan.plan_id;
   last_step_ = step;
+  if (verdict.cause == GuardCause::kOutsideSlice) Halt();
   if (!verdict.ok()) executing_.reset();
   return verdict;
 }

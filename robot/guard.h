@@ -8,9 +8,11 @@ every message of PLAN_CERTIFIED and, at every step boundary, its measured state:
                  in place of the one before
     Check     -> after each control: the state is inside X_t, so the next control may be applied
     Finish    -> nothing is executing
+    Halt      -> nothing is executing, nothing is accepted or started until Reset
 
 Every refusal is final: a plan refused by TryStart for anything but being early is forgotten, and a plan whose Check
-failed is executing no more. Only the plan that `executing` returns may be applied, control t after its step t passed.
+failed is executing no more. A state outside its slice halts the guard by itself: what the next certificate rests on has
+just been seen not to hold. Only the plan that `executing` returns may be applied, control t after its step t passed.
 
 What Check compares with: a certified_plan_t carries, for t = 0..T, the interval hull of the certified slice X_t,
 rounded outward. X_t lies in its hull, so a state outside the hull has left X_t and the certificate says nothing of it
@@ -27,6 +29,7 @@ Plan ids are compared whatever their source: a robot follows one planner. Single
 #include <string_view>
 
 #include "forereach/certified_plan_t.hpp"
+#include "lcmtypes/authentic.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -35,6 +38,9 @@ namespace forereach {
 enum class GuardCause {
   kNone,
   // Accept
+  kUnsigned,           ///< With a key: no signature, ...
+  kForged,             ///< ... one that is wrong, or made with another key, ...
+  kSignatureReplayed,  ///< ... or one that came before.
   kWrongLength,
   kTrailingBytes,
   kUnknownFingerprint,
@@ -49,6 +55,8 @@ enum class GuardCause {
   kConfigDigest,       ///< Certified under another configuration.
   kModelDigest,        ///< Certified for another model.
   kReplayed,           ///< plan_id is not newer than the last accepted one.
+  // Accept and TryStart
+  kHalted,             ///< Until Reset.
   // TryStart
   kNothingPending,
   kTooEarly,           ///< The plan stays pending.
@@ -85,6 +93,8 @@ struct GuardOptions {
   std::int64_t step_us = 0;             ///< Time between two step boundaries, positive.
   std::optional<Digest> config_digest;  ///< If set, plans certified under another configuration are refused.
   std::optional<Digest> model_digest;   ///< If set, plans certified for another model are refused.
+  std::optional<Key256> key;            ///< If set, plans that are not signed with it are refused (lcmtypes/authentic.h) ...
+  std::string channel = "PLAN_CERTIFIED";  ///< ... for this channel.
 };
 
 class Guard final {
@@ -93,7 +103,7 @@ class Guard final {
   explicit Guard(GuardOptions options);
 
   /** Checks one message of PLAN_CERTIFIED; if it passes, it becomes the pending plan.
-  In this order: decoded whole and nothing left over, dimensions, step period, the seal (lcmtypes/seal.h: plan digest,
+  In this order: not halted, signed where there is a key, decoded whole and nothing left over, dimensions, step period, the seal (lcmtypes/seal.h: plan digest,
   certificate digest, nothing in what is not in use), finite numbers, lower <= upper in every slice, not expired (now_us
   <= expires_utime), expected config and model digest, plan_id newer than the last accepted. The seal covers every bit of
   the message. Cost: that of the seal, under 0.1 ms. @param now_us robot's clock. */
@@ -113,11 +123,18 @@ class Guard final {
   /** The executing plan ends here. */
   void Finish() noexcept { executing_.reset(); }
 
+  /** Something that certificates rest on does not hold: all plans are forgotten, and none is taken until Reset, which is for
+  a person to call. */
+  void Halt() noexcept;
+  void Reset() noexcept { halted_ = false; }
+  [[nodiscard]] bool halted() const { return halted_; }
+
   /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check or Finish. */
   [[nodiscard]] const certified_plan_t* executing() const { return executing_.get(); }
   [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
 
  private:
+  [[nodiscard]] GuardVerdict Authenticated(Bytes& bytes);
   [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
   [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
@@ -126,6 +143,8 @@ class Guard final {
   [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
 
   GuardOptions options_;
+  std::optional<Authenticator> authenticator_;
+  bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;
   std::unique_ptr<certified_plan_t> pending_, executing_;
   int last_step_ = 0;  // of the executing plan, the last one checked

@@ -9,6 +9,8 @@
 #include <spdlog/spdlog.h>
 
 #include "certifier/numerics/text.h"
+#include "forereach/command_t.hpp"
+#include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 
@@ -20,8 +22,15 @@ constexpr std::int64_t kProgressUs = 1'000'000;
 std::int64_t PeriodUs(const Config& config) { return std::llround(config.robot.step_period_ms * 1e3); }
 
 GuardOptions OptionsOf(const Config& config) {
-  return {config.problem->model->num_states(), config.problem->model->num_inputs(), PeriodUs(config), config.digest,
-          config.model_digest};
+  GuardOptions options;
+  options.num_states = config.problem->model->num_states();
+  options.num_inputs = config.problem->model->num_inputs();
+  options.step_us = PeriodUs(config);
+  options.config_digest = config.digest;
+  options.model_digest = config.model_digest;
+  if (!config.bus.key.empty()) options.key = LoadKey(config.bus.key);
+  options.channel = config.bus.certified;
+  return options;
 }
 
 std::vector<int> RestCoordinates(const NominalModel& model) {
@@ -54,7 +63,10 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
     RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
-  bus.Subscribe(config_.bus.certified, [this](const Received& received) { OnCertified(received); });
+  // The guard checks the signature by itself.
+  bus.SubscribeUnchecked(config_.bus.certified, [this](const Received& received) { OnCertified(received); });
+  bus.Subscribe(config_.bus.fault, [this](const Received& received) { OnFault(received); });
+  bus.Subscribe(config_.bus.command, [this](const Received& received) { OnCommand(received); });
 }
 
 void RobotSimNode::Tick(std::int64_t now_us) {
@@ -68,6 +80,24 @@ void RobotSimNode::OnCertified(const Received& received) {
   if (!verdict.ok()) return PublishRefusal(received.utime, verdict);
   ++accepted_;
   PublishEvent(received.utime, execution_event_t::ACCEPTED, verdict.plan_id, -1, 0, "the plan waits for its start");
+}
+
+void RobotSimNode::OnFault(const Received& received) {
+  const auto fault = Decoded<fault_t>(received.bytes);
+  if (!fault || (fault->cause != fault_t::SLICE_LEFT && fault->cause != fault_t::DECLARATION_FALSIFIED)) return;
+  if (guard_.halted()) return;
+  const std::int64_t plan_id = executing_plan_id();
+  const int step = executing_step();
+  if (executing()) Stand();
+  guard_.Halt();
+  PublishEvent(received.utime, execution_event_t::HALTED, plan_id, step, 0, "emergency stop: " + GetText(fault->message));
+}
+
+void RobotSimNode::OnCommand(const Received& received) {
+  const auto command = Decoded<command_t>(received.bytes);
+  if (!command || command->kind != command_t::RESET || !guard_.halted()) return;
+  guard_.Reset();
+  PublishEvent(received.utime, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
 }
 
 void RobotSimNode::Boundary(std::int64_t utime) {
@@ -130,7 +160,9 @@ void RobotSimNode::ReportGoal(std::int64_t utime) {
 
 void RobotSimNode::StartPending(std::int64_t utime) {
   const GuardVerdict verdict = guard_.TryStart(utime, state_);
-  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kTooEarly) return;
+  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kHalted ||
+      verdict.cause == GuardCause::kTooEarly)
+    return;
   if (!verdict.ok()) return PublishRefusal(utime, verdict);
   step_ = 0;
   ++started_;

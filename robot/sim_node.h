@@ -12,13 +12,14 @@ So without a newer certificate the robot runs the tail it has already certified,
 
 Standing is a hold mode of the simulated robot: the speed and acceleration that a finished tail leaves are set to
 zero at once (v and a of the bicycle, vx and vy of the point mass), every other coordinate keeps its value, and no
-control and no residual act until the next plan starts. An emergency stop (STEP_OUTSIDE) enters the same mode, whatever
-the speed was: nothing certified is left to execute.
+control and no residual act until the next plan starts. An emergency stop (STEP_OUTSIDE, or HALTED when the certifier says
+SLICE_LEFT or DECLARATION_FALSIFIED) enters the same mode, whatever the speed was: nothing certified is left to execute.
+After it the robot stands until a reset on bus.channels.command.
 
 The run ends after the goal is reached or the time limit has passed: no further plan starts, the current one runs to
 its end, and once the robot stands it publishes FINISHED for kFinishedBoundaries boundaries and is done.
 
-Messages on PLAN_CERTIFIED are all it obeys. Obstacles and start are those of the task file. */
+With a key (bus.key) the guard takes signed plans only. Messages on PLAN_CERTIFIED, FAULT and COMMAND are all it obeys. Obstacles and start are those of the task file. */
 #pragma once
 
 #include <iostream>
@@ -60,6 +61,8 @@ class RobotSimNode final : public Node {
 
  private:
   void OnCertified(const Received& received);
+  void OnFault(const Received& received);
+  void OnCommand(const Received& received);
   void Boundary(std::int64_t utime);
   void FinishStep(std::int64_t utime);
   void ReportContacts(std::int64_t utime);

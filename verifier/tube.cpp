@@ -289,7 +289,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   Step step;
   step.remainder = Remainder(query, options.split_remainder);
   if (step.remainder.empty()) return no_bound("the nominal model's second derivative");
-  for (int k = 0; k < n; ++k) step.envelope.push_back(Envelope(query, k));
+  for (int k = 0; k < n; ++k) step.envelope.push_back(Envelope(query, k, options.known));
 
   Slice next;
   next.center = equations_.Value(query.center);
@@ -488,14 +488,16 @@ struct TubeMaker::Row {
 };
 
 // Every observation gives a bound; doubles choose those that may give the tightest.
-Bounds TubeMaker::Envelope(const Query& query, int k) const {
+Bounds TubeMaker::Envelope(const Query& query, int k, const KnownRows& known) const {
   const Row row(problem_.declaration, query, k);
   const Eigen::MatrixXd& z = problem_.transitions.z;
-  const int count = static_cast<int>(residuals_.size());
+  std::vector<int> rows;
+  for (int i = 0; i < static_cast<int>(residuals_.size()); ++i)
+    if (known.Contains(i)) rows.push_back(i);
   std::vector<double> lower, upper, slack;
   double highest = -kNone, lowest = kNone;
   bool trusted = true;
-  for (int i = 0; i < count; ++i) {
+  for (const int i : rows) {
     const Bounds& residual = residuals_[Index(i)][Index(k)];
     const double distance = row.Roughly(z, i), below = residual.lower.ToDouble(), above = residual.upper.ToDouble();
     lower.push_back(below - distance);
@@ -506,10 +508,10 @@ Bounds TubeMaker::Envelope(const Query& query, int k) const {
     lowest = std::min(lowest, upper.back() + slack.back());
   }
   std::optional<Bounds> bounds;
-  for (std::size_t i = 0; i < Index(count); ++i) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
     if (trusted && lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest) continue;
-    const Real distance = row.Distance(z, static_cast<int>(i));
-    const Bounds& residual = residuals_[i][Index(k)];
+    const Real distance = row.Distance(z, rows[i]);
+    const Bounds& residual = residuals_[Index(rows[i])][Index(k)];
     const Bounds found{residual.lower - distance, residual.upper + distance};
     bounds = bounds ? Bounds{max(bounds->lower, found.lower), min(bounds->upper, found.upper)} : found;
   }

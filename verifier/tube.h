@@ -5,6 +5,7 @@ For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h)
 #pragma once
 
 #include <memory>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -61,10 +62,19 @@ struct Tube {
   double ambiguity = 0;
 };
 
+/** Which of the problem's transitions were known: the first `base`, and from then on [begin, end). */
+struct KnownRows {
+  int base = std::numeric_limits<int>::max();
+  int begin = 0, end = 0;
+
+  [[nodiscard]] bool Contains(int i) const { return i < base || (begin <= i && i < end); }
+};
+
 /** Ways to a tube that is sound all the same, and tighter. */
 struct TubeOptions {
   bool reduce = true;            ///< Reduce the order as the certifier does, or never.
   bool split_remainder = false;  ///< Bound the Hessian over half the box too: the integral remainder in two parts.
+  KnownRows known = {};
 };
 
 /** A problem prepared for any number of plans, with as many bits as Precision said when it was made. Immutable. */
@@ -83,7 +93,7 @@ class TubeMaker final {
 
   [[nodiscard]] std::optional<Failure> LeavesDomain(const Query& query) const;
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
-  [[nodiscard]] Bounds Envelope(const Query& query, int k) const;
+  [[nodiscard]] Bounds Envelope(const Query& query, int k, const KnownRows& known) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;

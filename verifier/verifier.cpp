@@ -69,7 +69,7 @@ const TubeMaker& Verifier::MakerOf(int bits) const {
 
 Tube Verifier::Derive(const Certificate& certificate) const {
   const Precision precision(kBits[0]);
-  return MakerOf(kBits[0]).Make(certificate.initial_set, certificate.controls, {});
+  return MakerOf(kBits[0]).Make(certificate.initial_set, certificate.controls, {.known = certificate.known});
 }
 
 Verdict Verifier::Verify(const Certificate& certificate) const {
@@ -97,12 +97,13 @@ std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate
     ambiguity = std::max(ambiguity, tube.ambiguity);
     return tube.failure ? tube.failure : FindFalseClaim(*problem_, certificate, tube);
   };
-  const std::optional<Failure> failure = attempt({});
+  const KnownRows& known = certificate.known;
+  const std::optional<Failure> failure = attempt({.known = known});
   if (!failure) return std::nullopt;
   // The centred remainder may shrink where its center moves; by a rounding error, that is no difference of rules.
   const double rounding = method_ == Method::kCentred ? kRounding : 0;
   if (!(failure->excess < std::max(kGrowth * ambiguity, rounding))) return failure;
-  for (const TubeOptions& options : {TubeOptions{false, false}, TubeOptions{false, true}})
+  for (const TubeOptions& options : {TubeOptions{false, false, known}, TubeOptions{false, true, known}})
     if (!attempt(options)) return std::nullopt;
   return failure;
 }

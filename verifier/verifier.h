@@ -39,6 +39,7 @@ struct Certificate {
   InitialSet initial_set;
   Eigen::MatrixXd controls;  ///< inputs-by-T
   std::vector<Obstacle> obstacles;
+  KnownRows known;                    ///< Of the problem's transitions.
   std::vector<RecordedSlice> slices;  ///< T + 1 of them, or none: then only safety is derived.
 };
 

@@ -36,15 +36,16 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
 }
 
 // The domain's box over z = (x, u) envelops every query.
-LipschitzEnvelope MakeEnvelope(const Problem& problem, const Observations& observations) {
-  const Box &state = problem.domain.state, &input = problem.domain.input;
-  Eigen::VectorXd lower(state.dim() + input.dim()), upper(lower.size());
-  lower << state.lower(), input.lower();
-  upper << state.upper(), input.upper();
-  const auto size = static_cast<std::size_t>(lower.size());
-  EnvelopeOptions options;
-  options.max_leaf_visits = problem.max_leaf_visits;
-  return LipschitzEnvelope(problem.declaration, observations, {lower.data(), size}, {upper.data(), size}, options);
+ObservationStore MakeStore(const Problem& problem) {
+  std::vector<double> lower, upper;
+  for (const Interval& range : problem.domain.Ranges()) {
+    lower.push_back(range.lower);
+    upper.push_back(range.upper);
+  }
+  StoreOptions options;
+  options.max_observations = static_cast<std::size_t>(problem.max_observations);
+  options.envelope.max_leaf_visits = problem.max_leaf_visits;
+  return ObservationStore(problem.declaration, Observe(*problem.model, problem.transitions), lower, upper, options);
 }
 
 Decision Falsified(int step, int coordinate) {
@@ -97,10 +98,29 @@ Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
     : problem_((Validated(problem), std::move(problem))),
       projection_(problem_->projection, problem_->model->num_states()),
-      observations_(Observe(*problem_->model, problem_->transitions)),
-      violation_(FindViolation(problem_->declaration, observations_)),
-      envelope_(MakeEnvelope(*problem_, observations_)),
-      propagator_(*problem_->model, problem_->domain, envelope_, problem_->zonotope_order, problem_->method) {}
+      store_(MakeStore(*problem_)),
+      known_(store_.snapshot()),
+      propagator_(*problem_->model, problem_->domain, known_, problem_->zonotope_order, problem_->method) {}
+
+Certifier::Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
+  const auto finite = [](double value) { return std::isfinite(value); };
+  if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kUnusable;
+  if (!problem_->domain.Contains(z)) return Learned::kOutsideDomain;
+  const auto row = [](std::span<const double> values) {
+    return Eigen::Map<const Eigen::RowVectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+  };
+  try {
+    const Observations observed = Observe(*problem_->model, {row(z), row(next)});
+    const auto entries = [](const Eigen::MatrixXd& one_row) {
+      return std::span<const double>(one_row.data(), static_cast<std::size_t>(one_row.size()));
+    };
+    if (store_.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0) return Learned::kOutsideDomain;
+  } catch (const std::invalid_argument&) {
+    return Learned::kUnusable;
+  }
+  known_ = store_.snapshot();
+  return Learned::kAdded;
+}
 
 void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
   const NominalModel& model = *problem_->model;
@@ -128,7 +148,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   tube.length_ = 0;
   tube.slices_[0].Assign(initial_set);
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
-  if (violation_) return Falsified(*violation_);
+  if (violation()) return Falsified(*violation());
   const Decision stopped = Propagate(plan, tube);
   Decision decision = stopped.outcome == Outcome::kNone ? JudgeSafety(obstacles, tube) : stopped;
   for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;

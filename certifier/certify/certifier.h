@@ -1,7 +1,8 @@
 /** Algorithm 1 of the paper: certifies a plan, or abstains and says why.
 
 What does not depend on the plan is computed once, in the constructor: residuals of the observations, the pairwise test,
-the envelope's tables. Certify then allocates nothing, locks nothing, logs nothing and throws nothing. */
+the envelope's tables. Certify then allocates nothing, locks nothing, logs nothing and throws nothing. What is observed
+later is added by Learn, between two calls of Certify. */
 #pragma once
 
 #include <optional>
@@ -10,7 +11,7 @@ the envelope's tables. Certify then allocates nothing, locks nothing, logs nothi
 #include "certifier/certify/decision.h"
 #include "certifier/certify/problem.h"
 #include "certifier/reach/propagator.h"
-#include "certifier/residual/lipschitz_envelope.h"
+#include "certifier/residual/observation_store.h"
 #include "certifier/safety/projection.h"
 #include "certifier/safety/separation.h"
 
@@ -24,10 +25,26 @@ class Certifier final {
 
   [[nodiscard]] const Problem& problem() const { return *problem_; }
   [[nodiscard]] const Projection& projection() const { return projection_; }
-  /** The pair of observations that contradicts the declaration, if there is one. */
-  [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
+  /** The pair of observations that contradicts the declaration, if there is one. Learned ones are numbered on from the
+  problem's. */
+  [[nodiscard]] const std::optional<Violation>& violation() const { return known_.violation(); }
+  [[nodiscard]] std::size_t num_observations() const { return known_.size(); }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
-  [[nodiscard]] bool uses_hull_distance() const { return envelope_.uses_hull_distance(); }
+  [[nodiscard]] bool uses_hull_distance() const { return known_.uses_hull_distance(); }
+
+  enum class Learned {
+    kAdded,          ///< From now on every certificate rests on it; violation() says whether it falsifies the declaration.
+    kOutsideDomain,  ///< Not proven to lie in the domain: it says nothing about the residual there.
+    kUnusable,       ///< Not finite, or the nominal map has no finite enclosure there.
+  };
+  /** Adds one executed transition (z, x+), d_z and n entries. Its errors must be within the declared noise bound.
+  Not to be called while Certify runs. Cost: about a microsecond, and a new index whenever Compact has not been called
+  for 256 of them. */
+  Learned Learn(std::span<const double> z, std::span<const double> next);
+  /** Learned transitions that are not in the index yet. */
+  [[nodiscard]] int num_unindexed() const { return store_.tail_size(); }
+  /** Puts them into it. May run in a thread of its own beside anything; the next Learn takes it up. */
+  void Compact() { store_.Compact(); }
 
   /** What is proven of the distance between slice t of a tube and an obstacle: by interval hulls or by the best
   direction, whichever proves more. */
@@ -57,9 +74,8 @@ class Certifier final {
 
   std::shared_ptr<const Problem> problem_;
   Projection projection_;
-  Observations observations_;
-  std::optional<Violation> violation_;
-  LipschitzEnvelope envelope_;
+  ObservationStore store_;
+  ObservationStore::Snapshot known_;  // propagator_ refers to it
   Propagator propagator_;
 };
 

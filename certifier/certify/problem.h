@@ -24,6 +24,7 @@ struct Problem {
   Eigen::MatrixXd projection;                 ///< P, p-by-n
   Method method = Method::kCentred;           ///< How the nominal remainder is bounded
   int max_leaf_visits = 512;                  ///< EnvelopeOptions: bounds the work of one search
+  int max_observations = 10'000'000;          ///< Beyond it those that never attain the envelope are forgotten
   int zonotope_order = 5;                     ///< rho: at most rho * n generators after reduction
 };
 

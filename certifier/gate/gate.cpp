@@ -7,6 +7,7 @@
 #include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/transition_message.h"
 #include "certifier/numerics/text.h"
 #include "lcmtypes/seal.h"
 
@@ -38,15 +39,32 @@ Gate::Gate(const Config& config)
       declaration_digest_(config.declaration_digest),
       observations_digest_(config.observations_digest),
       obstacles_digest_(config.obstacles_digest),
-      obstacles_(config.obstacles) {}
+      obstacles_(config.obstacles),
+      sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)) {}
 
-GateAnswer Gate::Decide(Bytes candidate, std::int64_t now_us) noexcept { return Answer(candidate, now_us, false); }
+void Gate::Inherit(const Gate& before) {
+  last_obstacles_sequence_ = before.last_obstacles_sequence_;
+  sources_ = before.sources_;
+  decisions_ = before.decisions_;
+  certificates_ = before.certificates_;
+  counts_ = before.counts_;
+  counts_.learned = 0;
+}
 
-GateAnswer Gate::Displace(Bytes candidate, std::int64_t now_us) noexcept { return Answer(candidate, now_us, true); }
+GateAnswer Gate::Decide(Bytes candidate, const Clock& clock) noexcept { return Answer(candidate, clock, std::nullopt); }
 
-GateAnswer Gate::Answer(Bytes bytes, std::int64_t now_us, bool displaced) {
+GateAnswer Gate::Decide(Bytes candidate, std::int64_t now_us) noexcept {
+  return Answer(candidate, [now_us] { return now_us; }, std::nullopt);
+}
+
+GateAnswer Gate::Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why) noexcept {
+  return Answer(candidate, [now_us] { return now_us; }, Rejection{cause, why});
+}
+
+GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection> from_outside) noexcept {
   GateAnswer answer;
   decision_t& decision = answer.decision;
+  const std::int64_t now_us = clock();
   decision.utime = now_us;
   decision.sequence = decisions_++;
   decision.outcome = decision_t::REJECTED;
@@ -58,15 +76,18 @@ GateAnswer Gate::Answer(Bytes bytes, std::int64_t now_us, bool displaced) {
   try {
     candidate_plan_t candidate{};
     std::optional<Rejection> rejection = Admit(bytes, candidate, now_us);
-    if (displaced) rejection = {decision_t::CAUSE_QUEUE_FULL, "newer candidates displaced it from the queue"};
+    if (!rejection) rejection = std::move(from_outside);
+    if (!rejection) rejection = CheckDeadline(candidate, now_us);
     decision.candidate_utime = candidate.utime;
     decision.plan_id = candidate.plan_id;
     std::ranges::copy(candidate.source, decision.source);
     if (rejection) {
+      decision.outcome = rejection->outcome;
       decision.cause = rejection->cause;
-      SetText(decision.message, "rejected: " + rejection->why);
+      SetText(decision.message, (rejection->outcome == decision_t::REJECTED ? "rejected: " : "abstained: ") + rejection->why);
     } else {
       Certify(candidate, answer);
+      WithdrawIfLate(answer, clock());
     }
   } catch (const std::exception& error) {
     decision.outcome = decision_t::REJECTED;
@@ -74,7 +95,8 @@ GateAnswer Gate::Answer(Bytes bytes, std::int64_t now_us, bool displaced) {
     SetText(decision.message, std::string("rejected: internal error: ") + error.what());
     answer.certified.reset();
   }
-  Count(decision.outcome);
+  if (answer.certified) ++certificates_;
+  Count(decision);
   return answer;
 }
 
@@ -92,9 +114,10 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
     case DecodeStatus::kOk:
       break;
   }
+  sources_.Hear(candidate);
   if (auto rejection = CheckContent(candidate)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
-  return CheckSource(candidate);
+  return CheckSource(candidate, now_us);
 }
 
 std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candidate) const {
@@ -116,18 +139,29 @@ std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candid
   return std::nullopt;
 }
 
-std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const {
-  const std::int64_t lifetime = Microseconds(options_.certificate_lifetime_ms);
-  switch (FreshnessOf(candidate.utime, now_us, Microseconds(options_.max_age_ms), Microseconds(options_.max_ahead_ms))) {
+Gate::Stamp Gate::Judge(std::int64_t utime, std::int64_t now_us) const {
+  const Freshness freshness =
+      FreshnessOf(utime, now_us, Microseconds(options_.max_age_ms), Microseconds(options_.max_ahead_ms));
+  switch (freshness) {
     case Freshness::kStale:
-      return Rejection{decision_t::CAUSE_STALE, "stamped " + Milliseconds(now_us, candidate.utime) + " ago, at most " +
-                                                    ToText(options_.max_age_ms) + " ms allowed"};
+      return {freshness, "stamped " + Milliseconds(now_us, utime) + " ago, at most " + ToText(options_.max_age_ms) +
+                             " ms allowed"};
     case Freshness::kFuture:
-      return Rejection{decision_t::CAUSE_FUTURE, "stamped " + Milliseconds(candidate.utime, now_us) + " ahead, at most " +
-                                                     ToText(options_.max_ahead_ms) + " ms allowed"};
+      return {freshness, "stamped " + Milliseconds(utime, now_us) + " ahead, at most " + ToText(options_.max_ahead_ms) +
+                             " ms allowed"};
     case Freshness::kFresh:
       break;
   }
+  return {freshness, ""};
+}
+
+std::string Gate::CheckFresh(std::int64_t utime, std::int64_t now_us) const { return Judge(utime, now_us).fault; }
+
+std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const {
+  const std::int64_t lifetime = Microseconds(options_.certificate_lifetime_ms);
+  const Stamp stamp = Judge(candidate.utime, now_us);
+  if (stamp.freshness != Freshness::kFresh)
+    return Rejection{stamp.freshness == Freshness::kStale ? decision_t::CAUSE_STALE : decision_t::CAUSE_FUTURE, stamp.fault};
   switch (FreshnessOf(candidate.start_utime, now_us, 0, lifetime)) {
     case Freshness::kStale:
       return Rejection{decision_t::CAUSE_TOO_LATE, "its start was " + Milliseconds(now_us, candidate.start_utime) + " ago"};
@@ -141,22 +175,27 @@ std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidat
   return std::nullopt;
 }
 
-std::optional<Gate::Rejection> Gate::CheckSource(const candidate_plan_t& candidate) {
-  const std::string source(reinterpret_cast<const char*>(candidate.source), sizeof candidate.source);
-  const auto known = last_plan_id_.find(source);
-  if (known == last_plan_id_.end()) {
-    if (last_plan_id_.size() >= kMaxSources)
-      return Rejection{decision_t::CAUSE_TOO_MANY_SOURCES,
-                       "more than " + std::to_string(kMaxSources) + " sources have sent candidates"};
-    last_plan_id_.emplace(source, candidate.plan_id);
-    return std::nullopt;
+std::optional<Gate::Rejection> Gate::CheckSource(const candidate_plan_t& candidate, std::int64_t now_us) {
+  switch (sources_.Admit(candidate, now_us)) {
+    case Sources::Admission::kNew:
+      return std::nullopt;
+    case Sources::Admission::kUsed:
+      return Rejection{decision_t::CAUSE_DUPLICATE,
+                       "plan_id " + std::to_string(candidate.plan_id) + " was used by this source, or is too far below its highest, " +
+                           std::to_string(sources_.HighestPlanId(candidate))};
+    case Sources::Admission::kTooManySources:
+      break;
   }
-  if (candidate.plan_id <= known->second)
-    return Rejection{decision_t::CAUSE_DUPLICATE, "plan_id " + std::to_string(candidate.plan_id) +
-                                                      " does not exceed this source's last, " +
-                                                      std::to_string(known->second)};
-  known->second = candidate.plan_id;
-  return std::nullopt;
+  return Rejection{decision_t::CAUSE_TOO_MANY_SOURCES,
+                   "more than " + std::to_string(Sources::kMaxSources) + " sources send candidates"};
+}
+
+std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const {
+  if (candidate.start_utime - now_us >= Microseconds(options_.decision_budget_ms)) return std::nullopt;
+  return Rejection{decision_t::CAUSE_DEADLINE,
+                   "it starts in " + ToText(static_cast<double>(candidate.start_utime - now_us) / 1e3) +
+                       " ms, a decision may take " + ToText(options_.decision_budget_ms) + " ms",
+                   decision_t::ABSTAIN_DEADLINE};
 }
 
 void Gate::Certify(const candidate_plan_t& candidate, GateAnswer& answer) {
@@ -176,12 +215,27 @@ void Gate::Certify(const candidate_plan_t& candidate, GateAnswer& answer) {
   decision.margin = verdict.margin;
   decision.threshold = verdict.threshold;
   SetText(decision.message, Explain(verdict, certifier_.problem()));
-  if (verdict.outcome == Outcome::kCertified) Attest(candidate, decision, answer.certified.emplace());
+  if (verdict.outcome != Outcome::kCertified) return;
+  if (!options_.shadow) return Attest(candidate, decision, answer.certified.emplace());
+  decision.outcome = decision_t::REJECTED;
+  decision.cause = decision_t::CAUSE_SHADOW;
+  SetText(decision.message, "rejected: shadow mode; else: " + Explain(verdict, certifier_.problem()));
+}
+
+// Should the budget not have been enough: its execution might begin before the robot has it.
+void Gate::WithdrawIfLate(GateAnswer& answer, std::int64_t now_us) const {
+  const std::int64_t taken = now_us - answer.decision.utime;
+  if (!answer.certified || taken <= Microseconds(options_.decision_budget_ms)) return;
+  answer.certified.reset();
+  answer.decision.outcome = decision_t::ABSTAIN_DEADLINE;
+  answer.decision.cause = decision_t::CAUSE_OVERRUN;
+  SetText(answer.decision.message, "abstained: the decision took " + ToText(static_cast<double>(taken) / 1e3) +
+                                       " ms, it may take " + ToText(options_.decision_budget_ms) + " ms");
 }
 
 void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified) {
   certified.utime = decision.utime;
-  certified.sequence = certificates_++;
+  certified.sequence = certificates_;
   certified.expires_utime = decision.utime + Microseconds(options_.certificate_lifetime_ms);
   certified.plan = candidate;
   for (int t = 0; t <= candidate.num_steps; ++t) {
@@ -199,9 +253,7 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
 std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) {
   const auto message = Decoded<obstacles_t>(bytes);
   if (!message) return "not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) + " bytes";
-  if (FreshnessOf(message->utime, now_us, Microseconds(options_.max_age_ms), Microseconds(options_.max_ahead_ms)) !=
-      Freshness::kFresh)
-    return "stamped " + Milliseconds(now_us, message->utime) + " ago";
+  if (std::string error = CheckFresh(message->utime, now_us); !error.empty()) return error;
   if (message->sequence <= last_obstacles_sequence_)
     return "sequence " + std::to_string(message->sequence) + " does not exceed the last, " +
            std::to_string(last_obstacles_sequence_);
@@ -216,22 +268,44 @@ std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) {
   return {};
 }
 
-certifier_status_t Gate::Status(std::int64_t now_us) const {
-  certifier_status_t status = counts_;
+std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
+  const int n = certifier_.problem().model->num_states();
+  if (state.num_states != n)
+    return std::to_string(state.num_states) + " states, the task has " + std::to_string(n);
+  if (!AllFinite(std::span(state.state, static_cast<std::size_t>(n)))) return "NaN or infinity in it";
+  if (state.mode < robot_state_t::STANDING || state.mode > robot_state_t::FINISHED)
+    return "unknown mode " + std::to_string(state.mode);
+  return CheckFresh(state.utime, now_us);
+}
+
+std::string Gate::Learn(Bytes bytes) {
+  if (!options_.learns) return "the task has gate.learn: none";
+  const auto message = Decoded<transition_t>(bytes);
+  if (!message) return "not a transition_t of " + std::to_string(EncodedSize<transition_t>()) + " bytes";
+  const ExecutedTransition transition = FromMessage(*message, certifier_.problem());
+  if (!transition.refusal.empty()) return transition.refusal;
+  if (certifier_.Learn(transition.z, transition.next) != Certifier::Learned::kAdded)
+    return "the nominal model has no finite value there";
+  observations_digest_ = ChainedDigest(observations_digest_, bytes);
+  ++counts_.learned;
+  return {};
+}
+
+certifier_status_v2_t Gate::Status(std::int64_t now_us) const {
+  certifier_status_v2_t status = counts_;
   status.utime = now_us;
+  status.shadow = options_.shadow;
+  status.candidates_lost = sources_.lost();
+  status.observations = static_cast<std::int64_t>(certifier_.num_observations());
   SetDigests(status);
   return status;
 }
 
-void Gate::Count(std::int16_t outcome) {
+void Gate::Count(const decision_t& decision) {
   ++counts_.candidates;
-  switch (outcome) {
-    case decision_t::CERTIFIED: ++counts_.certified; return;
-    case decision_t::ABSTAIN_FALSIFIED: ++counts_.abstained_falsified; return;
-    case decision_t::ABSTAIN_DOMAIN: ++counts_.abstained_domain; return;
-    case decision_t::ABSTAIN_SAFETY: ++counts_.abstained_safety; return;
-    default: ++counts_.rejected;
-  }
+  ++counts_.by_outcome[decision.outcome];
+  ++counts_.by_cause[decision.cause];
+  counts_.consecutive_failures = decision.outcome == decision_t::CERTIFIED ? 0 : counts_.consecutive_failures + 1;
 }
 
 template <class Message>

@@ -1,23 +1,25 @@
 /** The gate: a candidate's bytes and a clock in, exactly one decision out. No bus, no wall clock, no thread in it.
 
 Whatever is not a proof is an abstention or a rejection: bytes that are no candidate, one that is stale, stamped ahead of
-the clock, too late for its own start, a repetition, of wrong size or not finite, and any error inside. */
+the clock, too late for its own start or to be decided on before it, a repetition, of wrong size or not finite, and any
+error inside. Whether the world is fit for certificates at all is for others to say (watch.h): they call Refuse. */
 #pragma once
 
 #include <cstdint>
-#include <map>
-#include <memory>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/freshness.h"
+#include "certifier/gate/sources.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
+#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/robot_state_t.hpp"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -30,7 +32,8 @@ struct GateAnswer {
 
 class Gate final {
  public:
-  static constexpr std::size_t kMaxSources = 16;
+  /** Microseconds since the Unix epoch. */
+  using Clock = std::function<std::int64_t()>;
 
   /** @throws std::invalid_argument as Certifier does. */
   explicit Gate(const Config& config);
@@ -41,34 +44,65 @@ class Gate final {
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
   /** Decides on one candidate. Never throws: an exception becomes a rejection. Both messages are complete but for
-  elapsed_us, which the caller measures. @param now_us microseconds since the Unix epoch. */
+  elapsed_us, which the caller measures. The clock is read twice: before, which is the decision's utime, and after: a
+  certificate that took longer than its budget is withdrawn. */
+  [[nodiscard]] GateAnswer Decide(Bytes candidate, const Clock& clock) noexcept;
+  /** The same at a moment, microseconds since the Unix epoch, as if it took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** Rejects a candidate unread, because newer ones displaced it from the queue. */
-  [[nodiscard]] GateAnswer Displace(Bytes candidate, std::int64_t now_us) noexcept;
+  /** Rejects a candidate without certifying it, for a cause that lies outside it. What is wrong with itself goes before. */
+  [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why) noexcept;
 
   /** Replaces the obstacles by those of an obstacles_t. Whole or not at all: returns what is wrong with the message, and
   the obstacles in force stay, or an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
-  /** Counts so far and the digests in force; the percentiles are the caller's. */
-  [[nodiscard]] certifier_status_t Status(std::int64_t now_us) const;
+  /** Adds an executed transition to the observations, if the task has it learn, and chains observations_digest:
+  BLAKE2b-256 of the digest before and the message's bytes. Returns what is wrong with it, and nothing has changed, or an
+  empty text. Whether it falsifies the declaration, certifier().violation() says. */
+  [[nodiscard]] std::string Learn(Bytes transition);
+  [[nodiscard]] bool learns() const { return options_.learns; }
+
+  /** What keeps a robot's state from being believed: sizes, numbers, a stamp that is stale or ahead; empty if nothing. */
+  [[nodiscard]] std::string CheckRobotState(const robot_state_t& state, std::int64_t now_us) const;
+  /** What is wrong with a stamp at this time, or empty. */
+  [[nodiscard]] std::string CheckFresh(std::int64_t utime, std::int64_t now_us) const;
+
+  /** As Certifier's. */
+  void Compact() { certifier_.Compact(); }
+
+  /** Goes on where another gate stops: its counts, sequences and sources. What is decided from now on is this one's. */
+  void Inherit(const Gate& before);
+
+  /** Counts so far and the digests in force; the rest is the caller's. */
+  [[nodiscard]] certifier_status_v2_t Status(std::int64_t now_us) const;
+  [[nodiscard]] Digest observations_digest() const { return observations_digest_; }
+  [[nodiscard]] Digest obstacles_digest() const { return obstacles_digest_; }
 
  private:
   struct Rejection {
     std::int16_t cause;
     std::string why;
+    std::int16_t outcome = decision_t::REJECTED;
   };
 
-  [[nodiscard]] GateAnswer Answer(Bytes candidate, std::int64_t now_us, bool displaced);
+  struct Stamp {
+    Freshness freshness;
+    std::string fault;  ///< Empty if fresh.
+  };
+
+  [[nodiscard]] Stamp Judge(std::int64_t utime, std::int64_t now_us) const;
+  [[nodiscard]] GateAnswer Answer(Bytes candidate, const Clock& clock, std::optional<Rejection> from_outside) noexcept;
   [[nodiscard]] std::optional<Rejection> Admit(Bytes bytes, candidate_plan_t& candidate, std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate) const;
   [[nodiscard]] std::optional<Rejection> CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const;
-  [[nodiscard]] std::optional<Rejection> CheckSource(const candidate_plan_t& candidate);
+  [[nodiscard]] std::optional<Rejection> CheckSource(const candidate_plan_t& candidate, std::int64_t now_us);
+  [[nodiscard]] std::optional<Rejection> CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const;
   void Certify(const candidate_plan_t& candidate, GateAnswer& answer);
+  void WithdrawIfLate(GateAnswer& answer, std::int64_t now_us) const;
   /** Fills and seals a message of zeros. */
   void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
-  void Count(std::int16_t outcome);
+  void Count(const decision_t& decision);
 
   template <class Message>
   void SetDigests(Message& message) const;
@@ -78,9 +112,9 @@ class Gate final {
   Digest config_digest_, model_digest_, declaration_digest_, observations_digest_, obstacles_digest_;
   std::vector<Obstacle> obstacles_;
   std::int64_t last_obstacles_sequence_ = -1;
-  std::map<std::string, std::int64_t> last_plan_id_;  // of each source
+  Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;
-  certifier_status_t counts_{};
+  certifier_status_v2_t counts_{};
   Tube tube_;
 };
 

@@ -1,4 +1,5 @@
 #include "certifier/process/certifier_node.h"
+#include "certifier/process/realtime.h"
 #include "certifier/task/process.h"
 
 int main(int argc, char** argv) {
@@ -6,7 +7,11 @@ int main(int argc, char** argv) {
   return RunProcess(argc, argv,
                     {"forereach-certifier",
                      "Certifies candidate plans on the bus, or abstains and says why. Each candidate gets exactly one "
-                     "decision; only certified plans are passed on.",
+                     "decision; only certified plans are passed on. SIGHUP reads the task file again.",
                      "forereach-certifier --config config/demo.yaml"},
-                    [](const Config& config, Bus& bus) { return std::make_unique<CertifierNode>(config, bus); });
+                    [](const Config& config, Bus& bus) {
+                      auto node = std::make_unique<CertifierNode>(config, bus);
+                      BecomeRealtime(config.realtime);
+                      return node;
+                    });
 }

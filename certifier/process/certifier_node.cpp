@@ -2,65 +2,291 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <iostream>
+#include <utility>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include "lcmtypes/names.h"
 
 namespace forereach {
+namespace {
 
-CertifierNode::CertifierNode(const Config& config, Bus& bus)
-    : channels_(config.bus), queue_size_(static_cast<std::size_t>(config.gate.queue)), sender_(bus), gate_(config) {
-  if (const auto& violation = gate_.certifier().violation())
+constexpr int kUnindexedAtMost = 128;
+// An index of so many is built in about a millisecond; of more it is built in a thread of its own.
+constexpr std::size_t kIndexedAtOnce = 4096;
+
+WatchOptions OptionsOf(const GateOptions& gate) {
+  return {gate.needs_robot_state, std::llround(gate.robot_timeout_ms * 1e3), std::llround(gate.max_clock_jump_ms * 1e3)};
+}
+
+std::int64_t PageFaults() {
+  rusage usage{};
+  ::getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_minflt + usage.ru_majflt;
+}
+
+fault_t EmptyFault(std::int16_t cause) {
+  fault_t fault{};
+  fault.cause = cause;
+  fault.plan_id = fault.first_observation = fault.second_observation = -1;
+  fault.step = fault.coordinate = -1;
+  return fault;
+}
+
+}  // namespace
+
+CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
+    : config_path_(config.path),
+      channels_(config.bus),
+      queue_size_(static_cast<std::size_t>(config.gate.queue)),
+      clocks_(std::move(clocks)),
+      bus_(bus),
+      sender_(bus),
+      gate_(std::make_unique<Gate>(config)),
+      watch_(OptionsOf(config.gate)) {
+  if (const auto& violation = gate_->certifier().violation())
     spdlog::warn("observations {} and {} contradict the declaration: every candidate will be abstained from (F)",
                  violation->first, violation->second);
-  if (gate_.certifier().uses_hull_distance())
+  if (gate_->certifier().uses_hull_distance())
     spdlog::warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
                  LipschitzEnvelope::kMaxExactColumns);
   bus.Subscribe(channels_.candidate, [this](const Received& received) {
-    queue_.push_back({true, {received.bytes.begin(), received.bytes.end()}});
-    ++waiting_candidates_;
+    queue_.emplace_back(received.bytes.begin(), received.bytes.end());
+    high_water_ = std::max(high_water_, queue_.size());
   });
-  bus.Subscribe(channels_.obstacles, [this](const Received& received) {
-    queue_.push_back({false, {received.bytes.begin(), received.bytes.end()}});
-  });
+  bus.Subscribe(channels_.obstacles, [this](const Received& received) { OnObstacles(received); });
+  bus.Subscribe(channels_.robot_state, [this](const Received& received) { OnRobotState(received); });
+  bus.Subscribe(channels_.transition, [this](const Received& received) { OnTransition(received); });
+  bus.Subscribe(channels_.command, [this](const Received& received) { OnCommand(received); });
 }
 
-void CertifierNode::Tick(std::int64_t now_us) {
-  while (!queue_.empty()) {
-    const Pending pending = std::move(queue_.front());
-    queue_.pop_front();
-    Work(pending, now_us, waiting_candidates_ > queue_size_);
-    if (pending.is_candidate) --waiting_candidates_;
+CertifierNode::~CertifierNode() {
+  if (compaction_.valid()) compaction_.wait();  // it works on *gate_
+}
+
+// ---- What changes the grounds of decisions.
+
+void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
+  ++refused_;
+  spdlog::warn("{}: refused: {}", channel, why);
+}
+
+void CertifierNode::OnObstacles(const Received& received) {
+  const std::string error = gate_->UpdateObstacles(received.bytes, received.utime);
+  if (!error.empty()) Refuse(channels_.obstacles, error + "; the obstacles in force stay");
+}
+
+void CertifierNode::OnRobotState(const Received& received) {
+  robot_state_t state;
+  if (Decode(received.bytes, state) != DecodeStatus::kOk) return Refuse(channels_.robot_state, "not a robot_state_t");
+  const std::string error = gate_->CheckRobotState(state, received.utime);
+  if (!error.empty()) return Refuse(channels_.robot_state, error);
+  last_state_ = state;
+  if (state.mode == robot_state_t::FINISHED) return watch_.RobotHasFinished();
+  watch_.SeeRobot(received.utime);
+  const auto departure = conformance_.Check(state);
+  if (!departure) return;
+  fault_t fault = EmptyFault(fault_t::SLICE_LEFT);
+  fault.plan_id = departure->plan_id;
+  fault.step = static_cast<std::int16_t>(departure->step);
+  fault.coordinate = static_cast<std::int16_t>(departure->coordinate);
+  fault.value = departure->value;
+  fault.lower = departure->lower;
+  fault.upper = departure->upper;
+  Fail(fault, fmt::format("plan {}: state coordinate {} is {} at step {}, its certified slice is [{}, {}]",
+                          departure->plan_id, departure->coordinate, departure->value, departure->step,
+                          departure->lower, departure->upper));
+}
+
+void CertifierNode::OnTransition(const Received& received) {
+  if (const auto transition = Decoded<transition_t>(received.bytes)) last_transition_ = *transition;
+  if (!gate_->learns()) return;
+  const bool was_falsified = gate_->certifier().violation().has_value();
+  const std::string error = gate_->Learn(received.bytes);
+  if (!error.empty()) return Refuse(channels_.transition, error);
+  const auto& violation = gate_->certifier().violation();
+  if (was_falsified || !violation) return;
+  fault_t fault = EmptyFault(fault_t::DECLARATION_FALSIFIED);
+  fault.coordinate = static_cast<std::int16_t>(violation->coordinate);
+  fault.first_observation = violation->first;
+  fault.second_observation = violation->second;
+  fault.value = violation->difference;
+  fault.upper = violation->bound;
+  Fail(fault, fmt::format("the executed transition {} contradicts the declaration: with observation {} its residual {} "
+                          "differs by {}, the declaration allows {}",
+                          violation->second, violation->first, violation->coordinate, violation->difference,
+                          violation->bound));
+}
+
+void CertifierNode::OnCommand(const Received& received) {
+  const auto command = Decoded<command_t>(received.bytes);
+  if (!command) return Refuse(channels_.command, "not a command_t");
+  const std::string error = gate_->CheckFresh(command->utime, received.utime);
+  if (!error.empty()) return Refuse(channels_.command, error);
+  Obey(*command);
+}
+
+void CertifierNode::Obey(const command_t& command) {
+  switch (command.kind) {
+    case command_t::RESET:
+      if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));
+      next_heartbeat_us_ = 0;
+      return;
+    case command_t::RELOAD:
+      return Reload();
+    default:
+      return Refuse(channels_.command, "unknown kind " + std::to_string(command.kind));
   }
+}
+
+// ---- Faults.
+
+void CertifierNode::Fail(fault_t fault, const std::string& why) {
+  const Watch::Fault latched{fault.cause, clocks_.wall(), why};
+  if (watch_.Latch(latched)) Announce(fault, latched);
+}
+
+void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
+  fault.utime = latched.utime;
+  fault.sequence = faults_++;
+  fault.state = last_state_;
+  fault.transition = last_transition_;
+  SetText(fault.message, latched.why);
+  sender_.Send(channels_.fault, fault);
+  spdlog::error("fault {}: {}; nothing is certified until `forereach reset`", FaultName(latched.cause), latched.why);
+  next_heartbeat_us_ = 0;
+}
+
+// ---- Candidates.
+
+void CertifierNode::Tick(std::int64_t now_us) {
+  if (const auto fault = watch_.Advance(now_us, clocks_.steady())) Announce(EmptyFault(fault->cause), *fault);
+  TakeReload();
+  AnswerWaiting();
+  CompactIfDue();
   if (now_us >= next_heartbeat_us_) Heartbeat(now_us);
 }
 
-void CertifierNode::Work(const Pending& pending, std::int64_t now_us, bool displaced) {
-  if (!pending.is_candidate) {
-    const std::string error = gate_.UpdateObstacles(pending.bytes, now_us);
-    if (!error.empty()) {
-      ++refused_obstacles_;
-      spdlog::warn("{}: refused, the obstacles in force stay: {}", channels_.obstacles, error);
-    }
-    return;
+void CertifierNode::AnswerWaiting() {
+  for (int i = 0; i < kAtOnce && !queue_.empty(); ++i) {
+    const std::vector<std::uint8_t> newest = std::move(queue_.back());
+    queue_.pop_back();
+    Answer(newest, false);
   }
+  for (; queue_.size() > queue_size_; queue_.pop_front()) Answer(queue_.front(), true);
+}
+
+GateAnswer CertifierNode::Decide(Bytes candidate) {
+  switch (watch_.state()) {
+    case Watch::State::kDisarmed:
+      return gate_->Refuse(candidate, clocks_.wall(), decision_t::CAUSE_NOT_ARMED, "the robot's state is not known yet");
+    case Watch::State::kFault:
+      return gate_->Refuse(candidate, clocks_.wall(), decision_t::CAUSE_FAULT, "fault: " + watch_.fault()->why);
+    case Watch::State::kArmed:
+      break;
+  }
+  const std::int64_t before = PageFaults();
+  GateAnswer answer = gate_->Decide(candidate, clocks_.wall);
+  if (decided_ > 0) page_faults_ += PageFaults() - before;
+  return answer;
+}
+
+void CertifierNode::Answer(Bytes candidate, bool displaced) {
   const auto begin = std::chrono::steady_clock::now();
-  GateAnswer answer = displaced ? gate_.Displace(pending.bytes, now_us) : gate_.Decide(pending.bytes, now_us);
+  GateAnswer answer = displaced ? gate_->Refuse(candidate, clocks_.wall(), decision_t::CAUSE_QUEUE_FULL,
+                                                "newer candidates displaced it from the queue")
+                                : Decide(candidate);
   const std::chrono::duration<double, std::micro> elapsed = std::chrono::steady_clock::now() - begin;
   answer.decision.elapsed_us = elapsed.count();
 
   if (answer.certified) sender_.Send(channels_.certified, *answer.certified);
   sender_.Send(channels_.decision, answer.decision);
+  if (answer.certified) conformance_.Remember(*answer.certified);
   elapsed_us_[decided_++ % elapsed_us_.size()] = elapsed.count();
+}
+
+// ---- Work beside.
+
+void CertifierNode::CompactIfDue() {
+  if (gate_->certifier().num_unindexed() < kUnindexedAtMost) return;
+  if (gate_->certifier().num_observations() <= kIndexedAtOnce) return gate_->Compact();
+  if (compaction_.valid() && compaction_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  compaction_ = std::async(std::launch::async, [gate = gate_.get()] { gate->Compact(); });
+}
+
+void CertifierNode::Reload() {
+  if (reload_.valid()) return spdlog::warn("a reload is under way already");
+  spdlog::info("reloading {}", config_path_);
+  reload_ = std::async(std::launch::async, [path = config_path_, channels = channels_]() -> Loaded {
+    try {
+      const Config config = LoadConfig(path);
+      BusOptions bus = config.bus;
+      bus.url = channels.url, bus.key = channels.key;  // a command line may have given others
+      if (bus != channels) return {nullptr, path + ": bus.channels cannot change while the certifier runs"};
+      return {std::make_unique<Gate>(config), ""};
+    } catch (const std::exception& error) {
+      return {nullptr, error.what()};
+    }
+  });
+}
+
+void CertifierNode::TakeReload() {
+  if (!reload_.valid() || reload_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  Loaded loaded = reload_.get();
+  reload_error_ = loaded.error;
+  next_heartbeat_us_ = 0;
+  if (!loaded.gate) {
+    ++failed_reloads_;
+    return spdlog::error("not reloaded, version {} stays in force: {}", version_, loaded.error);
+  }
+  if (compaction_.valid()) compaction_.wait();
+  loaded.gate->Inherit(*gate_);
+  gate_ = std::move(loaded.gate);
+  spdlog::info("version {} of {} is in force", ++version_, config_path_);
+}
+
+// ---- The heartbeat.
+
+std::string CertifierNode::WhyNotOk() const {
+  if (watch_.fault()) return std::string(FaultName(watch_.fault()->cause)) + ": " + watch_.fault()->why;
+  if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F";
+  if (watch_.state() == Watch::State::kDisarmed) return "waits for the robot's state";
+  return reload_error_.empty() ? "" : "the last reload failed: " + reload_error_;
 }
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
   next_heartbeat_us_ = now_us + kHeartbeatUs;
-  certifier_status_t status = gate_.Status(now_us);
+  certifier_status_v2_t status = gate_->Status(now_us);
+  const bool error = watch_.fault() || gate_->certifier().violation();
   status.sequence = heartbeats_++;
+  status.state = static_cast<std::int16_t>(watch_.state());
+  status.level = error ? certifier_status_v2_t::ERROR
+                 : watch_.state() == Watch::State::kArmed ? certifier_status_v2_t::OK : certifier_status_v2_t::STALE;
+  if (watch_.fault()) {
+    status.fault = watch_.fault()->cause;
+    status.fault_utime = watch_.fault()->utime;
+  }
+  status.version = version_;
+  status.failed_reloads = failed_reloads_;
+  status.messages_refused = refused_;
+  status.messages_not_sent = sender_.refused();
+  status.bus_dropped = bus_.dropped();
+  const Refusals refusals = bus_.refusals();
+  status.refused_unsigned = refusals.unsigned_ones;
+  status.refused_forged = refusals.forged;
+  status.refused_replayed = refusals.replayed;
+  status.page_faults = page_faults_;
+  status.queue_depth = static_cast<std::int32_t>(queue_.size());
+  status.queue_high_water = static_cast<std::int32_t>(std::exchange(high_water_, queue_.size()));
   status.elapsed_p50_us = ElapsedPercentile(0.5);
   status.elapsed_p99_us = ElapsedPercentile(0.99);
+  status.elapsed_max_us = ElapsedPercentile(1);
+  SetText(status.message, WhyNotOk());
   sender_.Send(channels_.status, status);
 }
 
@@ -74,14 +300,19 @@ double CertifierNode::ElapsedPercentile(double fraction) const {
 }
 
 void CertifierNode::Stop() {
-  const certifier_status_t status = gate_.Status(0);
+  const certifier_status_v2_t status = gate_->Status(0);
+  const auto abstained = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
   std::cout << nlohmann::json{{"candidates", status.candidates},
-                              {"certified", status.certified},
-                              {"abstained", {{"falsified", status.abstained_falsified},
-                                             {"domain", status.abstained_domain},
-                                             {"safety", status.abstained_safety}}},
-                              {"rejected", status.rejected},
-                              {"refused_obstacles", refused_obstacles_},
+                              {"certified", abstained(decision_t::CERTIFIED)},
+                              {"abstained", {{"falsified", abstained(decision_t::ABSTAIN_FALSIFIED)},
+                                             {"domain", abstained(decision_t::ABSTAIN_DOMAIN)},
+                                             {"safety", abstained(decision_t::ABSTAIN_SAFETY)},
+                                             {"deadline", abstained(decision_t::ABSTAIN_DEADLINE)}}},
+                              {"rejected", abstained(decision_t::REJECTED)},
+                              {"observations", status.observations},
+                              {"learned", status.learned},
+                              {"faults", faults_},
+                              {"messages_refused", refused_},
                               {"messages_not_sent", sender_.refused()},
                               {"elapsed_us", {{"p50", ElapsedPercentile(0.5)}, {"p99", ElapsedPercentile(0.99)}}}}
             << std::endl;

@@ -1,7 +1,12 @@
-/** The certifier on a bus: candidates and obstacles in; decisions, certified plans and a heartbeat out.
+/** The certifier on a bus: candidates in; decisions, certified plans and a heartbeat out.
 
-Messages are queued as they arrive and worked off in order by Tick. At most `gate.queue` candidates are certified in one
-go: where more have arrived, the oldest are answered with a rejection, so that the newest are not kept waiting.
+Every candidate is answered once. The newest is decided on first, since it is the one that a planner still wants; of those
+that wait more than `gate.queue` the oldest are rejected. What changes the grounds of decisions takes effect as it
+arrives: obstacles, the robot's state, executed transitions, commands.
+
+Nothing is certified unless the robot's state is heard. A fault (watch.h, conformance.h, a falsified declaration) is sent
+on bus.channels.fault, and from then on every candidate is rejected until a person sends a reset. A reload reads the task
+file again, beside the running work, and takes it whole or not at all.
 
 An answer goes out before anything is counted or logged: first the certified plan, which the robot waits for, then the
 decision, so a planner that hears of a certificate knows that the plan was handed to the bus before. */
@@ -9,42 +14,91 @@ decision, so a planner that hears of a certificate knows that the plan was hande
 
 #include <array>
 #include <deque>
+#include <future>
+#include <memory>
 #include <vector>
 
+#include "certifier/gate/conformance.h"
 #include "certifier/gate/gate.h"
+#include "certifier/gate/watch.h"
+#include "forereach/command_t.hpp"
+#include "forereach/fault_t.hpp"
+#include "forereach/robot_state_t.hpp"
 #include "lcmtypes/node.h"
 
 namespace forereach {
 
+/** A wall clock and one that nobody sets, both in microseconds. A simulation gives the same for both. */
+struct Clocks {
+  Clock wall = WallClockUs;
+  Clock steady = SteadyClockUs;
+};
+
 class CertifierNode final : public Node {
  public:
   static constexpr std::int64_t kHeartbeatUs = 500'000;
+  static constexpr int kAtOnce = 8;  ///< Candidates decided on before the bus is looked at again.
 
-  CertifierNode(const Config& config, Bus& bus);
+  CertifierNode(const Config& config, Bus& bus, Clocks clocks = {});
+  ~CertifierNode() override;
 
   void Tick(std::int64_t now_us) override;
+  [[nodiscard]] bool busy() const override { return !queue_.empty(); }
+  void Reload() override;
   /** Prints the counts as one line of JSON on standard output. */
   void Stop() override;
 
-  [[nodiscard]] const Gate& gate() const { return gate_; }
+  [[nodiscard]] const Gate& gate() const { return *gate_; }
+  [[nodiscard]] const Watch& watch() const { return watch_; }
 
  private:
-  struct Pending {
-    bool is_candidate;
-    std::vector<std::uint8_t> bytes;
+  struct Loaded {
+    std::unique_ptr<Gate> gate;
+    std::string error;
   };
 
-  void Work(const Pending& pending, std::int64_t now_us, bool displaced);
+  void OnObstacles(const Received& received);
+  void OnRobotState(const Received& received);
+  void OnTransition(const Received& received);
+  void OnCommand(const Received& received);
+  void Obey(const command_t& command);
+
+  void AnswerWaiting();
+  [[nodiscard]] GateAnswer Decide(Bytes candidate);
+  void Answer(Bytes candidate, bool displaced);
+  void CompactIfDue();
+  void TakeReload();
+
+  /** Latches and announces, unless a fault is latched already. */
+  void Fail(fault_t fault, const std::string& why);
+  void Announce(fault_t fault, const Watch::Fault& latched);
+  void Refuse(const std::string& channel, const std::string& why);
+
   void Heartbeat(std::int64_t now_us);
+  [[nodiscard]] std::string WhyNotOk() const;
   [[nodiscard]] double ElapsedPercentile(double fraction) const;
 
+  const std::string config_path_;
   const BusOptions channels_;
   const std::size_t queue_size_;
+  const Clocks clocks_;
+  Bus& bus_;
   Sender sender_;
-  Gate gate_;
-  std::deque<Pending> queue_;
-  std::size_t waiting_candidates_ = 0;
-  std::int64_t next_heartbeat_us_ = 0, heartbeats_ = 0, refused_obstacles_ = 0;
+  std::unique_ptr<Gate> gate_;
+  Watch watch_;
+  Conformance conformance_;
+
+  std::deque<std::vector<std::uint8_t>> queue_;  // candidates, the newest at the back
+  robot_state_t last_state_{};
+  transition_t last_transition_{};
+
+  std::future<Loaded> reload_;
+  std::future<void> compaction_;  // of *gate_
+  std::int64_t version_ = 1, failed_reloads_ = 0;
+  std::string reload_error_;
+
+  std::int64_t next_heartbeat_us_ = 0, heartbeats_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
+  std::size_t high_water_ = 0;
   std::array<double, 1024> elapsed_us_{};  // of the last decisions, a ring
   std::size_t decided_ = 0;
 };

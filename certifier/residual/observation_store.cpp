@@ -73,6 +73,8 @@ std::size_t ObservationStore::Snapshot::size() const {
   return generation_->ids.size() + static_cast<std::size_t>(tail_size_);
 }
 
+bool ObservationStore::Snapshot::uses_hull_distance() const { return generation_->envelope.uses_hull_distance(); }
+
 ObservationStore::ObservationStore(Declaration declaration, const Observations& observations,
                                    std::span<const double> domain_lower, std::span<const double> domain_upper,
                                    const StoreOptions& options)

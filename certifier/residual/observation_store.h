@@ -42,6 +42,8 @@ class ObservationStore final {
     [[nodiscard]] std::size_t size() const;
     /** A provable contradiction among the observations, by their ids: then no residual is admissible. */
     [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
+    /** As LipschitzEnvelope's. */
+    [[nodiscard]] bool uses_hull_distance() const;
 
    private:
     friend class ObservationStore;

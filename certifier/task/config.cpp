@@ -160,13 +160,37 @@ Box ReadInitialSet(const Document& file) {
   }
 }
 
+std::string RelativeTo(const std::string& file, const std::string& path) {
+  return (std::filesystem::path(file).parent_path() / path).string();
+}
+
 GateOptions ReadGate(const Document& file) {
   GateOptions gate;
   file.Read("gate.max_age_ms", gate.max_age_ms);
   file.Read("gate.max_ahead_ms", gate.max_ahead_ms);
   file.Read("gate.certificate_lifetime_ms", gate.certificate_lifetime_ms);
+  file.Read("gate.decision_budget_ms", gate.decision_budget_ms);
   file.Read("gate.queue", gate.queue);
+  const auto read = [&](const char* key, const char* yes, bool& value) {
+    if (file.Has(key)) value = file.Text(key) == yes;
+  };
+  read("gate.mode", "shadow", gate.shadow);
+  read("gate.arming", "robot_state", gate.needs_robot_state);
+  file.Read("gate.robot_timeout_ms", gate.robot_timeout_ms);
+  file.Read("gate.max_clock_jump_ms", gate.max_clock_jump_ms);
+  read("gate.learn", "executed", gate.learns);
   return gate;
+}
+
+RealtimeOptions ReadRealtime(const Document& file) {
+  RealtimeOptions realtime;
+  if (file.Has("realtime.lock_memory")) {
+    const std::string word = file.Text("realtime.lock_memory");
+    using Lock = RealtimeOptions::Lock;
+    realtime.lock_memory = word == "no" ? Lock::kNo : word == "try" ? Lock::kTry : Lock::kRequire;
+  }
+  file.Read("realtime.fifo_priority", realtime.fifo_priority);
+  return realtime;
 }
 
 BusOptions ReadBus(const Document& file) {
@@ -186,6 +210,9 @@ BusOptions ReadBus(const Document& file) {
   read("transition", bus.transition);
   read("status", bus.status);
   read("event", bus.event);
+  read("fault", bus.fault);
+  read("command", bus.command);
+  if (file.Has("bus.key")) bus.key = RelativeTo(file.path(), file.Text("bus.key"));
   return bus;
 }
 
@@ -283,10 +310,6 @@ RobotOptions ReadRobot(const Document& file, const NominalModel& model) {
   return robot;
 }
 
-std::string RelativeTo(const std::string& file, const std::string& path) {
-  return (std::filesystem::path(file).parent_path() / path).string();
-}
-
 LoggerOptions ReadLogger(const Document& file) {
   LoggerOptions logger;
   if (file.Has("logger.directory")) logger.directory = RelativeTo(file.path(), file.Text("logger.directory"));
@@ -359,6 +382,7 @@ std::shared_ptr<const Problem> ReadProblem(Document& file, TransitionsFile trans
   problem->declaration = {ReadLipschitz(file, model), noise_bound};
   if (file.Has("certifier.method") && file.Text("certifier.method") == "paper") problem->method = Method::kPaper;
   file.Read("certifier.max_leaf_visits", problem->max_leaf_visits);
+  file.Read("certifier.max_observations", problem->max_observations);
   file.Read("certifier.zonotope_order", problem->zonotope_order);
   RequireOrder(file, problem->zonotope_order, model.num_states());
   if (transitions == TransitionsFile::kIgnore) return problem;
@@ -385,6 +409,7 @@ Config LoadConfig(const std::string& path, TransitionsFile transitions) {
   config.initial_set = ReadInitialSet(file);
   config.residual = ReadResidual(file, *problem.model);
   config.gate = ReadGate(file);
+  config.realtime = ReadRealtime(file);
   config.bus = ReadBus(file);
   config.planner = ReadPlanner(file);
   config.robot = ReadRobot(file, *problem.model);

@@ -5,6 +5,7 @@ and, made from it, in config/README.md. */
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,7 +27,20 @@ struct GateOptions {
   double max_age_ms = 500;
   double max_ahead_ms = 50;
   double certificate_lifetime_ms = 2000;
+  double decision_budget_ms = 5;  ///< A candidate that starts sooner is abstained from.
   int queue = 64;
+  bool shadow = false;             ///< Decide, and pass nothing on.
+  bool needs_robot_state = true;   ///< Certify only while the robot's state is heard.
+  double robot_timeout_ms = 1000;  ///< It counts as lost after this.
+  double max_clock_jump_ms = 200;
+  bool learns = true;  ///< Executed transitions add to the observations.
+};
+
+/** What the operating system is asked for, so that nothing keeps the certifier waiting. */
+struct RealtimeOptions {
+  enum class Lock { kNo, kTry, kRequire };
+  Lock lock_memory = Lock::kTry;
+  int fifo_priority = 0;  ///< SCHED_FIFO, 1..99; 0 leaves the scheduler alone.
 };
 
 struct BusOptions {
@@ -39,6 +53,16 @@ struct BusOptions {
   std::string transition = "TRANSITION";
   std::string status = "CERTIFIER_STATUS";
   std::string event = "EXECUTION_EVENT";
+  std::string fault = "FAULT";
+  std::string command = "COMMAND";
+  std::string key;  ///< Path of a key file; empty: messages are not signed.
+
+  /** The channels that are signed where there is a key: all that makes a certificate, or a robot move. */
+  [[nodiscard]] std::set<std::string> signed_channels() const {
+    return {candidate, certified, robot_state, obstacles, transition, fault, command};
+  }
+
+  friend bool operator==(const BusOptions&, const BusOptions&) = default;
 };
 
 struct PlannerOptions {
@@ -82,6 +106,7 @@ struct Config {
   Box initial_set;  ///< X0, rounded outward.
   std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds; dt and wheelbase are the model's.
   GateOptions gate;
+  RealtimeOptions realtime;
   BusOptions bus;
   PlannerOptions planner;
   RobotOptions robot;

@@ -6,6 +6,8 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "lcmtypes/authentic_bus.h"
+
 namespace forereach {
 
 int Guarded(const std::string& name, const std::function<int()>& body) {
@@ -20,13 +22,20 @@ int Guarded(const std::string& name, const std::function<int()>& body) {
   }
 }
 
+std::unique_ptr<Bus> OpenBus(const BusOptions& options, const std::string& name, Clock clock) {
+  std::unique_ptr<Bus> bus = OpenBus(options.url, clock);
+  if (options.key.empty()) return bus;
+  return Authenticate(std::move(bus), LoadKey(options.key), name, options.signed_channels(), std::move(clock));
+}
+
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
                const std::function<void(CLI::App&)>& add_options) {
   CLI::App app(description.purpose, description.name);
   app.footer("Example:\n  " + description.example + "\n\nThe keys of a task file are explained in config/README.md.");
-  std::string config_path, url;
+  std::string config_path, url, key;
   app.add_option("--config", config_path, "The task file (YAML)")->required()->type_name("FILE");
   app.add_option("--lcm-url", url, "The bus; by default the task file's bus.url")->type_name("URL");
+  app.add_option("--key", key, "Key file that messages are signed with; by default the task file's bus.key")->type_name("FILE");
   if (add_options) add_options(app);
   try {
     app.parse(argc, argv);
@@ -37,10 +46,12 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$: %v");
   CatchStopSignals();
   return Guarded(description.name, [&] {
-    const Config config = LoadConfig(config_path);
-    const std::unique_ptr<Bus> bus = OpenBus(url.empty() ? config.bus.url : url);
+    Config config = LoadConfig(config_path);
+    if (!url.empty()) config.bus.url = url;
+    if (!key.empty()) config.bus.key = key;
+    const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.name);
     const std::unique_ptr<Node> node = make_node(config, *bus);
-    spdlog::info("ready on {} with {}", url.empty() ? config.bus.url : url, config_path);
+    spdlog::info("ready on {} with {}{}", config.bus.url, config_path, config.bus.key.empty() ? "" : ", signed");
     RunNode(*node, *bus);
     return 0;
   });

@@ -24,7 +24,11 @@ struct ProcessDescription {
 
 using MakeNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& bus)>;
 
-/** Runs a node as a process with `--config FILE` and `--lcm-url URL` until it is done or gets SIGTERM or SIGINT.
+/** The bus of a task: it signs what it has to if the task has a key. @param name says who speaks.
+@throws BusError, KeyError. */
+[[nodiscard]] std::unique_ptr<Bus> OpenBus(const BusOptions& options, const std::string& name, Clock clock = WallClockUs);
+
+/** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key FILE` until it is done or gets SIGTERM or SIGINT.
 @param add_options adds a process's own options, if it has any.
 @return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other
 error. */

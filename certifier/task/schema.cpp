@@ -236,6 +236,8 @@ std::vector<Key> CertifierKeys() {
       Integer("certifier.max_leaf_visits", Between(1, 1 << 20), Problem{}.max_leaf_visits,
               "Groups of 32 observations that one search for the tightest may look at. Any of them give a sound bound; a "
               "decision whose search met this cap says so."),
+      Integer("certifier.max_observations", Between(1, 100'000'000), Problem{}.max_observations,
+              "Observations kept at most: beyond it those go that never attain the envelope."),
       Optional(Map("gate", "What the certifier accepts from the bus."), "all defaults"),
       Number("gate.max_age_ms", "ms", UpTo(kHourMs), gate.max_age_ms,
              "A candidate older than this is rejected as stale."),
@@ -243,8 +245,33 @@ std::vector<Key> CertifierKeys() {
              "A candidate stamped further ahead of the certifier's clock is rejected as from the future."),
       Number("gate.certificate_lifetime_ms", "ms", UpTo(kHourMs), gate.certificate_lifetime_ms,
              "Execution has to begin within this time of the certificate."),
+      Number("gate.decision_budget_ms", "ms", Between(0, kHourMs), gate.decision_budget_ms,
+             "The most a decision may take, its way to the robot included: a candidate that starts sooner is abstained "
+             "from unread."),
       Integer("gate.queue", Between(1, 65536), gate.queue,
               "Candidates that wait at most; beyond it the oldest is rejected."),
+      Optional(Word("gate.mode", {"enforce", "shadow"},
+                    "shadow: decide and count as ever, but certify nothing: what would be certified is rejected as shadow."),
+               "enforce"),
+      Optional(Word("gate.arming", {"robot_state", "none"},
+                    "robot_state: certify only once the robot's state is heard, and latch a fault when it is lost. none: "
+                    "for a certifier without a robot."),
+               "robot_state"),
+      Number("gate.robot_timeout_ms", "ms", UpTo(kHourMs), gate.robot_timeout_ms,
+             "The robot's state counts as lost after this time without one."),
+      Number("gate.max_clock_jump_ms", "ms", UpTo(kHourMs), gate.max_clock_jump_ms,
+             "A wall clock that moves by more than this against the time that has passed latches a fault."),
+      Optional(Word("gate.learn", {"executed", "none"},
+                    "executed: transitions that the robot reports add to the observations while it drives; "
+                    "declaration.noise_bound has to cover their errors. none: the file's transitions are all."),
+               "executed"),
+      Optional(Map("realtime", "What the certifier asks of the operating system."), "all defaults"),
+      Optional(Word("realtime.lock_memory", {"no", "try", "require"},
+                    "Keep its memory from being swapped out. try: go on where it is not allowed, and say so."),
+               "try"),
+      Integer("realtime.fifo_priority", Between(0, 99), RealtimeOptions{}.fifo_priority,
+              "Priority under SCHED_FIFO; 0 leaves the scheduler as it is. Where it is not allowed the certifier does not "
+              "start."),
   };
 }
 
@@ -253,6 +280,9 @@ std::vector<Key> BusKeys() {
   return {
       Optional(Map("bus", "Where messages go."), "all defaults"),
       Optional(Text("bus.url", "LCM provider; `--lcm-url` takes precedence."), bus.url),
+      Optional(Text("bus.key", "Key file, relative to this file: what makes the robot move is then signed, and refused "
+                    "unsigned. `forereach keygen` makes one; `--key` takes precedence."),
+               "none, nothing is signed"),
       Optional(Map("bus.channels", "Names of the channels, all different."), "all defaults"),
       Channel("candidate", bus.candidate, "candidate_plan_t, from planners."),
       Channel("decision", bus.decision, "decision_t, one for each candidate."),
@@ -260,8 +290,10 @@ std::vector<Key> BusKeys() {
       Channel("robot_state", bus.robot_state, "robot_state_t, from the robot."),
       Channel("obstacles", bus.obstacles, "obstacles_t, replaces those in force."),
       Channel("transition", bus.transition, "transition_t, executed steps."),
-      Channel("status", bus.status, "certifier_status_t, the certifier's heartbeat."),
+      Channel("status", bus.status, "certifier_status_v2_t, the certifier's heartbeat."),
       Channel("event", bus.event, "execution_event_t, what the robot's guard does."),
+      Channel("fault", bus.fault, "fault_t, why the certifier has stopped certifying."),
+      Channel("command", bus.command, "command_t, from a person: reset, reload."),
   };
 }
 

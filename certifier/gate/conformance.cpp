@@ -1,0 +1,37 @@
+#include "certifier/gate/conformance.h"
+
+#include <algorithm>
+
+namespace forereach {
+
+void Conformance::Remember(const certified_plan_t& certified) {
+  if (plans_.size() < kPlans)
+    plans_.push_back(certified);
+  else
+    plans_[next_] = certified;
+  next_ = (next_ + 1) % kPlans;
+}
+
+std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state) {
+  const bool executing = state.mode == robot_state_t::EXECUTING, follows = state.sequence == last_sequence_ + 1;
+  std::optional<Departure> departure;
+  if (executing && follows && last_plan_id_ >= 0) departure = Compare(last_plan_id_, last_step_ + 1, state);
+  if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, state);
+  last_sequence_ = state.sequence;
+  last_plan_id_ = executing ? state.executing_plan_id : -1;
+  last_step_ = state.executing_step;
+  return departure;
+}
+
+std::optional<Conformance::Departure> Conformance::Compare(std::int64_t plan_id, int step,
+                                                           const robot_state_t& state) const {
+  const auto known = std::ranges::find(plans_, plan_id, [](const certified_plan_t& c) { return c.plan.plan_id; });
+  if (known == plans_.end() || step < 0 || step > known->plan.num_steps) return std::nullopt;
+  for (int k = 0; k < known->plan.num_states; ++k) {
+    const double value = state.state[k], lower = known->slice_lower[step][k], upper = known->slice_upper[step][k];
+    if (!(lower <= value && value <= upper)) return Departure{plan_id, step, k, value, lower, upper};
+  }
+  return std::nullopt;
+}
+
+}  // namespace forereach

@@ -1,0 +1,46 @@
+/** Runtime conformance: is the robot where its certificate says?
+
+A state measured outside its certified slice refutes what the certificate rests on: the model, the declaration, its noise
+bound, or the measurement. The robot's guard looks for it too; the certifier does so that nothing more is certified on
+grounds that are known to be false. */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/robot_state_t.hpp"
+
+namespace forereach {
+
+class Conformance final {
+ public:
+  static constexpr std::size_t kPlans = 64;  ///< The last certified ones are remembered.
+
+  struct Departure {
+    std::int64_t plan_id;
+    int step, coordinate;
+    double value, lower, upper;
+  };
+
+  Conformance() { plans_.reserve(kPlans); }
+
+  void Remember(const certified_plan_t& certified);
+
+  /** Holds a usable state of the robot against the slice of the step that it says it is at, and, if it has gone on by one
+  boundary while executing, against that of the plan it was executing before. Nothing if it lies in them, or no certificate
+  for its plan is remembered. Cost O(n). */
+  [[nodiscard]] std::optional<Departure> Check(const robot_state_t& state);
+
+ private:
+  [[nodiscard]] std::optional<Departure> Compare(std::int64_t plan_id, int step, const robot_state_t& state) const;
+
+  std::vector<certified_plan_t> plans_;  // a ring
+  std::size_t next_ = 0;
+  std::int64_t last_sequence_ = -1, last_plan_id_ = -1;
+  int last_step_ = -1;
+};
+
+}  // namespace forereach

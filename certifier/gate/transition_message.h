@@ -1,0 +1,19 @@
+/** An executed transition from the bus, as a certifier learns it. */
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "certifier/certify/problem.h"
+#include "forereach/transition_t.hpp"
+
+namespace forereach {
+
+struct ExecutedTransition {
+  std::vector<double> z, next;  ///< (x, u) and x+
+  std::string refusal;          ///< What keeps it from being learned: sizes, NaN, outside the domain. Empty if nothing.
+};
+
+[[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
+
+}  // namespace forereach

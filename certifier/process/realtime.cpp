@@ -1,0 +1,28 @@
+#include "certifier/process/realtime.h"
+
+#include <cerrno>
+#include <cstring>
+
+#include <sched.h>
+#include <spdlog/spdlog.h>
+#include <sys/mman.h>
+
+namespace forereach {
+
+void BecomeRealtime(const RealtimeOptions& options) {
+  using Lock = RealtimeOptions::Lock;
+  if (options.lock_memory != Lock::kNo && ::mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+    const std::string why = std::string("cannot lock memory: ") + std::strerror(errno) +
+                            "; as root, or with `ulimit -l unlimited` or LimitMEMLOCK=infinity";
+    if (options.lock_memory == Lock::kRequire) throw BadInput("realtime.lock_memory: " + why);
+    spdlog::warn("{}", why);
+  }
+  if (options.fifo_priority == 0) return;
+  sched_param parameter{};
+  parameter.sched_priority = options.fifo_priority;
+  if (::sched_setscheduler(0, SCHED_FIFO, &parameter) != 0)
+    throw BadInput(std::string("realtime.fifo_priority: ") + std::strerror(errno) +
+                   "; as root, or with `ulimit -r 99` or LimitRTPRIO=99");
+}
+
+}  // namespace forereach

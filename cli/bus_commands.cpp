@@ -1,0 +1,175 @@
+// Commands for a system that runs: keygen, reset, reload, status.
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/process.h"
+#include "cli/commands.h"
+#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/command_t.hpp"
+#include "lcmtypes/authentic.h"
+#include "lcmtypes/names.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kPatienceMs = 3000;
+
+struct Options {
+  std::string config, url, key;
+  bool json = false;
+};
+
+struct Line {
+  Config config;
+  std::unique_ptr<Bus> bus;
+};
+
+Line Open(const Options& options) {
+  Line line{LoadConfig(options.config, TransitionsFile::kIgnore), nullptr};
+  if (!options.url.empty()) line.config.bus.url = options.url;
+  if (!options.key.empty()) line.config.bus.key = options.key;
+  line.bus = OpenBus(line.config.bus, "forereach");
+  return line;
+}
+
+// The first heartbeat that passes, or nothing.
+std::optional<certifier_status_v2_t> AwaitStatus(Bus& bus, const std::string& channel,
+                                                 const std::function<bool(const certifier_status_v2_t&)>& passes) {
+  std::optional<certifier_status_v2_t> found;
+  bus.Subscribe(channel, [&](const Received& received) {
+    const auto status = Decoded<certifier_status_v2_t>(received.bytes);
+    if (status && passes(*status)) found = status;
+  });
+  const std::int64_t end = SteadyClockUs() + kPatienceMs * 1000;
+  while (!found && SteadyClockUs() < end) bus.Dispatch(50);
+  return found;
+}
+
+std::string_view LevelName(std::int16_t level) {
+  return level == certifier_status_v2_t::OK ? "OK" : level == certifier_status_v2_t::STALE ? "STALE" : "ERROR";
+}
+
+std::string_view StateName(std::int16_t state) {
+  return state == certifier_status_v2_t::ARMED ? "armed" : state == certifier_status_v2_t::FAULT ? "fault" : "disarmed";
+}
+
+nlohmann::ordered_json ToJson(const certifier_status_v2_t& status) {
+  nlohmann::ordered_json by_outcome, by_cause;
+  for (std::int16_t i = 0; i < 16; ++i)
+    if (status.by_outcome[i] > 0) by_outcome[std::string(OutcomeName(i))] = status.by_outcome[i];
+  for (std::int16_t i = 1; i < 64; ++i)
+    if (status.by_cause[i] > 0) by_cause[std::string(CauseName(i))] = status.by_cause[i];
+  return {{"level", LevelName(status.level)},
+          {"state", StateName(status.state)},
+          {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
+          {"message", GetText(status.message)},
+          {"shadow", status.shadow != 0},
+          {"version", status.version},
+          {"failed_reloads", status.failed_reloads},
+          {"candidates", status.candidates},
+          {"by_outcome", by_outcome},
+          {"by_cause", by_cause},
+          {"candidates_lost", status.candidates_lost},
+          {"messages_refused", status.messages_refused},
+          {"refused_unsigned", status.refused_unsigned},
+          {"refused_forged", status.refused_forged},
+          {"refused_replayed", status.refused_replayed},
+          {"bus_dropped", status.bus_dropped},
+          {"observations", status.observations},
+          {"learned", status.learned},
+          {"queue_depth", status.queue_depth},
+          {"elapsed_us", {{"p50", status.elapsed_p50_us}, {"p99", status.elapsed_p99_us}, {"max", status.elapsed_max_us}}}};
+}
+
+void Print(const certifier_status_v2_t& status, bool json) {
+  if (json) {
+    std::cout << ToJson(status) << std::endl;
+    return;
+  }
+  std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");
+  if (const std::string message = GetText(status.message); !message.empty()) std::cout << ": " << message;
+  std::cout << "\nversion " << status.version << ", " << status.observations << " observations, of these " << status.learned
+            << " learned; " << status.candidates << " candidates:";
+  for (std::int16_t i = 0; i < 16; ++i)
+    if (status.by_outcome[i] > 0) std::cout << " " << status.by_outcome[i] << " " << OutcomeName(i);
+  std::cout << std::endl;
+}
+
+int NobodyAnswers(const BusOptions& bus) {
+  std::cerr << "forereach: no certifier answered on " << bus.url << " (" << bus.status << ") within "
+            << kPatienceMs / 1000 << " s; `forereach doctor` checks the bus" << std::endl;
+  return 1;
+}
+
+int ShowStatus(const Options& options) {
+  const Line line = Open(options);
+  const auto status = AwaitStatus(*line.bus, line.config.bus.status, [](const auto&) { return true; });
+  if (!status) return NobodyAnswers(line.config.bus);
+  Print(*status, options.json);
+  return status->level == certifier_status_v2_t::OK ? 0 : 1;
+}
+
+// Sends a command, and shows the heartbeat that answers it.
+int Command(const Options& options, std::int16_t kind) {
+  const Line line = Open(options);
+  const auto before = AwaitStatus(*line.bus, line.config.bus.status, [](const auto&) { return true; });
+  if (!before) return NobodyAnswers(line.config.bus);
+  command_t command{};
+  command.utime = WallClockUs();
+  command.kind = kind;
+  SetText(command.source, "forereach");
+  line.bus->Publish(line.config.bus.command, command);
+  const auto after = AwaitStatus(*line.bus, line.config.bus.status, [&](const certifier_status_v2_t& status) {
+    return kind == command_t::RESET ? status.utime >= command.utime
+                                    : status.version != before->version || status.failed_reloads != before->failed_reloads;
+  });
+  if (!after) return NobodyAnswers(line.config.bus);
+  Print(*after, options.json);
+  const bool done = kind == command_t::RESET ? after->state != certifier_status_v2_t::FAULT : after->version > before->version;
+  if (!done && after->messages_refused + after->refused_unsigned + after->refused_forged + after->refused_replayed >
+                   before->messages_refused + before->refused_unsigned + before->refused_forged + before->refused_replayed)
+    std::cerr << "forereach: the certifier refused the command; is it signed with its key (--key)?" << std::endl;
+  return done ? 0 : 1;
+}
+
+void Add(CLI::App& app, Action& action, const std::string& name, const std::string& purpose,
+         const std::function<int(const Options&)>& run) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(name, purpose);
+  command->add_option("--config", options->config, "The task file of the certifier")->required()->type_name("FILE");
+  command->add_option("--lcm-url", options->url, "The bus; by default the task file's bus.url")->type_name("URL");
+  command->add_option("--key", options->key, "Key file; by default the task file's bus.key")->type_name("FILE");
+  command->add_flag("--json", options->json, "One JSON document on standard output");
+  command->footer("Example:\n  forereach " + name + " --config config/demo.yaml");
+  command->callback([options, run, &action] { action = [options, run] { return run(*options); }; });
+}
+
+}  // namespace
+
+void AddBusCommands(CLI::App& app, Action& action) {
+  Add(app, action, "status", "Show the certifier's heartbeat: exit 0 if it would certify now, else 1", ShowStatus);
+  Add(app, action, "reset", "Clear a fault that the certifier and the robot have latched",
+      [](const Options& options) { return Command(options, command_t::RESET); });
+  Add(app, action, "reload", "Have the certifier read its task file again, whole or not at all",
+      [](const Options& options) { return Command(options, command_t::RELOAD); });
+
+  auto path = std::make_shared<std::string>();
+  CLI::App* keygen = app.add_subcommand("keygen", "Make a key file that only its owner can read, to sign messages with");
+  keygen->add_option("file", *path, "The new file")->required()->type_name("FILE");
+  keygen->footer("Example:\n  forereach keygen robot.key\nThen give --key robot.key to every process, or name it under "
+                 "bus.key in the task file.");
+  keygen->callback([path, &action] {
+    action = [path] {
+      MakeKeyFile(*path);
+      std::cout << *path << std::endl;
+      return 0;
+    };
+  });
+}
+
+}  // namespace forereach
