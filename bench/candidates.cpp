@@ -12,6 +12,7 @@ Config MakeConfig(const Task& task) {
   const NominalModel& model = *task.problem->model;
   config.problem = task.problem;
   config.obstacles = task.obstacles;
+  config.gate.needs_robot_state = false;
   config.digest = DigestOf(std::string_view("benchmark"));
   config.model_digest = ModelDigest(model);
   config.declaration_digest = DeclarationDigest(model, task.problem->declaration);

@@ -89,7 +89,7 @@ class Authenticator final {
   [[nodiscard]] Authenticity Judge(const std::string& channel, Bytes bytes);
   [[nodiscard]] bool TakeCounter(const std::string& channel, std::uint64_t sender, std::int64_t counter);
 
-  const Key256 key_;
+  Key256 key_;
   std::int64_t oldest_;  // counters up to this are refused
   std::map<std::pair<std::string, std::uint64_t>, std::int64_t> last_counter_;
   Refusals refusals_;

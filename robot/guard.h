@@ -93,7 +93,7 @@ struct GuardOptions {
   std::int64_t step_us = 0;             ///< Time between two step boundaries, positive.
   std::optional<Digest> config_digest;  ///< If set, plans certified under another configuration are refused.
   std::optional<Digest> model_digest;   ///< If set, plans certified for another model are refused.
-  std::optional<Key256> key;            ///< If set, plans that are not signed with it are refused (lcmtypes/authentic.h) ...
+  std::optional<Key256> key = {};       ///< If set, plans that are not signed with it are refused (lcmtypes/authentic.h) ...
   std::string channel = "PLAN_CERTIFIED";  ///< ... for this channel.
 };
 

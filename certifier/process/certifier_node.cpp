@@ -255,8 +255,8 @@ void CertifierNode::TakeReload() {
 std::string CertifierNode::WhyNotOk() const {
   if (watch_.fault()) return std::string(FaultName(watch_.fault()->cause)) + ": " + watch_.fault()->why;
   if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F";
-  if (watch_.state() == Watch::State::kDisarmed) return "waits for the robot's state";
-  return reload_error_.empty() ? "" : "the last reload failed: " + reload_error_;
+  if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
+  return watch_.state() == Watch::State::kDisarmed ? "waits for the robot's state" : "";
 }
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {

@@ -11,8 +11,6 @@
 namespace forereach {
 namespace {
 
-constexpr double kHeadroom = 2;  // of values, before the index has to be built anew for one
-
 std::span<const double> View(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
 
 void SetRow(Eigen::MatrixXd& matrix, int row, std::span<const double> values) {
@@ -89,7 +87,7 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
                                 " is outside [1, " + std::to_string(EnvelopeTail::kMaxCapacity) + "]");
   if (options.max_observations < 1)
     throw std::invalid_argument("observation store: max_observations must be at least 1");
-  options_.envelope.value_headroom = kHeadroom;
+  options_.envelope.value_headroom = kValueHeadroom;
   violation_ = FindViolation(declaration_, observations);
   next_id_ = observations.size();
   std::vector<int> ids(static_cast<std::size_t>(next_id_));

@@ -36,6 +36,9 @@ class ObservationStore final {
   class Newcomer;
 
  public:
+  /** EnvelopeOptions::value_headroom: a learned residual beyond this times the largest known costs a new index. */
+  static constexpr double kValueHeadroom = 2;
+
   class Snapshot final : public ResidualEnclosure {
    public:
     void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "certifier/residual/lipschitz_envelope.h"
+#include "certifier/residual/observation_store.h"
 #include "certifier/residual/observations.h"
 #include "experiments/methods/samples.h"
 
@@ -15,7 +15,8 @@ std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting, const D
     upper.push_back(range.upper);
   }
   declaration.Validate(setting.model.num_states(), setting.model.num_variables());
-  return std::make_unique<LipschitzEnvelope>(declaration, Observe(setting.model, setting.data), lower, upper);
+  return std::make_unique<LipschitzEnvelope>(declaration, Observe(setting.model, setting.data), lower, upper,
+                                             EnvelopeOptions{.value_headroom = ObservationStore::kValueHeadroom});
 }
 
 std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting) {

@@ -131,14 +131,14 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
       EXPECT_EQ(answer.certified->sequence, certificates++);
     }
   }
-  const certifier_status_t status = gate_.Status(kNow + 5);
+  const certifier_status_v2_t status = gate_.Status(kNow + 5);
   EXPECT_EQ(status.utime, kNow + 5);
   EXPECT_EQ(status.candidates, 50);
-  EXPECT_EQ(status.certified, 10);
-  EXPECT_EQ(status.abstained_falsified, 0);
-  EXPECT_EQ(status.abstained_domain, 10);
-  EXPECT_EQ(status.abstained_safety, 10);
-  EXPECT_EQ(status.rejected, 20);
+  EXPECT_EQ(status.by_outcome[decision_t::CERTIFIED], 10);
+  EXPECT_EQ(status.by_outcome[decision_t::ABSTAIN_FALSIFIED], 0);
+  EXPECT_EQ(status.by_outcome[decision_t::ABSTAIN_DOMAIN], 10);
+  EXPECT_EQ(status.by_outcome[decision_t::ABSTAIN_SAFETY], 10);
+  EXPECT_EQ(status.by_outcome[decision_t::REJECTED], 20);
   EXPECT_EQ(certificates, 10);
   ExpectDigestsOf(config_, status);
 }

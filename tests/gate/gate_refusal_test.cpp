@@ -127,7 +127,7 @@ TEST_F(GateRefusalTest, TheWholeLabelTellsSourcesApart) {
 }
 
 TEST_F(GateRefusalTest, OneSourceMoreThanItKeepsApart) {
-  static_assert(Gate::kMaxSources == 16);
+  static_assert(Sources::kMaxSources == 16);
   for (int source = 0; source < 16; ++source) {
     candidate_plan_t candidate = Candidate(1);
     SetText(candidate.source, "source " + std::to_string(source));
@@ -244,12 +244,12 @@ TEST_F(GateRefusalTest, WhatCouldBeDecodedIsNamedInTheDecision) {
 
 TEST_F(GateRefusalTest, ADisplacedCandidateIsRejectedHoweverGood) {
   for (const auto& bytes : {Encode(Candidate(1)), std::vector<std::uint8_t>{}}) {
-    const GateAnswer answer = gate_.Displace(bytes, kNow);
+    const GateAnswer answer = gate_.Refuse(bytes, kNow, decision_t::CAUSE_QUEUE_FULL, "newer candidates displaced it from the queue");
     EXPECT_EQ(answer.decision.outcome, decision_t::REJECTED);
-    EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_QUEUE_FULL);
+    EXPECT_EQ(answer.decision.cause, bytes.empty() ? decision_t::CAUSE_WRONG_LENGTH : decision_t::CAUSE_QUEUE_FULL);
     EXPECT_FALSE(answer.certified);
   }
-  EXPECT_EQ(gate_.Status(kNow).rejected, 2);
+  EXPECT_EQ(gate_.Status(kNow).by_outcome[decision_t::REJECTED], 2);
   EXPECT_EQ(Decide(Candidate(2)).outcome, decision_t::CERTIFIED);
 }
 

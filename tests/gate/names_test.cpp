@@ -68,6 +68,8 @@ TEST(NamesTest, EveryOutcomeHasItsName) { ExpectNamed(OutcomesAndCauses().first,
 
 TEST(NamesTest, EveryCauseHasItsName) { ExpectNamed(OutcomesAndCauses().second, CauseName); }
 
+TEST(NamesTest, EveryFaultHasItsName) { ExpectNamed(ConstantsOf("fault_t"), FaultName); }
+
 TEST(NamesTest, EveryEventHasItsName) { ExpectNamed(ConstantsOf("execution_event_t"), EventName); }
 
 // Recorded logs carry the numbers, and the fingerprint does not cover them: a new constant gets a new line, no line
@@ -77,7 +79,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
   EXPECT_EQ(
       outcomes,
       (Constants{
-          {"CERTIFIED", 1}, {"ABSTAIN_FALSIFIED", 2}, {"ABSTAIN_DOMAIN", 3}, {"ABSTAIN_SAFETY", 4}, {"REJECTED", 5}}));
+          {"CERTIFIED", 1}, {"ABSTAIN_FALSIFIED", 2}, {"ABSTAIN_DOMAIN", 3}, {"ABSTAIN_SAFETY", 4}, {"REJECTED", 5},
+          {"ABSTAIN_DEADLINE", 6}}));
   EXPECT_EQ(causes, (Constants{{"NONE", 0},
                                {"PAIRWISE", 1},
                                {"DOMAIN_EXIT", 2},
@@ -94,7 +97,12 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                {"TOO_MANY_SOURCES", 18},
                                {"TOO_LATE", 19},
                                {"QUEUE_FULL", 20},
-                               {"INTERNAL_ERROR", 21}}));
+                               {"INTERNAL_ERROR", 21},
+                               {"DEADLINE", 22},
+                               {"OVERRUN", 23},
+                               {"NOT_ARMED", 24},
+                               {"FAULT", 25},
+                               {"SHADOW", 26}}));
   EXPECT_EQ(ConstantsOf("execution_event_t"), (Constants{{"ACCEPTED", 1},
                                                          {"REFUSED", 2},
                                                          {"STARTED", 3},
@@ -103,7 +111,14 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                          {"TAIL_BEGUN", 6},
                                                          {"STANDING", 7},
                                                          {"GOAL_REACHED", 8},
-                                                         {"CONTACT", 9}}));
+                                                         {"CONTACT", 9},
+                                                         {"HALTED", 10},
+                                                         {"RESET", 11}}));
+  EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
+                                               {"CLOCK_JUMP", 2},
+                                               {"SLICE_LEFT", 3},
+                                               {"DECLARATION_FALSIFIED", 4}}));
+  EXPECT_EQ(ConstantsOf("command_t"), (Constants{{"RESET", 1}, {"RELOAD", 2}}));
   EXPECT_EQ(ConstantsOf("robot_state_t"), (Constants{{"STANDING", 1}, {"EXECUTING", 2}, {"FINISHED", 3}}));
   EXPECT_EQ(ConstantsOf("obstacle_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
 }

@@ -1,9 +1,20 @@
 // The certifier's node on an in-memory bus with a simulated clock.
 #include "certifier/process/certifier_node.h"
 
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 #include <map>
+#include <random>
+#include <regex>
 #include <set>
+#include <sstream>
 #include <string>
+#include <thread>
+#include <utility>
+
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,7 +32,7 @@ class CertifierNodeTest : public testing::Test {
   CertifierNodeTest() {
     config_.gate.queue = 4;
     config_.bus.decision = "MY_DECISION";  // a config may rename channels
-    node_ = std::make_unique<CertifierNode>(config_, *bus_);
+    node_ = std::make_unique<CertifierNode>(config_, *bus_, clocks_);
     bus_->Subscribe("MY_DECISION", [this](const Received& r) {
       decisions_.push_back(Decoded<decision_t>(r.bytes).value());
       order_ += 'd';
@@ -31,7 +42,7 @@ class CertifierNodeTest : public testing::Test {
       order_ += 'c';
     });
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_t>(r.bytes).value()); });
+                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_v2_t>(r.bytes).value()); });
   }
 
   void Run() {
@@ -47,11 +58,13 @@ class CertifierNodeTest : public testing::Test {
 
   std::int64_t now_us_ = kNow;
   Config config_ = SmallTask();
+  const Clock clock_ = [this] { return now_us_; };
+  const Clocks clocks_{clock_, clock_};
   std::unique_ptr<Bus> bus_ = OpenBus("memq://", [this] { return now_us_; });
   std::unique_ptr<CertifierNode> node_;
   std::vector<decision_t> decisions_;
   std::vector<certified_plan_t> certified_;
-  std::vector<certifier_status_t> status_;
+  std::vector<certifier_status_v2_t> status_;
   std::string order_;
 };
 
@@ -82,7 +95,7 @@ class RefusingBus final : public Bus {
 
 TEST_F(CertifierNodeTest, WhatTheBusRefusesIsCounted) {
   RefusingBus bus;
-  CertifierNode node(config_, bus);
+  CertifierNode node(config_, bus, clocks_);
   bus.Deliver("PLAN_CANDIDATE", Encode(Candidate(1)));
   node.Tick(kNow);
   testing::internal::CaptureStdout();
@@ -94,14 +107,22 @@ TEST_F(CertifierNodeTest, WhatTheBusRefusesIsCounted) {
 TEST_F(CertifierNodeTest, WhereMoreWaitThanItsQueueHoldsTheOldestAreAnsweredWithARejection) {
   for (int i = 1; i <= 7; ++i) bus_->Publish("PLAN_CANDIDATE", Candidate(i));
   Run();
-  EXPECT_THAT(Causes(), ElementsAre(20, 20, 20, 0, 0, 0, 0)) << "20 is queue_full";
+  EXPECT_THAT(Causes(), ElementsAre(0, 0, 0, 0, 0, 0, 0)) << "eight are decided on at once";
+  decisions_.clear();
+  certified_.clear();
+  for (int i = 11; i <= 25; ++i) bus_->Publish("PLAN_CANDIDATE", Candidate(i));
+  Run();
+  EXPECT_THAT(Causes(), ElementsAre(0, 0, 0, 0, 0, 0, 0, 0, 20, 20, 20)) << "20 is queue_full";
+  EXPECT_TRUE(node_->busy()) << "four still wait";
+  Run();
+  EXPECT_FALSE(node_->busy());
   std::vector<std::int64_t> ids, sequences;
   for (const decision_t& d : decisions_) ids.push_back(d.plan_id), sequences.push_back(d.sequence);
-  EXPECT_THAT(ids, ElementsAre(1, 2, 3, 4, 5, 6, 7));
-  EXPECT_THAT(sequences, ElementsAre(0, 1, 2, 3, 4, 5, 6));
-  EXPECT_EQ(certified_.size(), 4u);
+  EXPECT_THAT(ids, ElementsAre(25, 24, 23, 22, 21, 20, 19, 18, 11, 12, 13, 17, 16, 15, 14)) << "the newest first";
+  EXPECT_THAT(sequences, ElementsAre(7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21));
+  EXPECT_EQ(certified_.size(), 12u);
 
-  bus_->Publish("PLAN_CANDIDATE", Candidate(8));
+  bus_->Publish("PLAN_CANDIDATE", Candidate(28));
   Run();
   EXPECT_EQ(decisions_.back().outcome, decision_t::CERTIFIED) << "good again";
 }
@@ -110,23 +131,24 @@ TEST_F(CertifierNodeTest, AFloodOfCandidatesIsAnsweredOnceEach) {
   for (int round = 0; round < 20; ++round) {
     for (int i = 0; i < 25; ++i) bus_->Publish("PLAN_CANDIDATE", Candidate(25 * round + i));
     Run();
+    Run();
   }
   std::map<std::int64_t, int> answers;
   for (const decision_t& decision : decisions_) ++answers[decision.plan_id];
   EXPECT_EQ(answers.size(), 500u);
   for (const auto& [plan_id, count] : answers) EXPECT_EQ(count, 1) << plan_id;
-  EXPECT_EQ(certified_.size(), 80u) << "4 a round";
+  EXPECT_EQ(certified_.size(), 20u * 12) << "8 at once, and the 4 that may wait";
 }
 
-TEST_F(CertifierNodeTest, ObstaclesHoldFromTheirPlaceInTheQueueOn) {
+TEST_F(CertifierNodeTest, ObstaclesOvertakeCandidatesThatWait) {
   obstacles_t obstacles = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
   obstacles.utime = kNow;
   bus_->Publish("PLAN_CANDIDATE", Candidate(1));
   bus_->Publish("OBSTACLES", obstacles);
   bus_->Publish("PLAN_CANDIDATE", Candidate(2));
   Run();
-  EXPECT_THAT(Causes(), ElementsAre(0, 4)) << "4 is obstacle";
-  EXPECT_NE(GetDigest(decisions_[0].obstacles_digest), GetDigest(decisions_[1].obstacles_digest));
+  EXPECT_THAT(Causes(), ElementsAre(4, 4)) << "4 is obstacle";
+  EXPECT_EQ(GetDigest(decisions_[0].obstacles_digest), GetDigest(decisions_[1].obstacles_digest));
 }
 
 TEST_F(CertifierNodeTest, ABadObstaclesMessageLeavesThoseInForce) {
@@ -139,7 +161,7 @@ TEST_F(CertifierNodeTest, ABadObstaclesMessageLeavesThoseInForce) {
   EXPECT_THAT(Causes(), ElementsAre(4));
   testing::internal::CaptureStdout();
   node_->Stop();
-  EXPECT_THAT(testing::internal::GetCapturedStdout(), testing::HasSubstr("\"refused_obstacles\":1"));
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), testing::HasSubstr("\"messages_refused\":1"));
 }
 
 TEST_F(CertifierNodeTest, OnlyCertifiedPlansArePassedOn) {
@@ -148,7 +170,7 @@ TEST_F(CertifierNodeTest, OnlyCertifiedPlansArePassedOn) {
   bus_->Publish("PLAN_CANDIDATE", obstacles_t{});
   bus_->Publish("PLAN_CANDIDATE", Candidate(3, 0, kNow - 1'000'000));
   Run();
-  EXPECT_THAT(Causes(), ElementsAre(4, 2, 15, 10));
+  EXPECT_THAT(Causes(), ElementsAre(10, 15, 2, 4));
   EXPECT_TRUE(certified_.empty());
 }
 
@@ -164,12 +186,329 @@ TEST_F(CertifierNodeTest, BeatsTwiceASecondWithItsCounts) {
     EXPECT_EQ(status_[i].sequence, static_cast<std::int64_t>(i));
     EXPECT_EQ(status_[i].utime, kNow + static_cast<std::int64_t>(i) * 500'000);
     EXPECT_EQ(status_[i].candidates, 2);
-    EXPECT_EQ(status_[i].certified, 1);
-    EXPECT_EQ(status_[i].abstained_safety, 1);
+    EXPECT_EQ(status_[i].by_outcome[decision_t::CERTIFIED], 1);
+    EXPECT_EQ(status_[i].by_cause[decision_t::CAUSE_OBSTACLE], 1);
+    EXPECT_EQ(status_[i].level, certifier_status_v2_t::OK);
     EXPECT_GT(status_[i].elapsed_p50_us, 0);
     EXPECT_GE(status_[i].elapsed_p99_us, status_[i].elapsed_p50_us);
     EXPECT_EQ(GetDigest(status_[i].config_digest), config_.digest);
   }
+}
+
+// ---- Arming, faults, learning, reload.
+
+class ArmedNodeTest : public CertifierNodeTest {
+ protected:
+  ArmedNodeTest() {
+    config_.gate.needs_robot_state = true;
+    Restart();
+    bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+  }
+
+  void Restart() {
+    node_.reset();
+    bus_ = OpenBus("memq://", clock_);
+    node_ = std::make_unique<CertifierNode>(config_, *bus_, clocks_);
+    bus_->Subscribe("MY_DECISION", [this](const Received& r) { decisions_.push_back(Decoded<decision_t>(r.bytes).value()); });
+    bus_->Subscribe("PLAN_CERTIFIED",
+                    [this](const Received& r) { certified_.push_back(Decoded<certified_plan_t>(r.bytes).value()); });
+    bus_->Subscribe("CERTIFIER_STATUS",
+                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_v2_t>(r.bytes).value()); });
+  }
+
+  void Pass(std::int64_t us) { now_us_ += us; }
+
+  // The robot stands at the origin of the small task, or executes a plan.
+  robot_state_t State(std::int64_t plan_id = -1, int step = -1) {
+    robot_state_t state{};
+    state.utime = now_us_;
+    state.sequence = sequence_++;
+    state.executing_plan_id = plan_id;
+    state.executing_step = static_cast<std::int16_t>(step);
+    state.mode = plan_id < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
+    state.num_states = 4;
+    state.state[2] = 1;
+    state.state[3] = 0.1;
+    return state;
+  }
+  void SayState(const robot_state_t& state) {
+    bus_->Publish("ROBOT_STATE", state);
+    Run();
+  }
+  void Reset() {
+    command_t command{};
+    command.utime = now_us_;
+    command.kind = command_t::RESET;
+    bus_->Publish("COMMAND", command);
+    Run();
+  }
+  decision_t Ask(double acceleration = kAccelerationThatCertifies) {
+    bus_->Publish("PLAN_CANDIDATE", Candidate(next_plan_id_++, acceleration, now_us_));
+    Run();
+    return decisions_.back();
+  }
+
+  std::vector<fault_t> faults_;
+  std::int64_t next_plan_id_ = 1, sequence_ = 0;
+};
+
+TEST_F(ArmedNodeTest, CertifiesNothingBeforeItHasHeardTheRobot) {
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+  EXPECT_EQ(status_.back().level, certifier_status_v2_t::STALE);
+  robot_state_t bad = State();
+  bad.state[1] = std::numeric_limits<double>::quiet_NaN();
+  SayState(bad);
+  bad = State();
+  bad.num_states = 5;
+  SayState(bad);
+  bad = State();
+  bad.utime -= 1'000'000;
+  SayState(bad);
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED) << "what is no state arms nothing";
+  SayState(State());
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  EXPECT_EQ(certified_.size(), 1u);
+}
+
+TEST_F(ArmedNodeTest, LosingTheRobotLatchesUntilAReset) {
+  SayState(State());
+  Pass(1'000'000);
+  Run();
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << "just in time";
+  Pass(1);
+  Run();
+  ASSERT_EQ(faults_.size(), 1u);
+  EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
+  SayState(State());
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT) << "that it is back does not clear it";
+  EXPECT_EQ(status_.back().level, certifier_status_v2_t::ERROR);
+  Reset();
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+  SayState(State());
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(ArmedNodeTest, ARobotThatHasFinishedIsNotLost) {
+  SayState(State());
+  robot_state_t last = State();
+  last.mode = robot_state_t::FINISHED;
+  SayState(last);
+  Pass(5'000'000);
+  Run();
+  EXPECT_TRUE(faults_.empty());
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+}
+
+TEST_F(ArmedNodeTest, AClockThatJumpsLatches) {
+  std::int64_t steady = 0;
+  node_ = nullptr;
+  bus_ = OpenBus("memq://", clock_);
+  CertifierNode node(config_, *bus_, {clock_, [&] { return steady; }});
+  for (const std::int64_t jump : {200'000, 200'001}) {
+    node.Tick(now_us_);
+    now_us_ += 2000 + jump;
+    steady += 2000;
+    node.Tick(now_us_);
+    EXPECT_EQ(node.watch().fault().has_value(), jump > 200'000) << jump;
+  }
+  EXPECT_EQ(node.watch().fault()->cause, fault_t::CLOCK_JUMP);
+}
+
+TEST_F(ArmedNodeTest, AStateOutsideItsSliceLatchesAndNamesTheTransition) {
+  SayState(State());
+  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  const certified_plan_t plan = certified_.back();
+  for (const bool outside : {false, true}) {
+    ++sequence_;  // a lost message between, so that each is judged by what it says itself
+    robot_state_t state = State(plan.plan.plan_id, 1);
+    for (int k = 0; k < 4; ++k) state.state[k] = plan.slice_upper[1][k];
+    if (outside) state.state[2] = std::nextafter(plan.slice_upper[1][2], 10.0);
+    transition_t transition{};
+    transition.utime = 77;
+    bus_->Publish("TRANSITION", transition);
+    SayState(state);
+    ASSERT_EQ(faults_.size(), outside ? 1u : 0u);
+  }
+  EXPECT_EQ(faults_[0].cause, fault_t::SLICE_LEFT);
+  EXPECT_EQ(faults_[0].plan_id, plan.plan.plan_id);
+  EXPECT_EQ(faults_[0].step, 1);
+  EXPECT_EQ(faults_[0].coordinate, 2);
+  EXPECT_EQ(faults_[0].upper, plan.slice_upper[1][2]);
+  EXPECT_EQ(faults_[0].transition.utime, 77);
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
+}
+
+transition_t Executed(const Problem& problem, const Eigen::VectorXd& z, double error = 0) {
+  transition_t transition{};
+  transition.num_states = 4;
+  transition.num_inputs = 2;
+  std::copy_n(z.data(), 4, transition.state);
+  std::copy_n(z.data() + 4, 2, transition.input);
+  problem.model->Evaluate({z.data(), 6}, {transition.next_state, 4});
+  transition.next_state[2] += error;
+  return transition;
+}
+
+TEST_F(ArmedNodeTest, ExecutedTransitionsAddToTheObservationsAndChangeTheirDigest) {
+  SayState(State());
+  const Digest before = GetDigest(Ask().observations_digest);
+  const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
+  const transition_t transition = Executed(*config_.problem, z);
+  bus_->Publish("TRANSITION", transition);
+  Run();
+  EXPECT_EQ(node_->gate().certifier().num_observations(), 3u);
+  const decision_t after = Ask();
+  EXPECT_EQ(after.outcome, decision_t::CERTIFIED);
+  EXPECT_EQ(GetDigest(after.observations_digest), ChainedDigest(before, Encode(transition)));
+  bus_->Publish("TRANSITION", Executed(*config_.problem, z * 100));
+  Run();
+  EXPECT_EQ(node_->gate().certifier().num_observations(), 3u) << "outside the domain it says nothing";
+}
+
+TEST_F(ArmedNodeTest, ATransitionThatContradictsTheDeclarationFalsifiesItForGood) {
+  SayState(State());
+  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
+  bus_->Publish("TRANSITION", Executed(*config_.problem, z, 0.01));
+  Run();
+  ASSERT_EQ(faults_.size(), 1u);
+  EXPECT_EQ(faults_[0].cause, fault_t::DECLARATION_FALSIFIED);
+  EXPECT_EQ(faults_[0].second_observation, 2);
+  EXPECT_EQ(faults_[0].transition.next_state[2], Executed(*config_.problem, z, 0.01).next_state[2]);
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
+  Reset();
+  SayState(State());
+  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED) << "F from then on, whoever resets";
+}
+
+TEST_F(ArmedNodeTest, ManyTransitionsAreIndexedOnTheWay) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> anywhere(-2, 2);
+  for (int i = 0; i < 1000; ++i) {
+    Eigen::VectorXd z(6);
+    for (double& x : z) x = anywhere(random);
+    bus_->Publish("TRANSITION", Executed(*config_.problem, z));
+    Run();
+  }
+  EXPECT_EQ(node_->gate().certifier().num_observations(), 1002u);
+  EXPECT_LT(node_->gate().certifier().num_unindexed(), 128);
+  SayState(State());
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(ArmedNodeTest, ATaskThatDoesNotLearnIgnoresThem) {
+  config_.gate.learns = false;
+  Restart();
+  bus_->Publish("TRANSITION", Executed(*config_.problem, Eigen::VectorXd::Zero(6), 0.01));
+  SayState(State());
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(ArmedNodeTest, ShadowModeSaysWhatItWouldDoAndPassesNothingOn) {
+  config_.gate.shadow = true;
+  Restart();
+  SayState(State());
+  const decision_t decision = Ask();
+  EXPECT_EQ(decision.outcome, decision_t::REJECTED);
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_SHADOW);
+  EXPECT_GT(decision.margin, decision.threshold);
+  EXPECT_EQ(Ask(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
+  EXPECT_TRUE(certified_.empty());
+}
+
+TEST_F(ArmedNodeTest, TheBudgetDecidesBeforeTheDeadlineAndWithdrawsWhatTookLonger) {
+  SayState(State());
+  for (const std::int64_t left : {5000, 4999}) {
+    candidate_plan_t candidate = Candidate(next_plan_id_++, 0, now_us_);
+    candidate.start_utime = now_us_ + left;
+    bus_->Publish("PLAN_CANDIDATE", candidate);
+    Run();
+    EXPECT_EQ(decisions_.back().outcome, left == 5000 ? decision_t::CERTIFIED : decision_t::ABSTAIN_DEADLINE);
+  }
+  EXPECT_EQ(decisions_.back().cause, decision_t::CAUSE_DEADLINE);
+
+  for (const std::int64_t taken : {5000, 5001}) {
+    std::int64_t now = now_us_;
+    Gate gate(config_);
+    const GateAnswer answer =
+        gate.Decide(Encode(Candidate(1, 0, now_us_)), [&] { return std::exchange(now, now_us_ + taken); });
+    EXPECT_EQ(answer.certified.has_value(), taken == 5000);
+    EXPECT_EQ(answer.decision.cause, taken == 5000 ? decision_t::CAUSE_NONE : decision_t::CAUSE_OVERRUN);
+  }
+}
+
+TEST_F(ArmedNodeTest, CommandsThatAreStaleOrUnknownAreRefused) {
+  SayState(State());
+  Pass(2'000'000);
+  Run();
+  ASSERT_TRUE(node_->watch().fault());
+  command_t command{};
+  command.kind = command_t::RESET;
+  command.utime = now_us_ - 500'001;
+  bus_->Publish("COMMAND", command);
+  command.utime = now_us_;
+  command.kind = 7;
+  bus_->Publish("COMMAND", command);
+  Run();
+  EXPECT_TRUE(node_->watch().fault());
+  Reset();
+  EXPECT_FALSE(node_->watch().fault());
+}
+
+class ReloadTest : public testing::Test {
+ protected:
+  void Write(const std::string& text) const { std::ofstream(path_) << text; }
+  void Copy(const std::function<std::string(std::string)>& edit) const {
+    std::ostringstream text;
+    text << std::ifstream(kShipped).rdbuf();
+    Write(edit(std::regex_replace(text.str(), std::regex("data/"), FOREREACH_SOURCE_DIR "/config/data/")));
+  }
+  void Reload(CertifierNode& node) {
+    node.Reload();
+    for (int i = 0; i < 5000 && status_.version == 1 && status_.failed_reloads == 0; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      node.Tick(kNow);
+      bus_->Dispatch(0);
+    }
+  }
+
+  const std::string kShipped = FOREREACH_SOURCE_DIR "/config/point_mass.yaml";
+  const std::string path_ = testing::TempDir() + "forereach_reload_" + std::to_string(getpid()) + ".yaml";
+  const Clock clock_ = [] { return kNow; };
+  std::unique_ptr<Bus> bus_ = OpenBus("memq://", clock_);
+  certifier_status_v2_t status_{};
+};
+
+TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
+  Copy([](const std::string& text) { return text; });
+  const Config before = LoadConfig(path_);
+  CertifierNode node(before, *bus_, {clock_, clock_});
+  bus_->Subscribe("CERTIFIER_STATUS", [this](const Received& r) { status_ = Decoded<certifier_status_v2_t>(r.bytes).value(); });
+  node.Tick(kNow);
+  bus_->Dispatch(0);
+  ASSERT_EQ(status_.version, 1);
+
+  Copy([](const std::string& text) { return text + "\nnonsense: 3\n"; });
+  Reload(node);
+  EXPECT_EQ(status_.failed_reloads, 1);
+  EXPECT_EQ(status_.version, 1);
+  EXPECT_EQ(GetDigest(status_.config_digest), before.digest);
+  EXPECT_THAT(GetText(status_.message), testing::HasSubstr("nonsense"));
+
+  status_ = {};
+  status_.version = 1;
+  Copy([](const std::string& text) { return text + "\nbus: {channels: {decision: ELSEWHERE}}\n"; });
+  Reload(node);
+  EXPECT_EQ(status_.failed_reloads, 2) << "a channel cannot change under a running process";
+
+  status_ = {};
+  status_.version = 1;
+  Copy([](const std::string& text) { return "# another\n" + text; });
+  Reload(node);
+  EXPECT_EQ(status_.version, 2);
+  EXPECT_EQ(GetDigest(status_.config_digest), LoadConfig(path_).digest);
+  EXPECT_EQ(GetText(status_.message), "waits for the robot's state");
+  std::filesystem::remove(path_);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
+#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/names.h"
@@ -55,6 +55,7 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   Send(New(kIntoTheCircle), decision_t::CAUSE_OBSTACLE);
   Send(New(kOutsideDomain), decision_t::CAUSE_DOMAIN_EXIT);
 
+  ASSERT_TRUE(WaitForDecisions(4));  // of what waits together the newest is decided on first
   candidate_plan_t bad = New(kGentle);
   bad.plan_id = 1;
   Send(bad, decision_t::CAUSE_DUPLICATE);
@@ -103,13 +104,13 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   }
   EXPECT_EQ(Encode(certified[1].plan), Encode(good));
 
-  const auto status = probe_.Heard<certifier_status_t>("CERTIFIER_STATUS");
+  const auto status = probe_.Heard<certifier_status_v2_t>("CERTIFIER_STATUS");
   ASSERT_FALSE(status.empty());
   EXPECT_EQ(status.back().candidates, 15);
-  EXPECT_EQ(status.back().certified, 3);
-  EXPECT_EQ(status.back().abstained_safety, 1);
-  EXPECT_EQ(status.back().abstained_domain, 1);
-  EXPECT_EQ(status.back().rejected, 10);
+  EXPECT_EQ(status.back().by_outcome[decision_t::CERTIFIED], 3);
+  EXPECT_EQ(status.back().by_outcome[decision_t::ABSTAIN_SAFETY], 1);
+  EXPECT_EQ(status.back().by_outcome[decision_t::ABSTAIN_DOMAIN], 1);
+  EXPECT_EQ(status.back().by_outcome[decision_t::REJECTED], 10);
 
   EXPECT_EQ(certifier_.Terminate(), 0) << certifier_.error();
   const auto summary = nlohmann::json::parse(certifier_.output());
@@ -162,7 +163,7 @@ TEST_F(CertifierProcessTest, FiveHundredCandidatesInABurstAreAnsweredExactlyOnce
   EXPECT_EQ(answers.size(), kCandidates);
   for (const auto& [plan_id, count] : answers) EXPECT_EQ(count, 1) << plan_id;
   EXPECT_EQ(probe_.heard("PLAN_CERTIFIED").size(), kCandidates / 2);
-  EXPECT_EQ(probe_.Heard<certifier_status_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
+  EXPECT_EQ(probe_.Heard<certifier_status_v2_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
 }
 
 TEST_F(CertifierProcessTest, StopsInTheMiddleOfAFlood) {

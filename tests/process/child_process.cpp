@@ -80,15 +80,23 @@ bool ChildProcess::WaitForLog(const std::string& text) {
   return false;
 }
 
-std::optional<int> ChildProcess::WaitForExit(std::chrono::milliseconds patience) {
+bool ChildProcess::WaitForEnd(std::chrono::milliseconds patience) {
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (!Reap() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(kPoll);
-  if (!ended_ || !WIFEXITED(status_)) return std::nullopt;
+  return ended_;
+}
+
+void ChildProcess::Signal(int signal) {
+  if (!Reap()) kill(pid_, signal);
+}
+
+std::optional<int> ChildProcess::WaitForExit(std::chrono::milliseconds patience) {
+  if (!WaitForEnd(patience) || !WIFEXITED(status_)) return std::nullopt;
   return WEXITSTATUS(status_);
 }
 
 std::optional<int> ChildProcess::Terminate() {
-  if (!Reap()) kill(pid_, SIGTERM);
+  Signal(SIGTERM);
   return WaitForExit(kEndsWithin);
 }
 

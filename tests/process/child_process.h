@@ -30,6 +30,12 @@ class ChildProcess final {
   /** Its exit code once it has ended; nothing if it has not within `patience`, or was ended by a signal. */
   [[nodiscard]] std::optional<int> WaitForExit(std::chrono::milliseconds patience = kPatience);
 
+  /** True if it has ended, however, within `patience`. */
+  [[nodiscard]] bool WaitForEnd(std::chrono::milliseconds patience);
+
+  /** Sends it a signal, if it still runs. */
+  void Signal(int signal);
+
   /** Sends SIGTERM, then as WaitForExit within kEndsWithin. */
   [[nodiscard]] std::optional<int> Terminate();
 

@@ -401,6 +401,40 @@ TEST(GuardCheck, StepsComeInOrderAndEndAtTheHorizon) {
   EXPECT_EQ(guard.Check(1, State{0, 0}).cause, GuardCause::kNotExecuting);
 }
 
+TEST(GuardHalt, AStateOutsideItsSliceHaltsUntilAReset) {
+  Guard guard = Executing();
+  EXPECT_EQ(guard.Check(1, State{100, 0}).cause, GuardCause::kOutsideSlice);
+  EXPECT_TRUE(guard.halted());
+  const auto next = Sealed(Plan(8));
+  EXPECT_EQ(guard.Accept(next, kNow).cause, GuardCause::kHalted);
+  EXPECT_EQ(guard.TryStart(kNow, State{0, 0}).cause, GuardCause::kHalted);
+  guard.Reset();
+  EXPECT_TRUE(guard.Accept(next, kNow).ok());
+}
+
+TEST(GuardKey, TakesSignedPlansOnly) {
+  GuardOptions options = TwoStates();
+  options.key = Key256{1};
+  Guard guard(options);
+  const auto plan = Sealed(Plan());
+  EXPECT_EQ(guard.Accept(plan, kNow).cause, GuardCause::kUnsigned);
+  Signer signer({1}, "certifier", 0), stranger({2}, "certifier", 0);
+  EXPECT_EQ(guard.Accept(stranger.Sign("PLAN_CERTIFIED", plan, kNow), kNow).cause, GuardCause::kForged);
+  EXPECT_EQ(guard.Accept(signer.Sign("PLAN_CANDIDATE", plan, kNow), kNow).cause, GuardCause::kForged);
+  EXPECT_EQ(guard.pending(), nullptr);
+  const auto good = signer.Sign("PLAN_CERTIFIED", plan, kNow);
+  EXPECT_TRUE(guard.Accept(good, kNow).ok());
+  EXPECT_EQ(guard.Accept(good, kNow).cause, GuardCause::kSignatureReplayed);
+}
+
+TEST(GuardHalt, ForgetsWhatWaitsAndWhatExecutes) {
+  Guard guard = Executing();
+  ASSERT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+  guard.Halt();
+  EXPECT_EQ(guard.executing(), nullptr);
+  EXPECT_EQ(guard.pending(), nullptr);
+}
+
 TEST(GuardOptionsTest, ImpossibleOptionsThrow) {
   EXPECT_THROW(Guard({0, 1, kStep, {}, {}}), std::invalid_argument);
   EXPECT_THROW(Guard({17, 1, kStep, {}, {}}), std::invalid_argument);

@@ -163,7 +163,7 @@ class VerifyObstacles : public testing::Test {
       break;
     }
     candidate_.utime = kStart + 2;
-    candidate_.start_utime = kStart + 1000;
+    candidate_.start_utime = kStart + 100'000;
   }
 
   [[nodiscard]] obstacles_t Message(double x, std::int64_t sequence, std::int64_t utime) const {

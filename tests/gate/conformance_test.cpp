@@ -1,0 +1,83 @@
+// A measured state against the slice of the step it is at.
+#include "certifier/gate/conformance.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+namespace forereach {
+namespace {
+
+// Slices [t, t + 1] in both coordinates, T = 3.
+certified_plan_t Plan(std::int64_t plan_id) {
+  certified_plan_t plan{};
+  plan.plan.plan_id = plan_id;
+  plan.plan.num_states = 2;
+  plan.plan.num_steps = 3;
+  for (int t = 0; t <= 3; ++t)
+    for (int k = 0; k < 2; ++k) plan.slice_lower[t][k] = t, plan.slice_upper[t][k] = t + 1;
+  return plan;
+}
+
+robot_state_t At(std::int64_t sequence, std::int64_t plan_id, int step, double x, double y) {
+  robot_state_t state{};
+  state.sequence = sequence;
+  state.executing_plan_id = plan_id;
+  state.executing_step = static_cast<std::int16_t>(step);
+  state.mode = plan_id < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
+  state.num_states = 2;
+  state.state[0] = x;
+  state.state[1] = y;
+  return state;
+}
+
+TEST(ConformanceTest, TheSliceIsClosed) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  EXPECT_FALSE(conformance.Check(At(0, 7, 1, 1, 2)));
+  const auto above = conformance.Check(At(10, 7, 1, 1, std::nextafter(2.0, 3.0)));
+  ASSERT_TRUE(above);
+  EXPECT_EQ(above->plan_id, 7);
+  EXPECT_EQ(above->step, 1);
+  EXPECT_EQ(above->coordinate, 1);
+  EXPECT_EQ(above->upper, 2);
+  EXPECT_EQ(conformance.Check(At(20, 7, 1, std::nextafter(1.0, 0.0), 1))->coordinate, 0);
+  EXPECT_TRUE(conformance.Check(At(30, 7, 1, std::numeric_limits<double>::quiet_NaN(), 1)));
+}
+
+TEST(ConformanceTest, WhatItWasExecutingBeforeCountsWhereAnotherPlanTakesOver) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  certified_plan_t next = Plan(8);
+  next.slice_upper[0][0] = next.slice_upper[0][1] = 9;
+  conformance.Remember(next);
+  EXPECT_FALSE(conformance.Check(At(0, 7, 0, 0.5, 0.5)));
+  const auto departure = conformance.Check(At(1, 8, 0, 0.5, 1.5));
+  ASSERT_TRUE(departure) << "inside slice 0 of plan 8, not inside slice 1 of plan 7";
+  EXPECT_EQ(departure->plan_id, 7);
+  EXPECT_EQ(departure->step, 1);
+  EXPECT_FALSE(conformance.Check(At(5, 8, 0, 0.5, 1.5))) << "with messages missing between, it cannot tell";
+}
+
+TEST(ConformanceTest, StandingAndUnknownPlansAreNotJudged) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  EXPECT_FALSE(conformance.Check(At(0, 7, 2, 2.5, 2.5)));
+  EXPECT_FALSE(conformance.Check(At(1, -1, -1, 100, 100))) << "standing is a hold mode of the robot";
+  EXPECT_FALSE(conformance.Check(At(2, 99, 0, 100, 100)));
+  EXPECT_FALSE(conformance.Check(At(3, 7, 4, 100, 100))) << "past the horizon";
+  EXPECT_FALSE(conformance.Check(At(5, 7, -1, 100, 100)));
+}
+
+TEST(ConformanceTest, TheLastPlansAreRemembered) {
+  Conformance conformance;
+  const auto count = static_cast<std::int64_t>(Conformance::kPlans);
+  for (std::int64_t id = 0; id <= count; ++id) conformance.Remember(Plan(id));
+  EXPECT_FALSE(conformance.Check(At(0, 0, 0, 100, 100))) << "the first is forgotten";
+  EXPECT_TRUE(conformance.Check(At(10, 1, 0, 100, 100)));
+  EXPECT_TRUE(conformance.Check(At(20, count, 0, 100, 100)));
+}
+
+}  // namespace
+}  // namespace forereach
