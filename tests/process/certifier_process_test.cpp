@@ -1,4 +1,5 @@
 // forereach-certifier as a process, fed good and bad messages over a real bus.
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <string>
@@ -102,7 +103,7 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
     EXPECT_TRUE(FindSealFaults(plan).empty());
     EXPECT_EQ(GetDigest(plan.config_digest), config_.digest);
   }
-  EXPECT_EQ(Encode(certified[1].plan), Encode(good));
+  EXPECT_TRUE(std::ranges::any_of(certified, [&](const auto& plan) { return Encode(plan.plan) == Encode(good); }));
 
   const auto status = probe_.Heard<certifier_status_v2_t>("CERTIFIER_STATUS");
   ASSERT_FALSE(status.empty());

@@ -1,0 +1,397 @@
+// The fault campaign: real processes on a real loopback bus are killed, stopped, lied to, flooded and cut off, and after each
+// try a witness says whether anything happened that may never happen. Writes a table.
+#include <csignal>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include <CLI/CLI.hpp>
+#include <sys/mount.h>
+
+#include "certifier/gate/candidate_message.h"
+#include "cli/progress.h"
+#include "forereach/command_t.hpp"
+#include "tests/faults/relay.h"
+#include "tests/faults/rig.h"
+
+namespace forereach {
+namespace {
+
+using std::chrono::milliseconds;
+
+struct Row {
+  std::string fault;
+  int tries = 0;
+  std::size_t forbidden = 0;         // what may never happen, and did
+  std::int64_t lost_by_logger = 0;   // confirmed and not in the log
+  int recovered = 0, said_why = 0;   // of the tries
+  std::string remark;
+};
+
+struct Options {
+  int kills = 1000, floods = 100'000, others = 20;
+  unsigned seed = 1;
+  std::string report = "docs/reliability.md";
+};
+
+// The demo's task, with its files named absolutely.
+std::string Task(const std::string& more = "") {
+  std::ostringstream text;
+  text << std::ifstream(FOREREACH_SOURCE_DIR "/config/demo.yaml").rdbuf();
+  std::string task = text.str();
+  const std::string relative = "transitions: data/";
+  task.replace(task.find(relative), relative.size(), "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
+  return task + "\n" + more;
+}
+
+class Campaign final {
+ public:
+  explicit Campaign(const Options& options) : options_(options), random_(options.seed) {}
+
+  std::vector<Row> Run() {
+    Signals("SIGKILL at a random moment", SIGKILL, options_.kills);
+    Signals("SIGSTOP for up to 2 s", SIGSTOP, options_.others * 2);
+    BadNetwork();
+    Lies();
+    Nonsense();
+    Forgeries();
+    Flood();
+    Disks();
+    NoNetwork();
+    BadReload();
+    return rows_;
+  }
+
+ private:
+  int Below(int bound) { return static_cast<int>(random_() % static_cast<unsigned>(bound)); }
+
+  // `hurt` does something to a healthy system; then it has to heal.
+  void Try(Row& row, Rig& rig, const std::function<void()>& hurt, bool logger_hurt = false) {
+    ++row.tries;
+    const std::size_t before = rig.witness().violations().size();
+    hurt();
+    if (logger_hurt) row.lost_by_logger += rig.LostByLogger();
+    const std::string why = rig.Heal();
+    for (std::size_t i = before; i < rig.witness().violations().size(); ++i)
+      std::cerr << row.fault << ": FORBIDDEN: " << rig.witness().violations()[i] << "\n";
+    row.forbidden += rig.witness().violations().size() - before;
+    if (why.empty())
+      ++row.recovered;
+    else
+      std::cerr << row.fault << ": " << why << "\n", ++row.said_why, row.remark = why;
+    progress_->Advance();
+  }
+
+  Row& Begin(const std::string& fault, int tries) {
+    std::cerr << fault << "\n";
+    rows_.push_back({fault});
+    progress_ = std::make_unique<Progress>("tries", static_cast<std::size_t>(tries));
+    return rows_.back();
+  }
+
+  void Signals(const std::string& fault, int signal, int tries) {
+    Rig rig(Task());
+    Row& row = Begin(fault, tries);
+    if (const std::string why = rig.Heal(); !why.empty()) row.remark = "never began: " + why;
+    for (int i = 0; i < tries && row.remark.rfind("never", 0) != 0; ++i) {
+      const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
+      Try(row, rig, [&] {
+        rig.Listen(milliseconds(Below(120)));
+        rig.Signal(role, signal);
+        if (signal == SIGKILL) {
+          static_cast<void>(rig.Reap(role));
+        } else {
+          rig.Listen(milliseconds(Below(2000)));
+          rig.Signal(role, SIGCONT);
+        }
+      }, role == Rig::kLogger);
+    }
+  }
+
+  void BadNetwork() {
+    const std::vector<std::pair<std::string, Weather>> weathers{{"one message in five dropped", {.drop = 0.2}},
+                                                                {"one in five sent twice", {.repeat = 0.2}},
+                                                                {"one in five delayed by 60 ms", {.delay = 0.2}},
+                                                                {"one in five overtaken", {.swap = 0.2}},
+                                                                {"one in five with a bit flipped", {.corrupt = 0.2}},
+                                                                {"all of these", {0.1, 0.1, 0.1, 0.1, 0.1, 60}}};
+    for (const auto& [name, weather] : weathers) {
+      Rig rig(Task(), true);
+      const BusOptions& channels = rig.config().bus;
+      Relay relay(rig.url(Rig::kPlanner), rig.url(Rig::kCertifier),
+                  {channels.candidate, channels.robot_state, channels.transition, channels.event, channels.command,
+                   channels.obstacles},
+                  options_.seed);
+      std::atomic<bool> stop = false;
+      std::mutex mutex;
+      std::thread passing([&] {
+        while (!stop) {
+          const std::lock_guard lock(mutex);
+          relay.Pass();
+          std::this_thread::sleep_for(std::chrono::microseconds(200));
+        }
+      });
+      const auto set = [&](const Weather& now) {
+        const std::lock_guard lock(mutex);
+        relay.SetWeather(now);
+      };
+      Row& row = Begin("Datagrams: " + name, options_.others);
+      for (int i = 0; i < options_.others; ++i)
+        Try(row, rig, [&] {
+          set(weather);
+          rig.Listen(milliseconds(1000));
+          set({});
+        });
+      stop = true;
+      passing.join();
+      row.remark += (row.remark.empty() ? "" : "; ") + std::to_string(relay.spoiled()) + " messages spoiled";
+    }
+  }
+
+  robot_state_t State(const Rig& rig) const {
+    robot_state_t state{};
+    state.utime = WallClockUs();
+    state.mode = robot_state_t::STANDING;
+    state.executing_plan_id = state.executing_step = -1;
+    state.num_states = static_cast<std::int16_t>(rig.config().problem->model->num_states());
+    return state;
+  }
+
+  // Signed: the liar has the key.
+  void Lies() {
+    Rig rig(Task());
+    Row& row = Begin("A robot that lies about its state (signed)", options_.others);
+    std::int64_t sequence = 1 << 30;
+    for (int i = 0; i < options_.others; ++i)
+      Try(row, rig, [&] {
+        for (int j = 0; j < 20; ++j) {
+          robot_state_t state = State(rig);
+          state.sequence = sequence++;
+          if (j % 2 == 0) state.mode = robot_state_t::EXECUTING;
+          state.executing_plan_id = j % 2 == 0 ? WallClockUs() : -1;
+          for (int k = 0; k < state.num_states; ++k) state.state[k] = j % 5 == 4 ? 1e300 : Below(100) - 50;
+          if (j % 2 == 0) state.mode = robot_state_t::STANDING;  // it claims no plan that it does not have
+          rig.bus().Publish(rig.config().bus.robot_state, state);
+          rig.Listen(milliseconds(5));
+        }
+      });
+  }
+
+  void Nonsense() {
+    Rig rig(Task());
+    Row& row = Begin("A planner that sends NaN, wrong sizes, garbage (signed)", options_.others);
+    std::int64_t id = 1;
+    for (int i = 0; i < options_.others; ++i)
+      Try(row, rig, [&] {
+        for (int j = 0; j < 50; ++j) {
+          candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
+          SetText(candidate.source, "nonsense");
+          if (j % 3 == 0) candidate.control[Below(6)][Below(2)] = std::numeric_limits<double>::quiet_NaN();
+          if (j % 3 == 1) candidate.num_steps = static_cast<std::int16_t>(random_());
+          if (j % 3 == 2) candidate.initial_half_width[Below(6)] = -1;
+          std::vector<std::uint8_t> bytes = Encode(candidate);
+          if (j % 7 == 0) bytes.resize(static_cast<std::size_t>(Below(20'000)));
+          rig.bus().Publish(rig.config().bus.candidate, Bytes(bytes));
+          if (j % 10 == 0) rig.Listen(milliseconds(5));
+        }
+      });
+  }
+
+  // Whoever is on the network, without the key: new plans, certified plans, resets, and what was heard before.
+  void Forgeries() {
+    Rig rig(Task());
+    Row& row = Begin("Forged and replayed messages (no key)", options_.others);
+    const BusOptions& channels = rig.config().bus;
+    std::vector<std::pair<std::string, std::vector<std::uint8_t>>> heard;
+    rig.open_bus().SubscribeUnchecked(".*", [&](const Received& r) {
+      if (channels.signed_channels().contains(r.channel) && heard.size() < 2000)
+        heard.push_back({r.channel, {r.bytes.begin(), r.bytes.end()}});
+    });
+    for (int i = 0; i < options_.others; ++i)
+      Try(row, rig, [&] {
+        heard.clear();
+        rig.Listen(milliseconds(500));
+        const auto recorded = heard;
+        for (const auto& [channel, bytes] : recorded) {
+          rig.open_bus().Publish(channel, Bytes(bytes));                     // again
+          rig.open_bus().Publish(channel, WithoutSignature(Bytes(bytes)));  // unsigned
+          auto altered = bytes;
+          altered[altered.size() / 2] ^= 1;
+          rig.open_bus().Publish(channel, Bytes(altered));
+        }
+        rig.Listen(milliseconds(100));
+      });
+    if (rig.witness().status()) {
+      const auto& s = *rig.witness().status();
+      row.remark += "refused by the certifier: " + std::to_string(s.refused_unsigned) + " unsigned, " +
+                    std::to_string(s.refused_forged) + " forged, " + std::to_string(s.refused_replayed) + " replayed";
+    }
+  }
+
+  void Flood() {
+    Rig rig(Task());
+    Row& row = Begin("A flood of " + std::to_string(options_.floods) + " candidates (signed)", 1);
+    std::int64_t candidates = 0;
+    Try(row, rig, [&] {
+      static_cast<void>(rig.Heal());
+      candidate_plan_t candidate = CandidateFor(rig.config(), 1, Eigen::Vector2d(0, 0), 12, milliseconds(500));
+      SetText(candidate.source, "flood");
+      const std::int64_t before = rig.witness().decisions();
+      for (int i = 0; i < options_.floods; ++i) {
+        candidate.plan_id = i + 1;
+        candidate.sequence = i;
+        candidate.utime = WallClockUs();
+        candidate.start_utime = candidate.utime + 500'000;
+        rig.bus().Publish(rig.config().bus.candidate, candidate);
+        if (i % 16 == 0) rig.Listen(milliseconds(0)), rig.open_bus().Dispatch(0);
+      }
+      rig.Listen(milliseconds(1500));
+      candidates = rig.witness().decisions() - before;
+    });
+    if (rig.witness().status())
+      row.remark = std::to_string(candidates) + " decisions heard; the certifier counts " +
+                   std::to_string(rig.witness().status()->candidates) + " decided on and " +
+                   std::to_string(rig.witness().status()->candidates_lost) + " that the bus lost";
+  }
+
+  void Disks();
+  void NoNetwork();
+  void BadReload();
+
+  const Options options_;
+  std::mt19937 random_;
+  std::vector<Row> rows_;
+  std::unique_ptr<Progress> progress_;
+};
+
+// A small file system of its own for the log, filled, made read-only, and given back.
+void Campaign::Disks() {
+  const ScratchDirectory scratch;
+  const std::string directory = scratch.path();
+  if (::mount("tmpfs", directory.c_str(), "tmpfs", 0, "size=3m") != 0) {
+    rows_.push_back({"Full disk, read-only directory"});
+    rows_.back().remark = "not tried: mounting a small file system needs root";
+    return;
+  }
+  {
+    Rig rig(Task());
+    rig.logger_options = {"--directory", directory};
+    for (const bool full : {true, false}) {
+      rig.Signal(Rig::kLogger, SIGTERM);
+      static_cast<void>(rig.Reap(Rig::kLogger));
+      rig.Start(Rig::kLogger);
+      Row& row = Begin(full ? "Full disk" : "Log directory read-only", options_.others);
+      for (int i = 0; i < options_.others; ++i)
+        Try(row, rig, [&] {
+          const std::string filler = directory + "/filler";
+          if (full)
+            std::ofstream(filler) << std::string(4 << 20, 'x');
+          else
+            ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT | MS_RDONLY, "size=3m");
+          rig.Listen(milliseconds(700));
+          if (full)
+            std::filesystem::remove(filler);
+          else
+            ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT, "size=3m");
+          for (const auto& entry : std::filesystem::directory_iterator(directory))
+            if (full && entry.path().extension() == ".lcmlog" && i % 4 == 3) {
+              rig.Signal(Rig::kLogger, SIGTERM);
+              static_cast<void>(rig.Reap(Rig::kLogger));
+              std::filesystem::remove(entry.path());
+              break;
+            }
+        });
+    }
+  }
+  ::umount(directory.c_str());
+}
+
+// A process that starts without a network says what to do, and ends.
+void Campaign::NoNetwork() {
+  const ScratchDirectory scratch;
+  const std::string task = scratch.Write("task.yaml", Task());
+  Row& row = Begin("No multicast route at the start", 4);
+  for (const char* program : {FOREREACH_CERTIFIER, FOREREACH_PLANNER, FOREREACH_LOGGER, FOREREACH_ROBOT_SIM}) {
+    ++row.tries;
+    std::vector<std::string> command{program, "--config", task, "--lcm-url", "udpm://10.255.255.1:7667?ttl=0"};
+    if (program == std::string(FOREREACH_LOGGER)) command.insert(command.end(), {"--directory", scratch.path() / "log"});
+    ChildProcess process(command);
+    const auto code = process.WaitForExit(std::chrono::seconds(10));
+    if (code == 2 && process.error().find("bus:") != std::string::npos) ++row.said_why;
+    progress_->Advance();
+  }
+  row.remark = "exit 2 and advice";
+}
+
+void Campaign::BadReload() {
+  Rig rig(Task());
+  Row& row = Begin("Reload of a bad task file", options_.others);
+  const std::string path = rig.task_path();
+  std::ostringstream good;
+  good << std::ifstream(path).rdbuf();
+  for (int i = 0; i < options_.others; ++i)
+    Try(row, rig, [&] {
+      std::ofstream(path) << good.str().substr(0, static_cast<std::size_t>(Below(static_cast<int>(good.str().size()))));
+      if (i % 2 == 0)
+        rig.Signal(Rig::kCertifier, SIGHUP);
+      else
+        rig.Command(command_t::RELOAD);
+      rig.Listen(milliseconds(200));
+      std::ofstream(path) << good.str();
+    });
+  if (rig.witness().status())
+    row.remark = std::to_string(rig.witness().status()->failed_reloads) + " reloads refused, version " +
+                 std::to_string(rig.witness().status()->version) + " in force";
+}
+
+std::string Table(const std::vector<Row>& rows, const Options& options) {
+  std::ostringstream text;
+  text << "Made by `scripts/faults --kills " << options.kills << " --others " << options.others << " --flood "
+       << options.floods << " --seed " << options.seed << "`. *Forbidden*: an uncertified plan was executed, a control was not\n"
+       << "its plan's, a candidate was answered twice. *Lost*: events that the logger had confirmed and its log does not\n"
+       << "hold. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK and decides, the logger\n"
+       << "records. *Said why*: it did not, and told the reason.\n\n"
+       << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
+  for (const Row& row : rows)
+    text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | " << row.lost_by_logger << " | "
+         << row.recovered << " | " << row.said_why << " | " << row.remark << " |\n";
+  return text.str();
+}
+
+// Replaces what stands between the two marks in the report.
+void Write(const std::string& path, const std::string& table) {
+  const std::string begin = "<!-- faults -->\n", end = "<!-- end of faults -->";
+  std::ostringstream old;
+  old << std::ifstream(path).rdbuf();
+  std::string text = old.str();
+  const std::size_t from = text.find(begin), to = text.find(end);
+  if (from == std::string::npos || to == std::string::npos)
+    text = begin + table + end + "\n";
+  else
+    text.replace(from + begin.size(), to - from - begin.size(), table);
+  std::ofstream(path) << text;
+}
+
+int Main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Hurts the four processes in every way it knows, and says what happened.", "forereach_faults");
+  app.add_option("--kills", options.kills, "SIGKILLs in all")->capture_default_str();
+  app.add_option("--others", options.others, "Tries of each other fault")->capture_default_str();
+  app.add_option("--flood", options.floods, "Candidates in the flood")->capture_default_str();
+  app.add_option("--seed", options.seed, "Of the random moments")->capture_default_str();
+  app.add_option("--report", options.report, "Where the table goes; empty: to standard output alone")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  const std::vector<Row> rows = Campaign(options).Run();
+  const std::string table = Table(rows, options);
+  std::cout << table << std::flush;
+  if (!options.report.empty()) Write(options.report, table);
+  const bool clean = std::ranges::all_of(rows, [](const Row& row) {
+    return row.forbidden == 0 && row.lost_by_logger == 0 && row.recovered + row.said_why == row.tries;
+  });
+  return clean ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace forereach
+
+int main(int argc, char** argv) { return forereach::Main(argc, argv); }

@@ -1,0 +1,63 @@
+/** Hears everything on the bus and holds it to what may never happen, whatever fails. */
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "certifier/task/config.h"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/logger_status_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "lcmtypes/authentic.h"
+#include "lcmtypes/bus.h"
+
+namespace forereach {
+
+class Witness final {
+ public:
+  /** @param key of the system; a plan that is not signed with it is no certified plan. */
+  Witness(Bus& bus, const BusOptions& channels, const Key256& key);
+
+  /** One line for each thing that may not happen and did:
+      - a robot executes a plan for which no certified plan, signed and sealed, was on the bus;
+      - a control is applied that is not the one of that plan and step;
+      - a candidate is answered twice by one certifier;
+      - a plan is passed on whose decision is not "certified". */
+  [[nodiscard]] const std::vector<std::string>& violations() const { return violations_; }
+
+  [[nodiscard]] std::int64_t decisions() const { return decisions_; }
+  [[nodiscard]] std::int64_t certificates() const { return static_cast<std::int64_t>(plans_.size()); }
+  [[nodiscard]] std::int64_t transitions() const { return transitions_; }
+  [[nodiscard]] const std::optional<certifier_status_v2_t>& status() const { return status_; }
+  [[nodiscard]] const std::optional<logger_status_t>& logger_status() const { return logger_status_; }
+  void Forget() { status_.reset(), logger_status_.reset(); }
+
+ private:
+  void OnDecision(const Received& received);
+  void OnCertified(const Received& received);
+  void OnState(const Received& received);
+  void OnTransition(const Received& received);
+  void Violate(const std::string& what) { violations_.push_back(what); }
+
+  const BusOptions channels_;
+  Authenticator authenticator_;
+  std::map<std::int64_t, certified_plan_t> plans_;
+  std::map<Digest, std::int16_t> outcomes_;
+  struct Applied {
+    std::int64_t plan_id;
+    int step;
+  };
+  std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
+  std::optional<certifier_status_v2_t> status_;
+  std::optional<logger_status_t> logger_status_;
+  std::int64_t decisions_ = 0, transitions_ = 0;
+  std::vector<std::string> violations_;
+};
+
+}  // namespace forereach
