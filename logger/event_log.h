@@ -33,6 +33,11 @@ struct LogEvent {
   std::vector<std::uint8_t> data;
 };
 
+/** BLAKE2b-256 of the event's record as it stands in the file: any bit of it that changes changes the digest. */
+[[nodiscard]] Digest DigestOf(const LogEvent& event);
+/** Bytes of that record. */
+[[nodiscard]] std::int64_t RecordBytes(const LogEvent& event);
+
 inline constexpr std::int32_t kMaxLogChannelBytes = 63;  ///< LCM's own limit.
 inline constexpr std::int32_t kMaxLogDataBytes = 1 << 24;
 
@@ -51,7 +56,7 @@ class EventLogReader final {
   /** Reads the next record; `event` is meaningful for kEvent only. kEnd and kCutTail repeat.
   Length fields are not believed blindly: one that points behind the end of the file is a cut tail only if no whole
   record follows, and one behind whose record no sync word stands is damaged if it hides another whole record.
-  Cost: linear in the bytes passed; allocates at most kMaxLogDataBytes. */
+  Cost: linear in the bytes passed; `event` never holds more than kMaxLogDataBytes beside its channel. */
   [[nodiscard]] LogStatus Next(LogEvent& event);
 
   /** Bytes from the beginning of the file to behind the last record or damage passed. */

@@ -21,7 +21,7 @@ void Sql(const std::string& path, const char* sql) {
 Rows SampleRows() {
   Rows rows;
   DecisionRow& decision = rows.decisions.emplace_back();
-  decision.event = {"a.lcmlog", 7};
+  decision.event = {"a.lcmlog", 7, "d7"};
   decision.utime = 11;
   decision.candidate_utime = 12;
   decision.sequence = 13;
@@ -40,12 +40,12 @@ Rows SampleRows() {
   decision.elapsed_us = 1.5;
   decision.plan_digest = "00ff";
   EventRow& event = rows.events.emplace_back();
-  event.event = {"a.lcmlog", 8};
+  event.event = {"a.lcmlog", 8, "e8"};
   event.kind = "goal_reached";
   event.state = {0.1, -2, 1e300};
   event.value = 0.7;
   GapRow& gap = rows.gaps.emplace_back();
-  gap.event = {"a.lcmlog", 9};
+  gap.event = {"a.lcmlog", 9, "f9"};
   gap.channel = "C";
   gap.source = "s";
   gap.expected = 4;
