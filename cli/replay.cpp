@@ -1,6 +1,7 @@
 #include "cli/replay.h"
 
 #include <deque>
+#include <filesystem>
 #include <map>
 #include <optional>
 
@@ -16,7 +17,7 @@ namespace {
 
 struct Recorded {
   decision_t decision;
-  std::int64_t event;
+  std::string event;
 };
 
 std::string InWords(const decision_t& decision) {
@@ -43,33 +44,37 @@ class Replayer {
   explicit Replayer(const Config& config) : config_(config) { gate_.emplace(config); }
 
   // A first pass: which decision each candidate's bytes were given, in order.
-  void Collect(const LogEvent& event) {
+  void Collect(const LogEvent& event, const std::string& log) {
     if (event.channel != config_.bus.decision) return;
     if (const auto decision = Decoded<decision_t>(event.data))
-      recorded_[GetDigest(decision->plan_digest)].push_back({*decision, event.number});
+      recorded_[GetDigest(decision->plan_digest)].push_back({*decision, NameOf(event, log)});
   }
 
-  void Feed(const LogEvent& event) {
+  void Feed(const LogEvent& event, const std::string& log) {
     if (event.channel == config_.bus.obstacles) {
       static_cast<void>(gate_->UpdateObstacles(event.data, event.utime));
     } else if (event.channel == config_.bus.candidate) {
-      FeedCandidate(event);
+      FeedCandidate(event, NameOf(event, log));
     } else if (event.channel == config_.bus.certified) {
-      CheckSeal(event);
+      CheckSeal(event, NameOf(event, log));
     }
   }
 
-  ReplayResult Finish() {
+  ReplayResult Finish(std::int64_t corruptions) {
+    result_.corruptions = corruptions;
     for (const auto& [digest, decisions] : recorded_)
       for (const Recorded& recorded : decisions)
         Differ(recorded.event, recorded.decision.plan_id, "decided, but its candidate is not in the log");
     return std::move(result_);
   }
 
-  void AddCorruptions(std::int64_t count) { result_.corruptions = count; }
-
  private:
-  void FeedCandidate(const LogEvent& event) {
+  // `log` names the file where there are several.
+  static std::string NameOf(const LogEvent& event, const std::string& log) {
+    return log + "event " + std::to_string(event.number);
+  }
+
+  void FeedCandidate(const LogEvent& event, const std::string& name) {
     ++result_.candidates;
     auto& waiting = recorded_[DigestOf(event.data)];
     std::optional<Recorded> recorded;
@@ -80,7 +85,7 @@ class Replayer {
       last_sequence_ = recorded->decision.sequence;
     }
     const decision_t replayed = gate_->Decide(event.data, event.utime).decision;
-    if (!recorded) return Differ(event.number, replayed.plan_id, "no decision recorded; replayed " + InWords(replayed));
+    if (!recorded) return Differ(name, replayed.plan_id, "no decision recorded; replayed " + InWords(replayed));
     if (recorded->decision.cause == decision_t::CAUSE_QUEUE_FULL) {
       ++result_.displaced;
       return;
@@ -89,19 +94,19 @@ class Replayer {
     if (difference.empty())
       ++result_.agreed;
     else
-      Differ(event.number, replayed.plan_id, difference);
+      Differ(name, replayed.plan_id, difference);
   }
 
-  void CheckSeal(const LogEvent& event) {
+  void CheckSeal(const LogEvent& event, const std::string& name) {
     const auto certified = Decoded<certified_plan_t>(event.data);
-    if (!certified) return Differ(event.number, -1, "not a certified_plan_t");
+    if (!certified) return Differ(name, -1, "not a certified_plan_t");
     for (const SealFault& fault : FindSealFaults(*certified))
-      Differ(event.number, certified->plan.plan_id,
+      Differ(name, certified->plan.plan_id,
              "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
   }
 
-  void Differ(std::int64_t event, std::int64_t plan_id, const std::string& what) {
-    result_.differences.push_back("event " + std::to_string(event) + ", plan " + std::to_string(plan_id) + ": " + what);
+  void Differ(const std::string& event, std::int64_t plan_id, const std::string& what) {
+    result_.differences.push_back(event + ", plan " + std::to_string(plan_id) + ": " + what);
   }
 
   const Config& config_;
@@ -113,13 +118,15 @@ class Replayer {
 
 }  // namespace
 
-ReplayResult Replay(const std::string& log_path, const Config& config) {
+ReplayResult Replay(const std::vector<std::string>& logs, const Config& config) {
   Replayer replayer(config);
-  EventLogReader first(log_path), second(log_path);
-  ForEachEvent(first, [&](const LogEvent& event) { replayer.Collect(event); });
-  ForEachEvent(second, [&](const LogEvent& event) { replayer.Feed(event); });
-  replayer.AddCorruptions(second.corruptions());
-  return replayer.Finish();
+  const auto name = [&logs](const std::string& log) {
+    return logs.size() == 1 ? "" : std::filesystem::path(log).filename().string() + " ";
+  };
+  ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) { replayer.Collect(event, name(log)); });
+  const LogDamage damage =
+      ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) { replayer.Feed(event, name(log)); });
+  return replayer.Finish(damage.places);
 }
 
 }  // namespace forereach

@@ -19,10 +19,10 @@ struct ReplayResult {
   std::vector<std::string> differences;
 };
 
-/** Feeds candidates and obstacles of a log, in its order and at the times it recorded them, to a new gate, and compares
+/** Feeds candidates and obstacles of logs that follow one another, in their order and at the times it recorded them, to a new gate, and compares
 each decision with the recorded one of the same bytes; certified plans have to be sealed (lcmtypes/seal.h). A certifier that
-was started again within the log begins with a new gate here too.
-@throws LogError if the log cannot be read, std::invalid_argument as Certifier does. */
-[[nodiscard]] ReplayResult Replay(const std::string& log_path, const Config& config);
+was started again within the logs begins with a new gate here too.
+@throws LogError if a log cannot be read, std::invalid_argument as Certifier does. */
+[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& config);
 
 }  // namespace forereach

@@ -97,9 +97,10 @@ bool EventLogReader::SyncAt(std::int64_t offset) {
 // The offset of the first whole record that begins in [from, end), or end.
 std::int64_t EventLogReader::FindRecord(std::int64_t from, std::int64_t end) {
   std::array<std::uint8_t, 1 << 16> block;
+  const std::int64_t limit = std::min<std::int64_t>(end + 3, size_);  // the sync word may reach beyond the end
   std::int64_t step = 256;  // doubled, so that a log of nothing but damage costs no more than it has bytes
-  for (; end - from >= static_cast<std::int64_t>(kSync.size()); step = std::min<std::int64_t>(2 * step, std::ssize(block))) {
-    const std::int64_t bytes = std::min(end - from, step);
+  for (; limit - from >= std::ssize(kSync); step = std::min<std::int64_t>(2 * step, std::ssize(block))) {
+    const std::int64_t bytes = std::min(limit - from, step);
     if (!ReadAt(from, block.data(), bytes)) break;
     const auto block_end = block.begin() + bytes;
     for (auto at = block.begin(); (at = std::search(at, block_end, kSync.begin(), kSync.end())) != block_end; ++at) {
@@ -124,7 +125,8 @@ LogStatus EventLogReader::Next(LogEvent& event) {
     event.utime = header.utime;
     event.channel.resize(static_cast<std::size_t>(header.channel_bytes));
     const auto data_bytes = static_cast<std::size_t>(header.data_bytes);
-    if (event.data.capacity() < data_bytes) event.data = {};  // growing would hold the old bytes beside the new
+    // Growing would hold the old bytes beside the new.
+    if (event.data.capacity() < data_bytes) std::vector<std::uint8_t>().swap(event.data);
     event.data.resize(data_bytes);
     if (next == end && ReadAt(channel, event.channel.data(), header.channel_bytes) &&
         ReadAt(data, event.data.data(), header.data_bytes)) {
@@ -155,6 +157,18 @@ void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEven
         return;
     }
   }
+}
+
+LogDamage ForEachEvent(const std::vector<std::string>& logs,
+                       const std::function<void(const LogEvent&, const std::string&)>& visit) {
+  LogDamage damage;
+  for (const std::string& log : logs) {
+    EventLogReader reader(log);
+    ForEachEvent(reader, [&](const LogEvent& event) { visit(event, log); });
+    damage.places += reader.corruptions();
+    damage.bytes += reader.skipped_bytes();
+  }
+  return damage;
 }
 
 EventLogWriter::EventLogWriter(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {

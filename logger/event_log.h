@@ -87,6 +87,16 @@ class EventLogReader final {
 counts. */
 void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEvent&)>& visit);
 
+/** Damaged places of logs, and the bytes in them. */
+struct LogDamage {
+  std::int64_t places = 0, bytes = 0;
+};
+
+/** Calls `visit` with each event of several logs that follow one another, as the files of one run do, and the log's path.
+@throws LogError if one cannot be read. */
+LogDamage ForEachEvent(const std::vector<std::string>& logs,
+                       const std::function<void(const LogEvent&, const std::string&)>& visit);
+
 /** What a writer found in a file that existed already. */
 struct LogRecovery {
   std::int64_t events = 0;           ///< Whole records kept.

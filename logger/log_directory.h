@@ -10,6 +10,8 @@ namespace forereach {
 
 class LogDirectory final {
  public:
+  static constexpr const char* kDatabase = "decisions.sqlite";
+
   /** Makes it if need be. @throws LogError if it cannot. */
   explicit LogDirectory(std::string path);
 

@@ -39,7 +39,7 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
       options_(config.logger),
       free_space_(std::move(free_space)),
       directory_(options_.directory),
-      database_(directory_.PathOf("decisions.sqlite")),
+      database_(directory_.PathOf(LogDirectory::kDatabase)),
       summary_(config),
       interpreter_(channels_, ""),
       flush_(options_.flush_ms * 1e3),
@@ -145,6 +145,7 @@ void Recorder::Rotate(std::int64_t now_us) {
     if (!flushed || !flushed_rows_.empty()) throw LogError("the events and rows of this one cannot be written");
     Open(now_us, ended);
     if (whole) database_.EndRun(ended, now_us);
+    WatchDisk(now_us);  // the ended file may go for the quota
     rotation_problem_.clear();
   } catch (const BadInput& error) {
     rotation_problem_ = std::string("no new log file: ") + error.what();

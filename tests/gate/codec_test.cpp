@@ -12,6 +12,7 @@
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
+#include "forereach/logger_status_t.hpp"
 #include "forereach/obstacle_t.hpp"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -31,7 +32,7 @@ const std::map<std::string, Contract> kContracts = {
     {"certifier_status_t", {0x553e2b8fcb2c6ae3, 248}}, {"decision_t", {0x6c785a9e0911c4e6, 466}},
     {"execution_event_t", {0x4742c25e0eefd377, 336}},  {"obstacle_t", {0x29158dc0270b76d4, 406}},
     {"obstacles_t", {0x9c72b610dc35fea7, 25498}},      {"robot_state_t", {0xe3677d78a66b57da, 166}},
-    {"transition_t", {0xa599cda800864690, 348}},
+    {"transition_t", {0xa599cda800864690, 348}},       {"logger_status_t", {0x2a2438623a759ef0, 260}},
 };
 
 template <class Message>
@@ -50,7 +51,7 @@ class MessageTest : public testing::Test {
 };
 
 using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_t, decision_t, execution_event_t,
-                                obstacle_t, obstacles_t, robot_state_t, transition_t>;
+                                obstacle_t, obstacles_t, robot_state_t, transition_t, logger_status_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {

@@ -239,7 +239,7 @@ TEST_F(DiskTest, AFileThatAloneExceedsTheQuotaPausesAndNothingIsDeleted) {
   EXPECT_FALSE(node_->recorder().recording());
   EXPECT_THAT(node_->recorder().trouble(), HasSubstr("logger.quota_mb"));
   node_->Tick(bus_.now_us += kMinuteUs);  // now the full file is an old one
-  Feed(3);
+  Feed(11);
   EXPECT_TRUE(node_->recorder().recording());
   Stop();
   EXPECT_EQ(LostTo("quota"), 10);
