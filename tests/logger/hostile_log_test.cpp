@@ -168,7 +168,7 @@ class HostileLog : public testing::Test {
 
 TEST_F(HostileLog, EveryUndamagedRecordIsRecovered) {
   std::size_t undamaged = 0, hidden = 0, damaged_rounds = 0;
-  for (int round = 0; round < 400; ++round) {
+  for (int round = 0; round < 200; ++round) {
     SCOPED_TRACE(testing::Message() << "round " << round);
     Damaged log = Window(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog", Below(380), 1 + Below(45));
     for (std::size_t harms = 1 + Below(8); harms > 0 && !log.bytes.empty(); --harms) Harm(log);
@@ -183,8 +183,8 @@ TEST_F(HostileLog, EveryUndamagedRecordIsRecovered) {
     undamaged += expected.size();
     damaged_rounds += expected.size() < ends_.size();
   }
-  EXPECT_GT(undamaged, 2000u);
-  EXPECT_GT(damaged_rounds, 200u);
+  EXPECT_GT(undamaged, 1000u);
+  EXPECT_GT(damaged_rounds, 100u);
   EXPECT_LE(hidden, undamaged / 100);
 }
 
@@ -222,12 +222,12 @@ TEST_F(HostileLog, NestedClaimsTakeNoLongerThanTheirBytes) {
   header[23] = 1;                                   // one byte of channel
   header[25] = 1;                                   // 65536 of data
   std::vector<std::uint8_t> bytes;
-  for (int i = 0; i < 200'000; ++i) bytes.insert(bytes.end(), header.begin(), header.end());
+  for (int i = 0; i < 50'000; ++i) bytes.insert(bytes.end(), header.begin(), header.end());
   bytes.push_back(0);                               // no claim ends at a sync word
   WriteBytes(scratch_ / "nested", bytes);
   EventLogReader reader(scratch_ / "nested");
   ForEachEvent(reader, [](const LogEvent&) {});
-  EXPECT_GT(reader.corruptions(), 100'000);
+  EXPECT_GT(reader.corruptions(), 25'000);
 }
 
 }  // namespace
