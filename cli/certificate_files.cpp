@@ -237,14 +237,16 @@ verifier::Certificate CertificateOf(const certified_plan_t& certified, const std
 
 class LogReading {
  public:
-  LogReading(const std::string& path, const Config& config, LearnedHistory& learned,
+  // Names the file of each certificate if `names` says so.
+  LogReading(const std::vector<std::string>& logs, bool names, const Config& config, LearnedHistory& learned,
              std::vector<RecordedCertificate>& certificates)
       : config_(config), obstacles_(config), learned_(learned), certificates_(certificates) {
-    EventLogReader reader(path);
-    ForEachEvent(reader, [this](const LogEvent& event) { Take(event); });
-    if (reader.corruptions() > 0)
-      certificates_.push_back(
-          {path, {}, "the log is damaged in " + std::to_string(reader.corruptions()) + " places", {}});
+    const LogDamage damage = ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
+      log_ = names ? std::filesystem::path(log).filename().string() + " " : "";
+      Take(event);
+    });
+    if (damage.places > 0)
+      certificates_.push_back({logs[0], {}, "the log is damaged in " + std::to_string(damage.places) + " places", {}});
     for (const auto& [digest, outcome] : outcomes_)
       if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
         certificates_.push_back(
@@ -301,7 +303,7 @@ class LogReading {
   void TakeCertified(const LogEvent& event) {
     RecordedCertificate certificate;
     const auto certified = Decoded<certified_plan_t>(event.message());
-    certificate.name = "event " + std::to_string(event.number);
+    certificate.name = log_ + "event " + std::to_string(event.number);
     if (!certified || !HasSizes(certified->plan)) {
       certificate.missing = "not a certified_plan_t of this task's sizes";
       certificates_.push_back(std::move(certificate));
@@ -348,17 +350,18 @@ class LogReading {
   LearnedHistory& learned_;
   certifier_status_v2_t last_status_{};
   std::vector<RecordedCertificate>& certificates_;
+  std::string log_;
   std::map<Digest, std::size_t> in_force_;  // when a candidate was sent
   std::map<Digest, std::int16_t> outcomes_;
   std::set<Digest> plans_;
   std::int64_t last_decision_ = -1, last_certified_ = -1;
 };
 
-CertificateFile FromLog(const std::string& path, Config config) {
+CertificateFile FromLogs(const std::vector<std::string>& logs, Config config) {
   CertificateFile file;
   file.config = std::move(config);
   LearnedHistory learned(file.config);
-  file.not_certificates = LogReading(path, file.config, learned, file.certificates).abstentions();
+  file.not_certificates = LogReading(logs, logs.size() > 1, file.config, learned, file.certificates).abstentions();
   file.config.problem = learned.WithAll();
   return file;
 }
@@ -391,23 +394,38 @@ void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, cons
     certificates.push_back({"plan with digest " + digest, {}, "certified in the log, but not in the database", {}});
 }
 
+// The files of each run: what a file does not know, the one before does.
+std::vector<std::vector<RunRow>> Chains(Database& database) {
+  std::vector<std::vector<RunRow>> chains;
+  for (RunRow& run : database.Runs()) {
+    if (run.continues.empty() || chains.empty() || chains.back().back().log_file != run.continues) chains.emplace_back();
+    chains.back().push_back(std::move(run));
+  }
+  return chains;
+}
+
 CertificateFile FromDatabase(const std::string& path, Config config) {
   CertificateFile file;
   file.config = std::move(config);
   Database database(path);
   LearnedHistory learned(file.config);
-  for (const RunRow& run : database.Runs()) {
-    const std::string log = (std::filesystem::path(path).parent_path() / run.log_file).string();
-    if (!std::filesystem::exists(log)) {
-      file.certificates.push_back({run.log_file, {}, "the log is not beside the database", {}});
-      continue;
+  for (const std::vector<RunRow>& chain : Chains(database)) {
+    std::vector<std::string> logs;
+    std::vector<DecisionRow> rows;
+    for (const RunRow& run : chain) {
+      const std::string log = (std::filesystem::path(path).parent_path() / run.log_file).string();
+      if (std::filesystem::exists(log)) {
+        logs.push_back(log);
+        std::ranges::move(database.Read(run.log_file).decisions, std::back_inserter(rows));
+      } else {
+        const char* why = run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not beside the database";
+        file.certificates.push_back({run.log_file, {}, why, {}});
+      }
     }
-    const std::size_t before = file.certificates.size();
-    const LogReading reading(log, file.config, learned, file.certificates);
-    for (std::size_t i = before; i < file.certificates.size(); ++i)
-      file.certificates[i].name = run.log_file + " " + file.certificates[i].name;
+    if (logs.empty()) continue;
+    const LogReading reading(logs, true, file.config, learned, file.certificates);
     file.not_certificates += reading.abstentions();
-    CheckRows(database.Read(run.log_file).decisions, reading, learned, file.config, file.certificates);
+    CheckRows(rows, reading, learned, file.config, file.certificates);
   }
   file.config.problem = learned.WithAll();
   return file;
@@ -435,7 +453,7 @@ CertificateFile ReadCertificates(const std::string& path, const std::string& con
   try {
     if (first.rfind(std::string("SQLite format 3\0", 16), 0) == 0)
       return FromDatabase(path, TaskGiven(path, config_path));
-    if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLog(path, TaskGiven(path, config_path));
+    if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLogs({path}, TaskGiven(path, config_path));
     if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{') {
       std::ifstream stream = OpenForReading(path);
       return FromDecision(path, Json::parse(stream), config_path);
@@ -446,6 +464,10 @@ CertificateFile ReadCertificates(const std::string& path, const std::string& con
     throw ConfigError(path + ": " + error.what());
   }
   throw ConfigError(path + ": neither a decision (JSON), nor an event log, nor a decision database");
+}
+
+CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path) {
+  return FromLogs(logs, TaskGiven(logs.front(), config_path));
 }
 
 }  // namespace forereach

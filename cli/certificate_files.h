@@ -34,4 +34,7 @@ struct CertificateFile {
 @throws BadInput if the file is none of the three, cannot be read, or needs a task file and has none. */
 [[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path);
 
+/** Of event logs that follow one another, as the files of one run do. @throws BadInput likewise. */
+[[nodiscard]] CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path);
+
 }  // namespace forereach

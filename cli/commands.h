@@ -10,6 +10,9 @@ class App;
 
 namespace forereach {
 
+/** What commands say of their LOG arguments. */
+inline constexpr const char* kLogs = "LCM event log; several if the run was recorded in several, in their order";
+
 using Action = std::function<int()>;
 
 void AddCertifyCommand(CLI::App& app, Action& action);
@@ -18,6 +21,7 @@ void AddDeclareCommand(CLI::App& app, Action& action);
 void AddVerifyCommand(CLI::App& app, Action& action);
 void AddReplayCommand(CLI::App& app, Action& action);
 void AddReportCommand(CLI::App& app, Action& action);
+void AddCheckLogCommand(CLI::App& app, Action& action);
 void AddRunCommand(CLI::App& app, Action& action);
 void AddDoctorCommand(CLI::App& app, Action& action);
 void AddKeysCommand(CLI::App& app, Action& action);

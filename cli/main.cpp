@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   AddVerifyCommand(app, action);
   AddReplayCommand(app, action);
   AddReportCommand(app, action);
+  AddCheckLogCommand(app, action);
   AddRunCommand(app, action);
   AddDoctorCommand(app, action);
   AddKeysCommand(app, action);

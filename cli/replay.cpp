@@ -1,6 +1,7 @@
 #include "cli/replay.h"
 
 #include <deque>
+#include <filesystem>
 #include <map>
 #include <optional>
 
@@ -51,34 +52,34 @@ class Replayer {
  public:
   explicit Replayer(const Config& config) : config_(config) { Restart(); }
 
-  void Feed(const LogEvent& event) {
+  // `log` names the file where there are several.
+  void Feed(const LogEvent& event, const std::string& log) {
+    const std::string name = log + "event " + std::to_string(event.number);
     if (event.channel == config_.bus.obstacles || event.channel == config_.bus.transition) {
       changes_.push_back({event.channel, {event.message().begin(), event.message().end()}, event.utime});
     } else if (event.channel == config_.bus.candidate) {
       ++result_.candidates;
-      candidates_[DigestOf(event.message())].push_back(
-          {{event.message().begin(), event.message().end()}, event.number});
+      candidates_[DigestOf(event.message())].push_back({{event.message().begin(), event.message().end()}, name});
     } else if (event.channel == config_.bus.decision) {
-      FeedDecision(event);
+      FeedDecision(event, name);
     } else if (event.channel == config_.bus.status) {
       FeedStatus(event);
     } else if (event.channel == config_.bus.certified) {
-      CheckSeal(event);
+      CheckSeal(event, name);
     }
   }
 
-  ReplayResult Finish() {
+  ReplayResult Finish(std::int64_t corruptions) {
+    result_.corruptions = corruptions;
     for (const auto& [digest, waiting] : candidates_)
-      for (const Candidate& candidate : waiting) Differ(candidate.event, -1, "no decision recorded");
+      for (const Candidate& candidate : waiting) Differ(candidate.name, -1, "no decision recorded");
     return std::move(result_);
   }
-
-  void AddCorruptions(std::int64_t count) { result_.corruptions = count; }
 
  private:
   struct Candidate {
     std::vector<std::uint8_t> bytes;
-    std::int64_t event;
+    std::string name;
   };
   struct Change {
     std::string channel;
@@ -100,13 +101,13 @@ class Replayer {
     last_status_ = *status;
   }
 
-  void FeedDecision(const LogEvent& event) {
+  void FeedDecision(const LogEvent& event, const std::string& name) {
     const auto recorded = Decoded<decision_t>(event.message());
     if (!recorded) return;
     if (recorded->sequence < last_sequence_) Restart();
     last_sequence_ = recorded->sequence;
     auto& waiting = candidates_[GetDigest(recorded->plan_digest)];
-    if (waiting.empty()) return Differ(event.number, recorded->plan_id, "decided, but its candidate is not in the log");
+    if (waiting.empty()) return Differ(name, recorded->plan_id, "decided, but its candidate is not in the log");
     const Candidate candidate = std::move(waiting.front());
     waiting.pop_front();
     CatchUp(*recorded);
@@ -119,7 +120,7 @@ class Replayer {
     if (difference.empty())
       ++result_.agreed;
     else
-      Differ(candidate.event, recorded->plan_id, difference);
+      Differ(candidate.name, recorded->plan_id, difference);
   }
 
   // What had changed before the decision was made, which is at most what is logged before it.
@@ -135,16 +136,16 @@ class Replayer {
     }
   }
 
-  void CheckSeal(const LogEvent& event) {
+  void CheckSeal(const LogEvent& event, const std::string& name) {
     const auto certified = Decoded<certified_plan_t>(event.message());
-    if (!certified) return Differ(event.number, -1, "not a certified_plan_t");
+    if (!certified) return Differ(name, -1, "not a certified_plan_t");
     for (const SealFault& fault : FindSealFaults(*certified))
-      Differ(event.number, certified->plan.plan_id,
+      Differ(name, certified->plan.plan_id,
              "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
   }
 
-  void Differ(std::int64_t event, std::int64_t plan_id, const std::string& what) {
-    result_.differences.push_back("event " + std::to_string(event) + ", plan " + std::to_string(plan_id) + ": " + what);
+  void Differ(const std::string& event, std::int64_t plan_id, const std::string& what) {
+    result_.differences.push_back(event + ", plan " + std::to_string(plan_id) + ": " + what);
   }
 
   const Config& config_;
@@ -158,12 +159,14 @@ class Replayer {
 
 }  // namespace
 
-ReplayResult Replay(const std::string& log_path, const Config& config) {
+ReplayResult Replay(const std::vector<std::string>& logs, const Config& config) {
   Replayer replayer(config);
-  EventLogReader reader(log_path);
-  ForEachEvent(reader, [&](const LogEvent& event) { replayer.Feed(event); });
-  replayer.AddCorruptions(reader.corruptions());
-  return replayer.Finish();
+  const auto name = [&logs](const std::string& log) {
+    return logs.size() == 1 ? "" : std::filesystem::path(log).filename().string() + " ";
+  };
+  const LogDamage damage =
+      ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) { replayer.Feed(event, name(log)); });
+  return replayer.Finish(damage.places);
 }
 
 }  // namespace forereach

@@ -20,10 +20,10 @@ struct ReplayResult {
   std::vector<std::string> differences;
 };
 
-/** Feeds the candidates of a log to a new gate, each at the time of its recorded decision and with the obstacles and
-executed transitions that the decision names by their digests, and compares what it says; certified plans have to be sealed
-(lcmtypes/seal.h). A certifier that was started again, or reloaded, within the log begins with a new gate here too.
-@throws LogError if the log cannot be read, std::invalid_argument as Certifier does. */
-[[nodiscard]] ReplayResult Replay(const std::string& log_path, const Config& config);
+/** Feeds the candidates of logs that follow one another to a new gate, each at the time of its recorded decision and with the
+obstacles and executed transitions that the decision names by their digests, and compares what it says; certified plans have
+to be sealed (lcmtypes/seal.h). A certifier that was started again, or reloaded, within the logs begins with a new gate here
+too. @throws LogError if a log cannot be read, std::invalid_argument as Certifier does. */
+[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& config);
 
 }  // namespace forereach

@@ -10,13 +10,14 @@ namespace forereach {
 namespace {
 
 struct Options {
-  std::string log, config;
+  std::vector<std::string> logs;
+  std::string config;
   bool json = false;
 };
 
 int RunReplay(const Options& options) {
   const Config config = LoadConfig(options.config);
-  const ReplayResult result = Replay(options.log, config);
+  const ReplayResult result = Replay(options.logs, config);
   if (options.json) {
     std::cout << nlohmann::json{{"candidates", result.candidates},
                                 {"agreed", result.agreed},
@@ -42,7 +43,7 @@ void AddReplayCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
       "replay", "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1");
-  command->add_option("log", options->log, "LCM event log")->required()->type_name("LOG");
+  command->add_option("logs", options->logs, kLogs)->required()->type_name("LOG");
   command->add_option("--config", options->config, "The task file it was recorded with")->required()->type_name("FILE");
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->footer("Example:\n  forereach replay run/log/events-20260101-120000.lcmlog --config config/demo.yaml");

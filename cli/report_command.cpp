@@ -10,7 +10,7 @@ namespace forereach {
 void AddReportCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<ReportOptions>();
   CLI::App* command = app.add_subcommand("report", "Sum up a recorded log, and draw it");
-  command->add_option("log", options->log, "LCM event log")->required()->type_name("LOG");
+  command->add_option("logs", options->logs, kLogs)->required()->type_name("LOG");
   command->add_option("--config", options->config, "The task file it was recorded with")->required()->type_name("FILE");
   command->add_option("--picture", options->picture, "Obstacles, tubes and driven path: .svg or .png, both without ending")
       ->type_name("FILE");

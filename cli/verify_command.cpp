@@ -18,7 +18,8 @@ using verifier::Status;
 using verifier::Verdict;
 
 struct Options {
-  std::string file, config;
+  std::vector<std::string> files;
+  std::string config;
   bool json = false;
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
@@ -121,7 +122,8 @@ void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& ver
 }
 
 int Verify(const Options& options) {
-  const CertificateFile file = ReadCertificates(options.file, options.config);
+  const CertificateFile file = options.files.size() == 1 ? ReadCertificates(options.files[0], options.config)
+                                                         : ReadLogs(options.files, options.config);
   RequireAcceptable(file.config);
   const std::vector<Verdict> verdicts = VerifyAll(file, options.jobs);
   const Summary summary = Count(verdicts);
@@ -143,9 +145,9 @@ void AddVerifyCommand(CLI::App& app, Action& action) {
                          "confirmed, 1 with the first that is not and the first step of it that fails, 2 bad input");
   command
       ->add_option(
-          "file", options->file,
-          "What holds the certificates: a decision (the output of certify --json), an LCM event log, or a decision "
-          "database with its logs beside it")
+          "files", options->files,
+          "What holds the certificates: a decision (the output of certify --json), an LCM event log (several if the run "
+          "was recorded in several, in their order), or a decision database with its logs beside it")
       ->required()
       ->type_name("DECISION|LOG|DATABASE");
   command->add_option("--config", options->config, "The task file they were made with; a decision names its own")

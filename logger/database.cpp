@@ -34,6 +34,13 @@ constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
     log_file TEXT NOT NULL, event_number INTEGER, channel TEXT NOT NULL, source TEXT NOT NULL,
     expected INTEGER, got INTEGER, lost INTEGER NOT NULL, utime INTEGER NOT NULL, reason TEXT NOT NULL,
     UNIQUE (log_file, event_number, reason));
+)sql",
+                                                                         R"sql(
+  ALTER TABLE runs ADD COLUMN continues TEXT NOT NULL DEFAULT '';
+  ALTER TABLE runs ADD COLUMN log_deleted_utime INTEGER;
+  ALTER TABLE decisions ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
+  ALTER TABLE execution_events ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
+  ALTER TABLE gaps ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
 )sql"};
 
 }  // namespace
@@ -130,12 +137,12 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
     // Where the file system allows no write-ahead log SQLite keeps its rollback journal, which is as safe and slower.
     Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
     insert_decision_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO decisions VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
       ON CONFLICT (log_file, event_number) DO NOTHING)sql");
     insert_event_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO execution_events VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number) DO NOTHING)sql");
     insert_gap_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO gaps VALUES
-      (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number, reason) DO NOTHING)sql");
+      (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number, reason) DO NOTHING)sql");
     set_events_ = std::make_unique<Statement>(handle, "UPDATE runs SET events = ? WHERE log_file = ?");
   } catch (const DatabaseError& error) {
     throw DatabaseError("database: " + path + ": " + error.what());
@@ -194,14 +201,14 @@ int Database::Insert(const DecisionRow& row) {
              row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle, row.first_observation,
              row.second_observation, row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
              row.plan_digest, row.config_digest, row.model_digest, row.declaration_digest, row.observations_digest,
-             row.obstacles_digest)
+             row.obstacles_digest, row.event.digest)
       .Run();
 }
 
 int Database::Insert(const EventRow& row) {
   return insert_event_
       ->Bind(row.event.log_file, row.event.event_number, row.utime, row.sequence, row.plan_id, row.kind, row.step,
-             row.coordinate, row.state, row.value, row.message)
+             row.coordinate, row.state, row.value, row.message, row.event.digest)
       .Run();
 }
 
@@ -209,13 +216,13 @@ int Database::Insert(const GapRow& row) {
   const auto or_null = [](std::int64_t value) { return value < 0 ? std::nullopt : std::optional(value); };
   return insert_gap_
       ->Bind(row.event.log_file, or_null(row.event.event_number), row.channel, row.source, or_null(row.expected),
-             or_null(row.got), row.lost, row.utime, row.reason)
+             or_null(row.got), row.lost, row.utime, row.reason, row.event.digest)
       .Run();
 }
 
-void Database::BeginRun(const std::string& log_file, std::int64_t start_utime) {
-  Statement(handle_.get(), "INSERT INTO runs (log_file, start_utime, schema) VALUES (?, ?, ?)")
-      .Bind(log_file, start_utime, kSchemaVersion)
+void Database::BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues) {
+  Statement(handle_.get(), "INSERT INTO runs (log_file, start_utime, schema, continues) VALUES (?, ?, ?, ?)")
+      .Bind(log_file, start_utime, kSchemaVersion, continues)
       .Run();
 }
 
@@ -225,15 +232,34 @@ void Database::EndRun(const std::string& log_file, std::int64_t end_utime, const
       .Run();
 }
 
+void Database::MarkLogDeleted(const std::string& log_file, std::int64_t utime) {
+  Statement(handle_.get(), "UPDATE runs SET log_deleted_utime = ? WHERE log_file = ?").Bind(utime, log_file).Run();
+}
+
 std::vector<RunRow> Database::Runs() {
   std::vector<RunRow> runs;
-  Statement select(handle_.get(),
-                   "SELECT log_file, start_utime, end_utime, events, schema, recovered FROM runs ORDER BY rowid");
+  Statement select(handle_.get(), R"sql(SELECT log_file, start_utime, end_utime, events, schema, recovered, continues,
+      log_deleted_utime FROM runs ORDER BY rowid)sql");
   for (select.Bind(); select.Step();) {
     RunRow& run = runs.emplace_back();
-    select.Read(run.log_file, run.start_utime, run.end_utime, run.events, run.schema, run.recovered);
+    select.Read(run.log_file, run.start_utime, run.end_utime, run.events, run.schema, run.recovered, run.continues,
+                run.log_deleted_utime);
   }
   return runs;
+}
+
+std::vector<LogReference> Database::References(const std::string& log_file) {
+  std::vector<LogReference> references;
+  Statement select(handle_.get(), R"sql(
+      SELECT event_number, event_digest FROM decisions WHERE log_file = ?1
+      UNION SELECT event_number, event_digest FROM execution_events WHERE log_file = ?1
+      UNION SELECT event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
+      ORDER BY event_number)sql");
+  for (select.Bind(log_file); select.Step();) {
+    LogReference& reference = references.emplace_back(log_file);
+    select.Read(reference.event_number, reference.digest);
+  }
+  return references;
 }
 
 Rows Database::Read(const std::string& log_file) {
@@ -245,21 +271,21 @@ Rows Database::Read(const std::string& log_file) {
                    row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle, row.first_observation,
                    row.second_observation, row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
                    row.plan_digest, row.config_digest, row.model_digest, row.declaration_digest,
-                   row.observations_digest, row.obstacles_digest);
+                   row.observations_digest, row.obstacles_digest, row.event.digest);
   }
   Statement events(handle_.get(),
                    "SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number");
   for (events.Bind(log_file); events.Step();) {
     EventRow& row = rows.events.emplace_back();
     events.Read(row.event.log_file, row.event.event_number, row.utime, row.sequence, row.plan_id, row.kind, row.step,
-                row.coordinate, row.state, row.value, row.message);
+                row.coordinate, row.state, row.value, row.message, row.event.digest);
   }
   Statement gaps(handle_.get(), R"sql(SELECT log_file, ifnull(event_number, -1), channel, source, ifnull(expected, -1),
-      ifnull(got, -1), lost, utime, reason FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid)sql");
+      ifnull(got, -1), lost, utime, reason, event_digest FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid)sql");
   for (gaps.Bind(log_file); gaps.Step();) {
     GapRow& row = rows.gaps.emplace_back();
     gaps.Read(row.event.log_file, row.event.event_number, row.channel, row.source, row.expected, row.got, row.lost,
-              row.utime, row.reason);
+              row.utime, row.reason, row.event.digest);
   }
   return rows;
 }

@@ -1,6 +1,6 @@
 /** The decision database: SQLite, one file for all runs of a directory. Only its source file sees SQL.
 
-Tables: `decisions`, `execution_events`, `gaps` as in rows.h, and `runs`. The journal is a write-ahead log with
+Tables: `decisions`, `execution_events`, `gaps` as in rows.h, and `runs`, one row for each log file. The journal is a write-ahead log with
 synchronous=NORMAL: a transaction is there whole or not at all after a kill, and after a power cut too; the event log is
 always written first, so rows that a cut took are made again from it. */
 #pragma once
@@ -24,7 +24,7 @@ class DatabaseError : public BadInput {
   using BadInput::BadInput;
 };
 
-/** One run of the logger. */
+/** One log file: a run of the logger, or a part of one. */
 struct RunRow {
   std::string log_file;
   std::int64_t start_utime = 0;
@@ -32,11 +32,13 @@ struct RunRow {
   std::int64_t events = 0;                ///< Rows of events with lower numbers than this are all here.
   int schema = 0;                         ///< Of the database when the run began.
   std::string recovered;                  ///< What a later start had to mend, empty after a clean end.
+  std::string continues;                  ///< The log file of the same run before this one; empty for the first.
+  std::optional<std::int64_t> log_deleted_utime;  ///< When the log was deleted for the quota; its rows stay.
 };
 
 class Database final {
  public:
-  static constexpr int kSchemaVersion = 1;  ///< PRAGMA user_version
+  static constexpr int kSchemaVersion = 2;  ///< PRAGMA user_version
 
   /** Creates the file, or opens it and brings an older schema up to date.
   @throws DatabaseError if it cannot be opened, belongs to another program or has a newer schema. */
@@ -51,12 +53,17 @@ class Database final {
   [[nodiscard]] std::optional<int> Write(const Rows& rows, const std::string& log_file, std::int64_t events);
 
   /** Each is a transaction of its own. @throws DatabaseError. */
-  void BeginRun(const std::string& log_file, std::int64_t start_utime);
+  void BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues = "");
   void EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered = "");
+  void MarkLogDeleted(const std::string& log_file, std::int64_t utime);
+  /** In the order in which they began. */
   [[nodiscard]] std::vector<RunRow> Runs();
 
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
+
+  /** The events that rows of one log file come from, by number; twice if rows differ in the digest. @throws DatabaseError. */
+  [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] const std::string& problem() const { return problem_; }

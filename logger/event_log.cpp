@@ -29,9 +29,31 @@ std::uint64_t GetBigEndian(const std::uint8_t* bytes, int count) {
   return value;
 }
 
+void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t utime, const std::string& channel,
+               Bytes data) {
+  out.insert(out.end(), kSync.begin(), kSync.end());
+  PutBigEndian(out, number);
+  PutBigEndian(out, utime);
+  PutBigEndian(out, static_cast<std::int32_t>(channel.size()));
+  PutBigEndian(out, static_cast<std::int32_t>(data.size()));
+  out.insert(out.end(), channel.begin(), channel.end());
+  out.insert(out.end(), data.begin(), data.end());
+}
+
 std::string Reason(const std::string& what, const std::string& path) { return what + path + ": " + std::strerror(errno); }
 
 }  // namespace
+
+Digest DigestOf(const LogEvent& event) {
+  std::vector<std::uint8_t> record;
+  record.reserve(static_cast<std::size_t>(RecordBytes(event)));
+  PutRecord(record, event.number, event.utime, event.channel, event.data);
+  return DigestOf(Bytes(record));
+}
+
+std::int64_t RecordBytes(const LogEvent& event) {
+  return kHeaderBytes + std::ssize(event.channel) + std::ssize(event.data);
+}
 
 EventLogReader::EventLogReader(const std::string& path) : file_(std::fopen(path.c_str(), "rb"), &std::fclose) {
   struct stat status {};
@@ -75,8 +97,10 @@ bool EventLogReader::SyncAt(std::int64_t offset) {
 // The offset of the first whole record that begins in [from, end), or end.
 std::int64_t EventLogReader::FindRecord(std::int64_t from, std::int64_t end) {
   std::array<std::uint8_t, 1 << 16> block;
-  while (end - from >= static_cast<std::int64_t>(kSync.size())) {
-    const std::int64_t bytes = std::min<std::int64_t>(end - from, static_cast<std::int64_t>(block.size()));
+  const std::int64_t limit = std::min<std::int64_t>(end + 3, size_);  // the sync word may reach beyond the end
+  std::int64_t step = 256;  // doubled, so that a log of nothing but damage costs no more than it has bytes
+  for (; limit - from >= std::ssize(kSync); step = std::min<std::int64_t>(2 * step, std::ssize(block))) {
+    const std::int64_t bytes = std::min(limit - from, step);
     if (!ReadAt(from, block.data(), bytes)) break;
     const auto block_end = block.begin() + bytes;
     for (auto at = block.begin(); (at = std::search(at, block_end, kSync.begin(), kSync.end())) != block_end; ++at) {
@@ -100,7 +124,10 @@ LogStatus EventLogReader::Next(LogEvent& event) {
     event.number = header.number;
     event.utime = header.utime;
     event.channel.resize(static_cast<std::size_t>(header.channel_bytes));
-    event.data.resize(static_cast<std::size_t>(header.data_bytes));
+    const auto data_bytes = static_cast<std::size_t>(header.data_bytes);
+    // Growing would hold the old bytes beside the new.
+    if (event.data.capacity() < data_bytes) std::vector<std::uint8_t>().swap(event.data);
+    event.data.resize(data_bytes);
     if (next == end && ReadAt(channel, event.channel.data(), header.channel_bytes) &&
         ReadAt(data, event.data.data(), header.data_bytes)) {
       offset_ = end;
@@ -130,6 +157,18 @@ void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEven
         return;
     }
   }
+}
+
+LogDamage ForEachEvent(const std::vector<std::string>& logs,
+                       const std::function<void(const LogEvent&, const std::string&)>& visit) {
+  LogDamage damage;
+  for (const std::string& log : logs) {
+    EventLogReader reader(log);
+    ForEachEvent(reader, [&](const LogEvent& event) { visit(event, log); });
+    damage.places += reader.corruptions();
+    damage.bytes += reader.skipped_bytes();
+  }
+  return damage;
 }
 
 EventLogWriter::EventLogWriter(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
@@ -164,13 +203,7 @@ std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& chann
   if (channel.empty() || channel.size() > kMaxLogChannelBytes || data.size() > kMaxLogDataBytes)
     throw std::invalid_argument("log: a channel has 1 to 63 bytes and a message at most 16777216, not " +
                                 std::to_string(channel.size()) + " and " + std::to_string(data.size()));
-  buffer_.insert(buffer_.end(), kSync.begin(), kSync.end());
-  PutBigEndian(buffer_, next_number_);
-  PutBigEndian(buffer_, std::max<std::int64_t>(utime, 0));
-  PutBigEndian(buffer_, static_cast<std::int32_t>(channel.size()));
-  PutBigEndian(buffer_, static_cast<std::int32_t>(data.size()));
-  buffer_.insert(buffer_.end(), channel.begin(), channel.end());
-  buffer_.insert(buffer_.end(), data.begin(), data.end());
+  PutRecord(buffer_, next_number_, std::max<std::int64_t>(utime, 0), channel, data);
   return next_number_++;
 }
 

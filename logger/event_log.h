@@ -37,6 +37,11 @@ struct LogEvent {
   [[nodiscard]] Bytes message() const { return WithoutSignature(data); }
 };
 
+/** BLAKE2b-256 of the event's record as it stands in the file: any bit of it that changes changes the digest. */
+[[nodiscard]] Digest DigestOf(const LogEvent& event);
+/** Bytes of that record. */
+[[nodiscard]] std::int64_t RecordBytes(const LogEvent& event);
+
 inline constexpr std::int32_t kMaxLogChannelBytes = 63;  ///< LCM's own limit.
 inline constexpr std::int32_t kMaxLogDataBytes = 1 << 24;
 
@@ -55,7 +60,7 @@ class EventLogReader final {
   /** Reads the next record; `event` is meaningful for kEvent only. kEnd and kCutTail repeat.
   Length fields are not believed blindly: one that points behind the end of the file is a cut tail only if no whole
   record follows, and one behind whose record no sync word stands is damaged if it hides another whole record.
-  Cost: linear in the bytes passed; allocates at most kMaxLogDataBytes. */
+  Cost: linear in the bytes passed; `event` never holds more than kMaxLogDataBytes beside its channel. */
   [[nodiscard]] LogStatus Next(LogEvent& event);
 
   /** Bytes from the beginning of the file to behind the last record or damage passed. */
@@ -85,6 +90,16 @@ class EventLogReader final {
 /** Calls `visit` for each event from where the reader stands to the end of the log; passes over damage, which the reader
 counts. */
 void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEvent&)>& visit);
+
+/** Damaged places of logs, and the bytes in them. */
+struct LogDamage {
+  std::int64_t places = 0, bytes = 0;
+};
+
+/** Calls `visit` with each event of several logs that follow one another, as the files of one run do, and the log's path.
+@throws LogError if one cannot be read. */
+LogDamage ForEachEvent(const std::vector<std::string>& logs,
+                       const std::function<void(const LogEvent&, const std::string&)>& visit);
 
 /** What a writer found in a file that existed already. */
 struct LogRecovery {

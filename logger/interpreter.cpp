@@ -8,6 +8,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
+#include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/names.h"
@@ -83,23 +84,28 @@ std::pair<Stream, std::optional<std::int64_t>> Interpreter::Identify(const std::
   if (channel == channels_.status) return {plain, SequenceOf<certifier_status_v2_t>(bytes)};
   if (channel == channels_.fault) return {plain, SequenceOf<fault_t>(bytes)};
   if (channel == channels_.event) return {plain, SequenceOf<execution_event_t>(bytes)};
+  if (channel == channels_.logger_status) return {plain, SequenceOf<logger_status_t>(bytes)};
   return {plain, std::nullopt};  // obstacles_t's sequence only has to grow
 }
 
 void Interpreter::Observe(const LogEvent& event, Rows& rows) {
-  CheckSequence(event, rows);
+  const auto reference = [&] { return LogReference{log_file_, event.number, ToHex(DigestOf(event))}; };
+  if (std::optional<GapRow> gap = CheckSequence(event)) {
+    gap->event = reference();
+    rows.gaps.push_back(std::move(*gap));
+  }
   if (event.channel == channels_.candidate) {
     candidates_.emplace_back(DigestOf(event.message()), event.utime);
     if (candidates_.size() > kMaxCandidates) candidates_.pop_front();
   } else if (event.channel == channels_.decision) {
     if (const auto decision = Decoded<decision_t>(event.message())) {
-      DecisionRow row = MakeRow(*decision, {log_file_, event.number});
+      DecisionRow row = MakeRow(*decision, reference());
       row.latency_us = LatencyUs(GetDigest(decision->plan_digest), event.utime);
       rows.decisions.push_back(std::move(row));
     }
   } else if (event.channel == channels_.event) {
     if (const auto execution = Decoded<execution_event_t>(event.message()))
-      rows.events.push_back(MakeRow(*execution, {log_file_, event.number}));
+      rows.events.push_back(MakeRow(*execution, reference()));
   }
 }
 
@@ -108,22 +114,22 @@ void Interpreter::Forgive(const Stream& stream, std::int64_t lost) {
   if (found != streams_.end()) found->second.forgiven += lost;
 }
 
-void Interpreter::CheckSequence(const LogEvent& event, Rows& rows) {
+std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
   const auto [stream, sequence] = Identify(event.channel, event.message());
-  if (!sequence || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return;
+  if (!sequence || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return std::nullopt;
   Count& count = streams_[stream];
   const std::int64_t got = *sequence, expected = count.next.value_or(got), forgiven = count.forgiven;
   count = {got < INT64_MAX ? got + 1 : got, 0};
-  if (got == expected) return;
-  GapRow gap{{log_file_, event.number}, stream.channel, stream.source, expected, got, 0, event.utime, "restart"};
+  if (got == expected) return std::nullopt;
+  GapRow gap{{}, stream.channel, stream.source, expected, got, 0, event.utime, "restart"};
   if (got > expected) {
     gap.lost = expected < 0 ? 0 : std::max<std::int64_t>(got - expected - forgiven, 0);
     gap.reason = "bus";
-    if (gap.lost == 0) return;
+    if (gap.lost == 0) return std::nullopt;
   } else if (got > 0) {
     gap.lost = std::max<std::int64_t>(got - forgiven, 0);  // it began anew, and its first messages are missing
   }
-  rows.gaps.push_back(std::move(gap));
+  return gap;
 }
 
 double Interpreter::LatencyUs(const Digest& plan, std::int64_t utime) {

@@ -30,6 +30,9 @@ class Interpreter final {
   /** The stream of a message, and its sequence number if it is one of a type that counts them. */
   [[nodiscard]] std::pair<Stream, std::optional<std::int64_t>> Identify(const std::string& channel, Bytes bytes) const;
 
+  /** The next event is the first of another file, which goes on where this one ends. */
+  void Continue(std::string log_file) { log_file_ = std::move(log_file); }
+
   /** Adds the rows that the next event of the log gives. */
   void Observe(const LogEvent& event, Rows& rows);
 
@@ -45,7 +48,7 @@ class Interpreter final {
     std::int64_t forgiven = 0;
   };
 
-  void CheckSequence(const LogEvent& event, Rows& rows);
+  [[nodiscard]] std::optional<GapRow> CheckSequence(const LogEvent& event);  // without its event
   [[nodiscard]] double LatencyUs(const Digest& plan, std::int64_t utime);
 
   BusOptions channels_;

@@ -247,20 +247,19 @@ std::vector<std::string> PictureFiles(const std::string& name) {
 
 }  // namespace
 
-LogPicture PictureFromLog(const std::string& log_path, const Config& config) {
-  EventLogReader reader(log_path);
+LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config) {
   PictureMaker maker(config);
-  ForEachEvent(reader, [&maker](const LogEvent& event) { maker.Add(event); });
+  ForEachEvent(logs, [&maker](const LogEvent& event, const std::string&) { maker.Add(event); });
   return maker.Finish();
 }
 
 void Report(const ReportOptions& options, std::ostream& out) {
   const Config config = LoadConfig(options.config);
-  const Summary summary = SummarizeLog(options.log, config);
+  const Summary summary = SummarizeLogs(options.logs, config);
   const std::vector<std::string> files = PictureFiles(options.picture);
   LogPicture drawn;
   if (!files.empty()) {
-    drawn = PictureFromLog(options.log, config);
+    drawn = PictureFromLogs(options.logs, config);
     drawn.picture.title = TitleOf(config);
     drawn.picture.key_numbers = KeyNumbers(summary);
   }
@@ -268,7 +267,7 @@ void Report(const ReportOptions& options, std::ostream& out) {
 
   if (options.json) {
     nlohmann::json json = ToJson(summary);
-    json["log"] = options.log;
+    json["logs"] = options.logs;
     json["pictures"] = files;
     json["tubes_left_out"] = drawn.disagreements;
     out << json.dump(2) << "\n";

@@ -18,20 +18,21 @@ struct LogPicture {
   int disagreements = 0;
 };
 
-/** Certifies the candidates of a log again, under the obstacles in force when each was decided, and collects what there
+/** Certifies the candidates of logs that follow one another again, under the obstacles in force when each was decided, and collects what there
 is to draw: the tubes of certified plans and of abstentions S, the measured path, stops, goal, obstacles at the end.
 Without title and key numbers. Cost: one certify call a plan.
-@throws LogError if the log cannot be read, PictureError if the task's safety coordinates are not planar. */
-[[nodiscard]] LogPicture PictureFromLog(const std::string& log_path, const Config& config);
+@throws LogError if a log cannot be read, PictureError if the task's safety coordinates are not planar. */
+[[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config);
 
 struct ReportOptions {
-  std::string log, config;
+  std::vector<std::string> logs;  ///< Files of one run, in their order.
+  std::string config;
   std::string picture;  ///< .svg or .png; without such an ending both are written; none if empty.
   bool json = false;
   int width = 1200, height = 800;  ///< Pixels.
 };
 
-/** Prints the summary of a log to `out`, as text or as one JSON document, and writes its picture.
+/** Prints the summary of logs to `out`, as text or as one JSON document, and writes its picture.
 @throws BadInput; nothing has been printed then. */
 void Report(const ReportOptions& options, std::ostream& out);
 

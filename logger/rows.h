@@ -10,10 +10,11 @@ namespace forereach {
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-/** The event of the log that a row comes from: the pair is unique in each table. */
+/** The event of the log that a row comes from: file and number together are unique in each table. */
 struct LogReference {
-  std::string log_file;          ///< File name without directory.
+  std::string log_file;  ///< File name without directory.
   std::int64_t event_number = -1;
+  std::string digest;  ///< DigestOf the event, in hexadecimal; empty without an event, and in rows of schema version 1.
 };
 
 /** A decision_t in words. Digests in hexadecimal. */
@@ -46,7 +47,7 @@ struct GapRow {
   std::int64_t lost = 0;
   std::int64_t utime = 0;
   /** "bus": never arrived; "queue": arrived while the logger's queue was full; "restart": the sender began anew;
-  "disk": could not be written; "backlog": discarded by the bus before the logger took it, of any channel: those that
+  "disk": could not be written, or too little was free; "quota": logger.quota_mb had no room for them; "backlog": discarded by the bus before the logger took it, of any channel: those that
   count their messages show a gap "bus" too. */
   std::string reason;
 };

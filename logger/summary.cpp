@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -167,9 +166,9 @@ void SummaryBuilder::Add(const Rows& rows) {
   for (const GapRow& row : rows.gaps) Add(row);
 }
 
-void SummaryBuilder::AddDamage(std::int64_t corruptions, std::int64_t skipped_bytes) {
-  summary_.corruptions += corruptions;
-  summary_.skipped_bytes += skipped_bytes;
+void SummaryBuilder::Add(const LogDamage& damage) {
+  summary_.corruptions += damage.places;
+  summary_.skipped_bytes += damage.bytes;
 }
 
 Summary SummaryBuilder::Finish() const {
@@ -187,17 +186,15 @@ Summary SummaryBuilder::Finish() const {
   return summary;
 }
 
-Summary SummarizeLog(const std::string& path, const Config& config) {
-  EventLogReader reader(path);
-  Interpreter interpreter(config.bus, std::filesystem::path(path).filename().string());
+Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config) {
+  Interpreter interpreter(config.bus, "");
   SummaryBuilder builder(config);
-  ForEachEvent(reader, [&](const LogEvent& event) {
+  builder.Add(ForEachEvent(logs, [&](const LogEvent& event, const std::string&) {
     Rows rows;
     interpreter.Observe(event, rows);
     builder.Add(event);
     builder.Add(rows);
-  });
-  builder.AddDamage(reader.corruptions(), reader.skipped_bytes());
+  }));
   return builder.Finish();
 }
 

@@ -60,7 +60,7 @@ class SummaryBuilder final {
   void Add(const EventRow& row);
   void Add(const GapRow& row);
   void Add(const Rows& rows);
-  void AddDamage(std::int64_t corruptions, std::int64_t skipped_bytes);
+  void Add(const LogDamage& damage);
 
   [[nodiscard]] Summary Finish() const;
 
@@ -85,8 +85,9 @@ class SummaryBuilder final {
   std::vector<double> state_;
 };
 
-/** @throws LogError if the log cannot be read. Damage is passed over and counted. Cost: linear in the log. */
-[[nodiscard]] Summary SummarizeLog(const std::string& path, const Config& config);
+/** Of logs that follow one another, as the files of one run do. @throws LogError if one cannot be read. Damage is passed
+over and counted. Cost: linear in the logs. */
+[[nodiscard]] Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config);
 /** Of one log file's rows, or of all for an empty name. @throws DatabaseError. */
 [[nodiscard]] Summary SummarizeDatabase(Database& database, const std::string& log_file, const Config& config);
 

@@ -210,6 +210,7 @@ BusOptions ReadBus(const Document& file) {
   read("transition", bus.transition);
   read("status", bus.status);
   read("event", bus.event);
+  read("logger_status", bus.logger_status);
   read("fault", bus.fault);
   read("command", bus.command);
   if (file.Has("bus.key")) bus.key = RelativeTo(file.path(), file.Text("bus.key"));
@@ -315,6 +316,14 @@ LoggerOptions ReadLogger(const Document& file) {
   if (file.Has("logger.directory")) logger.directory = RelativeTo(file.path(), file.Text("logger.directory"));
   file.Read("logger.queue", logger.queue);
   file.Read("logger.flush_ms", logger.flush_ms);
+  file.Read("logger.rotate_mb", logger.rotate_mb);
+  file.Read("logger.rotate_minutes", logger.rotate_minutes);
+  if (file.Has("logger.quota_mb")) {
+    logger.quota_mb = file.Number("logger.quota_mb");
+    if (*logger.quota_mb < logger.rotate_mb)
+      file.Fail("logger.quota_mb", ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
+  }
+  file.Read("logger.min_free_mb", logger.min_free_mb);
   return logger;
 }
 

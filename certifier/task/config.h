@@ -53,6 +53,7 @@ struct BusOptions {
   std::string transition = "TRANSITION";
   std::string status = "CERTIFIER_STATUS";
   std::string event = "EXECUTION_EVENT";
+  std::string logger_status = "LOGGER_STATUS";
   std::string fault = "FAULT";
   std::string command = "COMMAND";
   std::string key;  ///< Path of a key file; empty: messages are not signed.
@@ -94,6 +95,10 @@ struct LoggerOptions {
   std::string directory = "log";
   int queue = 4096;       ///< Messages held for writing at most.
   double flush_ms = 200;  ///< A killed logger loses at most this much.
+  double rotate_mb = 1024;         ///< Most of one log file; 10^6 bytes each.
+  double rotate_minutes = 60;      ///< Longest time in one log file.
+  std::optional<double> quota_mb;  ///< Most of all log files together; nothing: none is ever deleted.
+  double min_free_mb = 256;        ///< With less free on the disk recording pauses.
 };
 
 struct Config {

@@ -23,6 +23,7 @@ constexpr Range UpTo(double upper) { return {0, upper, true, false}; }
 constexpr Range Between(double lower, double upper) { return {lower, upper, false, false}; }
 
 constexpr double kHourMs = 3.6e6;
+constexpr double kMaxMegabytes = 1e9;
 
 // Keys without a default here are required where their map is there.
 Key Required(Key key) {
@@ -292,6 +293,7 @@ std::vector<Key> BusKeys() {
       Channel("transition", bus.transition, "transition_t, executed steps."),
       Channel("status", bus.status, "certifier_status_v2_t, the certifier's heartbeat."),
       Channel("event", bus.event, "execution_event_t, what the robot's guard does."),
+      Channel("logger_status", bus.logger_status, "logger_status_t, the logger's heartbeat."),
       Channel("fault", bus.fault, "fault_t, why the certifier has stopped certifying."),
       Channel("command", bus.command, "command_t, from a person: reset, reload."),
   };
@@ -372,6 +374,16 @@ std::vector<Key> LoggerKeys() {
       Integer("logger.queue", Between(1, 1000000), logger.queue,
               "Messages held for writing at most; what is beyond is counted as a gap."),
       Number("logger.flush_ms", "ms", UpTo(60000), logger.flush_ms, "A killed logger loses at most this much."),
+      Number("logger.rotate_mb", "MB", UpTo(kMaxMegabytes), logger.rotate_mb,
+             "A log file that would grow beyond this is ended and a new one begun."),
+      Number("logger.rotate_minutes", "min", UpTo(1e6), logger.rotate_minutes,
+             "So is one that has been written to for this long."),
+      Optional(Number("logger.quota_mb", "MB", UpTo(kMaxMegabytes),
+                      "All log files of the directory together, at least rotate_mb: beyond it the oldest ended ones are "
+                      "deleted, and where that does not help recording pauses."),
+               "none is deleted"),
+      Number("logger.min_free_mb", "MB", UpTo(kMaxMegabytes), logger.min_free_mb,
+             "With less free on the disk recording pauses; it resumes by itself once an eighth more is free."),
   };
 }
 

@@ -39,7 +39,7 @@ std::string Edited(Edit edit) {
 
 TEST(Replay, RecordedLogAgreesOnEveryDecision) {
   const Config config = LoadConfig(kConfig);
-  const ReplayResult result = Replay(kLog, config);
+  const ReplayResult result = Replay({kLog}, config);
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
   EXPECT_EQ(result.agreed, result.candidates);
   EXPECT_GE(result.candidates, 10);
@@ -72,7 +72,7 @@ TEST(Replay, ChangedOutcomeIsListed) {
     }
     return true;
   });
-  EXPECT_EQ(Replay(path, LoadConfig(kConfig)).differences.size(), 1u);
+  EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u);
   std::filesystem::remove(path);
 }
 
@@ -86,7 +86,7 @@ TEST(Replay, MissingDecisionAndMissingCandidateAreListed) {
       dropped = true;
       return false;
     });
-    EXPECT_EQ(Replay(path, LoadConfig(kConfig)).differences.size(), 1u) << drop_decision;
+    EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u) << drop_decision;
     std::filesystem::remove(path);
   }
 }
@@ -102,7 +102,7 @@ TEST(Replay, ACertifiedPlanThatWasAlteredIsListed) {
       event.data = Encode(*certified);
       return true;
     });
-    const ReplayResult result = Replay(path, LoadConfig(kConfig));
+    const ReplayResult result = Replay({path}, LoadConfig(kConfig));
     std::filesystem::remove(path);
     EXPECT_EQ(result.differences.size(), 1u);
     return result.differences.empty() ? std::string() : result.differences.front();
@@ -118,7 +118,7 @@ TEST(Replay, ACertifiedPlanThatWasAlteredIsListed) {
 TEST(Replay, AnotherTaskIsNoticed) {
   Config config = LoadConfig(kConfig);
   config.declaration_digest[0] ^= 1;
-  const ReplayResult result = Replay(kLog, config);
+  const ReplayResult result = Replay({kLog}, config);
   EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
 }
 

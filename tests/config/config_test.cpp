@@ -61,6 +61,8 @@ TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
   EXPECT_TRUE(config.robot.residual_parameters.empty());
   EXPECT_EQ(config.logger.directory, "log");
   EXPECT_EQ(config.logger.queue, LoggerOptions{}.queue);
+  EXPECT_EQ(config.logger.quota_mb, std::nullopt);
+  EXPECT_EQ(config.bus.logger_status, "LOGGER_STATUS");
 }
 
 TEST(LoadConfig, ReadsEveryOption) {
@@ -72,12 +74,12 @@ TEST(LoadConfig, ReadsEveryOption) {
       "bus:\n"
       "  url: memq://\n"
       "  channels: {candidate: A, decision: B, certified: C, robot_state: D, obstacles: E, transition: F, status: G, "
-      "event: H}\n"
+      "event: H, logger_status: I}\n"
       "planner: {algorithm: rrt, goal: [1, 2], goal_radius: 3, clearance: 4, clearance_step: 5, progress_steps: 6,\n"
       "  tail_steps: 7, lead_steps: 8, candidates: 9, cruise_speed: 10, braking: 11, time_limit_ms: 12, seed: 13,\n"
       "  initial_half_width: [1, 2, 3, 4]}\n"
       "robot: {start: [4, 3, 2, 1], step_period_ms: 14, time_limit_s: 15, residual: {name: velocity_knee, knee: 2}}\n"
-      "logger: {directory: here, queue: 16, flush_ms: 17}\n");
+      "logger: {directory: here, queue: 16, flush_ms: 17, rotate_mb: 18, rotate_minutes: 19, quota_mb: 20, min_free_mb: 21}\n");
   EXPECT_EQ(config.problem->zonotope_order, 7);
   const GateOptions& gate = config.gate;
   EXPECT_EQ(std::tie(gate.max_age_ms, gate.max_ahead_ms, gate.certificate_lifetime_ms, gate.queue),
@@ -85,8 +87,8 @@ TEST(LoadConfig, ReadsEveryOption) {
   const BusOptions& bus = config.bus;
   EXPECT_EQ(bus.url, "memq://");
   EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
-                bus.status + bus.event,
-            "ABCDEFGH");
+                bus.status + bus.event + bus.logger_status,
+            "ABCDEFGHI");
   const PlannerOptions& planner = config.planner;
   EXPECT_EQ(planner.algorithm, "rrt");
   EXPECT_EQ(planner.goal, (std::vector<double>{1, 2}));
@@ -100,7 +102,10 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(std::tie(config.robot.step_period_ms, config.robot.time_limit_s), std::make_tuple(14.0, 15.0));
   EXPECT_EQ(config.robot.residual, "velocity_knee");
   EXPECT_EQ(config.logger.directory, files.directory().Path("here"));
-  EXPECT_EQ(std::tie(config.logger.queue, config.logger.flush_ms), std::make_tuple(16, 17.0));
+  const LoggerOptions& logger = config.logger;
+  EXPECT_EQ(std::tie(logger.queue, logger.flush_ms, logger.rotate_mb, logger.rotate_minutes, logger.min_free_mb),
+            std::make_tuple(16, 17.0, 18.0, 19.0, 21.0));
+  EXPECT_EQ(logger.quota_mb, 20);
 }
 
 TEST(LoadConfig, ResidualsHaveTheModelsStepAndTheResidualsOwnDefaults) {
@@ -179,6 +184,7 @@ TEST(LoadConfig, TransitionsNeedNotExistWhereTheyAreStillToBeMade) {
 TEST(Schema, DefaultsStandInsideTheirRanges) {
   for (const Key& key : Schema()) {
     if (key.fallback.empty() || (key.type != Key::Type::kNumber && key.type != Key::Type::kInteger)) continue;
+    if (key.fallback.find_first_of("0123456789") == std::string::npos) continue;  // in words
     EXPECT_TRUE(key.range.Contains(std::stod(key.fallback))) << key.path;
   }
 }

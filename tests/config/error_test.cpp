@@ -163,6 +163,8 @@ TEST_F(ErrorTest, WordsThatAreNotKnown) {
             "task.yaml:19: bus.channels.status: A.* is not 1 to 63 letters, digits and underscores");
   EXPECT_EQ(ErrorAfter("bus: {channels: {status: PLAN_DECISION}}\n"),
             "task.yaml:19: bus.channels.status: PLAN_DECISION is the name of another channel too");
+  EXPECT_EQ(ErrorAfter("logger: {rotate_mb: 20, quota_mb: 10}\n"),
+            "task.yaml:19: logger.quota_mb: 10 is less than logger.rotate_mb, 20");
 }
 
 TEST_F(ErrorTest, ObstaclesThatMakeNoSense) {

@@ -1,5 +1,7 @@
 #include "tests/faults/relay.h"
 
+#include <algorithm>
+
 namespace forereach {
 
 Relay::Relay(const std::string& from, const std::string& to, std::set<std::string> there, unsigned seed)

@@ -1,6 +1,8 @@
 #include "tests/faults/rig.h"
 
+#include <algorithm>
 #include <csignal>
+#include <filesystem>
 
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"

@@ -45,6 +45,7 @@ class Rig final {
   [[nodiscard]] Witness& witness() { return *witness_; }
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] std::string url(Role role) const { return relayed_ && role >= kPlanner ? near_url_ : far_url_; }
+  [[nodiscard]] const std::string& task_path() const { return task_path_; }
   [[nodiscard]] std::string key_path() const { return key_path_; }
   [[nodiscard]] std::string directory() const { return (scratch_.path() / "log").string(); }
   [[nodiscard]] std::string Said(Role role) const;

@@ -15,6 +15,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
+#include "forereach/logger_status_t.hpp"
 #include "forereach/obstacle_t.hpp"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -34,9 +35,8 @@ const std::map<std::string, Contract> kContracts = {
     {"certifier_status_t", {0x553e2b8fcb2c6ae3, 248}}, {"decision_t", {0x6c785a9e0911c4e6, 466}},
     {"execution_event_t", {0x4742c25e0eefd377, 336}},  {"obstacle_t", {0x29158dc0270b76d4, 406}},
     {"obstacles_t", {0x9c72b610dc35fea7, 25498}},      {"robot_state_t", {0xe3677d78a66b57da, 166}},
-    {"transition_t", {0xa599cda800864690, 348}},
-    {"certifier_status_v2_t", {0xc45b41cd96d85653, 1144}},
-    {"command_t", {0x1b315e627593a95f, 58}},
+    {"transition_t", {0xa599cda800864690, 348}},       {"logger_status_t", {0x2a2438623a759ef0, 260}},
+    {"certifier_status_v2_t", {0xc45b41cd96d85653, 1144}}, {"command_t", {0x1b315e627593a95f, 58}},
     {"fault_t", {0xdcbd63f7ef2c91dd, 728}},
 };
 
@@ -56,7 +56,8 @@ class MessageTest : public testing::Test {
 };
 
 using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_t, certifier_status_v2_t, command_t,
-                                decision_t, execution_event_t, fault_t, obstacle_t, obstacles_t, robot_state_t, transition_t>;
+                                decision_t, execution_event_t, fault_t, logger_status_t, obstacle_t, obstacles_t,
+                                robot_state_t, transition_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {

@@ -175,18 +175,45 @@ TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
   EXPECT_EQ(reader.skipped_bytes(), static_cast<std::int64_t>(RecordOffset(4) - RecordOffset(3)));
 }
 
-TEST(EventLog, FindsASyncWordAcrossReadBlocks) {
+TEST(EventLog, FindsASyncWordWhereverItLies) {
   const Scratch scratch;
   WriteSample(scratch / "log", 1);
   const std::vector<std::uint8_t> record = ReadBytes(scratch / "log");
-  for (const int shift : {-5, -4, -3, -2, -1, 0, 1}) {
-    std::vector<std::uint8_t> bytes(static_cast<std::size_t>((1 << 16) + shift + 1), 0x55);
+  for (std::size_t garbage = 1; garbage < (1 << 18); garbage += garbage < 2000 ? 1 : 997) {
+    std::vector<std::uint8_t> bytes(garbage, 0x55);
     bytes.insert(bytes.end(), record.begin(), record.end());
     WriteBytes(scratch / "bad", bytes);
     const LogContents contents = ReadLog(scratch / "bad");
-    EXPECT_EQ(contents.events.size(), 1u) << shift;
-    EXPECT_EQ(contents.skipped_bytes, (1 << 16) + shift + 1);
+    ASSERT_EQ(contents.events.size(), 1u) << garbage;
+    ASSERT_EQ(contents.skipped_bytes, static_cast<std::int64_t>(garbage));
   }
+}
+
+// A record that lost 1, 2, 3 bytes claims as many of the next one.
+TEST(EventLog, BytesCutOutCostThatRecordOnly) {
+  const Scratch scratch;
+  for (const int cut : {1, 2, 3, 4, 5}) {
+    std::filesystem::remove(scratch / "log");
+    WriteSample(scratch / "log");
+    std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+    const auto at = bytes.begin() + static_cast<std::ptrdiff_t>(RecordOffset(2) + kHeader + 12);
+    bytes.erase(at, at + cut);
+    WriteBytes(scratch / "log", bytes);
+    const LogContents contents = ReadLog(scratch / "log");
+    ASSERT_EQ(contents.events.size(), 4u) << cut;
+    EXPECT_EQ(contents.events[2].number, 3);
+    EXPECT_EQ(contents.corruptions, 1);
+  }
+}
+
+TEST(EventLog, TheDigestCoversEveryByteOfTheRecord) {
+  const Scratch scratch;
+  WriteSample(scratch / "log", 3);
+  const std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+  const LogEvent event = ReadLog(scratch / "log").events[2];
+  const Bytes record = Bytes(bytes).subspan(RecordOffset(2));
+  EXPECT_EQ(DigestOf(event), DigestOf(record));
+  EXPECT_EQ(RecordBytes(event), std::ssize(record));
 }
 
 TEST(EventLog, RecoveryKeepsWhatFollowsDamage) {

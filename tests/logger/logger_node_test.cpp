@@ -12,34 +12,11 @@
 
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "tests/logger/direct_bus.h"
 #include "tests/logger/scratch.h"
 
 namespace forereach {
 namespace {
-
-constexpr std::int64_t kStart = 1'700'000'000'000'000;  // 2023-11-14 22:13:20 UTC
-
-/** Hands every message to the subscribers at once. */
-class DirectBus final : public Bus {
- public:
-  explicit DirectBus(std::int64_t start = kStart) : now_us(start) {}
-
-  using Bus::Publish;
-  void Subscribe(const std::string& channel, Handler handler) override { handlers_.emplace_back(channel, std::move(handler)); }
-  bool Publish(const std::string& channel, Bytes bytes) override {
-    for (const auto& [pattern, handler] : handlers_)
-      if (pattern == ".*" || pattern == channel) handler({channel, bytes, now_us});
-    return true;
-  }
-  int Dispatch(int) override { return 0; }
-  std::int64_t dropped() const override { return dropped_count; }
-
-  std::int64_t now_us;
-  std::int64_t dropped_count = 0;
-
- private:
-  std::vector<std::pair<std::string, Handler>> handlers_;
-};
 
 class LoggerNodeTest : public testing::Test {
  protected:
@@ -58,9 +35,9 @@ TEST_F(LoggerNodeTest, RecordsEverythingAndSummarises) {
   std::string log_path;
   {
     LoggerNode node(config_, bus_, out_);
-    EXPECT_TRUE(node.recovered().empty());
+    EXPECT_TRUE(node.recorder().recovered().empty());
     node.Tick(bus_.now_us);
-    log_path = node.log_path();
+    log_path = node.recorder().log_path();
     EXPECT_THAT(log_path, testing::EndsWith("/events-20231114-221320.lcmlog"));
     const candidate_plan_t first = MakeCandidate(0, 100), second = MakeCandidate(1, 101);
     bus_.Publish("PLAN_CANDIDATE", first);
@@ -106,9 +83,9 @@ TEST_F(LoggerNodeTest, FlushesOnTimeOnly) {
   node.Tick(kStart);
   bus_.Publish("PLAN_DECISION", MakeDecision({}, 0, 1, 0));
   node.Tick(kStart + 99'999);
-  EXPECT_EQ(std::filesystem::file_size(node.log_path()), 0u);
+  EXPECT_EQ(std::filesystem::file_size(node.recorder().log_path()), 0u);
   node.Tick(kStart + 100'000);
-  EXPECT_EQ(ReadLog(node.log_path()).events.size(), 1u);
+  EXPECT_EQ(ReadLog(node.recorder().log_path()).events.size(), 1u);
   EXPECT_EQ(ReadRows().decisions.size(), 1u);
 }
 
@@ -119,7 +96,7 @@ TEST_F(LoggerNodeTest, ARunNeverWritesIntoAnOlderFile) {
     node.Tick(kStart);
     bus.Publish("C", MakeEvent(0, 1));
     node.Stop();
-    EXPECT_EQ(ReadLog(node.log_path()).events.size(), 1u);
+    EXPECT_EQ(ReadLog(node.recorder().log_path()).events.size(), 1u);
   }
   EXPECT_EQ(Runs().size(), 3u);
   EXPECT_EQ(Runs()[2].log_file, "events-20231114-221320-3.lcmlog");
@@ -177,13 +154,13 @@ TEST_F(LoggerNodeTest, RecordsOverflowOnce) {
   const Rows rows = ReadRows();
   EXPECT_EQ(rows.events.size(), 6u);
   ASSERT_EQ(rows.gaps.size(), 3u);
-  EXPECT_EQ(rows.gaps[0].reason, "queue");
-  EXPECT_EQ(rows.gaps[0].channel, "EXECUTION_EVENT");
-  EXPECT_EQ(rows.gaps[0].lost, 6);
-  EXPECT_EQ(rows.gaps[1].reason, "bus");
-  EXPECT_EQ(rows.gaps[1].lost, 1) << "the six dropped here must not be counted again";
-  EXPECT_EQ(rows.gaps[2].reason, "backlog");
-  EXPECT_EQ(rows.gaps[2].lost, 5);
+  EXPECT_EQ(rows.gaps[0].reason, "bus");
+  EXPECT_EQ(rows.gaps[0].lost, 1) << "the six dropped here must not be counted again";
+  EXPECT_EQ(rows.gaps[1].reason, "backlog");
+  EXPECT_EQ(rows.gaps[1].lost, 5);
+  EXPECT_EQ(rows.gaps[2].reason, "queue");
+  EXPECT_EQ(rows.gaps[2].channel, "EXECUTION_EVENT");
+  EXPECT_EQ(rows.gaps[2].lost, 6);
   EXPECT_THAT(out_.str(), testing::HasSubstr("7 (bus 1, queue 6)"));
 }
 
@@ -192,7 +169,7 @@ TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
   node.Tick(kStart);
   bus_.Publish("EXECUTION_EVENT", MakeEvent(0, execution_event_t::STARTED));
   node.Tick(kStart + 1'000'000);
-  const auto size = std::filesystem::file_size(node.log_path());
+  const auto size = std::filesystem::file_size(node.recorder().log_path());
 
   std::signal(SIGXFSZ, SIG_IGN);
   rlimit before{};
@@ -202,12 +179,12 @@ TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
   for (int i = 1; i < 4; ++i) bus_.Publish("EXECUTION_EVENT", MakeEvent(i, execution_event_t::STARTED));
   node.Tick(kStart + 2'000'000);
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-  EXPECT_EQ(std::filesystem::file_size(node.log_path()), size) << "no torn record stays";
+  EXPECT_EQ(std::filesystem::file_size(node.recorder().log_path()), size) << "no torn record stays";
 
   bus_.Publish("EXECUTION_EVENT", MakeEvent(4, execution_event_t::STANDING));
   node.Tick(kStart + 3'000'000);
   node.Stop();
-  const LogContents log = ReadLog(node.log_path());
+  const LogContents log = ReadLog(node.recorder().log_path());
   ASSERT_EQ(log.events.size(), 2u);
   EXPECT_EQ(log.events[1].number, 4);
   EXPECT_EQ(log.corruptions, 0);
@@ -246,11 +223,11 @@ TEST_F(LoggerNodeTest, MakesMissingRowsAgainFromTheLog) {
   for (int start = 0; start < 2; ++start) {
     DirectBus bus;
     const LoggerNode node(config_, bus, out_);
-    ASSERT_EQ(node.recovered().size(), start == 0 ? 2u : 0u) << "a mended run is mended once";
+    ASSERT_EQ(node.recorder().recovered().size(), start == 0 ? 2u : 0u) << "a mended run is mended once";
     if (start > 0) break;
-    EXPECT_THAT(node.recovered()[0], testing::AllOf(testing::HasSubstr("3 events kept"), testing::HasSubstr("50 bytes"),
+    EXPECT_THAT(node.recorder().recovered()[0], testing::AllOf(testing::HasSubstr("3 events kept"), testing::HasSubstr("50 bytes"),
                                                     testing::HasSubstr("3 rows written")));
-    EXPECT_THAT(node.recovered()[1], testing::HasSubstr("no log file was written"));
+    EXPECT_THAT(node.recorder().recovered()[1], testing::HasSubstr("no log file was written"));
   }
   EXPECT_EQ(std::filesystem::file_size(log), size);
   const Rows rows = ReadRows();
@@ -268,7 +245,7 @@ TEST_F(LoggerNodeTest, LeavesARunningLoggersFileAlone) {
   running.Tick(kStart);
   DirectBus other;
   const LoggerNode second(config_, other, out_);
-  EXPECT_TRUE(second.recovered().empty());
+  EXPECT_TRUE(second.recorder().recovered().empty());
   EXPECT_EQ(Runs()[0].end_utime, std::nullopt);
 }
 
@@ -292,6 +269,7 @@ TEST_F(LoggerNodeTest, LeavesARunningLoggersFileAlone) {
 
 TEST_F(LoggerNodeTest, SurvivesAKill) {
   config_.logger.flush_ms = 5;
+  config_.logger.rotate_mb = 0.4;  // some 40 candidates and their decisions
   const unsigned seed = std::random_device{}();
   RecordProperty("seed", std::to_string(seed));
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -321,28 +299,38 @@ TEST_F(LoggerNodeTest, SurvivesAKill) {
   { const LoggerNode recovery(config_, bus_, out_); }
 
   Database database(scratch_ / "log/decisions.sqlite");
-  const std::vector<RunRow> runs = database.Runs();
-  ASSERT_EQ(runs.size(), static_cast<std::size_t>(kRounds));
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    SCOPED_TRACE(runs[i].log_file + ": " + runs[i].recovered);
-    EXPECT_TRUE(runs[i].end_utime.has_value());
-    const LogContents log = ReadLog(scratch_ / ("log/" + runs[i].log_file));
-    EXPECT_EQ(log.end, LogStatus::kEnd);
-    EXPECT_EQ(log.corruptions, 0);
-    EXPECT_GE(std::ssize(log.events), reported[i]) << "flushed events must stay";
-    std::vector<std::int64_t> decisions;
-    for (std::size_t k = 0; k < log.events.size(); ++k) {
-      EXPECT_EQ(log.events[k].number, static_cast<std::int64_t>(k));
-      if (log.events[k].channel == "PLAN_DECISION") decisions.push_back(log.events[k].number);
+  std::vector<std::vector<RunRow>> chains;  // the files of each run
+  for (const RunRow& run : database.Runs()) {
+    EXPECT_TRUE(run.end_utime.has_value());
+    if (run.continues.empty()) chains.emplace_back();
+    EXPECT_EQ(run.continues, chains.back().empty() ? "" : chains.back().back().log_file);
+    chains.back().push_back(run);
+  }
+  ASSERT_EQ(chains.size(), static_cast<std::size_t>(kRounds));
+  for (std::size_t i = 0; i < chains.size(); ++i) {
+    std::int64_t events = 0, sequence = 0;
+    for (const RunRow& run : chains[i]) {
+      SCOPED_TRACE(run.log_file + ": " + run.recovered);
+      const LogContents log = ReadLog(scratch_ / ("log/" + run.log_file));
+      EXPECT_EQ(log.end, LogStatus::kEnd);
+      EXPECT_EQ(log.corruptions, 0);
+      events += std::ssize(log.events);
+      std::vector<std::int64_t> decisions;
+      for (std::size_t k = 0; k < log.events.size(); ++k) {
+        EXPECT_EQ(log.events[k].number, static_cast<std::int64_t>(k));
+        if (log.events[k].channel == "PLAN_DECISION") decisions.push_back(log.events[k].number);
+      }
+      const Rows rows = database.Read(run.log_file);
+      ASSERT_EQ(rows.decisions.size(), decisions.size());
+      for (std::size_t k = 0; k < decisions.size(); ++k) {
+        EXPECT_EQ(rows.decisions[k].event.event_number, decisions[k]);
+        EXPECT_EQ(rows.decisions[k].event.digest, ToHex(DigestOf(log.events[static_cast<std::size_t>(decisions[k])])));
+        EXPECT_EQ(rows.decisions[k].sequence, sequence++);
+        EXPECT_EQ(rows.decisions[k].latency_us, 0);
+      }
+      EXPECT_TRUE(rows.gaps.empty());
     }
-    const Rows rows = database.Read(runs[i].log_file);
-    ASSERT_EQ(rows.decisions.size(), decisions.size());
-    for (std::size_t k = 0; k < decisions.size(); ++k) {
-      EXPECT_EQ(rows.decisions[k].event.event_number, decisions[k]);
-      EXPECT_EQ(rows.decisions[k].sequence, static_cast<std::int64_t>(k));
-      EXPECT_EQ(rows.decisions[k].latency_us, 0);
-    }
-    EXPECT_TRUE(rows.gaps.empty());
+    EXPECT_GE(events, reported[i]) << "flushed events must stay";
   }
 }
 
@@ -354,10 +342,11 @@ TEST_F(LoggerNodeTest, TakesWhatTheMemoryBusCarries) {
   bus->Dispatch(0);
   node.Tick(kStart + 10);
   node.Stop();
-  const LogContents log = ReadLog(node.log_path());
-  ASSERT_EQ(log.events.size(), 1u);
-  EXPECT_EQ(log.events[0].utime, kStart + 5);
-  EXPECT_EQ(node.summary().contacts, 1);
+  const LogContents log = ReadLog(node.recorder().log_path());
+  ASSERT_EQ(log.events.size(), 2u) << "the logger hears its own heartbeat";
+  EXPECT_EQ(log.events[0].channel, "LOGGER_STATUS");
+  EXPECT_EQ(log.events[1].utime, kStart + 5);
+  EXPECT_EQ(node.recorder().summary().contacts, 1);
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ void WriteRun(const std::string& path) {
 TEST(Summary, CountsAHandMadeLog) {
   const Scratch scratch;
   WriteRun(scratch / "log");
-  const Summary summary = SummarizeLog(scratch / "log", GoalConfig());
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
   EXPECT_EQ(summary.proposed, 100);
   EXPECT_EQ(summary.decided, 100);
   EXPECT_EQ(summary.certified, 70);
@@ -83,7 +83,7 @@ TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
   Rows rows;
   while (reader.Next(event) == LogStatus::kEvent) interpreter.Observe(event, rows);
   ASSERT_TRUE(database.Write(rows, "log", event.number + 1));
-  nlohmann::json of_log = ToJson(SummarizeLog(scratch / "log", GoalConfig()));
+  nlohmann::json of_log = ToJson(SummarizeLogs({scratch / "log"}, GoalConfig()));
   nlohmann::json of_database = ToJson(SummarizeDatabase(database, "log", GoalConfig()));
   for (const char* log_only : {"messages", "duration_s", "distance_to_goal_m"}) {
     of_log.erase(log_only);
@@ -95,7 +95,7 @@ TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
 TEST(Summary, OfNothingIsUnknownNotZero) {
   const Scratch scratch;
   WriteBytes(scratch / "log", {});
-  const Summary summary = SummarizeLog(scratch / "log", GoalConfig());
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
   EXPECT_EQ(summary.proposed, 0);
   EXPECT_EQ(summary.distance_to_goal_m, std::nullopt);
   const nlohmann::json json = ToJson(summary);
@@ -110,7 +110,7 @@ TEST(Summary, PassesDamageAndCountsIt) {
   std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
   bytes[0] = 0;
   WriteBytes(scratch / "log", bytes);
-  const Summary summary = SummarizeLog(scratch / "log", GoalConfig());
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
   EXPECT_EQ(summary.proposed, 99);
   EXPECT_EQ(summary.corruptions, 1);
   EXPECT_GT(summary.skipped_bytes, 0);

@@ -1,0 +1,65 @@
+#include "logger/log_directory.h"
+
+#include <ctime>
+#include <filesystem>
+#include <limits>
+#include <utility>
+
+#include <sys/statvfs.h>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include "logger/event_log.h"
+
+namespace forereach {
+namespace {
+
+constexpr const char* kEnding = ".lcmlog";
+
+}  // namespace
+
+LogDirectory::LogDirectory(std::string path) : path_(std::move(path)) {
+  std::error_code error;
+  std::filesystem::create_directories(path_, error);
+  if (error) throw LogError("logger: cannot make the directory " + path_ + ": " + error.message());
+}
+
+std::string LogDirectory::PathOf(const std::string& file) const { return (std::filesystem::path(path_) / file).string(); }
+
+std::string LogDirectory::FreeName(std::int64_t now_us, const std::function<bool(const std::string&)>& taken) const {
+  const std::string stem = fmt::format("events-{:%Y%m%d-%H%M%S}", fmt::gmtime(static_cast<std::time_t>(now_us / 1'000'000)));
+  std::string name = stem + kEnding;
+  for (int i = 2; Bytes(name) || taken(name); ++i) name = fmt::format("{}-{}{}", stem, i, kEnding);
+  return name;
+}
+
+std::int64_t LogDirectory::LogBytes(const std::string& except) const {
+  std::int64_t bytes = 0;
+  std::error_code error;
+  for (std::filesystem::directory_iterator file(path_, error), end; !error && file != end; file.increment(error))
+    if (file->path().extension() == kEnding && file->path().filename() != except)
+      bytes += Bytes(file->path().filename().string()).value_or(0);
+  return bytes;
+}
+
+std::optional<std::int64_t> LogDirectory::Bytes(const std::string& file) const {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(PathOf(file), error);
+  return error ? std::nullopt : std::optional(static_cast<std::int64_t>(bytes));
+}
+
+bool LogDirectory::Remove(const std::string& file) const {
+  std::error_code error;
+  return std::filesystem::remove(PathOf(file), error) && !error;
+}
+
+std::int64_t FreeBytes(const std::string& directory) {
+  struct statvfs disk {};
+  if (::statvfs(directory.c_str(), &disk) != 0) return 0;
+  constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  const std::uint64_t block = disk.f_frsize, blocks = disk.f_bavail;
+  return static_cast<std::int64_t>(block > 0 && blocks > kMost / block ? kMost : blocks * block);
+}
+
+}  // namespace forereach

@@ -1,0 +1,335 @@
+#include "logger/recorder.h"
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kMaxBufferBytes = 4 << 20;
+constexpr std::size_t kMaxWaitingRows = 100'000;  // while the database refuses them
+constexpr std::size_t kMaxLosses = 256;           // a sender that invents channels must not fill the memory
+constexpr int kEventsPerTransaction = 4096;
+constexpr double kScanUs = 1e6, kGapsUs = 10e6, kRetryUs = 1e6;
+
+template <class Row>
+void MoveTo(std::vector<Row>& to, std::vector<Row>& from) {
+  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  from.clear();
+}
+
+// Of gaps found in events that are in no log.
+void WithoutEvents(std::vector<GapRow>& gaps) {
+  for (GapRow& gap : gaps) {
+    gap.event.event_number = -1;
+    gap.event.digest.clear();
+  }
+}
+
+std::int64_t BytesOf(double megabytes) { return static_cast<std::int64_t>(megabytes * 1e6); }
+
+}  // namespace
+
+Recorder::Recorder(const Config& config, FreeSpace free_space)
+    : channels_(config.bus),
+      options_(config.logger),
+      free_space_(std::move(free_space)),
+      directory_(options_.directory),
+      database_(directory_.PathOf(LogDirectory::kDatabase)),
+      summary_(config),
+      interpreter_(channels_, ""),
+      flush_(options_.flush_ms * 1e3),
+      age_(options_.rotate_minutes * 60e6),
+      scan_(kScanUs),
+      gaps_(kGapsUs),
+      retry_(kRetryUs) {
+  for (const RunRow& run : database_.Runs())
+    if (!run.end_utime) Recover(run);
+}
+
+void Recorder::Recover(const RunRow& run) {
+  std::string text = "no log file was written";
+  std::int64_t end_utime = run.start_utime;
+  if (directory_.Bytes(run.log_file)) try {
+      text = Mend(run, end_utime);
+    } catch (const LogError& error) {
+      spdlog::warn("{} was not ended and is left alone: {}", run.log_file, error.what());
+      return;
+    }
+  database_.EndRun(run.log_file, end_utime, text);
+  recovered_.push_back(run.log_file + ": " + text);
+  spdlog::warn("recovered {}", recovered_.back());
+}
+
+std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
+  const std::string path = directory_.PathOf(run.log_file);
+  const EventLogWriter mended(path);  // removes a cut tail, and keeps others from doing the same meanwhile
+  EventLogReader reader(path);
+  Interpreter interpreter = InterpreterFor(run);
+  Rows rows;
+  std::int64_t new_rows = 0, unwritten = 0, events = run.events;
+  const auto write = [&] {
+    const auto written = database_.Write(rows, run.log_file, events);
+    if (!written) throw DatabaseError(database_.problem());
+    new_rows += *written;
+    unwritten = 0;
+    rows = {};
+  };
+  ForEachEvent(reader, [&](const LogEvent& event) {
+    interpreter.Observe(event, rows);
+    if (event.number < run.events) rows = {};
+    events = std::max(run.events, event.number + 1);
+    if (++unwritten >= kEventsPerTransaction) write();
+  });
+  if (unwritten > 0) write();
+  const LogRecovery& found = mended.recovery();
+  end_utime = std::max(end_utime, found.last_utime);
+  return fmt::format("{} events kept, a cut tail of {} bytes removed, {} damaged places of {} bytes left, {} rows written",
+                     found.events, found.cut_bytes, found.corruptions, found.skipped_bytes, new_rows);
+}
+
+// What it knew when the file began: it has seen the file before, if there is one.
+Interpreter Recorder::InterpreterFor(const RunRow& run) const {
+  Interpreter interpreter(channels_, run.continues);
+  if (!run.continues.empty() && directory_.Bytes(run.continues)) {
+    EventLogReader before(directory_.PathOf(run.continues));
+    Rows ignored;
+    ForEachEvent(before, [&](const LogEvent& event) {
+      interpreter.Observe(event, ignored);
+      ignored = {};
+    });
+  }
+  interpreter.Continue(run.log_file);
+  return interpreter;
+}
+
+void Recorder::Begin(std::int64_t now_us) {
+  Open(now_us, "");
+  flush_.Start(now_us);
+  WatchDisk(now_us);
+  Report();
+}
+
+void Recorder::Open(std::int64_t now_us, const std::string& continues) {
+  const std::vector<RunRow> runs = database_.Runs();
+  const std::string file = directory_.FreeName(
+      now_us, [&](const std::string& name) { return std::ranges::find(runs, name, &RunRow::log_file) != runs.end(); });
+  auto log = std::make_unique<EventLogWriter>(directory_.PathOf(file));
+  try {
+    database_.BeginRun(file, now_us, continues);
+  } catch (const DatabaseError&) {
+    directory_.Remove(file);  // nothing is ever written to a log file that no run knows: it would not be mended
+    throw;
+  }
+  log_ = std::move(log);
+  log_file_ = file;
+  log_path_ = directory_.PathOf(file);
+  interpreter_.Continue(file);
+  other_bytes_ = directory_.LogBytes(file);
+  rows_lost_ = false;
+  ++files_;
+  age_.Start(now_us);
+  spdlog::info("recording to {}", log_path_);
+}
+
+void Recorder::Rotate(std::int64_t now_us) {
+  if (!retry_.IsOver(now_us)) return;
+  const bool flushed = Flush(now_us);
+  const std::string ended = log_file_;
+  const bool whole = !rows_lost_;
+  try {
+    if (!flushed || !flushed_rows_.empty()) throw LogError("the events and rows of this one cannot be written");
+    Open(now_us, ended);
+    if (whole) database_.EndRun(ended, now_us);
+    WatchDisk(now_us);  // the ended file may go for the quota
+    rotation_problem_.clear();
+  } catch (const BadInput& error) {
+    rotation_problem_ = std::string("no new log file: ") + error.what();
+    retry_.Start(now_us);
+  }
+}
+
+void Recorder::Tick(std::int64_t now_us) {
+  if (age_.IsOver(now_us) && log_->next_number() > 0) Rotate(now_us);
+  if (flush_.IsOver(now_us) || log_->pending_bytes() > kMaxBufferBytes) Flush(now_us);
+}
+
+void Recorder::Take(LogEvent event, std::int64_t now_us) {
+  if (event.data.size() > kMaxLogDataBytes || event.channel.size() > kMaxLogChannelBytes || event.channel.empty())
+    return CountLoss({event.channel, ""}, 1, event.utime, "disk");
+  const std::int64_t bytes = RecordBytes(event);
+  if (file_bytes() + bytes > BytesOf(options_.rotate_mb) && log_->next_number() > 0) Rotate(now_us);
+  if (pause_.empty() && !MakeRoom(bytes, now_us)) pause_ = "quota";
+  if (!pause_.empty()) return Miss(std::move(event));
+  event.utime = std::max<std::int64_t>(event.utime, 0);
+  event.number = log_->Append(event.utime, event.channel, event.data);
+  ++unflushed_[event.channel];
+  interpreter_.Observe(event, rows_);
+  summary_.Add(event);
+}
+
+// The counts go on, so that what the pause costs is not taken for a loss of the bus.
+void Recorder::Miss(LogEvent event) {
+  Rows missed;
+  interpreter_.Observe(event, missed);
+  WithoutEvents(missed.gaps);
+  MoveTo(rows_.gaps, missed.gaps);
+  CountLoss({event.channel, ""}, 1, event.utime, pause_);
+}
+
+void Recorder::Lose(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason) {
+  CountLoss(stream, lost, utime, reason);
+  interpreter_.Forgive(stream, lost);
+}
+
+void Recorder::CountLoss(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason) {
+  std::pair key{reason, stream};
+  if (losses_.size() >= kMaxLosses && !losses_.contains(key)) key.second = {"*", ""};
+  Loss& loss = losses_.try_emplace(key, Loss{0, utime}).first->second;
+  loss.lost += lost;
+  lost_ += lost;
+}
+
+void Recorder::MakeGaps(std::int64_t now_us) {
+  for (const auto& [key, loss] : losses_) {
+    const auto& [reason, stream] = key;
+    GapRow& gap = rows_.gaps.emplace_back();
+    gap.event.log_file = log_file_;
+    gap.channel = stream.channel;
+    gap.source = stream.source;
+    gap.lost = loss.lost;
+    gap.utime = loss.first_utime;
+    gap.reason = reason;
+  }
+  losses_.clear();
+  gaps_.Start(now_us);
+}
+
+bool Recorder::Flush(std::int64_t now_us) {
+  const auto begun = std::chrono::steady_clock::now();
+  flush_.Start(now_us);
+  // With nothing to write there is nothing to learn of the disk: a failure lasts until something has been written.
+  const bool learns = log_->pending_bytes() > 0 || !pause_.empty();
+  const bool flushed = FlushLog(now_us);
+  WatchDisk(now_us);
+  if (!flushed || !pause_.empty())
+    failed_flushes_ = std::min(failed_flushes_ + 1, INT16_MAX);
+  else if (learns)
+    failed_flushes_ = 0;
+  if (!losses_.empty() && (recording() || gaps_.IsOver(now_us))) MakeGaps(now_us);
+  summary_.Add(rows_);
+  MoveTo(flushed_rows_.decisions, rows_.decisions);
+  MoveTo(flushed_rows_.events, rows_.events);
+  MoveTo(flushed_rows_.gaps, rows_.gaps);
+  WriteRows();
+  flush_us_ = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begun).count();
+  worst_flush_us_ = std::max(worst_flush_us_, flush_us_);
+  Report();
+  return flushed;
+}
+
+bool Recorder::FlushLog(std::int64_t now_us) {
+  const bool flushed = log_->Flush();
+  if (!flushed) {
+    // The log does not have these events, so no row may refer to them.
+    rows_.decisions.clear();
+    rows_.events.clear();
+    WithoutEvents(rows_.gaps);
+  }
+  for (const auto& [channel, events] : unflushed_)
+    if (flushed)
+      written_ += events;
+    else
+      CountLoss({channel, ""}, events, now_us, "disk");
+  unflushed_.clear();
+  return flushed;
+}
+
+// Rows that the database refuses wait for the next flush; beyond a bound they are left to the next start's recovery.
+void Recorder::WriteRows() {
+  const std::size_t waiting = flushed_rows_.decisions.size() + flushed_rows_.events.size() + flushed_rows_.gaps.size();
+  if (waiting == 0) return;
+  const std::int64_t events = rows_lost_ ? 0 : log_->next_number();
+  if (database_.Write(flushed_rows_, log_file_, events)) {
+    flushed_rows_ = {};
+  } else if (waiting > kMaxWaitingRows) {
+    rows_lost_ = true;
+    flushed_rows_ = {};
+  }
+}
+
+std::string Recorder::trouble() const {
+  if (pause_ == "quota") return fmt::format("paused: the logs have reached logger.quota_mb, {}", *options_.quota_mb);
+  if (!pause_.empty()) return fmt::format("paused: less than logger.min_free_mb, {}, is free", options_.min_free_mb);
+  if (failed_flushes_ > 0) return log_->problem();
+  if (!flushed_rows_.empty()) return database_.problem();
+  if (rows_lost_) return "rows are missing in the database, the next start makes them again";
+  return rotation_problem_;
+}
+
+void Recorder::Report() {
+  const std::string now = trouble();
+  if (now == reported_) return;
+  if (now.empty())
+    spdlog::info("{} can be written again", options_.directory);
+  else
+    spdlog::error("{}; what is lost is counted", now);
+  reported_ = now;
+}
+
+void Recorder::End(std::int64_t now_us) {
+  MakeGaps(now_us);
+  if (Flush(now_us); !losses_.empty()) {  // of this last flush
+    MakeGaps(now_us);
+    Flush(now_us);
+  }
+  // A run with rows missing stays open, so that the next start makes them again from the log.
+  if (flushed_rows_.empty() && !rows_lost_) try {
+      database_.EndRun(log_file_, now_us);
+    } catch (const DatabaseError& error) {
+      spdlog::error("{} is left to the next start to end: {}", log_file_, error.what());
+    }
+}
+
+// A pause ends with an eighth to spare, so that it does not end and begin with every flush.
+void Recorder::WatchDisk(std::int64_t now_us) {
+  free_bytes_ = free_space_(directory_.path());
+  if (scan_.IsOver(now_us)) {
+    other_bytes_ = directory_.LogBytes(log_file_);
+    scan_.Start(now_us);
+  }
+  const std::int64_t floor = BytesOf(options_.min_free_mb), quota = BytesOf(options_.quota_mb.value_or(0));
+  const bool was_quota = pause_ == "quota";
+  if (free_bytes_ < floor + (pause_ == "disk" ? floor / 8 : 0))
+    pause_ = "disk";
+  else
+    pause_ = MakeRoom(was_quota ? quota / 8 : 0, now_us) ? "" : "quota";
+}
+
+bool Recorder::HasRoom(std::int64_t bytes) const {
+  return !options_.quota_mb || log_bytes() + bytes <= BytesOf(*options_.quota_mb);
+}
+
+bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
+  if (HasRoom(bytes)) return true;
+  if (file_bytes() + bytes > BytesOf(*options_.quota_mb)) return false;
+  try {
+    for (const RunRow& run : database_.Runs()) {
+      const auto size = directory_.Bytes(run.log_file);
+      if (HasRoom(bytes) || !run.end_utime || run.log_file == log_file_ || !size) continue;
+      database_.MarkLogDeleted(run.log_file, now_us);
+      if (!directory_.Remove(run.log_file)) continue;
+      other_bytes_ -= *size;
+      spdlog::warn("{}, {} bytes, deleted for logger.quota_mb; its rows stay", run.log_file, *size);
+    }
+  } catch (const DatabaseError& error) {
+    spdlog::error("no log is deleted for logger.quota_mb: {}", error.what());
+  }
+  return HasRoom(bytes);
+}
+
+}  // namespace forereach

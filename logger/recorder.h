@@ -1,0 +1,143 @@
+/** Brings messages to log files and the database, rotates the files, keeps within the disk. Knows no bus.
+
+**Loss window.** Take puts a message into the log's buffer. Every logger.flush_ms the buffer goes to the file (write, then
+fdatasync) and after it the rows of those events go to the database in one transaction. So the database never knows more
+than the log, and a recorder that is killed loses at most what came since the last flush; a machine that loses power the
+same. When it begins, log files that were not ended are mended: a cut tail is removed and missing rows are made again.
+
+**Files.** One row of the database's runs for each file. A file ends, and the next begins, before the event with which it
+would exceed logger.rotate_mb, and after logger.rotate_minutes; event numbers begin anew, sequence counts and waiting
+candidates go on. A file that the database has not all rows of is not ended before it has.
+
+**Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes is
+counted by channel, and the counts become gaps. With a flush that fails it is the same for the events of that flush. Gaps
+of this kind are written when recording goes on, and until then every ten seconds. For the quota the logs of ended runs are
+deleted, oldest first, each marked in the database before; the file being written and runs that were not ended are never
+deleted, nor is any if that would not make room. */
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "certifier/task/config.h"
+#include "logger/database.h"
+#include "logger/event_log.h"
+#include "logger/interpreter.h"
+#include "logger/log_directory.h"
+#include "logger/summary.h"
+
+namespace forereach {
+
+/** Free bytes of a directory's disk. */
+using FreeSpace = std::function<std::int64_t(const std::string& directory)>;
+
+/** A period on a clock that may jump: over once it has passed since the start, and if the clock went back behind that. */
+class Period final {
+ public:
+  explicit Period(double us) : us_(static_cast<std::int64_t>(us)) {}
+  void Start(std::int64_t now_us) { start_ = now_us; }
+  [[nodiscard]] bool IsOver(std::int64_t now_us) const { return !start_ || now_us < *start_ || now_us - *start_ >= us_; }
+
+ private:
+  std::int64_t us_;
+  std::optional<std::int64_t> start_;
+};
+
+class Recorder final {
+ public:
+  /** Makes the directory if need be, opens the database in it and mends earlier runs.
+  @throws LogError, DatabaseError if the directory cannot be written to. */
+  Recorder(const Config& config, FreeSpace free_space);
+
+  /** Opens the first log file, named after its time; the rest is to be called after it. @throws as the constructor. */
+  void Begin(std::int64_t now_us);
+  [[nodiscard]] bool begun() const { return log_ != nullptr; }
+
+  /** The next message; its `number` is not read. */
+  void Take(LogEvent event, std::int64_t now_us);
+  /** `lost` messages of the stream, the next ones of its count, reached this process and not Take: they make one gap. */
+  void Lose(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason);
+  /** Flushes and rotates where it is time. */
+  void Tick(std::int64_t now_us);
+  /** Flushes and ends the run; nothing may be called after it. */
+  void End(std::int64_t now_us);
+
+  [[nodiscard]] const Interpreter& interpreter() const { return interpreter_; }
+  [[nodiscard]] const Database& database() const { return database_; }
+  [[nodiscard]] Summary summary() const { return summary_.Finish(); }
+  /** One line for each earlier run that was mended. */
+  [[nodiscard]] const std::vector<std::string>& recovered() const { return recovered_; }
+  [[nodiscard]] const std::string& log_path() const { return log_path_; }
+  /** Log files of this run. */
+  [[nodiscard]] int files() const { return files_; }
+
+  [[nodiscard]] bool recording() const { return pause_.empty() && failed_flushes_ == 0; }
+  /** What is wrong, for a person; empty if nothing is. */
+  [[nodiscard]] std::string trouble() const;
+  /** Flushes in a row that failed or found recording paused. */
+  [[nodiscard]] int failed_flushes() const { return failed_flushes_; }
+  /** Events that the disk confirmed, and messages that are in no log. */
+  [[nodiscard]] std::int64_t written() const { return written_; }
+  [[nodiscard]] std::int64_t lost() const { return lost_; }
+  [[nodiscard]] std::int64_t file_bytes() const { return log_->offset() + log_->pending_bytes(); }
+  [[nodiscard]] std::int64_t log_bytes() const { return other_bytes_ + file_bytes(); }
+  [[nodiscard]] std::int64_t free_bytes() const { return free_bytes_; }
+  /** Wall-clock time of the last flush, and of the worst since the last call of TakeWorstFlushUs. */
+  [[nodiscard]] double flush_us() const { return flush_us_; }
+  [[nodiscard]] double TakeWorstFlushUs() { return std::exchange(worst_flush_us_, 0); }
+
+ private:
+  struct Loss {
+    std::int64_t lost = 0, first_utime = 0;
+  };
+
+  void Recover(const RunRow& run);
+  [[nodiscard]] std::string Mend(const RunRow& run, std::int64_t& end_utime);
+  [[nodiscard]] Interpreter InterpreterFor(const RunRow& run) const;
+
+  void Open(std::int64_t now_us, const std::string& continues);
+  void Rotate(std::int64_t now_us);
+  void Miss(LogEvent event);
+  void CountLoss(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason);
+  void MakeGaps(std::int64_t now_us);
+
+  bool Flush(std::int64_t now_us);
+  [[nodiscard]] bool FlushLog(std::int64_t now_us);
+  void WriteRows();
+  void Report();
+
+  void WatchDisk(std::int64_t now_us);
+  [[nodiscard]] bool HasRoom(std::int64_t bytes) const;
+  [[nodiscard]] bool MakeRoom(std::int64_t bytes, std::int64_t now_us);
+
+  const BusOptions channels_;
+  const LoggerOptions options_;
+  const FreeSpace free_space_;
+  const LogDirectory directory_;
+  Database database_;
+  SummaryBuilder summary_;
+  Interpreter interpreter_;
+  std::vector<std::string> recovered_;
+
+  std::string log_path_, log_file_;
+  std::unique_ptr<EventLogWriter> log_;
+  int files_ = 0;
+  Period flush_, age_, scan_, gaps_, retry_;
+
+  std::map<std::string, std::int64_t> unflushed_;               // events in the log's buffer, by channel
+  Rows flushed_rows_, rows_;                                    // of events on disk; of events in the log's buffer
+  bool rows_lost_ = false;                                      // some of this file, to be made again by the next start
+  std::map<std::pair<std::string, Stream>, Loss> losses_;       // by reason; no gaps yet
+  std::string pause_;                                           // the reason of the gaps it makes; empty while recording
+  std::string rotation_problem_, reported_;
+  int failed_flushes_ = 0;
+  std::int64_t written_ = 0, lost_ = 0, other_bytes_ = 0, free_bytes_ = 0;
+  double flush_us_ = 0, worst_flush_us_ = 0;
+};
+
+}  // namespace forereach

@@ -1,0 +1,405 @@
+// Log files that follow one another, and disks that fill.
+#include <algorithm>
+#include <csignal>
+#include <functional>
+#include <random>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sqlite3.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "forereach/logger_status_t.hpp"
+#include "logger/logger_node.h"
+#include "tests/logger/direct_bus.h"
+#include "tests/logger/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr std::int64_t kMinuteUs = 60'000'000;
+constexpr std::int64_t kRecord = 28 + 15 + 336;  // of an execution event
+
+class DiskTest : public testing::Test {
+ protected:
+  DiskTest() {
+    config_.logger.directory = scratch_ / "log";
+    config_.logger.flush_ms = 10;
+    config_.logger.min_free_mb = 1;
+  }
+
+  LoggerNode& Start() {
+    return node_.emplace(config_, bus_, out_, [this](const std::string&) { return free_bytes_; });
+  }
+  /** `count` execution events in a row, one a millisecond, and a tick after each. */
+  void Feed(int count) {
+    for (int i = 0; i < count; ++i) {
+      bus_.Publish("EXECUTION_EVENT", MakeEvent(fed_++, execution_event_t::STARTED));
+      node_->Tick(bus_.now_us += 1000);
+    }
+  }
+  void Stop() {
+    node_->Stop();
+    node_.reset();
+    bus_.Disconnect();
+  }
+  [[nodiscard]] std::string PathOf(const RunRow& run) const { return scratch_ / ("log/" + run.log_file); }
+  [[nodiscard]] std::vector<RunRow> Runs() const { return Database(scratch_ / "log/decisions.sqlite").Runs(); }
+  [[nodiscard]] Rows ReadRows() const { return Database(scratch_ / "log/decisions.sqlite").Read(); }
+  /** Sequence numbers of the execution events in all logs that are there, in order. */
+  [[nodiscard]] std::vector<std::int64_t> Recorded() const {
+    std::vector<std::int64_t> sequences;
+    for (const RunRow& run : Runs()) {
+      if (!std::filesystem::exists(PathOf(run))) continue;
+      for (const LogEvent& event : ReadLog(PathOf(run)).events)
+        if (const auto execution = Decoded<execution_event_t>(event.data)) sequences.push_back(execution->sequence);
+    }
+    return sequences;
+  }
+  [[nodiscard]] std::int64_t LostTo(const std::string& reason) const {
+    std::int64_t lost = 0;
+    for (const GapRow& gap : ReadRows().gaps) lost += gap.reason == reason ? gap.lost : 0;
+    return lost;
+  }
+  [[nodiscard]] const logger_status_t& last() const { return bus_.heartbeats.back(); }
+
+  static std::vector<std::int64_t> UpTo(std::int64_t end) {
+    std::vector<std::int64_t> numbers(static_cast<std::size_t>(end));
+    std::ranges::generate(numbers, [n = std::int64_t{0}]() mutable { return n++; });
+    return numbers;
+  }
+
+  Scratch scratch_;
+  Config config_;
+  DirectBus bus_;
+  std::ostringstream out_;
+  std::int64_t free_bytes_ = std::int64_t{1} << 40, fed_ = 0;
+  std::optional<LoggerNode> node_;
+};
+
+TEST_F(DiskTest, AFileEndsBeforeTheEventThatWouldExceedItsSize) {
+  config_.logger.rotate_mb = 10 * kRecord * 1e-6;
+  Start();
+  Feed(35);
+  Stop();
+  const std::vector<RunRow> runs = Runs();
+  ASSERT_EQ(runs.size(), 4u);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    EXPECT_EQ(runs[i].continues, i == 0 ? "" : runs[i - 1].log_file);
+    EXPECT_TRUE(runs[i].end_utime.has_value());
+    EXPECT_EQ(std::filesystem::file_size(PathOf(runs[i])), static_cast<std::uintmax_t>((i < 3 ? 10 : 5) * kRecord));
+    EXPECT_EQ(ReadLog(PathOf(runs[i])).events.front().number, 0);
+  }
+  EXPECT_EQ(Recorded(), UpTo(35));
+  EXPECT_EQ(ReadRows().events.size(), 35u);
+  EXPECT_TRUE(ReadRows().gaps.empty());
+  EXPECT_THAT(out_.str(), HasSubstr("the last of 4"));
+}
+
+TEST_F(DiskTest, AnEventLargerThanAFileGetsOneOfItsOwn) {
+  config_.logger.rotate_mb = 1e-6;
+  Start();
+  Feed(3);
+  Stop();
+  EXPECT_EQ(Runs().size(), 3u);
+  EXPECT_EQ(Recorded(), UpTo(3));
+}
+
+TEST_F(DiskTest, AFileEndsByTimeButNoEmptyOne) {
+  config_.logger.rotate_minutes = 1;
+  Start();
+  Feed(5);
+  node_->Tick(bus_.now_us += kMinuteUs);
+  EXPECT_EQ(Runs().size(), 2u);
+  for (int i = 0; i < 5; ++i) node_->Tick(bus_.now_us += kMinuteUs);
+  EXPECT_EQ(Runs().size(), 2u) << "nothing was recorded since";
+  Feed(5);
+  Stop();
+  EXPECT_EQ(Recorded(), UpTo(10));
+}
+
+TEST_F(DiskTest, AClockThatGoesBackStopsNothing) {
+  Start();
+  Feed(20);
+  bus_.now_us -= 60 * kMinuteUs;
+  Feed(20);
+  EXPECT_GE(Recorded().size(), 30u) << "flushed";
+  const std::size_t heartbeats = bus_.heartbeats.size();
+  Feed(600);
+  EXPECT_GT(bus_.heartbeats.size(), heartbeats);
+  Stop();
+}
+
+TEST_F(DiskTest, CountsGoOnFromFileToFile) {
+  config_.logger.rotate_mb = 4 * kRecord * 1e-6;
+  Start();
+  Feed(4);
+  fed_ += 3;  // lost on the bus, at the very end of the first file
+  const candidate_plan_t candidate = MakeCandidate(0, 1);
+  Feed(1);
+  bus_.Publish("PLAN_CANDIDATE", candidate);
+  node_->Tick(bus_.now_us += 1000);
+  bus_.now_us += 250;
+  bus_.Publish("PLAN_DECISION", MakeDecision(candidate, 0, decision_t::CERTIFIED, 0));
+  node_->Tick(bus_.now_us);
+  Stop();
+  EXPECT_GE(Runs().size(), 3u) << "candidate and decision lie in different files";
+  const Rows rows = ReadRows();
+  ASSERT_EQ(rows.gaps.size(), 1u);
+  EXPECT_EQ(rows.gaps[0].lost, 3);
+  EXPECT_EQ(rows.gaps[0].event.event_number, 0);
+  ASSERT_EQ(rows.decisions.size(), 1u);
+  EXPECT_EQ(rows.decisions[0].latency_us, 1250);
+}
+
+/** Every row in words, so that sets of them can be compared. */
+std::vector<std::string> InWords(const Rows& rows) {
+  std::vector<std::string> words;
+  const auto reference = [](const LogReference& event) {
+    return event.log_file + " " + std::to_string(event.event_number) + " " + event.digest + " ";
+  };
+  for (const DecisionRow& row : rows.decisions)
+    words.push_back(reference(row.event) + row.plan_digest + " " + std::to_string(row.latency_us));
+  for (const EventRow& row : rows.events) words.push_back(reference(row.event) + std::to_string(row.sequence));
+  for (const GapRow& row : rows.gaps) words.push_back(reference(row.event) + row.channel + std::to_string(row.lost));
+  std::ranges::sort(words);
+  return words;
+}
+
+// Rows made again from the files of a run are those made while it ran, also where a file knows only with the one before.
+TEST_F(DiskTest, RowsMadeAgainAreTheSame) {
+  config_.logger.rotate_mb = 0.02;
+  Start();
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  std::mt19937 random(seed);
+  for (std::int64_t i = 0; i < 60; ++i) {
+    const candidate_plan_t candidate = MakeCandidate(i, i);
+    bus_.Publish("PLAN_CANDIDATE", candidate);
+    fed_ += random() % 4 == 0;
+    Feed(1);
+    bus_.now_us += static_cast<std::int64_t>(random() % 100);
+    bus_.Publish("PLAN_DECISION", MakeDecision(candidate, i, decision_t::CERTIFIED, 0));
+  }
+  Stop();
+  const std::vector<std::string> live = InWords(ReadRows());
+  EXPECT_GT(Runs().size(), 10u);
+  EXPECT_EQ(live.size(), 120 + ReadRows().gaps.size());
+
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open((scratch_ / "log/decisions.sqlite").c_str(), &handle), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(handle,
+                         "DELETE FROM decisions; DELETE FROM execution_events; DELETE FROM gaps;"
+                         "UPDATE runs SET end_utime = NULL, events = 0",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(handle);
+  { const LoggerNode recovery(config_, bus_, out_); }
+  EXPECT_EQ(InWords(ReadRows()), live);
+}
+
+TEST_F(DiskTest, TheQuotaTakesTheOldestEndedLogsAndKeepsTheirRows) {
+  config_.logger.rotate_mb = 10 * kRecord * 1e-6;
+  config_.logger.quota_mb = 35 * kRecord * 1e-6;
+  Start();
+  for (int i = 0; i < 95; ++i) {
+    Feed(1);
+    EXPECT_LE(LogDirectory(config_.logger.directory).LogBytes(), 35 * kRecord);
+  }
+  node_->Tick(bus_.now_us += 10'000);
+  EXPECT_EQ(node_->recorder().log_bytes(), LogDirectory(config_.logger.directory).LogBytes());
+  Stop();
+  const std::vector<RunRow> runs = Runs();
+  ASSERT_EQ(runs.size(), 10u);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    EXPECT_EQ(runs[i].log_deleted_utime.has_value(), i < 7) << i;
+    EXPECT_EQ(std::filesystem::exists(PathOf(runs[i])), i >= 7) << i;
+  }
+  EXPECT_EQ(ReadRows().events.size(), 95u) << "rows stay";
+  EXPECT_TRUE(ReadRows().gaps.empty());
+}
+
+TEST_F(DiskTest, AFileThatAloneExceedsTheQuotaPausesAndNothingIsDeleted) {
+  config_.logger.rotate_minutes = 1;
+  Start();
+  Feed(5);
+  Stop();
+  config_.logger.quota_mb = 20 * kRecord * 1e-6;
+  Start();
+  Feed(30);
+  EXPECT_EQ(Recorded().size(), 20u) << "the first file goes, then the second is full";
+  EXPECT_EQ(node_->recorder().lost(), 10);
+  EXPECT_FALSE(node_->recorder().recording());
+  EXPECT_THAT(node_->recorder().trouble(), HasSubstr("logger.quota_mb"));
+  node_->Tick(bus_.now_us += kMinuteUs);  // now the full file is an old one
+  Feed(11);
+  EXPECT_TRUE(node_->recorder().recording());
+  Stop();
+  EXPECT_EQ(LostTo("quota"), 10);
+}
+
+TEST_F(DiskTest, BelowTheFloorRecordingPausesAndResumesByItself) {
+  Start();
+  Feed(10);
+  free_bytes_ = 999'999;
+  Feed(10);  // the tenth is flushed, and the flush sees the disk
+  const std::int64_t kept = std::ssize(Recorded());
+  Feed(500);
+  EXPECT_EQ(last().state, logger_status_t::ERROR);
+  EXPECT_GT(last().failed_flushes, 10);
+  EXPECT_EQ(last().free_bytes, 999'999);
+  EXPECT_THAT(GetText(last().message), HasSubstr("logger.min_free_mb"));
+  EXPECT_EQ(std::ssize(Recorded()), kept);
+  free_bytes_ = 1'000'000;
+  Feed(500);
+  EXPECT_EQ(last().state, logger_status_t::ERROR) << "an eighth more has to be free";
+  free_bytes_ = 1'125'000;
+  Feed(600);
+  EXPECT_EQ(last().state, logger_status_t::OK);
+  EXPECT_EQ(last().failed_flushes, 0);
+  Stop();
+  EXPECT_EQ(std::ssize(Recorded()) + LostTo("disk"), fed_);
+  EXPECT_EQ(LostTo("bus"), 0) << "what the pause cost is not counted again";
+}
+
+TEST_F(DiskTest, ALongPauseWritesFewGapsAndFindsThoseOfTheBus) {
+  Start();
+  Feed(10);
+  free_bytes_ = 0;
+  Feed(12'000);
+  fed_ += 7;
+  Feed(12'000);
+  const Rows meanwhile = ReadRows();
+  EXPECT_GE(meanwhile.gaps.size(), 2u) << "written before it ends";
+  EXPECT_LE(meanwhile.gaps.size(), 4u);
+  Stop();
+  EXPECT_EQ(std::ssize(Recorded()) + LostTo("disk") + LostTo("bus"), fed_);
+  EXPECT_EQ(LostTo("bus"), 7);
+}
+
+TEST_F(DiskTest, TheHeartbeatSaysHowItFares) {
+  Start();
+  Feed(1200);
+  ASSERT_EQ(bus_.heartbeats.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(bus_.heartbeats[i].sequence, static_cast<std::int64_t>(i));
+  EXPECT_EQ(last().utime, kStart + 1'001'000);
+  EXPECT_EQ(last().state, logger_status_t::OK);
+  EXPECT_EQ(GetText(last().message), "recording");
+  EXPECT_EQ(last().events_lost, 0);
+  EXPECT_GT(last().events_written, 980);
+  EXPECT_LE(last().events_written, 1001);
+  EXPECT_EQ(last().queue_depth, 1);
+  EXPECT_EQ(last().queue_high_water, 1);
+  EXPECT_EQ(last().file_bytes, 1001 * kRecord);
+  EXPECT_EQ(last().log_bytes, last().file_bytes);
+  EXPECT_EQ(last().free_bytes, free_bytes_);
+  EXPECT_GT(last().flush_us, 0);
+  EXPECT_GE(last().flush_worst_us, last().flush_us);
+
+  node_->Tick(bus_.now_us += 1'900'000);
+  EXPECT_EQ(last().state, logger_status_t::OK);
+  node_->Tick(bus_.now_us += 600'000);
+  EXPECT_EQ(last().state, logger_status_t::STALE);
+  EXPECT_THAT(GetText(last().message), HasSubstr("nothing was heard for 2.5 s"));
+  Feed(501);
+  EXPECT_EQ(last().state, logger_status_t::OK);
+}
+
+TEST_F(DiskTest, ADatabaseThatLagsIsStale) {
+  Start();
+  Feed(1);
+  const auto sql = [this](const char* statement) {
+    sqlite3* handle = nullptr;
+    ASSERT_EQ(sqlite3_open((scratch_ / "log/decisions.sqlite").c_str(), &handle), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(handle, statement, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(handle);
+    sqlite3_close(handle);
+  };
+  sql("CREATE TRIGGER full BEFORE INSERT ON execution_events BEGIN SELECT RAISE(ABORT, 'no more'); END");
+  config_.logger.rotate_mb = 10 * kRecord * 1e-6;
+  Feed(600);
+  EXPECT_EQ(last().state, logger_status_t::STALE);
+  EXPECT_THAT(GetText(last().message), HasSubstr("no more"));
+  sql("DROP TRIGGER full");
+  Feed(600);
+  EXPECT_EQ(last().state, logger_status_t::OK);
+  Stop();
+  EXPECT_EQ(std::ssize(ReadRows().events), fed_);
+}
+
+TEST_F(DiskTest, AFailingFlushIsAnError) {
+  Start();
+  Feed(20);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit full{std::filesystem::file_size(node_->recorder().log_path()) + 10, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
+  Feed(500);
+  EXPECT_EQ(last().state, logger_status_t::ERROR);
+  EXPECT_GT(last().failed_flushes, 10);
+  EXPECT_THAT(GetText(last().message), HasSubstr("File too large"));
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  Feed(600);
+  EXPECT_EQ(last().state, logger_status_t::OK);
+  node_->Tick(bus_.now_us += 10'000);
+  EXPECT_EQ(node_->recorder().written() + node_->recorder().lost(), fed_);
+  Stop();
+  EXPECT_EQ(std::ssize(Recorded()) + LostTo("disk"), fed_);
+}
+
+/** A small file system of this process's own on a directory; `mounted` is false where that is not allowed. */
+class SmallDisk final {
+ public:
+  SmallDisk(const std::string& path, const std::string& options) : path_(path) {
+    std::filesystem::create_directories(path);
+    mounted = ::unshare(CLONE_NEWNS) == 0 && ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+              ::mount("tmpfs", path.c_str(), "tmpfs", 0, options.c_str()) == 0;
+  }
+  ~SmallDisk() {
+    if (mounted) ::umount2(path_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+  bool mounted = false;
+
+ private:
+  std::string path_;
+};
+
+TEST_F(DiskTest, OnARealDiskThatFills) {
+  const SmallDisk disk(config_.logger.directory, "size=6m");
+  if (!disk.mounted) GTEST_SKIP() << "no right to mount a small disk here";
+  const auto use = [this](const std::string& name, std::size_t bytes) {
+    WriteBytes(scratch_ / ("log/" + name), std::vector<std::uint8_t>(bytes));
+  };
+  config_.logger.min_free_mb = 2;
+  node_.emplace(config_, bus_, out_);
+  Feed(100);
+  EXPECT_TRUE(node_->recorder().recording());
+  use("something else", 3 << 20);  // below the floor
+  Feed(500);
+  EXPECT_FALSE(node_->recorder().recording());
+  EXPECT_EQ(last().state, logger_status_t::ERROR);
+  use("and more", 3 << 20);  // and nothing left at all
+  Feed(11'000);
+  EXPECT_FALSE(node_->recorder().recording());
+  std::filesystem::remove(scratch_ / "log/something else");
+  std::filesystem::remove(scratch_ / "log/and more");
+  Feed(600);
+  EXPECT_EQ(last().state, logger_status_t::OK);
+  Stop();
+  for (const RunRow& run : Runs()) EXPECT_EQ(ReadLog(PathOf(run)).end, LogStatus::kEnd);
+  EXPECT_EQ(std::ssize(Recorded()) + LostTo("disk"), fed_);
+  EXPECT_EQ(std::ssize(ReadRows().events), std::ssize(Recorded()));
+}
+
+}  // namespace
+}  // namespace forereach
