@@ -20,7 +20,8 @@ const std::array<std::string, Rig::kRoles> kPrograms{FOREREACH_LOGGER, FOREREACH
 }  // namespace
 
 Rig::Rig(const std::string& task, bool relayed)
-    : relayed_(relayed), task_path_(scratch_.Write("task.yaml", task)), key_path_((scratch_.path() / "key").string()) {
+    : relayed_(relayed), task_path_(scratch_.Write("task.yaml", task)), key_path_((scratch_.path() / "key").string()),
+      directory_((scratch_.path() / "log").string()) {
   static int rigs = 0;
   const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 40'000;
   far_url_ = "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
@@ -42,10 +43,7 @@ Rig::~Rig() {
 
 void Rig::Start(Role role) {
   std::vector<std::string> command{kPrograms[role], "--config", task_path_, "--lcm-url", url(role), "--key", key_path_};
-  if (role == kLogger) {
-    command.insert(command.end(), {"--directory", directory()});
-    command.insert(command.end(), logger_options.begin(), logger_options.end());
-  }
+  if (role == kLogger) command.insert(command.end(), {"--directory", directory_});
   if (role == kRobot) drive_began_ = std::chrono::steady_clock::now();
   processes_[role] = std::make_unique<ChildProcess>(command);
 }
@@ -125,11 +123,12 @@ std::string Rig::Heal() {
 
 std::int64_t Rig::LostByLogger() const {
   if (!witness_->logger_status()) return 0;
-  // Every log of the last run holds what it held when the heartbeat was sent; the newest run's files are the last ones.
   std::int64_t newest = 0;
   std::filesystem::path last;
-  for (const auto& entry : std::filesystem::directory_iterator(directory()))
-    if (entry.path().extension() == ".lcmlog" && (last.empty() || entry.path() > last)) last = entry.path();
+  const auto written = [](const std::filesystem::path& path) { return std::filesystem::last_write_time(path); };
+  for (const auto& entry : std::filesystem::directory_iterator(directory_))
+    if (entry.path().extension() == ".lcmlog" && (last.empty() || written(entry.path()) > written(last)))
+      last = entry.path();
   if (last.empty()) return witness_->logger_status()->events_written;
   EventLogReader reader(last.string());
   ForEachEvent(reader, [&](const LogEvent&) { ++newest; });

@@ -47,14 +47,15 @@ class Rig final {
   [[nodiscard]] std::string url(Role role) const { return relayed_ && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
   [[nodiscard]] std::string key_path() const { return key_path_; }
-  [[nodiscard]] std::string directory() const { return (scratch_.path() / "log").string(); }
+  [[nodiscard]] const std::string& directory() const { return directory_; }
+  /** From the logger's next start on. */
+  void SetDirectory(const std::string& directory) { directory_ = directory; }
   [[nodiscard]] std::string Said(Role role) const;
-  std::vector<std::string> logger_options;  ///< Added to its command line.
 
  private:
   const bool relayed_;
   ScratchDirectory scratch_;
-  std::string task_path_, key_path_, near_url_, far_url_;
+  std::string task_path_, key_path_, near_url_, far_url_, directory_;
   Config config_;
   std::unique_ptr<Bus> heard_, signed_;
   std::unique_ptr<Witness> witness_;

@@ -24,11 +24,12 @@ void Witness::OnDecision(const Received& received) {
   const auto decision = Decoded<decision_t>(received.bytes);
   if (!decision) return;
   ++decisions_;
-  const auto [known, is_new] = outcomes_.emplace(GetDigest(decision->plan_digest), decision->outcome);
-  // The same bytes sent twice are two candidates; the second is a duplicate and says so.
-  if (!is_new && decision->cause != decision_t::CAUSE_DUPLICATE)
+  const Digest digest = DigestOf(received.bytes);
+  const auto [known, is_new] = answers_.emplace(GetDigest(decision->plan_digest), Answer{digest, decision->cause});
+  // The network may deliver one answer twice. The same bytes sent twice are two candidates; the second is a duplicate.
+  if (!is_new && known->second.decision != digest && decision->cause != decision_t::CAUSE_DUPLICATE)
     Violate("plan " + std::to_string(decision->plan_id) + " was answered twice: " +
-            std::string(OutcomeName(known->second)) + ", then " + std::string(CauseName(decision->cause)));
+            std::string(CauseName(known->second.cause)) + ", then " + std::string(CauseName(decision->cause)));
 }
 
 void Witness::OnCertified(const Received& received) {

@@ -48,7 +48,11 @@ class Witness final {
   const BusOptions channels_;
   Authenticator authenticator_;
   std::map<std::int64_t, certified_plan_t> plans_;
-  std::map<Digest, std::int16_t> outcomes_;
+  struct Answer {
+    Digest decision;  // of the message
+    std::int16_t cause;
+  };
+  std::map<Digest, Answer> answers_;  // by the candidate
   struct Applied {
     std::int64_t plan_id;
     int step;
