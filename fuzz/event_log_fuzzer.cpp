@@ -1,5 +1,5 @@
 // The log reader and the writer's recovery over any bytes: they end, account for every byte, hold no more than one event of
-// the allowed size, and recovery keeps what the reader read.
+// the allowed size, and recovery keeps as much as the reader read.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -52,6 +52,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   EventLogWriter writer(path);
   Require(writer.recovery().events == events);
   const auto kept = static_cast<std::int64_t>(size) - writer.recovery().cut_bytes;
-  Require(ReadAll(path, kept) == events);
+  Require(ReadAll(path, kept) >= events);  // a claim that reached into the tail no longer discredits one before it
   return 0;
 }

@@ -115,6 +115,28 @@ TEST(Replay, ACertifiedPlanThatWasAlteredIsListed) {
   EXPECT_THAT(difference([](auto& c) { c.expires_utime += 1; }), HasSubstr("certificate_digest"));
 }
 
+// The seam lies between a candidate and its decision.
+TEST(Replay, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
+  std::vector<std::string> logs;
+  for (const bool second : {false, true}) {
+    bool behind = false;
+    logs.push_back(Edited([&](LogEvent& event) {
+      const bool here = behind == second;
+      if (event.number >= 200 && Decoded<candidate_plan_t>(event.data)) behind = true;
+      return here;
+    }));
+    std::filesystem::rename(logs.back(), logs.back() + std::to_string(second));
+    logs.back() += std::to_string(second);
+  }
+  const Config config = LoadConfig(kConfig);
+  const ReplayResult whole = Replay({kLog}, config), parts = Replay(logs, config);
+  EXPECT_TRUE(parts.differences.empty()) << parts.differences.front();
+  EXPECT_EQ(parts.candidates, whole.candidates);
+  EXPECT_EQ(parts.agreed, whole.agreed);
+  EXPECT_THAT(Replay({logs[1]}, config).differences, testing::Not(testing::IsEmpty()));
+  for (const std::string& log : logs) std::filesystem::remove(log);
+}
+
 TEST(Replay, AnotherTaskIsNoticed) {
   Config config = LoadConfig(kConfig);
   config.declaration_digest[0] ^= 1;
