@@ -1,6 +1,7 @@
 #include "experiments/chunks/training.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numeric>
 #include <vector>
@@ -21,13 +22,23 @@ using Hidden = dlib::htan<dlib::fc<kHidden, Below>>;
 using Network =
     dlib::loss_mean_squared_multioutput<dlib::fc<2 * kBlockSteps, Hidden<Hidden<dlib::input<Sample>>>>>;
 
+// The shortest decimal that is this float: a file of them has half the digits of one of doubles.
+double Written(float number) {
+  char text[32];
+  const char* const end = std::to_chars(text, text + sizeof text, number).ptr;
+  double read = 0;
+  std::from_chars(text, end, read);
+  return read;
+}
+
 // Means, and the deviations of row k, k + period, ... together. An input's steps share one, so that what is small in
 // each step is not learned at the cost of what is large.
 Policy::Scaling ScalingOf(const Eigen::MatrixXd& columns, Eigen::Index period) {
   const Eigen::VectorXd mean = columns.rowwise().mean();
   const Eigen::VectorXd variance = (columns.colwise() - mean).cwiseAbs2().rowwise().mean();
   const Eigen::VectorXd shared = variance.reshaped(period, variance.size() / period).rowwise().mean().cwiseSqrt();
-  return {mean, shared.replicate(variance.size() / period, 1)};
+  const auto written = [](double number) { return Written(static_cast<float>(number)); };
+  return {mean.unaryExpr(written), shared.replicate(variance.size() / period, 1).unaryExpr(written)};
 }
 
 std::vector<Sample> Scaled(const Eigen::MatrixXd& columns, const Policy::Scaling& scaling) {
@@ -44,8 +55,8 @@ template <class Layer>
 Policy::Layer LayerOf(const Layer& layer, Eigen::Index width, Eigen::Index height) {
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const float* numbers = layer.layer_details().get_layer_params().host();
-  return {Eigen::Map<const RowMajor>(numbers, width, height).transpose().cast<double>(),
-          Eigen::Map<const Eigen::VectorXf>(numbers + width * height, height).cast<double>()};
+  return {Eigen::Map<const RowMajor>(numbers, width, height).transpose().unaryExpr(&Written),
+          Eigen::Map<const Eigen::VectorXf>(numbers + width * height, height).unaryExpr(&Written)};
 }
 
 // The library draws first weights from std::rand, which is not the same everywhere: draws them anew, by Glorot and

@@ -10,7 +10,7 @@ namespace forereach::experiments {
 
 struct TrainingOptions {
   int demonstrations = 12'000;
-  int epochs = 150;
+  int epochs = 100;
   std::uint64_t seed = 1;  ///< Of demonstrations, first weights and the order of samples
   unsigned threads = 1;    ///< For the demonstrations; the result does not depend on it
 };
