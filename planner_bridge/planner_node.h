@@ -19,6 +19,7 @@ ignored. */
 
 #include <iostream>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,7 +29,7 @@ ignored. */
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/node.h"
-#include "planner_bridge/proposal.h"
+#include "planner_bridge/proposer.h"
 #include "planner_bridge/residual_estimate.h"
 
 namespace forereach {
@@ -82,7 +83,7 @@ class PlannerNode final : public Node {
   const std::int64_t period_us_;
   const Eigen::VectorXd half_width_;  // of X_0
   const ResidualEstimate residual_;
-  Planner planner_;
+  const std::unique_ptr<Proposer> proposer_;
 
   std::optional<Round> round_;
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded

@@ -28,7 +28,7 @@ double CruiseSteering(double speed, double wheelbase) {
 
 Eigen::VectorXd Features(const Eigen::VectorXd& state, const Reference& reference) {
   const Eigen::VectorXd frame = reference.states.col(0), end = reference.states.rightCols<1>();
-  Eigen::VectorXd features(12);
+  Eigen::VectorXd features(kFeatures);
   features << SeenFrom(frame, state), SeenFrom(frame, end);
   return features;
 }

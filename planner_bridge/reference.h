@@ -25,7 +25,9 @@ inline constexpr double kCruiseLateral = 6;        ///< m/s^2, v^2 tan(delta) / 
 /** The largest steering angle of such a reference. @param speed its largest, m/s. */
 [[nodiscard]] double CruiseSteering(double speed, double wheelbase);
 
-/** The 12 features: the robot's state, then the end of the reference, both seen from the reference's start (position
+inline constexpr int kFeatures = 12;
+
+/** The features: the robot's state, then the end of the reference, both seen from the reference's start (position
 turned by -theta, heading less theta). So a policy acts the same wherever it is and however it stands. */
 [[nodiscard]] Eigen::VectorXd Features(const Eigen::VectorXd& state, const Reference& reference);
 

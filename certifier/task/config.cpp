@@ -189,8 +189,17 @@ BusOptions ReadBus(const Document& file) {
   return bus;
 }
 
+std::string RelativeTo(const std::string& file, const std::string& path) {
+  return (std::filesystem::path(file).parent_path() / path).string();
+}
+
 PlannerOptions ReadPlanner(const Document& file) {
   PlannerOptions planner;
+  file.Read("planner.source", planner.source);
+  if (file.Has("planner.policy"))
+    planner.policy = RelativeTo(file.path(), file.Text("planner.policy"));
+  else if (planner.source == "policy")
+    file.Fail("planner.policy", "is missing, planner.source: policy needs it");
   file.Read("planner.algorithm", planner.algorithm);
   file.Read("planner.goal", planner.goal);
   file.Read("planner.goal_radius", planner.goal_radius);
@@ -281,10 +290,6 @@ RobotOptions ReadRobot(const Document& file, const NominalModel& model) {
   if (robot.residual != "none") RequireItsModel(file, key, robot.residual, model);
   robot.residual_parameters = ReadResidualParameters(file, robot.residual);
   return robot;
-}
-
-std::string RelativeTo(const std::string& file, const std::string& path) {
-  return (std::filesystem::path(file).parent_path() / path).string();
 }
 
 LoggerOptions ReadLogger(const Document& file) {
