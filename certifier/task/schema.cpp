@@ -270,9 +270,9 @@ std::vector<Key> PlannerKeys() {
   return {
       Optional(Map("planner", "How candidates are made."), "all defaults"),
       Optional(Word("planner.source", {"ompl", "policy"},
-                    "ompl: searched for. policy: a learned policy of the bicycle proposes its blocks; it knows nothing of "
-                    "obstacles, and of the keys below up to `time_limit_ms` it heeds goal, progress_steps (a block's at "
-                    "most), tail_steps, lead_steps, candidates, cruise_speed (up to 10) and braking."),
+                    "ompl: searched for, clear of the obstacles. policy: blocks of a learned policy of the bicycle, which "
+                    "knows of no obstacles; algorithm, clearances and seed do not concern it, progress_steps may not be "
+                    "more than a block has, and it drives at most 10 m/s."),
                planner.source),
       Text("planner.policy", "The policy's file, relative to this one; required for `source: policy`."),
       Optional(Word("planner.algorithm", {"kpiece", "est", "pdst", "rrt", "sst"}, "The OMPL control planner."),
