@@ -199,7 +199,7 @@ PlannerOptions ReadPlanner(const Document& file) {
   if (file.Has("planner.policy"))
     planner.policy = RelativeTo(file.path(), file.Text("planner.policy"));
   else if (planner.source == "policy")
-    file.Fail("planner.policy", "is missing, planner.source: policy needs it");
+    file.Fail("planner.policy", "missing: a policy's file, for planner.source: policy");
   file.Read("planner.algorithm", planner.algorithm);
   file.Read("planner.goal", planner.goal);
   file.Read("planner.goal_radius", planner.goal_radius);
