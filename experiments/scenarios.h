@@ -58,8 +58,8 @@ enum class Layout { kCorridor, kBelowKnee, kFixedGrid, kPolicyCorridor };
   return kNames[static_cast<std::size_t>(layout)];
 }
 
-/** `count` observed transitions, at points uniform in the layout's region or as chunks/blocks.h says. Those of a smaller
-count are the first of a larger, a grid's excepted, and noise does not move the points.
+/** `count` observed transitions, at points uniform in the layout's region or as chunks/blocks.h says. Those of a
+smaller count are the first of a larger, but for a grid, and noise does not move the points.
 @param noise_scale to each entry of a successor an error N(0, s^2), cut at NoiseBound(s), is added. */
 [[nodiscard]] Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale);
 

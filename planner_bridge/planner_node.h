@@ -7,6 +7,7 @@ candidate at a time and waits for its decision:
     certified          -> the round ends, the plan waits for its start
     abstention S       -> the next candidate keeps clearance_step more from obstacles
     abstention D       -> the next candidate keeps further inside the domain's bounds
+                           (a policy's follows another reference instead, policy_proposer.h)
     abstention F       -> the round ends: no candidate can pass
     rejected           -> the next candidate
 It ends without a certificate after `candidates` searches, or when too little time is left until its start; the next

@@ -36,7 +36,9 @@ class Field final {
     return {file_, name_ + (name_.empty() ? "" : ".") + name, *found};
   }
 
-  [[nodiscard]] Field operator[](std::size_t i) const { return {file_, name_ + "[" + std::to_string(i) + "]", json_[i]}; }
+  [[nodiscard]] Field operator[](std::size_t i) const {
+    return {file_, name_ + "[" + std::to_string(i) + "]", json_[i]};
+  }
 
   /** It is an object with these fields and no other. */
   void RequireFields(const std::set<std::string>& names) const {

@@ -33,10 +33,10 @@ struct Policy {
     Eigen::VectorXd bias;
   };
 
-  std::string model;               ///< The nominal model it was trained with: NominalModel::description()
-  int num_inputs = 0;              ///< m
+  std::string model;   ///< The nominal model it was trained with: NominalModel::description()
+  int num_inputs = 0;  ///< m
   Scaling input, output;
-  std::vector<Layer> layers;       ///< One at least; each as wide as the one before is high
+  std::vector<Layer> layers;  ///< One at least; each as wide as the one before is high
 
   [[nodiscard]] int num_features() const { return static_cast<int>(input.offset.size()); }
   [[nodiscard]] int num_steps() const { return static_cast<int>(output.offset.size()) / num_inputs; }

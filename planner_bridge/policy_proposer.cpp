@@ -23,16 +23,16 @@ void RequireFits(const Problem& problem, const PlannerOptions& options, const Po
   RequireGoalAndSteps(problem, options);
   const std::string model = problem.model->description();
   Require(policy.model == model, "is for the model " + policy.model + ", the task's is " + model);
-  Require(problem.model->name() == KinematicBicycle::kName, "there are policies for " +
-                                                                std::string(KinematicBicycle::kName) + " only");
+  Require(problem.model->name() == KinematicBicycle::kName,
+          "there are policies for " + std::string(KinematicBicycle::kName) + " only");
   Require(problem.projection == Eigen::MatrixXd::Identity(2, problem.model->num_states()),
           "a policy goes to a point (x, y), task.projection has to be [x, y]");
-  Require(policy.num_features() == kFeatures, "has " + std::to_string(policy.num_features()) +
-                                                  " features, has to have " + std::to_string(kFeatures));
+  Require(policy.num_features() == kFeatures,
+          "has " + std::to_string(policy.num_features()) + " features, has to have " + std::to_string(kFeatures));
   Require(policy.num_inputs == problem.model->num_inputs(), "has " + std::to_string(policy.num_inputs) + " inputs");
-  Require(options.progress_steps <= policy.num_steps(),
-          "its blocks have " + std::to_string(policy.num_steps()) + " steps, planner.progress_steps is " +
-              std::to_string(options.progress_steps));
+  Require(options.progress_steps <= policy.num_steps(), "its blocks have " + std::to_string(policy.num_steps()) +
+                                                            " steps, planner.progress_steps is " +
+                                                            std::to_string(options.progress_steps));
 }
 
 }  // namespace
@@ -72,8 +72,7 @@ std::optional<Proposal> PolicyProposer::Propose(const PlanRequest& request) {
   const NominalModel& model = *problem_->model;
   if (request.state.size() != model.num_states() || !request.state.allFinite() || request.attempt > kFan)
     return std::nullopt;
-  const Reference reference =
-      MakeReference(model, ReferenceStart(request.state, request.attempt), policy_.num_steps());
+  const Reference reference = MakeReference(model, ReferenceStart(request.state, request.attempt), policy_.num_steps());
   Eigen::MatrixXd progress = policy_.Act(Features(request.state, reference)).leftCols(options_.progress_steps);
   const Box& inputs = problem_->domain.input;
   for (auto column : progress.colwise()) column = column.cwiseMax(inputs.lower()).cwiseMin(inputs.upper());

@@ -2,8 +2,8 @@
 
 The policy sees neither obstacles nor bounds, and nothing is checked here but that inputs lie in their domain: what may
 not be driven, the certifier refuses, and the next candidate follows another reference. References start where the robot
-is, at its speed, and change it towards cruise_speed. The first steers along the arc to the goal; the following ones along
-kFan angles over the range that the policy was taught (reference.h), nearest to that arc first. */
+is, at its speed, and change it towards cruise_speed. The first steers along the arc to the goal; the following ones
+along kFan angles over the range that the policy was taught (reference.h), nearest to that arc first. */
 #pragma once
 
 #include <memory>
@@ -25,8 +25,8 @@ class PolicyProposer final : public Proposer {
 
   void SetObstacles(std::vector<Obstacle>) override {}
   [[nodiscard]] const Motion& motion() const override { return *motion_; }
-  /** None after 1 + kFan attempts, or if no tail of at most tail_steps ends the plan. Clearance, margin and seed are not
-  looked at. */
+  /** None after 1 + kFan attempts, or if no tail of at most tail_steps ends the plan. Clearance, margin and seed are
+  not looked at. */
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
 
  private:

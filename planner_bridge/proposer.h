@@ -1,5 +1,5 @@
-/** Where candidate plans come from: a request for one start in, a plan with its braking tail out. A proposal is no proof:
-candidates are certified or not by somebody else. */
+/** Where candidate plans come from: a request for one start in, a plan with its braking tail out. A proposal is no
+proof: candidates are certified or not by somebody else. */
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct PlanRequest {
   double clearance = 0;           ///< Kept from obstacles, m. One that is nearer at the start counts as it is there.
   Eigen::VectorXd domain_margin;  ///< Kept from the bounds of the state domain, n entries or none.
   std::uint32_t seed = 1;
-  int attempt = 0;                ///< How often this start was asked for before.
+  int attempt = 0;  ///< How often this start was asked for before.
 };
 
 struct Proposal {

@@ -17,10 +17,10 @@ struct Reference {
 [[nodiscard]] Reference MakeReference(const NominalModel& bicycle, const Eigen::VectorXd& start, int steps);
 
 /** How far references of a robot that drives to a goal go, and so what a policy for it has to be taught. */
-inline constexpr double kCruiseSpeed = 10;         ///< m/s, at the start; 0 at least
-inline constexpr double kCruiseAcceleration = 2;   ///< m/s^2, either sign
-inline constexpr double kCruiseSteering = 0.3;     ///< rad, either sign
-inline constexpr double kCruiseLateral = 6;        ///< m/s^2, v^2 tan(delta) / wheelbase at the faster end
+inline constexpr double kCruiseSpeed = 10;        ///< m/s, at the start; 0 at least
+inline constexpr double kCruiseAcceleration = 2;  ///< m/s^2, either sign
+inline constexpr double kCruiseSteering = 0.3;    ///< rad, either sign
+inline constexpr double kCruiseLateral = 6;       ///< m/s^2, v^2 tan(delta) / wheelbase at the faster end
 
 /** The largest steering angle of such a reference. @param speed its largest, m/s. */
 [[nodiscard]] double CruiseSteering(double speed, double wheelbase);

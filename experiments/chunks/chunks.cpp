@@ -1,5 +1,5 @@
-// Plans of a learned policy: certificate rate and recall by layout and N, whether abstention follows the distance to the
-// data, and where certification first stops.
+// Plans of a learned policy: certificate rate and recall by layout and N, whether abstention follows the distance to
+// the data, and where certification first stops.
 #include <algorithm>
 #include <iterator>
 #include <string>
@@ -24,7 +24,8 @@ Cell ChunkCell(Layout layout, int observations, double noise) {
 // Of one channel, every seed.
 std::vector<Cell> CellsOf(const Scope& scope, Layout layout, double noise) {
   std::vector<Cell> cells;
-  for (const int observations : scope.SizesOf(ChunkSystem())) AddSeeds(scope, ChunkCell(layout, observations, noise), cells);
+  for (const int observations : scope.SizesOf(ChunkSystem()))
+    AddSeeds(scope, ChunkCell(layout, observations, noise), cells);
   return cells;
 }
 
@@ -60,10 +61,11 @@ const char* const kWhy = "the paper's errands, obstacles and sample points are n
 
 Table OutcomeTable(const Scope& scope, const Results& results, double noise) {
   Table table{noise == 0 ? "Action chunks" : "Action chunks, sub-Gaussian channel",
-              noise == 0 ? "Blocks of 20 steps of a behaviour-cloned policy, groups A to C together, noiseless. What the "
-                           "policy is asked for, how it was taught, the grid and the corridor are ours: "
-                           "`experiments/chunks/demonstrations.h` and `blocks.h`."
-                         : "The same, s = 4.16e-6, cut at sigma = 3 s. The paper: within one point of its noiseless rows.",
+              noise == 0
+                  ? "Blocks of 20 steps of a behaviour-cloned policy, groups A to C together, noiseless. What the "
+                    "policy is asked for, how it was taught, the grid and the corridor are ours: "
+                    "`experiments/chunks/demonstrations.h` and `blocks.h`."
+                  : "The same, s = 4.16e-6, cut at sigma = 3 s. The paper: within one point of its noiseless rows.",
               {}};
   for (const Layout layout : kLayouts)
     for (const int observations : scope.SizesOf(ChunkSystem())) {
@@ -89,8 +91,11 @@ Table GroupTable(const Scope& scope, const Results& results) {
     for (const Group group : kGroups)
       for (const auto& [what, statistic] : std::initializer_list<std::pair<const char*, Statistic>>{
                {"target-safe", SafeRate}, {"recall", Recall}, {"D", DomainRate}, {"S", SafetyRate}})
-        table.rows.push_back({Words(layout) + ", " + NameOf(group) + ": " + what, {},
-                              OverSeeds(scope, results, ChunkCell(layout, most, 0), group, statistic), 3, ""});
+        table.rows.push_back({Words(layout) + ", " + NameOf(group) + ": " + what,
+                              {},
+                              OverSeeds(scope, results, ChunkCell(layout, most, 0), group, statistic),
+                              3,
+                              ""});
   return table;
 }
 
@@ -104,11 +109,12 @@ std::vector<SupportRecord> RecordsOf(const std::vector<Cell>& cells, const Resul
 }
 
 Table SupportTable(const Scope& scope, const Results& results) {
-  Table table{"Action chunks and distance to the data",
-              "d: the largest distance of a nominal state to its nearest observation, in units of the paper. Noiseless, "
-              "every N and seed. The paper's 45,000 records are those of one layout, and its text does not say which: "
-              "it is set beside the fixed grid here.",
-              {}};
+  Table table{
+      "Action chunks and distance to the data",
+      "d: the largest distance of a nominal state to its nearest observation, in units of the paper. Noiseless, "
+      "every N and seed. The paper's 45,000 records are those of one layout, and its text does not say which: "
+      "it is set beside the fixed grid here.",
+      {}};
   for (const Layout layout : kLayouts) {
     const auto paper = [&](const char* key) {
       return layout == Layout::kFixedGrid ? std::optional(Paper(key)) : std::nullopt;
@@ -119,8 +125,11 @@ Table SupportTable(const Scope& scope, const Results& results) {
     table.rows.insert(
         table.rows.end(),
         {{where + "records", paper("chunks.support.records"), Exactly(double(records.size())), 0, "this run has fewer"},
-         {where + "Spearman correlation of d and abstention", paper("chunks.support.spearman"),
-          {support.spearman, 0, 1}, 3, kWhy},
+         {where + "Spearman correlation of d and abstention",
+          paper("chunks.support.spearman"),
+          {support.spearman, 0, 1},
+          3,
+          kWhy},
          {where + "abstention, nearest quarter", paper("chunks.support.nearest"), Exactly(support.nearest), 3, kWhy},
          {where + "abstention, farthest quarter", paper("chunks.support.farthest"), Exactly(support.farthest), 3, kWhy},
          {where + "gap", paper("chunks.support.gap"), Exactly(support.gap()), 3, kWhy}});
@@ -160,10 +169,11 @@ Estimate PartAt(const Scope& scope, const Results& results, Cell cell, bool is_d
 }
 
 Table StepTable(const Scope& scope, const Results& results) {
-  Table table{"Action chunks, first abstention",
-              "Noiseless, the largest N: the part of all plans that abstains first at a step. The paper shows these as a "
-              "picture.",
-              {}};
+  Table table{
+      "Action chunks, first abstention",
+      "Noiseless, the largest N: the part of all plans that abstains first at a step. The paper shows these as a "
+      "picture.",
+      {}};
   for (const Layout layout : kLayouts)
     for (const bool is_domain : {true, false})
       for (std::size_t t = 0; t <= kBlockSteps; ++t) {

@@ -11,6 +11,7 @@ steps of 2 controls. The rest is ours:
 
 #include <cstdint>
 
+#include "experiments/chunks/ilqr.h"
 #include "experiments/random.h"
 #include "experiments/scenarios.h"
 #include "planner_bridge/reference.h"
@@ -27,6 +28,8 @@ struct Errand {
 
 [[nodiscard]] Errand DrawErrand(Group group, Random& random);
 [[nodiscard]] Errand DrawCruise(Random& random);
+
+[[nodiscard]] const TrackingWeights& ExpertWeights();
 
 /** The expert's controls, 2-by-20, |jerk| <= 10 and |steering rate| <= 1. */
 [[nodiscard]] Eigen::MatrixXd Demonstrate(const Errand& errand);

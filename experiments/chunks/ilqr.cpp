@@ -12,8 +12,8 @@ namespace forereach::experiments {
 namespace {
 
 constexpr int kIterations = 60;
-constexpr double kEnough = 1e-9;          // of the cost, gained by an iteration
-constexpr double kSmallestStep = 1e-4;    // of a Newton step
+constexpr double kEnough = 1e-9;        // of the cost, gained by an iteration
+constexpr double kSmallestStep = 1e-4;  // of a Newton step
 
 /** u = feedforward + gain (x - x_nominal). */
 struct Law {

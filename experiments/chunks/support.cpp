@@ -53,7 +53,8 @@ SupportStatistic SupportOf(std::vector<SupportRecord> records) {
   std::ranges::transform(records, abstained.begin(), [](const SupportRecord& record) { return record.abstained; });
   const std::span<const SupportRecord> all = records;
   const std::size_t quarter = records.size() / 4;
-  return {Correlation(Ranks(records), abstained), AbstentionRate(all.first(quarter)), AbstentionRate(all.last(quarter))};
+  return {Correlation(Ranks(records), abstained), AbstentionRate(all.first(quarter)),
+          AbstentionRate(all.last(quarter))};
 }
 
 }  // namespace forereach::experiments

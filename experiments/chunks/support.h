@@ -9,8 +9,8 @@
 
 namespace forereach::experiments {
 
-/** d = max_t min_i |(x_t - x_i) / system.support_scale|_2, x_0..x_T the nominal rollout from the middle of X0 and x_i the
-states that were observed. Cost O(T N n). */
+/** d = max_t min_i |(x_t - x_i) / system.support_scale|_2, x_0..x_T the nominal rollout from the middle of X0 and x_i
+the states that were observed. Cost O(T N n). */
 [[nodiscard]] double DistanceToData(const System& system, const Scenario& scenario, const Transitions& data);
 
 /** A plan's d, and whether it got no certificate. */
@@ -20,7 +20,7 @@ struct SupportRecord {
 };
 
 struct SupportStatistic {
-  std::optional<double> spearman;   ///< Rank correlation of d and abstention; none where either never changes
+  std::optional<double> spearman;    ///< Rank correlation of d and abstention; none where either never changes
   double nearest = 0, farthest = 0;  ///< Abstention rates of the quarters of records with the least and the largest d
   [[nodiscard]] double gap() const { return farthest - nearest; }
 };

@@ -19,8 +19,7 @@ enum : std::uint64_t { kForWeights = 0x77656967, kForOrder = 0x6f726465 };
 using Sample = dlib::matrix<float>;
 template <class Below>
 using Hidden = dlib::htan<dlib::fc<kHidden, Below>>;
-using Network =
-    dlib::loss_mean_squared_multioutput<dlib::fc<2 * kBlockSteps, Hidden<Hidden<dlib::input<Sample>>>>>;
+using Network = dlib::loss_mean_squared_multioutput<dlib::fc<2 * kBlockSteps, Hidden<Hidden<dlib::input<Sample>>>>>;
 
 // The shortest decimal that is this float: a file of them has half the digits of one of doubles.
 double Written(float number) {

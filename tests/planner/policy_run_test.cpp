@@ -139,8 +139,9 @@ TEST(PolicyProposer, RefusesWhatDoesNotFit) {
     return "accepted";
   };
   EXPECT_EQ(refusal(config, policy), "accepted");
-  EXPECT_EQ(refusal(PointMass(), policy),
-            "planner.policy: is for the model kinematic_bicycle dt=0.1 wheelbase=2.5, the task's is point_mass dt=0.15");
+  EXPECT_EQ(
+      refusal(PointMass(), policy),
+      "planner.policy: is for the model kinematic_bicycle dt=0.1 wheelbase=2.5, the task's is point_mass dt=0.15");
   Config long_blocks = config;
   long_blocks.planner.progress_steps = 21;
   EXPECT_EQ(refusal(long_blocks, policy), "planner.policy: its blocks have 20 steps, planner.progress_steps is 21");

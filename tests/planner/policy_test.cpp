@@ -6,9 +6,9 @@
 #include <fstream>
 #include <sstream>
 
-#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "planner_bridge/reference.h"

@@ -8,12 +8,6 @@
 namespace forereach::experiments {
 namespace {
 
-Eigen::VectorXd Vec(std::initializer_list<double> entries) {
-  return Eigen::Map<const Eigen::VectorXd>(entries.begin(), static_cast<Eigen::Index>(entries.size()));
-}
-
-const TrackingWeights kBicycleWeights{Vec({1, 1, 10, 1, 0.5, 2}), Vec({5, 5, 50, 5, 2, 10}), Vec({0.02, 0.5})};
-
 double Cost(const NominalModel& model, const Eigen::VectorXd& start, const Eigen::MatrixXd& controls,
             const Eigen::MatrixXd& reference, const TrackingWeights& weights) {
   return TrackingCost(Rollout(model, start, controls), controls, reference, weights);
@@ -22,10 +16,11 @@ double Cost(const NominalModel& model, const Eigen::VectorXd& start, const Eigen
 // A linear model with a quadratic cost has one stationary point: the sum's gradient is zero there.
 TEST(Ilqr, IsTheOptimumOfAPointMass) {
   const auto model = MakePointMass(0.15);
-  const TrackingWeights weights{Vec({1, 2, 0.1, 0.2}), Vec({5, 5, 1, 1}), Vec({0.3, 0.7})};
-  const Eigen::VectorXd start = Vec({1, -1, 0.5, 0});
+  const TrackingWeights weights{Eigen::VectorXd{{1, 2, 0.1, 0.2}}, Eigen::VectorXd{{5, 5, 1, 1}},
+                                Eigen::VectorXd{{0.3, 0.7}}};
+  const Eigen::VectorXd start = Eigen::VectorXd{{1, -1, 0.5, 0}};
   const Eigen::MatrixXd reference = Eigen::MatrixXd::Zero(4, 11);
-  const Box inputs(Vec({-9, -9}), Vec({9, 9}));
+  const Box inputs(Eigen::VectorXd{{-9, -9}}, Eigen::VectorXd{{9, 9}});
   const Eigen::MatrixXd best = Track(*model, start, reference, weights, inputs);
   constexpr double kStep = 1e-4;
   for (Eigen::Index i = 0; i < best.size(); ++i) {
@@ -45,12 +40,12 @@ TEST(Ilqr, NothingNearbyCostsLess) {
     const Errand errand = i % 2 ? DrawErrand(kGroups[i % 3], random) : DrawCruise(random);
     const Eigen::MatrixXd& reference = errand.reference.states;
     const Eigen::MatrixXd best = Demonstrate(errand);
-    const double cost = Cost(model, errand.state, best, reference, kBicycleWeights);
-    EXPECT_LT(cost, Cost(model, errand.state, Eigen::MatrixXd::Zero(2, kBlockSteps), reference, kBicycleWeights));
+    const double cost = Cost(model, errand.state, best, reference, ExpertWeights());
+    EXPECT_LT(cost, Cost(model, errand.state, Eigen::MatrixXd::Zero(2, kBlockSteps), reference, ExpertWeights()));
     for (int trial = 0; trial < 40; ++trial) {
       Eigen::MatrixXd other = best;
       for (double& u : other.reshaped()) u += 0.05 * random.Uniform(-1, 1);
-      EXPECT_GT(Cost(model, errand.state, other, reference, kBicycleWeights), cost * (1 - 1e-6)) << i;
+      EXPECT_GT(Cost(model, errand.state, other, reference, ExpertWeights()), cost * (1 - 1e-6)) << i;
     }
   }
 }
