@@ -1,6 +1,7 @@
 #include "experiments/chunks/blocks.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "experiments/chunks/demonstrations.h"
 #include "experiments/random.h"
@@ -36,7 +37,7 @@ int LargestDivisorUpToRoot(int count) {
 }
 
 double Mark(double lower, double upper, int i, int count) {
-  return count == 1 ? (lower + upper) / 2 : lower + (upper - lower) * i / (count - 1);
+  return std::lerp(lower, upper, count == 1 ? 0.5 : static_cast<double>(i) / (count - 1));
 }
 
 }  // namespace
