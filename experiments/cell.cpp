@@ -6,15 +6,26 @@
 #include "certifier/numerics/text.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/residual/observations.h"
+#include "experiments/chunks/support.h"
 #include "experiments/evaluate.h"
 
 namespace forereach::experiments {
 namespace {
 
+char LetterOf(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::kCertified: return 'C';
+    case Outcome::kDomain: return 'D';
+    case Outcome::kFalsified: return 'F';
+    default: return 'S';
+  }
+}
+
 void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollouts, Tally& tally) {
   const bool safe = rollouts.StayClearOf(scenario.obstacle);
   ++tally.plans;
   tally.safe += safe;
+  tally.answers += LetterOf(answer.outcome);
   tally.areas.push_back(answer.IsComplete() ? ProjectedArea(answer.slices.back()) : -1);
   if (answer.outcome == Outcome::kFalsified) {
     ++tally.falsified;
@@ -80,6 +91,7 @@ CellResult RunCell(const Cell& cell, const Effort& effort) {
       else
         evaluator.Certify(scenario, answer);
       Count(answer, scenario, rollouts, tally);
+      if (system.support_scale.size() > 0) tally.distances.push_back(DistanceToData(system, scenario, data));
     }
   }
   return result;

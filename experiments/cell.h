@@ -52,6 +52,8 @@ struct Tally {
   int undecided = 0;       ///< Tubes that count as not covered because membership could not be decided
   std::vector<int> domain_steps, safety_steps;  ///< By step, 0..T
   std::vector<double> areas;  ///< Of P X_T of each plan in turn, m^2; -1 where the tube is not complete
+  std::string answers;            ///< Of each plan in turn: C for a certificate, D, S or F
+  std::vector<double> distances;  ///< d of each plan in turn (chunks/support.h), where the system has a scale for it
 
   [[nodiscard]] int complete() const { return certified + safety; }
   [[nodiscard]] int false_certificates() const { return certified - certified_safe; }

@@ -32,7 +32,8 @@ std::span<const Experiment> Experiments() {
   static const std::vector<Experiment> all{MainResults(),    RecallByN(),        Comparison(),
                                            DomainExits(),    FirstAbstentions(), BoxAgainstZonotope(),
                                            ScalarEnvelope(), NoiseSweep(),       IncorrectDeclarations(),
-                                           ParameterBoxes(), NormRatios(),       CertifiedDeclarations()};
+                                           ParameterBoxes(), NormRatios(),       CertifiedDeclarations(),
+                                           ActionChunks()};
   return all;
 }
 

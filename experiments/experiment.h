@@ -82,6 +82,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment ParameterBoxes();
 [[nodiscard]] Experiment NormRatios();
 [[nodiscard]] Experiment CertifiedDeclarations();
+[[nodiscard]] Experiment ActionChunks();
 ///@}
 
 }  // namespace forereach::experiments

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "experiments/chunks/training.h"
 #include "experiments/run.h"
 
 using namespace forereach::experiments;
@@ -21,12 +22,23 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-experiments all --quick            a look, in seconds
   forereach-experiments recall --seeds 3       one experiment on three of the ten seeds
   forereach-experiments all --out run/paper    everything, in minutes
+  forereach-experiments train                  the policy of `chunks` and of config/policy.yaml, taught anew
 
 Exit: 0 done, 2 bad usage or a file that cannot be used.)";
 
 // The smallest that still shows what a method does.
 constexpr int kQuickSeeds = 2;
 constexpr Effort kQuickEffort{30, 24};
+
+void Train(const std::string& file, unsigned threads) {
+  TrainingOptions options;
+  options.threads = threads;
+  const forereach::Policy policy = TrainPolicy(options);
+  forereach::SavePolicy(file, policy);
+  constexpr std::uint64_t kOtherSeed = 2;
+  std::cout << file << ": error " << CloningError(policy, MakeDemonstrations(1200, kOtherSeed, threads))
+            << " on errands it was not taught, 1 being that of a policy that knows the mean only" << std::endl;
+}
 
 }  // namespace
 
@@ -51,6 +63,9 @@ int main(int argc, char** argv) {
   app.add_option("--report", report, "where the report goes; default report.md in --out");
   for (const Experiment& experiment : Experiments()) app.add_subcommand(experiment.name, experiment.about);
   app.add_subcommand("all", "all of them, in this order");
+  std::string policy = "config/policies/bicycle.json";
+  CLI::App* const train = app.add_subcommand("train", "make the policy that `chunks` asks for its plans");
+  train->add_option("--policy", policy, "where it goes")->capture_default_str();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -68,6 +83,7 @@ int main(int argc, char** argv) {
   options.command =
       "experiments/run " + name + (quick ? " --quick" : "") + (seeds > 0 ? " --seeds " + std::to_string(seeds) : "");
   try {
+    if (train->parsed()) return Train(policy, options.threads), 0;
     RunExperiments(options, std::cout);
   } catch (const std::exception& error) {
     std::cerr << "forereach-experiments: " << error.what() << "\n";

@@ -10,7 +10,9 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kPairwise = "Pairwise consistency test", kSets = "Reachable-set representation",
                                   kSensitivity = "Certificate-budget and envelope sensitivity", kNorms = "Norm ratios",
                                   kBoxes = "Table, Parameter boxes", kIncorrect = "Incorrect Lipschitz declarations",
-                                  kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol";
+                                  kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol",
+                                  kChunks = "Table, Action-chunk certification",
+                                  kChunkText = "Action-chunk protocol";
 
 inline constexpr PaperValue kPaperValues[] = {
     {"point_mass.B.coverage", 1.000, 3, kMain},
@@ -122,6 +124,39 @@ inline constexpr PaperValue kPaperValues[] = {
     {"grids.velocity_cross", 0.050577964, 9, kGrids},
     {"grids.by_speed", 0.011965171, 9, kGrids},
     {"grids.by_steering", 0.407688551, 9, kGrids},
+
+    {"chunks.fixed_grid.rate.25", 0.237, 3, kChunks, 0.02433},
+    {"chunks.fixed_grid.recall.25", 0.356, 3, kChunks, 0.03650},
+    {"chunks.fixed_grid.rate.50", 0.343, 3, kChunks, 0.02391},
+    {"chunks.fixed_grid.recall.50", 0.514, 3, kChunks, 0.03586},
+    {"chunks.fixed_grid.rate.100", 0.401, 3, kChunks, 0.01584},
+    {"chunks.fixed_grid.recall.100", 0.601, 3, kChunks, 0.02376},
+    {"chunks.fixed_grid.rate.150", 0.421, 3, kChunks, 0.01696},
+    {"chunks.fixed_grid.recall.150", 0.632, 3, kChunks, 0.02545},
+    {"chunks.fixed_grid.rate.200", 0.437, 3, kChunks, 0.01481},
+    {"chunks.fixed_grid.recall.200", 0.655, 3, kChunks, 0.02222},
+    {"chunks.fixed_grid.rate.400", 0.463, 3, kChunks, 0.00790},
+    {"chunks.fixed_grid.recall.400", 0.695, 3, kChunks, 0.01185},
+    {"chunks.policy_corridor.rate.25", 0.347, 3, kChunks, 0.02224},
+    {"chunks.policy_corridor.recall.25", 0.521, 3, kChunks, 0.03336},
+    {"chunks.policy_corridor.rate.50", 0.463, 3, kChunks, 0.02473},
+    {"chunks.policy_corridor.recall.50", 0.694, 3, kChunks, 0.03710},
+    {"chunks.policy_corridor.rate.100", 0.551, 3, kChunks, 0.02319},
+    {"chunks.policy_corridor.recall.100", 0.826, 3, kChunks, 0.03478},
+    {"chunks.policy_corridor.rate.150", 0.596, 3, kChunks, 0.02067},
+    {"chunks.policy_corridor.recall.150", 0.893, 3, kChunks, 0.03100},
+    {"chunks.policy_corridor.rate.200", 0.614, 3, kChunks, 0.01856},
+    {"chunks.policy_corridor.recall.200", 0.921, 3, kChunks, 0.02784},
+    {"chunks.policy_corridor.rate.400", 0.647, 3, kChunks, 0.01149},
+    {"chunks.policy_corridor.recall.400", 0.971, 3, kChunks, 0.01723},
+    {"chunks.coverage", 1, 3, kChunks, 0},
+    {"chunks.support.records", 45000, 0, kChunkText},
+    {"chunks.support.spearman", 0.697, 3, kChunkText},
+    {"chunks.support.nearest", 0.051, 3, kText},
+    {"chunks.support.farthest", 0.959, 3, kText},
+    {"chunks.support.gap", 0.908, 3, kChunkText},
+    {"chunks.cells", 240, 0, kChunkText},
+    {"chunks.uncovered", 0, 0, kChunkText},
 };
 
 }  // namespace forereach::experiments

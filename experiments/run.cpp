@@ -37,8 +37,8 @@ std::string Preamble(const RunOptions& options) {
 
 Models, residuals, horizons, the deployed declarations, sample sizes, noise scales and the order of zonotopes are the
 paper's. The bounds of its scenarios, its data regions and the sizes of its initial sets are not in its text: **those
-are ours**, in `experiments/scenarios.h` and `experiments/systems.h`. So are its seeds. Nothing in the certifier was
-fitted to a figure; `method: paper` is used throughout.
+are ours**, in `experiments/scenarios.h`, `experiments/systems.h` and, for learned plans, `experiments/chunks`. So are
+its seeds. Nothing in the certifier was fitted to a figure; `method: paper` is used throughout.
 
 A plan is *target-safe* if no rollout from its initial set, corners included, touches the obstacle. *Recall* is the part
 of the target-safe plans that get a certificate; a certificate for another is *false*. *Coverage* is the part of the

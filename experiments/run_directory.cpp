@@ -40,6 +40,8 @@ void VisitCounts(Tally& tally, const Visit& visit) {
   visit("domain_steps", tally.domain_steps);
   visit("safety_steps", tally.safety_steps);
   visit("areas", tally.areas);
+  visit("answers", tally.answers);
+  visit("distances", tally.distances);
 }
 
 Json ToJson(const Cell& cell, const CellResult& result) {

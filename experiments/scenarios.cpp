@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "experiments/chunks/blocks.h"
 #include "experiments/random.h"
 
 namespace forereach::experiments {
@@ -41,54 +42,61 @@ Start PointMassStart(Group group, Random& random) {
   return start;
 }
 
-// Where the target's rollout from the center is at step k, and the unit normal to the left of its last step.
-struct Place {
-  Eigen::Vector2d position, left;
-};
+Eigen::MatrixXd DrawPoints(const Box& region, int seed, int count, std::uint64_t system_key) {
+  Random random{kForPoints, system_key, static_cast<std::uint64_t>(seed)};
+  Eigen::MatrixXd points(count, region.dim());
+  for (int i = 0; i < count; ++i)
+    for (int l = 0; l < region.dim(); ++l) points(i, l) = random.Uniform(region.lower()[l], region.upper()[l]);
+  return points;
+}
 
-Place Follow(const System& system, const Start& start, int k) {
-  const auto n = static_cast<std::size_t>(system.num_states());
-  std::vector<double> z(n + 2), residual(n), next(n);
-  std::copy(start.center.begin(), start.center.end(), z.begin());
-  std::copy(start.control.begin(), start.control.end(), z.begin() + static_cast<std::ptrdiff_t>(n));
-  Eigen::Vector2d before{z[0], z[1]}, position = before;
-  for (int t = 0; t < k; ++t) {
-    system.step(z, residual, next);
-    std::copy(next.begin(), next.end(), z.begin());
-    before = position;
-    position = {z[0], z[1]};
+Eigen::MatrixXd PointsOf(const System& system, Layout layout, int seed, int count) {
+  switch (layout) {
+    case Layout::kFixedGrid: return GridPoints(count);
+    case Layout::kPolicyCorridor: return PolicyPoints(seed, count);
+    default: break;
   }
-  const Eigen::Vector2d along = (position - before).normalized();
-  return {position, {-along.y(), along.x()}};
+  return DrawPoints(layout == Layout::kCorridor ? system.data_region : system.quiet_region, seed, count,
+                    static_cast<std::uint64_t>(system.num_states()));
 }
 
 }  // namespace
 
+Circle PlaceBeside(const System& system, const Eigen::VectorXd& center, const Eigen::MatrixXd& controls, int k,
+                   double aside, double radius) {
+  const auto n = static_cast<std::size_t>(system.num_states()), m = static_cast<std::size_t>(system.num_inputs());
+  std::vector<double> z(n + m), residual(n), next(center.begin(), center.end());
+  Eigen::Vector2d before = center.head<2>(), position = before;
+  for (int t = 0; t < k; ++t) {
+    std::copy_n(controls.col(t).data(), m, std::copy(next.begin(), next.end(), z.begin()));
+    system.step(z, residual, next);
+    before = position;
+    position = {next[0], next[1]};
+  }
+  const Eigen::Vector2d along = (position - before).normalized();
+  return {position + aside * Eigen::Vector2d(-along.y(), along.x()), radius};
+}
+
 Scenario MakeScenario(const System& system, Group group, int seed, int index) {
+  if (&system == &ChunkSystem()) return MakeChunkScenario(group, seed, index);
   Random random{kForScenario, static_cast<std::uint64_t>(system.num_states()), static_cast<std::uint64_t>(group),
                 static_cast<std::uint64_t>(seed), static_cast<std::uint64_t>(index)};
   const Start start = &system == &BicycleSystem() ? BicycleStart(group, random) : PointMassStart(group, random);
-  const Place place = Follow(system, start, random.Integer(system.horizon - 3, system.horizon));
-  const bool safe = index % 2 == 0;
-  const double aside = safe ? start.radius + random.Uniform(start.least_clearance, start.largest_clearance)
-                            : random.Uniform(0, 0.8) * start.radius;
-  return {start.center,
-          start.control.replicate(1, system.horizon),
-          {place.position + aside * start.side * place.left, start.radius}};
+  const Eigen::MatrixXd controls = start.control.replicate(1, system.horizon);
+  const int k = random.Integer(system.horizon - 3, system.horizon);
+  const double aside = index % 2 == 0
+                           ? start.radius + random.Uniform(start.least_clearance, start.largest_clearance)
+                           : random.Uniform(0, 0.8) * start.radius;
+  return {start.center, controls, PlaceBeside(system, start.center, controls, k, aside * start.side, start.radius)};
 }
 
 Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale) {
-  const auto system_key = static_cast<std::uint64_t>(system.num_states()), seed_key = static_cast<std::uint64_t>(seed);
-  Random points{kForPoints, system_key, seed_key}, noise{kForNoise, system_key, seed_key};
-  const Box& region = layout == Layout::kCorridor ? system.data_region : system.quiet_region;
+  Random noise{kForNoise, static_cast<std::uint64_t>(system.num_states()), static_cast<std::uint64_t>(seed)};
   const int n = system.num_states();
-  Transitions data{Eigen::MatrixXd(count, region.dim()), Eigen::MatrixXd(count, n)};
-  std::vector<long double> z(static_cast<std::size_t>(region.dim())), next(static_cast<std::size_t>(n));
+  Transitions data{PointsOf(system, layout, seed, count), Eigen::MatrixXd(count, n)};
+  std::vector<long double> z(static_cast<std::size_t>(data.z.cols())), next(static_cast<std::size_t>(n));
   for (int i = 0; i < count; ++i) {
-    for (int l = 0; l < region.dim(); ++l) {
-      data.z(i, l) = points.Uniform(region.lower()[l], region.upper()[l]);
-      z[static_cast<std::size_t>(l)] = data.z(i, l);
-    }
+    std::ranges::copy(data.z.row(i), z.begin());
     system.target(z, next);
     for (int k = 0; k < n; ++k)
       data.x_next(i, k) = static_cast<double>(next[static_cast<std::size_t>(k)] +

@@ -12,6 +12,8 @@ the target meets it. The bicycle's B and C move it to the outside of the curve, 
 random side. */
 #pragma once
 
+#include <cstddef>
+
 #include <Eigen/Core>
 
 #include "certifier/residual/declaration.h"
@@ -40,18 +42,24 @@ struct Scenario {
   Circle obstacle;
 };
 
-/** Scenario `index` of a group; seeds count from 0. */
+/** Scenario `index` of a group; seeds count from 0. The plans of ChunkSystem() are a policy's (chunks/blocks.h). */
 [[nodiscard]] Scenario MakeScenario(const System& system, Group group, int seed, int index);
 
-/** Where observations are: in the data region, or only where the residual does not show. */
-enum class Layout { kCorridor, kBelowKnee };
-/** "corridor" or "below_knee". */
+/** A circle beside the target's rollout from `center` under `controls`: `aside` metres to the left of where it is at
+step k, square to its last step. */
+[[nodiscard]] Circle PlaceBeside(const System& system, const Eigen::VectorXd& center, const Eigen::MatrixXd& controls,
+                                 int k, double aside, double radius);
+
+/** Where observations are: in the data region, only where the residual does not show, and two of chunks/blocks.h. */
+enum class Layout { kCorridor, kBelowKnee, kFixedGrid, kPolicyCorridor };
+/** "corridor", "below_knee", "fixed_grid" or "policy_corridor". */
 [[nodiscard]] inline const char* NameOf(Layout layout) {
-  return layout == Layout::kCorridor ? "corridor" : "below_knee";
+  constexpr const char* kNames[] = {"corridor", "below_knee", "fixed_grid", "policy_corridor"};
+  return kNames[static_cast<std::size_t>(layout)];
 }
 
-/** `count` observed transitions at points uniform in the layout's region. Those of a smaller count are the first of a
-larger, and noise does not move the points.
+/** `count` observed transitions, at points uniform in the layout's region or as chunks/blocks.h says. Those of a
+smaller count are the first of a larger, but for a grid, and noise does not move the points.
 @param noise_scale to each entry of a successor an error N(0, s^2), cut at NoiseBound(s), is added. */
 [[nodiscard]] Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale);
 

@@ -30,6 +30,7 @@ struct System {
   double noise_scale;                  ///< s of the sub-Gaussian channel; sigma_k = 3 s
   int scenarios;                       ///< In each group and seed
   int rollouts;                        ///< Of the target, for each scenario
+  Eigen::VectorXd support_scale;       ///< Of distances to observations (chunks/support.h); none: not measured
 
   /** f*(z), in extended precision: for observations, which are rounded once. */
   void (*target)(std::span<const long double> z, std::span<long double> next);

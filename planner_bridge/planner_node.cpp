@@ -24,8 +24,8 @@ Eigen::VectorXd HalfWidth(const Config& config) {
   return Eigen::Map<const Eigen::VectorXd>(given.data(), n);
 }
 
-Planner MakePlanner(const Config& config) try {
-  return Planner(config.problem, config.planner, config.obstacles);
+std::unique_ptr<Proposer> ProposerOf(const Config& config) try {
+  return MakeProposer(config);
 } catch (const std::invalid_argument& error) {
   throw ConfigError(config.path + ": " + error.what());
 }
@@ -46,7 +46,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       period_us_(std::llround(config.robot.step_period_ms * 1e3)),
       half_width_(HalfWidth(config)),
       residual_(config.problem),
-      planner_(MakePlanner(config)) {
+      proposer_(ProposerOf(config)) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
@@ -114,7 +114,7 @@ std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& st
     std::copy_n(plan->control[step], plan->num_inputs, std::copy_n(x.data(), n, z.begin()));
     residual_.Predict({z.data(), n + static_cast<std::size_t>(plan->num_inputs)}, {x.data(), n});
   }
-  if (!executing || start >= plan->num_steps) planner_.motion().Hold({x.data(), n});
+  if (!executing || start >= plan->num_steps) proposer_->motion().Hold({x.data(), n});
   if (!x.allFinite()) return std::nullopt;
   return x;
 }
@@ -141,7 +141,7 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
     return EndRound(false);
   ++round_->searches;
   ++searches_;
-  const std::optional<Proposal> proposal = planner_.Propose(RequestOf(*round_));
+  const std::optional<Proposal> proposal = proposer_->Propose(RequestOf(*round_));
   if (!proposal) {
     ++fruitless_searches_;
     return;
@@ -162,7 +162,8 @@ PlanRequest PlannerNode::RequestOf(const Round& round) const {
     if (projection.col(k).any()) margin(k) = round.domain_exits * config_.planner.clearance_step;
   constexpr std::uint32_t kSpread = 1'000'003;
   return {round.center, round.clearance, margin,
-          static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_)};
+          static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
+          round.searches - 1};
 }
 
 candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us) {
@@ -231,7 +232,7 @@ void PlannerNode::OnObstacles(const Received& received) {
     return;
   }
   try {
-    planner_.SetObstacles(FromMessage(message, static_cast<int>(config_.problem->projection.rows())));
+    proposer_->SetObstacles(FromMessage(message, static_cast<int>(config_.problem->projection.rows())));
     last_obstacles_ = message.sequence;
   } catch (const std::invalid_argument&) {
     ++ignored_;

@@ -7,6 +7,7 @@ candidate at a time and waits for its decision:
     certified          -> the round ends, the plan waits for its start
     abstention S       -> the next candidate keeps clearance_step more from obstacles
     abstention D       -> the next candidate keeps further inside the domain's bounds
+                           (a policy's follows another reference instead, policy_proposer.h)
     abstention F       -> the round ends: no candidate can pass
     rejected           -> the next candidate; the round ends where the certifier is not armed or has latched a fault
     abstained, no time -> the next candidate
@@ -20,6 +21,7 @@ ignored. */
 
 #include <iostream>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,7 +31,7 @@ ignored. */
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/node.h"
-#include "planner_bridge/proposal.h"
+#include "planner_bridge/proposer.h"
 #include "planner_bridge/residual_estimate.h"
 
 namespace forereach {
@@ -83,7 +85,7 @@ class PlannerNode final : public Node {
   const std::int64_t period_us_;
   const Eigen::VectorXd half_width_;  // of X_0
   const ResidualEstimate residual_;
-  Planner planner_;
+  const std::unique_ptr<Proposer> proposer_;
 
   std::optional<Round> round_;
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded

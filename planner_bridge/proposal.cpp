@@ -147,13 +147,7 @@ class Planner::Impl {
         region_(ProjectedRegion(*problem_)),
         goal_(Eigen::Map<const Eigen::VectorXd>(options_.goal.data(), std::ssize(options_.goal))),
         obstacles_(std::move(obstacles)) {
-    if (goal_.size() != problem_->projection.rows())
-      throw std::invalid_argument("planner.goal: " + std::to_string(goal_.size()) + " entries, it has to have " +
-                                  std::to_string(problem_->projection.rows()));
-    if (options_.progress_steps < 1 || options_.tail_steps < 0 ||
-        options_.progress_steps + options_.tail_steps > kMaxSteps)
-      throw std::invalid_argument("planner.progress_steps + planner.tail_steps: more than " +
-                                  std::to_string(kMaxSteps) + " steps, or none");
+    RequireGoalAndSteps(*problem_, options_);
     ompl::msg::noOutputHandler();
   }
 

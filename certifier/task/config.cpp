@@ -217,8 +217,17 @@ BusOptions ReadBus(const Document& file) {
   return bus;
 }
 
+std::string RelativeTo(const std::string& file, const std::string& path) {
+  return (std::filesystem::path(file).parent_path() / path).string();
+}
+
 PlannerOptions ReadPlanner(const Document& file) {
   PlannerOptions planner;
+  file.Read("planner.source", planner.source);
+  if (file.Has("planner.policy"))
+    planner.policy = RelativeTo(file.path(), file.Text("planner.policy"));
+  else if (planner.source == "policy")
+    file.Fail("planner.policy", "missing: a policy's file, for planner.source: policy");
   file.Read("planner.algorithm", planner.algorithm);
   file.Read("planner.goal", planner.goal);
   file.Read("planner.goal_radius", planner.goal_radius);

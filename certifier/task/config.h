@@ -67,6 +67,8 @@ struct BusOptions {
 };
 
 struct PlannerOptions {
+  std::string source = "ompl";  ///< Or policy.
+  std::string policy;           ///< Its file; from a task file always there if the source is policy.
   std::string algorithm = "kpiece";
   std::vector<double> goal;     ///< In the safety coordinates, metres.
   double goal_radius = 1.0;     ///< Metres.

@@ -303,6 +303,12 @@ std::vector<Key> PlannerKeys() {
   const PlannerOptions planner;
   return {
       Optional(Map("planner", "How candidates are made."), "all defaults"),
+      Optional(Word("planner.source", {"ompl", "policy"},
+                    "ompl: searched for, clear of the obstacles. policy: blocks of a learned policy of the bicycle, which "
+                    "knows of no obstacles; algorithm, clearances and seed do not concern it, progress_steps may not be "
+                    "more than a block has, and it drives at most 10 m/s."),
+               planner.source),
+      Text("planner.policy", "The policy's file, relative to this one; required for `source: policy`."),
       Optional(Word("planner.algorithm", {"kpiece", "est", "pdst", "rrt", "sst"}, "The OMPL control planner."),
                planner.algorithm),
       Optional(

@@ -52,6 +52,7 @@ TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
   EXPECT_EQ(config.bus.url, "udpm://239.255.76.67:7667?ttl=0");
   EXPECT_EQ(config.bus.candidate, "PLAN_CANDIDATE");
   EXPECT_EQ(config.bus.event, "EXECUTION_EVENT");
+  EXPECT_EQ(config.planner.source, "ompl");
   EXPECT_EQ(config.planner.algorithm, PlannerOptions{}.algorithm);
   EXPECT_TRUE(config.planner.goal.empty());
   EXPECT_EQ(config.planner.initial_half_width, (std::vector<double>{0.1, 0.1, 0.1, 0.1}));
@@ -74,8 +75,9 @@ TEST(LoadConfig, ReadsEveryOption) {
       "bus:\n"
       "  url: memq://\n"
       "  channels: {candidate: A, decision: B, certified: C, robot_state: D, obstacles: E, transition: F, status: G, "
-      "event: H, logger_status: I}\n"
-      "planner: {algorithm: rrt, goal: [1, 2], goal_radius: 3, clearance: 4, clearance_step: 5, progress_steps: 6,\n"
+      "event: H, logger_status: I, fault: J, command: K}\n"
+      "planner: {source: policy, policy: p/own.json, algorithm: rrt, goal: [1, 2], goal_radius: 3, clearance: 4,\n"
+      "  clearance_step: 5, progress_steps: 6,\n"
       "  tail_steps: 7, lead_steps: 8, candidates: 9, cruise_speed: 10, braking: 11, time_limit_ms: 12, seed: 13,\n"
       "  initial_half_width: [1, 2, 3, 4]}\n"
       "robot: {start: [4, 3, 2, 1], step_period_ms: 14, time_limit_s: 15, residual: {name: velocity_knee, knee: 2}}\n"
@@ -87,9 +89,11 @@ TEST(LoadConfig, ReadsEveryOption) {
   const BusOptions& bus = config.bus;
   EXPECT_EQ(bus.url, "memq://");
   EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
-                bus.status + bus.event + bus.logger_status,
-            "ABCDEFGHI");
+                bus.status + bus.event + bus.logger_status + bus.fault + bus.command,
+            "ABCDEFGHIJK");
   const PlannerOptions& planner = config.planner;
+  EXPECT_EQ(planner.source, "policy");
+  EXPECT_EQ(planner.policy, files.directory().Path("p/own.json"));
   EXPECT_EQ(planner.algorithm, "rrt");
   EXPECT_EQ(planner.goal, (std::vector<double>{1, 2}));
   EXPECT_EQ(std::tie(planner.goal_radius, planner.clearance, planner.clearance_step, planner.progress_steps,

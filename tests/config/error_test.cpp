@@ -62,6 +62,8 @@ TEST_F(ErrorTest, MissingKeys) {
               StartsWith("task.yaml:8: declaration.noise_bound: missing: "));
   EXPECT_THAT(files_.ErrorWith(", radius: 0.8", ""),
               StartsWith("task.yaml:18: task.obstacles[0].circle.radius: missing: "));
+  EXPECT_EQ(ErrorAfter("planner: {source: policy}\n"),
+            "task.yaml:19: planner.policy: missing: a policy's file, for planner.source: policy");
   EXPECT_THAT(ErrorAfter("robot: {residual: {}}\n"), StartsWith("task.yaml:19: robot.residual.name: missing: "));
 }
 

@@ -66,17 +66,19 @@ TEST_F(RunTest, QuickFiguresAreInTheirBands) {
 }
 
 TEST_F(RunTest, FilesAreTheSameForAnyNumberOfThreads) {
-  RunOptions one = Quick({"main", "steps"}, "one"), two = Quick({"main", "steps"}, "two");
+  const std::vector<std::string> names{"main", "steps", "chunks"};
+  RunOptions one = Quick(names, "one"), two = Quick(names, "two");
   two.threads = 2;
   std::ostringstream out_one, out_two;
   RunExperiments(one, out_one);
   RunExperiments(two, out_two);
-  for (const char* name : {"main.csv", "steps.csv", "tables.csv", "report.md"}) {
+  for (const char* name : {"main.csv", "steps.csv", "chunks.csv", "tables.csv", "report.md"}) {
     EXPECT_FALSE(Read(root_ / "one" / name).empty());
     EXPECT_EQ(Read(root_ / "one" / name), Read(root_ / "two" / name)) << name;
   }
   EXPECT_EQ(out_one.str(), out_two.str());
   EXPECT_THAT(out_one.str(), HasSubstr("| bicycle, C: recall | 0.983 |"));
+  EXPECT_THAT(out_one.str(), HasSubstr("| fixed grid, N = 400: recall | 0.695 ± 0.012 |"));
 }
 
 TEST_F(RunTest, AFinishedCellIsNotRunAgain) {

@@ -1,0 +1,65 @@
+/** A learned policy as it is used: a file of weights, and its evaluation. How it was trained is not known here.
+
+A fully connected network with hidden layers of tanh maps features to a block of controls for steps t = 0..T-1, inputs
+of a step next to each other:
+    h_0 = (features - input.offset) / input.scale,   h_l = tanh(W_l h_{l-1} + b_l),
+    block = output.offset + output.scale * (W_L h_{L-1} + b_L).
+What the features of the bicycle are is in reference.h. A policy promises nothing: its blocks are candidates. */
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lcmtypes/bad_input.h"
+
+namespace forereach {
+
+/** A policy file that cannot be used: the text names file, field, value and bound. */
+class PolicyError : public BadInput {
+ public:
+  using BadInput::BadInput;
+};
+
+struct Policy {
+  /** Entry by entry; scales are positive. */
+  struct Scaling {
+    Eigen::VectorXd offset, scale;
+  };
+  struct Layer {
+    Eigen::MatrixXd weight;
+    Eigen::VectorXd bias;
+  };
+
+  std::string model;   ///< The nominal model it was trained with: NominalModel::description()
+  int num_inputs = 0;  ///< m
+  Scaling input, output;
+  std::vector<Layer> layers;  ///< One at least; each as wide as the one before is high
+
+  [[nodiscard]] int num_features() const { return static_cast<int>(input.offset.size()); }
+  [[nodiscard]] int num_steps() const { return static_cast<int>(output.offset.size()) / num_inputs; }
+
+  /** The block, m-by-T, a column a step. @param features num_features() entries. Cost: a multiplication a weight. */
+  [[nodiscard]] Eigen::MatrixXd Act(const Eigen::VectorXd& features) const;
+};
+
+/** Reads a policy file: JSON with exactly these fields,
+    format      "forereach-policy"
+    version     1
+    model       text
+    activation  "tanh"
+    inputs      m, 1 to 8
+    steps       T, 1 to 128
+    sizes       numbers of features, of each hidden layer, and m T; 2 to 9 of them, each 1 to 1024
+    input       {offset, scale}: as many numbers as features
+    output      {offset, scale}: m T numbers
+    layers      one less than sizes, each {weight: rows of numbers, bias: numbers}
+Numbers are finite, scales positive. @throws PolicyError. */
+[[nodiscard]] Policy LoadPolicy(const std::string& path);
+
+/** Writes it so that LoadPolicy gives it back to the last bit. @throws PolicyError if the file cannot be written. */
+void SavePolicy(const std::string& path, const Policy& policy);
+
+}  // namespace forereach

@@ -1,0 +1,90 @@
+#include "planner_bridge/policy_proposer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "certifier/dynamics/kinematic_bicycle.h"
+#include "planner_bridge/reference.h"
+
+namespace forereach {
+namespace {
+
+constexpr Eigen::Index kTheta = 2, kV = 3, kA = 4, kDelta = 5;
+
+void Require(bool holds, const std::string& what) {
+  if (!holds) throw std::invalid_argument("planner.policy: " + what);
+}
+
+void RequireFits(const Problem& problem, const PlannerOptions& options, const Policy& policy) {
+  RequireGoalAndSteps(problem, options);
+  const std::string model = problem.model->description();
+  Require(policy.model == model, "is for the model " + policy.model + ", the task's is " + model);
+  Require(problem.model->name() == KinematicBicycle::kName,
+          "there are policies for " + std::string(KinematicBicycle::kName) + " only");
+  Require(problem.projection == Eigen::MatrixXd::Identity(2, problem.model->num_states()),
+          "a policy goes to a point (x, y), task.projection has to be [x, y]");
+  Require(policy.num_features() == kFeatures,
+          "has " + std::to_string(policy.num_features()) + " features, has to have " + std::to_string(kFeatures));
+  Require(policy.num_inputs == problem.model->num_inputs(), "has " + std::to_string(policy.num_inputs) + " inputs");
+  Require(options.progress_steps <= policy.num_steps(), "its blocks have " + std::to_string(policy.num_steps()) +
+                                                            " steps, planner.progress_steps is " +
+                                                            std::to_string(options.progress_steps));
+}
+
+}  // namespace
+
+PolicyProposer::PolicyProposer(std::shared_ptr<const Problem> problem, PlannerOptions options, Policy policy)
+    : problem_(std::move(problem)), options_(std::move(options)), policy_(std::move(policy)) {
+  RequireFits(*problem_, options_, policy_);
+  motion_ = MakeMotion(*problem_, options_.braking);
+  wheelbase_ = problem_->model->parameters()[1];
+  duration_ = policy_.num_steps() * motion_->dt();
+}
+
+// The angle of the arc from the robot's pose through the goal; then the fan.
+double PolicyProposer::Steering(const Eigen::VectorXd& state, double most, int attempt) const {
+  const Eigen::Vector2d to_goal = Eigen::Map<const Eigen::Vector2d>(options_.goal.data()) - state.head<2>();
+  const double bearing = std::atan2(to_goal.y(), to_goal.x()) - state[kTheta];
+  const double arc = std::atan(wheelbase_ * 2 * std::sin(bearing) / std::max(to_goal.norm(), 1e-3));
+  const double direct = std::cos(bearing) < 0 ? std::copysign(most, std::sin(bearing)) : std::clamp(arc, -most, most);
+  if (attempt == 0) return direct;
+  std::array<double, kFan> fan;
+  for (std::size_t i = 0; i < kFan; ++i) fan[i] = most * (2.0 * static_cast<double>(i) / (kFan - 1) - 1);
+  std::ranges::stable_sort(fan, {}, [&](double angle) { return std::abs(angle - direct); });
+  return fan[static_cast<std::size_t>(attempt - 1)];
+}
+
+Eigen::VectorXd PolicyProposer::ReferenceStart(const Eigen::VectorXd& state, int attempt) const {
+  Eigen::VectorXd start = state;
+  start[kV] = std::clamp(state[kV], 0.0, kCruiseSpeed);
+  const double end = std::min(options_.cruise_speed, kCruiseSpeed);
+  start[kA] = std::clamp((end - start[kV]) / duration_, -kCruiseAcceleration, kCruiseAcceleration);
+  const double fastest = std::max(start[kV], start[kV] + start[kA] * duration_);
+  start[kDelta] = Steering(state, CruiseSteering(fastest, wheelbase_), attempt);
+  return start;
+}
+
+std::optional<Proposal> PolicyProposer::Propose(const PlanRequest& request) {
+  const NominalModel& model = *problem_->model;
+  if (request.state.size() != model.num_states() || !request.state.allFinite() || request.attempt > kFan)
+    return std::nullopt;
+  const Reference reference = MakeReference(model, ReferenceStart(request.state, request.attempt), policy_.num_steps());
+  Eigen::MatrixXd progress = policy_.Act(Features(request.state, reference)).leftCols(options_.progress_steps);
+  const Box& inputs = problem_->domain.input;
+  for (auto column : progress.colwise()) column = column.cwiseMax(inputs.lower()).cwiseMin(inputs.upper());
+
+  const Eigen::VectorXd end = Rollout(model, request.state, progress).rightCols<1>();
+  Eigen::MatrixXd tail;
+  if (!motion_->Brake({end.data(), static_cast<std::size_t>(end.size())}, 0, options_.tail_steps, tail))
+    return std::nullopt;
+  Proposal proposal{Eigen::MatrixXd(progress.rows(), progress.cols() + tail.cols()), options_.progress_steps, {}};
+  proposal.controls << progress, tail;
+  proposal.states = Rollout(model, request.state, proposal.controls);
+  return proposal;
+}
+
+}  // namespace forereach

@@ -1,0 +1,26 @@
+#include "planner_bridge/proposer.h"
+
+#include <stdexcept>
+#include <string>
+
+#include "planner_bridge/policy_proposer.h"
+#include "planner_bridge/proposal.h"
+
+namespace forereach {
+
+std::unique_ptr<Proposer> MakeProposer(const Config& config) {
+  if (config.planner.source == "policy")
+    return std::make_unique<PolicyProposer>(config.problem, config.planner, LoadPolicy(config.planner.policy));
+  return std::make_unique<Planner>(config.problem, config.planner, config.obstacles);
+}
+
+void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options) {
+  if (std::ssize(options.goal) != problem.projection.rows())
+    throw std::invalid_argument("planner.goal: " + std::to_string(options.goal.size()) + " entries, it has to have " +
+                                std::to_string(problem.projection.rows()));
+  if (options.progress_steps < 1 || options.tail_steps < 0 || options.progress_steps + options.tail_steps > kMaxSteps)
+    throw std::invalid_argument("planner.progress_steps + planner.tail_steps: more than " + std::to_string(kMaxSteps) +
+                                " steps, or none");
+}
+
+}  // namespace forereach
