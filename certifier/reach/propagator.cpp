@@ -175,7 +175,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   const auto join = active_instruction_set == InstructionSet::kAvx2 ? JoinAvx2 : JoinBaseline;
   if (!join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
-  AppendAndReduce(next, sums.scores, {record.remainder.half_width.data(), n}, {residual_half_width.data(), n}, order_);
+  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), residual_half_width.data(), order_);
   return {};
 }
 
