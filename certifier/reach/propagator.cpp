@@ -21,7 +21,7 @@ bool IsNegligible(const StepError& error) {
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        int zonotope_order, Method method)
-    : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), remainder_(model.program(), method) {
+    : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), method_(method) {
   const std::vector<Interval> box = domain.Ranges();
   // The hull of every slice that passes the domain check has at most half the domain's width.
   std::vector<double> half_width(box.size(), 0.0);
@@ -164,7 +164,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   using Status = StepResult::Status;
   const auto n = static_cast<std::size_t>(slice.dim());
   const double* half_width = record.half_width.data();
-  remainder_.Enclose(slice, half_width, expansion.hessian.data(), error.remainder.data(), record.remainder);
+  model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(), record.remainder);
   for (std::size_t k = 0; k < n; ++k)
     if (!std::isfinite(record.remainder.half_width[k])) return {Status::kNoFiniteEnclosure, {}, static_cast<int>(k)};
 

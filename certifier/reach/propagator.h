@@ -10,9 +10,9 @@ envelope. All rounding, that of f0(c), J and J G included, goes to the slack s',
 #include <span>
 
 #include "certifier/dynamics/model.h"
+#include "certifier/dynamics/remainder.h"
 #include "certifier/dynamics/rounding.h"
 #include "certifier/reach/domain.h"
-#include "certifier/reach/remainder.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/sets/zonotope.h"
 
@@ -70,7 +70,7 @@ class Propagator final {
   DomainTest domain_;
   const ResidualEnclosure& residual_;
   int order_;
-  RemainderBound remainder_;
+  Method method_;
   StepError error_;
   bool plain_;
 };
