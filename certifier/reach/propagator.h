@@ -60,10 +60,19 @@ class Propagator final {
  private:
   void ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
                          ExpansionError& error) const noexcept;
-  [[nodiscard]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
-                                           std::span<const double> center, std::span<const PlainInterval> hull,
-                                           StepRecord& record, Zonotope& next, double* next_half_width) const noexcept;
-  [[nodiscard]] StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
+  [[nodiscard, gnu::noinline]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
+                                                          std::span<const double> center,
+                                                          std::span<const PlainInterval> hull, StepRecord& record,
+                                                          Zonotope& next, double* next_half_width) const noexcept;
+  // Everything but what the model, the envelope and the reduction do, once for each instruction set.
+  [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
+                                                       StepRecord& record, Zonotope& next,
+                                                       double* next_half_width) const noexcept;
+  [[nodiscard]] StepResult StepAvx2(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                    Zonotope& next, double* next_half_width) const noexcept;
+  [[nodiscard]] StepResult StepBaseline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                        Zonotope& next, double* next_half_width) const noexcept;
+  [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
                                    const StepError& error, StepRecord& record, Zonotope& next,
                                    double* next_half_width) const noexcept;
   const NominalModel& model_;
