@@ -94,6 +94,15 @@ FOREREACH_INLINE Lanes SumEach(const Lanes& a, const Lanes& b, const Lanes& c, c
   return __builtin_shuffle(a_c, b_d, LaneMask{0, 4, 2, 6}) + __builtin_shuffle(a_c, b_d, LaneMask{1, 5, 3, 7});
 }
 
+/** Whether test(k), a mask of four, holds for the first n of all lanes, k = 0, 4, ... */
+template <class Test>
+FOREREACH_INLINE bool HoldsForFirst(std::size_t n, Test test) {
+  const auto count = static_cast<std::int64_t>(n);
+  LaneMask fails{}, left{count, count - 1, count - 2, count - 3};
+  for (std::size_t k = 0; k < n; k += kLaneCount, left -= LaneMask{4, 4, 4, 4}) fails |= ~test(k) & (left > 0);
+  return BitsOf(fails) == 0;
+}
+
 /** What the hot functions outside of classes run on: the best there is, unless a test chooses. */
 inline InstructionSet active_instruction_set = BestInstructionSet();
 

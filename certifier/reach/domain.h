@@ -75,13 +75,10 @@ class DomainTest final {
 
   FOREREACH_INLINE bool StateLiesWellInside(const double* center, const double* half_width) const noexcept {
     const Lanes margin = AllLanes(RoundingError(kMargin, 1));
-    unsigned inside = 0;
-    for (std::size_t k = 0; k < num_states_; k += kLaneCount) {
+    return HoldsForFirst(num_states_, [&](std::size_t k) __attribute__((always_inline)) {
       const Lanes c = LoadLanes(center + k), r = LoadLanes(half_width + k), reach = r + margin * (Abs(c) + r);
-      inside |= BitsOf((LoadLanes(&state_lower_[k]) < c - reach) & (c + reach < LoadLanes(&state_upper_[k]))) << k;
-    }
-    const unsigned all = (1u << num_states_) - 1;
-    return (inside & all) == all;
+      return (LoadLanes(&state_lower_[k]) < c - reach) & (c + reach < LoadLanes(&state_upper_[k]));
+    });
   }
   FOREREACH_INLINE bool InputLiesWellInside(std::span<const double> input) const noexcept {
     bool inside = true;

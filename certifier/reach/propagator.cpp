@@ -73,15 +73,6 @@ StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input
 
 namespace {
 
-// Whether test(k) holds in every lane that counts, for k = 0, 4, ...
-template <class Test>
-FOREREACH_INLINE bool HoldsInAll(std::size_t n, Test test) {
-  unsigned bits = 0;
-  for (std::size_t k = 0; k < n; k += kLaneCount) bits |= BitsOf(test(k)) << k;
-  const unsigned all = (1u << n) - 1;
-  return (bits & all) == all;
-}
-
 // A center and the hull around it.
 struct Surroundings {
   std::array<double, kMaxVariables> center;
@@ -108,7 +99,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
                            const ImageSums& sums, Zonotope& next, double* residual_half_width,
                            double* next_half_width) noexcept {
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
-  return HoldsInAll(static_cast<std::size_t>(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
+  return HoldsForFirst(static_cast<std::size_t>(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
     const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
     const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
     const Lanes half = (upper - lower) * AllLanes(0.5);
@@ -191,7 +182,7 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
     return Abs(LoadLanes(&record.remainder.half_width[k])) < AllLanes(kInfinity);
   };
-  if (!HoldsInAll(n, is_finite)) return Failed(record.remainder);
+  if (!HoldsForFirst(n, is_finite)) return Failed(record.remainder);
 
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
   ImageSums sums;
