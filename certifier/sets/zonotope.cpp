@@ -204,7 +204,7 @@ FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::s
 }
 
 // Lengths along the axes, of which the sum of what is boxed is made.
-struct alignas(32) Lengths : std::array<double, kMaxStates> {};
+using Lengths = std::array<double, kMaxStates>;
 
 // Moves all columns but those of a score up to `largest` to the front, in their order, in kRows rows from row k on, and
 // adds the absolute values of those to `boxed`. What is behind those in front is of no meaning.
