@@ -7,8 +7,8 @@ holds, and which coordinates safety is judged in. */
 #include <Eigen/Core>
 
 #include "certifier/dynamics/model.h"
+#include "certifier/dynamics/remainder.h"
 #include "certifier/reach/domain.h"
-#include "certifier/reach/remainder.h"
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/transitions.h"
 #include "certifier/safety/obstacle.h"

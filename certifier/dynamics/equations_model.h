@@ -23,6 +23,11 @@ class EquationsModel final : public NominalModel {
     forereach::Expand<kProgram>(parameters(), z, box, out);
   }
 
+  void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
+                        const double* error, Remainder& out) const noexcept override {
+    forereach::EncloseRemainder<kProgram>(method, slice, half_width, hessian, error, out);
+  }
+
   void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
            ImageSums& sums) const noexcept override {
     MapGenerators<kProgram>(expansion, error, slice, next, sums);

@@ -9,6 +9,7 @@ for the whole domain, how far each number can lie from the exact one. */
 #include <utility>
 
 #include "certifier/dynamics/program.h"
+#include "certifier/numerics/lanes.h"
 
 namespace forereach {
 
@@ -47,58 +48,52 @@ inline PlainInterval TanCurvature(PlainInterval t) {
   return {2 * t.lower * (1 + t.lower * t.lower), 2 * t.upper * (1 + t.upper * t.upper)};
 }
 
-/** Sine and cosine of a small angle: the first term that Taylor's polynomials leave out is below 2^-52 up to 1/4. */
-struct Turn {
-  double sine, cosine;
+/** What belongs to the two ends of an interval. */
+using Ends [[gnu::vector_size(16)]] = double;
 
-  explicit Turn(double angle) {
-    if (!(angle <= 0.25)) {
-      sine = std::sin(angle);
-      cosine = std::cos(angle);
-      return;
-    }
-    const double s = angle * angle;
-    sine = angle - angle * s * (1. / 6 - s * (1. / 120 - s * (1. / 5040 - s * (1. / 362880 - s * (1. / 39916800)))));
-    cosine = 1 - s * (1. / 2 - s * (1. / 24 - s * (1. / 720 - s * (1. / 40320 - s * (1. / 3628800)))));
-  }
-};
+FOREREACH_INLINE Ends Both(double x) { return Ends{x, x}; }
 
-/** The turns from a center c to the ends of an interval around it. */
+/** The turns from a center c to the ends of an interval around it: their sines, the first negative, and cosines. The first
+term that Taylor's polynomials leave out is below 2^-52 up to 1/4. */
 struct Turns {
-  Turn below{0}, above{0};
-  bool wide = false;  // too wide to tell by the slopes at its ends whether a sine is monotone on it
+  Ends sine, cosine;
+  bool wide;  // too wide to tell by the slopes at its ends whether a sine is monotone on it
 
-  Turns() = default;
-  Turns(double center, PlainInterval x)
-      : below(center - x.lower), above(x.upper - center), wide(!(x.upper - x.lower <= 3)) {}
+  FOREREACH_INLINE Turns(double center, PlainInterval x) : wide(!(x.upper - x.lower <= 3)) {
+    const Ends angle{center - x.lower, x.upper - center}, s = angle * angle;
+    const Ends size =
+        angle - angle * s * (1. / 6 - s * (1. / 120 - s * (1. / 5040 - s * (1. / 362880 - s * (1. / 39916800)))));
+    sine = Ends{-size[0], size[1]};
+    cosine = 1 - s * (1. / 2 - s * (1. / 24 - s * (1. / 720 - s * (1. / 40320 - s * (1. / 3628800)))));
+    if (!(angle[0] <= 0.25)) sine[0] = -std::sin(angle[0]), cosine[0] = std::cos(angle[0]);
+    if (!(angle[1] <= 0.25)) sine[1] = std::sin(angle[1]), cosine[1] = std::cos(angle[1]);
+  }
 };
 
 /** Sine and cosine at both ends by the addition theorems. Where the slope changes its sign an extremum may lie inside. */
 struct Wave {
-  double first_sine, last_sine, first_cosine, last_cosine;
+  Ends sines, cosines;
   bool wide;
 
-  Wave(double sine, double cosine, const Turns& turns)
-      : first_sine(sine * turns.below.cosine - cosine * turns.below.sine),
-        last_sine(sine * turns.above.cosine + cosine * turns.above.sine),
-        first_cosine(cosine * turns.below.cosine + sine * turns.below.sine),
-        last_cosine(cosine * turns.above.cosine - sine * turns.above.sine),
+  FOREREACH_INLINE Wave(double sine, double cosine, const Turns& turns)
+      : sines(Both(sine) * turns.cosine + Both(cosine) * turns.sine),
+        cosines(Both(cosine) * turns.cosine - Both(sine) * turns.sine),
         wide(turns.wide) {}
 
-  [[nodiscard]] PlainInterval SineRange() const { return Spanned(first_sine, last_sine, first_cosine, last_cosine); }
-  [[nodiscard]] PlainInterval CosineRange() const { return Spanned(first_cosine, last_cosine, -first_sine, -last_sine); }
+  [[nodiscard]] FOREREACH_INLINE PlainInterval SineRange() const { return Spanned(sines, cosines); }
+  [[nodiscard]] FOREREACH_INLINE PlainInterval CosineRange() const { return Spanned(cosines, -sines); }
 
  private:
-  [[nodiscard]] PlainInterval Spanned(double first, double last, double first_slope, double last_slope) const {
-    return {wide || (first_slope <= 0 && last_slope >= 0) ? -1 : std::min(first, last),
-            wide || (first_slope >= 0 && last_slope <= 0) ? 1 : std::max(first, last)};
+  [[nodiscard]] FOREREACH_INLINE PlainInterval Spanned(const Ends& ends, const Ends& slopes) const {
+    return {wide || (slopes[0] <= 0 && slopes[1] >= 0) ? -1 : std::min(ends[0], ends[1]),
+            wide || (slopes[0] >= 0 && slopes[1] <= 0) ? 1 : std::max(ends[0], ends[1])};
   }
 };
 
-/** Tangent over [c - below, c + above], which holds no pole. */
-inline PlainInterval TanRange(double tangent, const Turns& turns) {
-  const double down = turns.below.sine / turns.below.cosine, up = turns.above.sine / turns.above.cosine;
-  return {(tangent - down) / (1 + tangent * down), (tangent + up) / (1 - tangent * up)};
+/** Tangent over an interval that holds no pole, given that of its center. */
+FOREREACH_INLINE PlainInterval TanRange(double tangent, const Turns& turns) {
+  const Ends step = turns.sine / turns.cosine, range = (Both(tangent) + step) / (1 - Both(tangent) * step);
+  return {range[0], range[1]};
 }
 
 template <const Program& kProgram, std::size_t I>
@@ -160,19 +155,33 @@ inline void EvaluateOverBox(const double* parameters, const PlainInterval* box, 
   }
 }
 
-template <const Program& kProgram, std::size_t... I>
-inline void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out,
-                   std::index_sequence<I...>) {
-  std::array<double, sizeof...(I)> v;
-  std::array<PlainInterval, sizeof...(I)> w;
-  (EvaluateAtPoint<kProgram, I>(parameters, z, v.data()), ...);
-  (EvaluateOverBox<kProgram, I>(parameters, box, v.data(), w.data()), ...);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(kProgram.states); ++k)
-    out.value[k] = v[static_cast<std::size_t>(kProgram.value[k])];
-  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e)
-    out.jacobian[e] = v[static_cast<std::size_t>(kProgram.jacobian[e].node)];
-  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_second); ++e)
-    out.hessian[e] = w[static_cast<std::size_t>(kProgram.hessian[e].node)];
+/** Calls visit(0), ..., visit(N - 1) with constants, so that arrays indexed by them can live in registers. */
+template <std::size_t N, class Visit>
+FOREREACH_INLINE void ForEachConstant(Visit visit) {
+  [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+    (visit(std::integral_constant<std::size_t, I>()), ...);
+  }(std::make_index_sequence<N>());
+}
+
+template <const Program& kProgram>
+FOREREACH_INLINE void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
+  constexpr auto kSize = static_cast<std::size_t>(kProgram.size);
+  std::array<double, kSize> v;
+  std::array<PlainInterval, kSize> w;
+  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) { EvaluateAtPoint<kProgram, i>(parameters, z, v.data()); });
+  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) { EvaluateOverBox<kProgram, i>(parameters, box, v.data(), w.data()); });
+  ForEachConstant<kProgram.states>([&](auto k) __attribute__((always_inline)) { out.value[k] = v[kProgram.value[k]]; });
+  ForEachConstant<kProgram.num_first>([&](auto e) __attribute__((always_inline)) { out.jacobian[e] = v[kProgram.jacobian[e].node]; });
+  ForEachConstant<kProgram.num_second>([&](auto e) __attribute__((always_inline)) { out.hessian[e] = w[kProgram.hessian[e].node]; });
+}
+
+template <const Program& kProgram>
+FOREREACH_AVX2 void ExpandAvx2(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
+  Expand<kProgram>(parameters, z, box, out);
+}
+template <const Program& kProgram>
+FOREREACH_FLATTEN void ExpandBaseline(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
+  Expand<kProgram>(parameters, z, box, out);
 }
 
 }  // namespace internal
@@ -181,8 +190,9 @@ inline void Expand(const double* parameters, const double* z, const PlainInterva
 template <const Program& kProgram>
 inline void Expand(std::span<const double> parameters, std::span<const double> z, std::span<const PlainInterval> box,
                    Expansion& out) noexcept {
-  internal::Expand<kProgram>(parameters.data(), z.data(), box.data(), out,
-                             std::make_index_sequence<static_cast<std::size_t>(kProgram.size)>());
+  const auto expand = active_instruction_set == InstructionSet::kAvx2 ? internal::ExpandAvx2<kProgram>
+                                                                      : internal::ExpandBaseline<kProgram>;
+  expand(parameters.data(), z.data(), box.data(), out);
 }
 
 }  // namespace forereach

@@ -39,25 +39,27 @@ constexpr RowSpan RowOf(int k) {
 }
 
 template <const Program& kProgram, std::size_t E>
-FOREREACH_INLINE Lanes Weighted(const double* const* rows, std::size_t j, const Lanes* factors) {
+FOREREACH_INLINE Lanes Weighted(const Lanes* columns, const Lanes* factors) {
   constexpr Program::First entry = kProgram.jacobian[E];
-  const Lanes g = LoadLanes(rows[entry.column] + j);
   if constexpr (kProgram.IsOne(entry.node))
-    return g;
+    return columns[entry.column];
   else
-    return factors[E] * g;
+    return factors[E] * columns[entry.column];
 }
 
-template <const Program& kProgram, std::size_t K, std::size_t... E>
-FOREREACH_INLINE Lanes RowImage(const double* const* rows, std::size_t j, const Lanes* factors,
-                                std::index_sequence<E...>) {
-  constexpr std::size_t kFirst = static_cast<std::size_t>(RowOf<kProgram>(static_cast<int>(K)).first);
-  Lanes sum = AllLanes(0);
-  bool first = true;
-  ((sum = first ? Weighted<kProgram, kFirst + E>(rows, j, factors) : sum + Weighted<kProgram, kFirst + E>(rows, j, factors),
-    first = false),
-   ...);
-  return sum;
+template <const Program& kProgram, std::size_t K>
+FOREREACH_INLINE Lanes RowImage(const Lanes* columns, const Lanes* factors) {
+  constexpr RowSpan kRow = RowOf<kProgram>(static_cast<int>(K));
+  constexpr auto kFirst = static_cast<std::size_t>(kRow.first);
+  if constexpr (kRow.count == 0) {
+    return AllLanes(0);
+  } else {
+    Lanes sum = Weighted<kProgram, kFirst>(columns, factors);
+    [&]<std::size_t... E>(std::index_sequence<E...>) __attribute__((always_inline)) {
+      ((sum += Weighted<kProgram, kFirst + 1 + E>(columns, factors)), ...);
+    }(std::make_index_sequence<static_cast<std::size_t>(kRow.count - 1)>());
+    return sum;
+  }
 }
 
 /** Stores numbers four at a time, zeros behind the last. */
@@ -67,31 +69,37 @@ FOREREACH_INLINE void StoreAll(const double (&numbers)[N], double* to) {
   for (std::size_t i = 0; i < N; i += kLaneCount) StoreLanes(Lanes{at(i), at(i + 1), at(i + 2), at(i + 3)}, to + i);
 }
 
+/** The same of the sums of vectors. */
+template <std::size_t N>
+FOREREACH_INLINE void StoreSums(const Lanes (&rows)[N], double* to) {
+  const auto at = [&](std::size_t i) __attribute__((always_inline)) { return i < N ? rows[i] : AllLanes(0); };
+  for (std::size_t i = 0; i < N; i += kLaneCount) StoreLanes(SumEach(at(i), at(i + 1), at(i + 2), at(i + 3)), to + i);
+}
+
 template <const Program& kProgram, std::size_t... K>
 FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice, Zonotope& next, ImageSums& sums,
                               std::index_sequence<K...>) {
-  const double* const from[] = {slice.padded_row(static_cast<int>(K)).data()...};
-  double* const to[] = {next.mutable_row(static_cast<int>(K))...};
   std::array<Lanes, Program::kMaxFirst> factors;
   for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e) factors[e] = AllLanes(expansion.jacobian[e]);
   Lanes row_sums[sizeof...(K)] = {(static_cast<void>(K), AllLanes(0))...};
-  for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
+  ColumnScores::Writer scores(sums.scores);
+  const std::size_t size = slice.padded_size();
+  for (std::size_t j = 0; j < size; j += kLaneCount) {
+    // All are read before any is written: a row may be in several.
+    const Lanes columns[] = {LoadLanes(slice.padded_row(static_cast<int>(K)).data() + j)...};
     Lanes column_sum = AllLanes(0), largest = AllLanes(0);
     const auto row = [&]<std::size_t Row>(std::integral_constant<std::size_t, Row>) __attribute__((always_inline)) {
-      const Lanes image = RowImage<kProgram, Row>(
-          from, j, factors.data(),
-          std::make_index_sequence<static_cast<std::size_t>(RowOf<kProgram>(static_cast<int>(Row)).count)>());
-      StoreLanes(image, to[Row] + j);
-      const Lanes size = Abs(image);
-      row_sums[Row] += size;
-      column_sum += size;
-      largest = Max(largest, size);
+      const Lanes image = RowImage<kProgram, Row>(columns, factors.data()), absolute = Abs(image);
+      StoreLanes(image, next.mutable_row(static_cast<int>(Row)) + j);
+      row_sums[Row] += absolute;
+      column_sum = Row == 0 ? absolute : column_sum + absolute;
+      largest = Row == 0 ? absolute : Max(largest, absolute);
     };
     (row(std::integral_constant<std::size_t, K>()), ...);
-    sums.scores.Set(j, column_sum, largest);
+    scores.Add(j, column_sum, largest);
   }
-  sums.scores.Finish(static_cast<std::size_t>(slice.num_generators()));
-  StoreAll({Sum(row_sums[K])...}, sums.row.data());
+  scores.Finish(static_cast<std::size_t>(slice.num_generators()));
+  StoreSums(row_sums, sums.row.data());
 }
 
 /** (|J| s)_k + image_k: an upper bound but for a relative 2^-44 of itself. */

@@ -46,6 +46,12 @@ FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count, double othe
 }
 /** One bit for each lane of a mask. */
 FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
+#ifdef __SSE2__
+  using Half [[gnu::vector_size(16)]] = double;
+  std::array<Half, 2> halves;
+  __builtin_memcpy(&halves, &mask, sizeof halves);
+  return static_cast<unsigned>(__builtin_ia32_movmskpd(halves[0]) | __builtin_ia32_movmskpd(halves[1]) << 2);
+#endif
   const LaneMask bits = mask & LaneMask{1, 2, 4, 8}, pairs = bits | __builtin_shuffle(bits, LaneMask{2, 3, 0, 1});
   return static_cast<unsigned>((pairs | __builtin_shuffle(pairs, LaneMask{1, 0, 3, 2}))[0]);
 }
@@ -67,13 +73,35 @@ inline constexpr auto kPacking = [] {
 }  // namespace internal
 
 /** Moves the lanes whose bits are not set to the front, in their order; those behind them are of no meaning. */
-FOREREACH_INLINE Lanes PackLanes(const Lanes& x, unsigned left_out) {
+class Packing {
+ public:
+  FOREREACH_INLINE explicit Packing(unsigned left_out) {
+    __builtin_memcpy(&from_, internal::kPacking[left_out].data(), sizeof from_);
+  }
+  FOREREACH_INLINE Lanes operator()(const Lanes& x) const {
+    return std::bit_cast<Lanes>(__builtin_shuffle(std::bit_cast<Halves>(x), from_));
+  }
+
+ private:
   using Halves [[gnu::vector_size(32)]] = std::int32_t;
-  Halves from;
-  __builtin_memcpy(&from, internal::kPacking[left_out].data(), sizeof from);
-  return std::bit_cast<Lanes>(__builtin_shuffle(std::bit_cast<Halves>(x), from));
-}
+  Halves from_;
+};
 FOREREACH_INLINE double Sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
+/** The Sum of each, to the same bits. */
+FOREREACH_INLINE Lanes SumEach(const Lanes& a, const Lanes& b, const Lanes& c, const Lanes& d) {
+  const Lanes a_c = __builtin_shuffle(a, c, LaneMask{0, 1, 4, 5}) + __builtin_shuffle(a, c, LaneMask{2, 3, 6, 7});
+  const Lanes b_d = __builtin_shuffle(b, d, LaneMask{0, 1, 4, 5}) + __builtin_shuffle(b, d, LaneMask{2, 3, 6, 7});
+  return __builtin_shuffle(a_c, b_d, LaneMask{0, 4, 2, 6}) + __builtin_shuffle(a_c, b_d, LaneMask{1, 5, 3, 7});
+}
+
+/** Whether test(k), a mask of four, holds for the first n of all lanes, k = 0, 4, ... */
+template <class Test>
+FOREREACH_INLINE bool HoldsForFirst(std::size_t n, Test test) {
+  const auto count = static_cast<std::int64_t>(n);
+  LaneMask fails{}, left{count, count - 1, count - 2, count - 3};
+  for (std::size_t k = 0; k < n; k += kLaneCount, left -= LaneMask{4, 4, 4, 4}) fails |= ~test(k) & (left > 0);
+  return BitsOf(fails) == 0;
+}
 
 /** What the hot functions outside of classes run on: the best there is, unless a test chooses. */
 inline InstructionSet active_instruction_set = BestInstructionSet();

@@ -1,5 +1,6 @@
 #include "certifier/reach/domain.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <stdexcept>
@@ -82,21 +83,19 @@ bool Domain::Contains(std::span<const double> z) const noexcept {
 }
 
 DomainTest::DomainTest(const Domain& domain)
-    : domain_(domain), size_(static_cast<std::size_t>(domain.state.dim() + domain.input.dim())) {
-  for (std::size_t l = 0; l < size_; ++l) {
-    lower_[l] = BoxLower(domain, static_cast<int>(l));
-    upper_[l] = BoxUpper(domain, static_cast<int>(l));
-  }
+    : domain_(domain),
+      num_states_(static_cast<std::size_t>(domain.state.dim())),
+      size_(num_states_ + static_cast<std::size_t>(domain.input.dim())),
+      is_box_(domain.inequalities.empty() && domain.balls.empty()) {
+  std::ranges::copy(domain.state.lower(), state_lower_.begin());
+  std::ranges::copy(domain.state.upper(), state_upper_.begin());
+  std::ranges::copy(domain.input.lower(), input_lower_.begin());
+  std::ranges::copy(domain.input.upper(), input_upper_.begin());
 }
 
-// By plain arithmetic with a margin above its rounding: true only if all constraints hold.
-bool DomainTest::LiesWellInside(const double* center, const double* half_width) const noexcept {
-  constexpr double kMargin = 0x1p-48;
+// As for the box: true only if all of them hold, d_z entries each.
+bool DomainTest::MeetsConstraintsWell(const double* center, const double* half_width) const noexcept {
   bool inside = true;
-  for (std::size_t l = 0; l < size_; ++l) {
-    const double reach = half_width[l] + RoundingError(kMargin, std::abs(center[l]) + half_width[l]);
-    inside &= (lower_[l] < center[l] - reach) & (center[l] + reach < upper_[l]);
-  }
   for (const auto& [coefficients, bound] : domain_.inequalities) {
     double value = 0, size = std::abs(bound) + 0x1p-1000;
     for (std::size_t l = 0; l < size_; ++l) {
@@ -119,11 +118,15 @@ bool DomainTest::LiesWellInside(const double* center, const double* half_width) 
   return inside;
 }
 
-DomainExit DomainTest::FindExit(const double* center, const double* half_width) const noexcept {
-  if (LiesWellInside(center, half_width)) return {};
+DomainExit DomainTest::FindExitOf(const double* center, const double* half_width, std::span<const double> input,
+                                  bool inside_box) const noexcept {
+  std::array<double, kMaxVariables> middle, reach{};
+  std::copy_n(center, num_states_, middle.begin());
+  std::ranges::copy(input, middle.begin() + num_states_);
+  std::copy_n(half_width, num_states_, reach.begin());
+  if (inside_box && MeetsConstraintsWell(middle.data(), reach.data())) return {};
   std::array<Interval, kMaxVariables> box;
-  for (std::size_t l = 0; l < size_; ++l)
-    box[l] = {SubDown(center[l], half_width[l]), AddUp(center[l], half_width[l])};
+  for (std::size_t l = 0; l < size_; ++l) box[l] = {SubDown(middle[l], reach[l]), AddUp(middle[l], reach[l])};
   return forereach::FindExit(domain_, {box.data(), size_});
 }
 

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "certifier/numerics/interval.h"
+#include "certifier/numerics/lanes.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/sets/box.h"
 
@@ -60,16 +61,43 @@ class DomainTest final {
   /** @param domain outlives the test. */
   explicit DomainTest(const Domain& domain);
 
-  /** FindExit for the box {z : |z - center| <= half_width}: one that lies inside by a margin is found so in plain
-  arithmetic. d_z entries each. */
-  [[nodiscard]] DomainExit FindExit(const double* center, const double* half_width) const noexcept;
+  /** FindExit for the box {(x, input) : |x - center| <= half_width}: one that lies inside by a margin is found so in
+  plain arithmetic. @param center, half_width n entries, of kMaxStates that can be read. */
+  [[nodiscard]] FOREREACH_INLINE DomainExit FindExit(const double* center, const double* half_width,
+                                                     std::span<const double> input) const noexcept {
+    const bool inside = StateLiesWellInside(center, half_width) && InputLiesWellInside(input);
+    if (inside && is_box_) return {};
+    return FindExitOf(center, half_width, input, inside);
+  }
 
  private:
-  [[nodiscard]] bool LiesWellInside(const double* center, const double* half_width) const noexcept;
+  static constexpr double kMargin = 0x1p-48;  // above the rounding of plain arithmetic
+
+  FOREREACH_INLINE bool StateLiesWellInside(const double* center, const double* half_width) const noexcept {
+    const Lanes margin = AllLanes(RoundingError(kMargin, 1));
+    return HoldsForFirst(num_states_, [&](std::size_t k) __attribute__((always_inline)) {
+      const Lanes c = LoadLanes(center + k), r = LoadLanes(half_width + k), reach = r + margin * (Abs(c) + r);
+      return (LoadLanes(&state_lower_[k]) < c - reach) & (c + reach < LoadLanes(&state_upper_[k]));
+    });
+  }
+  FOREREACH_INLINE bool InputLiesWellInside(std::span<const double> input) const noexcept {
+    bool inside = true;
+    for (std::size_t l = 0; l < input.size(); ++l) {
+      const double reach = RoundingError(kMargin, std::abs(input[l]));
+      inside &= (input_lower_[l] < input[l] - reach) & (input[l] + reach < input_upper_[l]);
+    }
+    return inside;
+  }
+  // What else there is to test, where the domain is not a box or the point not well inside of it.
+  [[nodiscard, gnu::noinline]] DomainExit FindExitOf(const double* center, const double* half_width,
+                                                     std::span<const double> input, bool inside_box) const noexcept;
+  [[nodiscard]] bool MeetsConstraintsWell(const double* center, const double* half_width) const noexcept;
 
   const Domain& domain_;
-  std::size_t size_;
-  std::array<double, kMaxVariables> lower_, upper_;
+  std::size_t num_states_, size_;
+  bool is_box_;
+  std::array<double, kMaxStates> state_lower_{}, state_upper_{};
+  std::array<double, kMaxInputs> input_lower_, input_upper_;
 };
 
 }  // namespace forereach

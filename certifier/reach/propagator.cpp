@@ -21,7 +21,7 @@ bool IsNegligible(const StepError& error) {
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
                        int zonotope_order, Method method)
-    : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), remainder_(model.program(), method) {
+    : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), method_(method) {
   const std::vector<Interval> box = domain.Ranges();
   // The hull of every slice that passes the domain check has at most half the domain's width.
   std::vector<double> half_width(box.size(), 0.0);
@@ -67,43 +67,39 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
 
 StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
                             double* next_half_width) const noexcept {
-  using Status = StepResult::Status;
-  const auto n = static_cast<std::size_t>(slice.dim()), variables = n + input.size();
-  const double* half_width = record.half_width.data();
-  std::array<double, kMaxVariables> center, reach;
-  std::array<PlainInterval, kMaxVariables> hull;
-  for (std::size_t l = 0; l < n; ++l) {
-    center[l] = slice.center(static_cast<int>(l));
-    reach[l] = half_width[l];
-    hull[l] = {center[l] - half_width[l], center[l] + half_width[l]};
-  }
-  for (std::size_t l = n; l < variables; ++l) {
-    center[l] = input[l - n];
-    reach[l] = 0;
-    hull[l] = {center[l], center[l]};
-  }
-
-  if (const DomainExit exit = domain_.FindExit(center.data(), reach.data()); exit.kind != DomainExit::Kind::kNone)
-    return {Status::kDomainExit, exit, -1};
-  if (plain_) {
-    Expansion expansion;
-    model_.Expand({center.data(), variables}, {hull.data(), variables}, expansion);
-    return Advance(slice, input, expansion, error_, record, next, next_half_width);
-  }
-  return StepByIntervals(slice, input, {center.data(), variables}, {hull.data(), variables}, record, next, next_half_width);
+  return active_instruction_set == InstructionSet::kAvx2 ? StepAvx2(slice, input, record, next, next_half_width)
+                                                         : StepBaseline(slice, input, record, next, next_half_width);
 }
 
 namespace {
 
+// A center and the hull around it.
+struct Surroundings {
+  std::array<double, kMaxVariables> center;
+  std::array<PlainInterval, kMaxVariables> hull;
+
+  FOREREACH_INLINE Surroundings(const Zonotope& slice, const double* half_width, std::span<const double> input) {
+    const auto n = static_cast<std::size_t>(slice.dim());
+    for (std::size_t k = 0; k < n; k += kLaneCount) {
+      const Lanes c = LoadLanes(slice.centers() + k), r = LoadLanes(half_width + k), lower = c - r, upper = c + r;
+      StoreLanes(c, &center[k]);
+      StoreLanes(__builtin_shuffle(lower, upper, LaneMask{0, 4, 1, 5}), &hull[k].lower);
+      StoreLanes(__builtin_shuffle(lower, upper, LaneMask{2, 6, 3, 7}), &hull[k + 2].lower);
+    }
+    for (std::size_t l = 0; l < input.size(); ++l) {
+      center[n + l] = input[l];
+      hull[n + l] = {input[l], input[l]};
+    }
+  }
+};
+
 // Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
 // no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
-FOREREACH_INLINE bool JoinLanes(const Expansion& expansion, const StepError& error, const StepRecord& record,
-                                const ImageSums& sums, Zonotope& next, double* residual_half_width,
-                                double* next_half_width) noexcept {
+FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, const StepRecord& record,
+                           const ImageSums& sums, Zonotope& next, double* residual_half_width,
+                           double* next_half_width) noexcept {
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
-  const auto n = static_cast<std::size_t>(next.dim());
-  std::array<double, kMaxStates> good;
-  for (std::size_t k = 0; k < n; k += kLaneCount) {
+  return HoldsForFirst(static_cast<std::size_t>(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
     const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
     const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
     const Lanes half = (upper - lower) * AllLanes(0.5);
@@ -118,24 +114,12 @@ FOREREACH_INLINE bool JoinLanes(const Expansion& expansion, const StepError& err
     StoreLanes(center, next.mutable_centers() + k);
     StoreLanes(slack, next.mutable_slacks() + k);
     StoreLanes(hull, next_half_width + k);
-    StoreLanes(Abs(center) + hull < AllLanes(kInfinity) && lower <= upper ? AllLanes(1) : AllLanes(0), &good[k]);
-  }
-  return std::all_of(good.begin(), good.begin() + n, [](double x) { return x == 1; });
-}
-
-FOREREACH_AVX2 bool JoinAvx2(const Expansion& expansion, const StepError& error, const StepRecord& record,
-                             const ImageSums& sums, Zonotope& next, double* residual_half_width,
-                             double* next_half_width) noexcept {
-  return JoinLanes(expansion, error, record, sums, next, residual_half_width, next_half_width);
-}
-FOREREACH_FLATTEN bool JoinBaseline(const Expansion& expansion, const StepError& error, const StepRecord& record,
-                                    const ImageSums& sums, Zonotope& next, double* residual_half_width,
-                                    double* next_half_width) noexcept {
-  return JoinLanes(expansion, error, record, sums, next, residual_half_width, next_half_width);
+    return (Abs(center) + hull < AllLanes(kInfinity)) & (lower <= upper);
+  });
 }
 
 // Why the successor could not be joined.
-StepResult Failed(const StepRecord& record, const Zonotope& next, const double* next_half_width) noexcept {
+[[gnu::noinline]] StepResult Failed(const StepRecord& record, const Zonotope& next, const double* next_half_width) noexcept {
   using Status = StepResult::Status;
   for (int k = 0; k < next.dim(); ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -145,7 +129,38 @@ StepResult Failed(const StepRecord& record, const Zonotope& next, const double* 
   return {Status::kNoFiniteEnclosure, {}, 0};
 }
 
+// The remainder that is not finite.
+[[gnu::noinline]] StepResult Failed(const Remainder& remainder) noexcept {
+  const auto* infinite = std::ranges::find_if_not(remainder.half_width, [](double x) { return std::isfinite(x); });
+  return {StepResult::Status::kNoFiniteEnclosure, {}, static_cast<int>(infinite - remainder.half_width.begin())};
+}
+
 }  // namespace
+
+FOREREACH_AVX2 StepResult Propagator::StepAvx2(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                               Zonotope& next, double* next_half_width) const noexcept {
+  return StepInline(slice, input, record, next, next_half_width);
+}
+FOREREACH_FLATTEN StepResult Propagator::StepBaseline(const Zonotope& slice, std::span<const double> input,
+                                                      StepRecord& record, Zonotope& next,
+                                                      double* next_half_width) const noexcept {
+  return StepInline(slice, input, record, next, next_half_width);
+}
+
+StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                  Zonotope& next, double* next_half_width) const noexcept {
+  const double* half_width = record.half_width.data();
+  if (const DomainExit exit = domain_.FindExit(slice.centers(), half_width, input); exit.kind != DomainExit::Kind::kNone)
+    return {StepResult::Status::kDomainExit, exit, -1};
+  const Surroundings around(slice, half_width, input);
+  const std::size_t variables = static_cast<std::size_t>(slice.dim()) + input.size();
+  const std::span<const double> center(around.center.data(), variables);
+  const std::span<const PlainInterval> hull(around.hull.data(), variables);
+  if (!plain_) return StepByIntervals(slice, input, center, hull, record, next, next_half_width);
+  Expansion expansion;
+  model_.Expand(center, hull, expansion);
+  return Advance(slice, input, expansion, error_, record, next, next_half_width);
+}
 
 StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const double> input,
                                        std::span<const double> center, std::span<const PlainInterval> hull,
@@ -161,21 +176,21 @@ StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const do
 StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
                                const StepError& error, StepRecord& record, Zonotope& next,
                                double* next_half_width) const noexcept {
-  using Status = StepResult::Status;
   const auto n = static_cast<std::size_t>(slice.dim());
   const double* half_width = record.half_width.data();
-  remainder_.Enclose(slice, half_width, expansion.hessian.data(), error.remainder.data(), record.remainder);
-  for (std::size_t k = 0; k < n; ++k)
-    if (!std::isfinite(record.remainder.half_width[k])) return {Status::kNoFiniteEnclosure, {}, static_cast<int>(k)};
+  model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(), record.remainder);
+  const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
+    return Abs(LoadLanes(&record.remainder.half_width[k])) < AllLanes(kInfinity);
+  };
+  if (!HoldsForFirst(n, is_finite)) return Failed(record.remainder);
 
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums);
   std::array<double, kMaxStates> residual_half_width;
-  const auto join = active_instruction_set == InstructionSet::kAvx2 ? JoinAvx2 : JoinBaseline;
-  if (!join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))
+  if (!Join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
-  AppendAndReduce(next, sums.scores, {record.remainder.half_width.data(), n}, {residual_half_width.data(), n}, order_);
+  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), residual_half_width.data(), order_);
   return {};
 }
 

@@ -10,9 +10,9 @@ envelope. All rounding, that of f0(c), J and J G included, goes to the slack s',
 #include <span>
 
 #include "certifier/dynamics/model.h"
+#include "certifier/dynamics/remainder.h"
 #include "certifier/dynamics/rounding.h"
 #include "certifier/reach/domain.h"
-#include "certifier/reach/remainder.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/sets/zonotope.h"
 
@@ -60,17 +60,26 @@ class Propagator final {
  private:
   void ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
                          ExpansionError& error) const noexcept;
-  [[nodiscard]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
-                                           std::span<const double> center, std::span<const PlainInterval> hull,
-                                           StepRecord& record, Zonotope& next, double* next_half_width) const noexcept;
-  [[nodiscard]] StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
+  [[nodiscard, gnu::noinline]] StepResult StepByIntervals(const Zonotope& slice, std::span<const double> input,
+                                                          std::span<const double> center,
+                                                          std::span<const PlainInterval> hull, StepRecord& record,
+                                                          Zonotope& next, double* next_half_width) const noexcept;
+  // Everything but what the model, the envelope and the reduction do, once for each instruction set.
+  [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
+                                                       StepRecord& record, Zonotope& next,
+                                                       double* next_half_width) const noexcept;
+  [[nodiscard]] StepResult StepAvx2(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                    Zonotope& next, double* next_half_width) const noexcept;
+  [[nodiscard]] StepResult StepBaseline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                        Zonotope& next, double* next_half_width) const noexcept;
+  [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
                                    const StepError& error, StepRecord& record, Zonotope& next,
                                    double* next_half_width) const noexcept;
   const NominalModel& model_;
   DomainTest domain_;
   const ResidualEnclosure& residual_;
   int order_;
-  RemainderBound remainder_;
+  Method method_;
   StepError error_;
   bool plain_;
 };

@@ -146,9 +146,7 @@ void LipschitzEnvelope::Enclose(const QuerySet& set, const EnvelopeTail& tail, i
 
 void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count,
                                    ResidualBounds& bounds) const noexcept {
-  std::copy_n(constant_.lower.begin(), rows_.size(), bounds.lower.begin());
-  std::copy_n(constant_.upper.begin(), rows_.size(), bounds.upper.begin());
-  bounds.capped = false;
+  bounds = constant_;
   if (tail)
     for (int k = 0; k < num_states(); ++k) {
       if (!row(k).is_constant()) continue;

@@ -41,7 +41,7 @@ double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const
 }
 
 // The dual bound along d, rounded against us.
-double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
+[[gnu::noinline]] double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
   const auto p = static_cast<std::size_t>(slice.dim());
   double core = kInfinity;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
@@ -184,7 +184,7 @@ void Descend(Search& search, Vector nearest) noexcept {
 
 // In the plane the distance is attained along the normal of an edge of {core - slice}, or towards a corner next to the
 // best such edge: the dual bound is concave in d, so it rises to its maximum and falls after it.
-void TryAllNormals(Search& search, const Zonotope& slice, const std::vector<Vector>& hull) noexcept {
+[[gnu::noinline]] void TryAllNormals(Search& search, const Zonotope& slice, const std::vector<Vector>& hull) noexcept {
   for (int j = 0; j < slice.num_generators(); ++j) search.Consider(Turned(search.generator(j)));
   for (std::size_t a = 0; a < hull.size(); ++a)
     for (std::size_t b = 0; b < a; ++b) search.Consider(Turned(hull[a] - hull[b]));
@@ -202,7 +202,7 @@ Vector BestPlanar(const Zonotope& slice, const Obstacle& obstacle) noexcept {
 
 // In space disjoint polytopes are separated by a face normal of one, or the cross product of an edge of each. The edges
 // of a box are the axes; the faces of a zonotope lie along pairs of generators.
-Vector BestSpatial(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+[[gnu::noinline]] Vector BestSpatial(const Zonotope& slice, const Obstacle& obstacle) noexcept {
   Search search(slice, obstacle);
   for (int k = 0; k < 3; ++k) search.Consider(Vector::Unit(k));
   for (int j = 0; j < slice.num_generators(); ++j) {
@@ -261,11 +261,27 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
   return {distance > 0x1p-400 && distance < kInfinity ? distance : -kInfinity, obstacle.radius()};
 }
 
-Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+namespace {
+
+FOREREACH_INLINE Separation SeparateInline(const Zonotope& slice, const Obstacle& obstacle) noexcept {
   const Vector direction = BestDirection(slice, obstacle);
   if (obstacle.kind() != Obstacle::Kind::kHalfSpace && std::abs(direction.squaredNorm() - 1) < 0x1p-46)
     if (const Separation plain{PlainDistanceLower(slice, obstacle, direction), obstacle.radius()}; plain.IsProven()) return plain;
   return {DistanceLower(slice, obstacle, direction), obstacle.radius()};
+}
+
+FOREREACH_AVX2 Separation SeparateAvx2(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  return SeparateInline(slice, obstacle);
+}
+FOREREACH_FLATTEN Separation SeparateBaseline(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  return SeparateInline(slice, obstacle);
+}
+
+}  // namespace
+
+Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+  return active_instruction_set == InstructionSet::kAvx2 ? SeparateAvx2(slice, obstacle)
+                                                         : SeparateBaseline(slice, obstacle);
 }
 
 }  // namespace forereach

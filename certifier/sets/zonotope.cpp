@@ -41,6 +41,7 @@ Zonotope::Zonotope(const Eigen::VectorXd& center, const Eigen::MatrixXd& generat
   Reset(static_cast<int>(center.size()), static_cast<int>(generators.cols()));
   for (int k = 0; k < dim_; ++k) {
     mutable_center(k) = center[k];
+    mutable_slack(k) = 0;
     std::fill_n(mutable_row(k), padded_size(), 0.0);
     for (int j = 0; j < num_generators_; ++j) mutable_row(k)[j] = generators(k, j);
   }
@@ -107,17 +108,6 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
   return AddUp(value.upper, AddUp(AddUp(spread, slack_along), error));
 }
 
-void Zonotope::Resize(int kept, int num_generators) noexcept {
-  num_generators_ = num_generators;
-  const std::size_t rest = static_cast<std::size_t>(kept) % kLaneCount, end = padded_size();
-  for (int k = 0; k < dim_; ++k) {
-    double* row = mutable_row(k);
-    std::size_t j = static_cast<std::size_t>(kept) - rest;
-    if (rest > 0) StoreLanes(FirstLanes(LoadLanes(row + j), rest, 0), row + j), j += kLaneCount;
-    for (; j < end; j += kLaneCount) StoreLanes(AllLanes(0), row + j);
-  }
-}
-
 void Zonotope::AppendAxis(int k, double length) noexcept {
   if (length == 0) return;
   const int j = num_generators_;
@@ -137,6 +127,7 @@ namespace {
 
 // By plain arithmetic: it only chooses what to keep.
 FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
+  ColumnScores::Writer writer(scores);
   for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
     Lanes sum = AllLanes(0), largest = AllLanes(0);
     for (int k = 0; k < set.dim(); ++k) {
@@ -144,9 +135,9 @@ FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
       sum += size;
       largest = Max(largest, size);
     }
-    scores.Set(j, sum, largest);
+    writer.Add(j, sum, largest);
   }
-  scores.Finish(static_cast<std::size_t>(set.num_generators()));
+  writer.Finish(static_cast<std::size_t>(set.num_generators()));
 }
 
 // Four lists of eight numbers, one in each lane.
@@ -154,7 +145,7 @@ using Lists = std::array<Lanes, 8>;
 
 FOREREACH_INLINE void Order(Lists& x, std::size_t i, std::size_t j) {
   const Lanes low = Min(x[j], x[i]);
-  x[j] = Max(x[i], x[j]);
+  x[j] = Max(x[j], x[i]);  // a comparison of its own, or the compiler makes of both what takes three operations
   x[i] = low;
 }
 
@@ -186,142 +177,159 @@ FOREREACH_INLINE Lists Shuffled(const Lists& x, const LaneMask& from) {
   return shuffled;
 }
 
+FOREREACH_INLINE Lists SortedBlock(const double* scores) {
+  Lists block;
+#pragma GCC unroll 8
+  for (std::size_t i = 0; i < 8; ++i) block[i] = LoadLanes(scores + i * kLaneCount);
+  Sort(block);
+  return block;
+}
+
 // The rank-th smallest of `count` scores, rank = 1 .. 8. Without a branch on a score: they are as good as random.
 FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::size_t rank) {
-  Lists smallest;
-  smallest.fill(AllLanes(kInfinity));
-  for (std::size_t first = 0; first < count; first += 8 * kLaneCount) {
-    Lists next;
-#pragma GCC unroll 8
-    for (std::size_t i = 0; i < 8; ++i) {
-      const std::size_t j = first + i * kLaneCount;
-      next[i] = j < count ? LoadLanes(&scores[j]) : AllLanes(kInfinity);
-    }
-    Sort(next);
-    if (first > 0)
-      MergeSmallest(smallest, next);
-    else
-      smallest = next;
-  }
+  Lists smallest = SortedBlock(scores);
+  for (std::size_t first = ColumnScores::kBlock; first < count; first += ColumnScores::kBlock)
+    MergeSmallest(smallest, SortedBlock(scores + first));
   MergeSmallest(smallest, Shuffled(smallest, LaneMask{1, 0, 3, 2}));
   MergeSmallest(smallest, Shuffled(smallest, LaneMask{2, 3, 0, 1}));
   return smallest[rank - 1][0];
 }
 
-double SmallestOfMany(const double* scores, std::size_t count, std::size_t rank) {
-  std::array<double, kMaxGenerators> sorted;
+[[gnu::noinline]] double SmallestOfMany(const double* scores, std::size_t count, std::size_t rank) {
+  std::array<double, kMaxGenerators> sorted{};
   std::copy_n(scores, count, sorted.begin());
   const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(rank - 1);
   std::nth_element(sorted.begin(), at, sorted.begin() + static_cast<std::ptrdiff_t>(count));
   return *at;
 }
 
-// Moves all columns but the `drop` of smallest score to the front, in their order, and adds the absolute values of those
-// to `boxed`. What is behind those in front is of no meaning.
-FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
-  // Which of four columns are dropped: all bits of their absolute values, and one bit each; how many are left.
-  struct Dropped {
-    LaneMask absolute;
-    unsigned bits;
-    std::ptrdiff_t left;
-  };
-  std::array<Dropped, kMaxGenerators / kLaneCount> dropped;
-  const auto count = static_cast<std::size_t>(set.num_generators());
-  const double largest = drop <= 8 ? Smallest(scores.data(), count, drop) : SmallestOfMany(scores.data(), count, drop);
-  const std::size_t chunks = set.padded_size() / kLaneCount;
-  for (std::size_t c = 0; c < chunks; ++c) {
-    const LaneMask mask = LoadLanes(scores.data() + c * kLaneCount) <= AllLanes(largest);
-    const unsigned bits = BitsOf(mask);
-    dropped[c] = {mask & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX}, bits, static_cast<std::ptrdiff_t>(kLaneCount) - std::popcount(bits)};
-  }
-  std::size_t first = 0;
-  while (dropped[first].bits == 0) ++first;
-  for (int k = 0; k < set.dim(); ++k) {
-    double* row = set.mutable_row(k);
-    double* to = row + first * kLaneCount;
-    Lanes sum = AllLanes(0);
-    for (std::size_t c = first; c < chunks; ++c) {
-      const Lanes four = LoadLanes(row + c * kLaneCount);
-      sum += std::bit_cast<Lanes>(std::bit_cast<LaneMask>(four) & dropped[c].absolute);
-      StoreLanes(PackLanes(four, dropped[c].bits), to);
-      to += dropped[c].left;
+// Lengths along the axes, of which the sum of what is boxed is made.
+using Lengths = std::array<double, kMaxStates>;
+
+// Moves all columns but those of a score up to `largest` to the front, in their order, in kRows rows from row k on, and
+// adds the absolute values of those to `boxed`. What is behind those in front is of no meaning.
+template <std::size_t kRows>
+FOREREACH_INLINE void DropFromRows(Zonotope& set, std::size_t k, const double* scores, const Lanes& largest,
+                                   const Lanes& inflation, Lengths& boxed) {
+  Lanes sums[PaddedToLanes(kRows)] = {};
+  const std::size_t size = set.padded_size();
+  for (std::size_t j = 0, to = 0; j < size; j += kLaneCount) {
+    const LaneMask dropped = LoadLanes(scores + j) <= largest;
+    const LaneMask absolute = dropped & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX};
+    const unsigned bits = BitsOf(dropped);
+    const Packing packing(bits);
+#pragma GCC unroll 8
+    for (std::size_t i = 0; i < kRows; ++i) {
+      double* row = set.mutable_row(static_cast<int>(k + i));
+      const Lanes four = LoadLanes(row + j);
+      sums[i] += std::bit_cast<Lanes>(std::bit_cast<LaneMask>(four) & absolute);
+      StoreLanes(packing(four), row + to);
     }
-    boxed[k] = (Sum(sum) + boxed[k]) * inflation;
+    to += kLaneCount - static_cast<std::size_t>(std::popcount(bits));
+  }
+  for (std::size_t i = 0; i < kRows; i += kLaneCount) {
+    const Lanes sum = SumEach(sums[i], sums[i + 1], sums[i + 2], sums[i + 3]);
+    StoreLanes((sum + LoadLanes(&boxed[k + i])) * inflation, &boxed[k + i]);
   }
 }
 
-FOREREACH_AVX2 void DropAvx2(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation, double* boxed) {
-  Drop(set, drop, scores, inflation, boxed);
-}
-FOREREACH_FLATTEN void DropBaseline(Zonotope& set, std::size_t drop, const ColumnScores& scores, double inflation,
-                                    double* boxed) {
-  Drop(set, drop, scores, inflation, boxed);
+// Moves all columns but the `drop` of smallest score to the front and adds the absolute values of those to `boxed`.
+FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const double* scores, const Lanes& inflation, Lengths& boxed) {
+  constexpr std::size_t kMaxRows = 8;
+  const auto count = static_cast<std::size_t>(set.num_generators()), n = static_cast<std::size_t>(set.dim());
+  const Lanes largest = AllLanes(drop <= 8 ? Smallest(scores, count, drop) : SmallestOfMany(scores, count, drop));
+  std::size_t k = 0;
+  for (; k + kMaxRows < n; k += kMaxRows) DropFromRows<kMaxRows>(set, k, scores, largest, inflation, boxed);
+  [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+    ((n - k == I + 1 ? DropFromRows<I + 1>(set, k, scores, largest, inflation, boxed) : void()), ...);
+  }(std::make_index_sequence<kMaxRows>());
 }
 
-// Axis-aligned generators.
-class Axes {
- public:
-  /** Appends lengths_k e_k, those that are not zero. */
-  void Append(std::span<const double> lengths) {
-    std::size_t size = size_;
-    for (std::size_t k = 0; k < lengths.size(); ++k) {
-      list_[size] = {k, lengths[k]};
-      size += lengths[k] != 0;
+// Axis-aligned generators lengths_k e_k, those whose bit k is set.
+struct Axes {
+  const double* lengths;
+  unsigned which;
+
+  FOREREACH_INLINE static Axes Nonzero(const double* lengths, std::size_t n) {
+    unsigned nonzero = 0;
+    for (std::size_t k = 0; k < n; k += kLaneCount) nonzero |= BitsOf(LoadLanes(lengths + k) != AllLanes(0)) << k;
+    return {lengths, nonzero & ((1u << n) - 1)};
+  }
+  [[nodiscard]] int size() const { return std::popcount(which); }
+
+  // Adds all but the first `stay` to `boxed`, and says how many of those that stay are left to find.
+  FOREREACH_INLINE int Box(int stay, Lengths& boxed) {
+    for (unsigned rest = which; rest != 0; rest &= rest - 1) {
+      if (stay > 0) {
+        --stay;
+        continue;
+      }
+      const auto k = static_cast<std::size_t>(std::countr_zero(rest));
+      boxed[k] += lengths[k];
+      which ^= 1u << k;
     }
-    size_ = size;
+    return stay;
   }
-  /** Forgets all but the first `kept` and adds their lengths up. */
-  void Take(int kept, double* lengths) {
-    const auto first = static_cast<std::size_t>(kept);
-    for (std::size_t i = first; i < size_; ++i) lengths[list_[i].coordinate] += list_[i].length;
-    size_ = first;
+  // Writes them into columns of zeros and returns the column after them.
+  FOREREACH_INLINE int Write(Zonotope& set, int column) const {
+    for (unsigned rest = which; rest != 0; rest &= rest - 1) {
+      const int k = std::countr_zero(rest);
+      set.mutable_row(k)[column++] = lengths[k];
+    }
+    return column;
   }
-  [[nodiscard]] int size() const { return static_cast<int>(size_); }
-  /** Leaves the first columns of the set and writes these behind them. */
-  void Write(Zonotope& set, int columns) const {
-    set.Resize(columns, columns + size());
-    for (std::size_t i = 0; i < size_; ++i) set.mutable_row(static_cast<int>(list_[i].coordinate))[columns++] = list_[i].length;
-  }
-
- private:
-  struct Axis {
-    std::size_t coordinate;
-    double length;
-  };
-  std::size_t size_ = 0;
-  std::array<Axis, 3 * kMaxStates + 1> list_;  // one more is written, and stays if its length is not zero
 };
+
+FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& scores, const double* first,
+                                           const double* second, int order) {
+  const auto n = static_cast<std::size_t>(set.dim());
+  const int count = set.num_generators(), most = order * set.dim(), keep = most - set.dim();
+  Axes early = Axes::Nonzero(first, n), late = Axes::Nonzero(second, n);
+  const int axes = early.size() + late.size();
+  int left = count, stay = axes;  // columns and axes that are not boxed
+  if (count + axes > most) {
+    left = scores.num_nonzero();
+    if (left + axes > most) {
+      left = std::min(keep, left);
+      // The score of an axis-aligned generator is 0, and the new ones come last: what stays are the first of them.
+      stay = std::min(keep - left, axes);
+    }
+  }
+  Lengths boxed;
+  for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(AllLanes(0), &boxed[k]);
+  if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
+  const Lanes inflation = AllLanes(1 + (2.0 * count + 8) * kUnitRoundoff);
+  if (left < count)
+    Drop(set, static_cast<std::size_t>(count - left), scores.data(), inflation, boxed);
+  else
+    for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(LoadLanes(&boxed[k]) * inflation, &boxed[k]);
+  const Axes box = Axes::Nonzero(boxed.data(), n);
+  set.Resize(left, left + stay + box.size());
+  box.Write(set, late.Write(set, early.Write(set, left)));
+}
+
+FOREREACH_AVX2 void AppendAndReduceAvx2(Zonotope& set, const ColumnScores& scores, const double* first,
+                                        const double* second, int order) {
+  AppendAndReduceLanes(set, scores, first, second, order);
+}
+FOREREACH_FLATTEN void AppendAndReduceBaseline(Zonotope& set, const ColumnScores& scores, const double* first,
+                                               const double* second, int order) {
+  AppendAndReduceLanes(set, scores, first, second, order);
+}
 
 }  // namespace
 
-void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept {
-  ColumnScores scores;
-  ScoreAll(set, scores);
-  AppendAndReduce(set, scores, first, second, order);
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second,
+                     int order) noexcept {
+  const auto append = active_instruction_set == InstructionSet::kAvx2 ? AppendAndReduceAvx2 : AppendAndReduceBaseline;
+  append(set, scores, first, second, order);
 }
 
-void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
-                     std::span<const double> second, int order) noexcept {
-  const int n = set.dim(), keep = (order - 1) * n, count = set.num_generators();
-  Axes axes;
-  axes.Append(first);
-  axes.Append(second);
-  if (count + axes.size() <= order * n) return axes.Write(set, count);
-  const int nonzero = scores.num_nonzero();
-  const bool reduces = nonzero + axes.size() > order * n;
-  const int left = reduces ? std::min(keep, nonzero) : nonzero;
-  std::array<double, kMaxStates> boxed;
-  std::fill_n(boxed.begin(), n, 0.0);
-  // The score of an axis-aligned generator is 0, and the new ones come last: what is left are the first of them.
-  if (reduces) axes.Take(std::min(keep - left, axes.size()), boxed.data());
-  const double inflation = 1 + (2.0 * count + 8) * kUnitRoundoff;
-  const auto drop = active_instruction_set == InstructionSet::kAvx2 ? DropAvx2 : DropBaseline;
-  if (left < count)
-    drop(set, static_cast<std::size_t>(count - left), scores, inflation, boxed.data());
-  else
-    for (int k = 0; k < n; ++k) boxed[static_cast<std::size_t>(k)] *= inflation;
-  axes.Append({boxed.data(), static_cast<std::size_t>(n)});
-  axes.Write(set, left);
+void ReduceOrder(Zonotope& set, int order) noexcept {
+  constexpr std::array<double, kMaxStates> kNone{};
+  ColumnScores scores;
+  ScoreAll(set, scores);
+  AppendAndReduce(set, scores, kNone.data(), kNone.data(), order);
 }
 
 }  // namespace forereach

@@ -69,19 +69,29 @@ class Zonotope final {
 
   /** @name In-place construction, for the kernels that own the set. No checks. */
   ///@{
-  /** Sets sizes, and the slack to zero. Who then writes the rows keeps their padding zero. */
+  /** Sets sizes. Who then writes centers, slacks and rows keeps the rows' padding zero. */
   void Reset(int dim, int num_generators) {
     dim_ = dim;
     num_generators_ = num_generators;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(dim); ++k) slack_[k] = 0;
   }
   /** Leaves the first `kept` columns; those after them, up to `num_generators`, are zero. */
-  void Resize(int kept, int num_generators) noexcept;
+  FOREREACH_INLINE void Resize(int kept, int num_generators) noexcept {
+    num_generators_ = num_generators;
+    const std::size_t rest = static_cast<std::size_t>(kept) % kLaneCount, end = padded_size();
+    std::size_t j = static_cast<std::size_t>(kept) - rest;
+    if (rest > 0) {
+      for (int k = 0; k < dim_; ++k) StoreLanes(FirstLanes(LoadLanes(mutable_row(k) + j), rest, 0), mutable_row(k) + j);
+      j += kLaneCount;
+    }
+    for (; j < end; j += kLaneCount)
+      for (int k = 0; k < dim_; ++k) StoreLanes(AllLanes(0), mutable_row(k) + j);
+  }
   /** Copies what is in use of another set, some 2 kB where the whole value has 15. */
   void Assign(const Zonotope& other) noexcept;
   [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
   /** kMaxStates entries each, of which dim() count. */
+  [[nodiscard]] const double* centers() const { return center_.data(); }
   [[nodiscard]] double* mutable_slacks() { return slack_.data(); }
   [[nodiscard]] double* mutable_centers() { return center_.data(); }
   [[nodiscard]] double* mutable_row(int k) { return rows_[static_cast<std::size_t>(k)].data(); }
@@ -96,50 +106,57 @@ class Zonotope final {
   static_assert(kMaxGenerators % kLaneCount == 0);
 };
 
-/** Appends the axis-aligned generators first_k e_k, then second_k e_k, those that are not zero, and reduces the order as
-Girard does, Eq. (order-reduction): a set with more than order * n generators keeps the (order - 1) * n columns of
-largest |g|_1 - |g|_inf (ties, to 45 bits: the earlier) and encloses the rest in a box, rounded outward; zero columns
-are dropped. The slack stays. The result contains the set with all generators. Cost O(n m + m^2), m generators. */
-void AppendAndReduce(Zonotope& set, std::span<const double> first, std::span<const double> second, int order) noexcept;
-
 /** The scores |g|_1 - |g|_inf of all columns, made unique: the index takes the last bits, so that no two are equal and
 the earlier of equals is the larger. -1 for zero columns. */
 class ColumnScores {
  public:
-  /** Sets four, from the sums and the largest of the columns' absolute values. */
-  FOREREACH_INLINE void Set(std::size_t first_column, const Lanes& sum, const Lanes& largest) {
-    const auto index = static_cast<std::int64_t>(kMaxGenerators - first_column);
-    const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so that bits of it are no NaN
-    const LaneMask bits = (std::bit_cast<LaneMask>(score) & ~LaneMask{127, 127, 127, 127}) |
-                          LaneMask{index, index - 1, index - 2, index - 3};
-    const LaneMask nonzero = largest > AllLanes(0);
-    nonzero_ -= nonzero;
-    StoreLanes(std::bit_cast<Lanes>((bits & nonzero) | (std::bit_cast<LaneMask>(AllLanes(-1)) & ~nonzero)),
-               &scores_[first_column]);
-  }
-  /** After all are set. */
-  FOREREACH_INLINE void Finish(std::size_t count) {
-    if (const std::size_t rest = count % kLaneCount; rest > 0) {
-      double* last = &scores_[count - rest];
-      StoreLanes(FirstLanes(LoadLanes(last), rest, kInfinity), last);
+  static constexpr std::size_t kBlock = 8 * kLaneCount;
+
+  /** Sets them, four after four. A local variable, whose state is in registers. */
+  class Writer {
+   public:
+    FOREREACH_INLINE explicit Writer(ColumnScores& scores) : scores_(scores) {}
+    /** From the sums and the largest of the next four columns' absolute values. */
+    FOREREACH_INLINE void Add(std::size_t first_column, const Lanes& sum, const Lanes& largest) {
+      const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so that bits of it are no NaN
+      const LaneMask bits = (std::bit_cast<LaneMask>(score) & ~LaneMask{127, 127, 127, 127}) | index_;
+      const LaneMask nonzero = largest > AllLanes(0);
+      nonzero_ -= nonzero;
+      index_ -= LaneMask{4, 4, 4, 4};
+      StoreLanes(nonzero ? std::bit_cast<Lanes>(bits) : AllLanes(-1), &scores_.scores_[first_column]);
     }
-  }
-  /** One for each column; infinity behind the last, up to a multiple of kLaneCount. */
+    /** After all `count` columns. */
+    FOREREACH_INLINE void Finish(std::size_t count) {
+      scores_.num_nonzero_ = static_cast<int>((nonzero_[0] + nonzero_[1]) + (nonzero_[2] + nonzero_[3]));
+      double* scores = scores_.scores_.data();
+      const std::size_t rest = count % kLaneCount;
+      if (rest > 0) StoreLanes(FirstLanes(LoadLanes(scores + count - rest), rest, kInfinity), scores + count - rest);
+      for (std::size_t j = PaddedToLanes(count); j % kBlock != 0; j += kLaneCount) StoreLanes(AllLanes(kInfinity), scores + j);
+    }
+
+   private:
+    ColumnScores& scores_;
+    LaneMask nonzero_{}, index_{kMaxGenerators, kMaxGenerators - 1, kMaxGenerators - 2, kMaxGenerators - 3};
+  };
+
+  /** One for each column; infinity behind the last, up to a multiple of kBlock. */
   [[nodiscard]] const double* data() const { return scores_.data(); }
-  [[nodiscard]] int num_nonzero() const {
-    return static_cast<int>((nonzero_[0] + nonzero_[1]) + (nonzero_[2] + nonzero_[3]));
-  }
+  [[nodiscard]] int num_nonzero() const { return num_nonzero_; }
 
  private:
-  LaneMask nonzero_{};
-  std::array<double, kMaxGenerators> scores_;
+  int num_nonzero_;
+  alignas(32) std::array<double, (kMaxGenerators + kBlock - 1) / kBlock * kBlock> scores_;
 };
 
-/** The same where the scores of the set's columns are known already. */
-void AppendAndReduce(Zonotope& set, const ColumnScores& scores, std::span<const double> first,
-                     std::span<const double> second, int order) noexcept;
+/** Appends the axis-aligned generators first_k e_k, then second_k e_k, those that are not zero, and reduces the order as
+Girard does, Eq. (order-reduction): a set with more than order * n generators keeps the (order - 1) * n columns of
+largest |g|_1 - |g|_inf (ties, to 45 bits: the earlier) and encloses the rest in a box, rounded outward; zero columns
+are dropped. The slack stays. The result contains the set with all generators. Cost O(n m + m^2), m generators.
+@param scores of the set's columns. @param first, second n lengths each, of kMaxStates that can be read. */
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second,
+                     int order) noexcept;
 
 /** Reduces the order only. */
-inline void ReduceOrder(Zonotope& set, int order) noexcept { AppendAndReduce(set, {}, {}, order); }
+void ReduceOrder(Zonotope& set, int order) noexcept;
 
 }  // namespace forereach

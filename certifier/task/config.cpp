@@ -217,10 +217,6 @@ BusOptions ReadBus(const Document& file) {
   return bus;
 }
 
-std::string RelativeTo(const std::string& file, const std::string& path) {
-  return (std::filesystem::path(file).parent_path() / path).string();
-}
-
 PlannerOptions ReadPlanner(const Document& file) {
   PlannerOptions planner;
   file.Read("planner.source", planner.source);
