@@ -29,7 +29,7 @@ const CellResult& Results::Of(const Cell& cell) const {
 }
 
 std::span<const Experiment> Experiments() {
-  static const std::vector<Experiment> all{MainResults(),    RecallByN(),        Comparison(),
+  static const std::vector<Experiment> all{MainResults(), RecallByN(), Comparison(), CertificateBudget(),
                                            DomainExits(),    FirstAbstentions(), BoxAgainstZonotope(),
                                            ScalarEnvelope(), NoiseSweep(),       IncorrectDeclarations(),
                                            ParameterBoxes(), NormRatios(),       CertifiedDeclarations()};

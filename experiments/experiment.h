@@ -73,6 +73,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment MainResults();
 [[nodiscard]] Experiment RecallByN();
 [[nodiscard]] Experiment Comparison();
+[[nodiscard]] Experiment CertificateBudget();
 [[nodiscard]] Experiment DomainExits();
 [[nodiscard]] Experiment FirstAbstentions();
 [[nodiscard]] Experiment BoxAgainstZonotope();

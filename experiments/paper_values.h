@@ -10,7 +10,8 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kPairwise = "Pairwise consistency test", kSets = "Reachable-set representation",
                                   kSensitivity = "Certificate-budget and envelope sensitivity", kNorms = "Norm ratios",
                                   kBoxes = "Table, Parameter boxes", kIncorrect = "Incorrect Lipschitz declarations",
-                                  kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol";
+                                  kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol",
+                                  kBudget = "Table, CP-SLS-MPC budget by N";
 
 inline constexpr PaperValue kPaperValues[] = {
     {"point_mass.B.coverage", 1.000, 3, kMain},
@@ -83,6 +84,23 @@ inline constexpr PaperValue kPaperValues[] = {
     {"point_mass.Global calibration.B.certified", 1, 3, kText},
     {"point_mass.Global calibration.B.coverage", 0, 3, kText},
     {"point_mass.Global calibration.B.false_safe", 0.5, 3, kText},
+
+    {"budget.25.starved", 1, 3, kBudget},
+    {"budget.50.starved", 1, 3, kBudget},
+    {"budget.100.starved", 1, 3, kBudget},
+    {"budget.150.starved", 0.147, 3, kBudget},
+    {"budget.200.starved", 0, 3, kBudget},
+    {"budget.400.starved", 0, 3, kBudget},
+    {"budget.150.drift", 15.11, 2, kBudget},
+    {"budget.150.tube", 15.15, 2, kBudget},
+    {"budget.150.total", 30.38, 2, kBudget},
+    {"budget.200.drift", 14.84, 2, kBudget},
+    {"budget.200.tube", 15.88, 2, kBudget},
+    {"budget.200.total", 31.08, 2, kBudget},
+    {"budget.400.drift", 14.78, 2, kBudget},
+    {"budget.400.tube", 15.76, 2, kBudget},
+    {"budget.400.total", 30.55, 2, kBudget},
+    {"budget.nonvacuous", 0, 0, kBudget},
 
     {"exits.queries", 186000, 0, kDomainCheck},
     {"exits.domain", 39807, 0, kDomainCheck},

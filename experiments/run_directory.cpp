@@ -34,12 +34,18 @@ void VisitCounts(Tally& tally, const Visit& visit) {
   visit("falsified", tally.falsified);
   visit("domain", tally.domain);
   visit("safety", tally.safety);
+  visit("vacuous", tally.vacuous);
   visit("covered", tally.covered);
   visit("prefix_covered", tally.prefix_covered);
   visit("undecided", tally.undecided);
   visit("domain_steps", tally.domain_steps);
   visit("safety_steps", tally.safety_steps);
   visit("areas", tally.areas);
+  visit("budget_drift", tally.budgets.drift);
+  visit("budget_tube", tally.budgets.tube);
+  visit("budget_total", tally.budgets.total);
+  visit("budget_least_mass", tally.budgets.least_mass);
+  visit("budget_complete", tally.budgets.complete);
 }
 
 Json ToJson(const Cell& cell, const CellResult& result) {
@@ -145,7 +151,7 @@ std::vector<CellResult> RunAll(const std::vector<Cell>& cells, const RunDirector
 std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>& results) {
   std::string text =
       "system,method,declaration,observations,noise,order,layout,seed,group,plans,safe,certified,certified_safe,"
-      "false_certificates,falsified,domain,safety,covered,prefix_covered,undecided,domain_steps,safety_steps\n";
+      "false_certificates,falsified,domain,safety,vacuous,covered,prefix_covered,undecided,domain_steps,safety_steps\n";
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell& cell = cells[i];
     for (const Tally& tally : results[i]) {
@@ -154,7 +160,7 @@ std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>&
               "," + NameOf(cell.layout) + "," + std::to_string(cell.seed) + "," + tally.group;
       for (const int count :
            {tally.plans, tally.safe, tally.certified, tally.certified_safe, tally.false_certificates(), tally.falsified,
-            tally.domain, tally.safety, tally.covered, tally.prefix_covered, tally.undecided})
+            tally.domain, tally.safety, tally.vacuous, tally.covered, tally.prefix_covered, tally.undecided})
         text.append(1, ',').append(std::to_string(count));
       text.append(1, ',').append(StepList(tally.domain_steps));
       text.append(1, ',').append(StepList(tally.safety_steps)).append(1, '\n');
