@@ -32,7 +32,7 @@ std::span<const Experiment> Experiments() {
   static const std::vector<Experiment> all{MainResults(), RecallByN(), Comparison(), CertificateBudget(),
                                            DomainExits(),    FirstAbstentions(), BoxAgainstZonotope(),
                                            ScalarEnvelope(), NoiseSweep(),       IncorrectDeclarations(),
-                                           ParameterBoxes(), NormRatios(),       CertifiedDeclarations()};
+                                           ParameterBoxes(), NormRatios(),       NominalDegradation(), CertifiedDeclarations()};
   return all;
 }
 

@@ -82,6 +82,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment IncorrectDeclarations();
 [[nodiscard]] Experiment ParameterBoxes();
 [[nodiscard]] Experiment NormRatios();
+[[nodiscard]] Experiment NominalDegradation();
 [[nodiscard]] Experiment CertifiedDeclarations();
 ///@}
 

@@ -11,6 +11,7 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kSensitivity = "Certificate-budget and envelope sensitivity", kNorms = "Norm ratios",
                                   kBoxes = "Table, Parameter boxes", kIncorrect = "Incorrect Lipschitz declarations",
                                   kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol",
+                                  kDegradation = "Nominal-model degradation",
                                   kBudget = "Table, CP-SLS-MPC budget by N";
 
 inline constexpr PaperValue kPaperValues[] = {
@@ -123,6 +124,9 @@ inline constexpr PaperValue kPaperValues[] = {
 
     {"norms.point_mass", 18.481, 3, kNorms},
     {"norms.bicycle", 11.368, 3, kNorms},
+
+    {"degradation.point_mass", 16.638, 3, kDegradation},
+    {"degradation.bicycle", 1.386, 3, kDegradation},
 
     {"boxes.5.slack", 1.177, 3, kBoxes},
     {"boxes.10.slack", 1.606, 3, kBoxes},

@@ -67,7 +67,7 @@ Place Follow(const System& system, const Start& start, int k) {
 Scenario MakeScenario(const System& system, Group group, int seed, int index) {
   Random random{kForScenario, static_cast<std::uint64_t>(system.num_states()), static_cast<std::uint64_t>(group),
                 static_cast<std::uint64_t>(seed), static_cast<std::uint64_t>(index)};
-  const Start start = &system == &BicycleSystem() ? BicycleStart(group, random) : PointMassStart(group, random);
+  const Start start = system.num_states() == BicycleSystem().num_states() ? BicycleStart(group, random) : PointMassStart(group, random);
   const Place place = Follow(system, start, random.Integer(system.horizon - 3, system.horizon));
   const bool safe = index % 2 == 0;
   const double aside = safe ? start.radius + random.Uniform(start.least_clearance, start.largest_clearance)
