@@ -13,7 +13,7 @@
 namespace forereach::experiments {
 namespace {
 
-// The nominal model with one more parameter: the part of each step's motion that it knows.
+// The nominal model with one more parameter: the part of it that is known.
 template <class Equations>
 struct Partly {
   static constexpr int kStates = Equations::kStates, kInputs = Equations::kInputs;
@@ -33,7 +33,7 @@ struct Partly {
   template <class T>
   static constexpr void Step(std::span<const T> parameters, std::span<const T> z, std::span<T> next) {
     Equations::template Step<T>(parameters, z, next);
-    for (std::size_t k = 0; k < next.size(); ++k) next[k] = z[k] + parameters[kOwn] * (next[k] - z[k]);
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] = parameters[kOwn] * next[k];
   }
 
   [[nodiscard]] std::array<double, kOwn + 1> parameters() const { return values; }
@@ -51,18 +51,16 @@ std::shared_ptr<const NominalModel> MakePartly(const NominalModel& whole, double
 constexpr double kSlack = 1e-12;
 
 System MakeDegraded(const System& system, double part) {
-  const double known = 1 - part, lacking = 1 - known;  // the latter exactly
+  const double known = 1 - part, lacking = 1 - known;
   System degraded = system;
   degraded.name += "_without_" + ToText(100 * part) + "_percent";
   degraded.model = &system == &BicycleSystem() ? MakePartly<KinematicBicycle>(*system.model, known)
                                                : MakePartly<PointMass>(*system.model, known);
-  Eigen::MatrixXd motion = LargestSlopes(system);
-  motion.leftCols(system.num_states()).diagonal().setZero();  // x itself; both models have ones there
-  degraded.deployed = (1 + kSlack) * (system.deployed + lacking * motion);
+  degraded.deployed = (1 + kSlack) * (system.deployed + lacking * LargestSlopes(system));
   degraded.step = [whole = system.step, lacking](std::span<const double> z, std::span<double> residual,
                                                  std::span<double> next) {
     whole(z, residual, next);
-    for (std::size_t k = 0; k < next.size(); ++k) residual[k] += lacking * (next[k] - residual[k] - z[k]);
+    for (std::size_t k = 0; k < next.size(); ++k) residual[k] += lacking * (next[k] - residual[k]);
   };
   return degraded;
 }
