@@ -95,10 +95,45 @@ std::vector<Table> BudgetTables(const Scope& scope, const Results& results) {
   return {budget, plug_ins};
 }
 
+std::vector<Plot> BudgetPlots(const Scope& scope, const Results& results) {
+  std::string mass, parts;
+  for (const int observations : scope.SizesOf(BicycleSystem())) {
+    const std::string n = std::to_string(observations);
+    const Pooled pooled = Pool(scope, results, BudgetCell(CpSlsMethods().front(), observations));
+    mass += DataLine({static_cast<double>(observations), *Median(pooled.mass).mean});
+    const auto line = [&](const char* whose, double drift, double tube) {
+      parts += "\"" + n + "\\n" + whose + "\" " + DataLine({0.1, drift, tube});
+    };
+    if (const auto drift = PaperOrNone("budget." + n + ".drift"))
+      line("paper", drift->value, Paper("budget." + n + ".tube").value);
+    if (!pooled.total.empty()) line("here", *Median(pooled.drift).mean, *Median(pooled.tube).mean);
+  }
+  return {{"budget",
+           "CP-SLS-MPC. Left: the weight that a plan's poorest step has, against the floor below which its radius is "
+           "infinite. Right: the medians of the budget's parts; a certificate needs a sum below 1.",
+           900, 400,
+           DataBlock("mass", mass) + DataBlock("parts", parts) + R"(set multiplot layout 1,2
+set key top left
+set xlabel 'observations N'; set ylabel 'effective mass'
+set yrange [0:*]
+plot $mass using 1:2 with linespoints pt 7 lw 2 lc rgb blue title 'median of the least mass', \
+  119 with lines lw 2 dt 2 lc rgb red title 'floor, 119'
+set xlabel ''; set ylabel 'budget, sum over the horizon'
+set yrange [0:42]
+set style data histogram
+set style histogram rowstacked
+set style fill solid 0.9 noborder
+set boxwidth 0.7
+plot $parts using 2:xtic(1) lc rgb red title 'alpha, 0.10', '' using 3 lc rgb blue title 'drift (TV)', \
+  '' using 4 lc rgb sky title 'tube', 1 with lines lw 2 dt 2 lc rgb '#333333' title 'of use below 1'
+unset multiplot
+)"}};
+}
+
 }  // namespace
 
 Experiment CertificateBudget() {
-  return {"budget", "CP-SLS-MPC's budget by N, four covariances", BudgetCells, BudgetTables};
+  return {"budget", "CP-SLS-MPC's budget by N, four covariances", BudgetCells, BudgetTables, BudgetPlots};
 }
 
 }  // namespace forereach::experiments

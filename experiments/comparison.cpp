@@ -1,4 +1,5 @@
 // ForeReach beside the other methods: coverage where there are no data, recall where there are.
+#include <cmath>
 #include <map>
 #include <string>
 
@@ -89,8 +90,39 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
   return {bicycle, point_mass};
 }
 
+std::vector<Plot> Plots(const Scope& scope, const Results& results) {
+  static constexpr const char* kColors[] = {"green", "blue",   "sky",   "orange", "'#F0A3C8'",
+                                            "purple", "grey", "'#333333'", "'#b8b8b8'"};
+  std::string data, lines;
+  for (std::size_t m = 0; m < Methods().size(); ++m) {
+    const Method& method = Methods()[m];
+    std::string points;
+    for (const int observations : Sizes(scope)) {
+      const Cell cell = With(method, PaperCell(BicycleSystem(), observations, 0, 0));
+      // No complete tube, no coverage: such a method says nothing, and is shown at 1.
+      points += DataLine({OverSeeds(scope, results, cell, Group::kB, Coverage).mean.value_or(1),
+                          OverSeeds(scope, results, cell, Group::kC, Recall).mean.value_or(0),
+                          0.6 + 0.35 * std::log2(observations / 25.0)});
+    }
+    const std::string name = "m" + std::to_string(m), color = kColors[m % std::size(kColors)];
+    data += DataBlock(name, points);
+    lines += std::string(m == 0 ? "plot " : ", ") + "$" + name + " using 1:2 with lines lw 1.2 lc rgb " + color +
+             " notitle, '' using 1:2:3 with points ps variable pt " + (m == 0 ? "3" : "7") + " lw 2 lc rgb " + color +
+             " title \"" + method.name + "\"";
+  }
+  return {{"methods",
+           "Coverage of complete tubes where there are no data (B) against recall where there are (C), bicycle, by "
+           "method; larger marks, more observations. A method without a complete tube stands at coverage 1. Only the "
+           "upper right corner is both sound and informative.",
+           840, 480,
+           data + "set xrange [-0.03:1.04]; set yrange [-0.04:1.05]\n"
+                  "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
+                  "set key outside right top\n" +
+               lines + "\n"}};
+}
+
 }  // namespace
 
-Experiment Comparison() { return {"methods", "every method: coverage without data, recall with them", Cells, Tables}; }
+Experiment Comparison() { return {"methods", "every method: coverage without data, recall with them", Cells, Tables, Plots}; }
 
 }  // namespace forereach::experiments

@@ -1,4 +1,5 @@
 // How much of the nominal model a certifier can lose: recall as less of it is known.
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -65,10 +66,28 @@ std::vector<Table> DegradationTables(const Scope& scope, const Results& results)
   return {table};
 }
 
+std::vector<Plot> DegradationPlots(const Scope& scope, const Results& results) {
+  std::string lines;
+  for (const double percent : PercentsOf(scope)) {
+    const auto recall = [&](const System& system) {
+      return OverSeeds(scope, results, DegradedCell(system, percent), Group::kC, Recall).mean.value_or(NAN);
+    };
+    lines += DataLine({percent, recall(PointMassSystem()), recall(BicycleSystem())});
+  }
+  return {{"degradation", "Recall of group C as less of the nominal model is known; at 100 % there is none.", 720, 400,
+           DataBlock("recall", lines) + R"(set yrange [0:1.05]; set xrange [0:100]
+set xlabel 'degradation d, %'; set ylabel 'certified recall, C'
+set key bottom left
+plot 0.5 with lines dt 2 lc rgb grey title 'reference', \
+  $recall using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb blue title 'point mass, N = 100', \
+  '' using 1:3 with linespoints pt 5 ps 0.6 lw 2 lc rgb green title 'bicycle, N = 400'
+)"}};
+}
+
 }  // namespace
 
 Experiment NominalDegradation() {
-  return {"degradation", "recall as the nominal model gets worse", DegradationCells, DegradationTables};
+  return {"degradation", "recall as the nominal model gets worse", DegradationCells, DegradationTables, DegradationPlots};
 }
 
 }  // namespace forereach::experiments

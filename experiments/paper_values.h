@@ -12,6 +12,8 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kBoxes = "Table, Parameter boxes", kIncorrect = "Incorrect Lipschitz declarations",
                                   kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol",
                                   kDegradation = "Nominal-model degradation",
+                                  kLimits = "Short-horizon lower-bound scan",
+                                  kAssumptions = "Affine control example", kEstimators = "Slope-estimator declarations",
                                   kBudget = "Table, CP-SLS-MPC budget by N";
 
 inline constexpr PaperValue kPaperValues[] = {
@@ -127,6 +129,20 @@ inline constexpr PaperValue kPaperValues[] = {
 
     {"degradation.point_mass", 16.638, 3, kDegradation},
     {"degradation.bicycle", 1.386, 3, kDegradation},
+
+    {"width.pairs", 64, 0, kLimits},
+    {"width.positive", 64, 0, kLimits},
+    {"width.tau", 10, 0, kLimits},
+    {"width.k", 2, 0, kLimits},
+    {"width.largest", 0.039228, 6, kLimits},
+
+    {"affine.linear.refuted", 0, 3, kAssumptions},
+    {"affine.linear.B.coverage", 1, 3, kAssumptions},
+    {"affine.linear.C.coverage", 1, 3, kAssumptions},
+    {"affine.knee.refuted", 1, 3, kAssumptions},
+    {"band.linear", 0.092, 3, kAssumptions},
+    {"band.knee", 0.850, 3, kAssumptions},
+    {"slopes", 0, 3, kEstimators},
 
     {"boxes.5.slack", 1.177, 3, kBoxes},
     {"boxes.10.slack", 1.606, 3, kBoxes},
