@@ -119,7 +119,8 @@ set yrange [0:*]
 plot $mass using 1:2 with linespoints pt 7 lw 2 lc rgb blue title 'median of the least mass', \
   119 with lines lw 2 dt 2 lc rgb red title 'floor, 119'
 set xlabel ''; set ylabel 'budget, sum over the horizon'
-set yrange [0:42]
+set yrange [0:48]
+set bmargin 3.5
 set style data histogram
 set style histogram rowstacked
 set style fill solid 0.9 noborder

@@ -106,17 +106,18 @@ std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
     plot.script +=
         DataBlock(panel.name() + "_obstacle", DataLine({circle.center.x(), circle.center.y(), circle.radius}));
   }
-  plot.script += "set multiplot layout 2,2 spacing 0.08,0.12\nset size ratio -1\nset style fill transparent solid 0.25\n";
+  plot.script += "set multiplot layout 2,2 title ' '\nset size ratio -1\nset offsets 0.3, 0.3, 0.6, 0.6\n"
+                 "set style fill transparent solid 0.25\n";
   for (const Panel& panel : panels) {
-    const std::string name = "$" + panel.name();
+    const std::string name = std::string(1, '$').append(panel.name());
     plot.script += "set title '" + std::string(&panel.system == &PointMassSystem() ? "Point mass" : "Bicycle") +
                    (panel.group == Group::kB ? ", no data near the plan" : ", data along the plan") + "'\n";
-    plot.script += &panel == &panels.front() ? "set key outside top left horizontal samplen 1\n" : "unset key\n";
-    plot.script += "plot " + name + "_obstacle with circles fs solid 0.5 lc rgb red title 'obstacle', " + name +
-                   "_ours with filledcurves closed lc rgb green title 'ForeReach', " + name +
+    plot.script += &panel == &panels.front() ? "set key at screen 0.5, 0.985 center top horizontal maxrows 1 samplen 2\n" : "unset key\n";
+    plot.script += "plot " + name + "_ours with filledcurves closed lc rgb green title 'ForeReach', " + name +
                    "_ours with lines lw 0.7 lc rgb green notitle, " + name +
                    "_global with lines lw 1 lc rgb blue title 'global calibration', " + name +
-                   "_target with lines lw 0.5 lc rgb '#333333' title 'target'\n";
+                   "_target with lines lw 0.5 lc rgb '#333333' title 'target', " + name +
+                   "_obstacle with circles fs transparent solid 0.6 lc rgb red title 'obstacle'\n";
   }
   plot.script += "unset multiplot\n";
   return {plot};

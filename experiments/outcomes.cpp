@@ -165,13 +165,15 @@ std::vector<Table> StepTables(const Scope& scope, const Results& results) {
   return tables;
 }
 
+constexpr std::size_t kFirstStepShown = 5;  // Nothing happens before.
+
 std::vector<Plot> StepPlots(const Scope& scope, const Results& results) {
   Plot plot{"steps", "The step at which a plan of the bicycle first abstains, noiseless, as a part of its group.", 900,
             400, ""};
   std::string panels;
   for (const int observations : {BicycleSystem().sample_sizes.front(), BicycleSystem().sample_sizes.back()}) {
     std::string lines;
-    for (std::size_t t = 0; t <= static_cast<std::size_t>(BicycleSystem().horizon); ++t) {
+    for (std::size_t t = kFirstStepShown; t <= static_cast<std::size_t>(BicycleSystem().horizon); ++t) {
       double exits = 0, unsafe = 0, unsafe_along = 0, plans = 0;
       Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
       for (; cell.seed < scope.seeds; ++cell.seed) {
@@ -187,7 +189,7 @@ std::vector<Plot> StepPlots(const Scope& scope, const Results& results) {
               "'B: may touch the obstacle (S)', '' using 4 lc rgb green title 'C: may touch the obstacle (S)'\n";
   }
   plot.script += "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
-                 "set style fill solid 0.9 noborder\nset yrange [0:0.4]\nset xlabel 'step'\n"
+                 "set style fill solid 0.9 noborder\nset yrange [0:0.5]\nset xlabel 'step'\n"
                  "set ylabel 'part of the plans'\nset key top left\n" +
                  panels + "unset multiplot\n";
   return {plot};
