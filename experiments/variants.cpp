@@ -50,13 +50,20 @@ std::shared_ptr<const NominalModel> MakePartly(const NominalModel& whole, double
 // Entries of L lie above the true slopes by this part of them, so that rounding makes no declaration false.
 constexpr double kSlack = 1e-12;
 
+const Eigen::MatrixXd& LargestSlopesOnce(const System& system) {
+  static std::map<const System*, Eigen::MatrixXd> known;
+  const auto [at, is_new] = known.try_emplace(&system);
+  if (is_new) at->second = LargestSlopes(system);
+  return at->second;
+}
+
 System MakeDegraded(const System& system, double part) {
   const double known = 1 - part, lacking = 1 - known;
   System degraded = system;
   degraded.name += "_without_" + ToText(100 * part) + "_percent";
   degraded.model = &system == &BicycleSystem() ? MakePartly<KinematicBicycle>(*system.model, known)
                                                : MakePartly<PointMass>(*system.model, known);
-  degraded.deployed = (1 + kSlack) * (system.deployed + lacking * LargestSlopes(system));
+  degraded.deployed = (1 + kSlack) * (system.deployed + lacking * LargestSlopesOnce(system));
   degraded.step = [whole = system.step, lacking](std::span<const double> z, std::span<double> residual,
                                                  std::span<double> next) {
     whole(z, residual, next);
