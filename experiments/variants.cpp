@@ -89,6 +89,7 @@ void StepLinear(std::span<const T> z, std::span<T> residual, std::span<T> next) 
 System MakeLinearPointMass() {
   System system = PointMassSystem();
   system.name = "linear_point_mass";
+  system.scenarios = 100;  // some hundred linear programs each
   const double dt = kPointMass.dt;
   system.deployed.setZero();
   for (int axis = 0; axis < 2; ++axis)

@@ -117,7 +117,7 @@ TEST(RunCell, CpSlsIsStarvedWithFewObservationsAndVacuousWithMany) {
 TEST_F(RunTest, LimitsAndAssumptionsHoldInAQuickRun) {
   std::ostringstream out;
   RunOptions options = Quick({"limits", "degradation", "assumptions"}, "limits");
-  options.effort = {8, 8};
+  options.effort = {3, 8};
   RunExperiments(options, out);
   EXPECT_THAT(out.str(), HasSubstr("| admissible pairs | 64 | Short-horizon lower-bound scan | 64 | 0 | same |"));
   EXPECT_THAT(out.str(), HasSubstr("| of these with a positive bound | 64 | Short-horizon lower-bound scan | 64 |"));
