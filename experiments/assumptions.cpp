@@ -18,9 +18,7 @@ const Method kAffine{"Affine residual", MakeAffine};
 
 const System* const kTargets[] = {&LinearPointMass(), &PointMassSystem()};
 
-std::string TargetOf(const System& system) {
-  return &system == &PointMassSystem() ? "knee target" : "linear target";
-}
+std::string TargetOf(const System& system) { return &system == &PointMassSystem() ? "knee target" : "linear target"; }
 
 Cell TargetCell(const System& system, const Method& method) {
   Cell cell = PaperCell(system, system.sample_sizes.back(), system.noise_scale, 0);
@@ -53,7 +51,8 @@ std::vector<Table> AssumptionTables(const Scope& scope, const Results& results) 
       "true slopes times a factor from this much below 1 are wrong and pass the pairwise test.",
       {}};
   const std::string why =
-      "the linear pair and its data are not in the paper's text; without noise, two observations in the right direction "
+      "the linear pair and its data are not in the paper's text; without noise, two observations in the right "
+      "direction "
       "show an affine residual's whole slope";
   for (const System* system : kTargets) {
     const std::string target = TargetOf(*system);
@@ -84,10 +83,11 @@ std::vector<Table> AssumptionTables(const Scope& scope, const Results& results) 
 std::vector<Cell> NoCells(const Scope&) { return {}; }
 
 std::vector<Table> SlopeTables(const Scope& scope, const Results&) {
-  Table table{"Slope estimators",
-              "Point mass, N = 100, noiseless data from below the knee, where the residual all but vanishes: the "
-              "estimated factor on the deployed matrix, the largest over the coordinates. A factor below 0.667 is wrong.",
-              {}};
+  Table table{
+      "Slope estimators",
+      "Point mass, N = 100, noiseless data from below the knee, where the residual all but vanishes: the "
+      "estimated factor on the deployed matrix, the largest over the coordinates. A factor below 0.667 is wrong.",
+      {}};
   const System& system = PointMassSystem();
   const Declaration declared{system.deployed, Eigen::VectorXd::Zero(system.num_states())};
   const std::pair<SlopeEstimator, const char*> estimators[] = {{SlopeEstimator::kLacki, "LACKI"},

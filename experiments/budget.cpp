@@ -111,8 +111,7 @@ std::vector<Plot> BudgetPlots(const Scope& scope, const Results& results) {
   return {{"budget",
            "CP-SLS-MPC. Left: the weight that a plan's poorest step has, against the floor below which its radius is "
            "infinite. Right: the medians of the budget's parts; a certificate needs a sum below 1.",
-           900, 400,
-           DataBlock("mass", mass) + DataBlock("parts", parts) + R"(set multiplot layout 1,2
+           900, 400, DataBlock("mass", mass) + DataBlock("parts", parts) + R"(set multiplot layout 1,2
 set key top left
 set xlabel 'observations N'; set ylabel 'effective mass'
 set yrange [0:*]

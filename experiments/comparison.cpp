@@ -91,7 +91,7 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
 }
 
 std::vector<Plot> Plots(const Scope& scope, const Results& results) {
-  static constexpr const char* kColors[] = {"green", "blue",   "sky",   "orange", "'#F0A3C8'",
+  static constexpr const char* kColors[] = {"green",  "blue", "sky",       "orange",   "'#F0A3C8'",
                                             "purple", "grey", "'#333333'", "'#b8b8b8'"};
   std::string data, lines, useless;
   for (std::size_t m = 0; m < Methods().size(); ++m) {
@@ -102,8 +102,8 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
       const Cell cell = With(method, PaperCell(BicycleSystem(), observations, 0, 0));
       recall = OverSeeds(scope, results, cell, Group::kC, Recall).mean.value_or(0);
       // No complete tube, no coverage: such a method says nothing, and is shown at 1.
-      points += DataLine({OverSeeds(scope, results, cell, Group::kB, Coverage).mean.value_or(1),
-                          recall, 0.6 + 0.2 * std::log2(observations / 25.0)});
+      points += DataLine({OverSeeds(scope, results, cell, Group::kB, Coverage).mean.value_or(1), recall,
+                          0.6 + 0.2 * std::log2(observations / 25.0)});
     }
     if (recall == 0) useless += (useless.empty() ? "" : ", ") + method.name;
     const std::string name = std::string(1, 'm').append(std::to_string(m)), color = kColors[m % std::size(kColors)];
@@ -117,15 +117,17 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
            "method; larger marks, more observations. A method without a complete tube stands at coverage 1. Only the "
            "upper right corner is both sound and informative.",
            840, 480,
-           data + "set xrange [-0.03:1.04]; set yrange [-0.04:1.05]\n"
-                  "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
-                  "set key outside right top\nset label 'certify nothing: " + useless +
-               "' at 0.97, 0.04 right font ',11'\n" +
-               lines + "\n"}};
+           data +
+               "set xrange [-0.03:1.04]; set yrange [-0.04:1.05]\n"
+               "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
+               "set key outside right top\nset label 'certify nothing: " +
+               useless + "' at 0.97, 0.04 right font ',11'\n" + lines + "\n"}};
 }
 
 }  // namespace
 
-Experiment Comparison() { return {"methods", "every method: coverage without data, recall with them", Cells, Tables, Plots}; }
+Experiment Comparison() {
+  return {"methods", "every method: coverage without data, recall with them", Cells, Tables, Plots};
+}
 
 }  // namespace forereach::experiments

@@ -39,7 +39,8 @@ std::optional<double> Crossing(const std::vector<double>& at, const std::vector<
 std::vector<Table> DegradationTables(const Scope& scope, const Results& results) {
   Table table{"Nominal degradation",
               "C, noiseless, the largest N. The nominal model is (1 - d) f0, and L grows by d sup |D f0|: at "
-              "d = 1 there is no model, and L is the L_f of the norm ratios. \"Tolerated\": the d at which recall comes down to 0.5.",
+              "d = 1 there is no model, and L is the L_f of the norm ratios. \"Tolerated\": the d at which recall "
+              "comes down to 0.5.",
               {}};
   const std::vector<double> percents = PercentsOf(scope);
   for (const System* system : Systems()) {
@@ -87,7 +88,8 @@ plot 0.5 with lines dt 2 lc rgb grey title 'reference', \
 }  // namespace
 
 Experiment NominalDegradation() {
-  return {"degradation", "recall as the nominal model gets worse", DegradationCells, DegradationTables, DegradationPlots};
+  return {"degradation", "recall as the nominal model gets worse", DegradationCells, DegradationTables,
+          DegradationPlots};
 }
 
 }  // namespace forereach::experiments

@@ -52,10 +52,11 @@ std::vector<Panel> Panels() {
 std::vector<Cell> NoCells(const Scope&) { return {}; }
 
 std::vector<Table> GeometryTables(const Scope&, const Results&) {
-  Table table{"Tube geometry",
-              "One plan a panel, the largest N, seed 0; 1 is yes. In B a plan that global calibration certifies and the "
-              "target spoils, in C one that ForeReach certifies. The paper shows these as pictures.",
-              {}};
+  Table table{
+      "Tube geometry",
+      "One plan a panel, the largest N, seed 0; 1 is yes. In B a plan that global calibration certifies and the "
+      "target spoils, in C one that ForeReach certifies. The paper shows these as pictures.",
+      {}};
   for (const Panel& panel : Panels()) {
     const auto row = [&](const char* what, bool is_so) {
       table.rows.push_back({panel.name() + ": " + what, {}, Exactly(is_so), 0, ""});
@@ -94,9 +95,7 @@ std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
   Plot plot{"geometry",
             "Tubes in position space, metres: left without data near the plan, right with them; above the point mass, "
             "below the bicycle. A tube that leaves the certification domain ends there.",
-            900,
-            760,
-            ""};
+            900, 760, ""};
   const std::vector<Panel> panels = Panels();
   for (const Panel& panel : panels) {
     plot.script += DataBlock(panel.name() + "_ours", Slices(panel.ours));
@@ -106,13 +105,16 @@ std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
     plot.script +=
         DataBlock(panel.name() + "_obstacle", DataLine({circle.center.x(), circle.center.y(), circle.radius}));
   }
-  plot.script += "set multiplot layout 2,2 title ' '\nset size ratio -1\nset offsets 0.3, 0.3, 0.6, 0.6\n"
-                 "set style fill transparent solid 0.25\n";
+  plot.script +=
+      "set multiplot layout 2,2 title ' '\nset size ratio -1\nset offsets 0.3, 0.3, 0.6, 0.6\n"
+      "set style fill transparent solid 0.25\n";
   for (const Panel& panel : panels) {
     const std::string name = std::string(1, '$').append(panel.name());
     plot.script += "set title '" + std::string(&panel.system == &PointMassSystem() ? "Point mass" : "Bicycle") +
                    (panel.group == Group::kB ? ", no data near the plan" : ", data along the plan") + "'\n";
-    plot.script += &panel == &panels.front() ? "set key at screen 0.5, 0.985 center top horizontal maxrows 1 samplen 2\n" : "unset key\n";
+    plot.script += &panel == &panels.front()
+                       ? "set key at screen 0.5, 0.985 center top horizontal maxrows 1 samplen 2\n"
+                       : "unset key\n";
     plot.script += "plot " + name + "_ours with filledcurves closed lc rgb green title 'ForeReach', " + name +
                    "_ours with lines lw 0.7 lc rgb green notitle, " + name +
                    "_global with lines lw 1 lc rgb blue title 'global calibration', " + name +

@@ -23,7 +23,9 @@ struct Scene {
   const System& system = BicycleSystem();
   Eigen::MatrixXd controls = Eigen::Vector2d(0.2, 0.02).replicate(1, system.horizon);
   SmoothResidual residual = Describe(HeadingSaturation{0.1, 2.5}, system.domain.Ranges());
-  Rollout rollout{*system.model, residual, {controls.data(), 2, system.horizon, 2},
+  Rollout rollout{*system.model,
+                  residual,
+                  {controls.data(), 2, system.horizon, 2},
                   (Eigen::VectorXd(6) << 0, 0, 0, 12, 0, 0.3).finished()};
   Eigen::MatrixXd data = MakeData(system, Layout::kCorridor, 0, 400, 0).z;
 
@@ -31,10 +33,8 @@ struct Scene {
   [[nodiscard]] std::vector<WidthBound> Scan(double slack) const {
     const SmoothBounds& used = residual.bounds;
     const double times = 1 + slack;
-    return ScanWidthBounds({rollout,
-                            {times * used.value, times * used.slope, times * used.curvature},
-                            data,
-                            system.projection()});
+    return ScanWidthBounds(
+        {rollout, {times * used.value, times * used.slope, times * used.curvature}, data, system.projection()});
   }
 };
 
@@ -43,13 +43,14 @@ const WidthBound& Widest(const std::vector<WidthBound>& bounds) {
 }
 
 Table PairTable(const Scene& scene) {
-  Table table{"Information limits, Theorem 1",
-              "Two systems that agree on all 400 observations, r0 +- a phi e_k with a bump at tau = 10 in x, simulated: "
-              "half their distance at tau + 1 is a for every a, so no tube of finite width is sound for both.",
-              {}};
+  Table table{
+      "Information limits, Theorem 1",
+      "Two systems that agree on all 400 observations, r0 +- a phi e_k with a bump at tau = 10 in x, simulated: "
+      "half their distance at tau + 1 is a for every a, so no tube of finite width is sound for both.",
+      {}};
   const Eigen::MatrixXd projection = scene.system.projection();
-  const WidthBound first = BoundWidth(
-      {scene.rollout, TwiceTheBounds(scene.residual.bounds), scene.data, projection}, 10, 0);
+  const WidthBound first =
+      BoundWidth({scene.rollout, TwiceTheBounds(scene.residual.bounds), scene.data, projection}, 10, 0);
   const Bump bump{scene.rollout.Queries().col(10), first.bump_radius};
   for (const double amplitude : {0.1, 10.0, 1000.0}) {
     const Pair pair = RollOutPair(scene.rollout, bump, 0, amplitude);
@@ -67,7 +68,8 @@ double SpeedFor(double half_width, double twice_remainder) { return std::sqrt(2 
 Table WidthTable(const Scene& scene) {
   Table table{
       "Information limits, Theorem 2",
-      "Bicycle, a plan in the middle of the corridor, v = 12 m/s, 400 observations, r0 the target's residual. The class "
+      "Bicycle, a plan in the middle of the corridor, v = 12 m/s, 400 observations, r0 the target's residual. The "
+      "class "
       "(R_max, H_1, H_2) is not in the paper's text; ours is twice what r0 uses. Where a_lin is least, the bound is "
       "gain^2 / (2 (h_0 + H_2)): at tau = 10, k = 2 all of it is dt v and curvature. H_2 exceeds sup |D^2 r0|, which "
       "the domain's largest speed makes large; the last two rows say which speed of the plan the paper's figure takes "
@@ -163,12 +165,13 @@ Inner InnerBounds(const System& system, int observations, int seed, int plans) {
 }
 
 Table InnerTable(const Scope& scope) {
-  Table table{"Inner bound",
-              "C, noiseless, a few plans a seed, complete tubes. Rollouts of the lower, upper and mixed McShane extensions "
-              "of the data from the center and corners of X0: systems that data and declaration allow, so every sound "
-              "tube contains them. Share: half the spread of their positions at T over the half-width of our tube; 1 "
-              "would mean that no sound tube is narrower.",
-              {}};
+  Table table{
+      "Inner bound",
+      "C, noiseless, a few plans a seed, complete tubes. Rollouts of the lower, upper and mixed McShane extensions "
+      "of the data from the center and corners of X0: systems that data and declaration allow, so every sound "
+      "tube contains them. Share: half the spread of their positions at T over the half-width of our tube; 1 "
+      "would mean that no sound tube is narrower.",
+      {}};
   for (const System* system : Systems())
     for (const int observations : scope.SizesOf(*system)) {
       std::vector<std::optional<double>> shares;
@@ -181,11 +184,8 @@ Table InnerTable(const Scope& scope) {
       }
       const std::string where = system->name + ", N = " + std::to_string(observations) + ": ";
       table.rows.push_back({where + "share", {}, EstimateOf(shares), 3, ""});
-      table.rows.push_back({where + "tubes that miss an extremal state, of " + std::to_string(tubes),
-                            {},
-                            Exactly(escapes),
-                            0,
-                            ""});
+      table.rows.push_back(
+          {where + "tubes that miss an extremal state, of " + std::to_string(tubes), {}, Exactly(escapes), 0, ""});
     }
   return table;
 }

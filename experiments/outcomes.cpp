@@ -87,15 +87,13 @@ std::vector<Plot> RecallPlots(const Scope& scope, const Results& results) {
   const System& bicycle = BicycleSystem();
   std::string lines;
   for (const int observations : scope.SizesOf(bicycle)) {
-    const Estimate ours =
-        OverSeeds(scope, results, PaperCell(bicycle, observations, 0, 0), Group::kC, Recall);
+    const Estimate ours = OverSeeds(scope, results, PaperCell(bicycle, observations, 0, 0), Group::kC, Recall);
     const PaperValue paper = Paper("bicycle.C.recall." + std::to_string(observations));
-    lines += DataLine({static_cast<double>(observations), ours.mean.value_or(NAN), ours.deviation, paper.value,
-                       paper.deviation});
+    lines += DataLine(
+        {static_cast<double>(observations), ours.mean.value_or(NAN), ours.deviation, paper.value, paper.deviation});
   }
   return {{"recall", "Recall of group C by the number of observations, mean and one standard deviation over the seeds.",
-           720, 440,
-           DataBlock("recall", lines) + R"(set logscale x 2
+           720, 440, DataBlock("recall", lines) + R"(set logscale x 2
 set xtics (25, 50, 100, 150, 200, 400)
 set xrange [22:450]; set yrange [0:1.05]
 set xlabel 'observations N'; set ylabel 'certified recall, bicycle C'
@@ -188,10 +186,11 @@ std::vector<Plot> StepPlots(const Scope& scope, const Results& results) {
               " using 2:xtic(1) lc rgb blue title 'B: leaves the domain (D)', '' using 3 lc rgb orange title "
               "'B: may touch the obstacle (S)', '' using 4 lc rgb green title 'C: may touch the obstacle (S)'\n";
   }
-  plot.script += "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
-                 "set style fill solid 0.9 noborder\nset yrange [0:0.5]\nset xlabel 'step'\n"
-                 "set ylabel 'part of the plans'\nset key top left\n" +
-                 panels + "unset multiplot\n";
+  plot.script +=
+      "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
+      "set style fill solid 0.9 noborder\nset yrange [0:0.5]\nset xlabel 'step'\n"
+      "set ylabel 'part of the plans'\nset key top left\n" +
+      panels + "unset multiplot\n";
   return {plot};
 }
 

@@ -56,8 +56,7 @@ void RunExperiments(const RunOptions& options, std::ostream& out) {
   const std::vector<Cell> cells = CellsOf(experiments, options.scope);
   const Results results(cells, RunAll(cells, directory, options.threads));
 
-  const std::filesystem::path report_file =
-      options.report.empty() ? directory.path() / "report.md" : options.report;
+  const std::filesystem::path report_file = options.report.empty() ? directory.path() / "report.md" : options.report;
   const std::filesystem::path pictures = report_file.parent_path() / "figures";
   std::vector<Table> tables;
   std::string report = Preamble(options);

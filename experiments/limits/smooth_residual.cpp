@@ -80,7 +80,8 @@ SmoothBounds BoundSmoothness(const ResidualSlopes& slopes, std::span<const doubl
     std::vector<Cell> open;
     for (const Cell& cell : cells) {
       Cell corner = cell;
-      for (const int l : active) corner[static_cast<std::size_t>(l)] = Interval(cell[static_cast<std::size_t>(l)].upper);
+      for (const int l : active)
+        corner[static_cast<std::size_t>(l)] = Interval(cell[static_cast<std::size_t>(l)].upper);
       seen = Largest(seen, BoundCell(slopes, corner, active));
     }
     for (const Cell& cell : cells) {

@@ -155,11 +155,10 @@ CpSlsBudget CpSls::Budget(const QuerySet& query) const {
 }
 
 std::span<const Method> CpSlsMethods() {
-  static const std::array<Method, 4> methods{
-      {{"CP-SLS-MPC equations", Make<Covariance::kLocal>},
-       {"CP-SLS-MPC, local diagonal", Make<Covariance::kLocalDiagonal>},
-       {"CP-SLS-MPC, global", Make<Covariance::kGlobal>},
-       {"CP-SLS-MPC, global diagonal", Make<Covariance::kGlobalDiagonal>}}};
+  static const std::array<Method, 4> methods{{{"CP-SLS-MPC equations", Make<Covariance::kLocal>},
+                                              {"CP-SLS-MPC, local diagonal", Make<Covariance::kLocalDiagonal>},
+                                              {"CP-SLS-MPC, global", Make<Covariance::kGlobal>},
+                                              {"CP-SLS-MPC, global diagonal", Make<Covariance::kGlobalDiagonal>}}};
   return methods;
 }
 

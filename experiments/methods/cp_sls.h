@@ -42,7 +42,7 @@ struct CpSlsOptions {
 /** sigma_k of one step, or the sum of several. */
 struct CpSlsBudget {
   double alpha = 0, drift = 0, tube = 0;
-  double mass = 0;  ///< sum_i w_i at the center; of a sum, the last step's
+  double mass = 0;       ///< sum_i w_i at the center; of a sum, the last step's
   bool starved = false;  ///< A step had no finite radius.
 
   /** What the certificate loses; infinite if starved. It says something only below 1. */

@@ -123,7 +123,8 @@ TEST_F(RunTest, LimitsAndAssumptionsHoldInAQuickRun) {
   EXPECT_THAT(out.str(), HasSubstr("| of these with a positive bound | 64 | Short-horizon lower-bound scan | 64 |"));
   EXPECT_THAT(out.str(), HasSubstr("| bicycle, N = 400: tubes that miss an extremal state, of 4 |  |  | 0 |"));
   for (const char* system : {"bicycle", "point_mass"})
-    EXPECT_THAT(out.str(), HasSubstr(std::string("| ") + system + ": false certificates, all groups | 0 | "
+    EXPECT_THAT(out.str(), HasSubstr(std::string("| ") + system +
+                                     ": false certificates, all groups | 0 | "
                                      "Experiments, text | 0 | 0 | same |"));
   EXPECT_THAT(out.str(), HasSubstr("| Affine residual, linear target: F | 0.000 | Affine control example | 0.000 "));
   EXPECT_THAT(out.str(), HasSubstr("| Affine residual, linear target: C coverage | 1.000 | Affine control example | "
