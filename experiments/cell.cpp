@@ -8,6 +8,7 @@
 #include "certifier/residual/observations.h"
 #include "experiments/chunks/support.h"
 #include "experiments/evaluate.h"
+#include "experiments/methods/cp_sls.h"
 
 namespace forereach::experiments {
 namespace {
@@ -21,11 +22,34 @@ char LetterOf(Outcome outcome) {
   }
 }
 
-void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollouts, Tally& tally) {
+// The sum over the steps whose query is known, the one that D ended the tube at included.
+CpSlsBudget CountBudget(const CpSls& method, const Answer& answer, const Scenario& scenario, PlanBudgets& budgets) {
+  const auto inputs = static_cast<std::size_t>(scenario.controls.rows());
+  const int known = std::min(answer.length + 1, static_cast<int>(scenario.controls.cols()));
+  CpSlsBudget sum;
+  double least_mass = kInfinity;
+  for (int t = 0; t < known; ++t) {
+    const auto step = static_cast<std::size_t>(t);
+    const QuerySet query{answer.slices[step],
+                         {scenario.controls.col(t).data(), inputs},
+                         {answer.steps[step].half_width.data(), static_cast<std::size_t>(answer.slices[step].dim())}};
+    const CpSlsBudget budget = method.Budget(query);
+    sum += budget;
+    least_mass = std::min(least_mass, budget.mass);
+  }
+  budgets.drift.push_back(sum.starved ? -1 : sum.drift);
+  budgets.tube.push_back(sum.starved ? -1 : sum.tube);
+  budgets.total.push_back(sum.starved ? -1 : sum.total());
+  budgets.least_mass.push_back(least_mass);
+  budgets.complete.push_back(answer.IsComplete());
+  return sum;
+}
+
+void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollouts, bool is_vacuous, Tally& tally) {
   const bool safe = rollouts.StayClearOf(scenario.obstacle);
   ++tally.plans;
   tally.safe += safe;
-  tally.answers += LetterOf(answer.outcome);
+  tally.answers += is_vacuous && answer.outcome == Outcome::kCertified ? 'V' : LetterOf(answer.outcome);
   tally.areas.push_back(answer.IsComplete() ? ProjectedArea(answer.slices.back()) : -1);
   if (answer.outcome == Outcome::kFalsified) {
     ++tally.falsified;
@@ -38,6 +62,10 @@ void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollo
   const auto step = static_cast<std::size_t>(std::max(answer.step, 0));
   switch (answer.outcome) {
     case Outcome::kCertified:
+      if (is_vacuous) {
+        ++tally.vacuous;
+        return;
+      }
       ++tally.certified;
       tally.certified_safe += safe;
       return;
@@ -72,6 +100,7 @@ CellResult RunCell(const Cell& cell, const Effort& effort) {
                                 Eigen::VectorXd::Constant(system.num_states(), NoiseBound(cell.noise))};
   const auto residual =
       cell.method.make({*system.model, system.domain, declaration, data, static_cast<std::uint64_t>(cell.seed)});
+  const auto* const budgeted = dynamic_cast<const CpSls*>(residual.get());
   const bool falsified = cell.method.name == Methods().front().name &&
                          FindViolation(declaration, Observe(*system.model, data)).has_value();
   const Evaluator evaluator(system, *residual, cell.zonotope_order);
@@ -90,7 +119,8 @@ CellResult RunCell(const Cell& cell, const Effort& effort) {
         answer.outcome = Outcome::kFalsified;
       else
         evaluator.Certify(scenario, answer);
-      Count(answer, scenario, rollouts, tally);
+      const bool is_vacuous = budgeted && CountBudget(*budgeted, answer, scenario, tally.budgets).IsVacuous();
+      Count(answer, scenario, rollouts, is_vacuous, tally);
       if (system.support_scale.size() > 0) tally.distances.push_back(DistanceToData(system, scenario, data));
     }
   }

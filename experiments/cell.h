@@ -40,22 +40,31 @@ struct Effort {
   int scenarios, rollouts;  ///< At most so many as the system's own
 };
 
+/** CP-SLS-MPC's budget summed over the steps of each plan in turn whose query is known. */
+struct PlanBudgets {
+  std::vector<double> drift, tube, total;  ///< -1 for all three where a step is starved
+  std::vector<double> least_mass;          ///< min_k sum_i w_i
+  std::vector<int> complete;               ///< 1 where all steps are in the sum
+};
+
 /** What came of the plans of one group. */
 struct Tally {
   char group = 'A';
   int plans = 0;
   int safe = 0;                                              ///< Target-safe: no rollout touches the obstacle
-  int certified = 0, falsified = 0, domain = 0, safety = 0;  ///< Add up to plans
+  int certified = 0, falsified = 0, domain = 0, safety = 0;  ///< Add up to plans, with vacuous
+  int vacuous = 0;  ///< Nothing else is in the way, but the method's own budget leaves no probability: CP-SLS-MPC
   int certified_safe = 0;
   int covered = 0;         ///< Of the complete tubes, certified + safety
   int prefix_covered = 0;  ///< Of the tubes that D ended
   int undecided = 0;       ///< Tubes that count as not covered because membership could not be decided
   std::vector<int> domain_steps, safety_steps;  ///< By step, 0..T
   std::vector<double> areas;  ///< Of P X_T of each plan in turn, m^2; -1 where the tube is not complete
-  std::string answers;            ///< Of each plan in turn: C for a certificate, D, S or F
+  std::string answers;            ///< Of each plan in turn: C for a certificate, D, S, F, or V for a vacuous budget
   std::vector<double> distances;  ///< d of each plan in turn (chunks/support.h), where the system has a scale for it
+  PlanBudgets budgets;        ///< CP-SLS-MPC's
 
-  [[nodiscard]] int complete() const { return certified + safety; }
+  [[nodiscard]] int complete() const { return certified + safety + vacuous; }
   [[nodiscard]] int false_certificates() const { return certified - certified_safe; }
 };
 

@@ -29,11 +29,13 @@ const CellResult& Results::Of(const Cell& cell) const {
 }
 
 std::span<const Experiment> Experiments() {
-  static const std::vector<Experiment> all{MainResults(),    RecallByN(),        Comparison(),
-                                           DomainExits(),    FirstAbstentions(), BoxAgainstZonotope(),
-                                           ScalarEnvelope(), NoiseSweep(),       IncorrectDeclarations(),
-                                           ParameterBoxes(), NormRatios(),       CertifiedDeclarations(),
-                                           ActionChunks()};
+  static const std::vector<Experiment> all{MainResults(),       RecallByN(),          Comparison(),
+                                           CertificateBudget(), ActionChunks(),       DomainExits(),
+                                           FirstAbstentions(),  TubeGeometry(),       BoxAgainstZonotope(),
+                                           ScalarEnvelope(),    NoiseSweep(),         NominalDegradation(),
+                                           IncorrectDeclarations(), EstimatedSlopes(), AssumptionFamilies(),
+                                           ParameterBoxes(),    NormRatios(),         InformationLimits(),
+                                           CertifiedDeclarations()};
   return all;
 }
 
@@ -44,6 +46,8 @@ std::optional<double> CertificateRate(const Tally& tally) { return Ratio(tally.c
 std::optional<double> FalseSafeRate(const Tally& tally) { return Ratio(tally.false_certificates(), tally.certified); }
 std::optional<double> DomainRate(const Tally& tally) { return Ratio(tally.domain, tally.plans); }
 std::optional<double> SafetyRate(const Tally& tally) { return Ratio(tally.safety, tally.plans); }
+
+std::optional<double> FalsifiedRate(const Tally& tally) { return Ratio(tally.falsified, tally.plans); }
 
 Estimate OverSeeds(const Scope& scope, const Results& results, Cell cell, Group group, Statistic statistic) {
   std::vector<std::optional<double>> values;

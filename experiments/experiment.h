@@ -1,4 +1,4 @@
-/** An experiment of the paper: which cells it needs, and the tables that come of them. */
+/** An experiment of the paper: which cells it needs, and the tables and pictures that come of them. */
 #pragma once
 
 #include <functional>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "experiments/cell.h"
+#include "experiments/plot.h"
 #include "experiments/table.h"
 
 namespace forereach::experiments {
@@ -40,6 +41,7 @@ struct Experiment {
   std::string name, about;  ///< A word for the command line, a line for its help
   std::function<std::vector<Cell>(const Scope&)> cells;
   std::function<std::vector<Table>(const Scope&, const Results&)> tables;
+  std::function<std::vector<Plot>(const Scope&, const Results&)> plots = {};  ///< May be empty
 };
 
 /** All of them, in the order of the report. */
@@ -55,6 +57,7 @@ using Statistic = std::optional<double> (*)(const Tally&);
 [[nodiscard]] std::optional<double> FalseSafeRate(const Tally& tally);    ///< certified and not safe / certified
 [[nodiscard]] std::optional<double> DomainRate(const Tally& tally);       ///< D / plans
 [[nodiscard]] std::optional<double> SafetyRate(const Tally& tally);       ///< S / plans
+[[nodiscard]] std::optional<double> FalsifiedRate(const Tally& tally);    ///< F / plans
 ///@}
 
 /** Over the seeds of a scope, whatever the cell's own. */
@@ -73,14 +76,20 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment MainResults();
 [[nodiscard]] Experiment RecallByN();
 [[nodiscard]] Experiment Comparison();
+[[nodiscard]] Experiment CertificateBudget();
 [[nodiscard]] Experiment DomainExits();
 [[nodiscard]] Experiment FirstAbstentions();
+[[nodiscard]] Experiment TubeGeometry();
 [[nodiscard]] Experiment BoxAgainstZonotope();
 [[nodiscard]] Experiment ScalarEnvelope();
 [[nodiscard]] Experiment NoiseSweep();
 [[nodiscard]] Experiment IncorrectDeclarations();
 [[nodiscard]] Experiment ParameterBoxes();
 [[nodiscard]] Experiment NormRatios();
+[[nodiscard]] Experiment NominalDegradation();
+[[nodiscard]] Experiment InformationLimits();
+[[nodiscard]] Experiment AssumptionFamilies();
+[[nodiscard]] Experiment EstimatedSlopes();
 [[nodiscard]] Experiment CertifiedDeclarations();
 [[nodiscard]] Experiment ActionChunks();
 ///@}

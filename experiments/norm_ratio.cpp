@@ -6,10 +6,10 @@
 
 namespace forereach::experiments {
 
-double NormRatio(const System& system, const Eigen::MatrixXd& lipschitz) {
+Eigen::MatrixXd LargestSlopes(const System& system) {
   constexpr int kPoints = 5;
   const std::vector<Interval> ranges = system.domain.Ranges();
-  Eigen::MatrixXd largest = Eigen::MatrixXd::Zero(lipschitz.rows(), lipschitz.cols());
+  Eigen::MatrixXd largest = Eigen::MatrixXd::Zero(system.deployed.rows(), system.deployed.cols());
   std::vector<int> digits(ranges.size(), 0);
   std::vector<double> z(digits.size());
   Linearization linearization;
@@ -26,7 +26,11 @@ double NormRatio(const System& system, const Eigen::MatrixXd& lipschitz) {
     std::fill(digits.begin(), next, 0);
     if (!done) ++*next;
   }
-  return (largest + lipschitz).norm() / lipschitz.norm();
+  return largest;
+}
+
+double NormRatio(const System& system, const Eigen::MatrixXd& lipschitz) {
+  return (LargestSlopes(system) + lipschitz).norm() / lipschitz.norm();
 }
 
 }  // namespace forereach::experiments

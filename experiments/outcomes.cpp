@@ -1,4 +1,5 @@
 // What ForeReach answers: the main table, recall by N, where plans leave the domain, where certification first stops.
+#include <cmath>
 #include <string>
 
 #include "experiments/experiment.h"
@@ -82,6 +83,28 @@ std::vector<Table> RecallTables(const Scope& scope, const Results& results) {
   return {quiet, noisy};
 }
 
+std::vector<Plot> RecallPlots(const Scope& scope, const Results& results) {
+  const System& bicycle = BicycleSystem();
+  std::string lines;
+  for (const int observations : scope.SizesOf(bicycle)) {
+    const Estimate ours = OverSeeds(scope, results, PaperCell(bicycle, observations, 0, 0), Group::kC, Recall);
+    const PaperValue paper = Paper("bicycle.C.recall." + std::to_string(observations));
+    lines += DataLine(
+        {static_cast<double>(observations), ours.mean.value_or(NAN), ours.deviation, paper.value, paper.deviation});
+  }
+  return {{"recall", "Recall of group C by the number of observations, mean and one standard deviation over the seeds.",
+           720, 440, DataBlock("recall", lines) + R"(set logscale x 2
+set xtics (25, 50, 100, 150, 200, 400)
+set xrange [22:450]; set yrange [0:1.05]
+set xlabel 'observations N'; set ylabel 'certified recall, bicycle C'
+set key bottom right
+plot $recall using 1:($4-$5):($4+$5) with filledcurves fc rgb '#cfcfcf' title 'paper, one deviation', \
+  '' using 1:4 with lines lw 2 dt 2 lc rgb grey title 'paper', \
+  '' using 1:2 with lines lw 2 lc rgb green notitle, \
+  '' using 1:2:3 with yerrorbars pt 7 ps 0.7 lw 1.6 lc rgb green title 'ForeReach, here'
+)"}};
+}
+
 // ---- exits
 
 std::vector<Table> ExitTables(const Scope& scope, const Results& results) {
@@ -140,6 +163,37 @@ std::vector<Table> StepTables(const Scope& scope, const Results& results) {
   return tables;
 }
 
+constexpr std::size_t kFirstStepShown = 5;  // Nothing happens before.
+
+std::vector<Plot> StepPlots(const Scope& scope, const Results& results) {
+  Plot plot{"steps", "The step at which a plan of the bicycle first abstains, noiseless, as a part of its group.", 900,
+            400, ""};
+  std::string panels;
+  for (const int observations : {BicycleSystem().sample_sizes.front(), BicycleSystem().sample_sizes.back()}) {
+    std::string lines;
+    for (std::size_t t = kFirstStepShown; t <= static_cast<std::size_t>(BicycleSystem().horizon); ++t) {
+      double exits = 0, unsafe = 0, unsafe_along = 0, plans = 0;
+      Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
+      for (; cell.seed < scope.seeds; ++cell.seed) {
+        const Tally &b = results.Of(cell, Group::kB), &c = results.Of(cell, Group::kC);
+        exits += b.domain_steps[t], unsafe += b.safety_steps[t], unsafe_along += c.safety_steps[t], plans += b.plans;
+      }
+      lines += DataLine({static_cast<double>(t), exits / plans, unsafe / plans, unsafe_along / plans});
+    }
+    const std::string n = std::to_string(observations);
+    plot.script += DataBlock("steps" + n, lines);
+    panels += "set title 'N = " + n + "'\nplot $steps" + n +
+              " using 2:xtic(1) lc rgb blue title 'B: leaves the domain (D)', '' using 3 lc rgb orange title "
+              "'B: may touch the obstacle (S)', '' using 4 lc rgb green title 'C: may touch the obstacle (S)'\n";
+  }
+  plot.script +=
+      "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
+      "set style fill solid 0.9 noborder\nset yrange [0:0.5]\nset xlabel 'step'\n"
+      "set ylabel 'part of the plans'\nset key top left\n" +
+      panels + "unset multiplot\n";
+  return {plot};
+}
+
 std::vector<Cell> StepCells(const Scope& scope) {
   std::vector<Cell> cells;
   for (const int observations : {BicycleSystem().sample_sizes.front(), BicycleSystem().sample_sizes.back()})
@@ -152,7 +206,7 @@ std::vector<Cell> StepCells(const Scope& scope) {
 Experiment MainResults() { return {"main", "outcomes of both systems, Table 1", MainCells, MainTables}; }
 
 Experiment RecallByN() {
-  return {"recall", "the bicycle's recall and coverage by N, both channels", RecallCells, RecallTables};
+  return {"recall", "the bicycle's recall and coverage by N, both channels", RecallCells, RecallTables, RecallPlots};
 }
 
 Experiment DomainExits() {
@@ -160,7 +214,7 @@ Experiment DomainExits() {
 }
 
 Experiment FirstAbstentions() {
-  return {"steps", "the step at which certification first stops", StepCells, StepTables};
+  return {"steps", "the step at which certification first stops", StepCells, StepTables, StepPlots};
 }
 
 }  // namespace forereach::experiments

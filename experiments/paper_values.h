@@ -12,7 +12,11 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kBoxes = "Table, Parameter boxes", kIncorrect = "Incorrect Lipschitz declarations",
                                   kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol",
                                   kChunks = "Table, Action-chunk certification",
-                                  kChunkText = "Action-chunk protocol";
+                                  kChunkText = "Action-chunk protocol",
+                                  kDegradation = "Nominal-model degradation",
+                                  kLimits = "Short-horizon lower-bound scan",
+                                  kAssumptions = "Affine control example", kEstimators = "Slope-estimator declarations",
+                                  kBudget = "Table, CP-SLS-MPC budget by N";
 
 inline constexpr PaperValue kPaperValues[] = {
     {"point_mass.B.coverage", 1.000, 3, kMain},
@@ -86,6 +90,23 @@ inline constexpr PaperValue kPaperValues[] = {
     {"point_mass.Global calibration.B.coverage", 0, 3, kText},
     {"point_mass.Global calibration.B.false_safe", 0.5, 3, kText},
 
+    {"budget.25.starved", 1, 3, kBudget},
+    {"budget.50.starved", 1, 3, kBudget},
+    {"budget.100.starved", 1, 3, kBudget},
+    {"budget.150.starved", 0.147, 3, kBudget},
+    {"budget.200.starved", 0, 3, kBudget},
+    {"budget.400.starved", 0, 3, kBudget},
+    {"budget.150.drift", 15.11, 2, kBudget},
+    {"budget.150.tube", 15.15, 2, kBudget},
+    {"budget.150.total", 30.38, 2, kBudget},
+    {"budget.200.drift", 14.84, 2, kBudget},
+    {"budget.200.tube", 15.88, 2, kBudget},
+    {"budget.200.total", 31.08, 2, kBudget},
+    {"budget.400.drift", 14.78, 2, kBudget},
+    {"budget.400.tube", 15.76, 2, kBudget},
+    {"budget.400.total", 30.55, 2, kBudget},
+    {"budget.nonvacuous", 0, 0, kBudget},
+
     {"exits.queries", 186000, 0, kDomainCheck},
     {"exits.domain", 39807, 0, kDomainCheck},
     {"exits.fraction", 39807.0 / 186000, 3, kDomainCheck},
@@ -107,6 +128,23 @@ inline constexpr PaperValue kPaperValues[] = {
 
     {"norms.point_mass", 18.481, 3, kNorms},
     {"norms.bicycle", 11.368, 3, kNorms},
+
+    {"degradation.point_mass", 16.638, 3, kDegradation},
+    {"degradation.bicycle", 1.386, 3, kDegradation},
+
+    {"width.pairs", 64, 0, kLimits},
+    {"width.positive", 64, 0, kLimits},
+    {"width.tau", 10, 0, kLimits},
+    {"width.k", 2, 0, kLimits},
+    {"width.largest", 0.039228, 6, kLimits},
+
+    {"affine.linear.refuted", 0, 3, kAssumptions},
+    {"affine.linear.B.coverage", 1, 3, kAssumptions},
+    {"affine.linear.C.coverage", 1, 3, kAssumptions},
+    {"affine.knee.refuted", 1, 3, kAssumptions},
+    {"band.linear", 0.092, 3, kAssumptions},
+    {"band.knee", 0.850, 3, kAssumptions},
+    {"slopes", 0, 3, kEstimators},
 
     {"boxes.5.slack", 1.177, 3, kBoxes},
     {"boxes.10.slack", 1.606, 3, kBoxes},

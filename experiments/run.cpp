@@ -56,6 +56,8 @@ void RunExperiments(const RunOptions& options, std::ostream& out) {
   const std::vector<Cell> cells = CellsOf(experiments, options.scope);
   const Results results(cells, RunAll(cells, directory, options.threads));
 
+  const std::filesystem::path report_file = options.report.empty() ? directory.path() / "report.md" : options.report;
+  const std::filesystem::path pictures = report_file.parent_path() / "figures";
   std::vector<Table> tables;
   std::string report = Preamble(options);
   for (const Experiment* experiment : experiments) {
@@ -69,9 +71,13 @@ void RunExperiments(const RunOptions& options, std::ostream& out) {
       report += text;
       tables.push_back(table);
     }
+    if (!experiment->plots) continue;
+    for (const Plot& plot : experiment->plots(options.scope, results))
+      if (Draw(plot, directory.path() / "plots", pictures))
+        report += "\n![" + plot.caption + "](figures/" + plot.name + ".svg)\n\n" + plot.caption + "\n";
   }
   WriteFile(directory.path() / "tables.csv", ToCsv(tables));
-  WriteFile(options.report.empty() ? directory.path() / "report.md" : options.report, report);
+  WriteFile(report_file, report);
 }
 
 }  // namespace forereach::experiments

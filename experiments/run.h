@@ -24,6 +24,7 @@ struct RunOptions {
     DIR/NAME.csv    of each experiment with cells: a line for each cell and group
     DIR/tables.csv  all tables
     DIR/report.md   the same for people; also printed to `out`
+    DIR/plots/NAME.gp  the pictures' scripts; the pictures are in figures/ beside the report, which links them
 The CSV files are the same for any number of threads.
 @throws std::invalid_argument for an unknown name, std::runtime_error as RunDirectory does. */
 void RunExperiments(const RunOptions& options, std::ostream& out);

@@ -34,6 +34,7 @@ void VisitCounts(Tally& tally, const Visit& visit) {
   visit("falsified", tally.falsified);
   visit("domain", tally.domain);
   visit("safety", tally.safety);
+  visit("vacuous", tally.vacuous);
   visit("covered", tally.covered);
   visit("prefix_covered", tally.prefix_covered);
   visit("undecided", tally.undecided);
@@ -42,6 +43,11 @@ void VisitCounts(Tally& tally, const Visit& visit) {
   visit("areas", tally.areas);
   visit("answers", tally.answers);
   visit("distances", tally.distances);
+  visit("budget_drift", tally.budgets.drift);
+  visit("budget_tube", tally.budgets.tube);
+  visit("budget_total", tally.budgets.total);
+  visit("budget_least_mass", tally.budgets.least_mass);
+  visit("budget_complete", tally.budgets.complete);
 }
 
 Json ToJson(const Cell& cell, const CellResult& result) {
@@ -147,7 +153,7 @@ std::vector<CellResult> RunAll(const std::vector<Cell>& cells, const RunDirector
 std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>& results) {
   std::string text =
       "system,method,declaration,observations,noise,order,layout,seed,group,plans,safe,certified,certified_safe,"
-      "false_certificates,falsified,domain,safety,covered,prefix_covered,undecided,domain_steps,safety_steps\n";
+      "false_certificates,falsified,domain,safety,vacuous,covered,prefix_covered,undecided,domain_steps,safety_steps\n";
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell& cell = cells[i];
     for (const Tally& tally : results[i]) {
@@ -156,7 +162,7 @@ std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>&
               "," + NameOf(cell.layout) + "," + std::to_string(cell.seed) + "," + tally.group;
       for (const int count :
            {tally.plans, tally.safe, tally.certified, tally.certified_safe, tally.false_certificates(), tally.falsified,
-            tally.domain, tally.safety, tally.covered, tally.prefix_covered, tally.undecided})
+            tally.domain, tally.safety, tally.vacuous, tally.covered, tally.prefix_covered, tally.undecided})
         text.append(1, ',').append(std::to_string(count));
       text.append(1, ',').append(StepList(tally.domain_steps));
       text.append(1, ',').append(StepList(tally.safety_steps)).append(1, '\n');

@@ -81,7 +81,8 @@ Scenario MakeScenario(const System& system, Group group, int seed, int index) {
   if (&system == &ChunkSystem()) return MakeChunkScenario(group, seed, index);
   Random random{kForScenario, static_cast<std::uint64_t>(system.num_states()), static_cast<std::uint64_t>(group),
                 static_cast<std::uint64_t>(seed), static_cast<std::uint64_t>(index)};
-  const Start start = &system == &BicycleSystem() ? BicycleStart(group, random) : PointMassStart(group, random);
+  const Start start = system.num_states() == BicycleSystem().num_states() ? BicycleStart(group, random)
+                                                                                : PointMassStart(group, random);
   const Eigen::MatrixXd controls = start.control.replicate(1, system.horizon);
   const int k = random.Integer(system.horizon - 3, system.horizon);
   const double aside = index % 2 == 0

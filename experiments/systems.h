@@ -4,6 +4,7 @@ Model, residual, step, horizon and the deployed declaration are the paper's. Dom
 of X0 are not in its text; they are ours. */
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -33,9 +34,9 @@ struct System {
   Eigen::VectorXd support_scale;       ///< Of distances to observations (chunks/support.h); none: not measured
 
   /** f*(z), in extended precision: for observations, which are rounded once. */
-  void (*target)(std::span<const long double> z, std::span<long double> next);
+  std::function<void(std::span<const long double> z, std::span<long double> next)> target;
   /** r*(z) and f*(z) in plain arithmetic: for rollouts. */
-  void (*step)(std::span<const double> z, std::span<double> residual, std::span<double> next);
+  std::function<void(std::span<const double> z, std::span<double> residual, std::span<double> next)> step;
 
   [[nodiscard]] int num_states() const { return model->num_states(); }
   [[nodiscard]] int num_inputs() const { return model->num_inputs(); }

@@ -49,6 +49,11 @@ std::string Quoted(const std::string& text) {
 
 }  // namespace
 
+std::optional<PaperValue> PaperOrNone(std::string_view key) {
+  const auto found = std::ranges::find(kPaperValues, key, &PaperValue::key);
+  return found == std::end(kPaperValues) ? std::nullopt : std::optional(*found);
+}
+
 const PaperValue& Paper(std::string_view key) {
   const auto found = std::ranges::find(kPaperValues, key, &PaperValue::key);
   if (found == std::end(kPaperValues)) throw std::invalid_argument("paper: no value " + std::string(key));
@@ -69,7 +74,7 @@ Estimate EstimateOf(const std::vector<std::optional<double>>& of_each_seed) {
 
 std::string Verdict(const Row& row) {
   if (!row.paper) return "";
-  if (!row.ours.mean) return "no plan to measure it on";
+  if (!row.ours.mean) return row.reason.empty() ? "no plan to measure it on" : row.reason;
   if (Fixed(*row.ours.mean, row.paper->decimals) == Fixed(row.paper->value, row.paper->decimals)) return "same";
   constexpr double kPaperSeeds = 10;
   if (row.paper->deviation >= 0 && row.ours.seeds > 1) {

@@ -43,32 +43,57 @@ SmoothBounds BoundCell(const ResidualSlopes& slopes, std::span<const Interval> w
   return cell;
 }
 
+constexpr double kRelativeGap = 0.005;
+
+SmoothBounds Largest(const SmoothBounds& a, const SmoothBounds& b) {
+  return {std::max(a.value, b.value), std::max(a.slope, b.slope), std::max(a.curvature, b.curvature)};
+}
+
+bool IsWithin(const SmoothBounds& a, const SmoothBounds& limit, double gap) {
+  return a.value <= limit.value * (1 + gap) && a.slope <= limit.slope * (1 + gap) &&
+         a.curvature <= limit.curvature * (1 + gap);
+}
+
+// Appends the 2^a parts of a cell, each of the a active sides cut in two.
+void Halve(const std::vector<Interval>& cell, std::span<const int> active, std::vector<std::vector<Interval>>& parts) {
+  for (unsigned part = 0; part < 1U << active.size(); ++part) {
+    std::vector<Interval>& half = parts.emplace_back(cell);
+    for (std::size_t a = 0; a < active.size(); ++a) {
+      Interval& side = half[static_cast<std::size_t>(active[a])];
+      const double middle = side.Middle();
+      side = part >> a & 1 ? Interval(middle, side.upper) : Interval(side.lower, middle);
+    }
+  }
+}
+
 }  // namespace
 
 SmoothBounds BoundSmoothness(const ResidualSlopes& slopes, std::span<const double> parameters,
-                             std::span<const Interval> box, int cells) {
+                             std::span<const Interval> box, int halvings) {
   const std::vector<int> active = Occurring(slopes);
-  std::vector<Interval> w = Arguments(slopes, parameters);
-  std::copy(box.begin(), box.end(), w.begin());
-  std::vector<int> at(active.size(), 0);
-  SmoothBounds bounds;
-  for (;;) {
-    for (std::size_t a = 0; a < active.size(); ++a) {
-      const Interval& side = box[static_cast<std::size_t>(active[a])];
-      const auto edge = [&](int i) {
-        return i == 0 ? side.lower : i == cells ? side.upper : side.lower + (side.upper - side.lower) * i / cells;
-      };
-      w[static_cast<std::size_t>(active[a])] = {edge(at[a]), edge(at[a] + 1)};
+  using Cell = std::vector<Interval>;  // the arguments
+  Cell whole = Arguments(slopes, parameters);
+  std::copy(box.begin(), box.end(), whole.begin());
+  std::vector<Cell> cells{whole};
+  SmoothBounds seen, bounds;  // at points, of cells that are done
+  for (int depth = 0; !cells.empty(); ++depth) {
+    std::vector<Cell> open;
+    for (const Cell& cell : cells) {
+      Cell corner = cell;
+      for (const int l : active)
+        corner[static_cast<std::size_t>(l)] = Interval(cell[static_cast<std::size_t>(l)].upper);
+      seen = Largest(seen, BoundCell(slopes, corner, active));
     }
-    const SmoothBounds cell = BoundCell(slopes, w, active);
-    bounds.value = std::max(bounds.value, cell.value);
-    bounds.slope = std::max(bounds.slope, cell.slope);
-    bounds.curvature = std::max(bounds.curvature, cell.curvature);
-    std::size_t a = 0;
-    while (a < active.size() && at[a] == cells - 1) at[a++] = 0;
-    if (a == active.size()) return bounds;
-    ++at[a];
+    for (const Cell& cell : cells) {
+      const SmoothBounds of_cell = BoundCell(slopes, cell, active);
+      if (depth == halvings || IsWithin(of_cell, seen, kRelativeGap))
+        bounds = Largest(bounds, of_cell);
+      else
+        Halve(cell, active, open);
+    }
+    cells = std::move(open);
   }
+  return bounds;
 }
 
 Eigen::MatrixXd JacobianAt(const ResidualSlopes& slopes, std::span<const double> parameters,

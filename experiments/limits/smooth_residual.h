@@ -27,11 +27,12 @@ struct SmoothResidual {
   SmoothBounds bounds;
 };
 
-/** Upper bounds over a box of d_z intervals, by interval jets over cells: each coordinate that the residual depends on
-is cut into `cells` parts. Operator norms are bounded by Frobenius norms, sqrt(sum_k |.|_F^2). Infinite where a kink is
-met. Cost: cells^a jets for each derivative, a coordinates that matter. */
+/** Upper bounds over a box of d_z intervals, by interval jets over cells: the coordinates that the residual depends on
+are cut in two, at most `halvings` times, until the bounds are within 0.5 % of values at points. Operator norms are
+bounded by Frobenius norms, sqrt(sum_k |.|_F^2); for the bicycle's residual the two suprema agree in four digits.
+Infinite where a kink is met. Cost: for each level the jets of the cells that may still hold a maximum. */
 [[nodiscard]] SmoothBounds BoundSmoothness(const ResidualSlopes& slopes, std::span<const double> parameters,
-                                           std::span<const Interval> box, int cells);
+                                           std::span<const Interval> box, int halvings);
 
 /** D_z r(z) by jets at a point. */
 [[nodiscard]] Eigen::MatrixXd JacobianAt(const ResidualSlopes& slopes, std::span<const double> parameters,
@@ -42,7 +43,7 @@ met. Cost: cells^a jets for each derivative, a coordinates that matter. */
 
 /** A residual of dynamics/residuals.h over the box. */
 template <class Residual>
-SmoothResidual Describe(const Residual& residual, std::span<const Interval> box, int cells = 256) {
+SmoothResidual Describe(const Residual& residual, std::span<const Interval> box, int halvings = 14) {
   const auto exact = residual.parameters();
   const std::vector<double> parameters(exact.begin(), exact.end());
   return {[residual](std::span<const long double> z, std::span<long double> r) { residual(z, r); },
@@ -50,7 +51,7 @@ SmoothResidual Describe(const Residual& residual, std::span<const Interval> box,
             static const EquationsSlopes<Residual> slopes;
             return JacobianAt(slopes, parameters, z);
           },
-          BoundSmoothness(EquationsSlopes<Residual>(), parameters, box, cells)};
+          BoundSmoothness(EquationsSlopes<Residual>(), parameters, box, halvings)};
 }
 
 }  // namespace forereach::experiments

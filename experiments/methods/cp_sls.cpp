@@ -1,6 +1,7 @@
 #include "experiments/methods/cp_sls.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -37,6 +38,11 @@ double TotalVariation(std::vector<double> a, std::vector<double> b) {
     last_b = share_b;
   }
   return sum / 2;
+}
+
+template <Covariance kCovariance>
+std::unique_ptr<ResidualEnclosure> Make(const Setting& setting) {
+  return std::make_unique<CpSls>(setting, CpSlsOptions{.covariance = kCovariance});
 }
 
 }  // namespace
@@ -135,6 +141,7 @@ CpSlsBudget CpSls::Budget(const QuerySet& query) const {
   const Eigen::VectorXd scaled = Scaled(CenterOf(query)), weights = Weights(scaled);
   const double mass = weights.sum();
   CpSlsBudget budget;
+  budget.mass = mass;
   budget.alpha = options_.miscoverage / options_.horizon;
   budget.starved = mass < StarvationFloor(options_.miscoverage, options_.horizon);
   const Eigen::VectorXd distances = (locations_.rowwise() - scaled.transpose()).rowwise().norm();
@@ -147,8 +154,12 @@ CpSlsBudget CpSls::Budget(const QuerySet& query) const {
   return budget;
 }
 
-std::unique_ptr<ResidualEnclosure> MakeCpSls(const Setting& setting) {
-  return std::make_unique<CpSls>(setting, CpSlsOptions{});
+std::span<const Method> CpSlsMethods() {
+  static const std::array<Method, 4> methods{{{"CP-SLS-MPC equations", Make<Covariance::kLocal>},
+                                              {"CP-SLS-MPC, local diagonal", Make<Covariance::kLocalDiagonal>},
+                                              {"CP-SLS-MPC, global", Make<Covariance::kGlobal>},
+                                              {"CP-SLS-MPC, global diagonal", Make<Covariance::kGlobalDiagonal>}}};
+  return methods;
 }
 
 }  // namespace forereach::experiments

@@ -42,6 +42,7 @@ struct CpSlsOptions {
 /** sigma_k of one step, or the sum of several. */
 struct CpSlsBudget {
   double alpha = 0, drift = 0, tube = 0;
+  double mass = 0;       ///< sum_i w_i at the center; of a sum, the last step's
   bool starved = false;  ///< A step had no finite radius.
 
   /** What the certificate loses; infinite if starved. It says something only below 1. */
@@ -54,6 +55,7 @@ struct CpSlsBudget {
     alpha += step.alpha;
     drift += step.drift;
     tube += step.tube;
+    mass = step.mass;
     starved |= step.starved;
     return *this;
   }
@@ -95,6 +97,7 @@ class CpSls final : public ResidualEnclosure {
   double drift_rate_ = 0;
 };
 
-[[nodiscard]] std::unique_ptr<ResidualEnclosure> MakeCpSls(const Setting& setting);
+/** All four plug-ins, the local one first, which is the one among Methods(). */
+[[nodiscard]] std::span<const Method> CpSlsMethods();
 
 }  // namespace forereach::experiments

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
+#include <map>
+#include <mutex>
 #include <numbers>
 #include <stdexcept>
 #include <string>
@@ -26,29 +29,34 @@ GaussianProcess::Hyperparameters FromLogarithms(const Eigen::VectorXd& logarithm
 }  // namespace
 
 GaussianProcess::GaussianProcess(Eigen::MatrixXd inputs, Eigen::VectorXd outputs, Hyperparameters hyperparameters)
-    : inputs_(std::move(inputs)),
+    : scaled_(inputs * hyperparameters.length_scales.cwiseInverse().asDiagonal()),
       outputs_(std::move(outputs)),
       hyperparameters_(std::move(hyperparameters)),
-      kernel_(inputs_.rows(), inputs_.rows()) {
-  for (Eigen::Index i = 0; i < inputs_.rows(); ++i)
-    for (Eigen::Index j = 0; j <= i; ++j) kernel_(i, j) = kernel_(j, i) = Kernel(inputs_.row(i) - inputs_.row(j));
+      kernel_(inputs.rows(), inputs.rows()) {
+  for (Eigen::Index j = 0; j < scaled_.rows(); ++j) kernel_.col(j) = Kernel(scaled_.row(j));
   Eigen::MatrixXd noisy = kernel_;
   noisy.diagonal().array() += hyperparameters_.noise * hyperparameters_.noise;
   factor_.compute(noisy);
   weights_ = factor_.solve(outputs_);
 }
 
-double GaussianProcess::Kernel(const Eigen::VectorXd& difference) const {
-  const double square = difference.cwiseQuotient(hyperparameters_.length_scales).squaredNorm();
-  return hyperparameters_.signal * hyperparameters_.signal * std::exp(-square / 2);
+Eigen::VectorXd GaussianProcess::Kernel(const Eigen::VectorXd& scaled) const {
+  Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(scaled_.rows());
+  for (Eigen::Index l = 0; l < scaled.size(); ++l) squares += (scaled_.col(l).array() - scaled[l]).square();
+  return hyperparameters_.signal * hyperparameters_.signal * (-squares / 2).exp();
 }
 
-GaussianProcess::Prediction GaussianProcess::Predict(const Eigen::VectorXd& point) const {
-  Eigen::VectorXd covariance(inputs_.rows());
-  for (Eigen::Index i = 0; i < inputs_.rows(); ++i) covariance[i] = Kernel(inputs_.row(i).transpose() - point);
+std::vector<GaussianProcess::Prediction> GaussianProcess::Predict(const Eigen::MatrixXd& points) const {
+  Eigen::MatrixXd covariances(scaled_.rows(), points.cols());
+  for (Eigen::Index p = 0; p < points.cols(); ++p)
+    covariances.col(p) = Kernel(points.col(p).cwiseQuotient(hyperparameters_.length_scales));
+  const Eigen::VectorXd means = covariances.transpose() * weights_;
   const double prior = hyperparameters_.signal * hyperparameters_.signal;
-  const double explained = factor_.matrixL().solve(covariance).squaredNorm();
-  return {covariance.dot(weights_), std::sqrt(std::max(0.0, prior - explained))};
+  factor_.matrixL().solveInPlace(covariances);
+  std::vector<Prediction> predictions;
+  for (Eigen::Index p = 0; p < points.cols(); ++p)
+    predictions.push_back({means[p], std::sqrt(std::max(0.0, prior - covariances.col(p).squaredNorm()))});
+  return predictions;
 }
 
 double GaussianProcess::LogMarginalLikelihood() const {
@@ -59,13 +67,13 @@ double GaussianProcess::LogMarginalLikelihood() const {
 }
 
 Eigen::VectorXd GaussianProcess::LikelihoodGradient() const {
-  const Eigen::Index count = inputs_.rows(), a = inputs_.cols();
+  const Eigen::Index count = scaled_.rows(), a = scaled_.cols();
   const Eigen::MatrixXd difference =
       weights_ * weights_.transpose() - factor_.solve(Eigen::MatrixXd::Identity(count, count));
   const Eigen::MatrixXd weighted = difference.cwiseProduct(kernel_);
   Eigen::VectorXd gradient(a + 2);
   for (Eigen::Index l = 0; l < a; ++l) {
-    const Eigen::VectorXd z = inputs_.col(l) / hyperparameters_.length_scales[l];
+    const Eigen::VectorXd z = scaled_.col(l);
     // sum_ij W_ij (z_i - z_j)^2, W symmetric
     gradient[l] = weighted.rowwise().sum().dot(z.cwiseAbs2()) - z.dot(weighted * z);
   }
@@ -74,8 +82,10 @@ Eigen::VectorXd GaussianProcess::LikelihoodGradient() const {
   return gradient;
 }
 
+namespace {
+
 // Rprop's own constants; the logarithms stay within +-5, the noise above 1e-3.
-GaussianProcess FitGaussianProcess(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs) {
+GaussianProcess::Hyperparameters FindHyperparameters(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs) {
   constexpr int kSteps = 100;
   constexpr double kFirst = 0.1, kSmallest = 1e-6, kLargest = 1, kGrow = 1.2, kShrink = 0.5, kReach = 5;
   const Eigen::Index a = inputs.cols();
@@ -102,7 +112,25 @@ GaussianProcess FitGaussianProcess(const Eigen::MatrixXd& inputs, const Eigen::V
     }
     before = gradient;
   }
-  return {inputs, outputs, FromLogarithms(best)};
+  return FromLogarithms(best);
+}
+
+}  // namespace
+
+GaussianProcess FitGaussianProcess(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs) {
+  using Found = std::shared_future<GaussianProcess::Hyperparameters>;
+  static std::mutex mutex;
+  static std::map<std::vector<double>, Found> known;
+  std::vector<double> key(inputs.data(), inputs.data() + inputs.size());
+  key.insert(key.end(), outputs.begin(), outputs.end());
+  std::promise<GaussianProcess::Hyperparameters> promise;
+  std::unique_lock lock(mutex);
+  const auto [entry, is_new] = known.try_emplace(std::move(key));
+  if (is_new) entry->second = promise.get_future().share();
+  const Found found = entry->second;
+  lock.unlock();
+  if (is_new) promise.set_value(FindHyperparameters(inputs, outputs));
+  return {inputs, outputs, found.get()};
 }
 
 GaussianProcessBand::GaussianProcessBand(const Setting& setting, double deviations)
@@ -133,11 +161,13 @@ GaussianProcessBand::GaussianProcessBand(const Setting& setting, double deviatio
 
 void GaussianProcessBand::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
   const auto a = static_cast<Eigen::Index>(active_.size());
-  Eigen::VectorXd lower(a), upper(a);
+  const unsigned corners = 1U << a;
+  Eigen::MatrixXd points(a, corners + 1);  // the center last
   for (Eigen::Index l = 0; l < a; ++l) {
     const Interval hull = HullOf(query, active_[static_cast<std::size_t>(l)]);
-    lower[l] = (hull.lower - input_mean_[l]) / input_scale_[l];
-    upper[l] = (hull.upper - input_mean_[l]) / input_scale_[l];
+    for (unsigned corner = 0; corner < corners; ++corner) points(l, corner) = corner >> l & 1 ? hull.upper : hull.lower;
+    points(l, corners) = (hull.lower + hull.upper) / 2;
+    points.row(l) = (points.row(l).array() - input_mean_[l]) / input_scale_[l];
   }
   bounds.capped = false;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -146,14 +176,10 @@ void GaussianProcessBand::Enclose(const QuerySet& query, ResidualBounds& bounds)
     bounds.upper[k] = row.upper;
     if (!row.process) continue;
     double lowest = kInfinity, highest = -kInfinity;
-    const auto look = [&](const Eigen::VectorXd& point) {
-      const auto [mean, deviation] = row.process->Predict(point);
+    for (const auto& [mean, deviation] : row.process->Predict(points)) {
       lowest = std::min(lowest, mean - deviations_ * deviation);
       highest = std::max(highest, mean + deviations_ * deviation);
-    };
-    look((lower + upper) / 2);
-    for (unsigned corner = 0; corner < 1U << a; ++corner)
-      look(Eigen::VectorXd::NullaryExpr(a, [&](Eigen::Index l) { return corner >> l & 1 ? upper[l] : lower[l]; }));
+    }
     bounds.lower[k] += row.mean + row.scale * lowest;
     bounds.upper[k] += row.mean + row.scale * highest;
   }

@@ -36,7 +36,9 @@ class GaussianProcess {
   GaussianProcess(Eigen::MatrixXd inputs, Eigen::VectorXd outputs, Hyperparameters hyperparameters);
 
   /** Eqs. (2.25), (2.26) at one point, a entries. Cost O(N^2). */
-  [[nodiscard]] Prediction Predict(const Eigen::VectorXd& point) const;
+  [[nodiscard]] Prediction Predict(const Eigen::VectorXd& point) const { return Predict(Eigen::MatrixXd(point))[0]; }
+  /** The same at several points, the columns of an a-by-p matrix: one pass over the factor. */
+  [[nodiscard]] std::vector<Prediction> Predict(const Eigen::MatrixXd& points) const;
 
   /** log p(y | X), Eq. (5.8). */
   [[nodiscard]] double LogMarginalLikelihood() const;
@@ -47,9 +49,10 @@ class GaussianProcess {
   [[nodiscard]] const Hyperparameters& hyperparameters() const { return hyperparameters_; }
 
  private:
-  [[nodiscard]] double Kernel(const Eigen::VectorXd& difference) const;
+  /** k(x_i, point) for every i; the point in length-scales. */
+  [[nodiscard]] Eigen::VectorXd Kernel(const Eigen::VectorXd& scaled) const;
 
-  Eigen::MatrixXd inputs_;
+  Eigen::MatrixXd scaled_;  // inputs in length-scales
   Eigen::VectorXd outputs_;
   Hyperparameters hyperparameters_;
   Eigen::MatrixXd kernel_;  // without noise
@@ -57,7 +60,9 @@ class GaussianProcess {
   Eigen::VectorXd weights_;  // (K + noise^2 I)^-1 y
 };
 
-/** The process of largest likelihood found. Cost: about a hundred O(N^3). */
+/** The process of largest likelihood found. Cost: about a hundred O(N^3), once for each (inputs, outputs) in the life
+of the program: the parameters found are kept, as bands of several k ask for the same. Any number of threads may call.
+*/
 [[nodiscard]] GaussianProcess FitGaussianProcess(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs);
 
 /** Claims: at each single location, were the residual a draw of the fitted process, r_k(z) lies inside with the

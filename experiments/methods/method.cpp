@@ -19,7 +19,7 @@ std::span<const Method> Methods() {
                                               {"GP (k=2)", MakeGaussianProcess2},
                                               {"GP (k=3)", MakeGaussianProcess3},
                                               {"Alanwar Alg. 6", MakeAlanwar},
-                                              {"CP-SLS-MPC equations", MakeCpSls},
+                                              CpSlsMethods().front(),
                                               {"Scalar envelope", MakeScalarEnvelope}}};
   return methods;
 }

@@ -1,6 +1,7 @@
 // Runs: quick figures in bands that a broken method would miss, the same files for any number of threads, resuming.
 #include "experiments/run.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -65,6 +66,72 @@ TEST_F(RunTest, QuickFiguresAreInTheirBands) {
   EXPECT_LT(estimate(point_mass, Group::kB, DomainRate), 0.95);
 }
 
+TEST_F(RunTest, QuickBaselinesFallOnTheirSides) {
+  const RunDirectory directory(root_, {30, 24});
+  const Scope scope{1, true};
+  const auto estimate = [&](const char* method, int observations, Group group, Statistic statistic) {
+    Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
+    cell.method = *std::ranges::find(Methods(), method, &Method::name);
+    const Results results({cell}, RunAll({cell}, directory, 1));
+    return OverSeeds(scope, results, cell, group, statistic).mean;
+  };
+  // Unsound where there are no data, and of use where there are.
+  for (const char* method : {"Global calibration", "Regional calibration", "Plug-in Gaussian"}) {
+    EXPECT_LT(*estimate(method, 400, Group::kB, Coverage), 0.8) << method;
+    EXPECT_GT(*estimate(method, 400, Group::kC, Recall), 0.2) << method;
+  }
+  EXPECT_LT(*estimate("GP (k=2)", 100, Group::kB, Coverage), 0.8);
+  EXPECT_GT(*estimate("GP (k=2)", 100, Group::kC, Recall), 0.9);
+  EXPECT_GE(*estimate("GP (k=3)", 100, Group::kB, Coverage), *estimate("GP (k=2)", 100, Group::kB, Coverage));
+  // Of no use.
+  for (const char* method : {"Alanwar Alg. 6", "CP-SLS-MPC equations", "Scalar envelope"})
+    for (const Group group : kGroups) EXPECT_EQ(estimate(method, 400, group, CertificateRate), 0) << method;
+  EXPECT_EQ(estimate("Scalar envelope", 400, Group::kC, DomainRate), 1);
+}
+
+TEST(RunCell, CpSlsIsStarvedWithFewObservationsAndVacuousWithMany) {
+  const auto run = [](int observations) {
+    Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
+    cell.method = *std::ranges::find(Methods(), "CP-SLS-MPC equations", &Method::name);
+    return RunCell(cell, {60, 1});
+  };
+  int vacuous = 0;
+  for (const Tally& few : run(100)) {
+    EXPECT_EQ(few.domain, few.plans);
+    EXPECT_THAT(few.budgets.total, testing::Each(-1));
+    EXPECT_THAT(few.budgets.least_mass, testing::Each(testing::Lt(119)));
+  }
+  for (const Tally& many : run(400)) {
+    vacuous += many.vacuous;
+    EXPECT_EQ(many.certified, 0);
+    EXPECT_EQ(many.vacuous + many.safety + many.domain, many.plans);
+    EXPECT_THAT(many.budgets.least_mass, testing::Each(testing::Gt(119)));
+    for (std::size_t i = 0; i < many.budgets.total.size(); ++i) {
+      if (many.budgets.complete[i] == 0) continue;
+      EXPECT_NEAR(many.budgets.total[i], 0.1 + many.budgets.drift[i] + many.budgets.tube[i], 1e-12);
+    }
+  }
+  EXPECT_GT(vacuous, 0);
+}
+
+TEST_F(RunTest, LimitsAndAssumptionsHoldInAQuickRun) {
+  std::ostringstream out;
+  RunOptions options = Quick({"limits", "degradation", "assumptions"}, "limits");
+  options.effort = {3, 8};
+  RunExperiments(options, out);
+  EXPECT_THAT(out.str(), HasSubstr("| admissible pairs | 64 | Short-horizon lower-bound scan | 64 | 0 | same |"));
+  EXPECT_THAT(out.str(), HasSubstr("| of these with a positive bound | 64 | Short-horizon lower-bound scan | 64 |"));
+  EXPECT_THAT(out.str(), HasSubstr("| bicycle, N = 400: tubes that miss an extremal state, of 4 |  |  | 0 |"));
+  for (const char* system : {"bicycle", "point_mass"})
+    EXPECT_THAT(out.str(), HasSubstr(std::string("| ") + system +
+                                     ": false certificates, all groups | 0 | "
+                                     "Experiments, text | 0 | 0 | same |"));
+  EXPECT_THAT(out.str(), HasSubstr("| Affine residual, linear target: F | 0.000 | Affine control example | 0.000 "));
+  EXPECT_THAT(out.str(), HasSubstr("| Affine residual, linear target: C coverage | 1.000 | Affine control example | "
+                                   "1.000 "));
+  EXPECT_THAT(out.str(), HasSubstr("| Affine residual, knee target: F | 1.000 | Affine control example | 1.000 "));
+}
+
 TEST_F(RunTest, FilesAreTheSameForAnyNumberOfThreads) {
   const std::vector<std::string> names{"main", "steps", "chunks"};
   RunOptions one = Quick(names, "one"), two = Quick(names, "two");
@@ -72,7 +139,7 @@ TEST_F(RunTest, FilesAreTheSameForAnyNumberOfThreads) {
   std::ostringstream out_one, out_two;
   RunExperiments(one, out_one);
   RunExperiments(two, out_two);
-  for (const char* name : {"main.csv", "steps.csv", "chunks.csv", "tables.csv", "report.md"}) {
+  for (const char* name : {"main.csv", "steps.csv", "chunks.csv", "tables.csv", "report.md", "figures/steps.svg"}) {
     EXPECT_FALSE(Read(root_ / "one" / name).empty());
     EXPECT_EQ(Read(root_ / "one" / name), Read(root_ / "two" / name)) << name;
   }

@@ -1,0 +1,139 @@
+// What CP-SLS-MPC's certificate loses on the plans, by the size of its calibration set and its covariance.
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "experiments/experiment.h"
+#include "experiments/methods/cp_sls.h"
+
+namespace forereach::experiments {
+namespace {
+
+Cell BudgetCell(const Method& method, int observations) {
+  Cell cell = PaperCell(BicycleSystem(), observations, 0, 0);
+  cell.method = method;
+  return cell;
+}
+
+std::vector<Cell> BudgetCells(const Scope& scope) {
+  std::vector<Cell> cells;
+  for (const int observations : scope.SizesOf(BicycleSystem()))
+    for (const Method& method : CpSlsMethods()) AddSeeds(scope, BudgetCell(method, observations), cells);
+  return cells;
+}
+
+// Of the plans of all groups and seeds together.
+struct Pooled {
+  int plans = 0, starved = 0, meaningful = 0;
+  std::vector<double> drift, tube, total;  // of complete tubes, none starved
+  std::vector<double> mass;                // of every plan
+};
+
+Pooled Pool(const Scope& scope, const Results& results, Cell cell) {
+  Pooled pooled;
+  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed)
+    for (const Tally& tally : results.Of(cell)) {
+      const PlanBudgets& of = tally.budgets;
+      pooled.plans += tally.plans;
+      pooled.mass.insert(pooled.mass.end(), of.least_mass.begin(), of.least_mass.end());
+      for (std::size_t i = 0; i < of.total.size(); ++i) {
+        pooled.starved += of.total[i] < 0;
+        if (of.total[i] < 0 || of.complete[i] == 0) continue;
+        pooled.meaningful += of.total[i] < 1;
+        pooled.drift.push_back(of.drift[i]);
+        pooled.tube.push_back(of.tube[i]);
+        pooled.total.push_back(of.total[i]);
+      }
+    }
+  return pooled;
+}
+
+Estimate Median(std::vector<double> values) {
+  if (values.empty()) return {};
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return Exactly(*middle);
+}
+
+constexpr const char* kWhy = "weights, their bandwidth and the drift rate are ours: cp_sls.h";
+
+void AddRowsOf(int observations, const Pooled& pooled, std::vector<Row>& rows) {
+  const std::string n = std::to_string(observations);
+  const auto row = [&](const char* what, const char* key, const Estimate& ours, int decimals) {
+    const std::optional<PaperValue> paper = PaperOrNone("budget." + n + "." + key);
+    if (ours.mean || paper) rows.push_back({"N = " + n + ": " + what, paper, ours, decimals, kWhy});
+  };
+  row("median of the least mass", "mass", Median(pooled.mass), 1);
+  row("starved", "starved", Exactly(static_cast<double>(pooled.starved) / pooled.plans), 3);
+  rows.push_back({"N = " + n + ": budgets below one", Paper("budget.nonvacuous"), Exactly(pooled.meaningful), 0, kWhy});
+  row("median drift (TV)", "drift", Median(pooled.drift), 2);
+  row("median tube", "tube", Median(pooled.tube), 2);
+  row("median total", "total", Median(pooled.total), 2);
+}
+
+std::vector<Table> BudgetTables(const Scope& scope, const Results& results) {
+  Table budget{"CP-SLS-MPC budget",
+               "Bicycle, noiseless, local covariance, all groups. Starved: plans with a step of too little weight, "
+               "where the radius is infinite; the floor is 119. The others' budgets, summed over the horizon, by "
+               "their medians; the paper's probability bound is one minus the total.",
+               {}};
+  Table plug_ins{"CP-SLS-MPC, four covariances",
+                 "The same plans, every N. \"Every tested row is starved or vacuous\", says the paper of its four.",
+                 {}};
+  for (const Method& method : CpSlsMethods()) {
+    int meaningful = 0;
+    Pooled pooled;
+    for (const int observations : scope.SizesOf(BicycleSystem())) {
+      pooled = Pool(scope, results, BudgetCell(method, observations));
+      if (&method == &CpSlsMethods().front()) AddRowsOf(observations, pooled, budget.rows);
+      meaningful += pooled.meaningful;
+    }
+    plug_ins.rows.push_back(
+        {method.name + ": budgets below one", Paper("budget.nonvacuous"), Exactly(meaningful), 0, kWhy});
+    plug_ins.rows.push_back({method.name + ": median total at the largest N", {}, Median(pooled.total), 2, ""});
+  }
+  return {budget, plug_ins};
+}
+
+std::vector<Plot> BudgetPlots(const Scope& scope, const Results& results) {
+  std::string mass, parts;
+  for (const int observations : scope.SizesOf(BicycleSystem())) {
+    const std::string n = std::to_string(observations);
+    const Pooled pooled = Pool(scope, results, BudgetCell(CpSlsMethods().front(), observations));
+    mass += DataLine({static_cast<double>(observations), *Median(pooled.mass).mean});
+    const auto line = [&](const char* whose, double drift, double tube) {
+      parts += "\"" + n + "\\n" + whose + "\" " + DataLine({0.1, drift, tube});
+    };
+    if (const auto drift = PaperOrNone("budget." + n + ".drift"))
+      line("paper", drift->value, Paper("budget." + n + ".tube").value);
+    if (!pooled.total.empty()) line("here", *Median(pooled.drift).mean, *Median(pooled.tube).mean);
+  }
+  return {{"budget",
+           "CP-SLS-MPC. Left: the weight that a plan's poorest step has, against the floor below which its radius is "
+           "infinite. Right: the medians of the budget's parts; a certificate needs a sum below 1.",
+           900, 400, DataBlock("mass", mass) + DataBlock("parts", parts) + R"(set multiplot layout 1,2
+set key top left
+set xlabel 'observations N'; set ylabel 'effective mass'
+set yrange [0:*]
+plot $mass using 1:2 with linespoints pt 7 lw 2 lc rgb blue title 'median of the least mass', \
+  119 with lines lw 2 dt 2 lc rgb red title 'floor, 119'
+set xlabel ''; set ylabel 'budget, sum over the horizon'
+set yrange [0:48]
+set bmargin 3.5
+set style data histogram
+set style histogram rowstacked
+set style fill solid 0.9 noborder
+set boxwidth 0.7
+plot $parts using 2:xtic(1) lc rgb red title 'alpha, 0.10', '' using 3 lc rgb blue title 'drift (TV)', \
+  '' using 4 lc rgb sky title 'tube', 1 with lines lw 2 dt 2 lc rgb '#333333' title 'of use below 1'
+unset multiplot
+)"}};
+}
+
+}  // namespace
+
+Experiment CertificateBudget() {
+  return {"budget", "CP-SLS-MPC's budget by N, four covariances", BudgetCells, BudgetTables, BudgetPlots};
+}
+
+}  // namespace forereach::experiments

@@ -1,0 +1,95 @@
+// How much of the nominal model a certifier can lose: recall as less of it is known.
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "experiments/experiment.h"
+#include "experiments/variants.h"
+
+namespace forereach::experiments {
+namespace {
+
+constexpr double kReference = 0.5;  // the paper's "common reference level"
+
+// The parts lacking, in per cent. The paper has 49 cells in 4D and 60 in 6D, and does not say which.
+std::vector<double> PercentsOf(const Scope& scope) {
+  return scope.quick ? std::vector<double>{5, 90} : std::vector<double>{0, 2, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90};
+}
+
+Cell DegradedCell(const System& system, double percent) {
+  return PaperCell(Degraded(system, percent / 100), system.sample_sizes.back(), 0, 0);
+}
+
+std::vector<Cell> DegradationCells(const Scope& scope) {
+  std::vector<Cell> cells;
+  for (const System* system : Systems())
+    for (const double percent : PercentsOf(scope)) AddSeeds(scope, DegradedCell(*system, percent), cells);
+  return cells;
+}
+
+// Where the line through the means first comes down to the reference; none if it does not.
+std::optional<double> Crossing(const std::vector<double>& at, const std::vector<double>& recall) {
+  for (std::size_t i = 1; i < at.size(); ++i)
+    if (recall[i - 1] >= kReference && recall[i] < kReference)
+      return at[i - 1] + (at[i] - at[i - 1]) * (recall[i - 1] - kReference) / (recall[i - 1] - recall[i]);
+  return std::nullopt;
+}
+
+std::vector<Table> DegradationTables(const Scope& scope, const Results& results) {
+  Table table{"Nominal degradation",
+              "C, noiseless, the largest N. The nominal model is (1 - d) f0, and L grows by d sup |D f0|: at "
+              "d = 1 there is no model, and L is the L_f of the norm ratios. \"Tolerated\": the d at which recall "
+              "comes down to 0.5.",
+              {}};
+  const std::vector<double> percents = PercentsOf(scope);
+  for (const System* system : Systems()) {
+    std::vector<double> recalls;
+    std::vector<Row> rows;
+    int false_certificates = 0;
+    for (const double percent : percents) {
+      char text[16];
+      std::snprintf(text, sizeof text, "%g %%", percent);
+      const Cell cell = DegradedCell(*system, percent);
+      const Estimate recall = OverSeeds(scope, results, cell, Group::kC, Recall);
+      recalls.push_back(recall.mean.value_or(0));
+      false_certificates += FalseCertificates(scope, results, cell);
+      rows.push_back({system->name + ", d = " + text + ": C recall", {}, recall, 3, ""});
+    }
+    const std::optional<double> crossing = Crossing(percents, recalls);
+    table.rows.push_back({system->name + ": tolerated, %", Paper("degradation." + system->name),
+                          crossing ? Exactly(*crossing) : Estimate{}, 3,
+                          "the paper does not say what degrades, nor how much of it it declares"});
+    table.rows.push_back({system->name + ": false certificates, all groups", Paper("false_certificates"),
+                          Exactly(false_certificates), 0, ""});
+    table.rows.insert(table.rows.end(), rows.begin(), rows.end());
+  }
+  return {table};
+}
+
+std::vector<Plot> DegradationPlots(const Scope& scope, const Results& results) {
+  std::string lines;
+  for (const double percent : PercentsOf(scope)) {
+    const auto recall = [&](const System& system) {
+      return OverSeeds(scope, results, DegradedCell(system, percent), Group::kC, Recall).mean.value_or(NAN);
+    };
+    lines += DataLine({percent, recall(PointMassSystem()), recall(BicycleSystem())});
+  }
+  return {{"degradation", "Recall of group C as less of the nominal model is known; at 100 % there is none.", 720, 400,
+           DataBlock("recall", lines) + R"(set yrange [0:1.05]; set xrange [0:100]
+set xlabel 'degradation d, %'; set ylabel 'certified recall, C'
+set key bottom left
+plot 0.5 with lines dt 2 lc rgb grey title 'reference', \
+  $recall using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb blue title 'point mass, N = 100', \
+  '' using 1:3 with linespoints pt 5 ps 0.6 lw 2 lc rgb green title 'bicycle, N = 400'
+)"}};
+}
+
+}  // namespace
+
+Experiment NominalDegradation() {
+  return {"degradation", "recall as the nominal model gets worse", DegradationCells, DegradationTables,
+          DegradationPlots};
+}
+
+}  // namespace forereach::experiments

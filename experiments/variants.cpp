@@ -1,0 +1,123 @@
+#include "experiments/variants.h"
+
+#include <array>
+#include <map>
+#include <vector>
+
+#include "certifier/dynamics/equations_model.h"
+#include "certifier/dynamics/kinematic_bicycle.h"
+#include "certifier/dynamics/point_mass.h"
+#include "certifier/numerics/text.h"
+#include "experiments/norm_ratio.h"
+
+namespace forereach::experiments {
+namespace {
+
+// The nominal model with one more parameter: the part of it that is known.
+template <class Equations>
+struct Partly {
+  static constexpr int kStates = Equations::kStates, kInputs = Equations::kInputs;
+  static constexpr std::size_t kOwn = Equations::kParameterNames.size();
+  static constexpr const char* kName = "degraded";
+  static constexpr auto kStateNames = Equations::kStateNames;
+  static constexpr auto kInputNames = Equations::kInputNames;
+  static constexpr std::array<const char*, kOwn + 1> kParameterNames = [] {
+    std::array<const char*, kOwn + 1> names{};
+    std::copy(Equations::kParameterNames.begin(), Equations::kParameterNames.end(), names.begin());
+    names[kOwn] = "known";
+    return names;
+  }();
+
+  std::array<double, kOwn + 1> values;
+
+  template <class T>
+  static constexpr void Step(std::span<const T> parameters, std::span<const T> z, std::span<T> next) {
+    Equations::template Step<T>(parameters, z, next);
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] = parameters[kOwn] * next[k];
+  }
+
+  [[nodiscard]] std::array<double, kOwn + 1> parameters() const { return values; }
+};
+
+template <class Equations>
+std::shared_ptr<const NominalModel> MakePartly(const NominalModel& whole, double known) {
+  Partly<Equations> equations{};
+  std::ranges::copy(whole.parameters(), equations.values.begin());
+  equations.values.back() = known;
+  return std::make_shared<EquationsModel<Partly<Equations>>>(equations);
+}
+
+// Entries of L lie above the true slopes by this part of them, so that rounding makes no declaration false.
+constexpr double kSlack = 1e-12;
+
+const Eigen::MatrixXd& LargestSlopesOnce(const System& system) {
+  static std::map<const System*, Eigen::MatrixXd> known;
+  const auto [at, is_new] = known.try_emplace(&system);
+  if (is_new) at->second = LargestSlopes(system);
+  return at->second;
+}
+
+System MakeDegraded(const System& system, double part) {
+  const double known = 1 - part, lacking = 1 - known;
+  System degraded = system;
+  degraded.name += "_without_" + ToText(100 * part) + "_percent";
+  degraded.model = &system == &BicycleSystem() ? MakePartly<KinematicBicycle>(*system.model, known)
+                                               : MakePartly<PointMass>(*system.model, known);
+  degraded.deployed = (1 + kSlack) * (system.deployed + lacking * LargestSlopesOnce(system));
+  degraded.step = [whole = system.step, lacking](std::span<const double> z, std::span<double> residual,
+                                                 std::span<double> next) {
+    whole(z, residual, next);
+    for (std::size_t k = 0; k < next.size(); ++k) residual[k] += lacking * (next[k] - residual[k]);
+  };
+  return degraded;
+}
+
+constexpr PointMass kPointMass{0.15};
+constexpr double kRate = 0.15, kDamping = 0.4, kCross = 0.3;
+template <class T>
+void StepLinear(std::span<const T> z, std::span<T> residual, std::span<T> next) {
+  const T dt = kPointMass.dt, vx = z[2], vy = z[3];
+  const std::array<T, 2> acceleration{-kRate * (kDamping * vx + kCross * vy), kRate * (kCross * vx - kDamping * vy)};
+  kPointMass(z, next);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    residual[axis] = dt * dt / 2 * acceleration[axis];
+    residual[axis + 2] = dt * acceleration[axis];
+  }
+  for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual[k];
+}
+
+System MakeLinearPointMass() {
+  System system = PointMassSystem();
+  system.name = "linear_point_mass";
+  system.scenarios = 100;  // some hundred linear programs each
+  const double dt = kPointMass.dt;
+  system.deployed.setZero();
+  for (int axis = 0; axis < 2; ++axis)
+    for (int from = 0; from < 2; ++from) {
+      const double slope = kRate * (axis == from ? kDamping : kCross) * (1 + kSlack);
+      system.deployed(axis, 2 + from) = dt * dt / 2 * slope;
+      system.deployed(axis + 2, 2 + from) = dt * slope;
+    }
+  system.target = [](std::span<const long double> z, std::span<long double> next) {
+    std::array<long double, 4> residual;
+    StepLinear<long double>(z, residual, next);
+  };
+  system.step = StepLinear<double>;
+  return system;
+}
+
+}  // namespace
+
+const System& Degraded(const System& system, double part) {
+  static std::map<std::pair<const System*, double>, System> known;
+  const auto [at, is_new] = known.try_emplace({&system, part});
+  if (is_new) at->second = MakeDegraded(system, part);
+  return at->second;
+}
+
+const System& LinearPointMass() {
+  static const System system = MakeLinearPointMass();
+  return system;
+}
+
+}  // namespace forereach::experiments
