@@ -16,6 +16,7 @@
 #include "cli/progress.h"
 #include "forereach/command_t.hpp"
 #include "tests/faults/relay.h"
+#include "tests/faults/report.h"
 #include "tests/faults/rig.h"
 
 namespace forereach {
@@ -359,20 +360,6 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
   return text.str();
 }
 
-// Replaces what stands between the two marks in the report.
-void Write(const std::string& path, const std::string& table) {
-  const std::string begin = "<!-- faults -->\n", end = "<!-- end of faults -->";
-  std::ostringstream old;
-  old << std::ifstream(path).rdbuf();
-  std::string text = old.str();
-  const std::size_t from = text.find(begin), to = text.find(end);
-  if (from == std::string::npos || to == std::string::npos)
-    text = begin + table + end + "\n";
-  else
-    text.replace(from + begin.size(), to - from - begin.size(), table);
-  std::ofstream(path) << text;
-}
-
 int Main(int argc, char** argv) {
   Options options;
   CLI::App app("Hurts the four processes in every way it knows, and says what happened.", "forereach_faults");
@@ -386,7 +373,7 @@ int Main(int argc, char** argv) {
   const std::vector<Row> rows = Campaign(options).Run();
   const std::string table = Table(rows, options);
   std::cout << table << std::flush;
-  if (!options.report.empty()) Write(options.report, table);
+  if (!options.report.empty()) ReplaceBetween(options.report, "faults", table);
   const bool clean = std::ranges::all_of(rows, [](const Row& row) {
     return row.forbidden == 0 && row.lost_by_logger == 0 && row.recovered + row.said_why == row.tries;
   });

@@ -39,6 +39,7 @@ class ChildProcess final {
   /** Sends SIGTERM, then as WaitForExit within kEndsWithin. */
   [[nodiscard]] std::optional<int> Terminate();
 
+  [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] std::string output() const;
   [[nodiscard]] std::string error() const;
 
