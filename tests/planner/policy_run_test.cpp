@@ -31,9 +31,10 @@ struct Traffic {
 Traffic RunTask(const Config& config) {
   Traffic traffic;
   std::int64_t now = 1'700'000'000'000'000;
-  const auto bus = OpenBus("memq://", [&now] { return now; });
+  const Clock clock = [&now] { return now; };
+  const auto bus = OpenBus("memq://", clock);
   std::ostringstream planner_out, robot_out;
-  CertifierNode certifier(config, *bus);
+  CertifierNode certifier(config, *bus, {clock, clock});
   PlannerNode planner(config, *bus, planner_out);
   RobotSimNode robot(config, *bus, robot_out);
   const auto keep = [&bus](const std::string& channel, auto message, auto use) {
