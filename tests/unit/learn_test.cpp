@@ -1,0 +1,132 @@
+// A certifier that learns as it goes says what one says that knew all from the beginning.
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/dynamics/models.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kBase = 5, kLearned = 400;
+
+// A residual of theta that rises with v, inside what is declared; the domain has a ball besides its box.
+class LearnTest : public testing::Test {
+ protected:
+  LearnTest() {
+    problem_.model = MakeKinematicBicycle(0.1, 2.5);
+    problem_.domain.state = Box(Eigen::VectorXd::Constant(6, -30), Eigen::VectorXd::Constant(6, 30));
+    problem_.domain.input = Box(Eigen::Vector2d(-20, -2), Eigen::Vector2d(20, 2));
+    problem_.domain.state = Box((Eigen::VectorXd(6) << -40, -40, -3, 0, -3, -0.4).finished(),
+                                (Eigen::VectorXd(6) << 40, 40, 3, 20, 3, 0.4).finished());
+    problem_.domain.balls.push_back({{3, 5}, Eigen::Vector2d(10, 0), 9});
+    problem_.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+    problem_.declaration.lipschitz(2, 3) = 0.02;
+    problem_.declaration.lipschitz(2, 5) = 0.3;
+    problem_.projection = Eigen::MatrixXd::Identity(2, 6);
+    problem_.transitions.z.resize(0, 8);
+    problem_.transitions.x_next.resize(0, 6);
+  }
+
+  Eigen::VectorXd Draw() {
+    const auto in = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); };
+    return (Eigen::VectorXd(8) << in(-5, 5), in(-5, 5), in(-1, 1), in(6, 14), in(-1, 1), in(-0.3, 0.3), in(-1, 1), in(-0.2, 0.2))
+        .finished();
+  }
+  Eigen::VectorXd Next(const Eigen::VectorXd& z, double error = 0) const {
+    Eigen::VectorXd next(6);
+    problem_.model->Evaluate({z.data(), 8}, {next.data(), 6});
+    next[2] += 0.01 * std::sin(z[3]) + error;
+    return next;
+  }
+  static void Add(Problem& problem, const Eigen::VectorXd& z, const Eigen::VectorXd& next) {
+    Transitions& data = problem.transitions;
+    data.z.conservativeResize(data.z.rows() + 1, Eigen::NoChange);
+    data.x_next.conservativeResize(data.x_next.rows() + 1, Eigen::NoChange);
+    data.z.bottomRows(1) = z.transpose();
+    data.x_next.bottomRows(1) = next.transpose();
+  }
+  static Certifier::Learned Learn(Certifier& certifier, const Eigen::VectorXd& z, const Eigen::VectorXd& next) {
+    return certifier.Learn({z.data(), 8}, {next.data(), 6});
+  }
+  Decision Certify(const Certifier& certifier, Tube& tube) const {
+    const std::vector<double> controls(2 * 12, 0.05);
+    const auto initial_set = Zonotope::FromBox((Eigen::VectorXd(6) << 0, 0, 0, 10, 0, 0.05).finished(),
+                                               (Eigen::VectorXd(6) << 0.1, 0.1, 0.02, 0.2, 0.02, 0.005).finished());
+    return certifier.Certify({controls.data(), 2, 12, 2}, initial_set, {}, tube);
+  }
+
+  const unsigned seed_ = std::random_device{}();
+  const testing::ScopedTrace trace_{__FILE__, __LINE__, "seed " + std::to_string(seed_)};
+  std::mt19937 random_{seed_};
+  Problem problem_;
+};
+
+TEST_F(LearnTest, SaysWhatOneSaysThatKnewAllFromTheBeginning) {
+  Problem all = problem_;
+  std::vector<Eigen::VectorXd> points;
+  for (int i = 0; i < kBase + kLearned; ++i) {
+    points.push_back(Draw());
+    Add(all, points.back(), Next(points.back()));
+    if (i < kBase) Add(problem_, points.back(), Next(points.back()));
+  }
+  Certifier learning(std::make_shared<Problem>(problem_));
+  Tube tube, tube_of_all, tube_before;
+  const Decision before = Certify(learning, tube_before);
+  for (int i = kBase; i < kBase + kLearned; ++i) {
+    const auto& z = points[static_cast<std::size_t>(i)];
+    ASSERT_EQ(Learn(learning, z, Next(z)), Certifier::Learned::kAdded);
+    if (i == 100 || i == 300) learning.Compact();
+  }
+  EXPECT_EQ(learning.num_observations(), static_cast<std::size_t>(kBase + kLearned));
+  const Certifier knowing(std::make_shared<Problem>(all));
+  EXPECT_EQ(Certify(learning, tube).outcome, Certify(knowing, tube_of_all).outcome);
+  ASSERT_EQ(tube.length(), tube_of_all.length());
+  for (int k = 0; k < 6; ++k) {
+    const double learned = tube.slice(tube.length()).HalfWidthUpper(k);
+    EXPECT_NEAR(learned, tube_of_all.slice(tube.length()).HalfWidthUpper(k), 1e-9);
+    if (before.outcome == Outcome::kCertified) {
+      EXPECT_LE(learned, tube_before.slice(tube.length()).HalfWidthUpper(k) + 1e-12) << "data only narrow";
+    }
+  }
+}
+
+TEST_F(LearnTest, TheWholeDomainCountsNotItsBoxAlone) {
+  Add(problem_, Draw(), Next(Draw()));
+  problem_.transitions.x_next.row(0) = Next(problem_.transitions.z.row(0).transpose()).transpose();
+  Certifier certifier(std::make_shared<Problem>(problem_));
+  Eigen::VectorXd z = Draw();
+  z[3] = 19;
+  z[5] = 0;
+  EXPECT_EQ(Learn(certifier, z, Next(z)), Certifier::Learned::kAdded) << "on the ball's edge";
+  z[3] = std::nextafter(19.0, 20.0);
+  EXPECT_EQ(Learn(certifier, z, Next(z)), Certifier::Learned::kOutsideDomain) << "inside the box, outside the ball";
+  z = Draw();
+  z[0] = std::nan("");
+  EXPECT_EQ(Learn(certifier, z, Next(Draw())), Certifier::Learned::kUnusable);
+  z = Draw();
+  EXPECT_EQ(Learn(certifier, z, Eigen::VectorXd::Constant(6, INFINITY)), Certifier::Learned::kUnusable);
+  EXPECT_EQ(certifier.num_observations(), 2u);
+}
+
+TEST_F(LearnTest, AContradictionNamesThePairAndFalsifies) {
+  for (int i = 0; i < kBase; ++i) {
+    const Eigen::VectorXd z = Draw();
+    Add(problem_, z, Next(z));
+  }
+  Certifier certifier(std::make_shared<Problem>(problem_));
+  EXPECT_FALSE(certifier.violation());
+  const Eigen::VectorXd z = problem_.transitions.z.row(3).transpose();
+  EXPECT_EQ(Learn(certifier, z, Next(z, 1e-3)), Certifier::Learned::kAdded);
+  ASSERT_TRUE(certifier.violation());
+  EXPECT_EQ(certifier.violation()->second, kBase);
+  EXPECT_EQ(certifier.violation()->coordinate, 2);
+  Tube tube;
+  EXPECT_EQ(Certify(certifier, tube).outcome, Outcome::kFalsified);
+}
+
+}  // namespace
+}  // namespace forereach
