@@ -1,8 +1,10 @@
 // Commands for a system that runs: keygen, reset, reload, status.
 #include <algorithm>
-#include <chrono>
+#include <functional>
 #include <iostream>
-#include <thread>
+#include <memory>
+#include <optional>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -24,31 +26,39 @@ struct Options {
   bool json = false;
 };
 
-struct Line {
-  Config config;
-  std::unique_ptr<Bus> bus;
+// A line to the certifier: commands to it, heartbeats from it.
+class Line final {
+ public:
+  explicit Line(const Options& options) : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
+    if (!options.url.empty()) channels_.url = options.url;
+    if (!options.key.empty()) channels_.key = options.key;
+    bus_ = OpenBus(channels_, "forereach");
+    bus_->Subscribe(channels_.status, [this](const Received& received) {
+      if (const auto status = Decoded<certifier_status_v2_t>(received.bytes)) heard_.push_back(*status);
+    });
+  }
+
+  // The first heartbeat from now on that passes, or nothing.
+  std::optional<certifier_status_v2_t> Await(const std::function<bool(const certifier_status_v2_t&)>& passes) {
+    const std::int64_t end = SteadyClockUs() + kPatienceMs * 1000;
+    for (heard_.clear(); SteadyClockUs() < end; bus_->Dispatch(50)) {
+      const auto found = std::ranges::find_if(heard_, passes);
+      if (found != heard_.end()) return *found;
+    }
+    return std::nullopt;
+  }
+  std::optional<certifier_status_v2_t> Await() {
+    return Await([](const auto&) { return true; });
+  }
+
+  void Send(const command_t& command) { bus_->Publish(channels_.command, command); }
+  [[nodiscard]] const BusOptions& channels() const { return channels_; }
+
+ private:
+  BusOptions channels_;
+  std::unique_ptr<Bus> bus_;
+  std::vector<certifier_status_v2_t> heard_;
 };
-
-Line Open(const Options& options) {
-  Line line{LoadConfig(options.config, TransitionsFile::kIgnore), nullptr};
-  if (!options.url.empty()) line.config.bus.url = options.url;
-  if (!options.key.empty()) line.config.bus.key = options.key;
-  line.bus = OpenBus(line.config.bus, "forereach");
-  return line;
-}
-
-// The first heartbeat that passes, or nothing.
-std::optional<certifier_status_v2_t> AwaitStatus(Bus& bus, const std::string& channel,
-                                                 const std::function<bool(const certifier_status_v2_t&)>& passes) {
-  std::optional<certifier_status_v2_t> found;
-  bus.Subscribe(channel, [&](const Received& received) {
-    const auto status = Decoded<certifier_status_v2_t>(received.bytes);
-    if (status && passes(*status)) found = status;
-  });
-  const std::int64_t end = SteadyClockUs() + kPatienceMs * 1000;
-  while (!found && SteadyClockUs() < end) bus.Dispatch(50);
-  return found;
-}
 
 std::string_view LevelName(std::int16_t level) {
   return level == certifier_status_v2_t::OK ? "OK" : level == certifier_status_v2_t::STALE ? "STALE" : "ERROR";
@@ -107,32 +117,35 @@ int NobodyAnswers(const BusOptions& bus) {
 }
 
 int ShowStatus(const Options& options) {
-  const Line line = Open(options);
-  const auto status = AwaitStatus(*line.bus, line.config.bus.status, [](const auto&) { return true; });
-  if (!status) return NobodyAnswers(line.config.bus);
+  Line line(options);
+  const auto status = line.Await();
+  if (!status) return NobodyAnswers(line.channels());
   Print(*status, options.json);
   return status->level == certifier_status_v2_t::OK ? 0 : 1;
 }
 
 // Sends a command, and shows the heartbeat that answers it.
 int Command(const Options& options, std::int16_t kind) {
-  const Line line = Open(options);
-  const auto before = AwaitStatus(*line.bus, line.config.bus.status, [](const auto&) { return true; });
-  if (!before) return NobodyAnswers(line.config.bus);
+  Line line(options);
+  const auto before = line.Await();
+  if (!before) return NobodyAnswers(line.channels());
   command_t command{};
   command.utime = WallClockUs();
   command.kind = kind;
   SetText(command.source, "forereach");
-  line.bus->Publish(line.config.bus.command, command);
-  const auto after = AwaitStatus(*line.bus, line.config.bus.status, [&](const certifier_status_v2_t& status) {
+  line.Send(command);
+  const auto refused = [](const certifier_status_v2_t& status) {
+    return status.messages_refused + status.refused_unsigned + status.refused_forged + status.refused_replayed;
+  };
+  const auto after = line.Await([&](const certifier_status_v2_t& status) {
+    if (refused(status) > refused(*before)) return true;
     return kind == command_t::RESET ? status.utime >= command.utime
                                     : status.version != before->version || status.failed_reloads != before->failed_reloads;
   });
-  if (!after) return NobodyAnswers(line.config.bus);
+  if (!after) return NobodyAnswers(line.channels());
   Print(*after, options.json);
   const bool done = kind == command_t::RESET ? after->state != certifier_status_v2_t::FAULT : after->version > before->version;
-  if (!done && after->messages_refused + after->refused_unsigned + after->refused_forged + after->refused_replayed >
-                   before->messages_refused + before->refused_unsigned + before->refused_forged + before->refused_replayed)
+  if (!done && refused(*after) > refused(*before))
     std::cerr << "forereach: the certifier refused the command; is it signed with its key (--key)?" << std::endl;
   return done ? 0 : 1;
 }
