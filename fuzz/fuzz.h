@@ -1,6 +1,8 @@
 /** What the fuzzers share. A property that fails ends the process, which libFuzzer takes for a finding. */
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
