@@ -73,7 +73,8 @@ verifier::RecordedSlice SliceOf(const Json& slice) {
 
 std::string TaskOf(const Json& inputs) {
   const auto absolute = inputs.at("config").at("absolute").get<std::string>();
-  return std::filesystem::exists(absolute) ? absolute : inputs["config"].at("given").get<std::string>();
+  std::error_code no_path;
+  return std::filesystem::exists(absolute, no_path) ? absolute : inputs["config"].at("given").get<std::string>();
 }
 
 CertificateFile FromDecision(const std::string& path, const Json& document, const std::string& config_path) {
