@@ -12,6 +12,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/transition_message.h"
 #include "certifier/task/files.h"
+#include "certifier/task/json_file.h"
 #include "cli/decision_json.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
@@ -72,7 +73,8 @@ verifier::RecordedSlice SliceOf(const Json& slice) {
 
 std::string TaskOf(const Json& inputs) {
   const auto absolute = inputs.at("config").at("absolute").get<std::string>();
-  return std::filesystem::exists(absolute) ? absolute : inputs["config"].at("given").get<std::string>();
+  std::error_code no_path;
+  return std::filesystem::exists(absolute, no_path) ? absolute : inputs["config"].at("given").get<std::string>();
 }
 
 CertificateFile FromDecision(const std::string& path, const Json& document, const std::string& config_path) {
@@ -456,7 +458,7 @@ CertificateFile ReadCertificates(const std::string& path, const std::string& con
     if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLogs({path}, TaskGiven(path, config_path));
     if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{') {
       std::ifstream stream = OpenForReading(path);
-      return FromDecision(path, Json::parse(stream), config_path);
+      return FromDecision(path, ParseJson<Json>(stream), config_path);
     }
   } catch (const Json::exception& error) {
     throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());

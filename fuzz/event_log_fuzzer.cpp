@@ -1,31 +1,11 @@
 // The log reader and the writer's recovery over any bytes: they end, account for every byte, hold no more than one event of
 // the allowed size, and recovery keeps as much as the reader read.
-#include <cstddef>
-#include <cstdint>
-#include <cstdlib>
-#include <string>
-
-#include <sys/mman.h>
-#include <unistd.h>
-
+#include "fuzz/fuzz.h"
 #include "logger/event_log.h"
 
 namespace {
 
 using namespace forereach;
-
-void Require(bool holds) {
-  if (!holds) std::abort();
-}
-
-// A file in memory with these bytes, by a path that opens it anew.
-std::string FileOf(const std::uint8_t* data, std::size_t size) {
-  static const int file = ::memfd_create("log", MFD_CLOEXEC);
-  static const std::string path = "/proc/self/fd/" + std::to_string(file);
-  Require(file >= 0 && ::ftruncate(file, 0) == 0);
-  Require(::pwrite(file, data, size, 0) == static_cast<ssize_t>(size));
-  return path;
-}
 
 std::int64_t ReadAll(const std::string& path, std::int64_t size) {
   EventLogReader reader(path);
@@ -47,7 +27,8 @@ std::int64_t ReadAll(const std::string& path, std::int64_t size) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::string path = FileOf(data, size);
+  static MemoryFile file;
+  const std::string path = file.Write(Bytes(data, size));
   const std::int64_t events = ReadAll(path, static_cast<std::int64_t>(size));
   EventLogWriter writer(path);
   Require(writer.recovery().events == events);

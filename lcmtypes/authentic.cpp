@@ -91,7 +91,8 @@ Key256 LoadKey(const std::string& path) {
   const ssize_t size = ::read(file.get(), text.data(), text.size());
   Key256 key;
   std::size_t bytes = 0;
-  if (size != static_cast<ssize_t>(kKeyFileBytes) || std::memcmp(text.data(), kKeyPrefix.data(), kKeyPrefix.size()) != 0 ||
+  if (size != static_cast<ssize_t>(kKeyFileBytes) || text[kKeyFileBytes - 1] != '\n' ||
+      std::memcmp(text.data(), kKeyPrefix.data(), kKeyPrefix.size()) != 0 ||
       sodium_hex2bin(key.data(), key.size(), text.data() + kKeyPrefix.size(), 2 * key.size(), nullptr, &bytes, nullptr) != 0 ||
       bytes != key.size())
     Fail(path, "holds no key; `forereach keygen " + path + "` makes one");

@@ -10,6 +10,7 @@
 
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/json_file.h"
 
 namespace forereach {
 namespace {
@@ -186,7 +187,7 @@ Policy LoadPolicy(const std::string& path) {
   if (!file) throw PolicyError(path + ": cannot be read");
   Json json;
   try {
-    json = Json::parse(file);
+    json = ParseJson<Json>(file);
   } catch (const Json::exception& error) {
     throw PolicyError(path + ": " + error.what());
   }

@@ -13,7 +13,8 @@ void Conformance::Remember(const certified_plan_t& certified) {
 }
 
 std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state) {
-  const bool executing = state.mode == robot_state_t::EXECUTING, follows = state.sequence == last_sequence_ + 1;
+  const bool executing = state.mode == robot_state_t::EXECUTING;
+  const bool follows = state.sequence > last_sequence_ && state.sequence - 1 == last_sequence_;  // any numbers: no overflow
   std::optional<Departure> departure;
   if (executing && follows && last_plan_id_ >= 0) departure = Compare(last_plan_id_, last_step_ + 1, state);
   if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, state);

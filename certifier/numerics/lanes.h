@@ -52,8 +52,8 @@ FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
   __builtin_memcpy(&halves, &mask, sizeof halves);
   return static_cast<unsigned>(__builtin_ia32_movmskpd(halves[0]) | __builtin_ia32_movmskpd(halves[1]) << 2);
 #endif
-  const LaneMask bits = mask & LaneMask{1, 2, 4, 8}, pairs = bits | __builtin_shuffle(bits, LaneMask{2, 3, 0, 1});
-  return static_cast<unsigned>((pairs | __builtin_shuffle(pairs, LaneMask{1, 0, 3, 2}))[0]);
+  const LaneMask bits = mask & LaneMask{1, 2, 4, 8}, pairs = bits | __builtin_shufflevector(bits, bits, 2, 3, 0, 1);
+  return static_cast<unsigned>((pairs | __builtin_shufflevector(pairs, pairs, 1, 0, 3, 2))[0]);
 }
 
 namespace internal {
@@ -79,7 +79,14 @@ class Packing {
     __builtin_memcpy(&from_, internal::kPacking[left_out].data(), sizeof from_);
   }
   FOREREACH_INLINE Lanes operator()(const Lanes& x) const {
-    return std::bit_cast<Lanes>(__builtin_shuffle(std::bit_cast<Halves>(x), from_));
+    const auto halves = std::bit_cast<Halves>(x);
+#ifdef __clang__  // has no shuffle by a variable
+    Halves packed;
+    for (std::size_t i = 0; i < 2 * kLaneCount; ++i) packed[i] = halves[from_[i]];
+    return std::bit_cast<Lanes>(packed);
+#else
+    return std::bit_cast<Lanes>(__builtin_shuffle(halves, from_));
+#endif
   }
 
  private:
@@ -89,9 +96,9 @@ class Packing {
 FOREREACH_INLINE double Sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
 /** The Sum of each, to the same bits. */
 FOREREACH_INLINE Lanes SumEach(const Lanes& a, const Lanes& b, const Lanes& c, const Lanes& d) {
-  const Lanes a_c = __builtin_shuffle(a, c, LaneMask{0, 1, 4, 5}) + __builtin_shuffle(a, c, LaneMask{2, 3, 6, 7});
-  const Lanes b_d = __builtin_shuffle(b, d, LaneMask{0, 1, 4, 5}) + __builtin_shuffle(b, d, LaneMask{2, 3, 6, 7});
-  return __builtin_shuffle(a_c, b_d, LaneMask{0, 4, 2, 6}) + __builtin_shuffle(a_c, b_d, LaneMask{1, 5, 3, 7});
+  const Lanes a_c = __builtin_shufflevector(a, c, 0, 1, 4, 5) + __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  const Lanes b_d = __builtin_shufflevector(b, d, 0, 1, 4, 5) + __builtin_shufflevector(b, d, 2, 3, 6, 7);
+  return __builtin_shufflevector(a_c, b_d, 0, 4, 2, 6) + __builtin_shufflevector(a_c, b_d, 1, 5, 3, 7);
 }
 
 /** Whether test(k), a mask of four, holds for the first n of all lanes, k = 0, 4, ... */

@@ -83,8 +83,8 @@ struct Surroundings {
     for (std::size_t k = 0; k < n; k += kLaneCount) {
       const Lanes c = LoadLanes(slice.centers() + k), r = LoadLanes(half_width + k), lower = c - r, upper = c + r;
       StoreLanes(c, &center[k]);
-      StoreLanes(__builtin_shuffle(lower, upper, LaneMask{0, 4, 1, 5}), &hull[k].lower);
-      StoreLanes(__builtin_shuffle(lower, upper, LaneMask{2, 6, 3, 7}), &hull[k + 2].lower);
+      StoreLanes(__builtin_shufflevector(lower, upper, 0, 4, 1, 5), &hull[k].lower);
+      StoreLanes(__builtin_shufflevector(lower, upper, 2, 6, 3, 7), &hull[k + 2].lower);
     }
     for (std::size_t l = 0; l < input.size(); ++l) {
       center[n + l] = input[l];

@@ -170,10 +170,11 @@ FOREREACH_INLINE void MergeSmallest(Lists& x, const Lists& partner) {
       if ((i & distance) == 0) Order(x, i, i + distance);
 }
 
-FOREREACH_INLINE Lists Shuffled(const Lists& x, const LaneMask& from) {
+template <int... kFrom>
+FOREREACH_INLINE Lists Shuffled(const Lists& x) {
   Lists shuffled;
 #pragma GCC unroll 8
-  for (std::size_t i = 0; i < 8; ++i) shuffled[i] = __builtin_shuffle(x[i], from);
+  for (std::size_t i = 0; i < 8; ++i) shuffled[i] = __builtin_shufflevector(x[i], x[i], kFrom...);
   return shuffled;
 }
 
@@ -190,8 +191,8 @@ FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::s
   Lists smallest = SortedBlock(scores);
   for (std::size_t first = ColumnScores::kBlock; first < count; first += ColumnScores::kBlock)
     MergeSmallest(smallest, SortedBlock(scores + first));
-  MergeSmallest(smallest, Shuffled(smallest, LaneMask{1, 0, 3, 2}));
-  MergeSmallest(smallest, Shuffled(smallest, LaneMask{2, 3, 0, 1}));
+  MergeSmallest(smallest, Shuffled<1, 0, 3, 2>(smallest));
+  MergeSmallest(smallest, Shuffled<2, 3, 0, 1>(smallest));
   return smallest[rank - 1][0];
 }
 

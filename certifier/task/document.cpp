@@ -4,9 +4,11 @@
 #include <array>
 #include <map>
 #include <numeric>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include "certifier/task/config.h"
@@ -298,12 +300,29 @@ std::string ReadAll(const std::string& path) {
   return text;
 }
 
+class Nobody final : public YAML::EventHandler {
+  using Mark = YAML::Mark;
+  using Anchor = YAML::anchor_t;
+  void OnDocumentStart(const Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const Mark&, Anchor) override {}
+  void OnAlias(const Mark&, Anchor) override {}
+  void OnScalar(const Mark&, const std::string&, Anchor, const std::string&) override {}
+  void OnSequenceStart(const Mark&, const std::string&, Anchor, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const Mark&, const std::string&, Anchor, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+// Not by YAML::LoadAll: of a lone comma it reads empty documents without end.
 YAML::Node Parse(const std::string& path, const std::string& text) {
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() != 1)
-      throw ConfigError(At(path, 1) + "has " + std::to_string(documents.size()) + " YAML documents, has to have 1");
-    return documents.front();
+    std::istringstream in(text);
+    YAML::Parser parser(in);
+    Nobody nobody;
+    if (!parser.HandleNextDocument(nobody)) throw ConfigError(At(path, 1) + "has no YAML document, has to have one");
+    if (parser.HandleNextDocument(nobody)) throw ConfigError(At(path, 1) + "has several YAML documents, has to have one");
+    return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw ConfigError(At(path, LineOf(error.mark)) + "not valid YAML: " + error.msg);
   }

@@ -220,8 +220,9 @@ TEST_F(ErrorTest, TransitionsThatCannotBeRead) {
 TEST_F(ErrorTest, FilesThatAreNotTasks) {
   EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML: "));
   EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML: "));
-  EXPECT_EQ(files_.Error(""), "task.yaml:1: has 0 YAML documents, has to have 1");
-  EXPECT_EQ(files_.Error(std::string(kTask) + "---\nmore: 1\n"), "task.yaml:1: has 2 YAML documents, has to have 1");
+  EXPECT_EQ(files_.Error(""), "task.yaml:1: has no YAML document, has to have one");
+  EXPECT_EQ(files_.Error(std::string(kTask) + "---\nmore: 1\n"), "task.yaml:1: has several YAML documents, has to have one");
+  EXPECT_EQ(files_.Error("   ,"), "task.yaml:1: has several YAML documents, has to have one");
   EXPECT_EQ(files_.Error("just words\n"), "task.yaml:1: just words is not a map");
   EXPECT_EQ(files_.Error("? [a, b]\n: 1\n"), "task.yaml:1: a list is not a key");
   EXPECT_THAT(files_.Error(std::string(100000, '[')), HasSubstr("task.yaml:1: not valid YAML: "));

@@ -150,7 +150,7 @@ TEST_F(KeyFile, ThatHoldsNoKeyIsRefused) {
   std::getline(std::ifstream(path_), text);
   std::string no_hex = text;
   no_hex.back() = 'g';
-  for (const std::string& bad : {std::string(), text, text + "0\n", text.substr(1) + "\n", no_hex + "\n"}) {
+  for (const std::string& bad : {std::string(), text, text + "0\n", text + "0", text.substr(1) + "\n", no_hex + "\n"}) {
     std::ofstream(path_, std::ios::trunc) << bad;
     EXPECT_THAT(Problem(), HasSubstr("holds no key")) << bad;
   }

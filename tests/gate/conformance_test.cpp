@@ -70,6 +70,13 @@ TEST(ConformanceTest, StandingAndUnknownPlansAreNotJudged) {
   EXPECT_FALSE(conformance.Check(At(5, 7, -1, 100, 100)));
 }
 
+TEST(ConformanceTest, TheSmallestSequenceDoesNotFollowTheLargest) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  EXPECT_FALSE(conformance.Check(At(std::numeric_limits<std::int64_t>::max(), 7, 0, 0.5, 0.5)));
+  EXPECT_FALSE(conformance.Check(At(std::numeric_limits<std::int64_t>::min(), 99, 0, 100, 100)));
+}
+
 TEST(ConformanceTest, TheLastPlansAreRemembered) {
   Conformance conformance;
   const auto count = static_cast<std::int64_t>(Conformance::kPlans);

@@ -104,6 +104,16 @@ TEST(Policy, EveryBadFieldIsNamedWithValueAndBound) {
   EXPECT_NO_THROW(static_cast<void>(LoadPolicy(path)));
 }
 
+TEST(Policy, AFieldOfAMillionListsInOneAnotherIsRefused) {
+  const std::string path = Scratch("policy.json");
+  SavePolicy(path, Small());
+  std::stringstream good;
+  good << std::ifstream(path).rdbuf();
+  const std::string text = good.str(), field = "\"forereach-policy\"", deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+  std::ofstream(path) << std::string(text).replace(text.find(field), field.size(), deep);
+  EXPECT_THROW(static_cast<void>(LoadPolicy(path)), PolicyError);
+}
+
 TEST(Policy, WhatIsNoJsonIsRefusedWithItsFile) {
   const std::string path = Scratch("policy.json");
   for (const char* text : {"", "{", "{\"format\": 1e999}", "\xff"}) {

@@ -77,6 +77,22 @@ TEST_F(VerifyDecision, OfEveryShippedCertificateConfirmed) {
   }
 }
 
+TEST_F(VerifyDecision, WhoseTaskHasANameThatNoFileHasIsBadInput) {
+  decision_["inputs"]["config"]["absolute"] = std::string(5000, 'a');
+  const Output output = Verify();
+  EXPECT_EQ(output.code, 0) << output.text << "the name as given serves";
+  decision_["inputs"]["config"]["given"] = "nowhere.yaml";
+  EXPECT_EQ(Verify().code, 2);
+}
+
+TEST_F(VerifyDecision, NestedWithoutEndIsBadInput) {
+  const std::string text = decision_.dump(), deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+  std::ofstream(scratch_ / "decision.json") << std::string(text).insert(text.find("\"center\""), "\"a\":" + deep + ",");
+  const Output output = Forereach("verify " + scratch_ / "decision.json 2>&1");
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("nested deeper than 32 levels"));
+}
+
 TEST_F(VerifyDecision, AsJson) {
   Json document = Json::parse(Verify("--json").text);
   EXPECT_EQ(document["confirmed"], 1);

@@ -1,0 +1,45 @@
+// Signatures: what a receiver takes is what a signer with the key made for the channel, whole, once, and not from before.
+#include <set>
+
+#include "fuzz/fuzz.h"
+#include "lcmtypes/authentic.h"
+
+namespace {
+
+using namespace forereach;
+
+constexpr Key256 kKey{1, 2, 3}, kOtherKey{4};
+constexpr std::int64_t kBegun = 1'000'000;
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  FuzzedDataProvider input(data, size);
+  Signer signer(kKey, "planner", kBegun), forger(kOtherKey, "planner", kBegun);
+  Authenticator authenticator(kKey, kBegun);
+  std::set<std::vector<std::uint8_t>> made, taken;
+  std::vector<std::uint8_t> bytes;
+  std::int64_t refused = 0;
+  for (int i = 0; i < 16 && input.remaining_bytes() > 0; ++i) {
+    const std::int64_t now = input.ConsumeIntegralInRange<std::int64_t>(0, 2 * kBegun);
+    const std::vector<std::uint8_t> message = input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 80));
+    switch (input.ConsumeIntegralInRange(0, 4)) {
+      case 0: made.insert(bytes = signer.Sign("COMMAND", message, now)); break;
+      case 1: bytes = signer.Sign("OTHER", message, now); break;
+      case 2: bytes = forger.Sign("COMMAND", message, now); break;
+      case 3: bytes = message; break;
+      case 4: Damage(input, bytes); break;  // or once more
+    }
+    const auto [authenticity, inside] = authenticator.Check("COMMAND", bytes);
+    if (authenticity == Authenticity::kAuthentic) {
+      Require(made.contains(bytes) && taken.insert(bytes).second);
+      Require(inside.data() == bytes.data() && inside.size() + kSignatureBytes == bytes.size());
+    } else {
+      Require(inside.empty());
+      ++refused;
+    }
+  }
+  const Refusals& refusals = authenticator.refusals();
+  Require(refusals.unsigned_ones + refusals.forged + refusals.replayed == refused);
+  return 0;
+}

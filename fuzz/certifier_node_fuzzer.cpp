@@ -1,0 +1,180 @@
+// Every inbound type in any order through the certifier's node: each candidate is answered once, a certified plan goes out
+// right before its decision, and none while a fault is latched or the robot's state is not known.
+#include <map>
+
+#include <spdlog/spdlog.h>
+
+#include "certifier/gate/obstacle_message.h"
+#include "certifier/process/certifier_node.h"
+#include "fuzz/fuzz.h"
+#include "lcmtypes/seal.h"
+#include "tests/gate/small_task.h"
+
+namespace {
+
+using namespace forereach;
+
+/** Hands each message to its subscriber at once, and looks at what the node sends. */
+class WitnessBus final : public Bus {
+ public:
+  using Bus::Publish;
+  void Subscribe(const std::string& channel, Handler handler) override { handlers_[channel] = std::move(handler); }
+  int Dispatch(int) override { return 0; }
+  std::int64_t dropped() const override { return 0; }
+
+  bool Publish(const std::string& channel, Bytes bytes) override {
+    if (channel == "PLAN_CERTIFIED") {
+      Require(!certified_ && may_certify);
+      certified_ = Decoded<certified_plan_t>(bytes);
+      Require(certified_ && FindSealFaults(*certified_).empty());
+    } else if (channel == "PLAN_DECISION") {
+      TakeDecision(Decoded<decision_t>(bytes));
+    }
+    return true;
+  }
+
+  void Deliver(const std::string& channel, Bytes bytes, std::int64_t now_us) {
+    if (channel == "PLAN_CANDIDATE") ++unanswered_[DigestOf(bytes)];
+    handlers_.at(channel)({channel, bytes, now_us});
+  }
+
+  void RequireAllAnswered() const {
+    Require(!certified_);
+    for (const auto& [digest, count] : unanswered_) Require(count == 0);
+  }
+
+  bool may_certify = false;
+
+ private:
+  void TakeDecision(const std::optional<decision_t>& decision) {
+    Require(decision.has_value() && unanswered_[GetDigest(decision->plan_digest)]-- > 0);
+    Require(certified_.has_value() == (decision->outcome == decision_t::CERTIFIED));
+    Require(!certified_ || GetDigest(certified_->plan_digest) == GetDigest(decision->plan_digest));
+    Require(decision->cause != decision_t::CAUSE_INTERNAL_ERROR);
+    certified_.reset();
+  }
+
+  std::map<std::string, Handler> handlers_;
+  std::map<Digest, int> unanswered_;
+  std::optional<certified_plan_t> certified_;
+};
+
+robot_state_t RobotState(FuzzedDataProvider& input, std::int64_t now) {
+  robot_state_t state{};
+  state.utime = now;
+  state.sequence = input.ConsumeBool() ? INT64_MAX - input.ConsumeIntegralInRange(0, 2) : input.ConsumeIntegralInRange(0, 8);
+  state.executing_plan_id = input.ConsumeIntegralInRange(-1, 8);
+  state.executing_step = input.ConsumeIntegralInRange<std::int16_t>(-1, 11);
+  state.mode = input.ConsumeIntegralInRange<std::int16_t>(0, 4);
+  state.num_states = 4;
+  state.state[0] = 0.15 * state.executing_step;
+  state.state[2] = 1;
+  return state;
+}
+
+transition_t Transition(FuzzedDataProvider& input, std::int64_t now) {
+  transition_t transition{};
+  transition.utime = now;
+  transition.num_states = 4;
+  transition.num_inputs = 2;
+  transition.state[2] = 1;
+  transition.next_state[0] = 0.15;
+  transition.next_state[2] = 1;
+  if (input.ConsumeBool()) transition.next_state[input.ConsumeIntegralInRange(0, 3)] = OddNumber(input);
+  return transition;
+}
+
+obstacle_t AnyObstacle(FuzzedDataProvider& input) {
+  obstacle_t obstacle{};
+  obstacle.kind = input.ConsumeIntegralInRange<std::int16_t>(0, 5);
+  obstacle.dimension = input.ConsumeIntegralInRange<std::int16_t>(1, 3);
+  obstacle.num_points = input.ConsumeIntegralInRange<std::int16_t>(0, 16);
+  obstacle.value = OddNumber(input);
+  for (int p = 0; p < std::min<int>(obstacle.num_points, 16); ++p)
+    for (double& coordinate : obstacle.point[p])
+      coordinate = input.ConsumeBool() ? OddNumber(input) : input.ConsumeIntegral<std::int8_t>();
+  return obstacle;
+}
+
+obstacles_t AnyObstacles(FuzzedDataProvider& input, std::int64_t now) {
+  obstacles_t obstacles = ToMessage({Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)});
+  obstacles.utime = now;
+  obstacles.sequence = input.ConsumeIntegralInRange(0, 8);
+  if (input.ConsumeBool()) return obstacles;
+  obstacles.num_obstacles = input.ConsumeIntegralInRange<std::int16_t>(-1, 4);
+  for (int i = 0; i < obstacles.num_obstacles; ++i) obstacles.obstacle[i] = AnyObstacle(input);
+  return obstacles;
+}
+
+command_t Command(std::int64_t now) {
+  command_t command{};
+  command.utime = now;
+  command.kind = command_t::RESET;  // RELOAD reads a file in a thread of its own: config_fuzzer.cpp
+  return command;
+}
+
+class Session final {
+ public:
+  explicit Session(const Config& config) : node_(config, bus_, {[this] { return now_; }, [this] { return steady_; }}) {}
+
+  void Step(FuzzedDataProvider& input) {
+    switch (input.ConsumeIntegralInRange(0, 6)) {
+      case 0: return bus_.Deliver("PLAN_CANDIDATE", Damaged(input, Candidate(input.ConsumeIntegralInRange(1, 8), OddNumber(input), now_)), now_);
+      case 1: return bus_.Deliver("ROBOT_STATE", Damaged(input, RobotState(input, now_)), now_);
+      case 2: return bus_.Deliver("TRANSITION", Damaged(input, Transition(input, now_)), now_);
+      case 3: return bus_.Deliver("OBSTACLES", Damaged(input, AnyObstacles(input, now_)), now_);
+      case 4: return DeliverCommand(Damaged(input, Command(now_)));
+      case 5: return Wait(input);
+      case 6: return Tick();
+    }
+  }
+
+  void Finish() {
+    while (node_.busy()) Tick();
+    bus_.RequireAllAnswered();
+  }
+
+ private:
+  void DeliverCommand(const std::vector<std::uint8_t>& bytes) {
+    const auto command = Decoded<command_t>(bytes);
+    if (!command || command->kind != command_t::RELOAD) bus_.Deliver("COMMAND", bytes, now_);
+  }
+
+  void Wait(FuzzedDataProvider& input) {
+    const std::int64_t by = input.ConsumeIntegralInRange(0, 1'500'000);
+    steady_ += by;
+    now_ += by + (input.ConsumeBool() ? 0 : input.ConsumeIntegralInRange(-400'000, 400'000));
+  }
+
+  void Tick() {
+    // A fault that this tick finds is latched before candidates are looked at, so it may only take the right away.
+    bus_.may_certify = node_.watch().state() == Watch::State::kArmed;
+    node_.Tick(now_);
+  }
+
+  std::int64_t now_ = kNow, steady_ = 0;
+  WitnessBus bus_;
+  CertifierNode node_;
+};
+
+std::vector<Config> Tasks() {
+  Config watchful = SmallTask(), stubborn = SmallTask();
+  watchful.gate.needs_robot_state = true;
+  stubborn.gate.learns = false;
+  stubborn.gate.queue = 1;
+  return {watchful, SmallTask(), stubborn};
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const std::vector<Config> tasks = [] {
+    spdlog::set_level(spdlog::level::off);
+    return Tasks();
+  }();
+  FuzzedDataProvider input(data, size);
+  Session session(tasks[input.ConsumeIntegralInRange<std::size_t>(0, tasks.size() - 1)]);
+  for (int step = 0; step < 64 && input.remaining_bytes() > 0; ++step) session.Step(input);
+  session.Finish();
+  return 0;
+}

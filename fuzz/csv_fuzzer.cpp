@@ -1,0 +1,23 @@
+// Transitions and plans: any bytes are finite numbers of the right shape, which come back to the last bit once written, or
+// refused with a ConfigError.
+#include "certifier/dynamics/models.h"
+#include "certifier/task/config.h"
+#include "fuzz/fuzz.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace forereach;
+  static MemoryFile file;
+  static const auto model = MakePointMass(0.15);
+  const std::string path = file.Write(Bytes(data, size));
+  if (Transitions read; IsTaken([&] { read = LoadTransitions(path, *model); })) {
+    Require(read.size() >= 1 && read.z.cols() == 6 && read.x_next.cols() == 4 && read.z.allFinite() && read.x_next.allFinite());
+    SaveTransitions(path, *model, read);
+    const Transitions again = LoadTransitions(path, *model);
+    Require(again.z == read.z && again.x_next == read.x_next);
+  } else if (Eigen::MatrixXd plan; IsTaken([&] { plan = LoadPlan(path, *model); })) {
+    Require(plan.rows() == 2 && 1 <= plan.cols() && plan.cols() <= 128 && plan.allFinite());
+    SavePlan(path, *model, plan);
+    Require(LoadPlan(path, *model) == plan);
+  }
+  return 0;
+}

@@ -1,0 +1,33 @@
+// `forereach verify`'s JSON: any bytes are a document that is confirmed or not, or refused with a ConfigError.
+#include "cli/certificate_files.h"
+#include "fuzz/fuzz.h"
+
+namespace {
+
+using namespace forereach;
+
+// So that a try takes milliseconds.
+bool IsSmall(const verifier::Certificate& certificate) {
+  for (const verifier::RecordedSlice& slice : certificate.slices)
+    if (slice.generators.cols() > 40) return false;
+  return certificate.controls.cols() <= 4;
+}
+
+void Verify(const CertificateFile& file) {
+  const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
+  for (const RecordedCertificate& recorded : file.certificates) {
+    if (!IsSmall(recorded.certificate)) continue;
+    const verifier::Verdict verdict = verifier.Verify(recorded.certificate);
+    Require((verdict.status == verifier::Status::kConfirmed) == verdict.failure.what.empty());
+    Require(verdict.status != verifier::Status::kConfirmed || recorded.certificate.controls.allFinite());
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static MemoryFile file;
+  const std::string& path = file.Write(Bytes(data, size));
+  IsTaken([&] { Verify(ReadCertificates(path, FOREREACH_FUZZ_TASK)); });
+  return 0;
+}
