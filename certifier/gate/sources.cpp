@@ -61,18 +61,19 @@ void Sources::Source::StartCounting(std::int64_t sequence) {
   came = 1;
 }
 
-// A source that starts again counts from 0; nobody sends kLeap candidates in between.
+// Candidates are not taken up in their order. A source that starts again counts from 0, or is far away.
 void Sources::Hear(const candidate_plan_t& candidate) {
-  constexpr std::int64_t kLeap = std::int64_t{1} << 32;
+  constexpr std::int64_t kLeap = std::int64_t{1} << 32, kBehind = 1 << 16;
   const auto known = sources_.find(NameOf(candidate));
   if (known == sources_.end() || candidate.sequence < 0) return;
   Source& source = known->second;
-  if (candidate.sequence == 0 || candidate.sequence < source.first_sequence ||
+  if (candidate.sequence == 0 || candidate.sequence < source.first_sequence - kBehind ||
       candidate.sequence - source.last_sequence > kLeap) {
     lost_before_ += source.lost();
     source.StartCounting(candidate.sequence);
     return;
   }
+  source.first_sequence = std::min(source.first_sequence, candidate.sequence);
   source.last_sequence = std::max(source.last_sequence, candidate.sequence);
   ++source.came;
 }

@@ -88,5 +88,22 @@ TEST(SourcesTest, CountsGapsAndNotOrder) {
   EXPECT_EQ(sources.lost(), 3) << "no leap counts";
 }
 
+TEST(SourcesTest, CountsWhatIsMissingWhereTheNewestComeFirst) {
+  Sources sources(kForget);
+  std::int64_t now = 0;
+  const auto take = [&](std::int64_t from, std::int64_t to) {
+    for (std::int64_t sequence = from; sequence != to; sequence += from < to ? 1 : -1) {
+      const candidate_plan_t candidate = From("a", sequence + 1, sequence);
+      sources.Hear(candidate);
+      static_cast<void>(sources.Admit(candidate, now));
+    }
+  };
+  for (std::int64_t batch = 0; batch < 100; ++batch, now += kForget + 1) {  // as the node does in a flood
+    take(100 * batch + 63, 100 * batch + 55);
+    take(100 * batch, 100 * batch + 56);
+  }
+  EXPECT_EQ(sources.lost(), 99 * 36) << "64 to 99 of each hundred but the last";
+}
+
 }  // namespace
 }  // namespace forereach
