@@ -128,7 +128,7 @@ struct EscapingKnee {
 
 template <class T = double>
 std::array<T, 8> EscapeParameters(double lambda) {
-  std::array<T, 8> parameters;
+  std::array<T, 8> parameters{};
   std::ranges::copy(VelocityKnee{kPointMass.dt}.parameters(), parameters.begin());
   parameters[7] = lambda - 1;
   return parameters;
@@ -141,16 +141,28 @@ void StepEscaping(double lambda, std::span<const T> z, std::span<T> residual, st
   for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual[k];
 }
 
+// A quarter turn of v turns the residual with it, and positions move by dt / 2 of what velocities change: two entries
+// are all there is to bound.
+Eigen::MatrixXd BoundEscape(const Domain& domain, double lambda) {
+  std::vector<Interval> parameters;
+  for (const double value : EscapeParameters(lambda)) parameters.push_back({value, value});
+  const EquationsSlopes<EscapingKnee> slopes;
+  Eigen::MatrixXd bound = Eigen::MatrixXd::Zero(4, 6);
+  for (int other = 0; other < 2; ++other) {
+    const double slope = BoundSlope(slopes, domain, parameters, 2, 2 + other, {.gap = 1e-3}).upper;
+    for (int axis = 0; axis < 2; ++axis) {
+      bound(2 + axis, 2 + (axis ^ other)) = slope;
+      bound(axis, 2 + (axis ^ other)) = kPointMass.dt / 2 * slope * (1 + kSlack);
+    }
+  }
+  return bound;
+}
+
 System MakeEscaping(double lambda) {
   System system = PointMassSystem();
   system.name = "escape_" + ToText(lambda);
   system.scenarios = 100;
-  std::vector<Interval> parameters;
-  for (const double value : EscapeParameters(lambda)) parameters.push_back({value, value});
-  const EquationsSlopes<EscapingKnee> slopes;
-  for (int k = 0; k < system.deployed.rows(); ++k)
-    for (int l = 2; l < 4; ++l)
-      system.deployed(k, l) = BoundSlope(slopes, system.domain, parameters, k, l, {.gap = 1e-3}).upper;
+  system.deployed = BoundEscape(system.domain, lambda);
   system.target = [lambda](std::span<const long double> z, std::span<long double> next) {
     std::array<long double, 4> residual;
     StepEscaping<long double>(lambda, z, residual, next);
