@@ -33,7 +33,7 @@ std::span<const Experiment> Experiments() {
                                            CertificateBudget(), ActionChunks(),       DomainExits(),
                                            FirstAbstentions(),  TubeGeometry(),       BoxAgainstZonotope(),
                                            ScalarEnvelope(),    NoiseSweep(),         NominalDegradation(),
-                                           IncorrectDeclarations(), EstimatedSlopes(), AssumptionFamilies(),
+                                           IncorrectDeclarations(), EstimatedSlopes(), AdversarialFamily(), AssumptionFamilies(),
                                            ParameterBoxes(),    NormRatios(),         InformationLimits(),
                                            CertifiedDeclarations()};
   return all;

@@ -90,6 +90,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment InformationLimits();
 [[nodiscard]] Experiment AssumptionFamilies();
 [[nodiscard]] Experiment EstimatedSlopes();
+[[nodiscard]] Experiment AdversarialFamily();
 [[nodiscard]] Experiment CertifiedDeclarations();
 [[nodiscard]] Experiment ActionChunks();
 ///@}

@@ -145,6 +145,7 @@ inline constexpr PaperValue kPaperValues[] = {
     {"band.linear", 0.092, 3, kAssumptions},
     {"band.knee", 0.850, 3, kAssumptions},
     {"slopes", 0, 3, kEstimators},
+    {"slopes.containment", 31.710, 3, kEstimators},
 
     {"boxes.5.slack", 1.177, 3, kBoxes},
     {"boxes.10.slack", 1.606, 3, kBoxes},

@@ -1,12 +1,16 @@
 #include "experiments/variants.h"
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <vector>
 
+#include "certifier/declare/residual_slopes.h"
+#include "certifier/declare/slope_bound.h"
 #include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/residuals.h"
 #include "certifier/numerics/text.h"
 #include "experiments/norm_ratio.h"
 
@@ -106,6 +110,69 @@ System MakeLinearPointMass() {
   return system;
 }
 
+struct EscapingKnee {
+  using Nominal = PointMass;
+  static constexpr const char* kName = "escaping_knee";
+  static constexpr std::array<const char*, 8> kParameterNames{
+      "dt", "damping", "cross", "knee", "softplus_temperature", "regularizer", "smoothing", "steepening"};
+
+  template <class T>
+  static void Evaluate(std::span<const T> parameters, std::span<const T> z, std::span<T> residual) {
+    using std::sqrt;
+    VelocityKnee::Evaluate<T>(parameters.first(7), z, residual);
+    const T speed = sqrt(z[2] * z[2] + z[3] * z[3] + parameters[6]);
+    const T factor = T(1) + parameters[7] * SmoothGate((speed - parameters[3]) / parameters[4]);
+    for (T& r : residual) r = factor * r;
+  }
+};
+
+template <class T = double>
+std::array<T, 8> EscapeParameters(double lambda) {
+  std::array<T, 8> parameters{};
+  std::ranges::copy(VelocityKnee{kPointMass.dt}.parameters(), parameters.begin());
+  parameters[7] = lambda - 1;
+  return parameters;
+}
+
+template <class T>
+void StepEscaping(double lambda, std::span<const T> z, std::span<T> residual, std::span<T> next) {
+  EscapingKnee::Evaluate<T>(EscapeParameters<T>(lambda), z, residual);
+  kPointMass(z, next);
+  for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual[k];
+}
+
+// A quarter turn of v turns the residual with it, and positions move by dt / 2 of what velocities change: two entries
+// are all there is to bound.
+Eigen::MatrixXd BoundEscape(const Domain& domain, double lambda) {
+  std::vector<Interval> parameters;
+  for (const double value : EscapeParameters(lambda)) parameters.push_back({value, value});
+  const EquationsSlopes<EscapingKnee> slopes;
+  Eigen::MatrixXd bound = Eigen::MatrixXd::Zero(4, 6);
+  for (int other = 0; other < 2; ++other) {
+    const double slope = BoundSlope(slopes, domain, parameters, 2, 2 + other, {.gap = 1e-3}).upper;
+    for (int axis = 0; axis < 2; ++axis) {
+      bound(2 + axis, 2 + (axis ^ other)) = slope;
+      bound(axis, 2 + (axis ^ other)) = kPointMass.dt / 2 * slope * (1 + kSlack);
+    }
+  }
+  return bound;
+}
+
+System MakeEscaping(double lambda) {
+  System system = PointMassSystem();
+  system.name = "escape_" + ToText(lambda);
+  system.scenarios = 100;
+  system.deployed = BoundEscape(system.domain, lambda);
+  system.target = [lambda](std::span<const long double> z, std::span<long double> next) {
+    std::array<long double, 4> residual;
+    StepEscaping<long double>(lambda, z, residual, next);
+  };
+  system.step = [lambda](std::span<const double> z, std::span<double> residual, std::span<double> next) {
+    StepEscaping<double>(lambda, z, residual, next);
+  };
+  return system;
+}
+
 }  // namespace
 
 const System& Degraded(const System& system, double part) {
@@ -118,6 +185,19 @@ const System& Degraded(const System& system, double part) {
 const System& LinearPointMass() {
   static const System system = MakeLinearPointMass();
   return system;
+}
+
+const System& Escaping(double lambda) {
+  static std::map<double, System> known;
+  const auto [at, is_new] = known.try_emplace(lambda);
+  if (is_new) at->second = MakeEscaping(lambda);
+  return at->second;
+}
+
+double EscapeAt(double lambda, double speed) {
+  std::array<double, 4> residual;
+  EscapingKnee::Evaluate<double>(EscapeParameters(lambda), std::array{0.0, 0.0, speed, 0.0, 0.0, 0.0}, residual);
+  return std::hypot(residual[2], residual[3]) / kPointMass.dt;
 }
 
 }  // namespace forereach::experiments

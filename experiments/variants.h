@@ -17,4 +17,14 @@ a = 0.15 M v in place of the knee, and declared exactly; the paper gives no figu
 same model, domain and data region. */
 [[nodiscard]] const System& LinearPointMass();
 
+/** The adversarial residual family, on the point mass: the knee's residual r, steepened beyond the knee,
+    r_lambda(z) = [1 + (lambda - 1) SmoothGate((s - v_knee) / beta_pm)] r(z),   s the speed.
+Smooth; r_1 = r; no member differs from r up to the knee, bit by bit, and far beyond it r_lambda nears lambda r. The
+declaration bounds the slopes of r_lambda over the domain by branch and bound, to 0.1 %. The paper draws such a family
+and gives no formula: this one is ours. Made once for each lambda; not for several threads at once. @pre lambda >= 1 */
+[[nodiscard]] const System& Escaping(double lambda);
+
+/** |a| = |(r_lambda)_v|_2 / dt at a speed, m/s^2; the direction does not matter. */
+[[nodiscard]] double EscapeAt(double lambda, double speed);
+
 }  // namespace forereach::experiments

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "experiments/scenarios.h"
 #include "tests/oracle/random.h"
 
 namespace forereach::experiments {
@@ -63,6 +65,45 @@ TEST(Degraded, LeavesTheTargetAndDeclaresWhatTheModelLacks) {
 TEST(LinearPointMass, IsDeclaredExactly) {
   ExpectDeclared(LinearPointMass(), 3);
   EXPECT_NEAR(LinearPointMass().deployed(2, 2), 0.15 * 0.15 * 0.4, 1e-12);
+}
+
+// The largest |d r_k / d z_l| at many angles of the velocity, at the domain's largest speed.
+double SteepestAtTheRim(const System& system, std::size_t k, std::size_t l) {
+  constexpr double kStep = 1e-5;
+  constexpr int kAngles = 1000;
+  double steepest = 0;
+  for (int i = 0; i < kAngles; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kAngles;
+    std::vector<double> z{0, 0, 5.4 * std::cos(angle), 5.4 * std::sin(angle), 0, 0}, next(4), before(4), after(4);
+    system.step(z, before, next);
+    z[l] += kStep;
+    system.step(z, after, next);
+    steepest = std::max(steepest, std::abs(after[k] - before[k]) / kStep);
+  }
+  return steepest;
+}
+
+TEST(Escaping, IsDeclaredWithinAPercent) {
+  for (const double lambda : {1.0, 32.0}) {
+    const System& system = Escaping(lambda);
+    ExpectDeclared(system, 4);
+    for (const int k : {0, 1, 2, 3})
+      for (const int l : {2, 3})
+        EXPECT_NEAR(SteepestAtTheRim(system, static_cast<std::size_t>(k), static_cast<std::size_t>(l)) /
+                        system.deployed(k, l), 1, 0.01)
+            << lambda << " " << k << " " << l;
+  }
+  EXPECT_GT(Escaping(32).deployed(2, 2), 25 * Escaping(1).deployed(2, 2));
+}
+
+TEST(Escaping, MembersAgreeBelowTheKneeAndTheFirstIsTheKnee) {
+  const auto successors = [](const System& system, Layout layout) { return MakeData(system, layout, 0, 100, 0).x_next; };
+  for (const Layout layout : {Layout::kBelowKnee, Layout::kCorridor})
+    EXPECT_EQ(successors(Escaping(1), layout), successors(PointMassSystem(), layout));
+  EXPECT_EQ(successors(Escaping(32), Layout::kBelowKnee), successors(Escaping(1), Layout::kBelowKnee));
+  EXPECT_NE(successors(Escaping(32), Layout::kCorridor), successors(Escaping(1), Layout::kCorridor));
+  EXPECT_EQ(EscapeAt(32, 0.9), EscapeAt(1, 0.9));
+  EXPECT_GT(EscapeAt(32, 3), 29 * EscapeAt(1, 3));
 }
 
 }  // namespace
