@@ -98,7 +98,7 @@ TEST(SourcesTest, CountsWhatIsMissingWhereTheNewestComeFirst) {
       static_cast<void>(sources.Admit(candidate, now));
     }
   };
-  for (std::int64_t batch = 0; batch < 100; ++batch, now += kForget + 1) {  // as the node does in a flood
+  for (std::int64_t batch = 0; batch < 100; ++batch, now += 1000) {  // as the node does in a flood
     take(100 * batch + 63, 100 * batch + 55);
     take(100 * batch, 100 * batch + 56);
   }
