@@ -17,6 +17,7 @@
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/transition_message.h"
 #include "certifier/sets/zonogon.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -34,7 +35,7 @@ constexpr std::size_t kBatch = 256;
 class PictureMaker final {
  public:
   explicit PictureMaker(const Config& config)
-      : channels_(config.bus), certifier_(config.problem), obstacles_(config.obstacles) {
+      : channels_(config.bus), certifier_(config.problem), obstacles_(config.obstacles), learns_(config.gate.learns) {
     if (certifier_.projection().dim() != 2)
       throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}",
                                      certifier_.projection().dim()));
@@ -51,6 +52,8 @@ class PictureMaker final {
       if (const auto decision = Decoded<decision_t>(event.message())) AddDecision(*decision);
     } else if (event.channel == channels_.obstacles) {
       if (const auto obstacles = Decoded<obstacles_t>(event.message())) SetObstacles(*obstacles);
+    } else if (event.channel == channels_.transition) {
+      if (const auto transition = Decoded<transition_t>(event.message()); transition && learns_) Learn(*transition);
     } else if (event.channel == channels_.robot_state) {
       if (const auto state = Decoded<robot_state_t>(event.message())) AddState(*state);
     } else if (event.channel == channels_.event) {
@@ -95,6 +98,14 @@ class PictureMaker final {
     if (!candidate || (!certified && decision.outcome != decision_t::ABSTAIN_SAFETY)) return;
     decided_.push_back({*candidate, decision.outcome, decision.step});
     if (decided_.size() >= kBatch) CertifyAgain();
+  }
+
+  // As the gate did, so that what comes after is decided on with it.
+  void Learn(const transition_t& message) {
+    const ExecutedTransition transition = FromMessage(message, certifier_.problem());
+    if (!transition.refusal.empty()) return;
+    CertifyAgain();
+    static_cast<void>(certifier_.Learn(transition.z, transition.next));
   }
 
   // All that were decided on under the obstacles in force; leaves out those whose answer is not the recorded one.
@@ -200,6 +211,7 @@ class PictureMaker final {
   BusOptions channels_;
   Certifier certifier_;
   std::vector<Obstacle> obstacles_;
+  const bool learns_;
   std::vector<Decided> decided_;  // under the obstacles in force, and not yet certified again
   std::deque<std::pair<Digest, std::vector<std::uint8_t>>> candidates_;  // received and not yet decided
   std::map<std::int64_t, std::vector<Picture::Polygon>> tubes_;          // of certified plans, by plan_id
