@@ -14,7 +14,7 @@
 namespace forereach {
 namespace {
 
-constexpr std::size_t kQueueMessages = 4096;
+constexpr std::size_t kQueueMessages = 4096, kQueueBytes = std::size_t{32} << 20;  // 800 certified plans
 constexpr int kLcmQueueMessages = 1024;
 constexpr int kReceivePollMs = 50;
 
@@ -53,6 +53,7 @@ class LcmBus final : public Bus {
       std::unique_lock lock(mutex_);
       if (!in_memory_) arrived_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !queue_.empty(); });
       batch.swap(queue_);
+      queued_bytes_ = 0;
     }
     std::exception_ptr failure;
     for (const Stored& stored : batch) {
@@ -85,17 +86,24 @@ class LcmBus final : public Bus {
     LcmBus& bus = *subscription->bus;
     try {
       std::lock_guard lock(bus.mutex_);
-      if (bus.queue_.size() >= kQueueMessages) {
-        bus.queue_.pop_front();
-        ++bus.dropped_;
-      }
       const std::int64_t utime = bus.in_memory_ ? bus.clock_() : buffer->recv_utime;
       const auto* data = static_cast<const std::uint8_t*>(buffer->data);
-      bus.queue_.push_back({channel, {data, data + buffer->data_size}, utime, &subscription->handler});
+      bus.Store({channel, {data, data + buffer->data_size}, utime, &subscription->handler});
     } catch (...) {
       ++bus.dropped_;
     }
     bus.arrived_.notify_one();
+  }
+
+  // The oldest make room. A message longer than all of the room is kept alone.
+  void Store(Stored stored) {
+    queued_bytes_ += stored.bytes.size();
+    queue_.push_back(std::move(stored));
+    while (queue_.size() > 1 && (queue_.size() > kQueueMessages || queued_bytes_ > kQueueBytes)) {
+      queued_bytes_ -= queue_.front().bytes.size();
+      queue_.pop_front();
+      ++dropped_;
+    }
   }
 
   void Receive() {
@@ -105,9 +113,10 @@ class LcmBus final : public Bus {
   const bool in_memory_;
   const Clock clock_;
   lcm::LCM lcm_;
-  std::mutex mutex_;  // guards queue_ and subscriptions_
+  std::mutex mutex_;  // guards queue_, queued_bytes_ and subscriptions_
   std::condition_variable arrived_;
   std::deque<Stored> queue_;
+  std::size_t queued_bytes_ = 0;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
   std::atomic<std::int64_t> dropped_ = 0;
   std::atomic<bool> stopping_ = false;

@@ -52,7 +52,7 @@ class Bus {
   A handler that throws loses that message only: the exception reaches the caller, the bus stays usable. */
   virtual int Dispatch(int timeout_ms) = 0;
 
-  /** Messages discarded here because more than the bounded queue holds had arrived undispatched. */
+  /** Messages discarded here because more than the bounded queue holds, 4096 or 32 MiB, had arrived undispatched. */
   [[nodiscard]] virtual std::int64_t dropped() const = 0;
 
   /** Messages that were not authentic, on a bus that looks. */

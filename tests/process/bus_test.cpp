@@ -100,6 +100,29 @@ TEST(MemoryBusTest, CountsWhatItsQueueCannotHold) {
   EXPECT_EQ(heard.front(), bus->dropped());
 }
 
+// Messages that are long are bounded by their bytes, before there are so many.
+TEST(MemoryBusTest, HoldsSoManyBytesOnly) {
+  const auto bus = OpenBus("memq://", [] { return 0; });
+  constexpr std::size_t kBound = std::size_t{32} << 20;
+  const std::vector<std::uint8_t> half(kBound / 2), whole(kBound), more(kBound + 1);
+  std::vector<std::size_t> heard;
+  bus->Subscribe("A", [&](const Received& r) { heard.push_back(r.bytes.size()); });
+  const auto after = [&](std::initializer_list<const std::vector<std::uint8_t>*> sent) {
+    heard.clear();
+    for (const auto* bytes : sent) bus->Publish("A", Bytes(*bytes));
+    bus->Dispatch(0);
+    return heard;
+  };
+  using Sizes = std::vector<std::size_t>;
+  EXPECT_EQ(after({&half, &half}), (Sizes{kBound / 2, kBound / 2}));
+  EXPECT_EQ(bus->dropped(), 0);
+  EXPECT_EQ(after({&half, &half, &half}), (Sizes{kBound / 2, kBound / 2})) << "the room is free again each time";
+  EXPECT_EQ(bus->dropped(), 1);
+  EXPECT_EQ(after({&half, &whole}), Sizes{kBound});
+  EXPECT_EQ(after({&half, &more}), Sizes{kBound + 1}) << "a message longer than the room is kept alone";
+  EXPECT_EQ(bus->dropped(), 3);
+}
+
 class ThrowingHandlerTest : public testing::TestWithParam<const char*> {
  protected:
   std::string url() const { return std::string(GetParam()) == "memq" ? "memq://" : PrivateBusUrl(); }
