@@ -9,14 +9,14 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/freshness.h"
-#include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/transition_message.h"
 #include "certifier/task/files.h"
 #include "certifier/task/json_file.h"
 #include "cli/decision_json.h"
+#include "cli/restarts.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -114,28 +114,25 @@ CertificateFile FromDecision(const std::string& path, const Json& document, cons
 // The obstacles that were in force, one version after the other, in the order of the log.
 class ObstacleHistory {
  public:
-  explicit ObstacleHistory(const Config& config) : config_(config) { Restart(); }
+  explicit ObstacleHistory(const Config& config) : config_(config), versions_{OfTask()} {}
 
-  void Restart() {
-    versions_.push_back({config_.obstacles, config_.obstacles_digest});
-    last_sequence_ = -1;
+  void Restart() { versions_.push_back(OfTask()); }
+
+  void Reload() {
+    ObstaclesInForce after = OfTask();
+    after.Inherit(versions_.back());
+    versions_.push_back(std::move(after));
   }
 
-  // As the gate takes them: fresh, in order, whole or not at all.
+  // As the gate takes them.
   void Update(const LogEvent& event) {
     const auto message = Decoded<obstacles_t>(event.message());
     const auto us = [](double ms) { return static_cast<std::int64_t>(std::llround(ms * 1e3)); };
-    if (!message || message->sequence <= last_sequence_ ||
-        FreshnessOf(message->utime, event.utime, us(config_.gate.max_age_ms), us(config_.gate.max_ahead_ms)) !=
-            Freshness::kFresh)
+    if (!message || FreshnessOf(message->utime, event.utime, us(config_.gate.max_age_ms), us(config_.gate.max_ahead_ms)) !=
+                        Freshness::kFresh)
       return;
-    try {
-      auto obstacles = FromMessage(*message, static_cast<int>(config_.problem->projection.rows()));
-      const Digest digest = ObstaclesDigest(obstacles);
-      versions_.push_back({std::move(obstacles), digest});
-      last_sequence_ = message->sequence;
-    } catch (const std::invalid_argument&) {
-    }
+    ObstaclesInForce after = versions_.back();
+    if (after.Update(*message).empty()) versions_.push_back(std::move(after));
   }
 
   [[nodiscard]] std::size_t now() const { return versions_.size() - 1; }
@@ -143,20 +140,19 @@ class ObstacleHistory {
   // The version of that digest that was in force some time since `first`; without one, that which was at `first`.
   [[nodiscard]] std::size_t Find(std::size_t first, const Digest& digest) const {
     for (std::size_t i = first; i < versions_.size(); ++i)
-      if (versions_[i].digest == digest) return i;
+      if (versions_[i].digest() == digest) return i;
     return first;
   }
 
-  struct Version {
-    std::vector<Obstacle> obstacles;
-    Digest digest;
-  };
-  [[nodiscard]] const Version& version(std::size_t i) const { return versions_[i]; }
+  [[nodiscard]] const ObstaclesInForce& version(std::size_t i) const { return versions_[i]; }
 
  private:
+  [[nodiscard]] ObstaclesInForce OfTask() const {
+    return {config_.obstacles, static_cast<int>(config_.problem->projection.rows())};
+  }
+
   const Config& config_;
-  std::vector<Version> versions_;
-  std::int64_t last_sequence_ = -1;
+  std::vector<ObstaclesInForce> versions_;
 };
 
 // The transitions that were learned on the way, and what the certifier knew at each digest of its observations.
@@ -182,13 +178,10 @@ class LearnedHistory {
     Note();
   }
 
-  [[nodiscard]] std::optional<verifier::KnownRows> Find(const Digest& digest) const {
+  // @param digest in hexadecimal.
+  [[nodiscard]] std::optional<verifier::KnownRows> Find(const std::string& digest) const {
     const auto known = known_.find(digest);
     return known == known_.end() ? std::nullopt : std::optional(known->second);
-  }
-
-  [[nodiscard]] bool Knows(const std::string& hex_digest) const {
-    return std::ranges::any_of(known_, [&](const auto& entry) { return ToHex(entry.first) == hex_digest; });
   }
 
   // The task's problem with all of them behind its own transitions.
@@ -209,14 +202,14 @@ class LearnedHistory {
  private:
   void Note() {
     const int base = config_.problem->transitions.size();
-    known_[digest_] = {base, base + static_cast<int>(begin_), base + static_cast<int>(rows_.size())};
+    known_[ToHex(digest_)] = {base, base + static_cast<int>(begin_), base + static_cast<int>(rows_.size())};
   }
 
   const Config& config_;
   std::vector<ExecutedTransition> rows_;
   std::size_t begin_ = 0;  // of those learned since the certifier began
   Digest digest_;
-  std::map<Digest, verifier::KnownRows> known_;
+  std::map<std::string, verifier::KnownRows> known_;
 };
 
 verifier::Certificate CertificateOf(const certified_plan_t& certified, const std::vector<Obstacle>& obstacles) {
@@ -285,12 +278,11 @@ class LogReading {
     last = sequence;
   }
 
-  // Nor does it know what it had learned; a reload forgets it too.
   void TakeStatus(const LogEvent& event) {
-    const auto status = Decoded<certifier_status_v2_t>(event.message());
-    if (!status) return;
-    if (status->sequence < last_status_.sequence || status->version != last_status_.version) learned_.Restart();
-    last_status_ = *status;
+    const Restarts::Kind kind = restarts_.Notice(event.message());
+    if (kind == Restarts::Kind::kNone) return;
+    learned_.Restart();
+    if (kind == Restarts::Kind::kReload) obstacles_.Reload();
   }
 
   void TakeDecision(const LogEvent& event) {
@@ -329,7 +321,7 @@ class LogReading {
     const auto sent = in_force_.find(plan);
     const Digest named = GetDigest(certified.obstacles_digest);
     const auto& version = obstacles_.version(obstacles_.Find(sent == in_force_.end() ? 0 : sent->second, named));
-    certificate.certificate = CertificateOf(certified, version.obstacles);
+    certificate.certificate = CertificateOf(certified, version.all());
     const auto compare = [&](const char* what, const char* name, const Digest& expected, const Digest& found) {
       Compare(certificate, std::string(what) + name, ToHex(expected), ToHex(found));
     };
@@ -338,11 +330,11 @@ class LogReading {
     compare(kOtherInput, "config", config_.digest, GetDigest(certified.config_digest));
     compare(kOtherInput, "model", config_.model_digest, GetDigest(certified.model_digest));
     compare(kOtherInput, "declaration", config_.declaration_digest, GetDigest(certified.declaration_digest));
-    if (const auto known = learned_.Find(GetDigest(certified.observations_digest)))
+    if (const auto known = learned_.Find(ToHex(GetDigest(certified.observations_digest))))
       certificate.certificate.known = *known;
     else
       compare(kOtherInput, "observations", config_.observations_digest, GetDigest(certified.observations_digest));
-    compare(kOtherInput, "obstacles in force", version.digest, named);
+    compare(kOtherInput, "obstacles in force", version.digest(), named);
     if (sent == in_force_.end())
       certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
   }
@@ -350,7 +342,7 @@ class LogReading {
   const Config& config_;
   ObstacleHistory obstacles_;
   LearnedHistory& learned_;
-  certifier_status_v2_t last_status_{};
+  Restarts restarts_;
   std::vector<RecordedCertificate>& certificates_;
   std::string log_;
   std::map<Digest, std::size_t> in_force_;  // when a candidate was sent
@@ -384,7 +376,7 @@ void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, cons
     Compare(certificate, std::string(kOtherInput) + "model", ToHex(config.model_digest), row.model_digest);
     Compare(certificate, std::string(kOtherInput) + "declaration", ToHex(config.declaration_digest),
             row.declaration_digest);
-    if (!learned.Knows(row.observations_digest))
+    if (!learned.Find(row.observations_digest))
       Compare(certificate, std::string(kOtherInput) + "observations", ToHex(config.observations_digest),
               row.observations_digest);
     if (!certificate.missing.empty() || !certificate.mismatches.empty()) {

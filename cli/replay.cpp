@@ -3,11 +3,12 @@
 #include <deque>
 #include <filesystem>
 #include <map>
-#include <optional>
+#include <memory>
+#include <utility>
 
 #include "certifier/gate/gate.h"
+#include "cli/restarts.h"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -88,17 +89,21 @@ class Replayer {
   };
 
   void Restart() {
-    gate_.emplace(config_);
+    gate_ = std::make_unique<Gate>(config_);
     changes_.clear();
     last_sequence_ = -1;
   }
 
-  // The first heartbeat comes before anything is decided on or learned.
+  void Reload() {
+    while (!changes_.empty()) TakeChange();
+    const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(config_));
+    gate_->Inherit(*before);
+  }
+
   void FeedStatus(const LogEvent& event) {
-    const auto status = Decoded<certifier_status_v2_t>(event.message());
-    if (!status) return;
-    if (status->sequence < last_status_.sequence || status->version != last_status_.version) Restart();
-    last_status_ = *status;
+    const Restarts::Kind kind = restarts_.Notice(event.message());
+    if (kind == Restarts::Kind::kBegin) Restart();
+    if (kind == Restarts::Kind::kReload) Reload();
   }
 
   void FeedDecision(const LogEvent& event, const std::string& name) {
@@ -126,14 +131,17 @@ class Replayer {
   // What had changed before the decision was made, which is at most what is logged before it.
   void CatchUp(const decision_t& recorded) {
     const Digest obstacles = GetDigest(recorded.obstacles_digest), observations = GetDigest(recorded.observations_digest);
-    while (!changes_.empty() && (gate_->obstacles_digest() != obstacles || gate_->observations_digest() != observations)) {
-      const Change& change = changes_.front();
-      if (change.channel == config_.bus.obstacles)
-        static_cast<void>(gate_->UpdateObstacles(change.bytes, change.utime));
-      else
-        static_cast<void>(gate_->Learn(change.bytes));
-      changes_.pop_front();
-    }
+    while (!changes_.empty() && (gate_->obstacles_digest() != obstacles || gate_->observations_digest() != observations))
+      TakeChange();
+  }
+
+  void TakeChange() {
+    const Change& change = changes_.front();
+    if (change.channel == config_.bus.obstacles)
+      static_cast<void>(gate_->UpdateObstacles(change.bytes, change.utime));
+    else
+      static_cast<void>(gate_->Learn(change.bytes));
+    changes_.pop_front();
   }
 
   void CheckSeal(const LogEvent& event, const std::string& name) {
@@ -149,10 +157,10 @@ class Replayer {
   }
 
   const Config& config_;
-  std::optional<Gate> gate_;
+  std::unique_ptr<Gate> gate_;
   std::map<Digest, std::deque<Candidate>> candidates_;  // not decided yet
   std::deque<Change> changes_;                          // logged, and perhaps not yet seen by the certifier
-  certifier_status_v2_t last_status_{};
+  Restarts restarts_;
   std::int64_t last_sequence_ = -1;
   ReplayResult result_;
 };

@@ -20,6 +20,7 @@ void CatchStopSignals() {
 
 void RunNode(Node& node, Bus& bus) {
   CatchStopSignals();
+  node.Tick(WallClockUs());  // its first sign of life comes before anything that it hears
   while (!stop_requested && !node.done()) {
     bus.Dispatch(node.busy() ? 0 : kTickMs);
     if (reload_requested) {

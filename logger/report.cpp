@@ -16,7 +16,7 @@
 #include "certifier/certify/batch.h"
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/transition_message.h"
 #include "certifier/sets/zonogon.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -35,7 +35,7 @@ constexpr std::size_t kBatch = 256;
 class PictureMaker final {
  public:
   explicit PictureMaker(const Config& config)
-      : channels_(config.bus), certifier_(config.problem), obstacles_(config.obstacles), learns_(config.gate.learns) {
+      : channels_(config.bus), certifier_(config.problem), obstacles_(config.obstacles, certifier_.projection().dim()), learns_(config.gate.learns) {
     if (certifier_.projection().dim() != 2)
       throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}",
                                      certifier_.projection().dim()));
@@ -51,7 +51,7 @@ class PictureMaker final {
     } else if (event.channel == channels_.decision) {
       if (const auto decision = Decoded<decision_t>(event.message())) AddDecision(*decision);
     } else if (event.channel == channels_.obstacles) {
-      if (const auto obstacles = Decoded<obstacles_t>(event.message())) SetObstacles(*obstacles);
+      if (const auto obstacles = Decoded<obstacles_t>(event.message())) Update(*obstacles);
     } else if (event.channel == channels_.transition) {
       if (const auto transition = Decoded<transition_t>(event.message()); transition && learns_) Learn(*transition);
     } else if (event.channel == channels_.robot_state) {
@@ -68,7 +68,7 @@ class PictureMaker final {
       for (std::size_t t = 0; t < tube.size(); ++t)
         (executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed : picture.certified)
             .push_back(std::move(tube[t]));
-    for (const Obstacle& obstacle : obstacles_) AddObstacle(obstacle);
+    for (const Obstacle& obstacle : obstacles_.all()) AddObstacle(obstacle);
     return std::move(result_);
   }
 
@@ -78,14 +78,10 @@ class PictureMaker final {
     int outcome, step;
   };
 
-  void SetObstacles(const obstacles_t& message) {
-    try {
-      std::vector<Obstacle> obstacles = FromMessage(message, certifier_.projection().dim());
-      CertifyAgain();
-      obstacles_ = std::move(obstacles);
-    } catch (const std::invalid_argument&) {
-      // The gate kept its obstacles too.
-    }
+  // Where they are refused, the gate kept its obstacles too.
+  void Update(const obstacles_t& message) {
+    CertifyAgain();
+    static_cast<void>(obstacles_.Update(message));
   }
 
   void AddDecision(const decision_t& decision) {
@@ -110,13 +106,14 @@ class PictureMaker final {
 
   // All that were decided on under the obstacles in force; leaves out those whose answer is not the recorded one.
   void CertifyAgain() {
+    if (decided_.empty()) return;
     std::vector<Plan> plans;
     std::vector<Zonotope> initial_sets;
     std::vector<const Decided*> asked;
     for (const Decided& decided : decided_) try {
         const Zonotope initial_set = InitialSetOf(decided.candidate);
         const Plan plan = PlanOf(decided.candidate);
-        certifier_.Require(plan, initial_set, obstacles_);
+        certifier_.Require(plan, initial_set, obstacles_.all());
         plans.push_back(plan);
         initial_sets.push_back(initial_set);
         asked.push_back(&decided);
@@ -128,7 +125,7 @@ class PictureMaker final {
       if (static_cast<int>(again.outcome) == asked[i]->outcome && again.step == asked[i]->step)
         outlines[i] = Outlines(tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
     };
-    (void)CertifyAll(certifier_, plans, initial_sets, obstacles_, std::max(1u, std::thread::hardware_concurrency()), draw);
+    (void)CertifyAll(certifier_, plans, initial_sets, obstacles_.all(), std::max(1u, std::thread::hardware_concurrency()), draw);
     for (std::size_t i = 0; i < asked.size(); ++i) {
       if (outlines[i].empty())
         ++result_.disagreements;
@@ -210,7 +207,7 @@ class PictureMaker final {
 
   BusOptions channels_;
   Certifier certifier_;
-  std::vector<Obstacle> obstacles_;
+  ObstaclesInForce obstacles_;
   const bool learns_;
   std::vector<Decided> decided_;  // under the obstacles in force, and not yet certified again
   std::deque<std::pair<Digest, std::vector<std::uint8_t>>> candidates_;  // received and not yet decided

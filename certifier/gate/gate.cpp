@@ -6,7 +6,6 @@
 
 #include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/transition_message.h"
 #include "certifier/numerics/text.h"
 #include "lcmtypes/seal.h"
@@ -38,12 +37,11 @@ Gate::Gate(const Config& config)
       model_digest_(config.model_digest),
       declaration_digest_(config.declaration_digest),
       observations_digest_(config.observations_digest),
-      obstacles_digest_(config.obstacles_digest),
-      obstacles_(config.obstacles),
+      obstacles_(config.obstacles, certifier_.projection().dim()),
       sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)) {}
 
 void Gate::Inherit(const Gate& before) {
-  last_obstacles_sequence_ = before.last_obstacles_sequence_;
+  obstacles_.Inherit(before.obstacles_);
   sources_ = before.sources_;
   decisions_ = before.decisions_;
   certificates_ = before.certificates_;
@@ -201,8 +199,8 @@ std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candi
 void Gate::Certify(const candidate_plan_t& candidate, GateAnswer& answer) {
   const Zonotope initial_set = InitialSetOf(candidate);
   const Plan plan = PlanOf(candidate);
-  certifier_.Require(plan, initial_set, obstacles_);
-  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_, tube_);
+  certifier_.Require(plan, initial_set, obstacles_.all());
+  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
 
   decision_t& decision = answer.decision;
   decision.outcome = static_cast<std::int16_t>(verdict.outcome);
@@ -254,18 +252,7 @@ std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) {
   const auto message = Decoded<obstacles_t>(bytes);
   if (!message) return "not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) + " bytes";
   if (std::string error = CheckFresh(message->utime, now_us); !error.empty()) return error;
-  if (message->sequence <= last_obstacles_sequence_)
-    return "sequence " + std::to_string(message->sequence) + " does not exceed the last, " +
-           std::to_string(last_obstacles_sequence_);
-  try {
-    std::vector<Obstacle> obstacles = FromMessage(*message, certifier_.projection().dim());
-    obstacles_digest_ = ObstaclesDigest(obstacles);
-    obstacles_ = std::move(obstacles);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  last_obstacles_sequence_ = message->sequence;
-  return {};
+  return obstacles_.Update(*message);
 }
 
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
@@ -314,7 +301,7 @@ void Gate::SetDigests(Message& message) const {
   SetDigest(message.model_digest, model_digest_);
   SetDigest(message.declaration_digest, declaration_digest_);
   SetDigest(message.observations_digest, observations_digest_);
-  SetDigest(message.obstacles_digest, obstacles_digest_);
+  SetDigest(message.obstacles_digest, obstacles_.digest());
 }
 
 }  // namespace forereach

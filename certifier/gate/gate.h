@@ -13,6 +13,7 @@ error inside. Whether the world is fit for certificates at all is for others to 
 
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/freshness.h"
+#include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/sources.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -39,7 +40,7 @@ class Gate final {
   explicit Gate(const Config& config);
 
   [[nodiscard]] const Certifier& certifier() const { return certifier_; }
-  [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_; }
+  [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
   /** The tube of the last candidate that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
@@ -71,13 +72,13 @@ class Gate final {
   /** As Certifier's. */
   void Compact() { certifier_.Compact(); }
 
-  /** Goes on where another gate stops: its counts, sequences and sources. What is decided from now on is this one's. */
+  /** Goes on where another gate stops: its counts, sources and the obstacles it has heard. */
   void Inherit(const Gate& before);
 
   /** Counts so far and the digests in force; the rest is the caller's. */
   [[nodiscard]] certifier_status_v2_t Status(std::int64_t now_us) const;
   [[nodiscard]] Digest observations_digest() const { return observations_digest_; }
-  [[nodiscard]] Digest obstacles_digest() const { return obstacles_digest_; }
+  [[nodiscard]] Digest obstacles_digest() const { return obstacles_.digest(); }
 
  private:
   struct Rejection {
@@ -109,9 +110,8 @@ class Gate final {
 
   Certifier certifier_;
   GateOptions options_;
-  Digest config_digest_, model_digest_, declaration_digest_, observations_digest_, obstacles_digest_;
-  std::vector<Obstacle> obstacles_;
-  std::int64_t last_obstacles_sequence_ = -1;
+  Digest config_digest_, model_digest_, declaration_digest_, observations_digest_;
+  ObstaclesInForce obstacles_;
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;
   certifier_status_v2_t counts_{};

@@ -165,6 +165,7 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
 // ---- Candidates.
 
 void CertifierNode::Tick(std::int64_t now_us) {
+  if (heartbeats_ == 0) Heartbeat(now_us);  // says that nothing has been decided or learned yet
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) Announce(EmptyFault(fault->cause), *fault);
   TakeReload();
   AnswerWaiting();

@@ -8,11 +8,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "certifier/gate/gate.h"
+#include "certifier/gate/obstacle_message.h"
 #include "cli/replay.h"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "logger/event_log.h"
+#include "tests/gate/small_task.h"
 
 namespace forereach {
 namespace {
@@ -22,12 +26,17 @@ using testing::HasSubstr;
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
+// The path of a log that is not there yet.
+std::string NewLog() {
+  const std::string path = testing::TempDir() + "forereach_replay_" + std::to_string(getpid()) + ".lcmlog";
+  std::filesystem::remove(path);
+  return path;
+}
+
 // Copies the log, each event changed by `edit`.
 template <class Edit>
 std::string Edited(Edit edit) {
-  const std::string path =
-      testing::TempDir() + "forereach_replay_" + std::to_string(getpid()) + ".lcmlog";
-  std::filesystem::remove(path);
+  const std::string path = NewLog();
   EventLogReader reader(kLog);
   EventLogWriter writer(path);
   LogEvent event;
@@ -135,6 +144,72 @@ TEST(Replay, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
   EXPECT_EQ(parts.agreed, whole.agreed);
   EXPECT_THAT(Replay({logs[1]}, config).differences, testing::Not(testing::IsEmpty()));
   for (const std::string& log : logs) std::filesystem::remove(log);
+}
+
+// A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if the
+// certifier itself began after them.
+TEST(Replay, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
+  const Config config = SmallTask();
+  obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
+  on_the_way.utime = kNow;
+  for (const std::int64_t heartbeat : {0, 7}) {
+    Gate gate(config);
+    if (heartbeat > 0) {
+      EXPECT_EQ(gate.UpdateObstacles(Encode(on_the_way), kNow), "");
+    }
+    const auto candidate = Encode(Candidate(1));
+    const decision_t decision = gate.Decide(candidate, kNow).decision;
+    EXPECT_EQ(decision.outcome, heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
+    certifier_status_v2_t status{};
+    status.sequence = heartbeat;
+    const std::string path = NewLog();
+    {
+      EventLogWriter writer(path);
+      writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
+      writer.Append(kNow, config.bus.status, Encode(status));
+      writer.Append(kNow, config.bus.candidate, candidate);
+      writer.Append(kNow, config.bus.decision, Encode(decision));
+      EXPECT_TRUE(writer.Flush());
+    }
+    const ReplayResult result = Replay({path}, config);
+    EXPECT_EQ(result.agreed, 1);
+    EXPECT_THAT(result.differences, testing::IsEmpty());
+    std::filesystem::remove(path);
+  }
+}
+
+// What was heard before a reload counts after it, beside the task's own.
+TEST(Replay, AReloadKeepsTheObstaclesThatWereHeard) {
+  const Config config = SmallTask();
+  obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
+  far_away.utime = kNow;
+  Gate before(config), after(config);
+  certifier_status_v2_t first{}, second{};
+  second.sequence = 1;
+  first.version = 1, second.version = 2;
+  const std::string path = NewLog();
+  {
+    EventLogWriter writer(path);
+    writer.Append(kNow, config.bus.status, Encode(first));
+    writer.Append(kNow, config.bus.obstacles, Encode(far_away));
+    EXPECT_EQ(before.UpdateObstacles(Encode(far_away), kNow), "");
+    const auto decide = [&](Gate& gate, std::int64_t plan_id, std::int16_t outcome) {
+      const auto candidate = Encode(Candidate(plan_id, kAccelerationIntoTheCircle));
+      const decision_t decision = gate.Decide(candidate, kNow).decision;
+      EXPECT_EQ(decision.outcome, outcome);
+      writer.Append(kNow, config.bus.candidate, candidate);
+      writer.Append(kNow, config.bus.decision, Encode(decision));
+    };
+    decide(before, 1, decision_t::CERTIFIED);
+    after.Inherit(before);
+    writer.Append(kNow, config.bus.status, Encode(second));
+    decide(after, 2, decision_t::ABSTAIN_SAFETY);
+    EXPECT_TRUE(writer.Flush());
+  }
+  const ReplayResult result = Replay({path}, config);
+  EXPECT_EQ(result.agreed, 2);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+  std::filesystem::remove(path);
 }
 
 TEST(Replay, AnotherTaskIsNoticed) {

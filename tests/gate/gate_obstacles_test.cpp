@@ -2,6 +2,7 @@
 #include <functional>
 #include <initializer_list>
 #include <limits>
+#include <memory>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -87,6 +88,41 @@ TEST_F(GateObstaclesTest, OnlyANewerSequenceReplaces) {
   ExpectRefused(Encode(Message(kOnTheWay, 6)), "sequence 6");
   ExpectRefused(Encode(Message(kOnTheWay, -1)), "sequence -1");
   EXPECT_EQ(Update(Message(kOnTheWay, 8)), "");
+}
+
+TEST_F(GateObstaclesTest, ASenderThatBeganAnewIsTakenByItsStamp) {
+  EXPECT_EQ(Update(Message(kFarAway, 7)), "");
+  obstacles_t anew = Message(kOnTheWay, 0);
+  ExpectRefused(Encode(anew), "nor does its stamp");
+  anew.utime = kNow + 1;
+  EXPECT_EQ(Update(anew), "");
+  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(kOnTheWay));
+  ExpectRefused(Encode(anew), "sequence 0 does not exceed the last, 0, nor does its stamp");
+}
+
+// A person who changes the task file does not know what is being seen.
+TEST_F(GateObstaclesTest, AReloadKeepsWhatWasHeardBesideTheTasks) {
+  const std::vector<Obstacle> of_task = SmallTask().obstacles;
+  const auto reloaded = [](const Gate& before) {
+    auto gate = std::make_unique<Gate>(SmallTask());
+    gate->Inherit(before);
+    return gate;
+  };
+  EXPECT_EQ(reloaded(gate_)->obstacles_digest(), ObstaclesDigest(of_task)) << "nothing was heard";
+
+  EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
+  std::vector<Obstacle> both = of_task;
+  both.insert(both.end(), kOnTheWay.begin(), kOnTheWay.end());
+  const auto once = reloaded(gate_), twice = reloaded(*once);
+  for (Gate* gate : {once.get(), twice.get()}) {
+    EXPECT_EQ(gate->obstacles_digest(), ObstaclesDigest(both));
+    const decision_t decision = gate->Decide(Encode(Candidate(next_plan_id_++)), kNow).decision;
+    EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_SAFETY);
+    EXPECT_EQ(decision.obstacle, 2);
+    EXPECT_NE(gate->UpdateObstacles(Encode(Message(kFarAway, 0)), kNow), "") << "as old as the one before";
+  }
+  EXPECT_EQ(once->UpdateObstacles(Encode(Message(kFarAway, 1)), kNow), "");
+  EXPECT_EQ(once->obstacles_digest(), ObstaclesDigest(kFarAway));
 }
 
 TEST_F(GateObstaclesTest, OldOrFutureOnesAreRefused) {

@@ -1,0 +1,35 @@
+/** When the certifier of a log began anew, as its heartbeats tell: what it had learned is gone then. */
+#pragma once
+
+#include <cstdint>
+
+#include "forereach/certifier_status_v2_t.hpp"
+#include "lcmtypes/codec.h"
+
+namespace forereach {
+
+class Restarts final {
+ public:
+  enum class Kind {
+    kNone,
+    kBegin,   ///< A new process, which has heard nothing yet.
+    kReload,  ///< The same with its task read again: the obstacles that it had heard it still knows.
+  };
+
+  /** What has happened between the heartbeat before and this message of CERTIFIER_STATUS. A process counts heartbeats from
+  0, and versions up by each reload. A log may begin in the middle of its life, which is no beginning. */
+  [[nodiscard]] Kind Notice(Bytes message) {
+    const auto status = Decoded<certifier_status_v2_t>(message);
+    if (!status) return Kind::kNone;
+    const bool began = status->sequence == 0 || status->sequence < last_sequence_;
+    const bool reloaded = last_sequence_ >= 0 && status->version != last_version_;
+    last_sequence_ = status->sequence;
+    last_version_ = status->version;
+    return began ? Kind::kBegin : reloaded ? Kind::kReload : Kind::kNone;
+  }
+
+ private:
+  std::int64_t last_sequence_ = -1, last_version_ = 0;
+};
+
+}  // namespace forereach
