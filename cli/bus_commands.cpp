@@ -22,7 +22,8 @@ namespace {
 constexpr int kPatienceMs = 3000;
 
 struct Options {
-  std::string config, url, key;
+  std::string config;
+  BusArguments bus;
   bool json = false;
 };
 
@@ -30,8 +31,7 @@ struct Options {
 class Line final {
  public:
   explicit Line(const Options& options) : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
-    if (!options.url.empty()) channels_.url = options.url;
-    if (!options.key.empty()) channels_.key = options.key;
+    options.bus.Override(channels_);
     bus_ = OpenBus(channels_, "forereach");
     bus_->Subscribe(channels_.status, [this](const Received& received) {
       if (const auto status = Decoded<certifier_status_v2_t>(received.bytes)) heard_.push_back(*status);
@@ -59,14 +59,6 @@ class Line final {
   std::unique_ptr<Bus> bus_;
   std::vector<certifier_status_v2_t> heard_;
 };
-
-std::string_view LevelName(std::int16_t level) {
-  return level == certifier_status_v2_t::OK ? "OK" : level == certifier_status_v2_t::STALE ? "STALE" : "ERROR";
-}
-
-std::string_view StateName(std::int16_t state) {
-  return state == certifier_status_v2_t::ARMED ? "armed" : state == certifier_status_v2_t::FAULT ? "fault" : "disarmed";
-}
 
 nlohmann::ordered_json ToJson(const certifier_status_v2_t& status) {
   nlohmann::ordered_json by_outcome, by_cause;
@@ -155,8 +147,7 @@ void Add(CLI::App& app, Action& action, const std::string& name, const std::stri
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(name, purpose);
   command->add_option("--config", options->config, "The task file of the certifier")->required()->type_name("FILE");
-  command->add_option("--lcm-url", options->url, "The bus; by default the task file's bus.url")->type_name("URL");
-  command->add_option("--key", options->key, "Key file; by default the task file's bus.key")->type_name("FILE");
+  options->bus.AddTo(*command);
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->footer("Example:\n  forereach " + name + " --config config/demo.yaml");
   command->callback([options, run, &action] { action = [options, run] { return run(*options); }; });

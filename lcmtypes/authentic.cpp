@@ -18,25 +18,11 @@ constexpr std::size_t kTagBytes = 32, kNumberBytes = 8;
 static_assert(kSignatureBytes == 2 * kNumberBytes + kTagBytes + kMark.size());
 constexpr std::size_t kKeyFileBytes = kKeyPrefix.size() + 2 * sizeof(Key256) + 1;
 
-using Number = std::array<std::uint8_t, kNumberBytes>;
-
-Number BigEndian(std::uint64_t value) {
-  Number bytes;
-  for (auto byte = bytes.rbegin(); byte != bytes.rend(); ++byte, value >>= 8) *byte = static_cast<std::uint8_t>(value);
-  return bytes;
-}
-
-std::uint64_t FromBigEndian(Bytes bytes) {
-  std::uint64_t value = 0;
-  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
-  return value;
-}
-
 // `covered`: the message, the sender and the counter.
 Digest TagOf(const Key256& key, const std::string& channel, Bytes covered) {
   crypto_generichash_state state;
   crypto_generichash_init(&state, key.data(), key.size(), kTagBytes);
-  const Number size = BigEndian(channel.size());
+  const auto size = BigEndian<std::uint64_t>(channel.size());
   crypto_generichash_update(&state, size.data(), size.size());
   crypto_generichash_update(&state, reinterpret_cast<const std::uint8_t*>(channel.data()), channel.size());
   crypto_generichash_update(&state, covered.data(), covered.size());
@@ -103,7 +89,7 @@ Bytes WithoutSignature(Bytes bytes) { return IsSigned(bytes) ? bytes.first(bytes
 
 Signer::Signer(const Key256& key, const std::string& name, std::int64_t begun_us) : key_(key) {
   const Digest digest = DigestOf(name + " " + std::to_string(begun_us) + " " + std::to_string(::getpid()));
-  sender_ = FromBigEndian(Bytes(digest).first(kNumberBytes));
+  sender_ = FromBigEndian<std::uint64_t>(digest);
 }
 
 std::vector<std::uint8_t> Signer::Sign(const std::string& channel, Bytes message, std::int64_t now_us) {
@@ -115,20 +101,10 @@ std::vector<std::uint8_t> Signer::Sign(const std::string& channel, Bytes message
   const auto append = [&](const auto& part) { bytes.insert(bytes.end(), part.begin(), part.end()); };
   append(message);
   append(BigEndian(sender_));
-  append(BigEndian(static_cast<std::uint64_t>(counter)));
+  append(BigEndian(counter));
   append(TagOf(key_, channel, bytes));
   append(kMark);
   return bytes;
-}
-
-const char* AuthenticityName(Authenticity authenticity) {
-  switch (authenticity) {
-    case Authenticity::kAuthentic: return "authentic";
-    case Authenticity::kUnsigned: return "unsigned";
-    case Authenticity::kForged: return "forged";
-    case Authenticity::kReplayed: return "replayed";
-  }
-  return "unknown";
 }
 
 std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, Bytes bytes) {
@@ -147,8 +123,8 @@ Authenticity Authenticator::Judge(const std::string& channel, Bytes bytes) {
   const std::size_t covered = bytes.size() - kTagBytes - kMark.size();
   const Digest tag = TagOf(key_, channel, bytes.first(covered));
   if (sodium_memcmp(tag.data(), bytes.data() + covered, kTagBytes) != 0) return Authenticity::kForged;
-  const std::uint64_t sender = FromBigEndian(bytes.subspan(covered - 2 * kNumberBytes, kNumberBytes));
-  const auto counter = static_cast<std::int64_t>(FromBigEndian(bytes.subspan(covered - kNumberBytes, kNumberBytes)));
+  const std::uint64_t sender = FromBigEndian<std::uint64_t>(bytes.subspan(covered - 2 * kNumberBytes));
+  const auto counter = FromBigEndian<std::int64_t>(bytes.subspan(covered - kNumberBytes));
   return TakeCounter(channel, sender, counter) ? Authenticity::kAuthentic : Authenticity::kReplayed;
 }
 

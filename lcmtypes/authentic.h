@@ -66,7 +66,6 @@ class Signer final {
 enum class Authenticity { kAuthentic, kUnsigned, kForged, kReplayed };
 
 /** "authentic", "unsigned", "forged", "replayed". */
-[[nodiscard]] const char* AuthenticityName(Authenticity authenticity);
 
 /** Messages refused, by reason. */
 struct Refusals {

@@ -5,6 +5,7 @@ Nothing here looks at values; whoever receives a message validates them. Needs n
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -28,6 +29,23 @@ using Digest = std::array<std::uint8_t, 32>;
 /** Lower-case hexadecimal, 64 characters. */
 [[nodiscard]] std::string ToHex(const Digest& digest);
 
+/** As messages, logs and signatures spell numbers. */
+template <std::integral Integer>
+[[nodiscard]] std::array<std::uint8_t, sizeof(Integer)> BigEndian(Integer value) {
+  std::array<std::uint8_t, sizeof(Integer)> bytes;
+  for (auto byte = bytes.rbegin(); byte != bytes.rend(); ++byte, value = static_cast<Integer>(value >> 8))
+    *byte = static_cast<std::uint8_t>(value);
+  return bytes;
+}
+
+/** The number that `bytes` begin with; there have to be as many as it has. */
+template <std::integral Integer>
+[[nodiscard]] Integer FromBigEndian(Bytes bytes) {
+  std::uint64_t value = 0;
+  for (const std::uint8_t byte : bytes.first(sizeof(Integer))) value = value << 8 | byte;
+  return static_cast<Integer>(value);
+}
+
 enum class DecodeStatus { kOk, kWrongLength, kTrailingBytes, kUnknownFingerprint };
 
 template <class Message>
@@ -49,9 +67,7 @@ template <class Message>
 [[nodiscard]] DecodeStatus Decode(Bytes bytes, Message& message) {
   message = Message{};
   if (bytes.size() < 8) return DecodeStatus::kWrongLength;
-  std::uint64_t fingerprint = 0;
-  for (int i = 0; i < 8; ++i) fingerprint = fingerprint << 8 | bytes[static_cast<std::size_t>(i)];
-  if (fingerprint != static_cast<std::uint64_t>(Message::getHash())) return DecodeStatus::kUnknownFingerprint;
+  if (FromBigEndian<std::int64_t>(bytes) != Message::getHash()) return DecodeStatus::kUnknownFingerprint;
   const std::size_t size = EncodedSize<Message>();
   if (bytes.size() < size) return DecodeStatus::kWrongLength;
   if (bytes.size() > size) return DecodeStatus::kTrailingBytes;

@@ -1,5 +1,6 @@
 #include "lcmtypes/names.h"
 
+#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -69,6 +70,24 @@ std::string_view FaultName(std::int16_t cause) {
     case fault_t::CLOCK_JUMP: return "clock_jump";
     case fault_t::SLICE_LEFT: return "slice_left";
     case fault_t::DECLARATION_FALSIFIED: return "declaration_falsified";
+    default: return "unknown";
+  }
+}
+
+std::string_view LevelName(std::int16_t level) {
+  switch (level) {
+    case certifier_status_v2_t::OK: return "OK";
+    case certifier_status_v2_t::STALE: return "STALE";
+    case certifier_status_v2_t::ERROR: return "ERROR";
+    default: return "unknown";
+  }
+}
+
+std::string_view StateName(std::int16_t state) {
+  switch (state) {
+    case certifier_status_v2_t::DISARMED: return "disarmed";
+    case certifier_status_v2_t::ARMED: return "armed";
+    case certifier_status_v2_t::FAULT: return "fault";
     default: return "unknown";
   }
 }

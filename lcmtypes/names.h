@@ -18,4 +18,10 @@ namespace forereach {
 /** "robot_state_lost", ... as fault_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view FaultName(std::int16_t cause);
 
+/** "OK", "STALE", "ERROR": the level of certifier_status_v2_t; "unknown" for any other number. */
+[[nodiscard]] std::string_view LevelName(std::int16_t level);
+
+/** "disarmed", "armed", "fault": the state of certifier_status_v2_t; "unknown" for any other number. */
+[[nodiscard]] std::string_view StateName(std::int16_t state);
+
 }  // namespace forereach

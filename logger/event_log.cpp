@@ -17,27 +17,16 @@ constexpr std::array<std::uint8_t, 4> kSync{0xED, 0xA1, 0xDA, 0x01};
 constexpr std::int64_t kHeaderBytes = 28;
 constexpr std::int64_t kMaxNumber = std::int64_t{1} << 62;
 
-template <class Integer>
-void PutBigEndian(std::vector<std::uint8_t>& out, Integer value) {
-  for (int shift = 8 * (static_cast<int>(sizeof value) - 1); shift >= 0; shift -= 8)
-    out.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(value) >> shift));
-}
-
-std::uint64_t GetBigEndian(const std::uint8_t* bytes, int count) {
-  std::uint64_t value = 0;
-  for (int i = 0; i < count; ++i) value = value << 8 | bytes[i];
-  return value;
-}
-
 void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t utime, const std::string& channel,
                Bytes data) {
-  out.insert(out.end(), kSync.begin(), kSync.end());
-  PutBigEndian(out, number);
-  PutBigEndian(out, utime);
-  PutBigEndian(out, static_cast<std::int32_t>(channel.size()));
-  PutBigEndian(out, static_cast<std::int32_t>(data.size()));
-  out.insert(out.end(), channel.begin(), channel.end());
-  out.insert(out.end(), data.begin(), data.end());
+  const auto put = [&out](const auto& part) { out.insert(out.end(), part.begin(), part.end()); };
+  put(kSync);
+  put(BigEndian(number));
+  put(BigEndian(utime));
+  put(BigEndian(static_cast<std::int32_t>(channel.size())));
+  put(BigEndian(static_cast<std::int32_t>(data.size())));
+  put(channel);
+  put(data);
 }
 
 std::string Reason(const std::string& what, const std::string& path) { return what + path + ": " + std::strerror(errno); }
@@ -76,10 +65,10 @@ EventLogReader::Found EventLogReader::Examine(std::int64_t offset, Header& heade
   if (!ReadAt(offset, bytes.data(), left)) return Found::kNothing;
   if (!std::equal(kSync.begin(), kSync.begin() + std::min<std::int64_t>(left, 4), bytes.begin())) return Found::kNothing;
   if (left < kHeaderBytes) return Found::kCut;
-  header.number = static_cast<std::int64_t>(GetBigEndian(&bytes[4], 8));
-  header.utime = static_cast<std::int64_t>(GetBigEndian(&bytes[12], 8));
-  header.channel_bytes = static_cast<std::int32_t>(GetBigEndian(&bytes[20], 4));
-  header.data_bytes = static_cast<std::int32_t>(GetBigEndian(&bytes[24], 4));
+  header.number = FromBigEndian<std::int64_t>(Bytes(bytes).subspan(4));
+  header.utime = FromBigEndian<std::int64_t>(Bytes(bytes).subspan(12));
+  header.channel_bytes = FromBigEndian<std::int32_t>(Bytes(bytes).subspan(20));
+  header.data_bytes = FromBigEndian<std::int32_t>(Bytes(bytes).subspan(24));
   const bool plausible = header.number >= 0 && header.number < kMaxNumber && header.utime >= 0 &&
                          header.channel_bytes > 0 && header.channel_bytes <= kMaxLogChannelBytes &&
                          header.data_bytes >= 0 && header.data_bytes <= kMaxLogDataBytes;

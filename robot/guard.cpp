@@ -275,10 +275,9 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::span<const double
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
-  if (pending_) verdict.plan_id = pending_->plan.plan_id;
-  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kHalted ||
-      verdict.cause == GuardCause::kTooEarly)
-    return verdict;
+  if (!pending_) return verdict;
+  verdict.plan_id = pending_->plan.plan_id;
+  if (verdict.cause == GuardCause::kTooEarly) return verdict;
   if (verdict.ok()) {
     executing_ = std::move(pending_);
     last_step_ = 0;

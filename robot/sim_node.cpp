@@ -159,10 +159,9 @@ void RobotSimNode::ReportGoal(std::int64_t utime) {
 }
 
 void RobotSimNode::StartPending(std::int64_t utime) {
+  if (guard_.pending() == nullptr) return;
   const GuardVerdict verdict = guard_.TryStart(utime, state_);
-  if (verdict.cause == GuardCause::kNothingPending || verdict.cause == GuardCause::kHalted ||
-      verdict.cause == GuardCause::kTooEarly)
-    return;
+  if (verdict.cause == GuardCause::kTooEarly) return;
   if (!verdict.ok()) return PublishRefusal(utime, verdict);
   step_ = 0;
   ++started_;

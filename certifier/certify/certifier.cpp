@@ -37,11 +37,7 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
 
 // The domain's box over z = (x, u) envelops every query.
 ObservationStore MakeStore(const Problem& problem) {
-  std::vector<double> lower, upper;
-  for (const Interval& range : problem.domain.Ranges()) {
-    lower.push_back(range.lower);
-    upper.push_back(range.upper);
-  }
+  const auto [lower, upper] = problem.domain.Corners();
   StoreOptions options;
   options.max_observations = static_cast<std::size_t>(problem.max_observations);
   options.envelope.max_leaf_visits = problem.max_leaf_visits;

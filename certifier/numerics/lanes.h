@@ -51,9 +51,10 @@ FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
   std::array<Half, 2> halves;
   __builtin_memcpy(&halves, &mask, sizeof halves);
   return static_cast<unsigned>(__builtin_ia32_movmskpd(halves[0]) | __builtin_ia32_movmskpd(halves[1]) << 2);
-#endif
+#else
   const LaneMask bits = mask & LaneMask{1, 2, 4, 8}, pairs = bits | __builtin_shufflevector(bits, bits, 2, 3, 0, 1);
   return static_cast<unsigned>((pairs | __builtin_shufflevector(pairs, pairs, 1, 0, 3, 2))[0]);
+#endif
 }
 
 namespace internal {

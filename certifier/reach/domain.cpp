@@ -76,6 +76,15 @@ std::vector<Interval> Domain::Ranges() const {
   return ranges;
 }
 
+std::pair<std::vector<double>, std::vector<double>> Domain::Corners() const {
+  std::pair<std::vector<double>, std::vector<double>> corners;
+  for (const Interval& range : Ranges()) {
+    corners.first.push_back(range.lower);
+    corners.second.push_back(range.upper);
+  }
+  return corners;
+}
+
 bool Domain::Contains(std::span<const double> z) const noexcept {
   std::array<Interval, kMaxVariables> point;
   for (std::size_t l = 0; l < z.size(); ++l) point[l] = Interval(z[l]);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -37,6 +38,8 @@ struct Domain {
 
   /** The range of each coordinate of z, the state's and then the input's. */
   [[nodiscard]] std::vector<Interval> Ranges() const;
+  /** The same, lower ends and upper ends. */
+  [[nodiscard]] std::pair<std::vector<double>, std::vector<double>> Corners() const;
 
   /** True only if z provably lies inside. */
   [[nodiscard]] bool Contains(std::span<const double> z) const noexcept;

@@ -53,10 +53,6 @@ class Propagator final {
   /** Upper bounds on the half-widths of the slice's hull, n of them. */
   static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
 
-  /** Whether a step evaluates the model in plain arithmetic, with an error bounded for the whole domain at set-up, or,
-  where that bound is not small, in interval arithmetic, which takes longer. */
-  [[nodiscard]] bool expands_in_plain_arithmetic() const { return plain_; }
-
  private:
   void ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
                          ExpansionError& error) const noexcept;

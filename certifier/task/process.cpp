@@ -28,14 +28,24 @@ std::unique_ptr<Bus> OpenBus(const BusOptions& options, const std::string& name,
   return Authenticate(std::move(bus), LoadKey(options.key), name, options.signed_channels(), std::move(clock));
 }
 
+void BusArguments::AddTo(CLI::App& app) {
+  app.add_option("--lcm-url", url, "The bus; by default the task file's bus.url")->type_name("URL");
+  app.add_option("--key", key, "Key file that messages are signed with; by default the task file's bus.key")->type_name("FILE");
+}
+
+void BusArguments::Override(BusOptions& options) const {
+  if (!url.empty()) options.url = url;
+  if (!key.empty()) options.key = key;
+}
+
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
                const std::function<void(CLI::App&)>& add_options) {
   CLI::App app(description.purpose, description.name);
   app.footer("Example:\n  " + description.example + "\n\nThe keys of a task file are explained in config/README.md.");
-  std::string config_path, url, key;
+  std::string config_path;
+  BusArguments bus_arguments;
   app.add_option("--config", config_path, "The task file (YAML)")->required()->type_name("FILE");
-  app.add_option("--lcm-url", url, "The bus; by default the task file's bus.url")->type_name("URL");
-  app.add_option("--key", key, "Key file that messages are signed with; by default the task file's bus.key")->type_name("FILE");
+  bus_arguments.AddTo(app);
   if (add_options) add_options(app);
   try {
     app.parse(argc, argv);
@@ -47,8 +57,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   CatchStopSignals();
   return Guarded(description.name, [&] {
     Config config = LoadConfig(config_path);
-    if (!url.empty()) config.bus.url = url;
-    if (!key.empty()) config.bus.key = key;
+    bus_arguments.Override(config.bus);
     const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.name);
     const std::unique_ptr<Node> node = make_node(config, *bus);
     spdlog::info("ready on {} with {}{}", config.bus.url, config_path, config.bus.key.empty() ? "" : ", signed");

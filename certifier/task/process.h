@@ -28,6 +28,13 @@ using MakeNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& 
 @throws BusError, KeyError. */
 [[nodiscard]] std::unique_ptr<Bus> OpenBus(const BusOptions& options, const std::string& name, Clock clock = WallClockUs);
 
+/** `--lcm-url URL` and `--key FILE`, which stand before what the task file says. */
+struct BusArguments {
+  std::string url, key;
+  void AddTo(CLI::App& app);
+  void Override(BusOptions& options) const;
+};
+
 /** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key FILE` until it is done or gets SIGTERM or SIGINT.
 @param add_options adds a process's own options, if it has any.
 @return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other

@@ -1,7 +1,5 @@
 #include "experiments/methods/envelope.h"
 
-#include <vector>
-
 #include "certifier/residual/observation_store.h"
 #include "certifier/residual/observations.h"
 #include "experiments/methods/samples.h"
@@ -9,11 +7,7 @@
 namespace forereach::experiments {
 
 std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting, const Declaration& declaration) {
-  std::vector<double> lower, upper;
-  for (const Interval& range : setting.domain.Ranges()) {
-    lower.push_back(range.lower);
-    upper.push_back(range.upper);
-  }
+  const auto [lower, upper] = setting.domain.Corners();
   declaration.Validate(setting.model.num_states(), setting.model.num_variables());
   return std::make_unique<LipschitzEnvelope>(declaration, Observe(setting.model, setting.data), lower, upper,
                                              EnvelopeOptions{.value_headroom = ObservationStore::kValueHeadroom});

@@ -72,6 +72,17 @@ TEST(NamesTest, EveryFaultHasItsName) { ExpectNamed(ConstantsOf("fault_t"), Faul
 
 TEST(NamesTest, EveryEventHasItsName) { ExpectNamed(ConstantsOf("execution_event_t"), EventName); }
 
+TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {
+  Constants states = ConstantsOf("certifier_status_v2_t");
+  for (const std::string level : {"OK", "STALE", "ERROR"}) {
+    ASSERT_TRUE(states.contains(level));
+    EXPECT_EQ(LevelName(static_cast<std::int16_t>(states[level])), level);
+    states.erase(level);
+  }
+  ExpectNamed(states, StateName);
+  for (const std::int16_t other : {std::int16_t{0}, std::int16_t{4}, std::int16_t{-1}}) EXPECT_EQ(LevelName(other), "unknown");
+}
+
 // Recorded logs carry the numbers, and the fingerprint does not cover them: a new constant gets a new line, no line
 // ever changes.
 TEST(NamesTest, NumbersAreNeverReused) {
@@ -118,6 +129,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},
                                                {"DECLARATION_FALSIFIED", 4}}));
+  EXPECT_EQ(ConstantsOf("certifier_status_v2_t"),
+            (Constants{{"OK", 1}, {"STALE", 2}, {"ERROR", 3}, {"DISARMED", 1}, {"ARMED", 2}, {"FAULT", 3}}));
   EXPECT_EQ(ConstantsOf("command_t"), (Constants{{"RESET", 1}, {"RELOAD", 2}}));
   EXPECT_EQ(ConstantsOf("robot_state_t"), (Constants{{"STANDING", 1}, {"EXECUTING", 2}, {"FINISHED", 3}}));
   EXPECT_EQ(ConstantsOf("obstacle_t"), (Constants{{"CIRCLE", 1}, {"BOX", 2}, {"POLYGON", 3}, {"HALF_SPACE", 4}}));
