@@ -175,10 +175,8 @@ class Campaign final {
         for (int j = 0; j < 20; ++j) {
           robot_state_t state = State(rig);
           state.sequence = sequence++;
-          if (j % 2 == 0) state.mode = robot_state_t::EXECUTING;
           state.executing_plan_id = j % 2 == 0 ? WallClockUs() : -1;
           for (int k = 0; k < state.num_states; ++k) state.state[k] = j % 5 == 4 ? 1e300 : Below(100) - 50;
-          if (j % 2 == 0) state.mode = robot_state_t::STANDING;  // it claims no plan that it does not have
           rig.bus().Publish(rig.config().bus.robot_state, state);
           rig.Listen(milliseconds(5));
         }

@@ -61,8 +61,6 @@ bool Rig::Reap(Role role) {
 
 bool Rig::IsAlive(Role role) const { return processes_[role] && !processes_[role]->WaitForEnd(std::chrono::milliseconds(0)); }
 
-std::string Rig::Said(Role role) const { return processes_[role] ? processes_[role]->error() : ""; }
-
 void Rig::Listen(std::chrono::milliseconds time) {
   static_cast<void>(ListenUntil([] { return false; }, time));
 }

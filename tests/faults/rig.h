@@ -46,11 +46,8 @@ class Rig final {
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] std::string url(Role role) const { return relayed_ && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
-  [[nodiscard]] std::string key_path() const { return key_path_; }
-  [[nodiscard]] const std::string& directory() const { return directory_; }
   /** From the logger's next start on. */
   void SetDirectory(const std::string& directory) { directory_ = directory; }
-  [[nodiscard]] std::string Said(Role role) const;
 
  private:
   const bool relayed_;

@@ -50,7 +50,6 @@ void Witness::OnState(const Received& received) {
 void Witness::OnTransition(const Received& received) {
   const auto transition = Decoded<transition_t>(WithoutSignature(received.bytes));
   if (!transition) return;
-  ++transitions_;
   const auto applied = applied_.find(transition->utime);
   if (applied == applied_.end()) return;  // its state did not reach this listener
   const auto plan = plans_.find(applied->second.plan_id);

@@ -3,7 +3,6 @@
 
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -32,8 +31,6 @@ class Witness final {
   [[nodiscard]] const std::vector<std::string>& violations() const { return violations_; }
 
   [[nodiscard]] std::int64_t decisions() const { return decisions_; }
-  [[nodiscard]] std::int64_t certificates() const { return static_cast<std::int64_t>(plans_.size()); }
-  [[nodiscard]] std::int64_t transitions() const { return transitions_; }
   [[nodiscard]] const std::optional<certifier_status_v2_t>& status() const { return status_; }
   [[nodiscard]] const std::optional<logger_status_t>& logger_status() const { return logger_status_; }
   void Forget() { status_.reset(), logger_status_.reset(); }
@@ -60,7 +57,7 @@ class Witness final {
   std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
   std::optional<certifier_status_v2_t> status_;
   std::optional<logger_status_t> logger_status_;
-  std::int64_t decisions_ = 0, transitions_ = 0;
+  std::int64_t decisions_ = 0;
   std::vector<std::string> violations_;
 };
 
