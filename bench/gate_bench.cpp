@@ -6,6 +6,7 @@
 
 #include "bench/candidates.h"
 #include "certifier/gate/gate.h"
+#include "lcmtypes/authentic.h"
 #include "lcmtypes/seal.h"
 
 namespace forereach::bench {
@@ -72,6 +73,34 @@ void RunCertificateDigest(State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(CertificateDigest(certified));
 }
 
+// What a key adds: a keyed digest of the message, on sending and again on receiving.
+template <class Message>
+void RunSign(State& state) {
+  Signer signer(Key256{}, "benchmark", kNow);
+  const std::vector<std::uint8_t> bytes = Encode(Message{});
+  for (auto _ : state) benchmark::DoNotOptimize(signer.Sign("PLAN", bytes, kNow));
+}
+
+// Each is taken once only, so a batch is signed beforehand.
+template <class Message>
+void RunCheck(State& state) {
+  Signer signer(Key256{}, "benchmark", kNow);
+  Authenticator authenticator(Key256{}, 0);
+  const std::vector<std::uint8_t> bytes = Encode(Message{});
+  std::vector<std::vector<std::uint8_t>> batch(256);
+  std::size_t next = batch.size();
+  for (auto _ : state) {
+    if (next == batch.size()) {
+      state.PauseTiming();
+      for (auto& message : batch) message = signer.Sign("PLAN", bytes, kNow);
+      next = 0;
+      state.ResumeTiming();
+    }
+    if (authenticator.Check("PLAN", batch[next++]).first != Authenticity::kAuthentic)
+      return state.SkipWithError("not authentic");
+  }
+}
+
 BENCHMARK_CAPTURE(RunDecide, certified, decision_t::CERTIFIED)->Name("gate/certified")->UseManualTime();
 BENCHMARK_CAPTURE(RunDecide, blocked, decision_t::ABSTAIN_SAFETY)->Name("gate/abstained")->UseManualTime();
 BENCHMARK(RunCertifyAlone)->Name("gate/certify_alone");
@@ -80,6 +109,10 @@ BENCHMARK(RunDigest)->Name("gate/digest_candidate");
 BENCHMARK(RunCertificateDigest)->Name("gate/certificate_digest");
 BENCHMARK_TEMPLATE(RunEncode, decision_t)->Name("gate/encode_decision");
 BENCHMARK_TEMPLATE(RunEncode, certified_plan_t)->Name("gate/encode_certified");
+BENCHMARK_TEMPLATE(RunSign, candidate_plan_t)->Name("gate/sign_candidate");
+BENCHMARK_TEMPLATE(RunCheck, candidate_plan_t)->Name("gate/check_candidate");
+BENCHMARK_TEMPLATE(RunSign, certified_plan_t)->Name("gate/sign_certified");
+BENCHMARK_TEMPLATE(RunCheck, certified_plan_t)->Name("gate/check_certified");
 
 }  // namespace
 }  // namespace forereach::bench

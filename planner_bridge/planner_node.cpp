@@ -59,7 +59,7 @@ void PlannerNode::Tick(std::int64_t now_us) {
 
 void PlannerNode::OnRobotState(const Received& received) {
   robot_state_t state;
-  if (Decode(received.bytes, state) != DecodeStatus::kOk || !IsUsable(state)) {
+  if (Decode(received.bytes, state) != DecodeStatus::kOk || !IsUsable(state, received.utime)) {
     ++ignored_;
     return;
   }
@@ -69,8 +69,10 @@ void PlannerNode::OnRobotState(const Received& received) {
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && NextPlanIsDue(state)) BeginRound(state);
 }
 
-bool PlannerNode::IsUsable(const robot_state_t& state) const {
+// One from the future would keep out all that come before that time.
+bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
   return state.num_states == config_.problem->model->num_states() && state.utime > last_state_utime_ &&
+         state.utime <= now_us + std::llround(config_.gate.max_ahead_ms * 1e3) &&
          robot_state_t::STANDING <= state.mode && state.mode <= robot_state_t::FINISHED &&
          std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });
 }

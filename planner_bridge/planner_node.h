@@ -15,8 +15,8 @@ It ends without a certificate after `candidates` searches, or when too little ti
 state begins another. All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has
 said FINISHED, no round begins any more.
 
-Messages that do not decode, contain what is not finite, or concern somebody else's candidates are counted and
-ignored. */
+Messages that do not decode, contain what is not finite, are states stamped ahead of the clock by more than
+gate.max_ahead_ms, or concern somebody else's candidates are counted and ignored. */
 #pragma once
 
 #include <iostream>
@@ -67,7 +67,7 @@ class PlannerNode final : public Node {
   void OnDecision(const Received& received);
   void OnObstacles(const Received& received);
 
-  [[nodiscard]] bool IsUsable(const robot_state_t& state) const;
+  [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
   [[nodiscard]] std::optional<Eigen::VectorXd> PredictStart(const robot_state_t& state) const;

@@ -170,7 +170,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
   TakeReload();
   AnswerWaiting();
   CompactIfDue();
-  if (now_us >= next_heartbeat_us_) Heartbeat(now_us);
+  if (clocks_.steady() >= next_heartbeat_us_) Heartbeat(now_us);
 }
 
 void CertifierNode::AnswerWaiting() {
@@ -261,7 +261,7 @@ std::string CertifierNode::WhyNotOk() const {
 }
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
-  next_heartbeat_us_ = now_us + kHeartbeatUs;
+  next_heartbeat_us_ = clocks_.steady() + kHeartbeatUs;
   certifier_status_v2_t status = gate_->Status(now_us);
   const bool error = watch_.fault() || gate_->certifier().violation();
   status.sequence = heartbeats_++;

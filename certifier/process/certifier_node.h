@@ -97,7 +97,8 @@ class CertifierNode final : public Node {
   std::int64_t version_ = 1, failed_reloads_ = 0;
   std::string reload_error_;
 
-  std::int64_t next_heartbeat_us_ = 0, heartbeats_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
+  std::int64_t next_heartbeat_us_ = 0;  // by the steady clock
+  std::int64_t heartbeats_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
   std::size_t high_water_ = 0;
   std::array<double, 1024> elapsed_us_{};  // of the last decisions, a ring
   std::size_t decided_ = 0;

@@ -1,6 +1,7 @@
 // The fault campaign: real processes on a real loopback bus are killed, stopped, lied to, flooded and cut off, and after each
 // try a witness says whether anything happened that may never happen. Writes a table.
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <iostream>
@@ -15,6 +16,7 @@
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
 #include "forereach/command_t.hpp"
+#include "tests/faults/demo_task.h"
 #include "tests/faults/relay.h"
 #include "tests/faults/report.h"
 #include "tests/faults/rig.h"
@@ -22,7 +24,10 @@
 namespace forereach {
 namespace {
 
+using std::chrono::microseconds;
 using std::chrono::milliseconds;
+
+constexpr std::chrono::seconds kAnewIfBackBy{-5};  // a shorter jump back is waited out
 
 struct Row {
   std::string fault;
@@ -39,16 +44,6 @@ struct Options {
   std::string report = "docs/reliability.md", only;
 };
 
-// The demo's task, with its files named absolutely.
-std::string Task(const std::string& more = "") {
-  std::ostringstream text;
-  text << std::ifstream(FOREREACH_SOURCE_DIR "/config/demo.yaml").rdbuf();
-  std::string task = text.str();
-  const std::string relative = "transitions: data/";
-  task.replace(task.find(relative), relative.size(), "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
-  return task + "\n" + more;
-}
-
 class Campaign final {
  public:
   explicit Campaign(const Options& options) : options_(options), random_(options.seed) {}
@@ -56,6 +51,7 @@ class Campaign final {
   std::vector<Row> Run() {
     const std::vector<std::pair<std::string, std::function<void()>>> all{
         {"kill", [this] { Signals("SIGKILL at a random moment", SIGKILL, options_.kills); }},
+        {"clock", [this] { Clocks(); }},
         {"stop", [this] { Signals("SIGSTOP for up to 2 s", SIGSTOP, options_.others * 2); }},
         {"network", [this] { BadNetwork(); }},
         {"lies", [this] { Lies(); }},
@@ -90,6 +86,13 @@ class Campaign final {
     progress_->Advance();
   }
 
+  // What has to be seen in a try.
+  static void Demand(Row& row, bool seen, const std::string& what) {
+    if (seen) return;
+    std::cerr << row.fault << ": FORBIDDEN: " << what << "\n";
+    ++row.forbidden;
+  }
+
   Row& Begin(const std::string& fault, int tries) {
     std::cerr << fault << "\n";
     rows_.emplace_back().fault = fault;
@@ -98,7 +101,7 @@ class Campaign final {
   }
 
   void Signals(const std::string& fault, int signal, int tries) {
-    Rig rig(Task());
+    Rig rig(DemoTask());
     Row& row = Begin(fault, tries);
     if (const std::string why = rig.Heal(); !why.empty()) row.remark = "never began: " + why;
     for (int i = 0; i < tries && row.remark.rfind("never", 0) != 0; ++i) {
@@ -116,6 +119,59 @@ class Campaign final {
     }
   }
 
+  // 0.3 s to an hour, forward or backward.
+  microseconds Jump() {
+    const double seconds = 0.3 * std::pow(3600 / 0.3, std::uniform_real_distribution<double>(0, 1)(random_));
+    return microseconds(std::llround((Below(2) == 0 ? 1e6 : -1e6) * seconds));
+  }
+
+  // A jump is said on FAULT, and nothing certified until the reset that Heal sends.
+  static void DemandLatched(Row& row, Rig& rig) {
+    const auto& fault = rig.witness().fault();
+    Demand(row, fault && fault->cause == fault_t::CLOCK_JUMP, "its clock jumped and it latched no CLOCK_JUMP");
+    Demand(row, rig.witness().certificates_since_fault() == 0, "it certified before the reset");
+  }
+
+  void Clocks() {
+    for (const Rig::Role role : {Rig::kCertifier, Rig::kPlanner, Rig::kRobot, Rig::kLogger}) OneClock(role);
+    AllClocks();
+  }
+
+  // For a second one process is at odds with the others.
+  void OneClock(Rig::Role role) {
+    Rig rig(DemoTask(), {.settable_clocks = true});
+    Row& row = Begin(std::string("The clock of the ") + Rig::kNames[role] + " jumps by 0.3 s to an hour, and back",
+                     options_.others);
+    if (const std::string why = rig.Heal(); !why.empty()) row.remark = "never began: " + why;
+    for (int i = 0; i < options_.others; ++i)
+      Try(row, rig, [&] {
+        rig.SetClock(role, Jump());
+        rig.Listen(milliseconds(1000));
+        rig.SetClock(role, microseconds(0));
+        rig.Listen(milliseconds(200));
+        if (role == Rig::kCertifier) DemandLatched(row, rig);
+      }, role == Rig::kLogger);
+  }
+
+  // As when the machine's clock is set. Whoever begins after it went back signs with times that were used before it did, so
+  // all begin anew.
+  void AllClocks() {
+    Rig rig(DemoTask(), {.settable_clocks = true});
+    Row& row = Begin("All clocks jump by 0.3 s to an hour, and stay", options_.others);
+    if (const std::string why = rig.Heal(); !why.empty()) row.remark = "never began: " + why;
+    microseconds offset(0);
+    int anew = 0;
+    for (int i = 0; i < options_.others; ++i)
+      Try(row, rig, [&] {
+        const microseconds jump = Jump();
+        rig.SetClocks(offset += jump);
+        rig.Listen(milliseconds(1000));
+        DemandLatched(row, rig);
+        if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
+      }, true);
+    row.remark += (row.remark.empty() ? "" : "; ") + std::to_string(anew) + " times back by more than 5 s: all started again";
+  }
+
   void BadNetwork() {
     const std::vector<std::pair<std::string, Weather>> weathers{{"one message in five dropped", {.drop = 0.2}},
                                                                 {"one in five sent twice", {.repeat = 0.2}},
@@ -124,7 +180,7 @@ class Campaign final {
                                                                 {"one in five with a bit flipped", {.corrupt = 0.2}},
                                                                 {"all of these", {0.1, 0.1, 0.1, 0.1, 0.1, 60}}};
     for (const auto& [name, weather] : weathers) {
-      Rig rig(Task(), true);
+      Rig rig(DemoTask(), {.relayed = true});
       const BusOptions& channels = rig.config().bus;
       Relay relay(rig.url(Rig::kPlanner), rig.url(Rig::kCertifier),
                   {channels.candidate, channels.robot_state, channels.transition, channels.event, channels.command,
@@ -136,7 +192,7 @@ class Campaign final {
         while (!stop) {
           const std::lock_guard lock(mutex);
           relay.Pass();
-          std::this_thread::sleep_for(std::chrono::microseconds(200));
+          std::this_thread::sleep_for(microseconds(200));
         }
       });
       const auto set = [&](const Weather& now) {
@@ -167,7 +223,7 @@ class Campaign final {
 
   // Signed: the liar has the key.
   void Lies() {
-    Rig rig(Task());
+    Rig rig(DemoTask());
     Row& row = Begin("A robot that lies about its state (signed)", options_.others);
     std::int64_t sequence = 1 << 30;
     for (int i = 0; i < options_.others; ++i)
@@ -175,10 +231,8 @@ class Campaign final {
         for (int j = 0; j < 20; ++j) {
           robot_state_t state = State(rig);
           state.sequence = sequence++;
-          if (j % 2 == 0) state.mode = robot_state_t::EXECUTING;
           state.executing_plan_id = j % 2 == 0 ? WallClockUs() : -1;
           for (int k = 0; k < state.num_states; ++k) state.state[k] = j % 5 == 4 ? 1e300 : Below(100) - 50;
-          if (j % 2 == 0) state.mode = robot_state_t::STANDING;  // it claims no plan that it does not have
           rig.bus().Publish(rig.config().bus.robot_state, state);
           rig.Listen(milliseconds(5));
         }
@@ -186,7 +240,7 @@ class Campaign final {
   }
 
   void Nonsense() {
-    Rig rig(Task());
+    Rig rig(DemoTask());
     Row& row = Begin("A planner that sends NaN, wrong sizes, garbage (signed)", options_.others);
     std::int64_t id = 1;
     for (int i = 0; i < options_.others; ++i)
@@ -207,7 +261,7 @@ class Campaign final {
 
   // Whoever is on the network, without the key: new plans, certified plans, resets, and what was heard before.
   void Forgeries() {
-    Rig rig(Task());
+    Rig rig(DemoTask());
     Row& row = Begin("Forged and replayed messages (no key)", options_.others);
     const BusOptions& channels = rig.config().bus;
     std::vector<std::pair<std::string, std::vector<std::uint8_t>>> heard;
@@ -237,7 +291,7 @@ class Campaign final {
   }
 
   void Flood() {
-    Rig rig(Task());
+    Rig rig(DemoTask());
     Row& row = Begin("A flood of " + std::to_string(options_.floods) + " candidates (signed)", 1);
     std::int64_t candidates = 0;
     Try(row, rig, [&] {
@@ -283,7 +337,7 @@ void Campaign::Disks() {
     return;
   }
   {
-    Rig rig(Task("logger: {min_free_mb: 1}\n"));
+    Rig rig(DemoTask("logger: {min_free_mb: 1}\n"));
     rig.SetDirectory(directory);
     for (const bool full : {true, false}) {
       rig.Signal(Rig::kLogger, SIGTERM);
@@ -311,7 +365,7 @@ void Campaign::Disks() {
 // A process that starts without a network says what to do, and ends.
 void Campaign::NoNetwork() {
   const ScratchDirectory scratch;
-  const std::string task = scratch.Write("task.yaml", Task());
+  const std::string task = scratch.Write("task.yaml", DemoTask());
   Row& row = Begin("No multicast route at the start", 4);
   for (const char* program : {FOREREACH_CERTIFIER, FOREREACH_PLANNER, FOREREACH_LOGGER, FOREREACH_ROBOT_SIM}) {
     ++row.tries;
@@ -326,7 +380,7 @@ void Campaign::NoNetwork() {
 }
 
 void Campaign::BadReload() {
-  Rig rig(Task());
+  Rig rig(DemoTask());
   Row& row = Begin("Reload of a bad task file", options_.others);
   const std::string path = rig.task_path();
   std::ostringstream good;
@@ -349,10 +403,12 @@ void Campaign::BadReload() {
 std::string Table(const std::vector<Row>& rows, const Options& options) {
   std::ostringstream text;
   text << "Made by `scripts/faults --kills " << options.kills << " --others " << options.others << " --flood "
-       << options.floods << " --seed " << options.seed << "`. *Forbidden*: an uncertified plan was executed, a control was not\n"
-       << "its plan's, a candidate was answered twice. *Lost*: events that the logger had confirmed and its log does not\n"
-       << "hold. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK and decides, the logger\n"
-       << "records. *Said why*: a process that cannot start exits with the reason.\n\n"
+       << options.floods << " --seed " << options.seed << (options.only.empty() ? "" : " --only " + options.only)
+       << "`. *Forbidden*: an uncertified plan was executed, a control\n"
+       << "was not its plan's, a candidate was answered twice, or after a jump of its clock the certifier latched nothing or\n"
+       << "certified before the reset. *Lost*: events that the logger had confirmed and its log does not hold. *Recovered*:\n"
+       << "within 20 s, after a reset where a fault was latched, the certifier is OK and certifies and the logger records.\n"
+       << "*Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows)
     text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | " << row.lost_by_logger << " | "
@@ -368,7 +424,8 @@ int Main(int argc, char** argv) {
   app.add_option("--flood", options.floods, "Candidates in the flood")->capture_default_str();
   app.add_option("--seed", options.seed, "Of the random moments")->capture_default_str();
   app.add_option("--report", options.report, "Where the table goes; empty: to standard output alone")->capture_default_str();
-  app.add_option("--only", options.only, "One kind: kill, stop, network, lies, nonsense, forgeries, flood, disks, route, reload");
+  app.add_option("--only", options.only,
+                 "One kind: kill, clock, stop, network, lies, nonsense, forgeries, flood, disks, route, reload");
   CLI11_PARSE(app, argc, argv);
   const std::vector<Row> rows = Campaign(options).Run();
   const std::string table = Table(rows, options);

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
+#include <stdexcept>
 
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
@@ -13,25 +15,31 @@ namespace {
 
 constexpr std::chrono::seconds kRecovers{20};
 constexpr std::chrono::seconds kDriveAtMost{9};  // it is near its goal then
+constexpr std::chrono::seconds kSilent{5};       // a robot whose clock went back waits until it is where it was
 
 const std::array<std::string, Rig::kRoles> kPrograms{FOREREACH_LOGGER, FOREREACH_CERTIFIER, FOREREACH_PLANNER,
                                                      FOREREACH_ROBOT_SIM};
 
+std::string LastLine(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text.substr(text.rfind('\n') + 1);
+}
+
 }  // namespace
 
-Rig::Rig(const std::string& task, bool relayed)
-    : relayed_(relayed), task_path_(scratch_.Write("task.yaml", task)), key_path_((scratch_.path() / "key").string()),
+Rig::Rig(const std::string& task, const Options& options)
+    : options_(options), task_path_(scratch_.Write("task.yaml", task)), key_path_((scratch_.path() / "key").string()),
       directory_((scratch_.path() / "log").string()) {
   static int rigs = 0;
   const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 40'000;
   far_url_ = "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
-  near_url_ = relayed ? "udpm://239.255.76.67:" + std::to_string(port + 1) + "?ttl=0" : far_url_;
+  near_url_ = options_.relayed ? "udpm://239.255.76.67:" + std::to_string(port + 1) + "?ttl=0" : far_url_;
   MakeKeyFile(key_path_);
   config_ = LoadConfig(task_path_);
   config_.bus.url = near_url_;
   config_.bus.key = key_path_;
   heard_ = OpenBus(near_url_);
-  signed_ = OpenBus(config_.bus, "campaign");
+  signed_ = OpenBus(config_.bus, "campaign", [this] { return NowUs(); });
   witness_ = std::make_unique<Witness>(*heard_, config_.bus, LoadKey(key_path_));
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) Start(role);
 }
@@ -42,10 +50,37 @@ Rig::~Rig() {
 }
 
 void Rig::Start(Role role) {
-  std::vector<std::string> command{kPrograms[role], "--config", task_path_, "--lcm-url", url(role), "--key", key_path_};
-  if (role == kLogger) command.insert(command.end(), {"--directory", directory_});
+  std::vector<std::string> command;
+  if (options_.settable_clocks) command = UnderClock(role);
+  command.insert(command.end(), {kPrograms[role], "--config", task_path_, "--lcm-url", url(role), "--key", key_path_});
+  if (role == kLogger) {
+    command.insert(command.end(), {"--directory", directory_});
+    earlier_logs_ = Logs();
+  }
   if (role == kRobot) drive_began_ = std::chrono::steady_clock::now();
   processes_[role] = std::make_unique<ChildProcess>(command);
+}
+
+std::vector<std::string> Rig::UnderClock(Role role) {
+  const std::string path = (scratch_.path() / (std::string("clock of the ") + kNames[role])).string();
+  if (!clocks_[role]) clocks_[role].reset(MapClockFile(path.c_str()));
+  if (!clocks_[role]) throw std::runtime_error(path + " cannot be mapped");
+  const char* others = std::getenv("ASAN_OPTIONS");  // a build with sanitizers wants to be the first library
+  return {"/usr/bin/env", "LD_PRELOAD=" FOREREACH_SETTABLE_CLOCK, "FOREREACH_CLOCK_FILE=" + path,
+          std::string("ASAN_OPTIONS=verify_asan_link_order=0:") + (others ? others : "")};
+}
+
+void Rig::SetClock(Role role, std::chrono::microseconds offset) {
+  ClockFile& clock = *clocks_[role];
+  clock.offset_us = offset.count();
+  const std::int64_t before = clock.reads;
+  if (!ListenUntil([&] { return clock.reads > before || !IsAlive(role); }, std::chrono::seconds(5)))
+    throw std::runtime_error(std::string(kNames[role]) + " does not look at its clock");
+}
+
+void Rig::SetClocks(std::chrono::microseconds offset) {
+  clock_offset_us_ = offset.count();
+  for (const auto& clock : clocks_) clock->offset_us = offset.count();
 }
 
 void Rig::Signal(Role role, int signal) {
@@ -60,8 +95,6 @@ bool Rig::Reap(Role role) {
 }
 
 bool Rig::IsAlive(Role role) const { return processes_[role] && !processes_[role]->WaitForEnd(std::chrono::milliseconds(0)); }
-
-std::string Rig::Said(Role role) const { return processes_[role] ? processes_[role]->error() : ""; }
 
 void Rig::Listen(std::chrono::milliseconds time) {
   static_cast<void>(ListenUntil([] { return false; }, time));
@@ -78,7 +111,7 @@ bool Rig::ListenUntil(const std::function<bool()>& done, std::chrono::millisecon
 
 void Rig::Command(std::int16_t kind) {
   command_t command{};
-  command.utime = WallClockUs();
+  command.utime = NowUs();
   command.kind = kind;
   SetText(command.source, "campaign");
   signed_->Publish(config_.bus.command, command);
@@ -93,12 +126,19 @@ void Rig::DriveAnew() {
   Start(kRobot);
 }
 
+void Rig::EndAll() {
+  for (const Role role : {kRobot, kPlanner, kCertifier, kLogger}) {
+    Signal(role, SIGTERM);
+    static_cast<void>(Reap(role));
+  }
+}
+
 std::string Rig::Heal() {
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot})
     if (!IsAlive(role)) Start(role);
   if (std::chrono::steady_clock::now() - drive_began_ > kDriveAtMost) DriveAnew();
   witness_->Forget();
-  const std::int64_t before = witness_->decisions();
+  const std::int64_t before = witness_->decisions(), certificates_before = witness_->certificates();
   auto next_reset = std::chrono::steady_clock::now();
   const bool healed = ListenUntil(
       [&] {
@@ -107,8 +147,10 @@ std::string Rig::Heal() {
           Command(command_t::RESET);
           next_reset = std::chrono::steady_clock::now() + std::chrono::milliseconds(200);
         }
-        if (!IsAlive(kRobot) || !IsAlive(kPlanner)) DriveAnew();
-        return status && status->level == certifier_status_v2_t::OK && witness_->decisions() > before &&
+        const bool silent = std::chrono::steady_clock::now() - std::max(witness_->robot_heard(), drive_began_) > kSilent;
+        if (silent || !IsAlive(kRobot) || !IsAlive(kPlanner)) DriveAnew();
+        return status && status->level == certifier_status_v2_t::OK &&
+               witness_->certificates() > certificates_before &&
                witness_->logger_status() && witness_->logger_status()->state == logger_status_t::OK;
       },
       kRecovers);
@@ -117,22 +159,28 @@ std::string Rig::Heal() {
   std::string why = status ? "certifier: " + GetText(status->message) : "no certifier is heard";
   why += witness_->logger_status() ? "; logger: " + GetText(witness_->logger_status()->message) : "; no logger is heard";
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot})
-    if (!IsAlive(role)) why += std::string("; ") + kNames[role] + " ended";
-  return why + "; decisions " + std::to_string(witness_->decisions() - before);
+    why += std::string("; ") + kNames[role] + (IsAlive(role) ? ": " + LastLine(processes_[role]->error()) : " ended");
+  return why + "; decisions " + std::to_string(witness_->decisions() - before) + ", certificates " +
+         std::to_string(witness_->certificates() - certificates_before);
+}
+
+std::set<std::string> Rig::Logs() const {
+  std::set<std::string> logs;
+  std::error_code none_yet;
+  for (const auto& entry : std::filesystem::directory_iterator(directory_, none_yet))
+    if (entry.path().extension() == ".lcmlog") logs.insert(entry.path().string());
+  return logs;
 }
 
 std::int64_t Rig::LostByLogger() const {
   if (!witness_->logger_status()) return 0;
-  std::int64_t newest = 0;
-  std::filesystem::path last;
-  const auto written = [](const std::filesystem::path& path) { return std::filesystem::last_write_time(path); };
-  for (const auto& entry : std::filesystem::directory_iterator(directory_))
-    if (entry.path().extension() == ".lcmlog" && (last.empty() || written(entry.path()) > written(last)))
-      last = entry.path();
-  if (last.empty()) return witness_->logger_status()->events_written;
-  EventLogReader reader(last.string());
-  ForEachEvent(reader, [&](const LogEvent&) { ++newest; });
-  return std::max<std::int64_t>(witness_->logger_status()->events_written - newest, 0);
+  std::int64_t events = 0;
+  for (const std::string& log : Logs()) {
+    if (earlier_logs_.contains(log)) continue;
+    EventLogReader reader(log);
+    ForEachEvent(reader, [&](const LogEvent&) { ++events; });
+  }
+  return std::max<std::int64_t>(witness_->logger_status()->events_written - events, 0);
 }
 
 }  // namespace forereach

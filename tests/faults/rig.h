@@ -5,8 +5,10 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 
+#include "tests/faults/clock_file.h"
 #include "tests/faults/witness.h"
 #include "tests/process/process_fixture.h"
 
@@ -17,8 +19,14 @@ class Rig final {
   enum Role { kLogger, kCertifier, kPlanner, kRobot, kRoles };
   static constexpr std::array<const char*, kRoles> kNames{"logger", "certifier", "planner", "robot"};
 
-  /** @param task YAML of the task. @param relayed certifier and logger on a bus of their own: somebody has to relay. */
-  Rig(const std::string& task, bool relayed = false);
+  struct Options {
+    bool relayed = false;          ///< Certifier and logger are on a bus of their own: somebody has to relay.
+    bool settable_clocks = false;  ///< SetClock may be called.
+  };
+
+  /** @param task YAML of the task. */
+  explicit Rig(const std::string& task) : Rig(task, Options()) {}
+  Rig(const std::string& task, const Options& options);
   ~Rig();
 
   void Start(Role role);
@@ -27,14 +35,23 @@ class Rig final {
   bool Reap(Role role);
   [[nodiscard]] bool IsAlive(Role role) const;
 
+  /** From now on the wall clock of a process is the machine's plus `offset`. @throws std::runtime_error if the process
+  does not look at it. */
+  void SetClock(Role role, std::chrono::microseconds offset);
+  /** The same for all of them, and for what this one signs. */
+  void SetClocks(std::chrono::microseconds offset);
+
   void Listen(std::chrono::milliseconds time);
   [[nodiscard]] bool ListenUntil(const std::function<bool()>& done, std::chrono::milliseconds patience);
 
-  /** Starts what is dead, resets what is latched, and waits until the certifier is OK and decides again.
+  /** Starts what is dead and the drive of a robot that is silent, resets what is latched, and waits until the certifier is OK
+  and certifies again, and the logger records.
   @return empty, or what does not come back. */
   [[nodiscard]] std::string Heal();
   /** Ends the robot's drive and begins another. */
   void DriveAnew();
+  /** Ends all four, for Heal to start. */
+  void EndAll();
 
   /** After the logger was hurt: events that it had confirmed and that its log does not hold. */
   [[nodiscard]] std::int64_t LostByLogger() const;
@@ -44,22 +61,26 @@ class Rig final {
   [[nodiscard]] Bus& open_bus() { return *heard_; }  ///< Does not.
   [[nodiscard]] Witness& witness() { return *witness_; }
   [[nodiscard]] const Config& config() const { return config_; }
-  [[nodiscard]] std::string url(Role role) const { return relayed_ && role >= kPlanner ? near_url_ : far_url_; }
+  [[nodiscard]] std::string url(Role role) const { return options_.relayed && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
-  [[nodiscard]] std::string key_path() const { return key_path_; }
-  [[nodiscard]] const std::string& directory() const { return directory_; }
   /** From the logger's next start on. */
   void SetDirectory(const std::string& directory) { directory_ = directory; }
-  [[nodiscard]] std::string Said(Role role) const;
 
  private:
-  const bool relayed_;
+  [[nodiscard]] std::int64_t NowUs() const { return WallClockUs() + clock_offset_us_; }
+  [[nodiscard]] std::vector<std::string> UnderClock(Role role);
+  [[nodiscard]] std::set<std::string> Logs() const;
+
+  const Options options_;
   ScratchDirectory scratch_;
   std::string task_path_, key_path_, near_url_, far_url_, directory_;
   Config config_;
   std::unique_ptr<Bus> heard_, signed_;
   std::unique_ptr<Witness> witness_;
   std::array<std::unique_ptr<ChildProcess>, kRoles> processes_;
+  std::array<std::unique_ptr<ClockFile, UnmapClockFile>, kRoles> clocks_;
+  std::int64_t clock_offset_us_ = 0;
+  std::set<std::string> earlier_logs_;  // of loggers before this one
   std::chrono::steady_clock::time_point drive_began_{};
 };
 

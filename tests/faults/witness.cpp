@@ -12,6 +12,10 @@ Witness::Witness(Bus& bus, const BusOptions& channels, const Key256& key) : chan
   bus.SubscribeUnchecked(channels_.certified, [this](const Received& r) { OnCertified(r); });
   bus.SubscribeUnchecked(channels_.robot_state, [this](const Received& r) { OnState(r); });
   bus.SubscribeUnchecked(channels_.transition, [this](const Received& r) { OnTransition(r); });
+  bus.SubscribeUnchecked(channels_.fault, [this](const Received& r) {
+    fault_ = Decoded<fault_t>(WithoutSignature(r.bytes));
+    certificates_at_fault_ = certificates_;
+  });
   bus.SubscribeUnchecked(channels_.status, [this](const Received& r) {
     if (const auto status = Decoded<certifier_status_v2_t>(r.bytes)) status_ = status;
   });
@@ -36,10 +40,12 @@ void Witness::OnCertified(const Received& received) {
   const auto [authenticity, message] = authenticator_.Check(channels_.certified, received.bytes);
   const auto plan = Decoded<certified_plan_t>(message);
   if (authenticity != Authenticity::kAuthentic || !plan || !FindSealFaults(*plan).empty()) return;
+  ++certificates_;
   plans_[plan->plan.plan_id] = *plan;
 }
 
 void Witness::OnState(const Received& received) {
+  robot_heard_ = std::chrono::steady_clock::now();
   const auto state = Decoded<robot_state_t>(WithoutSignature(received.bytes));
   if (!state || state->mode != robot_state_t::EXECUTING) return;
   applied_[state->utime] = {state->executing_plan_id, state->executing_step};
@@ -50,7 +56,6 @@ void Witness::OnState(const Received& received) {
 void Witness::OnTransition(const Received& received) {
   const auto transition = Decoded<transition_t>(WithoutSignature(received.bytes));
   if (!transition) return;
-  ++transitions_;
   const auto applied = applied_.find(transition->utime);
   if (applied == applied_.end()) return;  // its state did not reach this listener
   const auto plan = plans_.find(applied->second.plan_id);

@@ -1,9 +1,9 @@
 /** Hears everything on the bus and holds it to what may never happen, whatever fails. */
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -11,6 +11,7 @@
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
@@ -27,16 +28,20 @@ class Witness final {
   /** One line for each thing that may not happen and did:
       - a robot executes a plan for which no certified plan, signed and sealed, was on the bus;
       - a control is applied that is not the one of that plan and step;
-      - a candidate is answered twice by one certifier;
-      - a plan is passed on whose decision is not "certified". */
+      - a candidate is answered twice by one certifier. */
   [[nodiscard]] const std::vector<std::string>& violations() const { return violations_; }
 
   [[nodiscard]] std::int64_t decisions() const { return decisions_; }
-  [[nodiscard]] std::int64_t certificates() const { return static_cast<std::int64_t>(plans_.size()); }
-  [[nodiscard]] std::int64_t transitions() const { return transitions_; }
+  /** Certified plans, signed and sealed. */
+  [[nodiscard]] std::int64_t certificates() const { return certificates_; }
+  /** The last one that the certifier has latched, and the certificates heard since. */
+  [[nodiscard]] const std::optional<fault_t>& fault() const { return fault_; }
+  [[nodiscard]] std::int64_t certificates_since_fault() const { return certificates_ - certificates_at_fault_; }
+  /** The last time a state was heard. */
+  [[nodiscard]] std::chrono::steady_clock::time_point robot_heard() const { return robot_heard_; }
   [[nodiscard]] const std::optional<certifier_status_v2_t>& status() const { return status_; }
   [[nodiscard]] const std::optional<logger_status_t>& logger_status() const { return logger_status_; }
-  void Forget() { status_.reset(), logger_status_.reset(); }
+  void Forget() { status_.reset(), logger_status_.reset(), fault_.reset(); }
 
  private:
   void OnDecision(const Received& received);
@@ -60,7 +65,9 @@ class Witness final {
   std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
   std::optional<certifier_status_v2_t> status_;
   std::optional<logger_status_t> logger_status_;
-  std::int64_t decisions_ = 0, transitions_ = 0;
+  std::chrono::steady_clock::time_point robot_heard_{};
+  std::optional<fault_t> fault_;
+  std::int64_t decisions_ = 0, certificates_ = 0, certificates_at_fault_ = 0;
   std::vector<std::string> violations_;
 };
 

@@ -352,6 +352,18 @@ TEST_F(PlannerNodeTest, AStateIsUsedOnce) {
   EXPECT_EQ(Summary()["messages_ignored"], 1);
 }
 
+TEST_F(PlannerNodeTest, AStateFromTheFutureDoesNotKeepOutThoseOfNow) {
+  robot_state_t state = Standing();
+  state.utime = now_ + 50'001;  // gate.max_ahead_ms is 50
+  Say(state);
+  Run(3);
+  EXPECT_TRUE(candidates_.empty());
+  EXPECT_EQ(Summary()["messages_ignored"], 1);
+  Say(Standing());
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
 TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
   config_.obstacles = {Obstacle::Circle(Vec({12, 0}), 2)};
   obstacles_t message = ToMessage(config_.obstacles);

@@ -311,6 +311,27 @@ TEST_F(ArmedNodeTest, AClockThatJumpsLatches) {
   EXPECT_EQ(node.watch().fault()->cause, fault_t::CLOCK_JUMP);
 }
 
+TEST_F(ArmedNodeTest, HeartbeatsGoOnWhereTheClockJumpsToAndFro) {
+  std::int64_t steady = 0;
+  node_ = nullptr;
+  bus_ = OpenBus("memq://", clock_);
+  int heartbeats = 0;
+  bus_->Subscribe("CERTIFIER_STATUS", [&](const Received&) { ++heartbeats; });
+  CertifierNode node(config_, *bus_, {clock_, [&] { return steady; }});
+  constexpr std::int64_t kHour = 3'600'000'000, kStep = CertifierNode::kHeartbeatUs;
+  for (const std::int64_t jump : {std::int64_t{0}, kHour, -kHour, -kHour}) {
+    now_us_ += jump;
+    heartbeats = 0;
+    for (int i = 0; i < 4; ++i) {
+      now_us_ += kStep;
+      steady += kStep;
+      node.Tick(now_us_);
+      bus_->Dispatch(0);
+    }
+    EXPECT_EQ(heartbeats, 4) << "after a jump of " << jump;
+  }
+}
+
 TEST_F(ArmedNodeTest, AStateOutsideItsSliceLatchesAndNamesTheTransition) {
   SayState(State());
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);

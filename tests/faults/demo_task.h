@@ -1,0 +1,20 @@
+/** The demo's task for processes of a test. */
+#pragma once
+
+#include <fstream>
+#include <sstream>
+#include <string>
+
+namespace forereach {
+
+/** Its files named absolutely. @param more YAML that is added. */
+inline std::string DemoTask(const std::string& more = "") {
+  std::ostringstream text;
+  text << std::ifstream(FOREREACH_SOURCE_DIR "/config/demo.yaml").rdbuf();
+  std::string task = text.str();
+  const std::string relative = "transitions: data/";
+  task.replace(task.find(relative), relative.size(), "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
+  return task + "\n" + more;
+}
+
+}  // namespace forereach
