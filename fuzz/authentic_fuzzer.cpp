@@ -1,27 +1,31 @@
 // Signatures: what a receiver takes is what a signer with the key made for the channel, whole, once, and not from before.
+#include <map>
 #include <set>
 
 #include "fuzz/fuzz.h"
 #include "lcmtypes/authentic.h"
 
+namespace forereach {
 namespace {
 
-using namespace forereach;
-
 constexpr Key256 kKey{1, 2, 3}, kOtherKey{4};
-constexpr std::int64_t kBegun = 1'000'000;
+constexpr int kBegun = 1'000'000, kMaxSigners = 80;
+static_assert(kMaxSigners > Authenticator::kMaxStreams);
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  FuzzedDataProvider input(data, size);
-  Signer signer(kKey, "planner", kBegun), forger(kOtherKey, "planner", kBegun);
+bool Try(Bytes data) {
+  FuzzedDataProvider input(data.data(), data.size());
+  std::map<int, Signer> signers;  // more than a receiver remembers
+  Signer forger(kOtherKey, "0", kBegun);
   Authenticator authenticator(kKey, kBegun);
   std::set<std::vector<std::uint8_t>> made, taken;
   std::vector<std::uint8_t> bytes;
   std::int64_t refused = 0;
-  for (int i = 0; i < 16 && input.remaining_bytes() > 0; ++i) {
-    const std::int64_t now = input.ConsumeIntegralInRange<std::int64_t>(0, 2 * kBegun);
+  for (int i = 0; i < 2 * kMaxSigners && input.remaining_bytes() > 0; ++i) {
+    const std::int64_t now = kBegun + i + 1 + (input.ConsumeBool() ? input.ConsumeIntegralInRange(-kBegun, kBegun) : 0);
+    const int who = input.ConsumeIntegralInRange(0, kMaxSigners - 1);
+    Signer& signer = signers.try_emplace(who, kKey, std::to_string(who), kBegun).first->second;
     const std::vector<std::uint8_t> message = input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 80));
     switch (input.ConsumeIntegralInRange(0, 4)) {
       case 0: made.insert(bytes = signer.Sign("COMMAND", message, now)); break;
@@ -41,5 +45,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const Refusals& refusals = authenticator.refusals();
   Require(refusals.unsigned_ones + refusals.forged + refusals.replayed == refused);
-  return 0;
+  return !taken.empty();
 }
+
+}  // namespace forereach

@@ -1,15 +1,15 @@
 // Candidates through the gate, under any of four tasks: each gets one decision, and a certified plan comes only with the
-// outcome CERTIFIED, sealed, and of a candidate that a certificate can be about.
+// outcome CERTIFIED, sealed, of a candidate that a certificate can be about, and with slices that its nominal run is in.
+#include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "certifier/gate/gate.h"
-#include "fuzz/fuzz.h"
+#include "fuzz/candidates.h"
 #include "lcmtypes/seal.h"
-#include "tests/gate/small_task.h"
 
+namespace forereach {
 namespace {
-
-using namespace forereach;
 
 std::vector<Config> Tasks() {
   Config shadow = SmallTask(), open = SmallTask();
@@ -17,6 +17,8 @@ std::vector<Config> Tasks() {
   open.obstacles.clear();
   return {SmallTask(), FalsifiedTask(), shadow, open};
 }
+
+constexpr std::size_t kNeverCertify[] = {1, 2};  // the data contradict the declaration; shadow mode
 
 bool IsProper(const candidate_plan_t& plan) {
   bool proper = plan.num_states == 4 && plan.num_inputs == 2 && 1 <= plan.num_steps && plan.num_steps <= 128;
@@ -26,7 +28,23 @@ bool IsProper(const candidate_plan_t& plan) {
   return proper;
 }
 
-void RequireCertificate(const GateAnswer& answer, Bytes bytes) {
+// What rounds where the run is computed is far below this; a slice is as exact as its rounding outward.
+void RequireNominalRunInside(const certified_plan_t& certified, const NominalModel& model) {
+  constexpr double kSlack = 1e-9;
+  const candidate_plan_t& plan = certified.plan;
+  double z[6], next[4];
+  std::copy_n(plan.initial_center, 4, next);
+  for (int t = 0; t <= plan.num_steps; ++t) {
+    for (int k = 0; k < 4; ++k)
+      Require(certified.slice_lower[t][k] - kSlack <= next[k] && next[k] <= certified.slice_upper[t][k] + kSlack);
+    if (t == plan.num_steps) return;
+    std::copy_n(next, 4, z);
+    std::copy_n(plan.control[t], 2, z + 4);
+    model.Evaluate({z, 6}, {next, 4});
+  }
+}
+
+void RequireCertificate(const GateAnswer& answer, Bytes bytes, const NominalModel& model) {
   const certified_plan_t& certified = *answer.certified;
   Require(answer.decision.outcome == decision_t::CERTIFIED && answer.decision.cause == decision_t::CAUSE_NONE);
   Require(Encode(certified.plan) == std::vector(bytes.begin(), bytes.end()) && IsProper(certified.plan));
@@ -36,28 +54,40 @@ void RequireCertificate(const GateAnswer& answer, Bytes bytes) {
     for (int k = 0; k < 4; ++k)
       Require(std::isfinite(certified.slice_lower[t][k]) && certified.slice_lower[t][k] <= certified.slice_upper[t][k] &&
               std::isfinite(certified.slice_upper[t][k]));
+  RequireNominalRunInside(certified, model);
+}
+
+std::vector<std::unique_ptr<Gate>> GatesFor(const std::vector<Config>& tasks) {
+  std::vector<std::unique_ptr<Gate>> gates;
+  for (const Config& task : tasks) gates.push_back(std::make_unique<Gate>(task));
+  return gates;
 }
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+bool Try(Bytes data) {
   static const std::vector<Config> tasks = Tasks();
-  FuzzedDataProvider input(data, size);
+  static const auto gates = GatesFor(tasks), fresh_gates = GatesFor(tasks);  // dearer to make than to ask
+  FuzzedDataProvider input(data.data(), data.size());
   const std::size_t task = input.ConsumeIntegralInRange<std::size_t>(0, tasks.size() - 1);
-  Gate gate(tasks[task]);
-  std::int64_t now = kNow, decided = 0;
+  Gate& gate = *gates[task];
+  gate.Inherit(*fresh_gates[task]);  // forgets the last execution, in which candidates could change nothing else
+  std::int64_t now = kNow, decided = 0, certified = 0;
   for (; input.remaining_bytes() > 0 && decided < 8; ++decided) {
-    now += input.ConsumeIntegralInRange<std::int64_t>(-1'000'000, 1'000'000);
-    const std::vector<std::uint8_t> bytes = Damaged(input, Candidate(input.ConsumeIntegralInRange(1, 8), OddNumber(input), now));
+    now += input.ConsumeBool() ? input.ConsumeIntegralInRange<std::int64_t>(-1'000'000, 1'000'000) : 0;
+    const std::vector<std::uint8_t> bytes = Damaged(input, AnyCandidate(input, now));
     const GateAnswer answer = gate.Decide(bytes, now);
     Require(answer.decision.sequence == decided && answer.decision.utime == now);
     Require(GetDigest(answer.decision.plan_digest) == DigestOf(bytes));
     Require(answer.certified.has_value() == (answer.decision.outcome == decision_t::CERTIFIED));
     Require(answer.decision.cause != decision_t::CAUSE_INTERNAL_ERROR);
     if (!answer.certified) continue;
-    Require(task != 1 && task != 2);  // the data contradict the declaration; shadow mode
-    RequireCertificate(answer, bytes);
+    Require(std::ranges::count(kNeverCertify, task) == 0);
+    RequireCertificate(answer, bytes, *tasks[task].problem->model);
+    ++certified;
   }
   Require(gate.Status(now).candidates == decided);
-  return 0;
+  return certified > 0;
 }
+
+}  // namespace forereach

@@ -6,13 +6,11 @@
 
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
-#include "fuzz/fuzz.h"
+#include "fuzz/candidates.h"
 #include "lcmtypes/seal.h"
-#include "tests/gate/small_task.h"
 
+namespace forereach {
 namespace {
-
-using namespace forereach;
 
 /** Hands each message to its subscriber at once, and looks at what the node sends. */
 class WitnessBus final : public Bus {
@@ -27,6 +25,7 @@ class WitnessBus final : public Bus {
       Require(!certified_ && may_certify);
       certified_ = Decoded<certified_plan_t>(bytes);
       Require(certified_ && FindSealFaults(*certified_).empty());
+      has_certified = true;
     } else if (channel == "PLAN_DECISION") {
       TakeDecision(Decoded<decision_t>(bytes));
     }
@@ -43,7 +42,7 @@ class WitnessBus final : public Bus {
     for (const auto& [digest, count] : unanswered_) Require(count == 0);
   }
 
-  bool may_certify = false;
+  bool may_certify = false, has_certified = false;
 
  private:
   void TakeDecision(const std::optional<decision_t>& decision) {
@@ -59,16 +58,19 @@ class WitnessBus final : public Bus {
   std::optional<certified_plan_t> certified_;
 };
 
-robot_state_t RobotState(FuzzedDataProvider& input, std::int64_t now) {
+robot_state_t RobotState(FuzzedDataProvider& input, std::int64_t sequence, std::int64_t now) {
   robot_state_t state{};
   state.utime = now;
-  state.sequence = input.ConsumeBool() ? INT64_MAX - input.ConsumeIntegralInRange(0, 2) : input.ConsumeIntegralInRange(0, 8);
-  state.executing_plan_id = input.ConsumeIntegralInRange(-1, 8);
-  state.executing_step = input.ConsumeIntegralInRange<std::int16_t>(-1, 11);
-  state.mode = input.ConsumeIntegralInRange<std::int16_t>(0, 4);
-  state.num_states = 4;
-  state.state[0] = 0.15 * state.executing_step;
+  state.sequence = AnyInteger(input, sequence, 8);
+  state.executing_plan_id = input.ConsumeIntegralInRange(0, 9) - 1;
+  state.executing_step = static_cast<std::int16_t>(input.ConsumeIntegralInRange(0, 12) - 1);
+  state.mode = input.ConsumeBool() ? AnySmall(input, 4) : robot_state_t::EXECUTING;
+  state.num_states = input.ConsumeBool() ? AnySmall(input, 16) : std::int16_t{4};
+  state.state[0] = 0.15 * state.executing_step;  // where the candidate that certifies wants it
+  state.state[1] = 0.015 * state.executing_step;
   state.state[2] = 1;
+  state.state[3] = 0.1;
+  if (input.ConsumeBool()) state.state[input.ConsumeIntegralInRange(0, 4)] = AnyNumber(input);
   return state;
 }
 
@@ -80,7 +82,8 @@ transition_t Transition(FuzzedDataProvider& input, std::int64_t now) {
   transition.state[2] = 1;
   transition.next_state[0] = 0.15;
   transition.next_state[2] = 1;
-  if (input.ConsumeBool()) transition.next_state[input.ConsumeIntegralInRange(0, 3)] = OddNumber(input);
+  if (input.ConsumeBool()) transition.state[input.ConsumeIntegralInRange(0, 3)] = AnyNumber(input);
+  if (input.ConsumeBool()) transition.next_state[input.ConsumeIntegralInRange(0, 3)] = AnyNumber(input);
   return transition;
 }
 
@@ -89,18 +92,17 @@ obstacle_t AnyObstacle(FuzzedDataProvider& input) {
   obstacle.kind = input.ConsumeIntegralInRange<std::int16_t>(0, 5);
   obstacle.dimension = input.ConsumeIntegralInRange<std::int16_t>(1, 3);
   obstacle.num_points = input.ConsumeIntegralInRange<std::int16_t>(0, 16);
-  obstacle.value = OddNumber(input);
-  for (int p = 0; p < std::min<int>(obstacle.num_points, 16); ++p)
-    for (double& coordinate : obstacle.point[p])
-      coordinate = input.ConsumeBool() ? OddNumber(input) : input.ConsumeIntegral<std::int8_t>();
+  obstacle.value = AnyNumber(input);
+  for (int p = 0; p < obstacle.num_points; ++p)
+    for (double& coordinate : obstacle.point[p]) coordinate = AnyNumber(input);
   return obstacle;
 }
 
-obstacles_t AnyObstacles(FuzzedDataProvider& input, std::int64_t now) {
+obstacles_t AnyObstacles(FuzzedDataProvider& input, std::int64_t sequence, std::int64_t now) {
   obstacles_t obstacles = ToMessage({Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)});
   obstacles.utime = now;
-  obstacles.sequence = input.ConsumeIntegralInRange(0, 8);
-  if (input.ConsumeBool()) return obstacles;
+  obstacles.sequence = AnyInteger(input, sequence, 8);
+  if (!input.ConsumeBool()) return obstacles;
   obstacles.num_obstacles = input.ConsumeIntegralInRange<std::int16_t>(-1, 4);
   for (int i = 0; i < obstacles.num_obstacles; ++i) obstacles.obstacle[i] = AnyObstacle(input);
   return obstacles;
@@ -118,14 +120,15 @@ class Session final {
   explicit Session(const Config& config) : node_(config, bus_, {[this] { return now_; }, [this] { return steady_; }}) {}
 
   void Step(FuzzedDataProvider& input) {
+    ++step_;
     switch (input.ConsumeIntegralInRange(0, 6)) {
-      case 0: return bus_.Deliver("PLAN_CANDIDATE", Damaged(input, Candidate(input.ConsumeIntegralInRange(1, 8), OddNumber(input), now_)), now_);
-      case 1: return bus_.Deliver("ROBOT_STATE", Damaged(input, RobotState(input, now_)), now_);
-      case 2: return bus_.Deliver("TRANSITION", Damaged(input, Transition(input, now_)), now_);
-      case 3: return bus_.Deliver("OBSTACLES", Damaged(input, AnyObstacles(input, now_)), now_);
-      case 4: return DeliverCommand(Damaged(input, Command(now_)));
-      case 5: return Wait(input);
-      case 6: return Tick();
+      case 0: return Tick();
+      case 1: return bus_.Deliver("ROBOT_STATE", Damaged(input, RobotState(input, step_, now_)), now_);
+      case 2: return bus_.Deliver("PLAN_CANDIDATE", Damaged(input, AnyCandidate(input, now_)), now_);
+      case 3: return bus_.Deliver("TRANSITION", Damaged(input, Transition(input, now_)), now_);
+      case 4: return bus_.Deliver("OBSTACLES", Damaged(input, AnyObstacles(input, step_, now_)), now_);
+      case 5: return DeliverCommand(Damaged(input, Command(now_)));
+      case 6: return Wait(input);
     }
   }
 
@@ -133,6 +136,8 @@ class Session final {
     while (node_.busy()) Tick();
     bus_.RequireAllAnswered();
   }
+
+  [[nodiscard]] bool has_certified() const { return bus_.has_certified; }
 
  private:
   void DeliverCommand(const std::vector<std::uint8_t>& bytes) {
@@ -152,7 +157,7 @@ class Session final {
     node_.Tick(now_);
   }
 
-  std::int64_t now_ = kNow, steady_ = 0;
+  std::int64_t now_ = kNow, steady_ = 0, step_ = 0;
   WitnessBus bus_;
   CertifierNode node_;
 };
@@ -167,14 +172,16 @@ std::vector<Config> Tasks() {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+bool Try(Bytes data) {
   static const std::vector<Config> tasks = [] {
     spdlog::set_level(spdlog::level::off);
     return Tasks();
   }();
-  FuzzedDataProvider input(data, size);
+  FuzzedDataProvider input(data.data(), data.size());
   Session session(tasks[input.ConsumeIntegralInRange<std::size_t>(0, tasks.size() - 1)]);
   for (int step = 0; step < 64 && input.remaining_bytes() > 0; ++step) session.Step(input);
   session.Finish();
-  return 0;
+  return session.has_certified();
 }
+
+}  // namespace forereach

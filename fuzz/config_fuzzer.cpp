@@ -2,17 +2,15 @@
 #include "certifier/task/config.h"
 #include "fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace forereach;
+bool forereach::Try(Bytes data) {
   static MemoryFile file;
-  const std::string& path = file.Write(Bytes(data, size));
-  IsTaken([&] {
+  const std::string& path = file.Write(data);
+  return IsTaken([&] {
     const Config config = LoadConfig(path, TransitionsFile::kIgnore);
     const auto n = static_cast<std::size_t>(config.problem->model->num_states());
-    Require(config.digest == DigestOf(Bytes(data, size)));
+    Require(config.digest == DigestOf(data));
     Require(config.initial_set.dim() == static_cast<Eigen::Index>(n) && config.robot.start.size() == n &&
             config.planner.initial_half_width.size() == n);
     for (const Obstacle& obstacle : config.obstacles) Require(obstacle.dim() == config.problem->projection.rows());
   });
-  return 0;
 }

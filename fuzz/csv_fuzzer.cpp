@@ -4,20 +4,21 @@
 #include "certifier/task/config.h"
 #include "fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace forereach;
+bool forereach::Try(Bytes data) {
   static MemoryFile file;
   static const auto model = MakePointMass(0.15);
-  const std::string path = file.Write(Bytes(data, size));
+  const std::string& path = file.Write(data);
   if (Transitions read; IsTaken([&] { read = LoadTransitions(path, *model); })) {
     Require(read.size() >= 1 && read.z.cols() == 6 && read.x_next.cols() == 4 && read.z.allFinite() && read.x_next.allFinite());
     SaveTransitions(path, *model, read);
     const Transitions again = LoadTransitions(path, *model);
     Require(again.z == read.z && again.x_next == read.x_next);
-  } else if (Eigen::MatrixXd plan; IsTaken([&] { plan = LoadPlan(path, *model); })) {
-    Require(plan.rows() == 2 && 1 <= plan.cols() && plan.cols() <= 128 && plan.allFinite());
-    SavePlan(path, *model, plan);
-    Require(LoadPlan(path, *model) == plan);
+    return true;
   }
-  return 0;
+  Eigen::MatrixXd plan;
+  if (!IsTaken([&] { plan = LoadPlan(path, *model); })) return false;
+  Require(plan.rows() == 2 && 1 <= plan.cols() && plan.cols() <= 128 && plan.allFinite());
+  SavePlan(path, *model, plan);
+  Require(LoadPlan(path, *model) == plan);
+  return true;
 }

@@ -1,10 +1,10 @@
 // `forereach verify`'s JSON: any bytes are a document that is confirmed or not, or refused with a ConfigError.
 #include "cli/certificate_files.h"
 #include "fuzz/fuzz.h"
+#include "fuzz/json_mutator.h"
 
+namespace forereach {
 namespace {
-
-using namespace forereach;
 
 // So that a try takes milliseconds.
 bool IsSmall(const verifier::Certificate& certificate) {
@@ -25,9 +25,10 @@ void Verify(const CertificateFile& file) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+bool Try(Bytes data) {
   static MemoryFile file;
-  const std::string& path = file.Write(Bytes(data, size));
-  IsTaken([&] { Verify(ReadCertificates(path, FOREREACH_FUZZ_TASK)); });
-  return 0;
+  const std::string& path = file.Write(data);
+  return IsTaken([&] { Verify(ReadCertificates(path, FOREREACH_FUZZ_TASK)); });
 }
+
+}  // namespace forereach

@@ -3,9 +3,8 @@
 #include "fuzz/fuzz.h"
 #include "logger/event_log.h"
 
+namespace forereach {
 namespace {
-
-using namespace forereach;
 
 std::int64_t ReadAll(const std::string& path, std::int64_t size) {
   EventLogReader reader(path);
@@ -26,13 +25,16 @@ std::int64_t ReadAll(const std::string& path, std::int64_t size) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+bool Try(Bytes data) {
   static MemoryFile file;
-  const std::string path = file.Write(Bytes(data, size));
-  const std::int64_t events = ReadAll(path, static_cast<std::int64_t>(size));
+  const std::string& path = file.Write(data);
+  const auto size = static_cast<std::int64_t>(data.size());
+  const std::int64_t events = ReadAll(path, size);
   EventLogWriter writer(path);
   Require(writer.recovery().events == events);
-  const auto kept = static_cast<std::int64_t>(size) - writer.recovery().cut_bytes;
+  const std::int64_t kept = size - writer.recovery().cut_bytes;
   Require(ReadAll(path, kept) >= events);  // a claim that reached into the tail no longer discredits one before it
-  return 0;
+  return events > 0;
 }
+
+}  // namespace forereach

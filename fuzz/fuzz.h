@@ -1,4 +1,7 @@
-/** What the fuzzers share. A property that fails ends the process, which libFuzzer takes for a finding. */
+/** What the fuzzers share. A property that fails ends the process, which libFuzzer takes for a finding.
+
+Choices are made so that zero, which is also what an input gives once it is used up, is the choice with nothing odd in
+it: short inputs are valid runs, and each byte more makes one thing different. */
 #pragma once
 
 #include <algorithm>
@@ -24,6 +27,10 @@ inline void Require(bool holds) {
   if (!holds) std::abort();
 }
 
+/** What each target is: one execution. @return whether the input got past everything that refuses; how many do is printed
+when the process ends, for a fuzzer in which none does tries little. */
+bool Try(Bytes input);
+
 /** A file in memory, which each Write fills anew; its path opens it. Only its owner can read it. */
 class MemoryFile final {
  public:
@@ -32,12 +39,9 @@ class MemoryFile final {
   }
 
   const std::string& Write(Bytes bytes) {
-    Require(::ftruncate(file_, 0) == 0);
+    Require(::ftruncate(file_, static_cast<off_t>(bytes.size())) == 0);
     Require(::pwrite(file_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()));
     return path_;
-  }
-  const std::string& Write(std::string_view text) {
-    return Write(Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
   }
 
  private:
@@ -66,21 +70,45 @@ inline double OddNumber(FuzzedDataProvider& input) {
   return input.PickValueInArray(kOdd);
 }
 
-/** Replaces a few of the bytes: by a number of any kind, in the order of the bus, or by any bytes. */
+/** An odd one, or a plain one. */
+inline double AnyNumber(FuzzedDataProvider& input) {
+  return input.ConsumeBool() ? OddNumber(input) : input.ConsumeIntegral<std::int8_t>() / 16.0;
+}
+
+/** Around `middle` by up to `reach`, next to the ends of what it can be, or any. */
+inline std::int64_t AnyInteger(FuzzedDataProvider& input, std::int64_t middle, std::int64_t reach) {
+  switch (input.ConsumeIntegralInRange(0, 4)) {
+    case 0: return middle;
+    case 1: return middle + input.ConsumeIntegralInRange(-reach, reach);
+    case 2: return std::numeric_limits<std::int64_t>::max() - input.ConsumeIntegralInRange(0, 2);
+    case 3: return std::numeric_limits<std::int64_t>::min() + input.ConsumeIntegralInRange(0, 2);
+    default: return input.ConsumeIntegral<std::int64_t>();
+  }
+}
+
+/** For sizes and kinds: one that is in use, or any. */
+inline std::int16_t AnySmall(FuzzedDataProvider& input, std::int16_t largest) {
+  return input.ConsumeBool() ? input.ConsumeIntegral<std::int16_t>() : input.ConsumeIntegralInRange<std::int16_t>(-1, largest);
+}
+
+/** How many things are odd: none half of the time, else up to seven. */
+inline int NumOdd(FuzzedDataProvider& input) { return input.ConsumeIntegralInRange(0, 15) - 8; }
+
+/** Replaces a few of the bytes: by a number of any kind, in the order of the bus, or by any bytes. Or changes the length. */
 inline void Damage(FuzzedDataProvider& input, std::vector<std::uint8_t>& bytes) {
-  for (int left = input.ConsumeIntegralInRange(0, 8); left > 0 && !bytes.empty(); --left) {
+  for (int left = NumOdd(input); left > 0 && !bytes.empty(); --left) {
     const auto at = input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() - 1);
     const auto size = std::min<std::size_t>(bytes.size() - at, std::size_t{1} << input.ConsumeIntegralInRange(0, 3));
     std::uint64_t value = input.ConsumeBool() ? std::bit_cast<std::uint64_t>(OddNumber(input)) : input.ConsumeIntegral<std::uint64_t>();
     for (std::size_t i = size; i-- > 0; value >>= 8) bytes[at + i] = static_cast<std::uint8_t>(value);
   }
-  if (input.ConsumeIntegralInRange(0, 15) == 0) bytes.resize(input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));
+  if (input.ConsumeIntegralInRange(0, 15) == 15) bytes.resize(input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));
 }
 
 /** A message of this type that was damaged on its way, or something else altogether. */
 template <class Message>
 std::vector<std::uint8_t> Damaged(FuzzedDataProvider& input, const Message& message) {
-  if (input.ConsumeIntegralInRange(0, 31) == 0) return input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 64));
+  if (input.ConsumeIntegralInRange(0, 31) == 31) return input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 64));
   std::vector<std::uint8_t> bytes = Encode(message);
   Damage(input, bytes);
   return bytes;

@@ -6,76 +6,105 @@
 #include "robot/guard.h"
 #include "tests/robot/sealed_plan.h"
 
+namespace forereach {
 namespace {
 
-using namespace forereach;
-
-constexpr std::int64_t kStart = 1'000'000'000'000, kStepUs = 40'000;
+constexpr std::int64_t kStart = kPlanStart, kStepUs = kPlanStepUs;
 constexpr Key256 kKey{1, 2, 3}, kOtherKey{4};
 
-// Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5].
-certified_plan_t Plan(std::int64_t id) {
-  certified_plan_t certified{};
+GuardOptions Options(bool with_key) {
+  return {2, 1, kStepUs, DigestOf("config"), DigestOf("model"), with_key ? std::optional(kKey) : std::nullopt};
+}
+
+// Makes something of it odd that a guard looks at.
+void Distort(FuzzedDataProvider& input, certified_plan_t& certified) {
   candidate_plan_t& plan = certified.plan;
-  plan.plan_id = id;
-  plan.start_utime = kStart;
-  plan.step_us = kStepUs;
-  plan.num_states = 2;
-  plan.num_inputs = 1;
-  plan.num_steps = 3;
-  plan.initial_center[0] = 1;
-  plan.initial_center[1] = -2;
-  plan.initial_half_width[0] = 0.5;
-  plan.initial_half_width[1] = 0.25;
-  certified.expires_utime = kStart + kStepUs;
-  for (int t = 0; t <= 3; ++t) {
-    certified.slice_lower[t][0] = -10 - t;
-    certified.slice_upper[t][0] = 10 + t;
-    certified.slice_lower[t][1] = -5;
-    certified.slice_upper[t][1] = 5;
+  const auto entry = [&](auto& slices) -> double& {
+    return slices[input.ConsumeIntegralInRange(0, 4)][input.ConsumeIntegralInRange(0, 2)];
+  };
+  switch (input.ConsumeIntegralInRange(0, 14)) {
+    case 0: entry(certified.slice_lower) = AnyNumber(input); return;
+    case 1: entry(certified.slice_upper) = AnyNumber(input); return;
+    case 2: certified.expires_utime = AnyInteger(input, certified.expires_utime, kStepUs); return;
+    case 3: plan.start_utime = AnyInteger(input, plan.start_utime, kStepUs); return;
+    case 4: plan.num_steps = AnySmall(input, 129); return;
+    case 5: plan.progress_steps = AnySmall(input, 4); return;
+    case 6: plan.num_states = AnySmall(input, 16); return;
+    case 7: plan.num_inputs = AnySmall(input, 8); return;
+    case 8: plan.step_us = AnyInteger(input, plan.step_us, 1); return;
+    case 9: plan.plan_id = AnyInteger(input, plan.plan_id, 8); return;
+    case 10: plan.initial_center[input.ConsumeIntegralInRange(0, 2)] = AnyNumber(input); return;
+    case 11: plan.initial_half_width[input.ConsumeIntegralInRange(0, 2)] = AnyNumber(input); return;
+    case 12: plan.control[input.ConsumeIntegralInRange(0, 3)][input.ConsumeIntegralInRange(0, 1)] = AnyNumber(input); return;
+    case 13: certified.config_digest[input.ConsumeIntegralInRange(0, 31)] ^= 1; return;
+    case 14: certified.model_digest[input.ConsumeIntegralInRange(0, 31)] ^= 1; return;
   }
-  return certified;
+}
+
+// A plan that passes, damaged or not; or one that was damaged and then sealed.
+std::vector<std::uint8_t> AnyPlan(FuzzedDataProvider& input) {
+  static const std::vector<std::vector<std::uint8_t>> sealed = [] {
+    std::vector<std::vector<std::uint8_t>> plans;
+    for (int id = 1; id <= 8; ++id) plans.push_back(Sealed(SmallPlan(id)));
+    return plans;
+  }();
+  if (input.ConsumeIntegralInRange(0, 31) == 31) return input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 64));
+  std::vector<std::uint8_t> bytes = sealed[input.ConsumeIntegralInRange<std::size_t>(0, sealed.size() - 1)];
+  Damage(input, bytes);
+  if (!input.ConsumeBool()) return bytes;
+  auto plan = Decoded<certified_plan_t>(bytes);
+  if (!plan) return bytes;
+  for (int left = NumOdd(input); left > 0; --left) Distort(input, *plan);
+  return Sealed(*plan);
 }
 
 class Session final {
  public:
-  explicit Session(bool with_key) : guard_({2, 1, kStepUs, {}, {}, with_key ? std::optional(kKey) : std::nullopt}), with_key_(with_key) {}
+  explicit Session(bool with_key) : guard_(Options(with_key)), with_key_(with_key) {}
 
   void Step(FuzzedDataProvider& input) {
     switch (input.ConsumeIntegralInRange(0, 5)) {
-      case 0: return Accept(input);
+      case 0: return Check(input);
       case 1: return TryStart(input);
-      case 2:
-      case 3: return Check(input);
-      case 4: return guard_.Finish();
-      case 5: return input.ConsumeBool() ? guard_.Halt() : guard_.Reset();
+      case 2: return Accept(input);
+      case 3: return guard_.Finish();
+      case 4: return guard_.Reset();
+      case 5: return guard_.Halt();
     }
   }
 
+  [[nodiscard]] bool has_executed() const { return has_executed_; }
   void RequireConsistent() const { Require(!guard_.halted() || (!guard_.pending() && !guard_.executing())); }
 
  private:
+  // With the guard's key where it has one, or otherwise, or as before.
+  struct Message {
+    std::vector<std::uint8_t> bytes;
+    bool is_signed = false;
+  };
+  void Receive(FuzzedDataProvider& input) {
+    const int how = input.ConsumeIntegralInRange(0, 3);
+    if (how == 3) return;
+    message_ = {AnyPlan(input), with_key_ == (how == 0)};
+    if (how == 2) message_ = {forger_.Sign("PLAN_CERTIFIED", message_.bytes, kStart), false};
+    if (message_.is_signed) message_.bytes = signer_.Sign("PLAN_CERTIFIED", message_.bytes, kStart);
+  }
+
   void Accept(FuzzedDataProvider& input) {
-    std::vector<std::uint8_t> bytes = Damaged(input, Plan(input.ConsumeIntegralInRange(1, 8)));
-    if (auto plan = Decoded<certified_plan_t>(bytes); plan && input.ConsumeBool()) bytes = Sealed(*plan);
-    const bool is_sealed = IsSealed(bytes), was_halted = guard_.halted();
-    const bool is_signed = input.ConsumeBool();
-    if (is_signed) bytes = signer_.Sign("PLAN_CERTIFIED", bytes, kStart);
-    else if (input.ConsumeBool()) bytes = forger_.Sign("PLAN_CERTIFIED", bytes, kStart);
-    const std::int64_t now = Time(input);
-    const GuardVerdict verdict = guard_.Accept(bytes, now);
+    Receive(input);
+    const bool was_halted = guard_.halted();
+    const std::int64_t now = AnyInteger(input, kStart, 2 * kStepUs);
+    const GuardVerdict verdict = guard_.Accept(message_.bytes, now);
     Require(verdict.ok() == verdict.message.empty() && verdict.cause != GuardCause::kInternalError);
     if (!verdict.ok()) return;
     const certified_plan_t& plan = *guard_.pending();
-    Require(is_sealed && !was_halted && is_signed == with_key_);
-    Require(plan.plan.plan_id > last_id_ && now <= plan.expires_utime);
+    Require(!was_halted && message_.is_signed == with_key_);
+    const Bytes inside = WithoutSignature(message_.bytes);
+    Require(Encode(plan) == std::vector(inside.begin(), inside.end()) && FindSealFaults(plan).empty());
+    Require(GetDigest(plan.config_digest) == DigestOf("config") && GetDigest(plan.model_digest) == DigestOf("model"));
+    Require((!last_id_ || plan.plan.plan_id > *last_id_) && now <= plan.expires_utime);
     last_id_ = plan.plan.plan_id;
     RequireSane(plan);
-  }
-
-  static bool IsSealed(Bytes bytes) {
-    const auto plan = Decoded<certified_plan_t>(bytes);
-    return plan && FindSealFaults(*plan).empty();
   }
 
   static void RequireSane(const certified_plan_t& plan) {
@@ -86,23 +115,24 @@ class Session final {
   }
 
   void TryStart(FuzzedDataProvider& input) {
-    const std::int64_t boundary = Time(input);
+    const std::int64_t boundary = AnyInteger(input, kStart, 2 * kStepUs);
     const std::vector<double> state = State(input);
     if (!guard_.TryStart(boundary, state).ok()) return;
     const certified_plan_t* plan = guard_.executing();
-    Require(plan && !guard_.pending() && std::abs(plan->plan.start_utime - boundary) <= kStepUs / 2 && boundary <= plan->expires_utime);
+    Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 && boundary <= plan->expires_utime);
     RequireInSlice(*plan, 0, state);
     step_ = 0;
   }
 
   void Check(FuzzedDataProvider& input) {
-    const int step = input.ConsumeBool() ? step_ + 1 : input.ConsumeIntegral<int>();
+    const int step = input.ConsumeBool() ? input.ConsumeIntegral<int>() : step_ + 1;
     const std::vector<double> state = State(input);
     const bool ok = guard_.Check(step, state).ok();
     Require(ok == (guard_.executing() != nullptr));  // after any refusal nothing is executing
     if (!ok) return;
     Require(step == ++step_);
     RequireInSlice(*guard_.executing(), step, state);
+    has_executed_ = true;
   }
 
   static void RequireInSlice(const certified_plan_t& plan, int step, const std::vector<double>& state) {
@@ -110,32 +140,36 @@ class Session final {
     for (std::size_t k = 0; k < 2; ++k) Require(plan.slice_lower[step][k] <= state[k] && state[k] <= plan.slice_upper[step][k]);
   }
 
-  static std::int64_t Time(FuzzedDataProvider& input) {
-    return input.ConsumeBool() ? kStart + input.ConsumeIntegralInRange<std::int64_t>(-2 * kStepUs, 2 * kStepUs) : input.ConsumeIntegral<std::int64_t>();
+  static std::uint64_t Apart(std::int64_t a, std::int64_t b) {
+    return static_cast<std::uint64_t>(std::max(a, b)) - static_cast<std::uint64_t>(std::min(a, b));
   }
 
   static std::vector<double> State(FuzzedDataProvider& input) {
     std::vector<double> state{1, -2};
     if (input.ConsumeBool()) state.resize(input.ConsumeIntegralInRange<std::size_t>(0, 20));
-    if (!state.empty() && input.ConsumeBool()) state[input.ConsumeIntegralInRange<std::size_t>(0, state.size() - 1)] = OddNumber(input);
+    if (!state.empty() && input.ConsumeBool()) state[input.ConsumeIntegralInRange<std::size_t>(0, state.size() - 1)] = AnyNumber(input);
     return state;
   }
 
   Guard guard_;
   const bool with_key_;
   Signer signer_{kKey, "certifier", kStart}, forger_{kOtherKey, "certifier", kStart};
-  std::int64_t last_id_ = INT64_MIN;
+  std::optional<std::int64_t> last_id_;
+  Message message_;
   int step_ = 0;
+  bool has_executed_ = false;
 };
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  FuzzedDataProvider input(data, size);
+bool Try(Bytes data) {
+  FuzzedDataProvider input(data.data(), data.size());
   Session session(input.ConsumeBool());
   for (int step = 0; step < 32 && input.remaining_bytes() > 0; ++step) {
     session.Step(input);
     session.RequireConsistent();
   }
-  return 0;
+  return session.has_executed();
 }
+
+}  // namespace forereach

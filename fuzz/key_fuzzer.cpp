@@ -2,14 +2,13 @@
 #include "fuzz/fuzz.h"
 #include "lcmtypes/authentic.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace forereach;
+bool forereach::Try(Bytes data) {
   static MemoryFile file;
-  const std::string& path = file.Write(Bytes(data, size));
-  IsTaken([&] {
-    std::string text = "forereach-key-1 " + ToHex(LoadKey(path)) + "\n", given(data, data + size);
+  const std::string& path = file.Write(data);
+  return IsTaken([&] {
+    const std::string text = "forereach-key-1 " + ToHex(LoadKey(path)) + "\n";
+    std::string given(data.begin(), data.end());
     for (char& c : given) c = static_cast<char>('A' <= c && c <= 'F' ? c - 'A' + 'a' : c);
     Require(given == text);
   });
-  return 0;
 }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr std::int64_t kStart = 1'000'000'000'000, kStep = 40'000, kNow = kStart - 3 * kStep;
+constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs, kNow = kStart - 3 * kStep;
 using State = std::array<double, 2>;
 
 double Above(double x) { return std::nextafter(x, kInf); }
@@ -27,33 +27,6 @@ GuardOptions TwoStates() {
   options.config_digest = DigestOf("config");
   options.model_digest = DigestOf("model");
   return options;
-}
-
-// Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5].
-certified_plan_t Plan(std::int64_t id = 7) {
-  certified_plan_t certified{};
-  candidate_plan_t& plan = certified.plan;
-  plan.plan_id = id;
-  plan.start_utime = kStart;
-  plan.step_us = kStep;
-  plan.num_states = 2;
-  plan.num_inputs = 1;
-  plan.num_steps = 3;
-  plan.progress_steps = 1;
-  plan.initial_center[0] = 1;
-  plan.initial_center[1] = -2;
-  plan.initial_half_width[0] = 0.5;
-  plan.initial_half_width[1] = 0.25;
-  certified.expires_utime = kStart + kStep;
-  for (int t = 0; t <= 3; ++t) {
-    certified.slice_lower[t][0] = -10 - t;
-    certified.slice_upper[t][0] = 10 + t;
-    certified.slice_lower[t][1] = -5;
-    certified.slice_upper[t][1] = 5;
-  }
-  SetDigest(certified.config_digest, DigestOf("config"));
-  SetDigest(certified.model_digest, DigestOf("model"));
-  return certified;
 }
 
 GuardCause AcceptedBy(const certified_plan_t& certified, std::int64_t now = kNow) {
@@ -68,7 +41,7 @@ GuardVerdict Start(const certified_plan_t& certified, const State& state, std::i
   return guard.TryStart(boundary, state);
 }
 
-Guard Executing(const certified_plan_t& certified = Plan()) {
+Guard Executing(const certified_plan_t& certified = SmallPlan()) {
   Guard guard(TwoStates());
   EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
   EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
@@ -77,7 +50,7 @@ Guard Executing(const certified_plan_t& certified = Plan()) {
 
 TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
   Guard guard(TwoStates());
-  const GuardVerdict verdict = guard.Accept(Sealed(Plan()), kNow);
+  const GuardVerdict verdict = guard.Accept(Sealed(SmallPlan()), kNow);
   EXPECT_EQ(verdict.cause, GuardCause::kNone) << verdict.message;
   EXPECT_EQ(verdict.plan_id, 7);
   ASSERT_NE(guard.pending(), nullptr);
@@ -86,7 +59,7 @@ TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
 }
 
 TEST(GuardAccept, RefusesAFlippedBitAnywhere) {
-  const std::vector<std::uint8_t> good = Sealed(Plan());
+  const std::vector<std::uint8_t> good = Sealed(SmallPlan());
   Guard guard(TwoStates());
   for (std::size_t i = 0; i < good.size(); i += i < 1024 || i + 512 > good.size() ? 1 : 37) {
     std::vector<std::uint8_t> bad = good;
@@ -100,19 +73,19 @@ TEST(GuardAccept, RefusesAFlippedBitAnywhere) {
 }
 
 TEST(GuardAccept, RefusesEveryWrongLengthAndEveryOtherType) {
-  const std::vector<std::uint8_t> good = Sealed(Plan());
+  const std::vector<std::uint8_t> good = Sealed(SmallPlan());
   Guard guard(TwoStates());
   for (std::size_t size : {0ul, 7ul, 8ul, 9ul, good.size() / 2, good.size() - 1})
     EXPECT_EQ(guard.Accept(Bytes(good).first(size), kNow).cause, GuardCause::kWrongLength) << size;
   std::vector<std::uint8_t> longer = good;
   longer.push_back(0);
   EXPECT_EQ(guard.Accept(longer, kNow).cause, GuardCause::kTrailingBytes);
-  EXPECT_EQ(guard.Accept(Encode(Plan().plan), kNow).cause, GuardCause::kUnknownFingerprint);
+  EXPECT_EQ(guard.Accept(Encode(SmallPlan().plan), kNow).cause, GuardCause::kUnknownFingerprint);
 }
 
 TEST(GuardAccept, RefusesAPlanForAnotherRobot) {
   const auto with = [](auto change) {
-    certified_plan_t certified = Plan();
+    certified_plan_t certified = SmallPlan();
     change(certified.plan);
     return AcceptedBy(certified);
   };
@@ -129,7 +102,7 @@ TEST(GuardAccept, RefusesAPlanForAnotherRobot) {
 }
 
 TEST(GuardAccept, RefusesWrongDigests) {
-  certified_plan_t certified = Plan();
+  certified_plan_t certified = SmallPlan();
   Seal(certified);
   certified.plan_digest[31] ^= 1;
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
@@ -141,10 +114,10 @@ TEST(GuardAccept, RefusesWrongDigests) {
   EXPECT_EQ(guard.Accept(Encode(certified), kNow).cause, GuardCause::kCertificateDigest);
 
   // Resealing what was changed does not help where an expected digest is known.
-  certified = Plan();
+  certified = SmallPlan();
   SetDigest(certified.config_digest, DigestOf("another config"));
   EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kConfigDigest);
-  certified = Plan();
+  certified = SmallPlan();
   SetDigest(certified.model_digest, DigestOf("another model"));
   EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kModelDigest);
 
@@ -157,7 +130,7 @@ TEST(GuardAccept, RefusesWrongDigests) {
 
 TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
   const auto altered = [](auto change) {
-    certified_plan_t certified = Plan();
+    certified_plan_t certified = SmallPlan();
     Seal(certified);
     change(certified);
     return Guard(TwoStates()).Accept(Encode(certified), kNow);
@@ -185,12 +158,12 @@ TEST(GuardAccept, RefusesNumbersThatBoundNothing) {
                               +[](certified_plan_t& c, double x) { c.plan.control[2][0] = x; },
                               +[](certified_plan_t& c, double x) { c.slice_lower[3][1] = x; },
                               +[](certified_plan_t& c, double x) { c.slice_upper[0][0] = x; }}) {
-      certified_plan_t certified = Plan();
+      certified_plan_t certified = SmallPlan();
       change(certified, bad);
       EXPECT_EQ(AcceptedBy(certified), GuardCause::kNonFinite) << bad;
     }
   }
-  certified_plan_t certified = Plan();
+  certified_plan_t certified = SmallPlan();
   certified.plan.initial_half_width[1] = -1e-300;
   EXPECT_EQ(AcceptedBy(certified), GuardCause::kNonFinite);
   certified.plan.initial_half_width[1] = 0;
@@ -198,7 +171,7 @@ TEST(GuardAccept, RefusesNumbersThatBoundNothing) {
 }
 
 TEST(GuardAccept, RefusesAnEmptySliceWithItsWitness) {
-  certified_plan_t certified = Plan();
+  certified_plan_t certified = SmallPlan();
   certified.slice_lower[3][1] = certified.slice_upper[3][1] = 0.5;
   EXPECT_EQ(AcceptedBy(certified), GuardCause::kNone);
   certified.slice_lower[3][1] = Above(0.5);
@@ -213,40 +186,40 @@ TEST(GuardAccept, RefusesAnEmptySliceWithItsWitness) {
 }
 
 TEST(GuardAccept, ExpiryItselfIsStillInTime) {
-  const std::int64_t expires = Plan().expires_utime;
-  EXPECT_EQ(AcceptedBy(Plan(), expires), GuardCause::kNone);
-  EXPECT_EQ(AcceptedBy(Plan(), expires + 1), GuardCause::kExpired);
+  const std::int64_t expires = SmallPlan().expires_utime;
+  EXPECT_EQ(AcceptedBy(SmallPlan(), expires), GuardCause::kNone);
+  EXPECT_EQ(AcceptedBy(SmallPlan(), expires + 1), GuardCause::kExpired);
 }
 
 TEST(GuardAccept, APlanIdIsAcceptedOnceAndOnlyUpwards) {
   Guard guard(TwoStates());
-  EXPECT_TRUE(guard.Accept(Sealed(Plan(7)), kNow).ok());
-  EXPECT_EQ(guard.Accept(Sealed(Plan(7)), kNow).cause, GuardCause::kReplayed);
-  EXPECT_EQ(guard.Accept(Sealed(Plan(6)), kNow).cause, GuardCause::kReplayed);
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(7)), kNow).ok());
+  EXPECT_EQ(guard.Accept(Sealed(SmallPlan(7)), kNow).cause, GuardCause::kReplayed);
+  EXPECT_EQ(guard.Accept(Sealed(SmallPlan(6)), kNow).cause, GuardCause::kReplayed);
   EXPECT_EQ(guard.pending()->plan.plan_id, 7);
-  EXPECT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
   EXPECT_EQ(guard.pending()->plan.plan_id, 8) << "the newest wins";
   EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
-  EXPECT_EQ(guard.Accept(Sealed(Plan(8)), kNow).cause, GuardCause::kReplayed) << "also once it has started";
+  EXPECT_EQ(guard.Accept(Sealed(SmallPlan(8)), kNow).cause, GuardCause::kReplayed) << "also once it has started";
 }
 
 TEST(GuardAccept, ARefusedPlanLeavesPendingAndLastIdAlone) {
   Guard guard(TwoStates());
-  EXPECT_TRUE(guard.Accept(Sealed(Plan(7)), kNow).ok());
-  certified_plan_t expired = Plan(100);
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(7)), kNow).ok());
+  certified_plan_t expired = SmallPlan(100);
   expired.expires_utime = kNow - 1;
   EXPECT_EQ(guard.Accept(Sealed(expired), kNow).cause, GuardCause::kExpired);
   EXPECT_EQ(guard.pending()->plan.plan_id, 7);
-  EXPECT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
 }
 
 TEST(GuardStart, TheBoundsOfX0AreInside) {
-  for (const double x : {0.5, 1.5}) EXPECT_TRUE(Start(Plan(), {x, -2}).ok()) << x;
-  for (const double y : {-2.25, -1.75}) EXPECT_TRUE(Start(Plan(), {1, y}).ok()) << y;
+  for (const double x : {0.5, 1.5}) EXPECT_TRUE(Start(SmallPlan(), {x, -2}).ok()) << x;
+  for (const double y : {-2.25, -1.75}) EXPECT_TRUE(Start(SmallPlan(), {1, y}).ok()) << y;
   for (const State outside : {State{Below(0.5), -2}, {Above(1.5), -2}, {1, Below(-2.25)}, {1, Above(-1.75)}})
-    EXPECT_EQ(Start(Plan(), outside).cause, GuardCause::kOutsideInitialSet) << outside[0] << ' ' << outside[1];
+    EXPECT_EQ(Start(SmallPlan(), outside).cause, GuardCause::kOutsideInitialSet) << outside[0] << ' ' << outside[1];
 
-  const GuardVerdict verdict = Start(Plan(), {1, Above(-1.75)});
+  const GuardVerdict verdict = Start(SmallPlan(), {1, Above(-1.75)});
   EXPECT_EQ(verdict.coordinate, 1);
   EXPECT_EQ(verdict.value, Above(-1.75));
   EXPECT_EQ(verdict.bound, -1.75);
@@ -264,7 +237,7 @@ TEST(GuardStart, X0IsComparedExactly) {
   };
   int on_the_edge = 0;
   for (int trial = 0; trial < 1000; ++trial) {
-    certified_plan_t certified = Plan();
+    certified_plan_t certified = SmallPlan();
     const double center = certified.plan.initial_center[0] = draw(60);
     const double half_width = certified.plan.initial_half_width[0] = std::abs(draw(60));
     for (int t = 0; t <= 3; ++t) {
@@ -283,7 +256,7 @@ TEST(GuardStart, X0IsComparedExactly) {
 }
 
 TEST(GuardStart, AFlatX0HasOneState) {
-  certified_plan_t certified = Plan();
+  certified_plan_t certified = SmallPlan();
   certified.plan.initial_half_width[0] = certified.plan.initial_half_width[1] = 0;
   EXPECT_TRUE(Start(certified, {1, -2}).ok());
   EXPECT_EQ(Start(certified, {Above(1), -2}).cause, GuardCause::kOutsideInitialSet);
@@ -291,16 +264,16 @@ TEST(GuardStart, AFlatX0HasOneState) {
 
 TEST(GuardStart, RefusesStatesThatAreNoNumbersOrTooFew) {
   for (const double bad : {kNaN, kInf, -kInf}) {
-    EXPECT_EQ(Start(Plan(), {bad, -2}).cause, GuardCause::kOutsideInitialSet) << bad;
-    EXPECT_EQ(Start(Plan(), {1, bad}).cause, GuardCause::kOutsideInitialSet) << bad;
+    EXPECT_EQ(Start(SmallPlan(), {bad, -2}).cause, GuardCause::kOutsideInitialSet) << bad;
+    EXPECT_EQ(Start(SmallPlan(), {1, bad}).cause, GuardCause::kOutsideInitialSet) << bad;
   }
   Guard guard(TwoStates());
-  EXPECT_TRUE(guard.Accept(Sealed(Plan()), kNow).ok());
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
   EXPECT_EQ(guard.TryStart(kStart, std::array{1.0}).cause, GuardCause::kWrongStateSize);
 }
 
 TEST(GuardStart, TheStateHasToLieInSliceZeroToo) {
-  certified_plan_t certified = Plan();
+  certified_plan_t certified = SmallPlan();
   certified.slice_upper[0][0] = 1.25;
   EXPECT_TRUE(Start(certified, {1.25, -2}).ok());
   const GuardVerdict verdict = Start(certified, {Above(1.25), -2});
@@ -310,11 +283,11 @@ TEST(GuardStart, TheStateHasToLieInSliceZeroToo) {
 }
 
 TEST(GuardStart, HalfAStepOffIsOnTime) {
-  EXPECT_TRUE(Start(Plan(), {1, -2}, kStart - kStep / 2).ok());
-  EXPECT_TRUE(Start(Plan(), {1, -2}, kStart + kStep / 2).ok());
-  EXPECT_EQ(Start(Plan(), {1, -2}, kStart - kStep / 2 - 1).cause, GuardCause::kTooEarly);
-  EXPECT_EQ(Start(Plan(), {1, -2}, kStart + kStep / 2 + 1).cause, GuardCause::kTooLate);
-  certified_plan_t certified = Plan();
+  EXPECT_TRUE(Start(SmallPlan(), {1, -2}, kStart - kStep / 2).ok());
+  EXPECT_TRUE(Start(SmallPlan(), {1, -2}, kStart + kStep / 2).ok());
+  EXPECT_EQ(Start(SmallPlan(), {1, -2}, kStart - kStep / 2 - 1).cause, GuardCause::kTooEarly);
+  EXPECT_EQ(Start(SmallPlan(), {1, -2}, kStart + kStep / 2 + 1).cause, GuardCause::kTooLate);
+  certified_plan_t certified = SmallPlan();
   certified.plan.start_utime = std::numeric_limits<std::int64_t>::min();
   EXPECT_EQ(Start(certified, {1, -2}).cause, GuardCause::kTooLate);
   certified.plan.start_utime = std::numeric_limits<std::int64_t>::max();
@@ -322,7 +295,7 @@ TEST(GuardStart, HalfAStepOffIsOnTime) {
 }
 
 TEST(GuardStart, ExpiryCountsAtTheBoundary) {
-  certified_plan_t certified = Plan();
+  certified_plan_t certified = SmallPlan();
   certified.expires_utime = kStart;
   EXPECT_TRUE(Start(certified, {1, -2}, kStart).ok());
   EXPECT_EQ(Start(certified, {1, -2}, kStart + 1).cause, GuardCause::kExpired);
@@ -331,22 +304,22 @@ TEST(GuardStart, ExpiryCountsAtTheBoundary) {
 TEST(GuardStart, OnlyAnEarlyPlanIsKept) {
   Guard guard(TwoStates());
   EXPECT_EQ(guard.TryStart(kStart, State{1, -2}).cause, GuardCause::kNothingPending);
-  EXPECT_TRUE(guard.Accept(Sealed(Plan()), kNow).ok());
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
   EXPECT_EQ(guard.TryStart(kStart - kStep, State{1, -2}).cause, GuardCause::kTooEarly);
   EXPECT_EQ(guard.TryStart(kStart, State{2, -2}).cause, GuardCause::kOutsideInitialSet);
   EXPECT_EQ(guard.TryStart(kStart, State{1, -2}).cause, GuardCause::kNothingPending);
 }
 
 TEST(GuardStart, ANewPlanTakesOverAndARefusedOneDoesNot) {
-  Guard guard = Executing(Plan(7));
+  Guard guard = Executing(SmallPlan(7));
   EXPECT_TRUE(guard.Check(1, State{1, -2}).ok());
-  EXPECT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
   EXPECT_FALSE(guard.TryStart(kStart, State{9, -2}).ok());
   ASSERT_NE(guard.executing(), nullptr);
   EXPECT_EQ(guard.executing()->plan.plan_id, 7);
   EXPECT_TRUE(guard.Check(2, State{1, -2}).ok()) << "the plan before goes on";
 
-  EXPECT_TRUE(guard.Accept(Sealed(Plan(9)), kNow).ok());
+  EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(9)), kNow).ok());
   EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
   EXPECT_EQ(guard.executing()->plan.plan_id, 9);
   EXPECT_TRUE(guard.Check(1, State{1, -2}).ok()) << "the new plan begins at its own step 1";
@@ -405,7 +378,7 @@ TEST(GuardHalt, AStateOutsideItsSliceHaltsUntilAReset) {
   Guard guard = Executing();
   EXPECT_EQ(guard.Check(1, State{100, 0}).cause, GuardCause::kOutsideSlice);
   EXPECT_TRUE(guard.halted());
-  const auto next = Sealed(Plan(8));
+  const auto next = Sealed(SmallPlan(8));
   EXPECT_EQ(guard.Accept(next, kNow).cause, GuardCause::kHalted);
   EXPECT_EQ(guard.TryStart(kNow, State{0, 0}).cause, GuardCause::kHalted);
   guard.Reset();
@@ -416,7 +389,7 @@ TEST(GuardKey, TakesSignedPlansOnly) {
   GuardOptions options = TwoStates();
   options.key = Key256{1};
   Guard guard(options);
-  const auto plan = Sealed(Plan());
+  const auto plan = Sealed(SmallPlan());
   EXPECT_EQ(guard.Accept(plan, kNow).cause, GuardCause::kUnsigned);
   Signer signer({1}, "certifier", 0), stranger({2}, "certifier", 0);
   EXPECT_EQ(guard.Accept(stranger.Sign("PLAN_CERTIFIED", plan, kNow), kNow).cause, GuardCause::kForged);
@@ -429,7 +402,7 @@ TEST(GuardKey, TakesSignedPlansOnly) {
 
 TEST(GuardHalt, ForgetsWhatWaitsAndWhatExecutes) {
   Guard guard = Executing();
-  ASSERT_TRUE(guard.Accept(Sealed(Plan(8)), kNow).ok());
+  ASSERT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
   guard.Halt();
   EXPECT_EQ(guard.executing(), nullptr);
   EXPECT_EQ(guard.pending(), nullptr);

@@ -15,6 +15,35 @@ inline void Seal(certified_plan_t& certified) {
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
 }
 
+inline constexpr std::int64_t kPlanStart = 1'000'000'000'000, kPlanStepUs = 40'000;
+
+/** Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5]. Not sealed. */
+inline certified_plan_t SmallPlan(std::int64_t plan_id = 7) {
+  certified_plan_t certified{};
+  candidate_plan_t& plan = certified.plan;
+  plan.plan_id = plan_id;
+  plan.start_utime = kPlanStart;
+  plan.step_us = kPlanStepUs;
+  plan.num_states = 2;
+  plan.num_inputs = 1;
+  plan.num_steps = 3;
+  plan.progress_steps = 1;
+  plan.initial_center[0] = 1;
+  plan.initial_center[1] = -2;
+  plan.initial_half_width[0] = 0.5;
+  plan.initial_half_width[1] = 0.25;
+  certified.expires_utime = kPlanStart + kPlanStepUs;
+  for (int t = 0; t <= 3; ++t) {
+    certified.slice_lower[t][0] = -10 - t;
+    certified.slice_upper[t][0] = 10 + t;
+    certified.slice_lower[t][1] = -5;
+    certified.slice_upper[t][1] = 5;
+  }
+  SetDigest(certified.config_digest, DigestOf("config"));
+  SetDigest(certified.model_digest, DigestOf("model"));
+  return certified;
+}
+
 inline std::vector<std::uint8_t> Sealed(certified_plan_t certified) {
   Seal(certified);
   return Encode(certified);

@@ -1,0 +1,32 @@
+#include "fuzz/fuzz.h"
+
+#include <cstdio>
+
+namespace {
+
+long long deep = 0;
+
+void PrintDeep() { std::fprintf(stderr, "stat::deep_executions: %lld\n", deep); }
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  deep += forereach::Try({data, size});
+  return 0;
+}
+
+// Each target's options are in CMakeLists.txt. Those of the command line come behind, and win.
+extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
+  static std::vector<std::string> options{FOREREACH_FUZZ_OPTIONS};
+  static std::vector<char*> all{(*argv)[0]};
+  for (std::string& option : options) all.push_back(option.data());
+  all.insert(all.end(), *argv + 1, *argv + *argc);
+  *argc = static_cast<int>(all.size());
+  all.push_back(nullptr);
+  *argv = all.data();
+  std::atexit(PrintDeep);
+  return 0;
+}
+
+// Freed memory is touched, if it is, within the same execution.
+extern "C" const char* __asan_default_options() { return "malloc_context_size=2:quarantine_size_mb=16"; }

@@ -1,0 +1,86 @@
+/** Makes libFuzzer change a JSON document where it means something, as well as its bytes: hardly any change of a byte
+leaves a document that gets past the parser. To be included by the one source file of a target. */
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "fuzz/fuzz.h"
+
+extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
+
+namespace forereach {
+
+class JsonMutator final {
+ public:
+  using Json = nlohmann::ordered_json;
+
+  explicit JsonMutator(unsigned seed) : random_(seed) {}
+
+  std::size_t Below(std::size_t end) { return random_() % end; }
+
+  void Change(Json& document) {
+    Json& place = AnyPlace(document);
+    switch (Below(8)) {
+      case 0: place = AnyPlace(document); return;
+      case 1: return RemoveEntry(place);
+      case 2: return AddEntry(place, AnyPlace(document));
+      case 3: std::swap(AnyEntry(place), AnyEntry(place)); return;
+      default: place = OtherValue(place); return;
+    }
+  }
+
+ private:
+  // An entry of a list or map; the value itself if it has none.
+  Json& AnyEntry(Json& value) {
+    if (!value.is_structured() || value.empty()) return value;
+    return (value.begin() + static_cast<Json::difference_type>(Below(value.size()))).value();
+  }
+
+  Json& AnyPlace(Json& document) {
+    Json* place = &document;
+    while (place->is_structured() && !place->empty() && Below(8) > 0) place = &AnyEntry(*place);
+    return *place;
+  }
+
+  void RemoveEntry(Json& value) {
+    if (value.is_structured() && !value.empty())
+      value.erase(value.begin() + static_cast<Json::difference_type>(Below(value.size())));
+  }
+
+  void AddEntry(Json& value, Json entry) {
+    if (value.is_array()) value.insert(value.begin() + static_cast<Json::difference_type>(Below(value.size() + 1)), std::move(entry));
+    if (value.is_object()) value["another"] = std::move(entry);
+  }
+
+  Json OtherValue(const Json& value) {
+    if (value.is_number() && Below(2) > 0) return OtherNumber(value.get<double>());
+    const Json other[] = {nullptr, true, "", "\n", 0, -1, 1024, 9007199254740993, 1e308, -5e-324, Json::array(), Json::object()};
+    return other[Below(std::size(other))];
+  }
+
+  double OtherNumber(double number) {
+    const double other[] = {-number, 2 * number, 0.5 * number, number + 1, std::nextafter(number, 1e308), std::nextafter(number, -1e308)};
+    return other[Below(std::size(other))];
+  }
+
+  std::minstd_rand random_;
+};
+
+}  // namespace forereach
+
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed) {
+  using forereach::JsonMutator;
+  JsonMutator mutator(seed);
+  JsonMutator::Json document = JsonMutator::Json::parse(data, data + size, nullptr, false);
+  if (document.is_discarded() || mutator.Below(4) == 0) return LLVMFuzzerMutate(data, size, max_size);
+  mutator.Change(document);
+  const std::string text = document.dump(-1, ' ', false, JsonMutator::Json::error_handler_t::replace);
+  if (text.size() > max_size) return LLVMFuzzerMutate(data, size, max_size);
+  std::memcpy(data, text.data(), text.size());
+  return text.size();
+}
