@@ -1,179 +1,202 @@
-// The soak: certifier and logger under a steady load of signed candidates, minute by minute. Memory has to stay flat, latency
-// not to drift, and all counters to add up. Writes a table.
+// The soak: certifier and logger under a steady load of signed candidates, interval by interval. Memory has to stay flat,
+// latency not to drift, and all counters to add up. Writes a table; what does not hold is an error.
 #include <algorithm>
+#include <csignal>
 #include <fstream>
 #include <iostream>
 #include <sstream>
-#include <unordered_map>
 
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
-#include "certifier/task/process.h"
-#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
-#include "forereach/robot_state_t.hpp"
 #include "lcmtypes/authentic.h"
+#include "logger/database.h"
+#include "tests/faults/load.h"
 #include "tests/faults/report.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
 namespace {
 
+constexpr int kIntervals = 60;
+constexpr double kJudgedFromMinutes = 10;  // shorter runs are all warming up
+// The last fifth of the run against the second, by medians.
+constexpr double kCertifierMayGrowKb = 2048, kLoggerMayGrowKb = 8192;
+constexpr double kLatencyMayGrowBy = 1.5, kAndByUs = 100;
+// For its summary the logger keeps two numbers of each decision, of the last million at most (logger/summary.h).
+constexpr double kLoggerKbPerDecision = 16 / 1024.0;
+
 struct Options {
   double minutes = 60, rate = 200;
   std::string report = "docs/reliability.md";
 };
 
-struct Minute {
-  double p50_us = 0, p99_us = 0, worst_us = 0;
-  std::int64_t certifier_kb = 0, logger_kb = 0, sent = 0, answered = 0;
+struct Interval {
+  double ended_min = 0, p50_us = 0, p99_us = 0, worst_us = 0, certifier_kb = 0, logger_kb = 0;
 };
 
-std::int64_t ResidentKb(pid_t pid) {
+double ResidentKb(pid_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/statm");
-  std::int64_t size = 0, resident = 0;
+  double size = 0, resident = 0;
   file >> size >> resident;
-  return resident * (::sysconf(_SC_PAGESIZE) / 1024);
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1024;
 }
 
-double Percentile(std::vector<double>& sorted, double fraction) {
-  if (sorted.empty()) return 0;
-  std::ranges::sort(sorted);
-  return sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1))];
+// What the logger's database knows of the certifier's decisions.
+struct Recorded {
+  std::int64_t decisions = 0, decisions_lost = 0;
+};
+
+Recorded ReadDatabase(const std::filesystem::path& directory, const std::string& channel) {
+  Database database((directory / "decisions.sqlite").string());
+  Recorded recorded;
+  for (const RunRow& run : database.Runs()) {
+    const Rows rows = database.Read(run.log_file);
+    recorded.decisions += static_cast<std::int64_t>(rows.decisions.size());
+    for (const GapRow& gap : rows.gaps)
+      if (gap.channel == channel) recorded.decisions_lost += gap.lost;
+  }
+  return recorded;
 }
 
 class Soak final {
  public:
   explicit Soak(const Options& options) : options_(options) {
-    task_ = scratch_.Write("task.yaml", PatientTask());
-    key_ = (scratch_.path() / "key").string();
-    MakeKeyFile(key_);
-    config_ = LoadConfig(task_);
+    // Of 27 GB that an hour writes the newest are kept.
+    const std::string task = scratch_.Write("task.yaml", PatientTask() + "logger: {rotate_mb: 256, quota_mb: 2048}\n");
+    config_ = LoadConfig(task);
     config_.bus.url = PrivateBusUrl();
-    config_.bus.key = key_;
-    bus_ = OpenBus(config_.bus, "soak");
-    bus_->Subscribe(config_.bus.decision, [this](const Received& r) { OnDecision(r); });
-    bus_->Subscribe(config_.bus.status, [this](const Received& r) { Keep(r, status_); });
-    bus_->Subscribe(config_.bus.logger_status, [this](const Received& r) { Keep(r, logger_); });
+    config_.bus.key = (scratch_.path() / "key").string();
+    MakeKeyFile(config_.bus.key);
+    load_ = std::make_unique<Load>(config_, [this](std::int64_t number) {
+      return CandidateFor(config_, 0, Eigen::Vector2d(0.2, number % 3 != 0 ? 0 : 2.5), 12, std::chrono::seconds(1));
+    });
+    load_->bus().Subscribe(config_.bus.logger_status, [this](const Received& r) {
+      if (const auto status = Decoded<logger_status_t>(r.bytes)) logger_ = *status;
+    });
   }
 
-  std::vector<Minute> Run() {
-    const std::vector<std::string> common{"--config", task_, "--lcm-url", config_.bus.url, "--key", key_};
-    const auto command = [&](const char* program, std::vector<std::string> more) {
-      std::vector<std::string> all{program};
-      all.insert(all.end(), common.begin(), common.end());
-      all.insert(all.end(), more.begin(), more.end());
-      return all;
-    };
-    ChildProcess logger(command(FOREREACH_LOGGER, {"--directory", (scratch_.path() / "log").string()}));
-    ChildProcess certifier(command(FOREREACH_CERTIFIER, {}));
-    if (!logger.WaitForLog("ready on") || !certifier.WaitForLog("ready on")) throw std::runtime_error(certifier.error());
+  void Run() {
+    const std::vector<std::string> common{"--config", config_.path, "--lcm-url", config_.bus.url, "--key", config_.bus.key};
+    std::vector<std::string> of_logger{FOREREACH_LOGGER, "--directory", log().string()}, of_certifier{FOREREACH_CERTIFIER};
+    of_logger.insert(of_logger.end(), common.begin(), common.end());
+    of_certifier.insert(of_certifier.end(), common.begin(), common.end());
+    ChildProcess logger(of_logger), certifier(of_certifier);
+    if (!logger.WaitForLog("ready on") || !certifier.WaitForLog("ready on"))
+      throw std::runtime_error(logger.error() + certifier.error());
+    load_->Begin();
     const std::int64_t begin = SteadyClockUs();
-    const auto period = static_cast<std::int64_t>(1e6 / options_.rate);
-    const auto total = static_cast<std::int64_t>(options_.minutes * 60e6);
-    std::vector<Minute> minutes;
-    std::int64_t next = begin, next_minute = begin + 60'000'000;
-    while (SteadyClockUs() - begin < total) {
-      if (SteadyClockUs() >= next) {
-        Send();
-        next += period;
-      }
-      bus_->Dispatch(SteadyClockUs() < next ? 1 : 0);
-      if (SteadyClockUs() < next_minute && SteadyClockUs() - begin < total) continue;
-      next_minute += 60'000'000;
-      minutes.push_back(EndMinute(certifier.pid(), logger.pid()));
-      std::cerr << "minute " << minutes.size() << ": p50 " << minutes.back().p50_us << " us, p99 " << minutes.back().p99_us
-                << " us, certifier " << minutes.back().certifier_kb << " kB, logger " << minutes.back().logger_kb << " kB\n";
+    load_->Start(options_.rate);
+    for (int i = 1; i <= kIntervals; ++i) {
+      const double minutes = options_.minutes * i / kIntervals;
+      load_->ListenUntil(begin + static_cast<std::int64_t>(minutes * 60e6));
+      EndInterval(minutes, certifier.pid(), logger.pid());
     }
-    for (int i = 0; i < 200; ++i) bus_->Dispatch(10);
-    return minutes;
+    wanted_ = options_.rate * static_cast<double>(SteadyClockUs() - begin) * 1e-6;
+    load_->Finish();
+    all_ran_ = !certifier.WaitForEnd(std::chrono::milliseconds(0)) && !logger.WaitForEnd(std::chrono::milliseconds(0));
+    logger.Signal(SIGTERM);
+    all_ran_ &= logger.WaitForExit(std::chrono::seconds(60)) == 0;
+    recorded_ = ReadDatabase(log(), config_.bus.decision);
   }
 
-  [[nodiscard]] std::int64_t sent() const { return sent_; }
-  [[nodiscard]] std::int64_t answered() const { return answered_; }
-  [[nodiscard]] const certifier_status_v2_t& status() const { return status_; }
-  [[nodiscard]] const logger_status_t& logger() const { return logger_; }
+  [[nodiscard]] std::string Table() const;
+  /** One line for each thing that does not hold. */
+  [[nodiscard]] std::vector<std::string> Judge() const;
 
  private:
-  template <class Message>
-  static void Keep(const Received& received, Message& message) {
-    if (const auto heard = Decoded<Message>(received.bytes)) message = *heard;
+  [[nodiscard]] std::filesystem::path log() const { return scratch_.path() / "log"; }
+
+  void EndInterval(double minutes, pid_t certifier, pid_t logger) {
+    std::vector<double> latencies = load_->TakeLatencies();
+    const Interval now{minutes, Percentile(latencies, 0.5), Percentile(latencies, 0.99), Percentile(latencies, 1),
+                       ResidentKb(certifier), ResidentKb(logger)};
+    intervals_.push_back(now);
+    if (intervals_.size() % (kIntervals / 12) == 0)
+      std::cerr << "minute " << minutes << ": p50 " << now.p50_us << " us, p99 " << now.p99_us << " us, certifier "
+                << now.certifier_kb << " kB, logger " << now.logger_kb << " kB\n";
   }
 
-  void Send() {
-    const bool clear = sent_ % 3 != 0;
-    candidate_plan_t candidate =
-        CandidateFor(config_, WallClockUs(), Eigen::Vector2d(0.2, clear ? 0 : 2.5), 12, std::chrono::seconds(1));
-    candidate.sequence = sent_++;
-    sent_at_[candidate.plan_id] = SteadyClockUs();
-    bus_->Publish(config_.bus.candidate, candidate);
-  }
-
-  void OnDecision(const Received& received) {
-    const auto decision = Decoded<decision_t>(received.bytes);
-    const auto sent = decision ? sent_at_.find(decision->plan_id) : sent_at_.end();
-    if (sent == sent_at_.end()) return;
-    latencies_.push_back(static_cast<double>(SteadyClockUs() - sent->second));
-    sent_at_.erase(sent);
-    ++answered_;
-  }
-
-  Minute EndMinute(pid_t certifier, pid_t logger) {
-    Minute minute;
-    minute.p50_us = Percentile(latencies_, 0.5);
-    minute.p99_us = Percentile(latencies_, 0.99);
-    minute.worst_us = Percentile(latencies_, 1);
-    minute.certifier_kb = ResidentKb(certifier);
-    minute.logger_kb = ResidentKb(logger);
-    minute.sent = sent_;
-    minute.answered = answered_;
-    latencies_.clear();
-    return minute;
+  // Medians over the second and the last fifth of the run.
+  [[nodiscard]] std::pair<double, double> EarlyAndLate(double Interval::*value) const {
+    const auto median = [&](std::size_t from) {
+      std::vector<double> values;
+      for (std::size_t i = from; i < from + kIntervals / 5; ++i) values.push_back(intervals_[i].*value);
+      return Percentile(values, 0.5);
+    };
+    return {median(kIntervals / 5), median(kIntervals - kIntervals / 5)};
   }
 
   const Options options_;
   ScratchDirectory scratch_;
-  std::string task_, key_;
   Config config_;
-  std::unique_ptr<Bus> bus_;
-  std::unordered_map<std::int64_t, std::int64_t> sent_at_;
-  std::vector<double> latencies_;
-  certifier_status_v2_t status_{};
+  std::unique_ptr<Load> load_;
   logger_status_t logger_{};
-  std::int64_t sent_ = 0, answered_ = 0;
+  std::vector<Interval> intervals_;
+  double wanted_ = 0;
+  bool all_ran_ = false;
+  Recorded recorded_;
 };
 
-std::string Table(const Options& options, const std::vector<Minute>& minutes, const Soak& soak) {
+std::string Soak::Table() const {
   std::ostringstream text;
-  text << "Made by `build/release/tests/faults/forereach_soak_processes --minutes " << options.minutes << " --rate "
-       << options.rate << "`: signed candidates of full size, two of three certified, while the logger records.\n\n"
-       << "| minute | p50 us | p99 us | worst us | certifier kB | logger kB |\n|---|---|---|---|---|---|\n";
-  const std::size_t step = std::max<std::size_t>(1, minutes.size() / 6);
-  for (std::size_t i = 0; i < minutes.size(); ++i)
-    if (i == 0 || (i + 1) % step == 0 || i + 1 == minutes.size())
-      text << "| " << i + 1 << " | " << minutes[i].p50_us << " | " << minutes[i].p99_us << " | " << minutes[i].worst_us
-           << " | " << minutes[i].certifier_kb << " | " << minutes[i].logger_kb << " |\n";
-  text << "\nSent " << soak.sent() << ", answers heard " << soak.answered() << "; the certifier counts "
-       << soak.status().candidates << " decided on, " << soak.status().candidates_lost << " lost by the bus and "
-       << soak.status().page_faults << " page faults while deciding; the logger " << soak.logger().events_written
-       << " events written, " << soak.logger().events_lost << " lost.\n";
+  text << "Made by `scripts/faults soak --minutes " << options_.minutes << " --rate " << options_.rate
+       << "`: signed candidates of 12 steps, two of three certified, while the\n"
+       << "logger records. Microseconds from a candidate's stamp to the arrival of its answer; resident memory.\n\n"
+       << "| minute | p50 us | p99 us | worst us | certifier kB | logger kB |\n|---:|---:|---:|---:|---:|---:|\n";
+  for (std::size_t i = 0; i < intervals_.size(); ++i)
+    if (i == 0 || (i + 1) % (kIntervals / 6) == 0)
+      text << "| " << intervals_[i].ended_min << " | " << intervals_[i].p50_us << " | " << intervals_[i].p99_us << " | "
+           << intervals_[i].worst_us << " | " << intervals_[i].certifier_kb << " | " << intervals_[i].logger_kb << " |\n";
+  const certifier_status_v2_t& certifier = load_->status();
+  text << "\nSent " << load_->sent() << ", answered " << load_->answered() << ", of these twice " << load_->answered_again()
+       << "; answers lost on the way " << load_->answers_lost() << ".\nThe certifier counts " << certifier.candidates
+       << " decided on, " << certifier.candidates_lost << " lost on the way and " << certifier.page_faults
+       << " page faults while deciding;\nthe logger " << logger_.events_written << " events written and "
+       << logger_.events_lost << " lost; its database holds " << recorded_.decisions << " decisions and "
+       << recorded_.decisions_lost << " as gaps.\n";
+  const std::vector<std::string> faults = Judge();
+  text << "Judgement: " << (faults.empty() ? "all holds" : "does not hold");
+  if (options_.minutes < kJudgedFromMinutes) text << "; too short to look at load, growth and drift";
+  for (const std::string& fault : faults) text << "\n- " << fault;
+  text << "\n";
   return text.str();
 }
 
-// What a leak or a drift would show: the last fifth against the second.
-bool IsSteady(const std::vector<Minute>& minutes, const Soak& soak) {
-  std::int64_t sum = 0;
-  for (const std::int64_t count : soak.status().by_outcome) sum += count;
-  bool good = sum == soak.status().candidates && soak.logger().events_lost == 0 &&
-              soak.sent() == soak.status().candidates + soak.status().candidates_lost &&
-              soak.answered() == soak.status().candidates;
-  if (minutes.size() >= 10) {
-    const Minute &early = minutes[minutes.size() / 5], &late = minutes.back();
-    good = good && late.certifier_kb < early.certifier_kb + 2048 && late.logger_kb < early.logger_kb + 8192;
-  }
-  return good;
+std::vector<std::string> Soak::Judge() const {
+  std::vector<std::string> faults;
+  const auto demand = [&](bool holds, const std::string& otherwise) {
+    if (!holds) faults.push_back(otherwise);
+  };
+  const auto equal = [&](std::int64_t a, std::int64_t b, const std::string& what) {
+    demand(a == b, what + ": " + std::to_string(a) + " and " + std::to_string(b));
+  };
+  const certifier_status_v2_t& certifier = load_->status();
+  std::int64_t outcomes = 0;
+  for (const std::int64_t count : certifier.by_outcome) outcomes += count;
+  demand(all_ran_, "a process ended before its time, or not well");
+  equal(load_->sent(), certifier.candidates + certifier.candidates_lost, "sent, and decided on or counted as lost");
+  equal(certifier.candidates, outcomes, "decided on, and decisions by outcome");
+  equal(certifier.candidates, load_->answered() + load_->answers_lost(), "decided on, and answers heard or missing");
+  equal(load_->answered_again(), 0, "answered twice, at most");
+  equal(logger_.events_lost, 0, "events lost by the logger, at most");
+  equal(certifier.candidates, recorded_.decisions + recorded_.decisions_lost, "decided on, and decisions recorded or a gap");
+  if (options_.minutes < kJudgedFromMinutes) return faults;
+  const auto sent = static_cast<double>(load_->sent());
+  demand(sent >= 0.99 * wanted_, "the load was less than asked for: the machine is too busy");
+  demand(static_cast<double>(certifier.by_outcome[decision_t::CERTIFIED]) >= 0.6 * sent, "too few were certified");
+  const auto flat = [&](double Interval::*value, double factor, double allowance, const std::string& what) {
+    const auto [early, late] = EarlyAndLate(value);
+    demand(late <= early * factor + allowance,
+           what + ": " + std::to_string(early) + " early, " + std::to_string(late) + " late");
+  };
+  flat(&Interval::certifier_kb, 1, kCertifierMayGrowKb, "the certifier grows, kB");
+  flat(&Interval::logger_kb, 1, kLoggerMayGrowKb + kLoggerKbPerDecision * 0.6 * sent, "the logger grows, kB");
+  flat(&Interval::p50_us, kLatencyMayGrowBy, kAndByUs, "the median latency drifts, us");
+  flat(&Interval::p99_us, kLatencyMayGrowBy, kAndByUs, "the 99th percentile drifts, us");
+  return faults;
 }
 
 int Main(int argc, char** argv) {
@@ -185,11 +208,11 @@ int Main(int argc, char** argv) {
   app.add_option("--report", options.report, "Where the table goes; empty: to standard output alone")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   Soak soak(options);
-  const std::vector<Minute> minutes = soak.Run();
-  const std::string table = Table(options, minutes, soak);
+  soak.Run();
+  const std::string table = soak.Table();
   std::cout << table << std::flush;
   if (!options.report.empty()) ReplaceBetween(options.report, "soak", table);
-  return IsSteady(minutes, soak) ? 0 : 1;
+  return soak.Judge().empty() ? 0 : 1;
 }
 
 }  // namespace
