@@ -3,6 +3,7 @@
 #include "certifier/dynamics/models.h"
 #include "certifier/task/config.h"
 #include "fuzz/fuzz.h"
+#include "fuzz/text_mutator.h"
 
 bool forereach::Try(Bytes data) {
   static MemoryFile file;

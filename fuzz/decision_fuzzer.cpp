@@ -13,14 +13,18 @@ bool IsSmall(const verifier::Certificate& certificate) {
   return certificate.controls.cols() <= 4;
 }
 
-void Verify(const CertificateFile& file) {
+// @return whether there was a certificate to derive.
+bool Verify(const CertificateFile& file) {
+  bool any = false;
   const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
   for (const RecordedCertificate& recorded : file.certificates) {
     if (!IsSmall(recorded.certificate)) continue;
+    any = true;
     const verifier::Verdict verdict = verifier.Verify(recorded.certificate);
     Require((verdict.status == verifier::Status::kConfirmed) == verdict.failure.what.empty());
     Require(verdict.status != verifier::Status::kConfirmed || recorded.certificate.controls.allFinite());
   }
+  return any;
 }
 
 }  // namespace
@@ -28,7 +32,8 @@ void Verify(const CertificateFile& file) {
 bool Try(Bytes data) {
   static MemoryFile file;
   const std::string& path = file.Write(data);
-  return IsTaken([&] { Verify(ReadCertificates(path, FOREREACH_FUZZ_TASK)); });
+  bool verified = false;
+  return IsTaken([&] { verified = Verify(ReadCertificates(path, FOREREACH_FUZZ_TASK)); }) && verified;
 }
 
 }  // namespace forereach

@@ -79,7 +79,8 @@ inline double AnyNumber(FuzzedDataProvider& input) {
 inline std::int64_t AnyInteger(FuzzedDataProvider& input, std::int64_t middle, std::int64_t reach) {
   switch (input.ConsumeIntegralInRange(0, 4)) {
     case 0: return middle;
-    case 1: return middle + input.ConsumeIntegralInRange(-reach, reach);
+    case 1: return static_cast<std::int64_t>(static_cast<std::uint64_t>(middle) +  // which may be at an end
+                                             static_cast<std::uint64_t>(input.ConsumeIntegralInRange(-reach, reach)));
     case 2: return std::numeric_limits<std::int64_t>::max() - input.ConsumeIntegralInRange(0, 2);
     case 3: return std::numeric_limits<std::int64_t>::min() + input.ConsumeIntegralInRange(0, 2);
     default: return input.ConsumeIntegral<std::int64_t>();

@@ -4,6 +4,7 @@ leaves a document that gets past the parser. To be included by the one source fi
 
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <random>
 #include <utility>
 
@@ -35,10 +36,12 @@ class JsonMutator final {
   }
 
  private:
+  Json::iterator AnyIn(Json& value) { return std::next(value.begin(), static_cast<Json::difference_type>(Below(value.size()))); }
+
   // An entry of a list or map; the value itself if it has none.
   Json& AnyEntry(Json& value) {
     if (!value.is_structured() || value.empty()) return value;
-    return (value.begin() + static_cast<Json::difference_type>(Below(value.size()))).value();
+    return *AnyIn(value);
   }
 
   Json& AnyPlace(Json& document) {
@@ -49,7 +52,7 @@ class JsonMutator final {
 
   void RemoveEntry(Json& value) {
     if (value.is_structured() && !value.empty())
-      value.erase(value.begin() + static_cast<Json::difference_type>(Below(value.size())));
+      value.erase(AnyIn(value));
   }
 
   void AddEntry(Json& value, Json entry) {

@@ -256,7 +256,7 @@ std::vector<LogReference> Database::References(const std::string& log_file) {
       UNION SELECT event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
       ORDER BY event_number)sql");
   for (select.Bind(log_file); select.Step();) {
-    LogReference& reference = references.emplace_back(log_file);
+    LogReference& reference = references.emplace_back(LogReference{log_file});
     select.Read(reference.event_number, reference.digest);
   }
   return references;
