@@ -1,10 +1,12 @@
 #include "lcmtypes/bus.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <exception>
+#include <fstream>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -15,13 +17,23 @@ namespace forereach {
 namespace {
 
 constexpr std::size_t kQueueMessages = 4096, kQueueBytes = std::size_t{32} << 20;  // 800 certified plans
+constexpr long kReceiveBufferBytes = long{2} << 20;  // Debian's default, 208 kB, holds four certified plans
 constexpr int kLcmQueueMessages = 1024;
 constexpr int kReceivePollMs = 50;
+
+// As much as the kernel grants: LCM complains where it is asked for more.
+std::string WithReceiveBuffer(const std::string& url) {
+  long granted = 0;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> granted;
+  if (granted <= 0 || !url.starts_with("udpm://") || url.find("recv_buf_size=") != std::string::npos) return url;
+  return url + (url.find('?') == std::string::npos ? '?' : '&') +
+         "recv_buf_size=" + std::to_string(std::min(granted, kReceiveBufferBytes));
+}
 
 class LcmBus final : public Bus {
  public:
   LcmBus(const std::string& url, Clock clock)
-      : in_memory_(url.starts_with("memq://")), clock_(std::move(clock)), lcm_(url) {
+      : in_memory_(url.starts_with("memq://")), clock_(std::move(clock)), lcm_(WithReceiveBuffer(url)) {
     // Asking for the file descriptor joins the multicast group, which a subscription would do without telling of failure.
     if (!lcm_.good() || (!in_memory_ && lcm_.getFileno() < 0))
       throw BusError("bus: cannot open " + url +
