@@ -3,16 +3,12 @@ leaves a document that gets past the parser. To be included by the one source fi
 #pragma once
 
 #include <cmath>
-#include <cstring>
 #include <iterator>
-#include <random>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
-#include "fuzz/fuzz.h"
-
-extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
+#include "fuzz/mutator.h"
 
 namespace forereach {
 
@@ -20,9 +16,7 @@ class JsonMutator final {
  public:
   using Json = nlohmann::ordered_json;
 
-  explicit JsonMutator(unsigned seed) : random_(seed) {}
-
-  std::size_t Below(std::size_t end) { return random_() % end; }
+  explicit JsonMutator(std::minstd_rand& random) : random_(random) {}
 
   void Change(Json& document) {
     Json& place = AnyPlace(document);
@@ -71,19 +65,19 @@ class JsonMutator final {
     return other[Below(std::size(other))];
   }
 
-  std::minstd_rand random_;
+  std::size_t Below(std::size_t end) { return random_() % end; }
+
+  std::minstd_rand& random_;
 };
 
 }  // namespace forereach
 
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed) {
-  using forereach::JsonMutator;
-  JsonMutator mutator(seed);
-  JsonMutator::Json document = JsonMutator::Json::parse(data, data + size, nullptr, false);
-  if (document.is_discarded() || mutator.Below(4) == 0) return LLVMFuzzerMutate(data, size, max_size);
-  mutator.Change(document);
-  const std::string text = document.dump(-1, ' ', false, JsonMutator::Json::error_handler_t::replace);
-  if (text.size() > max_size) return LLVMFuzzerMutate(data, size, max_size);
-  std::memcpy(data, text.data(), text.size());
-  return text.size();
+  using Json = forereach::JsonMutator::Json;
+  return forereach::MutateText(data, size, max_size, seed, [](std::string_view text, std::minstd_rand& random) {
+    Json document = Json::parse(text, nullptr, false);
+    if (document.is_discarded()) return std::string();
+    forereach::JsonMutator(random).Change(document);
+    return document.dump(-1, ' ', false, Json::error_handler_t::replace);
+  });
 }

@@ -2,20 +2,15 @@
 leaves a file that is not refused for a key or column of no name. To be included by the one source file of a target. */
 #pragma once
 
-#include <cstring>
-#include <random>
+#include <algorithm>
 
-#include "fuzz/fuzz.h"
-
-extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
+#include "fuzz/mutator.h"
 
 namespace forereach {
 
 class TextMutator final {
  public:
-  TextMutator(std::string_view text, unsigned seed) : text_(text), random_(seed) {}
-
-  std::size_t Below(std::size_t end) { return random_() % end; }
+  TextMutator(std::string_view text, std::minstd_rand& random) : text_(text), random_(random) {}
 
   std::string Changed() {
     const std::size_t at = Below(text_.size());
@@ -60,17 +55,16 @@ class TextMutator final {
     return std::string(text_.substr(0, range.begin)).append(by).append(text_.substr(range.begin + range.size));
   }
 
+  std::size_t Below(std::size_t end) { return random_() % end; }
+
   std::string_view text_;
-  std::minstd_rand random_;
+  std::minstd_rand& random_;
 };
 
 }  // namespace forereach
 
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed) {
-  forereach::TextMutator mutator({reinterpret_cast<const char*>(data), size}, seed);
-  if (size == 0 || mutator.Below(4) == 0) return LLVMFuzzerMutate(data, size, max_size);
-  const std::string text = mutator.Changed();
-  if (text.size() > max_size) return LLVMFuzzerMutate(data, size, max_size);
-  std::memcpy(data, text.data(), text.size());
-  return text.size();
+  return forereach::MutateText(data, size, max_size, seed, [](std::string_view text, std::minstd_rand& random) {
+    return forereach::TextMutator(text, random).Changed();
+  });
 }
