@@ -45,8 +45,7 @@ class JsonMutator final {
   }
 
   void RemoveEntry(Json& value) {
-    if (value.is_structured() && !value.empty())
-      value.erase(AnyIn(value));
+    if (value.is_structured() && !value.empty()) value.erase(AnyIn(value));
   }
 
   void AddEntry(Json& value, Json entry) {
