@@ -112,7 +112,7 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
     case DecodeStatus::kOk:
       break;
   }
-  sources_.Hear(candidate);
+  sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
   return CheckSource(candidate, now_us);

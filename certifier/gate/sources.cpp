@@ -8,6 +8,12 @@ std::string Sources::NameOf(const candidate_plan_t& candidate) {
   return {reinterpret_cast<const char*>(candidate.source), sizeof candidate.source};
 }
 
+void Sources::Source::ForgetAllBut(std::int64_t plan_id) {
+  highest = plan_id;
+  used.reset();
+  used.set(0);
+}
+
 // Differences of plan_ids, which may be any numbers, are taken unsigned.
 bool Sources::Source::Use(std::int64_t plan_id) {
   const auto apart = [](std::int64_t above, std::int64_t below) {
@@ -29,17 +35,13 @@ bool Sources::Source::Use(std::int64_t plan_id) {
 Sources::Admission Sources::Admit(const candidate_plan_t& candidate, std::int64_t now_us) {
   const std::string name = NameOf(candidate);
   auto known = sources_.find(name);
-  if (known != sources_.end() && now_us - known->second.heard_us > forget_after_us_) {
-    lost_before_ += known->second.lost();
-    sources_.erase(known);
-    known = sources_.end();
-  }
   if (known == sources_.end()) {
     if (sources_.size() >= kMaxSources && !MakeRoom(now_us)) return Admission::kTooManySources;
     known = sources_.emplace(name, Source{}).first;
-    known->second.highest = candidate.plan_id;
-    known->second.used.set(0);
-    known->second.StartCounting(std::max<std::int64_t>(candidate.sequence, 0));
+    known->second.StartCounting(candidate.sequence, candidate.utime);
+    known->second.ForgetAllBut(candidate.plan_id);
+  } else if (now_us - known->second.heard_us > forget_after_us_) {
+    known->second.ForgetAllBut(candidate.plan_id);
   } else if (!known->second.Use(candidate.plan_id)) {
     return Admission::kUsed;
   }
@@ -56,23 +58,26 @@ bool Sources::MakeRoom(std::int64_t now_us) {
   return true;
 }
 
-void Sources::Source::StartCounting(std::int64_t sequence) {
-  first_sequence = last_sequence = sequence;
+void Sources::Source::StartCounting(std::int64_t sequence, std::int64_t utime) {
+  first_sequence = last_sequence = std::max<std::int64_t>(sequence, 0);
   came = 1;
+  newest_utime = utime;
 }
 
-// Candidates are not taken up in their order. A source that starts again counts from 0, or is far away.
-void Sources::Hear(const candidate_plan_t& candidate) {
+void Sources::Hear(const candidate_plan_t& candidate, std::int64_t now_us) {
   constexpr std::int64_t kLeap = std::int64_t{1} << 32, kBehind = 1 << 16;
   const auto known = sources_.find(NameOf(candidate));
   if (known == sources_.end() || candidate.sequence < 0) return;
   Source& source = known->second;
-  if (candidate.sequence == 0 || candidate.sequence < source.first_sequence - kBehind ||
+  const std::int64_t utime = std::min(candidate.utime, now_us + forget_after_us_);  // else the newest for ever
+  const bool later = utime > source.newest_utime;
+  if ((later && candidate.sequence < source.last_sequence) || candidate.sequence < source.first_sequence - kBehind ||
       candidate.sequence - source.last_sequence > kLeap) {
     lost_before_ += source.lost();
-    source.StartCounting(candidate.sequence);
+    source.StartCounting(candidate.sequence, utime);
     return;
   }
+  source.newest_utime = std::max(source.newest_utime, utime);
   source.first_sequence = std::min(source.first_sequence, candidate.sequence);
   source.last_sequence = std::max(source.last_sequence, candidate.sequence);
   ++source.came;

@@ -1,9 +1,9 @@
 /** Who has sent which candidates: none is decided on twice, and what never arrived is counted.
 
 A plan_id may be used once. Candidates need not be taken up in their order: of each source the last kWindow plan_ids below
-the highest are told apart, older ones count as used. A source that has been silent for so long that whatever it sent
-before would be stale now makes room for another, so neither invented sources nor a huge plan_id lock anybody out for
-long. */
+the highest are told apart, older ones count as used. What a source has used is forgotten when it has been silent for so long
+that whatever it sent before would be stale now, and it makes room for another, so neither invented sources nor a huge
+plan_id lock anybody out for long. */
 #pragma once
 
 #include <algorithm>
@@ -27,8 +27,9 @@ class Sources final {
   candidate stays fresh. */
   explicit Sources(std::int64_t forget_after_us) : forget_after_us_(forget_after_us) {}
 
-  /** Every candidate that decodes, once, before anything else is asked of it. */
-  void Hear(const candidate_plan_t& candidate);
+  /** Every candidate that decodes, once, before anything else is asked of it. In whatever order they are taken up: a source
+  has begun to count anew if a later stamp has a smaller sequence. */
+  void Hear(const candidate_plan_t& candidate, std::int64_t now_us);
 
   /** If it is new, its plan_id is used from now on. */
   [[nodiscard]] Admission Admit(const candidate_plan_t& candidate, std::int64_t now_us);
@@ -42,10 +43,11 @@ class Sources final {
   struct Source {
     std::int64_t highest = 0, heard_us = 0;
     std::bitset<kWindow> used;  // bit i: highest - i
-    std::int64_t first_sequence = 0, last_sequence = 0, came = 0;
+    std::int64_t first_sequence = 0, last_sequence = 0, came = 0, newest_utime = 0;
 
+    void ForgetAllBut(std::int64_t plan_id);
     [[nodiscard]] bool Use(std::int64_t plan_id);
-    void StartCounting(std::int64_t sequence);
+    void StartCounting(std::int64_t sequence, std::int64_t utime);
     [[nodiscard]] std::int64_t lost() const {  // repetitions came too, so not below 0
       return std::max<std::int64_t>(last_sequence - first_sequence + 1 - came, 0);
     }
@@ -56,7 +58,7 @@ class Sources final {
 
   std::int64_t forget_after_us_;
   std::map<std::string, Source> sources_;
-  std::int64_t lost_before_ = 0;  // by sources forgotten or started again
+  std::int64_t lost_before_ = 0;  // of sources that made room or began anew
 };
 
 }  // namespace forereach

@@ -73,18 +73,24 @@ TEST(SourcesTest, SilentSourcesMakeRoomAndAHugeIdLocksNobodyOutForLong) {
 
 TEST(SourcesTest, CountsGapsAndNotOrder) {
   Sources sources(kForget);
-  const auto hear = [&](std::int64_t sequence) {
-    const candidate_plan_t candidate = From("a", sequence, sequence);
-    sources.Hear(candidate);
-    static_cast<void>(sources.Admit(candidate, 0));
+  constexpr std::int64_t kLater = 1000;
+  const auto hear = [&](std::int64_t sequence, std::int64_t utime) {
+    candidate_plan_t candidate = From("a", sequence, sequence);
+    candidate.utime = utime;
+    sources.Hear(candidate, kLater);
+    static_cast<void>(sources.Admit(candidate, kLater));
   };
-  for (const std::int64_t sequence : {0, 1, 4, 3, 7}) hear(sequence);
+  for (const std::int64_t sequence : {1, 4, 3, 0, 7}) hear(sequence, sequence);
   EXPECT_EQ(sources.lost(), 3) << "2, 5 and 6";
-  hear(0);  // it started again
-  hear(1);
+  hear(0, kLater);  // it began anew
+  hear(1, kLater);
   EXPECT_EQ(sources.lost(), 3);
-  hear(INT64_MAX);
-  hear(-5);
+  hear(3, INT64_MAX);  // stamped wrongly
+  EXPECT_EQ(sources.lost(), 4);
+  hear(2, kLater);
+  EXPECT_EQ(sources.lost(), 3);
+  hear(INT64_MAX, kLater);
+  hear(-5, kLater);
   EXPECT_EQ(sources.lost(), 3) << "no leap counts";
 }
 
@@ -93,8 +99,9 @@ TEST(SourcesTest, CountsWhatIsMissingWhereTheNewestComeFirst) {
   std::int64_t now = 0;
   const auto take = [&](std::int64_t from, std::int64_t to) {
     for (std::int64_t sequence = from; sequence != to; sequence += from < to ? 1 : -1) {
-      const candidate_plan_t candidate = From("a", sequence + 1, sequence);
-      sources.Hear(candidate);
+      candidate_plan_t candidate = From("a", sequence + 1, sequence);
+      candidate.utime = sequence;
+      sources.Hear(candidate, now);
       static_cast<void>(sources.Admit(candidate, now));
     }
   };
@@ -102,8 +109,24 @@ TEST(SourcesTest, CountsWhatIsMissingWhereTheNewestComeFirst) {
     take(100 * batch + 63, 100 * batch + 55);
     take(100 * batch, 100 * batch + 56);
   }
-  // 64 to 99 of each hundred but the last; and the eight that came before 0, which count as of a run before.
-  EXPECT_EQ(sources.lost(), 99 * 36 + 8);
+  EXPECT_EQ(sources.lost(), 99 * 36) << "64 to 99 of each hundred but the last";
+}
+
+// What a source has used is forgotten with time; what it sent is not counted as lost when it comes behind the newest.
+TEST(SourcesTest, CountsAcrossASilence) {
+  Sources sources(kForget);
+  std::int64_t now = 0;
+  const auto take = [&](std::int64_t sequence) {
+    candidate_plan_t candidate = From("a", sequence, sequence);
+    candidate.utime = sequence;
+    sources.Hear(candidate, now);
+    return sources.Admit(candidate, now);
+  };
+  EXPECT_EQ(take(1), Admission::kNew);
+  now += kForget + 1;
+  EXPECT_EQ(take(4000), Admission::kNew);
+  for (std::int64_t sequence = 2; sequence < 3999; ++sequence) static_cast<void>(take(sequence));
+  EXPECT_EQ(sources.lost(), 1) << "3999";
 }
 
 }  // namespace
