@@ -97,6 +97,8 @@ nlohmann::json ToJson(const Summary& summary) {
 }
 
 SummaryBuilder::SummaryBuilder(const Config& config) : channels_(config.bus), goal_(config.planner.goal) {
+  latency_.values.reserve(kMaxSamples);
+  certify_.values.reserve(kMaxSamples);
   if (config.problem) projection_ = config.problem->projection;
 }
 

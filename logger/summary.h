@@ -47,10 +47,10 @@ struct Summary {
 [[nodiscard]] std::string ToText(const Summary& summary);
 [[nodiscard]] nlohmann::json ToJson(const Summary& summary);
 
-/** Collects a summary piece by piece. Keeps the last kMaxSamples durations at most. */
+/** Collects a summary piece by piece, in memory that does not grow: quantiles are those of the last kMaxSamples durations. */
 class SummaryBuilder final {
  public:
-  static constexpr std::size_t kMaxSamples = 1 << 20;
+  static constexpr std::size_t kMaxSamples = 1 << 16;
 
   explicit SummaryBuilder(const Config& config);
 
