@@ -93,6 +93,15 @@ class Campaign final {
     ++row.forbidden;
   }
 
+  // The system has to be healthy before it can be hurt.
+  static bool FirstBegin(Row& row, Rig& rig) {
+    const std::string why = rig.Heal();
+    if (!why.empty()) Remark(row, "never began: " + why);
+    return why.empty();
+  }
+
+  static void Remark(Row& row, const std::string& text) { row.remark += (row.remark.empty() ? "" : "; ") + text; }
+
   Row& Begin(const std::string& fault, int tries) {
     std::cerr << fault << "\n";
     rows_.emplace_back().fault = fault;
@@ -103,8 +112,8 @@ class Campaign final {
   void Signals(const std::string& fault, int signal, int tries) {
     Rig rig(DemoTask());
     Row& row = Begin(fault, tries);
-    if (const std::string why = rig.Heal(); !why.empty()) row.remark = "never began: " + why;
-    for (int i = 0; i < tries && row.remark.rfind("never", 0) != 0; ++i) {
+    const bool began = FirstBegin(row, rig);
+    for (int i = 0; i < tries && began; ++i) {
       const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
       Try(row, rig, [&] {
         rig.Listen(milliseconds(Below(120)));
@@ -142,7 +151,7 @@ class Campaign final {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin(std::string("The clock of the ") + Rig::kNames[role] + " jumps by 0.3 s to an hour, and back",
                      options_.others);
-    if (const std::string why = rig.Heal(); !why.empty()) row.remark = "never began: " + why;
+    FirstBegin(row, rig);
     for (int i = 0; i < options_.others; ++i)
       Try(row, rig, [&] {
         rig.SetClock(role, Jump());
@@ -158,7 +167,7 @@ class Campaign final {
   void AllClocks() {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin("All clocks jump by 0.3 s to an hour, and stay", options_.others);
-    if (const std::string why = rig.Heal(); !why.empty()) row.remark = "never began: " + why;
+    FirstBegin(row, rig);
     microseconds offset(0);
     int anew = 0;
     for (int i = 0; i < options_.others; ++i)
@@ -169,7 +178,7 @@ class Campaign final {
         DemandLatched(row, rig);
         if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
       }, true);
-    row.remark += (row.remark.empty() ? "" : "; ") + std::to_string(anew) + " times back by more than 5 s: all started again";
+    Remark(row, std::to_string(anew) + " times back by more than 5 s: all started again");
   }
 
   void BadNetwork() {
@@ -208,7 +217,7 @@ class Campaign final {
         });
       stop = true;
       passing.join();
-      row.remark += (row.remark.empty() ? "" : "; ") + std::to_string(relay.spoiled()) + " messages spoiled";
+      Remark(row, std::to_string(relay.spoiled()) + " messages spoiled");
     }
   }
 
@@ -423,14 +432,12 @@ int Main(int argc, char** argv) {
   app.add_option("--others", options.others, "Tries of each other fault")->capture_default_str();
   app.add_option("--flood", options.floods, "Candidates in the flood")->capture_default_str();
   app.add_option("--seed", options.seed, "Of the random moments")->capture_default_str();
-  app.add_option("--report", options.report, "Where the table goes; empty: to standard output alone")->capture_default_str();
+  AddReportOption(app, options.report);
   app.add_option("--only", options.only,
                  "One kind: kill, clock, stop, network, lies, nonsense, forgeries, flood, disks, route, reload");
   CLI11_PARSE(app, argc, argv);
   const std::vector<Row> rows = Campaign(options).Run();
-  const std::string table = Table(rows, options);
-  std::cout << table << std::flush;
-  if (!options.report.empty()) ReplaceBetween(options.report, "faults", table);
+  Publish(options.report, "faults", Table(rows, options));
   const bool clean = std::ranges::all_of(rows, [](const Row& row) {
     return row.forbidden == 0 && row.lost_by_logger == 0 && row.recovered + row.said_why == row.tries;
   });

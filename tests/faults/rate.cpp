@@ -94,9 +94,8 @@ std::string Table(const Options& options, int steps, const std::vector<Row>& row
     const certifier_status_v2_t& status = row.status;
     const std::int64_t unaccounted = row.sent - row.answered - status.candidates_lost - row.answers_lost;
     text << "| " << row.name << " | " << row.sent << " | " << status.by_outcome[decision_t::CERTIFIED] << " | "
-         << OtherAnswers(status) << " | "
-         << row.again << " | " << status.candidates_lost << " | " << row.answers_lost << " | " << unaccounted << " | "
-         << row.p50_us << " | " << row.p99_us << " | " << row.worst_us << " | " << status.elapsed_p50_us << " | "
+         << OtherAnswers(status) << " | " << row.again << " | " << status.candidates_lost << " | " << row.answers_lost
+         << " | " << unaccounted << " | " << row.p50_us << " | " << row.p99_us << " | " << row.worst_us << " | " << status.elapsed_p50_us << " | "
          << status.elapsed_p99_us << " |\n";
   }
   return text.str();
@@ -115,7 +114,7 @@ int Main(int argc, char** argv) {
                "forereach_rate_processes");
   app.add_option("--seconds", options.seconds, "How long, for each row")->capture_default_str();
   app.add_option("--rate", options.rate, "Candidates a second")->capture_default_str();
-  app.add_option("--report", options.report, "Where the table goes; empty: to standard output alone")->capture_default_str();
+  AddReportOption(app, options.report);
   CLI11_PARSE(app, argc, argv);
   const ScratchDirectory scratch;
   Config config = LoadConfig(scratch.Write("task.yaml", DemoTask(kGate)));
@@ -130,9 +129,7 @@ int Main(int argc, char** argv) {
       const std::string name = std::string(is_signed ? "signed" : "unsigned") + (small ? ", receive buffers of 208 kB" : "");
       rows.push_back(Measure(options, name, config, steps));
     }
-  const std::string table = Table(options, steps, rows);
-  std::cout << table << std::flush;
-  if (!options.report.empty()) ReplaceBetween(options.report, "rate", table);
+  Publish(options.report, "rate", Table(options, steps, rows));
   return std::ranges::all_of(rows, [&](const Row& row) { return AddsUp(options, row); }) ? 0 : 1;
 }
 

@@ -1,9 +1,12 @@
-/** Tables that programs write into a page between two marks. */
+/** Tables that programs print, and write into a page between two marks. */
 #pragma once
 
 #include <fstream>
+#include <iostream>
 #include <sstream>
 #include <string>
+
+#include <CLI/CLI.hpp>
 
 namespace forereach {
 
@@ -19,6 +22,16 @@ inline void ReplaceBetween(const std::string& path, const std::string& name, con
   else
     page.replace(from + begin.size(), to - from - begin.size(), text);
   std::ofstream(path) << page;
+}
+
+/** The option that says which page. */
+inline void AddReportOption(CLI::App& app, std::string& report) {
+  app.add_option("--report", report, "Where the table goes; empty: to standard output alone")->capture_default_str();
+}
+
+inline void Publish(const std::string& report, const std::string& name, const std::string& table) {
+  std::cout << table << std::flush;
+  if (!report.empty()) ReplaceBetween(report, name, table);
 }
 
 }  // namespace forereach

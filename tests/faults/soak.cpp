@@ -100,9 +100,9 @@ class Soak final {
     recorded_ = ReadDatabase(log(), config_.bus.decision);
   }
 
-  [[nodiscard]] std::string Table() const;
   /** One line for each thing that does not hold. */
   [[nodiscard]] std::vector<std::string> Judge() const;
+  [[nodiscard]] std::string Table(const std::vector<std::string>& faults) const;
 
  private:
   [[nodiscard]] std::filesystem::path log() const { return scratch_.path() / "log"; }
@@ -138,7 +138,7 @@ class Soak final {
   Recorded recorded_;
 };
 
-std::string Soak::Table() const {
+std::string Soak::Table(const std::vector<std::string>& faults) const {
   std::ostringstream text;
   text << "Made by `scripts/faults soak --minutes " << options_.minutes << " --rate " << options_.rate
        << "`: signed candidates of 12 steps, two of three certified, while the\n"
@@ -155,7 +155,6 @@ std::string Soak::Table() const {
        << " page faults while deciding;\nthe logger " << logger_.events_written << " events written and "
        << logger_.events_lost << " lost; its database holds " << recorded_.decisions << " decisions and "
        << recorded_.decisions_lost << " as gaps.\n";
-  const std::vector<std::string> faults = Judge();
   text << "Judgement: " << (faults.empty() ? "all holds" : "does not hold");
   if (options_.minutes < kJudgedFromMinutes) text << "; too short to look at load, growth and drift";
   for (const std::string& fault : faults) text << "\n- " << fault;
@@ -203,14 +202,13 @@ int Main(int argc, char** argv) {
                "forereach_soak_processes");
   app.add_option("--minutes", options.minutes, "How long")->capture_default_str();
   app.add_option("--rate", options.rate, "Candidates a second")->capture_default_str();
-  app.add_option("--report", options.report, "Where the table goes; empty: to standard output alone")->capture_default_str();
+  AddReportOption(app, options.report);
   CLI11_PARSE(app, argc, argv);
   Soak soak(options);
   soak.Run();
-  const std::string table = soak.Table();
-  std::cout << table << std::flush;
-  if (!options.report.empty()) ReplaceBetween(options.report, "soak", table);
-  return soak.Judge().empty() ? 0 : 1;
+  const std::vector<std::string> faults = soak.Judge();
+  Publish(options.report, "soak", soak.Table(faults));
+  return faults.empty() ? 0 : 1;
 }
 
 }  // namespace
