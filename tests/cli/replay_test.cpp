@@ -33,6 +33,23 @@ std::string NewLog() {
   return path;
 }
 
+// The gate decides as expected, and the log has what came and what went.
+void DecideAndLog(Gate& gate, const std::vector<std::uint8_t>& candidate, std::int16_t expected, const Config& config,
+                  EventLogWriter& log) {
+  const decision_t decision = gate.Decide(candidate, kNow).decision;
+  EXPECT_EQ(decision.outcome, expected);
+  log.Append(kNow, config.bus.candidate, candidate);
+  log.Append(kNow, config.bus.decision, Encode(decision));
+}
+
+// Each decision of the log is made again. Removes it.
+void ExpectAgreed(const std::string& path, const Config& config, int decisions) {
+  const ReplayResult result = Replay({path}, config);
+  EXPECT_EQ(result.agreed, decisions);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+  std::filesystem::remove(path);
+}
+
 // Copies the log, each event changed by `edit`.
 template <class Edit>
 std::string Edited(Edit edit) {
@@ -157,9 +174,6 @@ TEST(Replay, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt)
     if (heartbeat > 0) {
       EXPECT_EQ(gate.UpdateObstacles(Encode(on_the_way), kNow), "");
     }
-    const auto candidate = Encode(Candidate(1));
-    const decision_t decision = gate.Decide(candidate, kNow).decision;
-    EXPECT_EQ(decision.outcome, heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED);
     certifier_status_v2_t status{};
     status.sequence = heartbeat;
     const std::string path = NewLog();
@@ -167,14 +181,11 @@ TEST(Replay, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt)
       EventLogWriter writer(path);
       writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
       writer.Append(kNow, config.bus.status, Encode(status));
-      writer.Append(kNow, config.bus.candidate, candidate);
-      writer.Append(kNow, config.bus.decision, Encode(decision));
+      DecideAndLog(gate, Encode(Candidate(1)), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED, config,
+                   writer);
       EXPECT_TRUE(writer.Flush());
     }
-    const ReplayResult result = Replay({path}, config);
-    EXPECT_EQ(result.agreed, 1);
-    EXPECT_THAT(result.differences, testing::IsEmpty());
-    std::filesystem::remove(path);
+    ExpectAgreed(path, config, 1);
   }
 }
 
@@ -193,23 +204,13 @@ TEST(Replay, AReloadKeepsTheObstaclesThatWereHeard) {
     writer.Append(kNow, config.bus.status, Encode(first));
     writer.Append(kNow, config.bus.obstacles, Encode(far_away));
     EXPECT_EQ(before.UpdateObstacles(Encode(far_away), kNow), "");
-    const auto decide = [&](Gate& gate, std::int64_t plan_id, std::int16_t outcome) {
-      const auto candidate = Encode(Candidate(plan_id, kAccelerationIntoTheCircle));
-      const decision_t decision = gate.Decide(candidate, kNow).decision;
-      EXPECT_EQ(decision.outcome, outcome);
-      writer.Append(kNow, config.bus.candidate, candidate);
-      writer.Append(kNow, config.bus.decision, Encode(decision));
-    };
-    decide(before, 1, decision_t::CERTIFIED);
+    DecideAndLog(before, Encode(Candidate(1, kAccelerationIntoTheCircle)), decision_t::CERTIFIED, config, writer);
     after.Inherit(before);
     writer.Append(kNow, config.bus.status, Encode(second));
-    decide(after, 2, decision_t::ABSTAIN_SAFETY);
+    DecideAndLog(after, Encode(Candidate(2, kAccelerationIntoTheCircle)), decision_t::ABSTAIN_SAFETY, config, writer);
     EXPECT_TRUE(writer.Flush());
   }
-  const ReplayResult result = Replay({path}, config);
-  EXPECT_EQ(result.agreed, 2);
-  EXPECT_THAT(result.differences, testing::IsEmpty());
-  std::filesystem::remove(path);
+  ExpectAgreed(path, config, 2);
 }
 
 TEST(Replay, AnotherTaskIsNoticed) {

@@ -23,6 +23,14 @@ candidate_plan_t From(const std::string& source, std::int64_t plan_id, std::int6
   return candidate;
 }
 
+// Hears it and takes it at once.
+Admission Take(Sources& sources, std::int64_t plan_id, std::int64_t sequence, std::int64_t utime, std::int64_t now) {
+  candidate_plan_t candidate = From("a", plan_id, sequence);
+  candidate.utime = utime;
+  sources.Hear(candidate, now);
+  return sources.Admit(candidate, now);
+}
+
 TEST(SourcesTest, EachPlanIdOnceInAnyOrder) {
   Sources sources(kForget);
   for (const std::int64_t id : {10, 8, 9, 12, 11}) EXPECT_EQ(sources.Admit(From("a", id), 0), Admission::kNew) << id;
@@ -75,10 +83,7 @@ TEST(SourcesTest, CountsGapsAndNotOrder) {
   Sources sources(kForget);
   constexpr std::int64_t kLater = 1000;
   const auto hear = [&](std::int64_t sequence, std::int64_t utime) {
-    candidate_plan_t candidate = From("a", sequence, sequence);
-    candidate.utime = utime;
-    sources.Hear(candidate, kLater);
-    static_cast<void>(sources.Admit(candidate, kLater));
+    static_cast<void>(Take(sources, sequence, sequence, utime, kLater));
   };
   for (const std::int64_t sequence : {1, 4, 3, 0, 7}) hear(sequence, sequence);
   EXPECT_EQ(sources.lost(), 3) << "2, 5 and 6";
@@ -98,12 +103,8 @@ TEST(SourcesTest, CountsWhatIsMissingWhereTheNewestComeFirst) {
   Sources sources(kForget);
   std::int64_t now = 0;
   const auto take = [&](std::int64_t from, std::int64_t to) {
-    for (std::int64_t sequence = from; sequence != to; sequence += from < to ? 1 : -1) {
-      candidate_plan_t candidate = From("a", sequence + 1, sequence);
-      candidate.utime = sequence;
-      sources.Hear(candidate, now);
-      static_cast<void>(sources.Admit(candidate, now));
-    }
+    for (std::int64_t sequence = from; sequence != to; sequence += from < to ? 1 : -1)
+      static_cast<void>(Take(sources, sequence + 1, sequence, sequence, now));
   };
   for (std::int64_t batch = 0; batch < 100; ++batch, now += 1000) {  // as the node does in a flood
     take(100 * batch + 63, 100 * batch + 55);
@@ -116,12 +117,7 @@ TEST(SourcesTest, CountsWhatIsMissingWhereTheNewestComeFirst) {
 TEST(SourcesTest, CountsAcrossASilence) {
   Sources sources(kForget);
   std::int64_t now = 0;
-  const auto take = [&](std::int64_t sequence) {
-    candidate_plan_t candidate = From("a", sequence, sequence);
-    candidate.utime = sequence;
-    sources.Hear(candidate, now);
-    return sources.Admit(candidate, now);
-  };
+  const auto take = [&](std::int64_t sequence) { return Take(sources, sequence, sequence, sequence, now); };
   EXPECT_EQ(take(1), Admission::kNew);
   now += kForget + 1;
   EXPECT_EQ(take(4000), Admission::kNew);
