@@ -26,7 +26,6 @@ namespace {
 
 constexpr int kRoundTrips = 500;
 constexpr std::size_t kRoundTripBytes = 2048;
-constexpr long kWantedBufferBytes = 2 * 1024 * 1024;
 constexpr const char* kReadyCommand = "scripts/ready-bus";
 
 struct Check {
@@ -84,16 +83,10 @@ Check CheckRoute(const std::string& group) {
           std::string(kReadyCommand) + ", or: ip route add 224.0.0.0/4 dev lo"};
 }
 
-long ReadNumber(const std::string& path) {
-  long number = -1;
-  std::ifstream(path) >> number;
-  return number;
-}
-
 Check CheckBuffer() {
-  const long bytes = ReadNumber("/proc/sys/net/core/rmem_max");
-  return {"receive buffer limit", bytes >= kWantedBufferBytes, std::to_string(bytes) + " bytes",
-          "a burst of plans may be lost; as root: sysctl -w net.core.rmem_max=" + std::to_string(kWantedBufferBytes)};
+  const long bytes = GrantedReceiveBufferBytes();
+  return {"receive buffer limit", bytes >= kReceiveBufferBytes, std::to_string(bytes) + " bytes",
+          "a burst of plans may be lost; as root: sysctl -w net.core.rmem_max=" + std::to_string(kReceiveBufferBytes)};
 }
 
 Check CheckRoundTrip(const std::string& url) {

@@ -17,15 +17,14 @@ namespace forereach {
 namespace {
 
 constexpr std::size_t kQueueMessages = 4096, kQueueBytes = std::size_t{32} << 20;  // 800 certified plans
-constexpr long kReceiveBufferBytes = long{2} << 20;  // Debian's default, 208 kB, holds four certified plans
 constexpr int kLcmQueueMessages = 1024;
 constexpr int kReceivePollMs = 50;
 
 // As much as the kernel grants: LCM complains where it is asked for more.
 std::string WithReceiveBuffer(const std::string& url) {
-  long granted = 0;
-  std::ifstream("/proc/sys/net/core/rmem_max") >> granted;
-  if (granted <= 0 || !url.starts_with("udpm://") || url.find("recv_buf_size=") != std::string::npos) return url;
+  if (!url.starts_with("udpm://") || url.find("recv_buf_size=") != std::string::npos) return url;
+  const long granted = GrantedReceiveBufferBytes();
+  if (granted <= 0) return url;
   return url + (url.find('?') == std::string::npos ? '?' : '&') +
          "recv_buf_size=" + std::to_string(std::min(granted, kReceiveBufferBytes));
 }
@@ -145,6 +144,12 @@ std::int64_t WallClockUs() {
 std::int64_t SteadyClockUs() {
   using namespace std::chrono;
   return duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
+long GrantedReceiveBufferBytes() {
+  long bytes = 0;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> bytes;
+  return bytes;
 }
 
 std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock) {

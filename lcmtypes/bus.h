@@ -65,12 +65,18 @@ class Bus {
 };
 
 /** Opens an LCM bus: `udpm://239.255.76.67:7667?ttl=0`, or `memq://`, which lives inside this object alone.
-A udpm bus asks for a receive buffer of 2 MB, unless the URL says recv_buf_size, and receives on a thread that only copies
-messages out; memq delivers within Dispatch, in order, stamped by
-`clock`, so that several nodes in one process can run on a simulated one.
+A udpm bus asks for a receive buffer of 2 MB, unless the URL says recv_buf_size, and receives on a thread that only
+copies messages out; memq delivers within Dispatch, in order, stamped by `clock`, so that several nodes in one process
+can run on a simulated one.
 @throws BusError for any other kind of URL, or if LCM cannot open it, for example without a multicast route; never falls
 back to another bus. */
 [[nodiscard]] std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock = WallClockUs);
+
+/** What a udpm bus asks for: Debian's default, 208 kB, holds four certified plans. */
+inline constexpr long kReceiveBufferBytes = long{2} << 20;
+
+/** The largest receive buffer that the kernel grants; 0 if it does not say. */
+[[nodiscard]] long GrantedReceiveBufferBytes();
 
 /** The version of LCM in use, as "1.3.1". */
 [[nodiscard]] std::string BusVersion();

@@ -12,7 +12,7 @@
 namespace forereach {
 
 std::string PrivateBusUrl() {
-  // Below the ports that the kernel hands out by itself. Tests hear long bursts, so they ask for a larger buffer.
+  // Below the ports that the kernel hands out by itself.
   return "udpm://239.255.76.67:" + std::to_string(10'000 + getpid() % 20'000) + "?ttl=0";
 }
 
