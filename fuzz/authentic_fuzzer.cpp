@@ -26,7 +26,7 @@ bool Try(Bytes data) {
     const std::int64_t now = kBegun + i + 1 + (input.ConsumeBool() ? input.ConsumeIntegralInRange(-kBegun, kBegun) : 0);
     const int who = input.ConsumeIntegralInRange(0, kMaxSigners - 1);
     Signer& signer = signers.try_emplace(who, kKey, std::to_string(who), kBegun).first->second;
-    const std::vector<std::uint8_t> message = input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 80));
+    const std::vector<std::uint8_t> message = AnyBytes(input, 80);
     switch (input.ConsumeIntegralInRange(0, 4)) {
       case 0: made.insert(bytes = signer.Sign("COMMAND", message, now)); break;
       case 1: bytes = signer.Sign("OTHER", message, now); break;

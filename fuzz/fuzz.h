@@ -95,13 +95,19 @@ inline std::int16_t AnySmall(FuzzedDataProvider& input, std::int16_t largest) {
 /** How many things are odd: none half of the time, else up to seven. */
 inline int NumOdd(FuzzedDataProvider& input) { return input.ConsumeIntegralInRange(0, 15) - 8; }
 
+/** Of any values, and up to so many. */
+inline std::vector<std::uint8_t> AnyBytes(FuzzedDataProvider& input, std::size_t at_most) {
+  return input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, at_most));
+}
+
 /** Replaces a few of the bytes: by a number of any kind, in the order of the bus, or by any bytes. Or changes the length. */
 inline void Damage(FuzzedDataProvider& input, std::vector<std::uint8_t>& bytes) {
   for (int left = NumOdd(input); left > 0 && !bytes.empty(); --left) {
     const auto at = input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() - 1);
     const auto size = std::min<std::size_t>(bytes.size() - at, std::size_t{1} << input.ConsumeIntegralInRange(0, 3));
-    std::uint64_t value = input.ConsumeBool() ? std::bit_cast<std::uint64_t>(OddNumber(input)) : input.ConsumeIntegral<std::uint64_t>();
-    for (std::size_t i = size; i-- > 0; value >>= 8) bytes[at + i] = static_cast<std::uint8_t>(value);
+    const auto value = BigEndian(input.ConsumeBool() ? std::bit_cast<std::uint64_t>(OddNumber(input))
+                                                     : input.ConsumeIntegral<std::uint64_t>());
+    std::copy(value.end() - static_cast<std::ptrdiff_t>(size), value.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
   }
   if (input.ConsumeIntegralInRange(0, 15) == 15) bytes.resize(input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));
 }
@@ -109,7 +115,7 @@ inline void Damage(FuzzedDataProvider& input, std::vector<std::uint8_t>& bytes) 
 /** A message of this type that was damaged on its way, or something else altogether. */
 template <class Message>
 std::vector<std::uint8_t> Damaged(FuzzedDataProvider& input, const Message& message) {
-  if (input.ConsumeIntegralInRange(0, 31) == 31) return input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 64));
+  if (input.ConsumeIntegralInRange(0, 31) == 31) return AnyBytes(input, 64);
   std::vector<std::uint8_t> bytes = Encode(message);
   Damage(input, bytes);
   return bytes;

@@ -48,7 +48,7 @@ std::vector<std::uint8_t> AnyPlan(FuzzedDataProvider& input) {
     for (int id = 1; id <= 8; ++id) plans.push_back(Sealed(SmallPlan(id)));
     return plans;
   }();
-  if (input.ConsumeIntegralInRange(0, 31) == 31) return input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, 64));
+  if (input.ConsumeIntegralInRange(0, 31) == 31) return AnyBytes(input, 64);
   std::vector<std::uint8_t> bytes = sealed[input.ConsumeIntegralInRange<std::size_t>(0, sealed.size() - 1)];
   Damage(input, bytes);
   if (!input.ConsumeBool()) return bytes;
