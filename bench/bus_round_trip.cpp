@@ -142,8 +142,7 @@ class Asker {
 };
 
 std::string PortUrl(int offset) {
-  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 4 + offset) % 20'000) +
-         "?ttl=0";
+  return "udpm://239.255.76.67:" + std::to_string(10'000 + (getpid() * 4 + offset) % 20'000) + "?ttl=0";
 }
 
 struct Results {

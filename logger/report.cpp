@@ -35,7 +35,10 @@ constexpr std::size_t kBatch = 256;
 class PictureMaker final {
  public:
   explicit PictureMaker(const Config& config)
-      : channels_(config.bus), certifier_(config.problem), obstacles_(config.obstacles, certifier_.projection().dim()), learns_(config.gate.learns) {
+      : channels_(config.bus),
+        certifier_(config.problem),
+        obstacles_(config.obstacles, certifier_.projection().dim()),
+        learns_(config.gate.learns) {
     if (certifier_.projection().dim() != 2)
       throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}",
                                      certifier_.projection().dim()));
@@ -125,7 +128,8 @@ class PictureMaker final {
       if (static_cast<int>(again.outcome) == asked[i]->outcome && again.step == asked[i]->step)
         outlines[i] = Outlines(tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
     };
-    (void)CertifyAll(certifier_, plans, initial_sets, obstacles_.all(), std::max(1u, std::thread::hardware_concurrency()), draw);
+    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+    (void)CertifyAll(certifier_, plans, initial_sets, obstacles_.all(), threads, draw);
     for (std::size_t i = 0; i < asked.size(); ++i) {
       if (outlines[i].empty())
         ++result_.disagreements;
