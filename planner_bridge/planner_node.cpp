@@ -8,7 +8,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/gate/obstacle_message.h"
 #include "forereach/obstacles_t.hpp"
 #include "lcmtypes/names.h"
 
@@ -46,7 +45,8 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       period_us_(std::llround(config.robot.step_period_ms * 1e3)),
       half_width_(HalfWidth(config)),
       residual_(config.problem),
-      proposer_(ProposerOf(config)) {
+      proposer_(ProposerOf(config)),
+      obstacles_(config.obstacles, static_cast<int>(config.problem->projection.rows())) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
@@ -229,16 +229,11 @@ void PlannerNode::Learn(const decision_t& decision) {
 
 void PlannerNode::OnObstacles(const Received& received) {
   obstacles_t message;
-  if (Decode(received.bytes, message) != DecodeStatus::kOk || message.sequence <= last_obstacles_) {
+  if (Decode(received.bytes, message) != DecodeStatus::kOk || !obstacles_.Update(message).empty()) {
     ++ignored_;
     return;
   }
-  try {
-    proposer_->SetObstacles(FromMessage(message, static_cast<int>(config_.problem->projection.rows())));
-    last_obstacles_ = message.sequence;
-  } catch (const std::invalid_argument&) {
-    ++ignored_;
-  }
+  proposer_->SetObstacles(obstacles_.all());
 }
 
 void PlannerNode::Stop() { out_ << Summary() << std::endl; }

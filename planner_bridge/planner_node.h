@@ -26,6 +26,7 @@ gate.max_ahead_ms, or concern somebody else's candidates are counted and ignored
 #include <string>
 #include <vector>
 
+#include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -90,7 +91,8 @@ class PlannerNode final : public Node {
   std::optional<Round> round_;
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
   std::optional<std::int64_t> waiting_start_;       // of a certified plan that is still to begin
-  std::int64_t last_state_utime_ = 0, last_obstacles_ = -1;
+  std::int64_t last_state_utime_ = 0;
+  ObstaclesInForce obstacles_;
   std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
   bool arrived_ = false, finished_ = false;
 

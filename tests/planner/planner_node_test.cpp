@@ -364,6 +364,20 @@ TEST_F(PlannerNodeTest, AStateFromTheFutureDoesNotKeepOutThoseOfNow) {
   EXPECT_EQ(candidates_.size(), 1u);
 }
 
+// As the gate does: else the planner would go on around the obstacles of before, and the gate refuse what it finds.
+TEST_F(PlannerNodeTest, HearsAPublisherOfObstaclesThatBeganAnew) {
+  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)});
+  message.utime = now_;
+  message.sequence = 7;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // a repetition: ignored
+  message.utime = now_ + 1;
+  message.sequence = 0;
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  Deliver();
+  EXPECT_EQ(Summary()["messages_ignored"], 1);
+}
+
 TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
   config_.obstacles = {Obstacle::Circle(Vec({12, 0}), 2)};
   obstacles_t message = ToMessage(config_.obstacles);
