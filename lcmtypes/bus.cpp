@@ -12,11 +12,13 @@
 #include <vector>
 
 #include <lcm/lcm-cpp.hpp>
+#include <malloc.h>
 
 namespace forereach {
 namespace {
 
 constexpr std::size_t kQueueMessages = 4096, kQueueBytes = std::size_t{32} << 20;  // 800 certified plans
+constexpr std::size_t kBurstBytes = std::size_t{1} << 20;
 constexpr int kLcmQueueMessages = 1024;
 constexpr int kReceivePollMs = 50;
 
@@ -60,11 +62,12 @@ class LcmBus final : public Bus {
   int Dispatch(int timeout_ms) override {
     if (in_memory_ && lcm_.handleTimeout(timeout_ms) > 0) while (lcm_.handleTimeout(0) > 0) {}
     std::deque<Stored> batch;
+    std::size_t bytes = 0;
     {
       std::unique_lock lock(mutex_);
       if (!in_memory_) arrived_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !queue_.empty(); });
       batch.swap(queue_);
-      queued_bytes_ = 0;
+      std::swap(bytes, queued_bytes_);
     }
     std::exception_ptr failure;
     for (const Stored& stored : batch) {
@@ -74,6 +77,7 @@ class LcmBus final : public Bus {
         failure = std::current_exception();
       }
     }
+    GiveBack(bytes > kBurstBytes);
     if (failure) std::rethrow_exception(failure);
     return static_cast<int>(batch.size());
   }
@@ -117,6 +121,12 @@ class LcmBus final : public Bus {
     }
   }
 
+  // What a burst and who handled it took of the heap goes back to the system once the burst is over.
+  void GiveBack(bool in_burst) {
+    if (!in_burst && was_in_burst_) ::malloc_trim(0);
+    was_in_burst_ = in_burst;
+  }
+
   void Receive() {
     while (!stopping_) lcm_.handleTimeout(kReceivePollMs);
   }
@@ -128,6 +138,7 @@ class LcmBus final : public Bus {
   std::condition_variable arrived_;
   std::deque<Stored> queue_;
   std::size_t queued_bytes_ = 0;
+  bool was_in_burst_ = false;  // only the thread that dispatches looks
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
   std::atomic<std::int64_t> dropped_ = 0;
   std::atomic<bool> stopping_ = false;
