@@ -6,8 +6,8 @@ holds, and which coordinates safety is judged in. */
 
 #include <Eigen/Core>
 
+#include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/model.h"
-#include "certifier/dynamics/remainder.h"
 #include "certifier/reach/domain.h"
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/transitions.h"

@@ -3,8 +3,10 @@
 
 #include <array>
 
-#include "certifier/dynamics/expansion.h"
+#include "certifier/dynamics/expand.h"
+#include "certifier/dynamics/image.h"
 #include "certifier/dynamics/model.h"
+#include "certifier/dynamics/remainder.h"
 
 namespace forereach {
 

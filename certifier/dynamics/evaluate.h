@@ -1,5 +1,5 @@
 /** Evaluates a program over any scalar, node by node: intervals for enclosures, extended precision for values. The hot
-step uses expansion.h instead. */
+step uses expand.h instead. */
 #pragma once
 
 #include <array>

@@ -1,15 +1,12 @@
-/** The nominal model around a point, in plain arithmetic: what the certify step evaluates. rounding.h bounds, once and
-for the whole domain, how far each number can lie from the exact one. */
+/** What the certify step takes of a nominal model, in plain arithmetic: its expansion around a point, the remainder that this
+leaves out, and what is known of an image. rounding.h bounds, once and for the whole domain, how far each number can lie from
+the exact one. expand.h, remainder.h and image.h make them, as straight-line code for a program that is known at compile time. */
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <span>
-#include <utility>
 
 #include "certifier/dynamics/program.h"
-#include "certifier/numerics/lanes.h"
+#include "certifier/sets/zonotope.h"
 
 namespace forereach {
 
@@ -25,174 +22,24 @@ struct Expansion {
   std::array<PlainInterval, Program::kMaxSecond> hessian;
 };
 
-namespace internal {
+/** How the remainder is bounded.
+kPaper: |rho_k| <= 1/2 r^T B_k r, Eq. (qt-formula), with B_k the largest absolute values of the Hessian.
+kCentred: rho_k in [lower, upper], whose middle moves the center. A diagonal term has d_i^2 in [0, r_i^2]. A mixed
+  product lies in [-N, P],  P, N = (sum_j |g_ij / r_i +- g_lj / r_l|)^2 r_i r_l / 4,  since d_i d_l is a quarter of
+  the difference of two squares; correlated generators make one of them small. Where a diagonal term and a mixed one
+  share a variable, a second bound is the exact range of 1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l, which their sum
+  overestimates; the better of the two counts. Never wider than kPaper, and as sound. */
+enum class Method { kPaper, kCentred };
 
-inline PlainInterval operator+(PlainInterval a, PlainInterval b) { return {a.lower + b.lower, a.upper + b.upper}; }
-inline PlainInterval operator-(PlainInterval a) { return {-a.upper, -a.lower}; }
-inline PlainInterval operator-(PlainInterval a, PlainInterval b) { return {a.lower - b.upper, a.upper - b.lower}; }
-inline PlainInterval Scaled(double a, PlainInterval b) {
-  const double p = a * b.lower, q = a * b.upper;
-  return {std::min(p, q), std::max(p, q)};
-}
-inline PlainInterval operator*(PlainInterval a, PlainInterval b) {
-  const double p = a.lower * b.lower, q = a.lower * b.upper, r = a.upper * b.lower, s = a.upper * b.upper;
-  return {std::min(std::min(p, q), std::min(r, s)), std::max(std::max(p, q), std::max(r, s))};
-}
-inline PlainInterval Divide(PlainInterval a, PlainInterval b) { return a * PlainInterval{1 / b.upper, 1 / b.lower}; }  // b does not contain 0
-inline PlainInterval Square(PlainInterval a) {
-  const double p = a.lower * a.lower, q = a.upper * a.upper;
-  const bool has_zero = a.lower <= 0 && a.upper >= 0;
-  return {has_zero ? 0 : std::min(p, q), std::max(p, q)};
-}
-inline PlainInterval TanCurvature(PlainInterval t) {
-  return {2 * t.lower * (1 + t.lower * t.lower), 2 * t.upper * (1 + t.upper * t.upper)};
-}
-
-/** What belongs to the two ends of an interval. */
-using Ends [[gnu::vector_size(16)]] = double;
-
-FOREREACH_INLINE Ends Both(double x) { return Ends{x, x}; }
-
-/** The turns from a center c to the ends of an interval around it: their sines, the first negative, and cosines. The first
-term that Taylor's polynomials leave out is below 2^-52 up to 1/4. */
-struct Turns {
-  Ends sine, cosine;
-  bool wide;  // too wide to tell by the slopes at its ends whether a sine is monotone on it
-
-  FOREREACH_INLINE Turns(double center, PlainInterval x) : wide(!(x.upper - x.lower <= 3)) {
-    const Ends angle{center - x.lower, x.upper - center}, s = angle * angle;
-    const Ends size =
-        angle - angle * s * (1. / 6 - s * (1. / 120 - s * (1. / 5040 - s * (1. / 362880 - s * (1. / 39916800)))));
-    sine = Ends{-size[0], size[1]};
-    cosine = 1 - s * (1. / 2 - s * (1. / 24 - s * (1. / 720 - s * (1. / 40320 - s * (1. / 3628800)))));
-    if (!(angle[0] <= 0.25)) sine[0] = -std::sin(angle[0]), cosine[0] = std::cos(angle[0]);
-    if (!(angle[1] <= 0.25)) sine[1] = std::sin(angle[1]), cosine[1] = std::cos(angle[1]);
-  }
+/** rho_k lies in center_k +- half_width_k. Zero where f0_k is affine. */
+struct Remainder {
+  std::array<double, kMaxStates> center, half_width;
 };
 
-/** Sine and cosine at both ends by the addition theorems. Where the slope changes its sign an extremum may lie inside. */
-struct Wave {
-  Ends sines, cosines;
-  bool wide;
-
-  FOREREACH_INLINE Wave(double sine, double cosine, const Turns& turns)
-      : sines(Both(sine) * turns.cosine + Both(cosine) * turns.sine),
-        cosines(Both(cosine) * turns.cosine - Both(sine) * turns.sine),
-        wide(turns.wide) {}
-
-  [[nodiscard]] FOREREACH_INLINE PlainInterval SineRange() const { return Spanned(sines, cosines); }
-  [[nodiscard]] FOREREACH_INLINE PlainInterval CosineRange() const { return Spanned(cosines, -sines); }
-
- private:
-  [[nodiscard]] FOREREACH_INLINE PlainInterval Spanned(const Ends& ends, const Ends& slopes) const {
-    return {wide || (slopes[0] <= 0 && slopes[1] >= 0) ? -1 : std::min(ends[0], ends[1]),
-            wide || (slopes[0] >= 0 && slopes[1] <= 0) ? 1 : std::max(ends[0], ends[1])};
-  }
+/** What is known of an image beside its generators. */
+struct ImageSums {
+  std::array<double, kMaxStates> row;  ///< sum_j |(J G)_kj|, plain
+  ColumnScores scores;
 };
-
-/** Tangent over an interval that holds no pole, given that of its center. */
-FOREREACH_INLINE PlainInterval TanRange(double tangent, const Turns& turns) {
-  const Ends step = turns.sine / turns.cosine, range = (Both(tangent) + step) / (1 - Both(tangent) * step);
-  return {range[0], range[1]};
-}
-
-template <const Program& kProgram, std::size_t I>
-inline void EvaluateAtPoint(const double* parameters, const double* z, double* v) {
-  if constexpr (kProgram.at_point[I]) {
-    constexpr Operation n = kProgram.nodes[I];
-    if constexpr (n.op == Op::kVariable) v[I] = z[n.a];
-    if constexpr (n.op == Op::kParameter) v[I] = parameters[n.a];
-    if constexpr (n.op == Op::kConstant) v[I] = n.constant;
-    if constexpr (n.op == Op::kAdd) v[I] = v[n.a] + v[n.b];
-    if constexpr (n.op == Op::kSubtract) v[I] = v[n.a] - v[n.b];
-    if constexpr (n.op == Op::kMultiply) v[I] = v[n.a] * v[n.b];
-    if constexpr (n.op == Op::kDivide) v[I] = v[n.a] / v[n.b];
-    if constexpr (n.op == Op::kNegate) v[I] = -v[n.a];
-    if constexpr (n.op == Op::kSquare) v[I] = v[n.a] * v[n.a];
-    if constexpr (n.op == Op::kSin) v[I] = std::sin(v[n.a]);
-    if constexpr (n.op == Op::kCos) v[I] = std::cos(v[n.a]);
-    if constexpr (n.op == Op::kTan) v[I] = v[n.b] / v[n.b + 1];
-    static_assert(n.op != Op::kTanCurvature, "a second derivative in the Jacobian");
-  }
-}
-
-/** Whether the node is the same number over the whole box. */
-template <const Program& kProgram>
-constexpr bool IsNumber(int i) {
-  return kProgram.node(i).op == Op::kParameter || kProgram.node(i).op == Op::kConstant;
-}
-
-template <const Program& kProgram, std::size_t I>
-inline void EvaluateOverBox(const double* parameters, const PlainInterval* box, const double* v, PlainInterval* w) {
-  constexpr Operation n = kProgram.nodes[I];
-  // Sine and cosine of one argument share their ends: the first of them that is needed sets both.
-  constexpr bool kSecondOfPair = n.op == Op::kCos && kProgram.over_box[static_cast<std::size_t>(n.b < 0 ? 0 : n.b)];
-  if constexpr (kProgram.over_box[I] && !kSecondOfPair) {
-    if constexpr (n.op == Op::kVariable) w[I] = box[n.a];
-    if constexpr (n.op == Op::kParameter) w[I] = {parameters[n.a], parameters[n.a]};
-    if constexpr (n.op == Op::kConstant) w[I] = {n.constant, n.constant};
-    if constexpr (n.op == Op::kAdd) w[I] = w[n.a] + w[n.b];
-    if constexpr (n.op == Op::kSubtract) w[I] = w[n.a] - w[n.b];
-    if constexpr (n.op == Op::kMultiply) {
-      if constexpr (IsNumber<kProgram>(n.a))
-        w[I] = Scaled(w[n.a].lower, w[n.b]);
-      else if constexpr (IsNumber<kProgram>(n.b))
-        w[I] = Scaled(w[n.b].lower, w[n.a]);
-      else
-        w[I] = w[n.a] * w[n.b];
-    }
-    if constexpr (n.op == Op::kDivide) w[I] = Divide(w[n.a], w[n.b]);
-    if constexpr (n.op == Op::kNegate) w[I] = -w[n.a];
-    if constexpr (n.op == Op::kSquare) w[I] = Square(w[n.a]);
-    if constexpr (n.op == Op::kTanCurvature) w[I] = TanCurvature(w[n.a]);
-    if constexpr (n.op == Op::kSin) {
-      const Wave wave(v[I], v[I + 1], Turns(v[n.a], w[n.a]));
-      w[I] = wave.SineRange();
-      w[I + 1] = wave.CosineRange();
-    }
-    if constexpr (n.op == Op::kCos) w[I] = Wave(v[I - 1], v[I], Turns(v[n.a], w[n.a])).CosineRange();
-    if constexpr (n.op == Op::kTan) w[I] = TanRange(v[I], Turns(v[n.a], w[n.a]));
-  }
-}
-
-/** Calls visit(0), ..., visit(N - 1) with constants, so that arrays indexed by them can live in registers. */
-template <std::size_t N, class Visit>
-FOREREACH_INLINE void ForEachConstant(Visit visit) {
-  [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-    (visit(std::integral_constant<std::size_t, I>()), ...);
-  }(std::make_index_sequence<N>());
-}
-
-template <const Program& kProgram>
-FOREREACH_INLINE void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
-  constexpr auto kSize = static_cast<std::size_t>(kProgram.size);
-  std::array<double, kSize> v;
-  std::array<PlainInterval, kSize> w;
-  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) { EvaluateAtPoint<kProgram, i>(parameters, z, v.data()); });
-  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) { EvaluateOverBox<kProgram, i>(parameters, box, v.data(), w.data()); });
-  ForEachConstant<kProgram.states>([&](auto k) __attribute__((always_inline)) { out.value[k] = v[kProgram.value[k]]; });
-  ForEachConstant<kProgram.num_first>([&](auto e) __attribute__((always_inline)) { out.jacobian[e] = v[kProgram.jacobian[e].node]; });
-  ForEachConstant<kProgram.num_second>([&](auto e) __attribute__((always_inline)) { out.hessian[e] = w[kProgram.hessian[e].node]; });
-}
-
-template <const Program& kProgram>
-FOREREACH_AVX2 void ExpandAvx2(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
-  Expand<kProgram>(parameters, z, box, out);
-}
-template <const Program& kProgram>
-FOREREACH_FLATTEN void ExpandBaseline(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
-  Expand<kProgram>(parameters, z, box, out);
-}
-
-}  // namespace internal
-
-/** @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4. */
-template <const Program& kProgram>
-inline void Expand(std::span<const double> parameters, std::span<const double> z, std::span<const PlainInterval> box,
-                   Expansion& out) noexcept {
-  const auto expand = active_instruction_set == InstructionSet::kAvx2 ? internal::ExpandAvx2<kProgram>
-                                                                      : internal::ExpandBaseline<kProgram>;
-  expand(parameters.data(), z.data(), box.data(), out);
-}
 
 }  // namespace forereach

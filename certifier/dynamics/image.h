@@ -7,19 +7,12 @@ that is known at compile time. One pass over the generators, four at a time, als
 #include <cstddef>
 #include <utility>
 
-#include "certifier/dynamics/expansion.h"
+#include "certifier/dynamics/expand.h"
 #include "certifier/dynamics/rounding.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/sets/zonotope.h"
 
 namespace forereach {
-
-/** What is known of an image beside its generators. */
-struct ImageSums {
-  std::array<double, kMaxStates> row;  ///< sum_j |(J G)_kj|, plain
-  ColumnScores scores;
-};
-
 namespace internal {
 
 /** The states' part of row k of the Jacobian: entries first .. first + count - 1 of the program's. */
@@ -62,14 +55,7 @@ FOREREACH_INLINE Lanes RowImage(const Lanes* columns, const Lanes* factors) {
   }
 }
 
-/** Stores numbers four at a time, zeros behind the last. */
-template <std::size_t N>
-FOREREACH_INLINE void StoreAll(const double (&numbers)[N], double* to) {
-  const auto at = [&](std::size_t i) __attribute__((always_inline)) { return i < N ? numbers[i] : 0.0; };
-  for (std::size_t i = 0; i < N; i += kLaneCount) StoreLanes(Lanes{at(i), at(i + 1), at(i + 2), at(i + 3)}, to + i);
-}
-
-/** The same of the sums of vectors. */
+/** StoreAll of the sums of vectors. */
 template <std::size_t N>
 FOREREACH_INLINE void StoreSums(const Lanes (&rows)[N], double* to) {
   const auto at = [&](std::size_t i) __attribute__((always_inline)) { return i < N ? rows[i] : AllLanes(0); };

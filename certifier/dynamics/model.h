@@ -10,9 +10,8 @@ d_z = states + inputs entries. */
 #include <vector>
 
 #include "certifier/dynamics/expansion.h"
-#include "certifier/dynamics/image.h"
 #include "certifier/dynamics/program.h"
-#include "certifier/dynamics/remainder.h"
+#include "certifier/dynamics/rounding.h"
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/sets/linear_map.h"
@@ -79,11 +78,11 @@ class NominalModel {
   @param z the center c of the box. */
   virtual void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out) const noexcept = 0;
 
-  /** What the expansion leaves out (remainder.h). */
+  /** What the expansion leaves out. */
   virtual void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width,
                                 const PlainInterval* hessian, const double* error, Remainder& out) const noexcept = 0;
 
-  /** The image of a slice's generators under the expansion's Jacobian (image.h). */
+  /** The image of a slice's generators under the expansion's Jacobian. */
   virtual void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
                    ImageSums& sums) const noexcept = 0;
 

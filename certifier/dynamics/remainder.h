@@ -7,47 +7,37 @@ in the interval Hessian over its hull. As straight-line code for a program that 
 #include <cmath>
 #include <cstddef>
 
-#include "certifier/dynamics/expansion.h"
+#include "certifier/dynamics/expand.h"
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/sets/zonotope.h"
 
 namespace forereach {
-
-/** How the remainder is bounded.
-kPaper: |rho_k| <= 1/2 r^T B_k r, Eq. (qt-formula), with B_k the largest absolute values of the Hessian.
-kCentred: rho_k in [lower, upper], whose middle moves the center. A diagonal term has d_i^2 in [0, r_i^2]. A mixed
-  product lies in [-N, P],  P, N = (sum_j |g_ij / r_i +- g_lj / r_l|)^2 r_i r_l / 4,  since d_i d_l is a quarter of
-  the difference of two squares; correlated generators make one of them small. Where a diagonal term and a mixed one
-  share a variable, a second bound is the exact range of 1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l, which their sum
-  overestimates; the better of the two counts. Never wider than kPaper, and as sound. */
-enum class Method { kPaper, kCentred };
-
-/** rho_k lies in center_k +- half_width_k. Zero where f0_k is affine. */
-struct Remainder {
-  std::array<double, kMaxStates> center, half_width;
-};
-
 namespace internal {
 
 /** The second derivatives of states, as the remainder takes them: an input is a point, d = 0. */
 struct RemainderTerms {
-  // A second derivative, or, for kCentred, a mixed one together with a diagonal one of its first variable.
-  struct Term {
+  // For kPaper: one second derivative.
+  struct Single {
     std::size_t output = 0, first = 0, second = 0, entry = 0;
-    bool has_diagonal = false;
-    std::size_t diagonal = 0;  // entry of (first, first)
-    std::size_t pair = 0;      // of a mixed one: which of `pairs`
-    [[nodiscard]] constexpr bool is_mixed() const { return first != second; }
+  };
+  // For kCentred: a mixed one, a diagonal one of the first variable, or both.
+  struct Joined {
+    static constexpr std::size_t kNone = Program::kMaxSecond;
+    std::size_t output = 0, first = 0, second = 0, mixed = kNone, diagonal = kNone;
+    std::size_t pair = 0;  // of the mixed one: which of `pairs`
+    [[nodiscard]] constexpr bool has_mixed() const { return mixed != kNone; }
+    [[nodiscard]] constexpr bool has_diagonal() const { return diagonal != kNone; }
   };
   // Two variables whose product occurs, in one output or more.
   struct Pair {
     std::size_t first = 0, second = 0;
+    constexpr bool operator==(const Pair&) const = default;
   };
-  std::array<Term, Program::kMaxSecond> single{}, joined{};
-  std::size_t num_single = 0, num_joined = 0;
+  std::array<Single, Program::kMaxSecond> single{};
+  std::array<Joined, Program::kMaxSecond> joined{};
   std::array<Pair, Program::kMaxSecond> pairs{};
-  std::size_t num_pairs = 0;
+  std::size_t num_single = 0, num_joined = 0, num_pairs = 0;
 
   constexpr explicit RemainderTerms(const Program& program) {
     for (int e = 0; e < program.num_second; ++e) {
@@ -57,30 +47,28 @@ struct RemainderTerms {
                               static_cast<std::size_t>(entry.column), static_cast<std::size_t>(e)};
     }
     for (std::size_t i = 0; i < num_single; ++i)
-      if (single[i].is_mixed()) joined[num_joined++] = single[i];
+      if (const auto& [output, first, second, entry] = single[i]; first != second)
+        joined[num_joined++] = {output, first, second, entry, Joined::kNone, PairOf(first, second)};
     for (std::size_t i = 0; i < num_single; ++i)
-      if (!single[i].is_mixed()) Join(single[i]);
-    for (std::size_t i = 0; i < num_joined; ++i)
-      if (joined[i].is_mixed()) joined[i].pair = PairOf(joined[i]);
+      if (single[i].first == single[i].second) Join(single[i]);
   }
 
  private:
-  constexpr void Join(const Term& diagonal) {
+  constexpr void Join(const Single& diagonal) {
     for (std::size_t i = 0; i < num_joined; ++i) {
-      Term& term = joined[i];
-      if (term.output != diagonal.output || !term.is_mixed() || term.has_diagonal) continue;
+      Joined& term = joined[i];
+      if (term.output != diagonal.output || term.has_diagonal()) continue;
       if (term.first != diagonal.first && term.second != diagonal.first) continue;
       if (term.first != diagonal.first) std::swap(term.first, term.second);
-      term.has_diagonal = true;
       term.diagonal = diagonal.entry;
       return;
     }
-    joined[num_joined++] = diagonal;
+    joined[num_joined++] = {diagonal.output, diagonal.first, diagonal.first, Joined::kNone, diagonal.entry, 0};
   }
-  constexpr std::size_t PairOf(const Term& term) {
-    const Pair pair{std::min(term.first, term.second), std::max(term.first, term.second)};
+  constexpr std::size_t PairOf(std::size_t i, std::size_t l) {
+    const Pair pair{std::min(i, l), std::max(i, l)};
     std::size_t p = 0;
-    while (p < num_pairs && (pairs[p].first != pair.first || pairs[p].second != pair.second)) ++p;
+    while (p < num_pairs && pairs[p] != pair) ++p;
     if (p == num_pairs) pairs[num_pairs++] = pair;
     return p;
   }
@@ -89,116 +77,148 @@ struct RemainderTerms {
 template <const Program& kProgram>
 inline constexpr RemainderTerms kRemainderTerms{kProgram};
 
-// Above all relative rounding of the few operations below, whose results are compared with the sum of their terms' sizes.
-inline constexpr double kRemainderRelative = 0x1p-44, kRemainderTiny = 0x1p-1060;
+// Above all relative rounding of the few operations below, whose results are compared with the sum of their terms' sizes;
+// and above what underflow leaves out, yet a normal number times any but a tiny derivative: others are slow to multiply.
+inline constexpr double kRemainderRelative = 0x1p-44, kRemainderTiny = 0x1p-1000;
 
 inline double CountedError(double error) { return kCountsRounding ? error : 0; }
 
 inline double Size(const PlainInterval& x) { return std::max(std::abs(x.lower), std::abs(x.upper)); }
 
-// [lower, upper] of a term, and the sum of the sizes it was made of.
-struct TermRange {
-  double lower, upper, size;
-};
-
-inline TermRange Diagonal(const PlainInterval& h, double r) {
-  const double half_square = r * r / 2;
-  return {half_square * std::min(0.0, h.lower), half_square * std::max(0.0, h.upper), half_square * Size(h)};
-}
-
-// max over 0 <= s <= r of 1/2 a s^2 + b s, b >= 0.
-inline double Peak(double a, double b, double r) {
-  return -a * r > b ? b * (b / (-2 * a)) : std::max(0.0, (a * r / 2 + b) * r);
-}
-
-// d_i d_l in [-negative, positive].
-struct ProductRange {
-  double negative, positive;
-};
-
-FOREREACH_INLINE ProductRange MixedProduct(const Zonotope& slice, std::size_t i, std::size_t l, double r_i, double r_l) {
-  const double product = r_i * r_l;
-  if (!(product > 0x1p-400)) return {product, product};  // the squares below could underflow
-  const double* g_i = slice.padded_row(static_cast<int>(i)).data();
-  const double* g_l = slice.padded_row(static_cast<int>(l)).data();
-  Lanes sum = AllLanes(0), difference = AllLanes(0);
-  for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
-    const Lanes a = LoadLanes(g_i + j) * AllLanes(r_l), b = LoadLanes(g_l + j) * AllLanes(r_i);
-    sum += Abs(a + b);
-    difference += Abs(a - b);
-  }
-  const double slack = slice.slack(static_cast<int>(i)) * r_l + slice.slack(static_cast<int>(l)) * r_i;
-  const double plus = Sum(sum) + slack, minus = Sum(difference) + slack;
-  return {std::min(product, minus * minus / (4 * product)), std::min(product, plus * plus / (4 * product))};
-}
-
-inline TermRange Mixed(const PlainInterval& h, const ProductRange& d, double product) {
-  return {std::min(std::min(h.lower * d.positive, h.upper * d.positive), std::min(-h.lower * d.negative, -h.upper * d.negative)),
-          std::max(std::max(h.lower * d.positive, h.upper * d.positive), std::max(-h.lower * d.negative, -h.upper * d.negative)),
-          Size(h) * product};
-}
-
 template <const Program& kProgram>
 FOREREACH_INLINE void EncloseSizes(const double* half_width, const PlainInterval* hessian, const double* error,
                                    Remainder& out) {
-  std::array<double, static_cast<std::size_t>(kProgram.states)> sums{};
+  constexpr auto kStates = static_cast<std::size_t>(kProgram.states);
+  double sums[kStates] = {};
   ForEachConstant<kRemainderTerms<kProgram>.num_single>([&](auto i) __attribute__((always_inline)) {
-    constexpr RemainderTerms::Term kTerm = kRemainderTerms<kProgram>.single[i];
-    const double weight = kTerm.is_mixed() ? 1 : 0.5, r = half_width[kTerm.first], other = half_width[kTerm.second];
+    constexpr RemainderTerms::Single kTerm = kRemainderTerms<kProgram>.single[i];
+    constexpr double kWeight = kTerm.first == kTerm.second ? 0.5 : 1;
+    const double r = half_width[kTerm.first], other = half_width[kTerm.second];
     if (r == 0 || other == 0) return;  // exactly zero
-    sums[kTerm.output] += weight * Size(hessian[kTerm.entry]) * (r * other + kRemainderTiny) * (1 + kRemainderRelative) +
+    sums[kTerm.output] += kWeight * Size(hessian[kTerm.entry]) * (r * other + kRemainderTiny) * (1 + kRemainderRelative) +
                           CountedError(error[kTerm.entry]);
   });
-  ForEachConstant<sums.size()>([&](auto k) __attribute__((always_inline)) {
-    out.center[k] = 0;
-    out.half_width[k] = sums[k];
+  constexpr double kNone[kStates] = {};
+  StoreAll(kNone, out.center.data());
+  StoreAll(sums, out.half_width.data());
+}
+
+// d_i d_l in [-negative, positive] for each pair of variables: positive, negative, positive, ...
+template <const Program& kProgram>
+using ProductEnds = std::array<double, PaddedToLanes(2 * kRemainderTerms<kProgram>.num_pairs)>;
+
+template <const Program& kProgram>
+FOREREACH_INLINE ProductEnds<kProgram> EncloseProducts(const Zonotope& slice, const double* half_width) {
+  constexpr std::size_t kPairs = kRemainderTerms<kProgram>.num_pairs;
+  ProductEnds<kProgram> ends;
+  std::array<Lanes, ends.size()> sums{};
+  for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount)
+    ForEachConstant<kPairs>([&](auto p) __attribute__((always_inline)) {
+      constexpr RemainderTerms::Pair kPair = kRemainderTerms<kProgram>.pairs[p];
+      const auto row = [&](std::size_t k) { return slice.padded_row(static_cast<int>(k)).data() + j; };
+      const Lanes a = LoadLanes(row(kPair.first)) * AllLanes(half_width[kPair.second]);
+      const Lanes b = LoadLanes(row(kPair.second)) * AllLanes(half_width[kPair.first]);
+      sums[2 * p] += Abs(a + b);
+      sums[2 * p + 1] += Abs(a - b);
+    });
+  ForEachConstant<(kPairs + 1) / 2>([&](auto g) __attribute__((always_inline)) {  // two pairs at a time
+    constexpr RemainderTerms::Pair kOne = kRemainderTerms<kProgram>.pairs[2 * g];
+    constexpr RemainderTerms::Pair kTwo = kRemainderTerms<kProgram>.pairs[std::min<std::size_t>(2 * g + 1, kPairs - 1)];
+    const double *r = half_width, *s = slice.slacks();
+    const Lanes r_i{r[kOne.first], r[kOne.first], r[kTwo.first], r[kTwo.first]};
+    const Lanes r_l{r[kOne.second], r[kOne.second], r[kTwo.second], r[kTwo.second]};
+    const Lanes s_i{s[kOne.first], s[kOne.first], s[kTwo.first], s[kTwo.first]};
+    const Lanes s_l{s[kOne.second], s[kOne.second], s[kTwo.second], s[kTwo.second]};
+    const Lanes product = r_i * r_l, quarter = AllLanes(0.25) / product;
+    const Lanes sum = SumEach(sums[4 * g], sums[4 * g + 1], sums[4 * g + 2], sums[4 * g + 3]) + (s_i * r_l + s_l * r_i);
+    const LaneMask fits = (product > AllLanes(0x1p-400)) & (product < AllLanes(0x1p400));  // else a factor could underflow
+    StoreLanes(fits ? Min(product, sum * sum * quarter) : product, &ends[4 * g]);
   });
+  return ends;
+}
+
+// max over 0 <= s <= r of 1/2 a s^2 + b s, b >= 0.
+FOREREACH_INLINE Lanes Peak(const Lanes& a, const Lanes& b, const Lanes& r) {
+  const Lanes top = b / -a, s = -a * r > b ? top : r;
+  return a * (s * s * AllLanes(0.5)) + b * s;
+}
+
+// get(term) of the joined terms from the first on; zero behind the last.
+template <const Program& kProgram, std::size_t kFirst, class Get>
+FOREREACH_INLINE Lanes FourTerms(Get get) {
+  const auto at = [&](std::size_t i) __attribute__((always_inline)) {
+    constexpr const RemainderTerms& kTerms = kRemainderTerms<kProgram>;
+    return i < kTerms.num_joined ? get(kTerms.joined[i]) : 0.0;
+  };
+  return Lanes{at(kFirst), at(kFirst + 1), at(kFirst + 2), at(kFirst + 3)};
+}
+
+FOREREACH_INLINE Lanes Where(const LaneMask& mask, const Lanes& x) {
+  return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & mask);
+}
+
+// The ranges of four joined terms, 1/2 a d_i^2 + h d_i d_l, and what rounding may have taken from them.
+struct TermRanges {
+  Lanes lower, upper, rounding;
+};
+
+template <const Program& kProgram, std::size_t kFirst>
+FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainInterval* hessian, const double* error,
+                                         const double* products) {
+  const auto each = [](auto get) __attribute__((always_inline)) { return FourTerms<kProgram, kFirst>(get); };
+  using Term = RemainderTerms::Joined;
+  const Lanes r = each([&](const Term& t) { return half_width[t.first]; });
+  const Lanes other = each([&](const Term& t) { return t.has_mixed() ? half_width[t.second] : 0; });
+  const Lanes positive = each([&](const Term& t) { return t.has_mixed() ? products[2 * t.pair] : 0; });
+  const Lanes negative = each([&](const Term& t) { return t.has_mixed() ? products[2 * t.pair + 1] : 0; });
+  // A variable that is a point makes its terms exactly zero, whatever their derivatives.
+  const LaneMask has_diagonal = r > AllLanes(0), has_mixed = has_diagonal & (other > AllLanes(0));
+  const auto of_mixed = [&](auto get) __attribute__((always_inline)) {
+    return Where(has_mixed, each([&](const Term& t) { return t.has_mixed() ? get(t.mixed) : 0; }));
+  };
+  const auto of_diagonal = [&](auto get) __attribute__((always_inline)) {
+    return Where(has_diagonal, each([&](const Term& t) { return t.has_diagonal() ? get(t.diagonal) : 0; }));
+  };
+  const auto lower = [&](std::size_t e) { return hessian[e].lower; };
+  const auto upper = [&](std::size_t e) { return hessian[e].upper; };
+  const auto counted = [&](std::size_t e) { return CountedError(error[e]); };
+
+  const Lanes h_lower = of_mixed(lower), h_upper = of_mixed(upper), h_size = Max(Abs(h_lower), Abs(h_upper));
+  const Lanes a_lower = of_diagonal(lower), a_upper = of_diagonal(upper), a_size = Max(Abs(a_lower), Abs(a_upper));
+  const Lanes half_square = r * r * AllLanes(0.5), slope = h_size * other;
+  const Lanes low = Min(h_lower * positive, -(h_upper * negative)) + half_square * Min(a_lower, AllLanes(0));
+  const Lanes high = Max(h_upper * positive, -(h_lower * negative)) + half_square * Max(a_upper, AllLanes(0));
+  const Lanes size = h_size * (r * other) + half_square * a_size;
+  const Lanes underflow = AllLanes(kRemainderTiny) * (h_size + AllLanes(0.5) * a_size);
+  const Lanes margin = of_mixed(counted) + of_diagonal(counted) + underflow;
+  return {Max(low, -Peak(-a_lower, slope, r)), Min(high, Peak(a_upper, slope, r)),
+          AllLanes(RoundingError(kRemainderRelative, 1)) * size + margin * AllLanes(1 + kRemainderRelative)};
 }
 
 template <const Program& kProgram>
 FOREREACH_INLINE void EncloseCentred(const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
                                      const double* error, Remainder& out) {
-  constexpr const RemainderTerms& kTerms = kRemainderTerms<kProgram>;
-  struct Sums {
-    double lower = 0, upper = 0, size = 0, margin = 0;
-  };
-  std::array<Sums, static_cast<std::size_t>(kProgram.states)> sums;
-  std::array<ProductRange, kTerms.num_pairs> products;
-  ForEachConstant<kTerms.num_pairs>([&](auto p) __attribute__((always_inline)) {
-    constexpr RemainderTerms::Pair kPair = kRemainderTerms<kProgram>.pairs[p];
-    products[p] = MixedProduct(slice, kPair.first, kPair.second, half_width[kPair.first], half_width[kPair.second]);
+  constexpr auto kStates = static_cast<std::size_t>(kProgram.states);
+  constexpr std::size_t kTerms = kRemainderTerms<kProgram>.num_joined;
+  const ProductEnds<kProgram> products = EncloseProducts<kProgram>(slice, half_width);
+  double lower[kStates] = {}, upper[kStates] = {}, rounding[kStates] = {};
+  ForEachConstant<(kTerms + kLaneCount - 1) / kLaneCount>([&](auto g) __attribute__((always_inline)) {
+    constexpr std::size_t kFirst = g * kLaneCount;
+    const TermRanges ranges = EncloseTerms<kProgram, kFirst>(half_width, hessian, error, products.data());
+    ForEachConstant<std::min(kLaneCount, kTerms - kFirst)>([&](auto i) __attribute__((always_inline)) {
+      constexpr std::size_t kLane = i, kOutput = kRemainderTerms<kProgram>.joined[kFirst + kLane].output;
+      lower[kOutput] += ranges.lower[kLane];
+      upper[kOutput] += ranges.upper[kLane];
+      rounding[kOutput] += ranges.rounding[kLane];
+    });
   });
-  ForEachConstant<kTerms.num_joined>([&](auto i) __attribute__((always_inline)) {
-    constexpr RemainderTerms::Term kTerm = kRemainderTerms<kProgram>.joined[i];
-    const double r = half_width[kTerm.first], other = half_width[kTerm.second];
-    const PlainInterval &h = hessian[kTerm.entry], &a = hessian[kTerm.diagonal];
-    Sums& sum = sums[kTerm.output];
-    TermRange range{0, 0, 0};
-    if (r == 0) return;  // exactly zero, and so is the mixed term where `other` is
-    if (other != 0) {
-      if constexpr (kTerm.is_mixed())
-        range = Mixed(h, products[kTerm.pair], r * other);
-      else
-        range = Diagonal(h, r);
-      sum.margin += CountedError(error[kTerm.entry]) + kRemainderTiny * Size(h);
-    }
-    if constexpr (kTerm.has_diagonal) {
-      const TermRange diagonal = Diagonal(a, r);
-      const double slope = other == 0 ? 0 : Size(h) * other;
-      range = {std::max(range.lower + diagonal.lower, -Peak(-a.lower, slope, r)),
-               std::min(range.upper + diagonal.upper, Peak(a.upper, slope, r)), range.size + diagonal.size};
-      sum.margin += CountedError(error[kTerm.diagonal]) + kRemainderTiny * Size(a);
-    }
-    sum.lower += range.lower;
-    sum.upper += range.upper;
-    sum.size += range.size;
+  double center[kStates], half[kStates];
+  ForEachConstant<kStates>([&](auto k) __attribute__((always_inline)) {
+    center[k] = (lower[k] + upper[k]) * 0.5;
+    half[k] = (upper[k] - lower[k]) * 0.5 + rounding[k];
   });
-  ForEachConstant<sums.size()>([&](auto k) __attribute__((always_inline)) {
-    const auto& [lower, upper, size, margin] = sums[k];
-    const double rounding = RoundingError(kRemainderRelative, size) + margin * (1 + kRemainderRelative);
-    out.center[k] = (lower + upper) / 2;
-    out.half_width[k] = (upper - lower) / 2 + rounding;
-  });
+  StoreAll(center, out.center.data());
+  StoreAll(half, out.half_width.data());
 }
 
 template <const Program& kProgram>

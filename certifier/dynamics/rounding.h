@@ -1,4 +1,4 @@
-/** How far the plain evaluation of a program (expansion.h) can lie from exact arithmetic, anywhere in a domain. */
+/** How far the plain evaluation of a program (expand.h) can lie from exact arithmetic, anywhere in a domain. */
 #pragma once
 
 #include <array>

@@ -32,6 +32,12 @@ FOREREACH_INLINE Lanes LoadLanes(const double* from) {
   return x;
 }
 FOREREACH_INLINE void StoreLanes(const Lanes& x, double* to) { __builtin_memcpy(to, &x, sizeof x); }
+/** Stores numbers four at a time, zeros behind the last: a load of four waits for four single stores. */
+template <std::size_t N>
+FOREREACH_INLINE void StoreAll(const double (&numbers)[N], double* to) {
+  const auto at = [&](std::size_t i) __attribute__((always_inline)) { return i < N ? numbers[i] : 0.0; };
+  for (std::size_t i = 0; i < N; i += kLaneCount) StoreLanes(Lanes{at(i), at(i + 1), at(i + 2), at(i + 3)}, to + i);
+}
 FOREREACH_INLINE Lanes AllLanes(double x) { return Lanes{x, x, x, x}; }
 FOREREACH_INLINE Lanes Abs(const Lanes& x) {
   return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});

@@ -9,8 +9,8 @@ envelope. All rounding, that of f0(c), J and J G included, goes to the slack s',
 #include <array>
 #include <span>
 
+#include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/model.h"
-#include "certifier/dynamics/remainder.h"
 #include "certifier/dynamics/rounding.h"
 #include "certifier/reach/domain.h"
 #include "certifier/residual/enclosure.h"

@@ -92,6 +92,7 @@ class Zonotope final {
   [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
   /** kMaxStates entries each, of which dim() count. */
   [[nodiscard]] const double* centers() const { return center_.data(); }
+  [[nodiscard]] const double* slacks() const { return slack_.data(); }
   [[nodiscard]] double* mutable_slacks() { return slack_.data(); }
   [[nodiscard]] double* mutable_centers() { return center_.data(); }
   [[nodiscard]] double* mutable_row(int k) { return rows_[static_cast<std::size_t>(k)].data(); }
