@@ -92,24 +92,25 @@ double CostOfBoxing(const std::vector<Real>& column, const std::vector<double>& 
 }
 
 // Whether the certifier, in doubles, may have ranked the last column kept and the first boxed the other way round, and
-// what that may cost; zero if not. Its columns carry a double's rounding of their own size and of the slice's.
-double CostOfConfusing(const Slice& slice, const Score& last, const Score& first) {
+// what that may cost; zero if not. Its columns carry a double's rounding of their own size and of the slice's, and the
+// remainders'.
+double CostOfConfusing(const Slice& slice, const Score& last, const Score& first, double remainder_rounding) {
   if (last.value.IsZero() && first.value.IsZero()) return 0;
   std::vector<double> size;
   for (int k = 0; k < slice.dim(); ++k) size.push_back((abs(slice.center[Index(k)]) + slice.HalfWidth(k)).ToDouble());
-  const double rounding = 0x1p-48 * *std::ranges::max_element(size);
+  const double rounding = std::max(0x1p-48 * *std::ranges::max_element(size), remainder_rounding);
   if (std::abs(last.rounded - first.rounded) > last.error + first.error + rounding) return 0;
   return std::max(CostOfBoxing(slice.columns[last.column], size), CostOfBoxing(slice.columns[first.column], size));
 }
 
 // Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
 // what it may have cost the certifier, in doubles, to go another way.
-double Reduce(Slice& slice, int order) {
+double Reduce(Slice& slice, int order, double remainder_rounding) {
   const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
   const double tiny = std::ranges::any_of(slice.columns, MayUnderflow) ? 1 : 0;
   if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return tiny;
   std::vector<Score> scores = Ranking(slice);
-  const double close = kept > 0 ? CostOfConfusing(slice, scores[kept - 1], scores[kept]) : 0;
+  const double close = kept > 0 ? CostOfConfusing(slice, scores[kept - 1], scores[kept], remainder_rounding) : 0;
   const auto rest = scores.begin() + static_cast<std::ptrdiff_t>(kept);
   std::sort(scores.begin(), rest, [](const Score& a, const Score& b) { return a.column < b.column; });
   Slice reduced{slice.center, {}};
@@ -253,7 +254,7 @@ struct TubeMaker::Query {
 };
 
 TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method method)
-    : problem_(problem), equations_(equations), method_(method) {
+    : problem_(problem), equations_(equations), method_(method), remainder_rounding_(RemainderRounding()) {
   const Transitions& data = problem.transitions;
   for (int i = 0; i < data.size(); ++i) {
     std::vector<Real> z;
@@ -267,6 +268,27 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
       row.push_back({observed - allowed, observed + allowed});
     }
   }
+}
+
+// The certifier rounds each remainder by what its expansion may be off anywhere in the domain, some 2^-46 of the largest
+// remainder there; where that is not negligible it takes intervals instead, which are as tight as the slice.
+double TubeMaker::RemainderRounding() const {
+  const Domain& domain = problem_.domain;
+  const int n = domain.state.dim();
+  std::vector<Real> box, half_width;
+  const auto add = [&](double lower, double upper) {
+    box.push_back(Real::FromTo(Real(lower), Real(upper)));
+    half_width.push_back(Real(0.5) * (Real(upper) - Real(lower)));
+  };
+  for (int l = 0; l < n; ++l) add(domain.state.lower()[l], domain.state.upper()[l]);
+  for (int l = 0; l < domain.input.dim(); ++l) add(domain.input.lower()[l], domain.input.upper()[l]);
+  const std::vector<SecondDerivative> hessian = equations_.Second(box);
+  if (!AllFinite(hessian)) return 0;
+  double largest = 0;
+  for (const Bounds& bounds : RemainderOver(hessian, {}, half_width, n, Method::kPaper))
+    largest = std::max(largest, bounds.upper.ToDouble());
+  const double rounding = 0x1p-40 * largest;
+  return rounding < 0x1p-20 ? rounding : 0;
 }
 
 Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls, const TubeOptions& options) const {
@@ -317,7 +339,7 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
     if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
   }
-  if (options.reduce) tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order));
+  if (options.reduce) tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
   tube.steps.push_back(std::move(step));
   tube.slices.push_back(std::move(next));
   return std::nullopt;

@@ -91,6 +91,7 @@ class TubeMaker final {
   struct Query;
   struct Row;
 
+  [[nodiscard]] double RemainderRounding() const;
   [[nodiscard]] std::optional<Failure> LeavesDomain(const Query& query) const;
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   [[nodiscard]] Bounds Envelope(const Query& query, int k, const KnownRows& known) const;
@@ -102,6 +103,8 @@ class TubeMaker final {
   /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included; [observation][state].
    */
   std::vector<std::vector<Bounds>> residuals_;
+  /** What rounding may have added to the certifier's columns by way of the remainder. */
+  double remainder_rounding_;
 };
 
 }  // namespace forereach::verifier
