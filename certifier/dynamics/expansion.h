@@ -1,6 +1,6 @@
-/** What the certify step takes of a nominal model, in plain arithmetic: its expansion around a point, the remainder that this
-leaves out, and what is known of an image. rounding.h bounds, once and for the whole domain, how far each number can lie from
-the exact one. expand.h, remainder.h and image.h make them, as straight-line code for a program that is known at compile time. */
+/** What the certify step takes of a nominal model, in plain arithmetic: expansion, remainder, and what is known of an
+image. expand.h, remainder.h and image.h make them, as straight-line code for a program that is known at compile time;
+rounding.h bounds, once and for the whole domain, how far each number can lie from the exact one. */
 #pragma once
 
 #include <array>

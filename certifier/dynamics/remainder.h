@@ -8,6 +8,7 @@ in the interval Hessian over its hull. As straight-line code for a program that 
 #include <cstddef>
 
 #include "certifier/dynamics/expand.h"
+#include "certifier/dynamics/expansion.h"
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/sets/zonotope.h"
@@ -137,10 +138,10 @@ FOREREACH_INLINE ProductEnds<kProgram> EncloseProducts(const Zonotope& slice, co
   return ends;
 }
 
-// max over 0 <= s <= r of 1/2 a s^2 + b s, b >= 0.
-FOREREACH_INLINE Lanes Peak(const Lanes& a, const Lanes& b, const Lanes& r) {
-  const Lanes top = b / -a, s = -a * r > b ? top : r;
-  return a * (s * s * AllLanes(0.5)) + b * s;
+// max over 0 <= s <= r of 1/2 a s^2 + h t s, h and t >= 0. A product that may underflow meets a or h only after it did.
+FOREREACH_INLINE Lanes Peak(const Lanes& a, const Lanes& h, const Lanes& t, const Lanes& r) {
+  const Lanes slope = h * t, top = slope / -a, s = -a * r > slope ? top : r;
+  return a * (s * s * AllLanes(0.5)) + h * (t * s);
 }
 
 // get(term) of the joined terms from the first on; zero behind the last.
@@ -185,13 +186,14 @@ FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainIn
 
   const Lanes h_lower = of_mixed(lower), h_upper = of_mixed(upper), h_size = Max(Abs(h_lower), Abs(h_upper));
   const Lanes a_lower = of_diagonal(lower), a_upper = of_diagonal(upper), a_size = Max(Abs(a_lower), Abs(a_upper));
-  const Lanes half_square = r * r * AllLanes(0.5), slope = h_size * other;
+  const Lanes half_square = r * r * AllLanes(0.5);
   const Lanes low = Min(h_lower * positive, -(h_upper * negative)) + half_square * Min(a_lower, AllLanes(0));
   const Lanes high = Max(h_upper * positive, -(h_lower * negative)) + half_square * Max(a_upper, AllLanes(0));
   const Lanes size = h_size * (r * other) + half_square * a_size;
-  const Lanes underflow = AllLanes(kRemainderTiny) * (h_size + AllLanes(0.5) * a_size);
+  // By both ends of h, for a NaN in either has to be seen.
+  const Lanes underflow = AllLanes(0.5 * kRemainderTiny) * (Abs(h_lower) + Abs(h_upper) + a_size);
   const Lanes margin = of_mixed(counted) + of_diagonal(counted) + underflow;
-  return {Max(low, -Peak(-a_lower, slope, r)), Min(high, Peak(a_upper, slope, r)),
+  return {Max(low, -Peak(-a_lower, h_size, other, r)), Min(high, Peak(a_upper, h_size, other, r)),
           AllLanes(RoundingError(kRemainderRelative, 1)) * size + margin * AllLanes(1 + kRemainderRelative)};
 }
 

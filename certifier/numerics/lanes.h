@@ -1,5 +1,5 @@
-/** Four doubles at a time, by the compiler's vectors: the same bits on every instruction set, since only +, -, *, max,
-abs and comparisons are used and sums are always taken in the same order. */
+/** Four doubles at a time, by the compiler's vectors: the same bits on every instruction set, since only +, -, *, /,
+max, abs and comparisons are used and sums are always taken in the same order. */
 #pragma once
 
 #include <array>
@@ -43,7 +43,7 @@ FOREREACH_INLINE Lanes Abs(const Lanes& x) {
   return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
-/** b where a is NaN. */
+/** b where a is NaN, as Max. */
 FOREREACH_INLINE Lanes Min(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
 /** The first `count` of four, `other` behind them. */
 FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count, double other) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "certifier/dynamics/models.h"
@@ -63,33 +64,75 @@ std::vector<Rational> PointOf(Random& random, const Zonotope& slice) {
   return d;
 }
 
+// rho(d) with each second derivative at one end or the other.
+std::vector<Rational> FormAt(Random& random, const Case& c, const Program& program, const std::vector<Rational>& d) {
+  std::vector<Rational> form(static_cast<std::size_t>(program.states));
+  for (int e = 0; e < program.num_second; ++e) {
+    const auto i = static_cast<std::size_t>(e);
+    const Program::Second& entry = program.hessian[i];
+    const bool low = random.Coin();
+    Rational h(low ? c.hessian[i].lower : c.hessian[i].upper);
+    h += Rational(low ? -c.error[i] : c.error[i]);
+    const Rational once(entry.row == entry.column ? 0.5 : 1.0);
+    form[static_cast<std::size_t>(entry.output)] +=
+        once * h * d[static_cast<std::size_t>(entry.row)] * d[static_cast<std::size_t>(entry.column)];
+  }
+  return form;
+}
+
+void ExpectContainsForms(Random& random, const Case& c, const NominalModel& model) {
+  for (const Method method : {Method::kPaper, Method::kCentred}) {
+    const Remainder bound = c.Bound(model, method);
+    for (int sample = 0; sample < 6; ++sample) {
+      const std::vector<Rational> form = FormAt(random, c, model.program(), PointOf(random, c.slice));
+      for (std::size_t k = 0; k < form.size(); ++k)
+        ASSERT_LE(abs(form[k] - Rational(bound.center[k])), Rational(bound.half_width[k])) << "output " << k;
+    }
+  }
+}
+
 TEST(RemainderOracle, ContainsEveryQuadraticFormOfTheSlice) {
   Random random(611);
   SCOPED_TRACE(random.trace());
   const auto model = MakeKinematicBicycle(0.1, 2.5);
-  const Program& program = model->program();
-  for (int trial = 0; trial < 3000; ++trial) {
-    const Case c(random, program);
-    for (const Method method : {Method::kPaper, Method::kCentred}) {
-      const Remainder bound = c.Bound(*model, method);
-      for (int sample = 0; sample < 6; ++sample) {
-        const std::vector<Rational> d = PointOf(random, c.slice);
-        std::vector<Rational> form(static_cast<std::size_t>(program.states));
-        for (int e = 0; e < program.num_second; ++e) {
-          const auto i = static_cast<std::size_t>(e);
-          const Program::Second& entry = program.hessian[i];
-          const bool low = random.Coin();
-          Rational h(low ? c.hessian[i].lower : c.hessian[i].upper);
-          h += Rational(low ? -c.error[i] : c.error[i]);
-          const Rational once(entry.row == entry.column ? 0.5 : 1.0);
-          form[static_cast<std::size_t>(entry.output)] +=
-              once * h * d[static_cast<std::size_t>(entry.row)] * d[static_cast<std::size_t>(entry.column)];
-        }
-        for (std::size_t k = 0; k < form.size(); ++k)
-          ASSERT_LE(abs(form[k] - Rational(bound.center[k])), Rational(bound.half_width[k])) << "output " << k;
-      }
+  for (int trial = 0; trial < 3000 && !testing::Test::HasFatalFailure(); ++trial)
+    ExpectContainsForms(random, Case(random, model->program()), *model);
+}
+
+// Every size is a power of two of its own, so that some products are subnormal numbers or zero and others are large.
+TEST(RemainderOracle, ContainsThemWhereProductsUnderflow) {
+  Random random(614);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  const auto any = [&](int lowest, int highest) { return random.Sign() * std::ldexp(1, random.Integer(lowest, highest)); };
+  for (int trial = 0; trial < 3000 && !testing::Test::HasFatalFailure(); ++trial) {
+    Case c(random, model->program());
+    Eigen::MatrixXd generators(6, random.Integer(1, 3));
+    for (double& entry : generators.reshaped()) entry = any(-600, 200);
+    c.slice = Zonotope(Eigen::VectorXd::Zero(6), generators);
+    Propagator::HalfWidths(c.slice, c.half_width.data());
+    for (PlainInterval& h : c.hessian) {
+      const double a = random.Coin(0.3) ? 0 : any(-1060, 0), b = random.Coin() ? a : any(-1060, 0);
+      h = {std::min(a, b), std::max(a, b)};
     }
+    std::ranges::fill(c.error, 0);
+    ExpectContainsForms(random, c, *model);
   }
+}
+
+TEST(RemainderOracle, SeesANumberThatIsNone) {
+  Random random(615);
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  const Program& program = model->program();
+  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e)
+    for (const bool low : {true, false}) {
+      Case c(random, program);
+      c.slice = Zonotope(Eigen::VectorXd::Zero(6), Eigen::MatrixXd::Identity(6, 6));
+      Propagator::HalfWidths(c.slice, c.half_width.data());
+      (low ? c.hessian[e].lower : c.hessian[e].upper) = std::numeric_limits<double>::quiet_NaN();
+      const auto output = static_cast<std::size_t>(program.hessian[e].output);
+      EXPECT_FALSE(c.Bound(*model, Method::kCentred).half_width[output] < kInfinity) << "derivative " << e;
+    }
 }
 
 TEST(RemainderOracle, CentredIsNeverWiderThanThePapers) {
