@@ -77,7 +77,8 @@ class LcmBus final : public Bus {
         failure = std::current_exception();
       }
     }
-    GiveBack(bytes > kBurstBytes);
+    was_in_burst_ |= bytes > kBurstBytes;
+    if (bytes <= kBurstBytes && timeout_ms > 0) GiveBack();
     if (failure) std::rethrow_exception(failure);
     return static_cast<int>(batch.size());
   }
@@ -121,10 +122,11 @@ class LcmBus final : public Bus {
     }
   }
 
-  // What a burst and who handled it took of the heap goes back to the system once the burst is over.
-  void GiveBack(bool in_burst) {
-    if (!in_burst && was_in_burst_) ::malloc_trim(0);
-    was_in_burst_ = in_burst;
+  // What a burst and who handled it took of the heap goes back to the system, once there is time for it: that takes some
+  // milliseconds.
+  void GiveBack() {
+    if (was_in_burst_) ::malloc_trim(0);
+    was_in_burst_ = false;
   }
 
   void Receive() {
