@@ -69,10 +69,15 @@ void PlannerNode::OnRobotState(const Received& received) {
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && NextPlanIsDue(state)) BeginRound(state);
 }
 
+Freshness PlannerNode::FreshnessAt(std::int64_t now_us, std::int64_t utime) const {
+  const GateOptions& gate = config_.gate;
+  return FreshnessOf(utime, now_us, std::llround(gate.max_age_ms * 1e3), std::llround(gate.max_ahead_ms * 1e3));
+}
+
 // One from the future would keep out all that come before that time.
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
   return state.num_states == config_.problem->model->num_states() && state.utime > last_state_utime_ &&
-         state.utime <= now_us + std::llround(config_.gate.max_ahead_ms * 1e3) &&
+         FreshnessAt(now_us, state.utime) != Freshness::kFuture &&
          robot_state_t::STANDING <= state.mode && state.mode <= robot_state_t::FINISHED &&
          std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });
 }
@@ -229,7 +234,8 @@ void PlannerNode::Learn(const decision_t& decision) {
 
 void PlannerNode::OnObstacles(const Received& received) {
   obstacles_t message;
-  if (Decode(received.bytes, message) != DecodeStatus::kOk || !obstacles_.Update(message).empty()) {
+  if (Decode(received.bytes, message) != DecodeStatus::kOk ||
+      FreshnessAt(received.utime, message.utime) != Freshness::kFresh || !obstacles_.Update(message).empty()) {
     ++ignored_;
     return;
   }

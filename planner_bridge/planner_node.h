@@ -15,8 +15,9 @@ It ends without a certificate after `candidates` searches, or when too little ti
 state begins another. All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has
 said FINISHED, no round begins any more.
 
-Messages that do not decode, contain what is not finite, are states stamped ahead of the clock by more than
-gate.max_ahead_ms, or concern somebody else's candidates are counted and ignored. */
+Messages that do not decode, contain what is not finite, are stamped ahead of the clock by more than gate.max_ahead_ms,
+are obstacles that the gate would not take (obstacles_in_force.h), or concern somebody else's candidates are counted
+and ignored. */
 #pragma once
 
 #include <iostream>
@@ -26,6 +27,7 @@ gate.max_ahead_ms, or concern somebody else's candidates are counted and ignored
 #include <string>
 #include <vector>
 
+#include "certifier/gate/freshness.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -68,6 +70,7 @@ class PlannerNode final : public Node {
   void OnDecision(const Received& received);
   void OnObstacles(const Received& received);
 
+  [[nodiscard]] Freshness FreshnessAt(std::int64_t now_us, std::int64_t utime) const;
   [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
@@ -92,8 +95,8 @@ class PlannerNode final : public Node {
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
   std::optional<std::int64_t> waiting_start_;       // of a certified plan that is still to begin
   std::int64_t last_state_utime_ = 0;
-  ObstaclesInForce obstacles_;
   std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
+  ObstaclesInForce obstacles_;
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,

@@ -371,16 +371,19 @@ TEST_F(PlannerNodeTest, HearsAPublisherOfObstaclesThatBeganAnew) {
   message.sequence = 7;
   ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
   ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));  // a repetition: ignored
-  message.utime = now_ + 1;
   message.sequence = 0;
+  message.utime = now_ + 50'001;  // gate.max_ahead_ms is 50: ignored
+  ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+  message.utime = now_ + 1;
   ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
   Deliver();
-  EXPECT_EQ(Summary()["messages_ignored"], 1);
+  EXPECT_EQ(Summary()["messages_ignored"], 2);
 }
 
 TEST_F(PlannerNodeTest, PlansAroundTheObstaclesItIsTold) {
   config_.obstacles = {Obstacle::Circle(Vec({12, 0}), 2)};
   obstacles_t message = ToMessage(config_.obstacles);
+  message.utime = now_;
   message.sequence = 1;
   ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
   message.num_obstacles = 65;
