@@ -1,4 +1,5 @@
-/** The expansion of a nominal model around a point, in plain arithmetic: value, Jacobian and second derivatives over a box. */
+/** The expansion of a nominal model around a point, in plain arithmetic: value, Jacobian, and second derivatives over a
+box. */
 #pragma once
 
 #include <algorithm>

@@ -7,7 +7,7 @@ that is known at compile time. One pass over the generators, four at a time, als
 #include <cstddef>
 #include <utility>
 
-#include "certifier/dynamics/expand.h"
+#include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/rounding.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/sets/zonotope.h"

@@ -99,8 +99,8 @@ FOREREACH_INLINE void EncloseSizes(const double* half_width, const PlainInterval
     sums[kTerm.output] += kWeight * Size(hessian[kTerm.entry]) * (r * other + kRemainderTiny) * (1 + kRemainderRelative) +
                           CountedError(error[kTerm.entry]);
   });
-  constexpr double kNone[kStates] = {};
-  StoreAll(kNone, out.center.data());
+  constexpr double kZeros[kStates] = {};
+  StoreAll(kZeros, out.center.data());
   StoreAll(sums, out.half_width.data());
 }
 
@@ -154,10 +154,6 @@ FOREREACH_INLINE Lanes FourTerms(Get get) {
   return Lanes{at(kFirst), at(kFirst + 1), at(kFirst + 2), at(kFirst + 3)};
 }
 
-FOREREACH_INLINE Lanes Where(const LaneMask& mask, const Lanes& x) {
-  return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & mask);
-}
-
 // The ranges of four joined terms, 1/2 a d_i^2 + h d_i d_l, and what rounding may have taken from them.
 struct TermRanges {
   Lanes lower, upper, rounding;
@@ -175,10 +171,10 @@ FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainIn
   // A variable that is a point makes its terms exactly zero, whatever their derivatives.
   const LaneMask has_diagonal = r > AllLanes(0), has_mixed = has_diagonal & (other > AllLanes(0));
   const auto of_mixed = [&](auto get) __attribute__((always_inline)) {
-    return Where(has_mixed, each([&](const Term& t) { return t.has_mixed() ? get(t.mixed) : 0; }));
+    return has_mixed ? each([&](const Term& t) { return t.has_mixed() ? get(t.mixed) : 0; }) : AllLanes(0);
   };
   const auto of_diagonal = [&](auto get) __attribute__((always_inline)) {
-    return Where(has_diagonal, each([&](const Term& t) { return t.has_diagonal() ? get(t.diagonal) : 0; }));
+    return has_diagonal ? each([&](const Term& t) { return t.has_diagonal() ? get(t.diagonal) : 0; }) : AllLanes(0);
   };
   const auto lower = [&](std::size_t e) { return hessian[e].lower; };
   const auto upper = [&](std::size_t e) { return hessian[e].upper; };
