@@ -270,22 +270,19 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
   }
 }
 
-// The certifier rounds each remainder by what its expansion may be off anywhere in the domain, some 2^-46 of the largest
-// remainder there; where that is not negligible it takes intervals instead, which are as tight as the slice.
+// The certifier rounds each remainder by what its expansion may be off anywhere in the domain, some 2^-44 of the largest
+// remainder there, and several meet in a column; where that is not negligible it takes intervals, as tight as the slice.
 double TubeMaker::RemainderRounding() const {
-  const Domain& domain = problem_.domain;
-  const int n = domain.state.dim();
+  const auto [lower, upper] = problem_.domain.Corners();
   std::vector<Real> box, half_width;
-  const auto add = [&](double lower, double upper) {
-    box.push_back(Real::FromTo(Real(lower), Real(upper)));
-    half_width.push_back(Real(0.5) * (Real(upper) - Real(lower)));
-  };
-  for (int l = 0; l < n; ++l) add(domain.state.lower()[l], domain.state.upper()[l]);
-  for (int l = 0; l < domain.input.dim(); ++l) add(domain.input.lower()[l], domain.input.upper()[l]);
+  for (std::size_t l = 0; l < lower.size(); ++l) {
+    box.push_back(Real::FromTo(Real(lower[l]), Real(upper[l])));
+    half_width.push_back(Real(0.5) * (Real(upper[l]) - Real(lower[l])));
+  }
   const std::vector<SecondDerivative> hessian = equations_.Second(box);
   if (!AllFinite(hessian)) return 0;
   double largest = 0;
-  for (const Bounds& bounds : RemainderOver(hessian, {}, half_width, n, Method::kPaper))
+  for (const Bounds& bounds : RemainderOver(hessian, {}, half_width, problem_.domain.state.dim(), Method::kPaper))
     largest = std::max(largest, bounds.upper.ToDouble());
   const double rounding = 0x1p-40 * largest;
   return rounding < 0x1p-20 ? rounding : 0;
@@ -339,7 +336,8 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
     if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
   }
-  if (options.reduce) tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
+  if (options.reduce)
+    tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
   tube.steps.push_back(std::move(step));
   tube.slices.push_back(std::move(next));
   return std::nullopt;
