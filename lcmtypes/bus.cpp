@@ -9,6 +9,7 @@
 #include <fstream>
 #include <mutex>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <lcm/lcm-cpp.hpp>
@@ -77,8 +78,10 @@ class LcmBus final : public Bus {
         failure = std::current_exception();
       }
     }
-    was_in_burst_ |= bytes > kBurstBytes;
-    if (bytes <= kBurstBytes && timeout_ms > 0) GiveBack();
+    if (bytes > kBurstBytes)
+      was_in_burst_ = true;
+    else if (timeout_ms > 0)
+      GiveBack();
     if (failure) std::rethrow_exception(failure);
     return static_cast<int>(batch.size());
   }
@@ -125,8 +128,7 @@ class LcmBus final : public Bus {
   // What a burst and who handled it took of the heap goes back to the system, once there is time for it: that takes some
   // milliseconds.
   void GiveBack() {
-    if (was_in_burst_) ::malloc_trim(0);
-    was_in_burst_ = false;
+    if (std::exchange(was_in_burst_, false)) ::malloc_trim(0);
   }
 
   void Receive() {
