@@ -169,7 +169,12 @@ TEST_F(CertifierProcessTest, FiveHundredCandidatesInABurstAreAnsweredExactlyOnce
   for (const auto& [plan_id, count] : answers) EXPECT_EQ(count, 1) << plan_id;
   const std::size_t certified = causes[decision_t::CAUSE_NONE], overrun = causes[decision_t::CAUSE_OVERRUN];
   EXPECT_EQ(probe_.heard("PLAN_CERTIFIED").size(), certified);
-  EXPECT_EQ(certified + overrun, kCandidates / 2) << "under a sanitizer a few take longer than they may";
+#ifdef __SANITIZE_THREAD__  // a few take longer there than they may
+  EXPECT_EQ(certified + overrun, kCandidates / 2);
+#else
+  EXPECT_EQ(overrun, 0u);
+  EXPECT_EQ(certified, kCandidates / 2);
+#endif
   EXPECT_EQ(probe_.Heard<certifier_status_v2_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
 }
 
