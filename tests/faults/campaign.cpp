@@ -94,7 +94,7 @@ class Campaign final {
   }
 
   // The system has to be healthy before it can be hurt.
-  static bool FirstBegin(Row& row, Rig& rig) {
+  static bool HealAtFirst(Row& row, Rig& rig) {
     const std::string why = rig.Heal();
     if (!why.empty()) Remark(row, "never began: " + why);
     return why.empty();
@@ -112,7 +112,7 @@ class Campaign final {
   void Signals(const std::string& fault, int signal, int tries) {
     Rig rig(DemoTask());
     Row& row = Begin(fault, tries);
-    const bool began = FirstBegin(row, rig);
+    const bool began = HealAtFirst(row, rig);
     for (int i = 0; i < tries && began; ++i) {
       const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
       Try(row, rig, [&] {
@@ -151,7 +151,7 @@ class Campaign final {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin(std::string("The clock of the ") + Rig::kNames[role] + " jumps by 0.3 s to an hour, and back",
                      options_.others);
-    FirstBegin(row, rig);
+    HealAtFirst(row, rig);
     for (int i = 0; i < options_.others; ++i)
       Try(row, rig, [&] {
         rig.SetClock(role, Jump());
@@ -167,7 +167,7 @@ class Campaign final {
   void AllClocks() {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin("All clocks jump by 0.3 s to an hour, and stay", options_.others);
-    FirstBegin(row, rig);
+    HealAtFirst(row, rig);
     microseconds offset(0);
     int anew = 0;
     for (int i = 0; i < options_.others; ++i)

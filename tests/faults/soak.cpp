@@ -2,7 +2,6 @@
 // latency not to drift, and all counters to add up. Writes a table; what does not hold is an error.
 #include <algorithm>
 #include <csignal>
-#include <fstream>
 #include <iostream>
 #include <sstream>
 
@@ -34,13 +33,6 @@ struct Options {
 struct Interval {
   double ended_min = 0, p50_us = 0, p99_us = 0, worst_us = 0, certifier_kb = 0, logger_kb = 0;
 };
-
-double ResidentKb(pid_t pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/statm");
-  double size = 0, resident = 0;
-  file >> size >> resident;
-  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1024;
-}
 
 // What the logger's database knows of the certifier's decisions.
 struct Recorded {
@@ -110,7 +102,7 @@ class Soak final {
   void EndInterval(double minutes, pid_t certifier, pid_t logger) {
     std::vector<double> latencies = load_->TakeLatencies();
     const Interval now{minutes, Percentile(latencies, 0.5), Percentile(latencies, 0.99), Percentile(latencies, 1),
-                       ResidentKb(certifier), ResidentKb(logger)};
+                       ResidentBytes(certifier) / 1024, ResidentBytes(logger) / 1024};
     intervals_.push_back(now);
     if (intervals_.size() % (kIntervals / 12) == 0)
       std::cerr << "minute " << minutes << ": p50 " << now.p50_us << " us, p99 " << now.p99_us << " us, certifier "

@@ -16,6 +16,13 @@ std::string PrivateBusUrl() {
   return "udpm://239.255.76.67:" + std::to_string(10'000 + getpid() % 20'000) + "?ttl=0";
 }
 
+double ResidentBytes(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/statm");
+  double size = 0, resident = 0;
+  file >> size >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE));
+}
+
 ScratchDirectory::ScratchDirectory() {
   std::string path = testing::TempDir() + "/forereach-test-XXXXXX";
   if (!mkdtemp(path.data())) throw std::system_error(errno, std::generic_category(), path);

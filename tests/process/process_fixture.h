@@ -18,6 +18,9 @@ namespace forereach {
 /** A multicast port that no other running test has: it is made of this process's number. */
 [[nodiscard]] std::string PrivateBusUrl();
 
+/** Of a process, this one too. */
+[[nodiscard]] double ResidentBytes(pid_t pid);
+
 /** A directory that goes with this object. */
 class ScratchDirectory final {
  public:
