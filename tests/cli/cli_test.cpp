@@ -6,13 +6,12 @@
 #include <set>
 #include <sstream>
 
-#include <unistd.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/program.h"
+#include "tests/scratch.h"
 
 namespace {
 
@@ -122,13 +121,13 @@ TEST(Help, ExitsWithZeroAndShowsAnExample) {
 }
 
 TEST(Plan, WritesACsvThatCertifyReads) {
-  const std::string file = testing::TempDir() + "forereach_plan_" + std::to_string(getpid()) + ".csv";
+  const forereach::ScratchDirectory scratch;
+  const std::string file = scratch / "plan.csv";
   const Output planned = Forereach("plan --config config/demo.yaml --out " + file);
   ASSERT_EQ(planned.code, 0) << planned.text;
   const Output certified = Forereach("certify --json --config config/demo.yaml --plan " + file);
   EXPECT_LE(certified.code, 1);
   EXPECT_NE(Json::parse(certified.text)["outcome"], "abstain_falsified");
-  std::remove(file.c_str());
 }
 
 TEST(Doctor, PrintsOneJsonDocument) {

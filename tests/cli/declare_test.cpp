@@ -9,7 +9,7 @@
 #include "certifier/task/config.h"
 #include "cli/cover_file.h"
 #include "tests/cli/program.h"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -49,7 +49,7 @@ class DeclareTest : public testing::Test {
     EXPECT_THAT(output.text, HasSubstr("check: refuted"));
   }
 
-  Scratch scratch_;
+  ScratchDirectory scratch_;
   const std::string task_ = scratch_ / "task.yaml", cover_ = scratch_ / "cover.json";
 };
 

@@ -1,9 +1,7 @@
 // A recorded log through the same gate gives the same decisions, and a changed one does not.
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
-
-#include <unistd.h>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,6 +15,7 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "logger/event_log.h"
 #include "tests/gate/small_task.h"
+#include "tests/scratch.h"
 
 namespace forereach {
 namespace {
@@ -25,13 +24,6 @@ using testing::HasSubstr;
 
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
-
-// The path of a log that is not there yet.
-std::string NewLog() {
-  const std::string path = testing::TempDir() + "forereach_replay_" + std::to_string(getpid()) + ".lcmlog";
-  std::filesystem::remove(path);
-  return path;
-}
 
 // The gate decides as expected, and the log has what came and what went.
 void DecideAndLog(Gate& gate, const std::vector<std::uint8_t>& candidate, std::int16_t expected, const Config& config,
@@ -42,28 +34,37 @@ void DecideAndLog(Gate& gate, const std::vector<std::uint8_t>& candidate, std::i
   log.Append(kNow, config.bus.decision, Encode(decision));
 }
 
-// Each decision of the log is made again. Removes it.
+// Each decision of the log is made again.
 void ExpectAgreed(const std::string& path, const Config& config, int decisions) {
   const ReplayResult result = Replay({path}, config);
   EXPECT_EQ(result.agreed, decisions);
   EXPECT_THAT(result.differences, testing::IsEmpty());
-  std::filesystem::remove(path);
 }
 
-// Copies the log, each event changed by `edit`.
-template <class Edit>
-std::string Edited(Edit edit) {
-  const std::string path = NewLog();
-  EventLogReader reader(kLog);
-  EventLogWriter writer(path);
-  LogEvent event;
-  while (reader.Next(event) == LogStatus::kEvent)
-    if (edit(event)) writer.Append(event.utime, event.channel, event.data);
-  EXPECT_TRUE(writer.Flush());
-  return path;
-}
+class ReplayTest : public testing::Test {
+ protected:
+  // The path of a log that is not there yet.
+  std::string NewLog() { return scratch_ / std::to_string(logs_++); }
 
-TEST(Replay, RecordedLogAgreesOnEveryDecision) {
+  // Copies the log, each event changed by `edit`.
+  template <class Edit>
+  std::string Edited(Edit edit) {
+    const std::string path = NewLog();
+    EventLogReader reader(kLog);
+    EventLogWriter writer(path);
+    LogEvent event;
+    while (reader.Next(event) == LogStatus::kEvent)
+      if (edit(event)) writer.Append(event.utime, event.channel, event.data);
+    EXPECT_TRUE(writer.Flush());
+    return path;
+  }
+
+ private:
+  const ScratchDirectory scratch_;
+  int logs_ = 0;
+};
+
+TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
   const Config config = LoadConfig(kConfig);
   const ReplayResult result = Replay({kLog}, config);
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
@@ -72,7 +73,7 @@ TEST(Replay, RecordedLogAgreesOnEveryDecision) {
   EXPECT_EQ(result.corruptions, 0);
 }
 
-TEST(Replay, RecordedLogHasCertificatesAndBothAbstentions) {
+TEST_F(ReplayTest, RecordedLogHasCertificatesAndBothAbstentions) {
   int certified = 0, domain = 0, safety = 0;
   EventLogReader reader(kLog);
   LogEvent event;
@@ -88,7 +89,7 @@ TEST(Replay, RecordedLogHasCertificatesAndBothAbstentions) {
   EXPECT_GT(safety, 0);
 }
 
-TEST(Replay, ChangedOutcomeIsListed) {
+TEST_F(ReplayTest, ChangedOutcomeIsListed) {
   bool changed = false;
   const std::string path = Edited([&](LogEvent& event) {
     if (auto decision = Decoded<decision_t>(event.data); decision && !changed) {
@@ -99,10 +100,9 @@ TEST(Replay, ChangedOutcomeIsListed) {
     return true;
   });
   EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u);
-  std::filesystem::remove(path);
 }
 
-TEST(Replay, MissingDecisionAndMissingCandidateAreListed) {
+TEST_F(ReplayTest, MissingDecisionAndMissingCandidateAreListed) {
   for (const bool drop_decision : {true, false}) {
     bool dropped = false;
     const std::string path = Edited([&](LogEvent& event) {
@@ -113,12 +113,11 @@ TEST(Replay, MissingDecisionAndMissingCandidateAreListed) {
       return false;
     });
     EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u) << drop_decision;
-    std::filesystem::remove(path);
   }
 }
 
-TEST(Replay, ACertifiedPlanThatWasAlteredIsListed) {
-  const auto difference = [](auto alter) {
+TEST_F(ReplayTest, ACertifiedPlanThatWasAlteredIsListed) {
+  const auto difference = [this](auto alter) {
     bool altered = false;
     const std::string path = Edited([&](LogEvent& event) {
       auto certified = Decoded<certified_plan_t>(event.data);
@@ -129,7 +128,6 @@ TEST(Replay, ACertifiedPlanThatWasAlteredIsListed) {
       return true;
     });
     const ReplayResult result = Replay({path}, LoadConfig(kConfig));
-    std::filesystem::remove(path);
     EXPECT_EQ(result.differences.size(), 1u);
     return result.differences.empty() ? std::string() : result.differences.front();
   };
@@ -142,7 +140,7 @@ TEST(Replay, ACertifiedPlanThatWasAlteredIsListed) {
 }
 
 // The seam lies between a candidate and its decision.
-TEST(Replay, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
+TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
   std::vector<std::string> logs;
   for (const bool second : {false, true}) {
     bool behind = false;
@@ -151,8 +149,6 @@ TEST(Replay, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
       if (event.number >= 200 && Decoded<candidate_plan_t>(event.data)) behind = true;
       return here;
     }));
-    std::filesystem::rename(logs.back(), logs.back() + std::to_string(second));
-    logs.back() += std::to_string(second);
   }
   const Config config = LoadConfig(kConfig);
   const ReplayResult whole = Replay({kLog}, config), parts = Replay(logs, config);
@@ -160,12 +156,11 @@ TEST(Replay, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
   EXPECT_EQ(parts.candidates, whole.candidates);
   EXPECT_EQ(parts.agreed, whole.agreed);
   EXPECT_THAT(Replay({logs[1]}, config).differences, testing::Not(testing::IsEmpty()));
-  for (const std::string& log : logs) std::filesystem::remove(log);
 }
 
 // A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if the
 // certifier itself began after them.
-TEST(Replay, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
+TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
   const Config config = SmallTask();
   obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
   on_the_way.utime = kNow;
@@ -190,7 +185,7 @@ TEST(Replay, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt)
 }
 
 // What was heard before a reload counts after it, beside the task's own.
-TEST(Replay, AReloadKeepsTheObstaclesThatWereHeard) {
+TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
   const Config config = SmallTask();
   obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
   far_away.utime = kNow;
@@ -213,7 +208,7 @@ TEST(Replay, AReloadKeepsTheObstaclesThatWereHeard) {
   ExpectAgreed(path, config, 2);
 }
 
-TEST(Replay, AnotherTaskIsNoticed) {
+TEST_F(ReplayTest, AnotherTaskIsNoticed) {
   Config config = LoadConfig(kConfig);
   config.declaration_digest[0] ^= 1;
   const ReplayResult result = Replay({kLog}, config);

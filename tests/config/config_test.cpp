@@ -5,7 +5,7 @@
 
 #include "certifier/task/schema.h"
 #include "certifier/dynamics/residuals.h"
-#include "scratch.h"
+#include "tests/config/task_files.h"
 
 namespace forereach {
 namespace {
@@ -20,7 +20,7 @@ TEST(LoadConfig, ReadsWhatIsRequired) {
   const TaskFiles files;
   const Config config = files.Load();
   const Problem& problem = *config.problem;
-  EXPECT_EQ(config.path, files.directory().Path("task.yaml"));
+  EXPECT_EQ(config.path, files.directory() / "task.yaml");
   EXPECT_EQ(problem.model->description(), "point_mass dt=0.15");
   EXPECT_EQ(problem.domain.state.lower(), Numbers({-20, -20, -5.4, -5.4}));
   EXPECT_EQ(problem.domain.input.upper(), Numbers({3, 3}));
@@ -93,7 +93,7 @@ TEST(LoadConfig, ReadsEveryOption) {
             "ABCDEFGHIJK");
   const PlannerOptions& planner = config.planner;
   EXPECT_EQ(planner.source, "policy");
-  EXPECT_EQ(planner.policy, files.directory().Path("p/own.json"));
+  EXPECT_EQ(planner.policy, files.directory() / "p/own.json");
   EXPECT_EQ(planner.algorithm, "rrt");
   EXPECT_EQ(planner.goal, (std::vector<double>{1, 2}));
   EXPECT_EQ(std::tie(planner.goal_radius, planner.clearance, planner.clearance_step, planner.progress_steps,
@@ -105,7 +105,7 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(config.robot.start, (std::vector<double>{4, 3, 2, 1}));
   EXPECT_EQ(std::tie(config.robot.step_period_ms, config.robot.time_limit_s), std::make_tuple(14.0, 15.0));
   EXPECT_EQ(config.robot.residual, "velocity_knee");
-  EXPECT_EQ(config.logger.directory, files.directory().Path("here"));
+  EXPECT_EQ(config.logger.directory, files.directory() / "here");
   const LoggerOptions& logger = config.logger;
   EXPECT_EQ(std::tie(logger.queue, logger.flush_ms, logger.rotate_mb, logger.rotate_minutes, logger.min_free_mb),
             std::make_tuple(16, 17.0, 18.0, 19.0, 21.0));

@@ -11,7 +11,7 @@
 
 #include "certifier/dynamics/models.h"
 #include "certifier/task/config.h"
-#include "scratch.h"
+#include "tests/config/task_files.h"
 
 namespace forereach {
 namespace {
@@ -25,7 +25,7 @@ class CsvTest : public testing::Test {
       (void)ReadCsv(files_.Write("t.csv", text), {"a", "b"});
       return {};
     } catch (const ConfigError& error) {
-      return std::string(error.what()).substr(files_.Path("").size());
+      return std::string(error.what()).substr((files_ / "").size());
     }
   }
 
@@ -61,12 +61,12 @@ TEST_F(CsvTest, ErrorsInTheHeader) {
 }
 
 TEST_F(CsvTest, MissingFileAndDirectory) {
-  EXPECT_THAT([&] { (void)ReadCsv(files_.Path("none.csv"), {"a"}); },
+  EXPECT_THAT([&] { (void)ReadCsv(files_ / "none.csv", {"a"}); },
               testing::ThrowsMessage<ConfigError>(HasSubstr("none.csv: cannot be read: No such file or directory")));
-  EXPECT_THAT([&] { (void)ReadCsv(files_.Path(""), {"a"}); },
+  EXPECT_THAT([&] { (void)ReadCsv(files_ / "", {"a"}); },
               testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory")));
   EXPECT_THAT(
-      [&] { WriteCsv(files_.Path("no/such/place.csv"), {"a"}, Eigen::MatrixXd::Zero(1, 1)); },
+      [&] { WriteCsv(files_ / "no/such/place.csv", {"a"}, Eigen::MatrixXd::Zero(1, 1)); },
       testing::ThrowsMessage<ConfigError>(HasSubstr("place.csv: cannot be written: No such file or directory")));
 }
 
@@ -98,12 +98,12 @@ TEST_F(CsvTest, PlansAndTransitionsComeBackToTheLastBit) {
   const auto model = MakeKinematicBicycle(0.1, 2.5);
 
   const Eigen::MatrixXd controls = AnyMatrix(random, 2, kMaxSteps);
-  SavePlan(files_.Path("plan.csv"), *model, controls);
-  EXPECT_TRUE(SameBits(LoadPlan(files_.Path("plan.csv"), *model), controls));
+  SavePlan(files_ / "plan.csv", *model, controls);
+  EXPECT_TRUE(SameBits(LoadPlan(files_ / "plan.csv", *model), controls));
 
   const Transitions transitions{AnyMatrix(random, 500, 8), AnyMatrix(random, 500, 6)};
-  SaveTransitions(files_.Path("steps.csv"), *model, transitions);
-  const Transitions loaded = LoadTransitions(files_.Path("steps.csv"), *model);
+  SaveTransitions(files_ / "steps.csv", *model, transitions);
+  const Transitions loaded = LoadTransitions(files_ / "steps.csv", *model);
   EXPECT_TRUE(SameBits(loaded.z, transitions.z));
   EXPECT_TRUE(SameBits(loaded.x_next, transitions.x_next));
 }

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/models.h"
-#include "scratch.h"
+#include "tests/config/task_files.h"
 
 namespace forereach {
 namespace {

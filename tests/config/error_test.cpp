@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "scratch.h"
+#include "tests/config/task_files.h"
 
 namespace forereach {
 namespace {
@@ -230,10 +230,10 @@ TEST_F(ErrorTest, FilesThatAreNotTasks) {
 }
 
 TEST_F(ErrorTest, FilesThatAreNotThere) {
-  EXPECT_THAT([&] { (void)LoadConfig(files_.directory().Path("none.yaml")); },
+  EXPECT_THAT([&] { (void)LoadConfig(files_.directory() / "none.yaml"); },
               testing::ThrowsMessage<ConfigError>(
-                  files_.directory().Path("none.yaml: cannot be read: No such file or directory")));
-  EXPECT_THAT([&] { (void)LoadConfig(files_.directory().Path("")); },
+                  files_.directory() / "none.yaml: cannot be read: No such file or directory"));
+  EXPECT_THAT([&] { (void)LoadConfig(files_.directory() / ""); },
               testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory, not a file")));
 }
 

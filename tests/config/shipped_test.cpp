@@ -11,7 +11,7 @@
 #include "certifier/task/config.h"
 #include "certifier/task/schema.h"
 #include "robot/target.h"
-#include "scratch.h"
+#include "tests/config/task_files.h"
 
 namespace forereach {
 namespace {

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "experiments/run_directory.h"
+#include "tests/scratch.h"
 
 namespace forereach::experiments {
 namespace {
@@ -30,17 +31,12 @@ std::string Read(const fs::path& path) {
 
 class RunTest : public testing::Test {
  protected:
-  RunTest() {
-    std::string path = testing::TempDir() + "/forereach-experiments-XXXXXX";
-    root_ = mkdtemp(path.data());
-  }
-  ~RunTest() override { fs::remove_all(root_); }
-
   [[nodiscard]] RunOptions Quick(std::vector<std::string> names, const std::string& directory) const {
     return {std::move(names), {2, true}, {30, 24}, 1, root_ / directory, "", "experiments/run"};
   }
 
-  fs::path root_;
+  const ScratchDirectory scratch_;
+  const fs::path root_ = scratch_.path();
 };
 
 TEST_F(RunTest, QuickFiguresAreInTheirBands) {

@@ -379,7 +379,7 @@ void Campaign::NoNetwork() {
   for (const char* program : {FOREREACH_CERTIFIER, FOREREACH_PLANNER, FOREREACH_LOGGER, FOREREACH_ROBOT_SIM}) {
     ++row.tries;
     std::vector<std::string> command{program, "--config", task, "--lcm-url", "udpm://10.255.255.1:7667?ttl=0"};
-    if (program == std::string(FOREREACH_LOGGER)) command.insert(command.end(), {"--directory", scratch.path() / "log"});
+    if (program == std::string(FOREREACH_LOGGER)) command.insert(command.end(), {"--directory", scratch / "log"});
     ChildProcess process(command);
     const auto code = process.WaitForExit(std::chrono::seconds(10));
     if (code == 2 && process.error().find("bus:") != std::string::npos) ++row.said_why;

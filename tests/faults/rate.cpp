@@ -119,7 +119,7 @@ int Main(int argc, char** argv) {
   const ScratchDirectory scratch;
   Config config = LoadConfig(scratch.Write("task.yaml", DemoTask(kGate)));
   const int steps = MostSteps(config);
-  const std::string key = (scratch.path() / "key").string(), url = PrivateBusUrl();
+  const std::string key = scratch / "key", url = PrivateBusUrl();
   MakeKeyFile(key);
   std::vector<Row> rows;
   for (const bool small : {false, true})

@@ -28,8 +28,8 @@ std::string LastLine(std::string text) {
 }  // namespace
 
 Rig::Rig(const std::string& task, const Options& options)
-    : options_(options), task_path_(scratch_.Write("task.yaml", task)), key_path_((scratch_.path() / "key").string()),
-      directory_((scratch_.path() / "log").string()) {
+    : options_(options), task_path_(scratch_.Write("task.yaml", task)), key_path_(scratch_ / "key"),
+      directory_(scratch_ / "log") {
   static int rigs = 0;
   const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 40'000;
   far_url_ = "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
@@ -62,7 +62,7 @@ void Rig::Start(Role role) {
 }
 
 std::vector<std::string> Rig::UnderClock(Role role) {
-  const std::string path = (scratch_.path() / (std::string("clock of the ") + kNames[role])).string();
+  const std::string path = scratch_ / (std::string("clock of the ") + kNames[role]);
   if (!clocks_[role]) clocks_[role].reset(MapClockFile(path.c_str()));
   if (!clocks_[role]) throw std::runtime_error(path + " cannot be mapped");
   const char* others = std::getenv("ASAN_OPTIONS");  // a build with sanitizers wants to be the first library

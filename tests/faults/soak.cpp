@@ -58,7 +58,7 @@ class Soak final {
     const std::string task = scratch_.Write("task.yaml", PatientTask() + "logger: {rotate_mb: 256, quota_mb: 2048}\n");
     config_ = LoadConfig(task);
     config_.bus.url = PrivateBusUrl();
-    config_.bus.key = (scratch_.path() / "key").string();
+    config_.bus.key = scratch_ / "key";
     MakeKeyFile(config_.bus.key);
     load_ = std::make_unique<Load>(config_, [this](std::int64_t number) {
       return CandidateFor(config_, 0, Eigen::Vector2d(0.2, number % 3 != 0 ? 0 : 2.5), 12, std::chrono::seconds(1));
@@ -97,7 +97,7 @@ class Soak final {
   [[nodiscard]] std::string Table(const std::vector<std::string>& faults) const;
 
  private:
-  [[nodiscard]] std::filesystem::path log() const { return scratch_.path() / "log"; }
+  [[nodiscard]] std::filesystem::path log() const { return scratch_ / "log"; }
 
   void EndInterval(double minutes, pid_t certifier, pid_t logger) {
     std::vector<double> latencies = load_->TakeLatencies();

@@ -1,7 +1,6 @@
 // Signed messages: what is refused, and that nothing but the message and its freshness decides.
 #include "lcmtypes/authentic.h"
 
-#include <filesystem>
 #include <fstream>
 #include <random>
 
@@ -12,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "lcmtypes/authentic_bus.h"
+#include "tests/scratch.h"
 
 namespace forereach {
 namespace {
@@ -109,8 +109,6 @@ TEST(Authentic, RandomBytesNeverPass) {
 
 class KeyFile : public testing::Test {
  protected:
-  KeyFile() { std::filesystem::remove(path_); }
-  ~KeyFile() override { std::filesystem::remove(path_); }
   std::string Problem() const {
     try {
       static_cast<void>(LoadKey(path_));
@@ -119,7 +117,8 @@ class KeyFile : public testing::Test {
       return error.what();
     }
   }
-  const std::string path_ = testing::TempDir() + "forereach_key_" + std::to_string(getpid());
+  const ScratchDirectory scratch_;
+  const std::string path_ = scratch_ / "key";
 };
 
 TEST_F(KeyFile, IsMadeForItsOwnerAloneAndIsNeverReplaced) {

@@ -12,6 +12,8 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include "tests/scratch.h"
+
 namespace {
 
 using testing::HasSubstr;
@@ -35,8 +37,6 @@ Result CheckIncludes(const std::string& root) {
 class IncludesTest : public testing::Test {
  protected:
   IncludesTest() {
-    std::string path = testing::TempDir() + "/forereach-house-XXXXXX";
-    root_ = mkdtemp(path.data());
     Write("certifier/numerics/interval.h", "#include <cmath>\n");
     Write("certifier/sets/box.h", "#include <Eigen/Core>\n#include \"certifier/numerics/interval.h\"\n");
     Write("certifier/gate/gate.h", "#include \"certifier/sets/box.h\"\n#include \"lcmtypes/codec.h\"\n");
@@ -52,7 +52,6 @@ class IncludesTest : public testing::Test {
     Write("tests/logger/log_test.cpp", "#include <lcm/lcm-cpp.hpp>\n");
     Write("bench/gate_bench.cpp", "#include \"certifier/gate/gate.h\"\n#include <benchmark/benchmark.h>\n");
   }
-  ~IncludesTest() override { std::filesystem::remove_all(root_); }
 
   void Write(const std::string& file, const std::string& text) {
     std::filesystem::create_directories((root_ / file).parent_path());
@@ -71,7 +70,8 @@ class IncludesTest : public testing::Test {
     for (const std::string& message : expected_) EXPECT_THAT(result.output, HasSubstr(message));
   }
 
-  std::filesystem::path root_;
+  const forereach::ScratchDirectory scratch_;
+  const std::filesystem::path root_ = scratch_.path();
   std::map<std::string, int> lines_;
   std::vector<std::string> expected_;
 };
@@ -127,7 +127,7 @@ TEST_F(IncludesTest, ThePartsOfTheHouse) {
   Refuse("experiments/bad.cpp", "\"planner_bridge/proposal.h\"",
          "experiments may include certifier, policies and cli/progress.h only");
   Refuse("certifier/gate/bad.cpp", "\"experiments/x.h\"", "certifier may not include experiments");
-  Refuse("logger/bad.cpp", "\"tests/logger/scratch.h\"", "logger may not include tests");
+  Refuse("logger/bad.cpp", "\"tests/logger/logs.h\"", "logger may not include tests");
   ExpectRefused();
 }
 

@@ -5,7 +5,7 @@
 
 #include "logger/database.h"
 #include "logger/interpreter.h"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -30,7 +30,7 @@ class CheckTest : public testing::Test {
 
   [[nodiscard]] LogCheck Check() const { return CheckLogs(scratch_.path()).at(0); }
 
-  const Scratch scratch_;
+  const ScratchDirectory scratch_;
   const std::string log_ = scratch_ / "a.lcmlog";
   static constexpr std::size_t kRecord = 28 + 15 + 336;
   Database database_;
@@ -92,7 +92,7 @@ TEST_F(CheckTest, RowsWithoutADigestAreUnchecked) {
 }
 
 TEST_F(CheckTest, WithoutADatabaseItSaysSoAndMakesNone) {
-  const Scratch empty;
+  const ScratchDirectory empty;
   EXPECT_THROW((void)CheckLogs(empty.path()), BadInput);
   EXPECT_THROW((void)CheckLogs(empty / "none"), BadInput);
   EXPECT_FALSE(std::filesystem::exists(empty / "none"));

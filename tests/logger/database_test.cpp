@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -57,7 +57,7 @@ Rows SampleRows() {
 }
 
 TEST(Database, RoundTrip) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   Database database(scratch / "d.sqlite");
   database.BeginRun("a.lcmlog", 10);
   EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
@@ -99,7 +99,7 @@ TEST(Database, RoundTrip) {
 }
 
 TEST(Database, WritesARowOnce) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   Database database(scratch / "d.sqlite");
   EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 3);
   EXPECT_EQ(database.Write(SampleRows(), "a.lcmlog", 10), 0);
@@ -107,7 +107,7 @@ TEST(Database, WritesARowOnce) {
 }
 
 TEST(Database, KeepsRunsOverReopening) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   {
     Database database(scratch / "d.sqlite");
     database.BeginRun("a.lcmlog", 10);
@@ -127,7 +127,7 @@ TEST(Database, KeepsRunsOverReopening) {
 }
 
 TEST(Database, MarksDeletedLogsAndWhatContinuesWhat) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   Database database(scratch / "d.sqlite");
   database.BeginRun("a.lcmlog", 10);
   database.BeginRun("b.lcmlog", 20, "a.lcmlog");
@@ -140,7 +140,7 @@ TEST(Database, MarksDeletedLogsAndWhatContinuesWhat) {
 }
 
 TEST(Database, ReferencesAreThoseOfAllTables) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   Database database(scratch / "d.sqlite");
   Rows rows = SampleRows();
   rows.gaps.push_back(rows.gaps[0]);
@@ -189,7 +189,7 @@ constexpr const char* kVersion1 = R"sql(
 )sql";
 
 TEST(Database, BringsVersion1UpToDate) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   Sql(scratch / "d.sqlite", kVersion1);
   { const Database migrates(scratch / "d.sqlite"); }
   Database database(scratch / "d.sqlite");
@@ -214,7 +214,7 @@ TEST(Database, BringsVersion1UpToDate) {
 }
 
 TEST(Database, RefusesANewerSchema) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   { const Database database(scratch / "d.sqlite"); }
   Sql(scratch / "d.sqlite", "PRAGMA user_version = 99");
   try {
@@ -226,7 +226,7 @@ TEST(Database, RefusesANewerSchema) {
 }
 
 TEST(Database, RefusesAnotherProgramsFile) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   Sql(scratch / "d.sqlite", "CREATE TABLE other (x)");
   EXPECT_THROW(Database(scratch / "d.sqlite"), DatabaseError);
   WriteBytes(scratch / "text", std::vector<std::uint8_t>(5000, 'x'));
@@ -235,7 +235,7 @@ TEST(Database, RefusesAnotherProgramsFile) {
 }
 
 TEST(Database, WritesAllOrNothing) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   Database database(scratch / "d.sqlite");
   Sql(scratch / "d.sqlite",
       "CREATE TRIGGER full BEFORE INSERT ON gaps BEGIN SELECT RAISE(ABORT, 'database or disk is full'); END");

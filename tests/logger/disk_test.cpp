@@ -16,7 +16,7 @@
 #include "forereach/logger_status_t.hpp"
 #include "logger/logger_node.h"
 #include "tests/logger/direct_bus.h"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -76,7 +76,7 @@ class DiskTest : public testing::Test {
     return numbers;
   }
 
-  Scratch scratch_;
+  ScratchDirectory scratch_;
   Config config_;
   DirectBus bus_;
   std::ostringstream out_;

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -34,7 +34,7 @@ void PutLength(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t v
 }
 
 TEST(EventLog, RoundTrip) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   const LogContents contents = ReadLog(scratch / "log");
   ASSERT_EQ(contents.events.size(), 5u);
@@ -50,7 +50,7 @@ TEST(EventLog, RoundTrip) {
 }
 
 TEST(EventLog, OffsetIsTheFileSizeAfterFlush) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   EventLogWriter writer(scratch / "log");
   const std::vector<std::uint8_t> data(7);
   writer.Append(1, "C", data);
@@ -62,7 +62,7 @@ TEST(EventLog, OffsetIsTheFileSizeAfterFlush) {
 }
 
 TEST(EventLog, LcmReadsOurFile) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   lcm::LogFile file(scratch / "log", "r");
   ASSERT_TRUE(file.good());
@@ -79,7 +79,7 @@ TEST(EventLog, LcmReadsOurFile) {
 }
 
 TEST(EventLog, WeReadLcmsFile) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   std::string data = "payload";
   {
     lcm::LogFile file(scratch / "log", "w");
@@ -100,7 +100,7 @@ TEST(EventLog, WeReadLcmsFile) {
 }
 
 TEST(EventLog, EmptyFileEnds) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteBytes(scratch / "log", {});
   EXPECT_EQ(ReadLog(scratch / "log").end, LogStatus::kEnd);
   EXPECT_THROW(EventLogReader(scratch / "missing"), LogError);
@@ -108,7 +108,7 @@ TEST(EventLog, EmptyFileEnds) {
 }
 
 TEST(EventLog, CutAtEveryByteOfTheLastRecord) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");
   const std::size_t last = RecordOffset(4);
@@ -137,7 +137,7 @@ TEST(EventLog, CutAtEveryByteOfTheLastRecord) {
 class CorruptLength : public testing::TestWithParam<std::uint32_t> {};
 
 TEST_P(CorruptLength, LosesThatRecordOnly) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   for (const std::size_t field : {20u, 24u}) {
     SCOPED_TRACE(field);
@@ -159,7 +159,7 @@ INSTANTIATE_TEST_SUITE_P(HugeNegativeAndSwallowing, CorruptLength,
                          testing::Values(0x7fffffffu, 0x80000000u, 0xffffffffu, 1u << 24, (1u << 24) + 1, 1u << 20, 60u));
 
 TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
   bytes[RecordOffset(3)] ^= 1;
@@ -176,7 +176,7 @@ TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
 }
 
 TEST(EventLog, FindsASyncWordWhereverItLies) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log", 1);
   const std::vector<std::uint8_t> record = ReadBytes(scratch / "log");
   for (std::size_t garbage = 1; garbage < (1 << 18); garbage += garbage < 2000 ? 1 : 997) {
@@ -191,7 +191,7 @@ TEST(EventLog, FindsASyncWordWhereverItLies) {
 
 // A record that lost 1, 2, 3 bytes claims as many of the next one.
 TEST(EventLog, BytesCutOutCostThatRecordOnly) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   for (const int cut : {1, 2, 3, 4, 5}) {
     std::filesystem::remove(scratch / "log");
     WriteSample(scratch / "log");
@@ -207,7 +207,7 @@ TEST(EventLog, BytesCutOutCostThatRecordOnly) {
 }
 
 TEST(EventLog, TheDigestCoversEveryByteOfTheRecord) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log", 3);
   const std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
   const LogEvent event = ReadLog(scratch / "log").events[2];
@@ -217,7 +217,7 @@ TEST(EventLog, TheDigestCoversEveryByteOfTheRecord) {
 }
 
 TEST(EventLog, RecoveryKeepsWhatFollowsDamage) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
   PutLength(bytes, RecordOffset(1) + 24, 0x7fffffff);
@@ -232,7 +232,7 @@ TEST(EventLog, RecoveryKeepsWhatFollowsDamage) {
 }
 
 TEST(EventLog, RecoveryRemovesNoGarbage) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log");
   std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
   const std::size_t size = bytes.size();
@@ -250,13 +250,13 @@ TEST(EventLog, RecoveryRemovesNoGarbage) {
 }
 
 TEST(EventLog, OneWriterAFile) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   const EventLogWriter writer(scratch / "log");
   EXPECT_THROW(EventLogWriter(scratch / "log"), LogError);
 }
 
 TEST(EventLog, RefusesWhatTheFormatCannotHold) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   EventLogWriter writer(scratch / "log");
   EXPECT_NO_THROW(writer.Append(0, std::string(63, 'c'), {}));
   EXPECT_THROW(writer.Append(0, std::string(64, 'c'), {}), std::invalid_argument);
@@ -267,7 +267,7 @@ TEST(EventLog, RefusesWhatTheFormatCannotHold) {
 
 // Whatever is changed, the reader ends, accounts for every byte, and returns only records that are in the file.
 TEST(EventLog, SurvivesMutation) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteSample(scratch / "log", 12);
   const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");
   const unsigned seed = std::random_device{}();

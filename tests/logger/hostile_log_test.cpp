@@ -10,7 +10,7 @@
 #include <malloc.h>
 
 #include "logger/event_log.h"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 // This program counts what it holds on the heap. Inlined, the compiler would see new end in free and warn.
 namespace {
@@ -163,7 +163,7 @@ class HostileLog : public testing::Test {
   const testing::ScopedTrace trace_{__FILE__, __LINE__, "seed " + std::to_string(seed_)};
   std::mt19937 random_{seed_};
   std::map<std::int64_t, std::int64_t> ends_;
-  const Scratch scratch_;
+  const ScratchDirectory scratch_;
 };
 
 TEST_F(HostileLog, EveryUndamagedRecordIsRecovered) {

@@ -13,7 +13,7 @@
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/logger/direct_bus.h"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -25,7 +25,7 @@ class LoggerNodeTest : public testing::Test {
   Rows ReadRows() { return Database(scratch_ / "log/decisions.sqlite").Read(); }
   std::vector<RunRow> Runs() { return Database(scratch_ / "log/decisions.sqlite").Runs(); }
 
-  Scratch scratch_;
+  ScratchDirectory scratch_;
   Config config_;
   DirectBus bus_;
   std::ostringstream out_;

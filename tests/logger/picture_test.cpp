@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -27,7 +27,7 @@ Picture Sample() {
 }
 
 TEST(Picture, WritesBothFormats) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   DrawPicture(Sample(), scratch / "a.svg");
   DrawPicture(Sample(), scratch / "a.png", 600, 400);
   const std::vector<std::uint8_t> svg = ReadBytes(scratch / "a.svg"), png = ReadBytes(scratch / "a.png");
@@ -39,7 +39,7 @@ TEST(Picture, WritesBothFormats) {
 }
 
 TEST(Picture, SameInputSameBytes) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   DrawPicture(Sample(), scratch / "a.png");
   DrawPicture(Sample(), scratch / "b.png");
   EXPECT_EQ(ReadBytes(scratch / "a.png"), ReadBytes(scratch / "b.png"));
@@ -50,7 +50,7 @@ TEST(Picture, SameInputSameBytes) {
 }
 
 TEST(Picture, DrawsNothingAndDegenerateThings) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   EXPECT_NO_THROW(DrawPicture({}, scratch / "empty.svg"));
   Picture picture;
   picture.path = {{1, 1}};
@@ -60,7 +60,7 @@ TEST(Picture, DrawsNothingAndDegenerateThings) {
 }
 
 TEST(Picture, SaysWhatItCannotWrite) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   EXPECT_THROW(DrawPicture({}, scratch / "a.jpg"), PictureError);
   EXPECT_THROW(DrawPicture({}, scratch / "a.png", 100, 800), PictureError);
   EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.png"), PictureError);

@@ -8,7 +8,7 @@
 #include "certifier/dynamics/models.h"
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/robot_state_t.hpp"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -66,7 +66,7 @@ class LogPictureTest : public testing::Test {
     Append("EXECUTION_EVENT", event);
   }
 
-  Scratch scratch_;
+  ScratchDirectory scratch_;
   EventLogWriter writer_{scratch_ / "log"};
   std::int64_t now_ = 0;
 };

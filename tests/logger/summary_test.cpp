@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "forereach/robot_state_t.hpp"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -48,7 +48,7 @@ void WriteRun(const std::string& path) {
 }
 
 TEST(Summary, CountsAHandMadeLog) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteRun(scratch / "log");
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
   EXPECT_EQ(summary.proposed, 100);
@@ -74,7 +74,7 @@ TEST(Summary, CountsAHandMadeLog) {
 }
 
 TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteRun(scratch / "log");
   Database database(scratch / "d.sqlite");
   EventLogReader reader(scratch / "log");
@@ -93,7 +93,7 @@ TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
 }
 
 TEST(Summary, OfNothingIsUnknownNotZero) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteBytes(scratch / "log", {});
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
   EXPECT_EQ(summary.proposed, 0);
@@ -105,7 +105,7 @@ TEST(Summary, OfNothingIsUnknownNotZero) {
 }
 
 TEST(Summary, PassesDamageAndCountsIt) {
-  const Scratch scratch;
+  const ScratchDirectory scratch;
   WriteRun(scratch / "log");
   std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
   bytes[0] = 0;

@@ -2,7 +2,6 @@
 #include "planner_bridge/policy.h"
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -13,13 +12,12 @@
 
 #include "planner_bridge/reference.h"
 #include "tests/planner/tasks.h"
+#include "tests/scratch.h"
 
 namespace forereach {
 namespace {
 
 using Json = nlohmann::json;
-
-std::string Scratch(const std::string& name) { return testing::TempDir() + "/" + name; }
 
 Json Read(const std::string& path) { return Json::parse(std::ifstream(path)); }
 
@@ -44,7 +42,8 @@ TEST(Policy, ComputesWhatItsHeaderSays) {
 }
 
 TEST(Policy, ComesBackFromItsFileToTheLastBit) {
-  const std::string path = Scratch("policy.json");
+  const ScratchDirectory scratch;
+  const std::string path = scratch / "policy.json";
   SavePolicy(path, Small());
   const Policy again = LoadPolicy(path);
   EXPECT_EQ(again.Act(Vec({0.1, 0.7})), Small().Act(Vec({0.1, 0.7})));
@@ -60,7 +59,8 @@ struct BadFile {
 };
 
 TEST(Policy, EveryBadFieldIsNamedWithValueAndBound) {
-  const std::string path = Scratch("policy.json");
+  const ScratchDirectory scratch;
+  const std::string path = scratch / "policy.json";
   SavePolicy(path, Small());
   const Json good = Read(path);
   for (const BadFile& bad : std::initializer_list<BadFile>{
@@ -105,7 +105,8 @@ TEST(Policy, EveryBadFieldIsNamedWithValueAndBound) {
 }
 
 TEST(Policy, AFieldOfAMillionListsInOneAnotherIsRefused) {
-  const std::string path = Scratch("policy.json");
+  const ScratchDirectory scratch;
+  const std::string path = scratch / "policy.json";
   SavePolicy(path, Small());
   std::stringstream good;
   good << std::ifstream(path).rdbuf();
@@ -115,7 +116,8 @@ TEST(Policy, AFieldOfAMillionListsInOneAnotherIsRefused) {
 }
 
 TEST(Policy, WhatIsNoJsonIsRefusedWithItsFile) {
-  const std::string path = Scratch("policy.json");
+  const ScratchDirectory scratch;
+  const std::string path = scratch / "policy.json";
   for (const char* text : {"", "{", "{\"format\": 1e999}", "\xff"}) {
     std::ofstream(path) << text;
     try {

@@ -52,7 +52,7 @@ class BusCommands : public testing::Test {
   }
 
   const ScratchDirectory scratch_;
-  const std::string path_ = (scratch_.path() / "task.yaml").string(), key_ = (scratch_.path() / "key").string();
+  const std::string path_ = scratch_ / "task.yaml", key_ = scratch_ / "key";
   Config config_;
   std::unique_ptr<Bus> bus_;
   std::unique_ptr<ChildProcess> certifier_;

@@ -2,7 +2,6 @@
 #include "certifier/process/certifier_node.h"
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -21,6 +20,7 @@
 
 #include "certifier/gate/obstacle_message.h"
 #include "tests/gate/small_task.h"
+#include "tests/scratch.h"
 
 namespace forereach {
 namespace {
@@ -491,7 +491,8 @@ class ReloadTest : public testing::Test {
   }
 
   const std::string kShipped = FOREREACH_SOURCE_DIR "/config/point_mass.yaml";
-  const std::string path_ = testing::TempDir() + "forereach_reload_" + std::to_string(getpid()) + ".yaml";
+  const ScratchDirectory scratch_;
+  const std::string path_ = scratch_ / "task.yaml";
   const Clock clock_ = [] { return kNow; };
   std::unique_ptr<Bus> bus_ = OpenBus("memq://", clock_);
   certifier_status_v2_t status_{};

@@ -13,7 +13,7 @@ namespace {
 
 TEST(LoggerProcessTest, RecordsAndEndsWithASummary) {
   const ScratchDirectory scratch;
-  const std::string path = scratch.Write("task.yaml", PatientTask()), directory = scratch.path() / "recorded";
+  const std::string path = scratch.Write("task.yaml", PatientTask()), directory = scratch / "recorded";
   const Config config = LoadConfig(path);
   BusProbe probe(PrivateBusUrl(), {"PLAN_CANDIDATE"});
   ChildProcess logger({FOREREACH_LOGGER, "--config", path, "--lcm-url", PrivateBusUrl(), "--directory", directory});

@@ -18,7 +18,7 @@ namespace {
 
 TEST(PipelineTest, FourProcessesDriveCertifiedPlansOnly) {
   const ScratchDirectory scratch;
-  const std::string path = scratch.Write("task.yaml", PatientTask(6)), directory = scratch.path() / "recorded";
+  const std::string path = scratch.Write("task.yaml", PatientTask(6)), directory = scratch / "recorded";
   const std::string url = PrivateBusUrl();
   BusProbe probe(url, {"PLAN_CANDIDATE", "PLAN_DECISION", "PLAN_CERTIFIED", "EXECUTION_EVENT"});
   ChildProcess logger({FOREREACH_LOGGER, "--config", path, "--lcm-url", url, "--directory", directory});

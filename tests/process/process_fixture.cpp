@@ -1,10 +1,8 @@
 #include "tests/process/process_fixture.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
 #include <fstream>
-#include <system_error>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -21,23 +19,6 @@ double ResidentBytes(pid_t pid) {
   double size = 0, resident = 0;
   file >> size >> resident;
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE));
-}
-
-ScratchDirectory::ScratchDirectory() {
-  std::string path = testing::TempDir() + "/forereach-test-XXXXXX";
-  if (!mkdtemp(path.data())) throw std::system_error(errno, std::generic_category(), path);
-  path_ = path;
-}
-
-ScratchDirectory::~ScratchDirectory() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
-std::string ScratchDirectory::Write(const std::string& name, const std::string& text) const {
-  const std::filesystem::path file = path_ / name;
-  std::ofstream(file) << text;
-  return file.string();
 }
 
 std::string PatientTask(int time_limit_s) {

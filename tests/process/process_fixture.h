@@ -1,7 +1,6 @@
 /** What tests of processes share: a bus of their own, a task file, candidates for it, and an ear on the bus. */
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -12,6 +11,7 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "lcmtypes/bus.h"
 #include "tests/process/child_process.h"
+#include "tests/scratch.h"
 
 namespace forereach {
 
@@ -20,22 +20,6 @@ namespace forereach {
 
 /** Of a process, this one too. */
 [[nodiscard]] double ResidentBytes(pid_t pid);
-
-/** A directory that goes with this object. */
-class ScratchDirectory final {
- public:
-  ScratchDirectory();
-  ~ScratchDirectory();
-  ScratchDirectory(const ScratchDirectory&) = delete;
-  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
-
-  [[nodiscard]] std::filesystem::path path() const { return path_; }
-  /** Writes a file in it and returns its path. */
-  std::string Write(const std::string& name, const std::string& text) const;
-
- private:
-  std::filesystem::path path_;
-};
 
 /** The shipped point mass with a goal, a robot that steps every 100 ms from rest at the origin, and a gate that bears
 with a slow machine and does without a robot: candidates may be 20 s old. The robot finishes after `time_limit_s`. */

@@ -54,7 +54,7 @@ TEST_P(UsageTest, AnUnknownOptionIsNamed) {
 }
 
 TEST_P(UsageTest, AMissingFileIsNamedInOneLine) {
-  ChildProcess process({program(), "--config", scratch_.path() / "none.yaml"});
+  ChildProcess process({program(), "--config", scratch_ / "none.yaml"});
   EXPECT_EQ(process.WaitForExit(), 2);
   EXPECT_THAT(process.error(), HasSubstr("none.yaml"));
   EXPECT_EQ(LastLine(process) + "\n", process.error());

@@ -12,7 +12,7 @@
 #include "cli/decision_json.h"
 #include "cli/progress.h"
 #include "tests/cli/program.h"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -57,7 +57,7 @@ class VerifyDecision : public testing::Test {
     for (const char* text : texts) EXPECT_THAT(output.text, HasSubstr(text));
   }
 
-  Scratch scratch_;
+  ScratchDirectory scratch_;
   std::string task_;
   Json decision_;
 };

@@ -12,7 +12,7 @@
 #include "cli/certificate_files.h"
 #include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/seal.h"
-#include "tests/logger/scratch.h"
+#include "tests/logger/logs.h"
 
 namespace forereach {
 namespace {
@@ -31,7 +31,7 @@ Verdict Judge(const CertificateFile& file, std::size_t i) {
 }
 
 // Copies the recorded log, each event changed by `edit`; false leaves it out.
-std::string Edited(const Scratch& scratch, const std::function<bool(LogEvent&)>& edit) {
+std::string Edited(const ScratchDirectory& scratch, const std::function<bool(LogEvent&)>& edit) {
   const std::string path = scratch / "edited.lcmlog";
   std::filesystem::remove(path);
   EventLogReader reader(kLog);
@@ -44,7 +44,7 @@ std::string Edited(const Scratch& scratch, const std::function<bool(LogEvent&)>&
 }
 
 // Changes the first certified plan, and if asked makes its digest good again.
-std::string EditedCertificate(const Scratch& scratch, bool reseal, const std::function<void(certified_plan_t&)>& edit) {
+std::string EditedCertificate(const ScratchDirectory& scratch, bool reseal, const std::function<void(certified_plan_t&)>& edit) {
   bool done = false;
   return Edited(scratch, [&](LogEvent& event) {
     auto certified = Decoded<certified_plan_t>(event.data);
@@ -69,7 +69,7 @@ TEST(VerifyLog, RecordedCourseIsConfirmed) {
 }
 
 TEST(VerifyLog, SliceShrunkenByOneUlp) {
-  Scratch scratch;
+  ScratchDirectory scratch;
   const auto path = EditedCertificate(scratch, false, [](certified_plan_t& certified) {
     certified.slice_upper[9][0] = std::nextafter(certified.slice_upper[9][0], -HUGE_VAL);
   });
@@ -81,7 +81,7 @@ TEST(VerifyLog, SliceShrunkenByOneUlp) {
 
 // The seal made good again covers no entry beyond those in use: these have to be zero.
 TEST(VerifyLog, AnEntryBeyondThoseInUse) {
-  Scratch scratch;
+  ScratchDirectory scratch;
   const auto path = EditedCertificate(scratch, true, [](certified_plan_t& certified) {
     certified.slice_lower[certified.plan.num_steps + 1][2] = 0.5;
   });
@@ -93,7 +93,7 @@ TEST(VerifyLog, AnEntryBeyondThoseInUse) {
 }
 
 TEST(VerifyLog, ALaterExpiry) {
-  Scratch scratch;
+  ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1'000'000; });
   const auto file = ReadCertificates(path, kConfig);
@@ -102,7 +102,7 @@ TEST(VerifyLog, ALaterExpiry) {
 }
 
 TEST(VerifyLog, SliceShrunkenAndResealed) {
-  Scratch scratch;
+  ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.slice_upper[9][0] -= 1e-9; });
   const auto file = ReadCertificates(path, kConfig);
@@ -114,7 +114,7 @@ TEST(VerifyLog, SliceShrunkenAndResealed) {
 }
 
 TEST(VerifyLog, ChangedControlOfTheCertifiedPlan) {
-  Scratch scratch;
+  ScratchDirectory scratch;
   const auto path =
       EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.plan.control[4][0] += 0.01; });
   const auto file = ReadCertificates(path, kConfig);
@@ -123,7 +123,7 @@ TEST(VerifyLog, ChangedControlOfTheCertifiedPlan) {
 }
 
 TEST(VerifyLog, MissingCertifiedPlanIsNoticed) {
-  Scratch scratch;
+  ScratchDirectory scratch;
   bool dropped = false;
   const auto path = Edited(scratch, [&](LogEvent& event) {
     if (dropped || !Decoded<certified_plan_t>(event.data)) return true;
@@ -136,7 +136,7 @@ TEST(VerifyLog, MissingCertifiedPlanIsNoticed) {
 }
 
 TEST(VerifyLog, DamageIsNoticed) {
-  Scratch scratch;
+  ScratchDirectory scratch;
   std::filesystem::copy(kLog, scratch / "damaged.lcmlog");
   std::fstream log(scratch / "damaged.lcmlog", std::ios::in | std::ios::out | std::ios::binary);
   log.seekp(4000);
@@ -194,7 +194,7 @@ class VerifyObstacles : public testing::Test {
     return path;
   }
 
-  Scratch scratch_;
+  ScratchDirectory scratch_;
   Config config_;
   candidate_plan_t candidate_{};
 };

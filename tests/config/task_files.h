@@ -1,38 +1,13 @@
 /** Task files to try: a good one, and the same with one thing changed. */
 #pragma once
 
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 
 #include "certifier/task/config.h"
+#include "tests/scratch.h"
 
 namespace forereach {
-
-/** A directory that goes with the object. */
-class ScratchDirectory {
- public:
-  ScratchDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "forereach-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw std::runtime_error("no scratch directory");
-    path_ = name;
-  }
-  ~ScratchDirectory() { std::filesystem::remove_all(path_); }
-  ScratchDirectory(const ScratchDirectory&) = delete;
-  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
-
-  std::string Path(const std::string& name) const { return path_ + "/" + name; }
-  std::string Write(const std::string& name, const std::string& text) const {
-    std::ofstream(Path(name), std::ios::binary) << text;
-    return Path(name);
-  }
-
- private:
-  std::string path_;
-};
 
 inline constexpr const char* kTransitions =
     "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n"
@@ -88,7 +63,7 @@ class TaskFiles {
     return Error(Replaced(kTask, from, to));
   }
   std::string Cut(std::string text) const {
-    const std::string prefix = directory_.Path("");
+    const std::string prefix = directory_ / "";
     for (std::size_t at; (at = text.find(prefix)) != std::string::npos;) text.erase(at, prefix.size());
     return text;
   }

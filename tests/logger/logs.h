@@ -1,11 +1,8 @@
-/** What the logger's tests share: a directory that goes away again, files as bytes, and messages. */
+/** What the logger's tests share: files as bytes, logs as lists, and messages. */
 #pragma once
 
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -14,29 +11,9 @@
 #include "forereach/execution_event_t.hpp"
 #include "lcmtypes/codec.h"
 #include "logger/event_log.h"
+#include "tests/scratch.h"
 
 namespace forereach {
-
-class Scratch final {
- public:
-  Scratch() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "forereach-logger-XXXXXX").string();
-    if (!mkdtemp(pattern.data())) throw std::runtime_error("no temporary directory");
-    path_ = pattern;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-
-  [[nodiscard]] std::string path() const { return path_.string(); }
-  [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline std::vector<std::uint8_t> ReadBytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
