@@ -262,6 +262,31 @@ std::vector<LogReference> Database::References(const std::string& log_file) {
   return references;
 }
 
+std::set<std::int64_t> Database::EventsBehindGaps(const std::string& log_file) {
+  std::set<std::int64_t> events;
+  Statement select(handle_.get(), "SELECT event_number FROM gaps WHERE log_file = ? AND event_number IS NOT NULL");
+  for (select.Bind(log_file); select.Step();) {
+    std::int64_t number = 0;
+    select.Read(number);
+    events.insert(number);
+  }
+  return events;
+}
+
+std::map<std::string, std::int64_t> Database::LossesWithoutEvents(const std::string& log_file) {
+  std::map<std::string, std::int64_t> losses;
+  Statement select(handle_.get(),
+                   "SELECT channel, lost FROM gaps WHERE log_file = ? AND event_number IS NULL AND lost > 0");
+  for (select.Bind(log_file); select.Step();) {
+    std::string channel;
+    std::int64_t lost = 0;
+    select.Read(channel, lost);
+    std::int64_t& sum = losses[channel];
+    sum = SumOfLost(sum, lost);
+  }
+  return losses;
+}
+
 Rows Database::Read(const std::string& log_file) {
   Rows rows;
   Statement decisions(handle_.get(), "SELECT * FROM decisions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number");

@@ -6,8 +6,10 @@ always written first, so rows that a cut took are made again from it. */
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -64,6 +66,12 @@ class Database final {
 
   /** The events that rows of one log file come from, by number; twice if rows differ in the digest. @throws DatabaseError. */
   [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);
+
+  /** The events of a log file that have a gap before them. @throws DatabaseError. */
+  [[nodiscard]] std::set<std::int64_t> EventsBehindGaps(const std::string& log_file);
+
+  /** Messages that a log file's gaps without an event count as lost, by channel. @throws DatabaseError. */
+  [[nodiscard]] std::map<std::string, std::int64_t> LossesWithoutEvents(const std::string& log_file);
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] const std::string& problem() const { return problem_; }

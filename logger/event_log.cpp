@@ -110,17 +110,19 @@ LogStatus EventLogReader::Next(LogEvent& event) {
     const std::int64_t channel = offset_ + kHeaderBytes, data = channel + header.channel_bytes;
     const std::int64_t end = data + header.data_bytes;
     next = SyncAt(end) ? end : FindRecord(offset_ + 1, end);
-    event.number = header.number;
-    event.utime = header.utime;
-    event.channel.resize(static_cast<std::size_t>(header.channel_bytes));
-    const auto data_bytes = static_cast<std::size_t>(header.data_bytes);
-    // Growing would hold the old bytes beside the new.
-    if (event.data.capacity() < data_bytes) std::vector<std::uint8_t>().swap(event.data);
-    event.data.resize(data_bytes);
-    if (next == end && ReadAt(channel, event.channel.data(), header.channel_bytes) &&
-        ReadAt(data, event.data.data(), header.data_bytes)) {
-      offset_ = end;
-      return LogStatus::kEvent;
+    if (next == end) {  // else the claim is not believed, and no room is made for it
+      event.number = header.number;
+      event.utime = header.utime;
+      event.channel.resize(static_cast<std::size_t>(header.channel_bytes));
+      const auto data_bytes = static_cast<std::size_t>(header.data_bytes);
+      // Growing would hold the old bytes beside the new.
+      if (event.data.capacity() < data_bytes) std::vector<std::uint8_t>().swap(event.data);
+      event.data.resize(data_bytes);
+      if (ReadAt(channel, event.channel.data(), header.channel_bytes) &&
+          ReadAt(data, event.data.data(), header.data_bytes)) {
+        offset_ = end;
+        return LogStatus::kEvent;
+      }
     }
   } else {
     next = FindRecord(offset_ + 1, size_);
@@ -184,8 +186,7 @@ void EventLogWriter::Recover(const std::string& path) {
   recovery_.cut_bytes = reader.size() - offset_;
   recovery_.corruptions = reader.corruptions();
   recovery_.skipped_bytes = reader.skipped_bytes();
-  if ((recovery_.cut_bytes > 0 && ::ftruncate(file_, offset_) != 0) || ::lseek(file_, offset_, SEEK_SET) < 0)
-    throw LogError(Reason("log: cannot recover ", path));
+  if (recovery_.cut_bytes > 0 && ::ftruncate(file_, offset_) != 0) throw LogError(Reason("log: cannot recover ", path));
 }
 
 std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& channel, Bytes data) {
@@ -198,21 +199,23 @@ std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& chann
 
 bool EventLogWriter::Flush() {
   if (buffer_.empty()) return true;
-  std::size_t written = 0;
-  while (written < buffer_.size()) {
-    const ssize_t count = ::write(file_, buffer_.data() + written, buffer_.size() - written);
+  const std::int64_t end = offset_ + pending_bytes();
+  std::int64_t at = offset_;  // not the file's own position, which a failed write leaves anywhere
+  while (at < end) {
+    const ssize_t count = ::pwrite(file_, buffer_.data() + (at - offset_), static_cast<std::size_t>(end - at), at);
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) break;
-    written += static_cast<std::size_t>(count);
+    at += count;
   }
-  const bool confirmed = written == buffer_.size() && ::fdatasync(file_) == 0;
+  const bool confirmed = at == end && (!is_torn_ || ::ftruncate(file_, end) == 0) && ::fdatasync(file_) == 0;
   if (confirmed) {
-    offset_ += static_cast<std::int64_t>(written);
+    offset_ = end;
+    is_torn_ = false;
   } else {
     problem_ = std::string("log: cannot write: ") + std::strerror(errno);
     // A torn record in the middle of the file would read as damage.
-    if (::ftruncate(file_, offset_) != 0 || ::lseek(file_, offset_, SEEK_SET) < 0)
-      problem_ += std::string("; cannot put the file back: ") + std::strerror(errno);
+    is_torn_ = ::ftruncate(file_, offset_) != 0;
+    if (is_torn_) problem_ += std::string("; cannot put the file back: ") + std::strerror(errno);
   }
   buffer_.clear();
   return confirmed;

@@ -59,7 +59,8 @@ class EventLogReader final {
 
   /** Reads the next record; `event` is meaningful for kEvent only. kEnd and kCutTail repeat.
   Length fields are not believed blindly: one that points behind the end of the file is a cut tail only if no whole
-  record follows, and one behind whose record no sync word stands is damaged if it hides another whole record.
+  record follows, and one behind whose record no sync word stands is damaged if it hides another whole record. Room is
+  made for records that are believed only.
   Cost: linear in the bytes passed; `event` never holds more than kMaxLogDataBytes beside its channel. */
   [[nodiscard]] LogStatus Next(LogEvent& event);
 
@@ -125,7 +126,8 @@ class EventLogWriter final {
   std::int64_t Append(std::int64_t utime, const std::string& channel, Bytes data);
 
   /** Writes everything appended so far and has the disk confirm it. On failure the file is put back to its last
-  whole record, the events since are lost and false is returned; `problem` then says why. */
+  whole record, the events since are lost and false is returned; `problem` then says why. Where it cannot be put back,
+  the next Flush writes over what was left and confirms nothing before the file ends with its own last record. */
   [[nodiscard]] bool Flush();
 
   [[nodiscard]] const LogRecovery& recovery() const { return recovery_; }
@@ -139,6 +141,7 @@ class EventLogWriter final {
   void Recover(const std::string& path);
 
   int file_ = -1;
+  bool is_torn_ = false;  // something may stand behind offset_
   std::vector<std::uint8_t> buffer_;
   std::int64_t offset_ = 0, next_number_ = 0;
   LogRecovery recovery_;

@@ -16,10 +16,13 @@
 namespace forereach {
 namespace {
 
+// By which a sender's clock may be ahead, or a message have been under way.
+constexpr std::int64_t kApartUs = 1'000'000;
+
 template <class Message>
-std::optional<std::int64_t> SequenceOf(Bytes bytes) {
+std::optional<Position> PositionOf(Bytes bytes) {
   const auto message = Decoded<Message>(bytes);
-  return message ? std::optional(message->sequence) : std::nullopt;
+  return message ? std::optional(Position{message->sequence, message->utime}) : std::nullopt;
 }
 
 DecisionRow MakeRow(const decision_t& decision, LogReference event) {
@@ -67,28 +70,32 @@ EventRow MakeRow(const execution_event_t& event, LogReference reference) {
 
 }  // namespace
 
-Interpreter::Interpreter(BusOptions channels, std::string log_file)
-    : channels_(std::move(channels)), log_file_(std::move(log_file)) {}
+Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optional<Key256> key)
+    : channels_(std::move(channels)),
+      signed_channels_(channels_.signed_channels()),
+      log_file_(std::move(log_file)),
+      key_(key) {}
 
-std::pair<Stream, std::optional<std::int64_t>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
+std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
   const Stream plain{channel, ""};
   if (channel == channels_.candidate) {
     const auto candidate = Decoded<candidate_plan_t>(bytes);
     if (!candidate) return {plain, std::nullopt};
-    return {{channel, GetText(candidate->source)}, candidate->sequence};
+    return {Stream{channel, GetText(candidate->source)}, Position{candidate->sequence, candidate->utime}};
   }
-  if (channel == channels_.decision) return {plain, SequenceOf<decision_t>(bytes)};
-  if (channel == channels_.certified) return {plain, SequenceOf<certified_plan_t>(bytes)};
-  if (channel == channels_.robot_state) return {plain, SequenceOf<robot_state_t>(bytes)};
-  if (channel == channels_.transition) return {plain, SequenceOf<transition_t>(bytes)};
-  if (channel == channels_.status) return {plain, SequenceOf<certifier_status_v2_t>(bytes)};
-  if (channel == channels_.fault) return {plain, SequenceOf<fault_t>(bytes)};
-  if (channel == channels_.event) return {plain, SequenceOf<execution_event_t>(bytes)};
-  if (channel == channels_.logger_status) return {plain, SequenceOf<logger_status_t>(bytes)};
+  if (channel == channels_.decision) return {plain, PositionOf<decision_t>(bytes)};
+  if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
+  if (channel == channels_.robot_state) return {plain, PositionOf<robot_state_t>(bytes)};
+  if (channel == channels_.transition) return {plain, PositionOf<transition_t>(bytes)};
+  if (channel == channels_.status) return {plain, PositionOf<certifier_status_v2_t>(bytes)};
+  if (channel == channels_.fault) return {plain, PositionOf<fault_t>(bytes)};
+  if (channel == channels_.event) return {plain, PositionOf<execution_event_t>(bytes)};
+  if (channel == channels_.logger_status) return {plain, PositionOf<logger_status_t>(bytes)};
   return {plain, std::nullopt};  // obstacles_t's sequence only has to grow
 }
 
 void Interpreter::Observe(const LogEvent& event, Rows& rows) {
+  if (!IsAuthentic(event)) return;
   const auto reference = [&] { return LogReference{log_file_, event.number, ToHex(DigestOf(event))}; };
   if (std::optional<GapRow> gap = CheckSequence(event)) {
     gap->event = reference();
@@ -114,12 +121,31 @@ void Interpreter::Forgive(const Stream& stream, std::int64_t lost) {
   if (found != streams_.end()) found->second.forgiven += lost;
 }
 
+bool Interpreter::IsAuthentic(const LogEvent& event) {
+  if (!key_ || !signed_channels_.contains(event.channel)) return true;
+  if (!authenticator_) authenticator_.emplace(*key_, std::max<std::int64_t>(event.utime, 0) - kApartUs);
+  return authenticator_->Check(event.channel, event.data).first == Authenticity::kAuthentic;
+}
+
+// 0 is a new beginning whatever its stamp, for the sender's clock may have been set back; but not the last 0 once more.
+bool Interpreter::Count::IsLateOrRepeated(const Position& behind) const {
+  return behind.sequence == 0 ? begun_utime == behind.utime : behind.utime <= newest_utime;
+}
+
 std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
-  const auto [stream, sequence] = Identify(event.channel, event.message());
-  if (!sequence || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return std::nullopt;
+  auto [stream, position] = Identify(event.channel, event.message());
+  if (!position || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return std::nullopt;
   Count& count = streams_[stream];
-  const std::int64_t got = *sequence, expected = count.next.value_or(got), forgiven = count.forgiven;
-  count = {got < INT64_MAX ? got + 1 : got, 0};
+  if (count.last == position) return std::nullopt;  // the same once more, however stamped
+  count.last = position;
+  // Else a stamp far ahead would be the newest for ever.
+  position->utime = std::min(position->utime, std::min(event.utime, INT64_MAX - kApartUs) + kApartUs);
+  const std::int64_t got = position->sequence, expected = count.next.value_or(got), forgiven = count.forgiven;
+  if (got < expected && count.IsLateOrRepeated(*position)) return std::nullopt;
+  count.newest_utime = count.next && got >= expected ? std::max(count.newest_utime, position->utime) : position->utime;
+  count.next = got < INT64_MAX ? got + 1 : got;
+  count.forgiven = 0;
+  if (got == 0) count.begun_utime = position->utime;
   if (got == expected) return std::nullopt;
   GapRow gap{{}, stream.channel, stream.source, expected, got, 0, event.utime, "restart"};
   if (got > expected) {

@@ -1,5 +1,12 @@
 /** Turns what the bus carried, in the order of the log, into database rows. No file, no SQL, no clock: the same events
-give the same rows, live and when a log is read again. */
+give the same rows, live and when a log is read again.
+
+Sequence numbers. A message ahead of its stream's count makes a gap "bus". One behind it is late or repeated and makes
+none, unless its sender has begun anew: then its stamp is later than all of the stream, or its sequence is 0. A late
+message that a gap has counted as lost stays counted.
+
+With a key, messages on the signed channels that are not authentic make no rows and do not count: neither unsigned and
+forged ones, nor those that came before or were signed long before the first that this interpreter saw. */
 #pragma once
 
 #include <compare>
@@ -7,10 +14,12 @@ give the same rows, live and when a log is read again. */
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
 #include "certifier/task/config.h"
+#include "lcmtypes/authentic.h"
 #include "lcmtypes/codec.h"
 #include "logger/event_log.h"
 #include "logger/rows.h"
@@ -23,12 +32,19 @@ struct Stream {
   auto operator<=>(const Stream&) const = default;
 };
 
+/** A message's own sequence and utime. */
+struct Position {
+  std::int64_t sequence, utime;
+  friend bool operator==(const Position&, const Position&) = default;
+};
+
 class Interpreter final {
  public:
-  Interpreter(BusOptions channels, std::string log_file);
+  /** @param key that `channels.signed_channels()` are signed with; nothing: every message is taken for authentic. */
+  Interpreter(BusOptions channels, std::string log_file, std::optional<Key256> key = {});
 
-  /** The stream of a message, and its sequence number if it is one of a type that counts them. */
-  [[nodiscard]] std::pair<Stream, std::optional<std::int64_t>> Identify(const std::string& channel, Bytes bytes) const;
+  /** The stream of a message, and its place in it if it is one of a type that counts them. */
+  [[nodiscard]] std::pair<Stream, std::optional<Position>> Identify(const std::string& channel, Bytes bytes) const;
 
   /** The next event is the first of another file, which goes on where this one ends. */
   void Continue(std::string log_file) { log_file_ = std::move(log_file); }
@@ -39,20 +55,31 @@ class Interpreter final {
   /** `lost` messages of the stream, the next ones of its count, are accounted for already: they make no second gap. */
   void Forgive(const Stream& stream, std::int64_t lost);
 
+  /** Messages that were not authentic. */
+  [[nodiscard]] Refusals refusals() const { return authenticator_ ? authenticator_->refusals() : Refusals{}; }
+
  private:
   static constexpr std::size_t kMaxStreams = 1024;     // a sender that invents sources must not fill the memory
   static constexpr std::size_t kMaxCandidates = 1024;  // undecided
 
   struct Count {
     std::optional<std::int64_t> next;
-    std::int64_t forgiven = 0;
+    std::int64_t forgiven = 0, newest_utime = 0;
+    std::optional<std::int64_t> begun_utime;  // of the last message 0
+    std::optional<Position> last;             // as it was heard
+
+    [[nodiscard]] bool IsLateOrRepeated(const Position& behind) const;
   };
 
+  [[nodiscard]] bool IsAuthentic(const LogEvent& event);
   [[nodiscard]] std::optional<GapRow> CheckSequence(const LogEvent& event);  // without its event
   [[nodiscard]] double LatencyUs(const Digest& plan, std::int64_t utime);
 
   BusOptions channels_;
+  std::set<std::string> signed_channels_;
   std::string log_file_;
+  std::optional<Key256> key_;
+  std::optional<Authenticator> authenticator_;  // from the first message on a signed channel on
   std::map<Stream, Count> streams_;
   std::deque<std::pair<Digest, std::int64_t>> candidates_;  // received and not yet decided
 };

@@ -13,6 +13,14 @@ namespace {
 
 constexpr std::size_t kMaxStreamsInOverflow = 256;
 
+// Empty if every message was authentic.
+std::string InWords(const Refusals& refusals) {
+  const auto& [unsigned_ones, forged, replayed] = refusals;
+  const std::int64_t all = unsigned_ones + forged + replayed;
+  if (all == 0) return "";
+  return fmt::format("{} (unsigned {}, forged {}, replayed {})", all, unsigned_ones, forged, replayed);
+}
+
 }  // namespace
 
 LoggerNode::LoggerNode(const Config& config, Bus& bus, std::ostream& out, FreeSpace free_space)
@@ -60,6 +68,7 @@ void LoggerNode::Drain(std::int64_t now_us) {
 void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
   heartbeat_.Start(now_us);
   const std::string trouble = recorder_.trouble(), silence = Silence(now_us);
+  const std::string refused = InWords(recorder_.interpreter().refusals());
   logger_status_t status{};
   status.utime = now_us;
   status.sequence = heartbeats_++;
@@ -76,7 +85,10 @@ void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
                  : trouble.empty() && silence.empty() ? logger_status_t::OK
                                                       : logger_status_t::STALE;
   status.failed_flushes = static_cast<std::int16_t>(recorder_.failed_flushes());
-  SetText(status.message, !trouble.empty() ? trouble : !silence.empty() ? silence : "recording");
+  SetText(status.message, !trouble.empty()   ? trouble
+                          : !silence.empty() ? silence
+                          : !refused.empty() ? "recording; not authentic and in no row: " + refused
+                                             : "recording");
   bus_.Publish(channels_.logger_status, status);
 }
 
@@ -91,8 +103,10 @@ void LoggerNode::Stop() {
   recorder_.End(now_us_);
   out_ << "log                       " << recorder_.log_path();
   if (recorder_.files() > 1) out_ << ", the last of " << recorder_.files();
-  out_ << "\ndatabase                  " << recorder_.database().path() << "\n"
-       << ToText(recorder_.summary()) << std::flush;
+  out_ << "\ndatabase                  " << recorder_.database().path() << "\n" << ToText(recorder_.summary());
+  const std::string refused = InWords(recorder_.interpreter().refusals());
+  if (!refused.empty()) out_ << "not authentic             " << refused << ", in the log and in no row\n";
+  out_ << std::flush;
 }
 
 }  // namespace forereach

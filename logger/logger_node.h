@@ -2,7 +2,8 @@
 database (logger/recorder.h says how, and what can be lost), and sends a heartbeat that says how it fares.
 
 Handlers only copy into a bounded queue, and Tick takes from it, whatever the disk does: what does not fit the queue is
-dropped, counted and becomes a gap. */
+dropped, counted and becomes a gap. With bus.key the log holds every message all the same, but only authentic ones make
+rows; how many were not is in the heartbeat's sentence and in what Stop prints. */
 #pragma once
 
 #include <cstdint>
@@ -25,7 +26,8 @@ class LoggerNode final : public Node {
   static constexpr std::int64_t kSilenceUs = 2'000'000;  ///< Without a message this long the bus counts as silent.
 
   /** Opens the database, mends earlier runs and subscribes to all.
-  @param out where Stop prints the summary. @throws LogError, DatabaseError if the directory cannot be written to. */
+  @param out where Stop prints the summary. @throws LogError, DatabaseError if the directory cannot be written to,
+  KeyError if bus.key cannot be used. */
   LoggerNode(const Config& config, Bus& bus, std::ostream& out, FreeSpace free_space = FreeBytes);
 
   /** The first call opens the log file, named after its time. @throws LogError, DatabaseError if it cannot. */

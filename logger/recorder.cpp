@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <set>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -11,8 +12,7 @@ namespace forereach {
 namespace {
 
 constexpr std::int64_t kMaxBufferBytes = 4 << 20;
-constexpr std::size_t kMaxWaitingRows = 100'000;  // while the database refuses them
-constexpr std::size_t kMaxLosses = 256;           // a sender that invents channels must not fill the memory
+constexpr std::size_t kMaxLosses = 256;  // a sender that invents channels must not fill the memory
 constexpr int kEventsPerTransaction = 4096;
 constexpr double kScanUs = 1e6, kGapsUs = 10e6, kRetryUs = 1e6;
 
@@ -20,6 +20,16 @@ template <class Row>
 void MoveTo(std::vector<Row>& to, std::vector<Row>& from) {
   to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
   from.clear();
+}
+
+// Takes from a gap found again what gaps without an event have counted already; false if nothing is left of it.
+bool IsMore(GapRow& gap, std::map<std::string, std::int64_t>& counted) {
+  const auto known = counted.find(gap.channel);
+  if (known == counted.end()) return true;
+  const std::int64_t again = std::min(known->second, gap.lost);
+  known->second -= again;
+  gap.lost -= again;
+  return gap.lost > 0 || gap.reason == "restart";
 }
 
 // Of gaps found in events that are in no log.
@@ -30,6 +40,34 @@ void WithoutEvents(std::vector<GapRow>& gaps) {
   }
 }
 
+// Where losses of this reason and stream are counted in such a map: once it is full, new streams are counted as one.
+template <class Counts>
+std::pair<std::string, Stream> KeyIn(const Counts& counts, const std::string& reason, const Stream& stream) {
+  std::pair key{reason, stream};
+  if (counts.size() >= kMaxLosses && !counts.contains(key)) key.second = {"*", ""};
+  return key;
+}
+
+// The gaps without an event, those of one stream and reason as one.
+std::vector<GapRow> MergedWithoutEvents(const std::vector<GapRow>& gaps) {
+  std::map<std::pair<std::string, Stream>, GapRow> merged;
+  for (const GapRow& gap : gaps) {
+    if (gap.event.event_number >= 0) continue;
+    const auto key = KeyIn(merged, gap.reason, {gap.channel, gap.source});
+    const auto [entry, is_first] = merged.try_emplace(key, gap);
+    GapRow& all = entry->second;
+    all.channel = key.second.channel;
+    all.source = key.second.source;
+    if (is_first) continue;
+    all.lost = SumOfLost(all.lost, gap.lost);
+    all.utime = std::min(all.utime, gap.utime);
+    all.expected = all.got = -1;
+  }
+  std::vector<GapRow> rows;
+  for (auto& [key, gap] : merged) rows.push_back(std::move(gap));
+  return rows;
+}
+
 std::int64_t BytesOf(double megabytes) { return static_cast<std::int64_t>(megabytes * 1e6); }
 
 }  // namespace
@@ -37,11 +75,12 @@ std::int64_t BytesOf(double megabytes) { return static_cast<std::int64_t>(megaby
 Recorder::Recorder(const Config& config, FreeSpace free_space)
     : channels_(config.bus),
       options_(config.logger),
+      key_(channels_.key.empty() ? std::nullopt : std::optional(LoadKey(channels_.key))),
       free_space_(std::move(free_space)),
       directory_(options_.directory),
       database_(directory_.PathOf(LogDirectory::kDatabase)),
       summary_(config),
-      interpreter_(channels_, ""),
+      interpreter_(channels_, "", key_),
       flush_(options_.flush_ms * 1e3),
       age_(options_.rotate_minutes * 60e6),
       scan_(kScanUs),
@@ -70,6 +109,8 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
   const EventLogWriter mended(path);  // removes a cut tail, and keeps others from doing the same meanwhile
   EventLogReader reader(path);
   Interpreter interpreter = InterpreterFor(run);
+  const std::set<std::int64_t> known = database_.EventsBehindGaps(run.log_file);
+  std::map<std::string, std::int64_t> counted = database_.LossesWithoutEvents(run.log_file);
   Rows rows;
   std::int64_t new_rows = 0, unwritten = 0, events = run.events;
   const auto write = [&] {
@@ -80,7 +121,10 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
     rows = {};
   };
   ForEachEvent(reader, [&](const LogEvent& event) {
+    const std::size_t gaps = rows.gaps.size();
     interpreter.Observe(event, rows);
+    const bool is_found_again = rows.gaps.size() > gaps && !known.contains(event.number);
+    if (is_found_again && !IsMore(rows.gaps.back(), counted)) rows.gaps.pop_back();
     if (event.number < run.events) rows = {};
     events = std::max(run.events, event.number + 1);
     if (++unwritten >= kEventsPerTransaction) write();
@@ -94,7 +138,7 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
 
 // What it knew when the file began: it has seen the file before, if there is one.
 Interpreter Recorder::InterpreterFor(const RunRow& run) const {
-  Interpreter interpreter(channels_, run.continues);
+  Interpreter interpreter(channels_, run.continues, key_);
   if (!run.continues.empty() && directory_.Bytes(run.continues)) {
     EventLogReader before(directory_.PathOf(run.continues));
     Rows ignored;
@@ -187,9 +231,7 @@ void Recorder::Lose(const Stream& stream, std::int64_t lost, std::int64_t utime,
 }
 
 void Recorder::CountLoss(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason) {
-  std::pair key{reason, stream};
-  if (losses_.size() >= kMaxLosses && !losses_.contains(key)) key.second = {"*", ""};
-  Loss& loss = losses_.try_emplace(key, Loss{0, utime}).first->second;
+  Loss& loss = losses_.try_emplace(KeyIn(losses_, reason, stream), Loss{0, utime}).first->second;
   loss.lost += lost;
   lost_ += lost;
 }
@@ -249,7 +291,6 @@ bool Recorder::FlushLog(std::int64_t now_us) {
   return flushed;
 }
 
-// Rows that the database refuses wait for the next flush; beyond a bound they are left to the next start's recovery.
 void Recorder::WriteRows() {
   const std::size_t waiting = flushed_rows_.decisions.size() + flushed_rows_.events.size() + flushed_rows_.gaps.size();
   if (waiting == 0) return;
@@ -258,7 +299,7 @@ void Recorder::WriteRows() {
     flushed_rows_ = {};
   } else if (waiting > kMaxWaitingRows) {
     rows_lost_ = true;
-    flushed_rows_ = {};
+    flushed_rows_ = {{}, {}, MergedWithoutEvents(flushed_rows_.gaps)};
   }
 }
 

@@ -4,6 +4,9 @@
 fdatasync) and after it the rows of those events go to the database in one transaction. So the database never knows more
 than the log, and a recorder that is killed loses at most what came since the last flush; a machine that loses power the
 same. When it begins, log files that were not ended are mended: a cut tail is removed and missing rows are made again.
+Rows that the database refuses wait. Beyond kMaxWaitingRows those that come from an event are dropped: the next start
+makes them again. Gaps without an event, which no log holds, wait on, those of one stream and reason as one. What they
+count is not counted once more where the log is read again.
 
 **Files.** One row of the database's runs for each file. A file ends, and the next begins, before the event with which it
 would exceed logger.rotate_mb, and after logger.rotate_minutes; event numbers begin anew, sequence counts and waiting
@@ -25,6 +28,7 @@ deleted, nor is any if that would not make room. */
 #include <vector>
 
 #include "certifier/task/config.h"
+#include "lcmtypes/authentic.h"
 #include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/interpreter.h"
@@ -50,8 +54,11 @@ class Period final {
 
 class Recorder final {
  public:
-  /** Makes the directory if need be, opens the database in it and mends earlier runs.
-  @throws LogError, DatabaseError if the directory cannot be written to. */
+  static constexpr std::size_t kMaxWaitingRows = 100'000;
+
+  /** Makes the directory if need be, opens the database in it and mends earlier runs. With bus.key only authentic
+  messages make rows (logger/interpreter.h).
+  @throws LogError, DatabaseError if the directory cannot be written to, KeyError. */
   Recorder(const Config& config, FreeSpace free_space);
 
   /** Opens the first log file, named after its time; the rest is to be called after it. @throws as the constructor. */
@@ -117,6 +124,7 @@ class Recorder final {
 
   const BusOptions channels_;
   const LoggerOptions options_;
+  const std::optional<Key256> key_;
   const FreeSpace free_space_;
   const LogDirectory directory_;
   Database database_;

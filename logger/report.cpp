@@ -22,7 +22,6 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
-#include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "logger/event_log.h"
 
@@ -37,7 +36,7 @@ class PictureMaker final {
   explicit PictureMaker(const Config& config)
       : channels_(config.bus),
         certifier_(config.problem),
-        obstacles_(config.obstacles, certifier_.projection().dim()),
+        obstacles_(config),
         learns_(config.gate.learns) {
     if (certifier_.projection().dim() != 2)
       throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}",
@@ -54,7 +53,8 @@ class PictureMaker final {
     } else if (event.channel == channels_.decision) {
       if (const auto decision = Decoded<decision_t>(event.message())) AddDecision(*decision);
     } else if (event.channel == channels_.obstacles) {
-      if (const auto obstacles = Decoded<obstacles_t>(event.message())) Update(*obstacles);
+      CertifyAgain();
+      static_cast<void>(obstacles_.Update(event.message(), event.utime));  // as the gate, but for the time between both
     } else if (event.channel == channels_.transition) {
       if (const auto transition = Decoded<transition_t>(event.message()); transition && learns_) Learn(*transition);
     } else if (event.channel == channels_.robot_state) {
@@ -80,12 +80,6 @@ class PictureMaker final {
     candidate_plan_t candidate;
     int outcome, step;
   };
-
-  // Where they are refused, the gate kept its obstacles too.
-  void Update(const obstacles_t& message) {
-    CertifyAgain();
-    static_cast<void>(obstacles_.Update(message));
-  }
 
   void AddDecision(const decision_t& decision) {
     const auto found = std::ranges::find(candidates_, GetDigest(decision.plan_digest),

@@ -1,6 +1,7 @@
 /** What the database holds of a log, without SQL: made by the interpreter, written and read by the database. */
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -47,10 +48,16 @@ struct GapRow {
   std::int64_t lost = 0;
   std::int64_t utime = 0;
   /** "bus": never arrived; "queue": arrived while the logger's queue was full; "restart": the sender began anew;
-  "disk": could not be written, or too little was free; "quota": logger.quota_mb had no room for them; "backlog": discarded by the bus before the logger took it, of any channel: those that
-  count their messages show a gap "bus" too. */
+  "disk": could not be written, or too little was free; "quota": logger.quota_mb had no room for them; "backlog":
+  discarded by the bus before the logger took it, of any channel: those that count their messages show a gap "bus" too. */
   std::string reason;
 };
+
+/** Of two counts of lost messages. A sender may invent any sequence, so it ends at the largest number. */
+[[nodiscard]] inline std::int64_t SumOfLost(std::int64_t a, std::int64_t b) {
+  b = std::max<std::int64_t>(b, 0);
+  return std::min(a, INT64_MAX - b) + b;
+}
 
 struct Rows {
   std::vector<DecisionRow> decisions;

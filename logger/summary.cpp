@@ -155,9 +155,10 @@ void SummaryBuilder::Add(const EventRow& row) {
 
 void SummaryBuilder::Add(const GapRow& row) {
   if (row.reason == "backlog") {
-    summary_.backlog += row.lost;
+    summary_.backlog = SumOfLost(summary_.backlog, row.lost);
   } else if (row.lost > 0) {
-    summary_.lost[row.reason] += row.lost;
+    std::int64_t& sum = summary_.lost[row.reason];
+    sum = SumOfLost(sum, row.lost);
   }
   if (row.reason == "restart") ++summary_.restarts;
 }

@@ -63,10 +63,17 @@ class DiskTest : public testing::Test {
     }
     return sequences;
   }
-  [[nodiscard]] std::int64_t LostTo(const std::string& reason) const {
+  [[nodiscard]] std::int64_t LostTo(const std::string& reason) const { return LostTo(reason, ReadRows()); }
+  [[nodiscard]] static std::int64_t LostTo(const std::string& reason, const Rows& rows) {
     std::int64_t lost = 0;
-    for (const GapRow& gap : ReadRows().gaps) lost += gap.reason == reason ? gap.lost : 0;
+    for (const GapRow& gap : rows.gaps) lost += gap.reason == reason ? gap.lost : 0;
     return lost;
+  }
+  void Sql(const char* statement) const {
+    sqlite3* handle = nullptr;
+    ASSERT_EQ(sqlite3_open((scratch_ / "log/decisions.sqlite").c_str(), &handle), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(handle, statement, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(handle);
+    sqlite3_close(handle);
   }
   [[nodiscard]] const logger_status_t& last() const { return bus_.heartbeats.back(); }
 
@@ -193,14 +200,8 @@ TEST_F(DiskTest, RowsMadeAgainAreTheSame) {
   EXPECT_GT(Runs().size(), 10u);
   EXPECT_EQ(live.size(), 120 + ReadRows().gaps.size());
 
-  sqlite3* handle = nullptr;
-  ASSERT_EQ(sqlite3_open((scratch_ / "log/decisions.sqlite").c_str(), &handle), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(handle,
-                         "DELETE FROM decisions; DELETE FROM execution_events; DELETE FROM gaps;"
-                         "UPDATE runs SET end_utime = NULL, events = 0",
-                         nullptr, nullptr, nullptr),
-            SQLITE_OK);
-  sqlite3_close(handle);
+  Sql("DELETE FROM decisions; DELETE FROM execution_events; DELETE FROM gaps;"
+      "UPDATE runs SET end_utime = NULL, events = 0");
   { const LoggerNode recovery(config_, bus_, out_); }
   EXPECT_EQ(InWords(ReadRows()), live);
 }
@@ -315,22 +316,55 @@ TEST_F(DiskTest, TheHeartbeatSaysHowItFares) {
 TEST_F(DiskTest, ADatabaseThatLagsIsStale) {
   Start();
   Feed(1);
-  const auto sql = [this](const char* statement) {
-    sqlite3* handle = nullptr;
-    ASSERT_EQ(sqlite3_open((scratch_ / "log/decisions.sqlite").c_str(), &handle), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(handle, statement, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(handle);
-    sqlite3_close(handle);
-  };
-  sql("CREATE TRIGGER full BEFORE INSERT ON execution_events BEGIN SELECT RAISE(ABORT, 'no more'); END");
+  Sql("CREATE TRIGGER full BEFORE INSERT ON execution_events BEGIN SELECT RAISE(ABORT, 'no more'); END");
   config_.logger.rotate_mb = 10 * kRecord * 1e-6;
   Feed(600);
   EXPECT_EQ(last().state, logger_status_t::STALE);
   EXPECT_THAT(GetText(last().message), HasSubstr("no more"));
-  sql("DROP TRIGGER full");
+  Sql("DROP TRIGGER full");
   Feed(600);
   EXPECT_EQ(last().state, logger_status_t::OK);
   Stop();
   EXPECT_EQ(std::ssize(ReadRows().events), fed_);
+}
+
+// Rows of events come back from the log; that of a loss which no event shows is the only word of it.
+TEST_F(DiskTest, ADatabaseThatRefusesForLongCostsNoGapWithoutAnEvent) {
+  config_.logger.flush_ms = 1000;
+  Start();
+  node_->Tick(bus_.now_us);
+  const auto burst = [this](std::int64_t count) {
+    for (; count > 0; --count) bus_.Publish("EXECUTION_EVENT", MakeEvent(fed_++, execution_event_t::STARTED));
+    node_->Tick(bus_.now_us += 1'000'000);
+  };
+  burst(1);
+  fed_ += 20;  // lost on the way: as many as the queue will lose
+  burst(1);
+  Sql("CREATE TRIGGER full BEFORE INSERT ON execution_events BEGIN SELECT RAISE(ABORT, 'no more'); END");
+  const std::int64_t queue = config_.logger.queue;
+  burst(queue + 10);
+  burst(queue + 10);
+  bus_.dropped_count = 7;
+  while (node_->recorder().written() <= static_cast<std::int64_t>(Recorder::kMaxWaitingRows)) burst(queue);
+  burst(queue);
+  Sql("DROP TRIGGER full");
+  burst(1);
+  EXPECT_THAT(node_->recorder().trouble(), HasSubstr("the next start makes them again"));
+  Stop();
+  const Rows live = ReadRows();
+  EXPECT_LT(std::ssize(live.events), fed_ / 2) << "rows were dropped";
+  EXPECT_EQ(live.gaps.size(), 3u) << "one for each stream and reason";
+  EXPECT_EQ(LostTo("bus", live), 20);
+  EXPECT_EQ(LostTo("queue", live), 20);
+  EXPECT_EQ(LostTo("backlog", live), 7);
+
+  { const LoggerNode recovery(config_, bus_, out_); }
+  const Rows mended = ReadRows();
+  EXPECT_EQ(std::ssize(mended.events), fed_ - 40);
+  EXPECT_EQ(mended.gaps.size(), 3u) << "the log shows the same losses, which are counted already";
+  EXPECT_EQ(LostTo("bus", mended), 20);
+  EXPECT_EQ(LostTo("queue", mended), 20);
+  EXPECT_EQ(LostTo("backlog", mended), 7);
 }
 
 TEST_F(DiskTest, AFailingFlushIsAnError) {

@@ -1,10 +1,15 @@
 #include "logger/event_log.h"
 
+#include <csignal>
 #include <cstring>
 #include <random>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "tests/logger/logs.h"
 
@@ -253,6 +258,57 @@ TEST(EventLog, OneWriterAFile) {
   const ScratchDirectory scratch;
   const EventLogWriter writer(scratch / "log");
   EXPECT_THROW(EventLogWriter(scratch / "log"), LogError);
+}
+
+/** While it lives, no file of this process grows beyond so many bytes: writes stop there and fail. */
+class FileSizeLimit final {
+ public:
+  explicit FileSizeLimit(std::int64_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    EXPECT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
+    const rlimit limit{static_cast<rlim_t>(bytes), before_.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  }
+  ~FileSizeLimit() { EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &before_), 0); }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+// A flush fails half-way, and the file cannot be cut back: it is sealed against that here.
+TEST(EventLog, NothingConfirmedIsLostWhereTheFileCannotBePutBack) {
+  const int file = ::memfd_create("log", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  ASSERT_GE(file, 0);
+  ASSERT_EQ(::fcntl(file, F_ADD_SEALS, F_SEAL_SHRINK), 0);
+  const std::string path = "/proc/self/fd/" + std::to_string(file);
+  const std::vector<std::uint8_t> data(100, 7);
+  EventLogWriter writer(path);
+  const auto flush = [&](const std::string& channel) {
+    writer.Append(1, channel, data);
+    return writer.Flush();
+  };
+  const auto flush_with_room_for_half = [&](const std::string& channel) {
+    const FileSizeLimit limit(writer.offset() + 50);
+    return flush(channel);
+  };
+  EXPECT_TRUE(flush("KEPT_1"));
+  EXPECT_FALSE(flush_with_room_for_half("LOST_2"));
+  EXPECT_NE(writer.problem().find("cannot put the file back"), std::string::npos) << writer.problem();
+  EXPECT_TRUE(flush("KEPT_3"));
+  EXPECT_FALSE(flush_with_room_for_half("LOST_4"));
+  writer.Append(1, "S", {});
+  EXPECT_FALSE(writer.Flush()) << "some of what failed would stay behind it";
+  EXPECT_TRUE(flush("KEPT_5"));
+  const LogContents contents = ReadLog(path);
+  ::close(file);
+  ASSERT_EQ(contents.events.size(), 3u);
+  EXPECT_EQ(contents.events[0].channel, "KEPT_1");
+  EXPECT_EQ(contents.events[1].channel, "KEPT_3");
+  EXPECT_EQ(contents.events[2].channel, "KEPT_5");
+  EXPECT_EQ(contents.end, LogStatus::kEnd);
+  EXPECT_EQ(contents.corruptions, 0);
 }
 
 TEST(EventLog, RefusesWhatTheFormatCannotHold) {

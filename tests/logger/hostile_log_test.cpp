@@ -63,6 +63,19 @@ struct Damaged {
 
 class HostileLog : public testing::Test {
  protected:
+  // Reads all that can be read, one event's room for all; `after_each` event and damage, until it fails.
+  template <class AfterEach>
+  static int CountEvents(EventLogReader& reader, LogEvent& event, AfterEach after_each) {
+    int events = 0;
+    while (!testing::Test::HasFatalFailure()) {
+      const LogStatus status = reader.Next(event);
+      if (status != LogStatus::kEvent && status != LogStatus::kCorrupt) break;
+      events += status == LogStatus::kEvent;
+      after_each();
+    }
+    return events;
+  }
+
   std::size_t Below(std::size_t bound) { return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random_); }
 
   /** The records of `path` from the `first` on, `count` at most, as one log; `ends_` gets where each ends, by its start. */
@@ -204,15 +217,34 @@ TEST_F(HostileLog, LengthsDoNotFillTheMemory) {
   EventLogReader reader(scratch_ / "log");
   LogEvent event;
   const std::size_t before = peak_bytes = live_bytes;
-  int events = 0;
-  while (true) {
-    const LogStatus status = reader.Next(event);
-    if (status != LogStatus::kEvent && status != LogStatus::kCorrupt) break;
-    events += status == LogStatus::kEvent;
-  }
-  EXPECT_EQ(events, 4);
+  EXPECT_EQ(CountEvents(reader, event, [] {}), 4);
   EXPECT_GE(peak_bytes - before, std::size_t{kMaxLogDataBytes});
   EXPECT_LE(peak_bytes - before, kMemory);
+}
+
+// Claims of 16 MiB before every tiny record, each of which the file is long enough for: none is believed.
+TEST_F(HostileLog, ClaimsThatAreNotBelievedTakeNoMemory) {
+  constexpr int kRecords = 10'000;
+  std::vector<std::uint8_t> claim{0xED, 0xA1, 0xDA, 0x01};
+  claim.resize(28);
+  claim[23] = 1;  // one byte of channel
+  std::vector<std::uint8_t> tiny = claim;
+  claim[24] = 1;  // kMaxLogDataBytes
+  tiny.push_back('T');
+  std::vector<std::uint8_t> bytes;
+  for (int i = 0; i < kRecords; ++i) {
+    bytes.insert(bytes.end(), claim.begin(), claim.end());
+    bytes.insert(bytes.end(), tiny.begin(), tiny.end());
+  }
+  bytes.resize(bytes.size() + kMaxLogDataBytes + 100);
+  WriteBytes(scratch_ / "claims", bytes);
+  bytes = {};
+  EventLogReader reader(scratch_ / "claims");
+  LogEvent event;
+  const std::size_t before = peak_bytes = live_bytes;
+  EXPECT_EQ(CountEvents(reader, event, [&] { ASSERT_EQ(event.data.capacity(), 0u); }), kRecords);
+  EXPECT_EQ(reader.corruptions(), kRecords + 1) << "the claims, and what is behind them";
+  EXPECT_LE(peak_bytes - before, std::size_t{1} << 16);
 }
 
 // Headers that each claim what follows them make the reader look again and again; that may not cost more than the bytes.

@@ -1,6 +1,7 @@
 #include "logger/logger_node.h"
 
 #include <csignal>
+#include <optional>
 #include <random>
 #include <sstream>
 
@@ -138,6 +139,79 @@ TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
   EXPECT_EQ(rows.gaps[0].event.event_number, 3);
   EXPECT_EQ(rows.gaps[1].reason, "restart");
   EXPECT_EQ(rows.gaps[1].lost, 0);
+}
+
+class SignedLoggerTest : public LoggerNodeTest {
+ protected:
+  SignedLoggerTest() {
+    MakeKeyFile(scratch_ / "key");
+    config_.bus.key = scratch_ / "key";
+    planner_.emplace(LoadKey(config_.bus.key), "planner", kStart);
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> Candidate(Signer& signer, std::int64_t sequence) const {
+    return signer.Sign("PLAN_CANDIDATE", Encode(MakeCandidate(sequence, sequence)), bus_.now_us);
+  }
+  /** Candidates 0, 1 and 4, between them a repeated one and two of somebody without the key. */
+  std::vector<std::vector<std::uint8_t>> Candidates() {
+    Signer other(Key256{1}, "other", kStart);
+    const auto first = Candidate(*planner_, 0);
+    return {first, Encode(MakeCandidate(std::int64_t{1} << 41, 1)), Candidate(other, std::int64_t{1} << 40), first,
+            Candidate(*planner_, 1), Candidate(*planner_, 4)};
+  }
+  static void ExpectOneGap(const Rows& rows) {
+    ASSERT_EQ(rows.gaps.size(), 1u);
+    EXPECT_EQ(rows.gaps[0].expected, 2);
+    EXPECT_EQ(rows.gaps[0].got, 4);
+    EXPECT_EQ(rows.gaps[0].lost, 2);
+    EXPECT_EQ(rows.gaps[0].event.event_number, 5);
+  }
+
+  std::optional<Signer> planner_;
+};
+
+TEST_F(SignedLoggerTest, RecordsEverythingAndMakesRowsOfAuthenticMessagesOnly) {
+  LoggerNode node(config_, bus_, out_);
+  node.Tick(kStart);
+  EXPECT_EQ(GetText(bus_.heartbeats.back().message), "recording");
+  for (const auto& candidate : Candidates()) bus_.Publish("PLAN_CANDIDATE", Bytes(candidate));
+  bus_.Publish("PLAN_DECISION", MakeDecision(MakeCandidate(4, 4), 0, decision_t::CERTIFIED, 0));  // never signed
+  node.Tick(bus_.now_us += 600'000);
+  EXPECT_THAT(GetText(bus_.heartbeats.back().message), testing::HasSubstr("3 (unsigned 1, forged 1, replayed 1)"));
+  EXPECT_EQ(bus_.heartbeats.back().state, logger_status_t::OK);
+  node.Stop();
+  EXPECT_THAT(out_.str(), testing::HasSubstr("not authentic             3 (unsigned 1, forged 1, replayed 1)"));
+  EXPECT_EQ(ReadLog(node.recorder().log_path()).events.size(), 7u);
+  const Rows rows = ReadRows();
+  ExpectOneGap(rows);
+  ASSERT_EQ(rows.decisions.size(), 1u);
+  EXPECT_EQ(rows.decisions[0].latency_us, 0);
+}
+
+TEST_F(SignedLoggerTest, MakesMissingRowsAgainOfAuthenticMessagesOnly) {
+  std::filesystem::create_directories(config_.logger.directory);
+  {
+    Database(scratch_ / "log/decisions.sqlite").BeginRun("a.lcmlog", kStart);
+    EventLogWriter writer(scratch_ / "log/a.lcmlog");
+    for (const auto& candidate : Candidates()) writer.Append(kStart + 500, "PLAN_CANDIDATE", candidate);
+    ASSERT_TRUE(writer.Flush());
+  }
+  { const LoggerNode recovery(config_, bus_, out_); }
+  ExpectOneGap(ReadRows());
+}
+
+TEST_F(SignedLoggerTest, WhatWasSignedLongBeforeMakesNoRow) {
+  bus_.now_us -= 10'000'000;
+  const auto recorded = Candidate(*planner_, std::int64_t{1} << 40);
+  bus_.now_us = kStart;
+  LoggerNode node(config_, bus_, out_);
+  node.Tick(kStart);
+  for (const auto& candidate : {recorded, Candidate(*planner_, 0), Candidate(*planner_, 1)})
+    bus_.Publish("PLAN_CANDIDATE", Bytes(candidate));
+  node.Tick(kStart);
+  node.Stop();
+  EXPECT_TRUE(ReadRows().gaps.empty());
+  EXPECT_EQ(node.recorder().interpreter().refusals().replayed, 1);
 }
 
 TEST_F(LoggerNodeTest, RecordsOverflowOnce) {

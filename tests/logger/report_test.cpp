@@ -7,6 +7,7 @@
 
 #include "certifier/dynamics/models.h"
 #include "certifier/gate/obstacle_message.h"
+#include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/logger/logs.h"
 
@@ -110,6 +111,10 @@ TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
                                  Obstacle::Polygon({Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 6), Eigen::Vector2d(6, 5),
                                                     Eigen::Vector2d(5, 6), Eigen::Vector2d(5.5, 5.5)}),
                                  Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 10)}));
+  obstacles_t ahead = ToMessage({Obstacle::Circle(Eigen::Vector2d(3, 0), 0.5)});
+  ahead.sequence = 1;
+  ahead.utime = now_ + 1 + 50'001;  // gate.max_ahead_ms is 50: the gate refused it
+  Append("OBSTACLES", ahead);
   Decide(Drive(1, true), decision_t::CERTIFIED, -1);
   const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, PointMassConfig());
   EXPECT_EQ(drawn.disagreements, 0);
