@@ -8,7 +8,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/gate/freshness.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/transition_message.h"
 #include "certifier/task/files.h"
@@ -114,25 +113,20 @@ CertificateFile FromDecision(const std::string& path, const Json& document, cons
 // The obstacles that were in force, one version after the other, in the order of the log.
 class ObstacleHistory {
  public:
-  explicit ObstacleHistory(const Config& config) : config_(config), versions_{OfTask()} {}
+  explicit ObstacleHistory(const Config& config) : config_(config), versions_{ObstaclesInForce(config)} {}
 
-  void Restart() { versions_.push_back(OfTask()); }
+  void Restart() { versions_.emplace_back(config_); }
 
   void Reload() {
-    ObstaclesInForce after = OfTask();
+    ObstaclesInForce after(config_);
     after.Inherit(versions_.back());
     versions_.push_back(std::move(after));
   }
 
   // As the gate takes them.
   void Update(const LogEvent& event) {
-    const auto message = Decoded<obstacles_t>(event.message());
-    const auto us = [](double ms) { return static_cast<std::int64_t>(std::llround(ms * 1e3)); };
-    if (!message || FreshnessOf(message->utime, event.utime, us(config_.gate.max_age_ms), us(config_.gate.max_ahead_ms)) !=
-                        Freshness::kFresh)
-      return;
     ObstaclesInForce after = versions_.back();
-    if (after.Update(*message).empty()) versions_.push_back(std::move(after));
+    if (after.Update(event.message(), event.utime).empty()) versions_.push_back(std::move(after));
   }
 
   [[nodiscard]] std::size_t now() const { return versions_.size() - 1; }
@@ -147,10 +141,6 @@ class ObstacleHistory {
   [[nodiscard]] const ObstaclesInForce& version(std::size_t i) const { return versions_[i]; }
 
  private:
-  [[nodiscard]] ObstaclesInForce OfTask() const {
-    return {config_.obstacles, static_cast<int>(config_.problem->projection.rows())};
-  }
-
   const Config& config_;
   std::vector<ObstaclesInForce> versions_;
 };

@@ -62,8 +62,11 @@ void MakeKeyFile(const std::string& path) {
   const std::string text = std::string(kKeyPrefix) + ToHex(key) + "\n";
   const File file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR));
   if (file.get() < 0) Fail(path, std::string("cannot be made: ") + std::strerror(errno));
-  if (::write(file.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()) || ::fsync(file.get()) != 0)
-    Fail(path, std::string("cannot be written: ") + std::strerror(errno));
+  errno = ENOSPC;  // what a short write means
+  if (::write(file.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(file.get()) == 0) return;
+  const std::string why = std::strerror(errno);
+  ::unlink(path.c_str());
+  Fail(path, "cannot be written: " + why);
 }
 
 Key256 LoadKey(const std::string& path) {

@@ -18,7 +18,6 @@ The signature stands behind the message, so that programs which know nothing of 
 #include <atomic>
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -64,8 +63,6 @@ class Signer final {
 };
 
 enum class Authenticity { kAuthentic, kUnsigned, kForged, kReplayed };
-
-/** "authentic", "unsigned", "forged", "replayed". */
 
 /** Messages refused, by reason. */
 struct Refusals {

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "forereach/obstacles_t.hpp"
+#include "certifier/gate/stamp.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -42,11 +42,11 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
     : config_(config),
       sender_(bus),
       out_(out),
-      period_us_(std::llround(config.robot.step_period_ms * 1e3)),
+      period_us_(Microseconds(config.robot.step_period_ms)),
       half_width_(HalfWidth(config)),
       residual_(config.problem),
       proposer_(ProposerOf(config)),
-      obstacles_(config.obstacles, static_cast<int>(config.problem->projection.rows())) {
+      obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
@@ -69,15 +69,10 @@ void PlannerNode::OnRobotState(const Received& received) {
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && NextPlanIsDue(state)) BeginRound(state);
 }
 
-Freshness PlannerNode::FreshnessAt(std::int64_t now_us, std::int64_t utime) const {
-  const GateOptions& gate = config_.gate;
-  return FreshnessOf(utime, now_us, std::llround(gate.max_age_ms * 1e3), std::llround(gate.max_ahead_ms * 1e3));
-}
-
 // One from the future would keep out all that come before that time.
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
   return state.num_states == config_.problem->model->num_states() && state.utime > last_state_utime_ &&
-         FreshnessAt(now_us, state.utime) != Freshness::kFuture &&
+         Judge(state.utime, now_us, config_.gate).freshness != Freshness::kFuture &&
          robot_state_t::STANDING <= state.mode && state.mode <= robot_state_t::FINISHED &&
          std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });
 }
@@ -233,9 +228,7 @@ void PlannerNode::Learn(const decision_t& decision) {
 }
 
 void PlannerNode::OnObstacles(const Received& received) {
-  obstacles_t message;
-  if (Decode(received.bytes, message) != DecodeStatus::kOk ||
-      FreshnessAt(received.utime, message.utime) != Freshness::kFresh || !obstacles_.Update(message).empty()) {
+  if (!obstacles_.Update(received.bytes, received.utime).empty()) {
     ++ignored_;
     return;
   }

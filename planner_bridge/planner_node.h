@@ -27,7 +27,6 @@ and ignored. */
 #include <string>
 #include <vector>
 
-#include "certifier/gate/freshness.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -70,7 +69,6 @@ class PlannerNode final : public Node {
   void OnDecision(const Received& received);
   void OnObstacles(const Received& received);
 
-  [[nodiscard]] Freshness FreshnessAt(std::int64_t now_us, std::int64_t utime) const;
   [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;

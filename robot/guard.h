@@ -11,8 +11,9 @@ every message of PLAN_CERTIFIED and, at every step boundary, its measured state:
     Halt      -> nothing is executing, nothing is accepted or started until Reset
 
 Every refusal is final: a plan refused by TryStart for anything but being early is forgotten, and a plan whose Check
-failed is executing no more. A state outside its slice halts the guard by itself: what the next certificate rests on has
-just been seen not to hold. Only the plan that `executing` returns may be applied, control t after its step t passed.
+failed is executing no more. A state that Check finds outside its slice halts the guard by itself: what the next
+certificate rests on has just been seen not to hold. Only the plan that `executing` returns may be applied, control t after
+its step t passed.
 
 What Check compares with: a certified_plan_t carries, for t = 0..T, the interval hull of the certified slice X_t,
 rounded outward. X_t lies in its hull, so a state outside the hull has left X_t and the certificate says nothing of it
@@ -27,6 +28,7 @@ Plan ids are compared whatever their source: a robot follows one planner. Single
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/authentic.h"
@@ -68,6 +70,7 @@ enum class GuardCause {
   // Check
   kNotExecuting,
   kStepOutOfOrder,     ///< Not the step after the last one checked, or past the horizon.
+  // all of them
   kInternalError,      ///< Out of memory.
 };
 
@@ -78,7 +81,7 @@ enum class GuardCause {
 struct GuardVerdict {
   GuardCause cause = GuardCause::kNone;
   std::int64_t plan_id = -1;  ///< The plan concerned, -1 if none or not decoded.
-  int step = -1;              ///< Witness of kOutsideSlice, kUnusedEntry, kNonFinite and kEmptySlice.
+  int step = -1;              ///< Witness of kOutsideInitialSet, kOutsideSlice, kUnusedEntry, kNonFinite, kEmptySlice.
   int coordinate = -1;        ///< Witness: the coordinate of state, X_0, slice or control, ...
   double value = 0;           ///< ... the value found there, ...
   double bound = 0;           ///< ... and the bound it broke, rounded to double.
@@ -103,10 +106,11 @@ class Guard final {
   explicit Guard(GuardOptions options);
 
   /** Checks one message of PLAN_CERTIFIED; if it passes, it becomes the pending plan.
-  In this order: not halted, signed where there is a key, decoded whole and nothing left over, dimensions, step period, the seal (lcmtypes/seal.h: plan digest,
-  certificate digest, nothing in what is not in use), finite numbers, lower <= upper in every slice, not expired (now_us
-  <= expires_utime), expected config and model digest, plan_id newer than the last accepted. The seal covers every bit of
-  the message. Cost: that of the seal, under 0.1 ms. @param now_us robot's clock. */
+  In this order: not halted, signed where there is a key, decoded whole and nothing left over, dimensions, step period,
+  the seal (lcmtypes/seal.h: plan digest, certificate digest, nothing in what is not in use), finite numbers, lower <=
+  upper in every slice, not expired (now_us <= expires_utime), expected config and model digest, plan_id newer than the
+  last accepted. The seal covers every bit of the message. Cost: that of the seal, under 0.1 ms.
+  @param now_us robot's clock. */
   [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
 
   /** Starts the pending plan at a step boundary if |start_utime - boundary_utime| <= step_us / 2, it has not expired
@@ -127,15 +131,19 @@ class Guard final {
   a person to call. */
   void Halt() noexcept;
   void Reset() noexcept { halted_ = false; }
+  /** The task has been read again: plans certified under this configuration and for this model are accepted too, and from
+  the first of them on no others. Till then it is not known whether the certifier has taken the new one. */
+  void Expect(const Digest& config_digest, const Digest& model_digest) noexcept;
   [[nodiscard]] bool halted() const { return halted_; }
 
-  /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check or Finish. */
+  /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check, Finish or Halt. */
   [[nodiscard]] const certified_plan_t* executing() const { return executing_.get(); }
   [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
 
  private:
   [[nodiscard]] GuardVerdict Authenticated(Bytes& bytes);
   [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
+  [[nodiscard]] bool IsNext(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
   [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::span<const double> state) const;
@@ -143,6 +151,7 @@ class Guard final {
   [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
 
   GuardOptions options_;
+  std::optional<std::pair<Digest, Digest>> next_;  // config and model, by Expect
   std::optional<Authenticator> authenticator_;
   bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
+#include "certifier/gate/stamp.h"
 #include "certifier/numerics/text.h"
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -19,13 +19,18 @@ namespace {
 
 constexpr std::int64_t kProgressUs = 1'000'000;
 
-std::int64_t PeriodUs(const Config& config) { return std::llround(config.robot.step_period_ms * 1e3); }
+std::optional<Config> Load(const std::string& path) try {
+  return LoadConfig(path);
+} catch (const std::exception& error) {
+  spdlog::error("not reloaded: {}", error.what());
+  return std::nullopt;
+}
 
 GuardOptions OptionsOf(const Config& config) {
   GuardOptions options;
   options.num_states = config.problem->model->num_states();
   options.num_inputs = config.problem->model->num_inputs();
-  options.step_us = PeriodUs(config);
+  options.step_us = Microseconds(config.robot.step_period_ms);
   options.config_digest = config.digest;
   options.model_digest = config.model_digest;
   if (!config.bus.key.empty()) options.key = LoadKey(config.bus.key);
@@ -56,9 +61,10 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
       sender_(bus),
       out_(out),
       target_(MakeTarget(config)),
-      period_us_(PeriodUs(config)),
+      period_us_(Microseconds(config.robot.step_period_ms)),
       guard_(OptionsOf(config)),
       rest_coordinates_(RestCoordinates(*config.problem->model)),
+      reload_([path = config.path] { return Load(path); }),
       state_(config.robot.start) {
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
@@ -70,6 +76,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
 }
 
 void RobotSimNode::Tick(std::int64_t now_us) {
+  TakeReload();
   if (!start_utime_) start_utime_ = now_us;
   while (!done() && *start_utime_ + boundaries_ * period_us_ <= now_us)
     Boundary(*start_utime_ + boundaries_ * period_us_);
@@ -85,7 +92,8 @@ void RobotSimNode::OnCertified(const Received& received) {
 void RobotSimNode::OnFault(const Received& received) {
   const auto fault = Decoded<fault_t>(received.bytes);
   if (!fault || (fault->cause != fault_t::SLICE_LEFT && fault->cause != fault_t::DECLARATION_FALSIFIED)) return;
-  if (guard_.halted()) return;
+  last_fault_ = FaultId(fault->utime, fault->sequence);
+  if (guard_.halted() || last_fault_ == cleared_fault_) return;
   const std::int64_t plan_id = executing_plan_id();
   const int step = executing_step();
   if (executing()) Stand();
@@ -95,9 +103,23 @@ void RobotSimNode::OnFault(const Received& received) {
 
 void RobotSimNode::OnCommand(const Received& received) {
   const auto command = Decoded<command_t>(received.bytes);
-  if (!command || command->kind != command_t::RESET || !guard_.halted()) return;
+  if (!command) return;
+  if (const Stamp stamp = Judge(command->utime, received.utime, config_.gate); !stamp.fault.empty())
+    return spdlog::warn("{}: refused: {}", config_.bus.command, stamp.fault);
+  if (command->kind == command_t::RELOAD) return Reload();
+  if (command->kind != command_t::RESET || !guard_.halted()) return;
   guard_.Reset();
+  cleared_fault_ = last_fault_;
   PublishEvent(received.utime, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
+}
+
+void RobotSimNode::Reload() { reload_.Ask(); }
+
+void RobotSimNode::TakeReload() {
+  const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
+  if (!config) return;
+  guard_.Expect(config->digest, config->model_digest);
+  spdlog::info("plans certified under {} as it is now are accepted", config_.path);
 }
 
 void RobotSimNode::Boundary(std::int64_t utime) {

@@ -19,7 +19,9 @@ After it the robot stands until a reset on bus.channels.command.
 The run ends after the goal is reached or the time limit has passed: no further plan starts, the current one runs to
 its end, and once the robot stands it publishes FINISHED for kFinishedBoundaries boundaries and is done.
 
-With a key (bus.key) the guard takes signed plans only. Messages on PLAN_CERTIFIED, FAULT and COMMAND are all it obeys. Obstacles and start are those of the task file. */
+With a key (bus.key) the guard takes signed plans only. Messages on PLAN_CERTIFIED, FAULT and COMMAND are all it obeys.
+Obstacles and start are those of the task file. A reload makes it take plans certified under the file as it is now
+(Guard::Expect); the robot and its world stay. */
 #pragma once
 
 #include <iostream>
@@ -27,9 +29,11 @@ With a key (bus.key) the guard takes signed plans only. Messages on PLAN_CERTIFI
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "certifier/task/config.h"
+#include "certifier/task/reloading.h"
 #include "forereach/execution_event_t.hpp"
 #include "lcmtypes/node.h"
 #include "robot/guard.h"
@@ -49,6 +53,8 @@ class RobotSimNode final : public Node {
   /** Handles every boundary up to `now_us`; a late call catches up, each boundary at its own time. */
   void Tick(std::int64_t now_us) override;
   [[nodiscard]] bool done() const override { return finished_boundaries_ >= kFinishedBoundaries; }
+  /** Reads the task file, beside the running work. */
+  void Reload() override;
   /** Prints Summary() on a line of its own. */
   void Stop() override;
 
@@ -63,6 +69,7 @@ class RobotSimNode final : public Node {
   void OnCertified(const Received& received);
   void OnFault(const Received& received);
   void OnCommand(const Received& received);
+  void TakeReload();
   void Boundary(std::int64_t utime);
   void FinishStep(std::int64_t utime);
   void ReportContacts(std::int64_t utime);
@@ -90,8 +97,11 @@ class RobotSimNode final : public Node {
   const std::int64_t period_us_;
   Guard guard_;
   std::vector<int> rest_coordinates_;  // zero while standing
+  Reloading<std::optional<Config>> reload_;
 
   std::vector<double> state_;
+  using FaultId = std::pair<std::int64_t, std::int64_t>;  // utime, sequence: the certifier repeats a fault until the reset
+  std::optional<FaultId> last_fault_, cleared_fault_;
   int step_ = 0;  // of the executing plan: the control applied from the last boundary on
   std::optional<std::int64_t> start_utime_;
   std::int64_t boundaries_ = 0, transitions_ = 0, events_ = 0;

@@ -8,16 +8,18 @@ grounds that are known to be false. */
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
 
 namespace forereach {
 
 class Conformance final {
  public:
-  static constexpr std::size_t kPlans = 64;  ///< The last certified ones are remembered.
+  static constexpr std::size_t kPlans = 64;  ///< The last certified ones are remembered, and the one that is executed.
 
   struct Departure {
     std::int64_t plan_id;
@@ -34,12 +36,16 @@ class Conformance final {
   for its plan is remembered. Cost O(n). */
   [[nodiscard]] std::optional<Departure> Check(const robot_state_t& state);
 
+  /** Holds the end of the step that began with the last state heard against the slice after it. A robot that ends its plan
+  there, or whose guard stops it, stands from then on, and its states say nothing of slices. */
+  [[nodiscard]] std::optional<Departure> Check(const transition_t& transition) const;
+
  private:
-  [[nodiscard]] std::optional<Departure> Compare(std::int64_t plan_id, int step, const robot_state_t& state) const;
+  [[nodiscard]] std::optional<Departure> Compare(std::int64_t plan_id, int step, std::span<const double> state) const;
 
   std::vector<certified_plan_t> plans_;  // a ring
   std::size_t next_ = 0;
-  std::int64_t last_sequence_ = -1, last_plan_id_ = -1;
+  std::int64_t last_sequence_ = -1, last_utime_ = -1, last_plan_id_ = -1;  // of the state heard last; plan -1: not executing
   int last_step_ = -1;
 };
 

@@ -6,6 +6,7 @@
 
 #include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
+#include "certifier/gate/stamp.h"
 #include "certifier/gate/transition_message.h"
 #include "certifier/numerics/text.h"
 #include "lcmtypes/seal.h"
@@ -16,12 +17,6 @@ namespace {
 // The bus contract fixes the numbers, so they are the same on both sides.
 static_assert(static_cast<int>(Outcome::kCertified) == 1 && static_cast<int>(Outcome::kSafety) == 4);
 static_assert(static_cast<int>(Cause::kPairwise) == 1 && static_cast<int>(Cause::kObstacle) == 4);
-
-std::int64_t Microseconds(double milliseconds) { return std::llround(milliseconds * 1e3); }
-
-std::string Milliseconds(std::int64_t later, std::int64_t earlier) {
-  return ToText(std::round((static_cast<double>(later) - static_cast<double>(earlier)) / 1e3)) + " ms";
-}
 
 template <class Range>
 bool AllFinite(const Range& values) {
@@ -37,12 +32,12 @@ Gate::Gate(const Config& config)
       model_digest_(config.model_digest),
       declaration_digest_(config.declaration_digest),
       observations_digest_(config.observations_digest),
-      obstacles_(config.obstacles, certifier_.projection().dim()),
+      obstacles_(config),
       sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)) {}
 
 void Gate::Inherit(const Gate& before) {
   obstacles_.Inherit(before.obstacles_);
-  sources_ = before.sources_;
+  sources_.Inherit(before.sources_);
   decisions_ = before.decisions_;
   certificates_ = before.certificates_;
   counts_ = before.counts_;
@@ -137,27 +132,11 @@ std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candid
   return std::nullopt;
 }
 
-Gate::Stamp Gate::Judge(std::int64_t utime, std::int64_t now_us) const {
-  const Freshness freshness =
-      FreshnessOf(utime, now_us, Microseconds(options_.max_age_ms), Microseconds(options_.max_ahead_ms));
-  switch (freshness) {
-    case Freshness::kStale:
-      return {freshness, "stamped " + Milliseconds(now_us, utime) + " ago, at most " + ToText(options_.max_age_ms) +
-                             " ms allowed"};
-    case Freshness::kFuture:
-      return {freshness, "stamped " + Milliseconds(utime, now_us) + " ahead, at most " + ToText(options_.max_ahead_ms) +
-                             " ms allowed"};
-    case Freshness::kFresh:
-      break;
-  }
-  return {freshness, ""};
-}
-
-std::string Gate::CheckFresh(std::int64_t utime, std::int64_t now_us) const { return Judge(utime, now_us).fault; }
+std::string Gate::CheckFresh(std::int64_t utime, std::int64_t now_us) const { return Judge(utime, now_us, options_).fault; }
 
 std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const {
   const std::int64_t lifetime = Microseconds(options_.certificate_lifetime_ms);
-  const Stamp stamp = Judge(candidate.utime, now_us);
+  const Stamp stamp = Judge(candidate.utime, now_us, options_);
   if (stamp.freshness != Freshness::kFresh)
     return Rejection{stamp.freshness == Freshness::kStale ? decision_t::CAUSE_STALE : decision_t::CAUSE_FUTURE, stamp.fault};
   switch (FreshnessOf(candidate.start_utime, now_us, 0, lifetime)) {
@@ -248,12 +227,7 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
 }
 
-std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) {
-  const auto message = Decoded<obstacles_t>(bytes);
-  if (!message) return "not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) + " bytes";
-  if (std::string error = CheckFresh(message->utime, now_us); !error.empty()) return error;
-  return obstacles_.Update(*message);
-}
+std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) { return obstacles_.Update(bytes, now_us); }
 
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
   const int n = certifier_.problem().model->num_states();

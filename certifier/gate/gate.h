@@ -12,7 +12,6 @@ error inside. Whether the world is fit for certificates at all is for others to 
 #include <vector>
 
 #include "certifier/certify/certifier.h"
-#include "certifier/gate/freshness.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/sources.h"
 #include "certifier/task/config.h"
@@ -40,6 +39,7 @@ class Gate final {
   explicit Gate(const Config& config);
 
   [[nodiscard]] const Certifier& certifier() const { return certifier_; }
+  [[nodiscard]] const GateOptions& options() const { return options_; }
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
   /** The tube of the last candidate that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
@@ -62,11 +62,10 @@ class Gate final {
   BLAKE2b-256 of the digest before and the message's bytes. Returns what is wrong with it, and nothing has changed, or an
   empty text. Whether it falsifies the declaration, certifier().violation() says. */
   [[nodiscard]] std::string Learn(Bytes transition);
-  [[nodiscard]] bool learns() const { return options_.learns; }
 
   /** What keeps a robot's state from being believed: sizes, numbers, a stamp that is stale or ahead; empty if nothing. */
   [[nodiscard]] std::string CheckRobotState(const robot_state_t& state, std::int64_t now_us) const;
-  /** What is wrong with a stamp at this time, or empty. */
+  /** What is wrong with a stamp at this time (stamp.h), or empty. */
   [[nodiscard]] std::string CheckFresh(std::int64_t utime, std::int64_t now_us) const;
 
   /** As Certifier's. */
@@ -77,6 +76,8 @@ class Gate final {
 
   /** Counts so far and the digests in force; the rest is the caller's. */
   [[nodiscard]] certifier_status_v2_t Status(std::int64_t now_us) const;
+  [[nodiscard]] const Digest& model_digest() const { return model_digest_; }
+  [[nodiscard]] const Digest& declaration_digest() const { return declaration_digest_; }
   [[nodiscard]] Digest observations_digest() const { return observations_digest_; }
   [[nodiscard]] Digest obstacles_digest() const { return obstacles_.digest(); }
 
@@ -87,12 +88,6 @@ class Gate final {
     std::int16_t outcome = decision_t::REJECTED;
   };
 
-  struct Stamp {
-    Freshness freshness;
-    std::string fault;  ///< Empty if fresh.
-  };
-
-  [[nodiscard]] Stamp Judge(std::int64_t utime, std::int64_t now_us) const;
   [[nodiscard]] GateAnswer Answer(Bytes candidate, const Clock& clock, std::optional<Rejection> from_outside) noexcept;
   [[nodiscard]] std::optional<Rejection> Admit(Bytes bytes, candidate_plan_t& candidate, std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate) const;

@@ -4,36 +4,38 @@
 #include <utility>
 
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/stamp.h"
 #include "certifier/task/canonical.h"
+#include "forereach/obstacles_t.hpp"
 
 namespace forereach {
 
-ObstaclesInForce::ObstaclesInForce(std::vector<Obstacle> of_task, int dim) : dim_(dim) { Put(std::move(of_task)); }
+ObstaclesInForce::ObstaclesInForce(const Config& config)
+    : options_(config.gate), dim_(static_cast<int>(config.problem->projection.rows())) {
+  Put(config.obstacles);
+}
 
-std::string ObstaclesInForce::Update(const obstacles_t& message) {
-  if (message.sequence <= sequence_ && message.utime <= utime_)
-    return "sequence " + std::to_string(message.sequence) + " does not exceed the last, " + std::to_string(sequence_) +
-           ", nor does its stamp the last one's";
+std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
+  const auto message = Decoded<obstacles_t>(bytes);
+  if (!message) return "not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) + " bytes";
+  if (std::string fault = Judge(message->utime, now_us, options_).fault; !fault.empty()) return fault;
+  if (heard_ && message->sequence <= heard_->sequence && message->utime <= heard_->utime)
+    return "sequence " + std::to_string(message->sequence) + " does not exceed the last, " +
+           std::to_string(heard_->sequence) + ", nor does its stamp the last one's";
   try {
-    heard_ = FromMessage(message, dim_);
+    heard_ = Heard{message->sequence, message->utime, FromMessage(*message, dim_)};
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
-  Put(heard_);
-  has_heard_ = true;
-  sequence_ = message.sequence;
-  utime_ = message.utime;
+  Put(heard_->obstacles);
   return {};
 }
 
 void ObstaclesInForce::Inherit(const ObstaclesInForce& before) {
-  if (!before.has_heard_) return;
+  if (!before.heard_) return;
   heard_ = before.heard_;
-  has_heard_ = true;
-  sequence_ = before.sequence_;
-  utime_ = before.utime_;
   std::vector<Obstacle> both = all_;
-  both.insert(both.end(), heard_.begin(), heard_.end());
+  both.insert(both.end(), heard_->obstacles.begin(), heard_->obstacles.end());
   Put(std::move(both));
 }
 

@@ -3,23 +3,25 @@ was heard: the new task's and those heard last count together until the next are
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "certifier/safety/obstacle.h"
-#include "forereach/obstacles_t.hpp"
+#include "certifier/task/config.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
 
 class ObstaclesInForce final {
  public:
-  /** @param dim number of safety coordinates. */
-  ObstaclesInForce(std::vector<Obstacle> of_task, int dim);
+  /** The task's. */
+  explicit ObstaclesInForce(const Config& config);
 
-  /** Takes a message that is fresh: whole, or not at all. Newer is what has a larger sequence or, from a sender that began
-  anew, a later stamp. Returns what is wrong, or an empty text. */
-  [[nodiscard]] std::string Update(const obstacles_t& message);
+  /** Takes the bytes of an obstacles_t that came at `now_us`: whole, or not at all. Its stamp has to be fresh (stamp.h), and
+  it newer than the one before: of a larger sequence or, from a sender that began anew, of a later stamp. Returns what is
+  wrong, or an empty text. */
+  [[nodiscard]] std::string Update(Bytes message, std::int64_t now_us);
 
   /** Goes on where another's obstacles were in force. */
   void Inherit(const ObstaclesInForce& before);
@@ -29,13 +31,18 @@ class ObstaclesInForce final {
   [[nodiscard]] const Digest& digest() const { return digest_; }
 
  private:
+  struct Heard {
+    std::int64_t sequence, utime;
+    std::vector<Obstacle> obstacles;
+  };
+
   void Put(std::vector<Obstacle> all);
 
-  int dim_;
-  std::vector<Obstacle> all_, heard_;
+  GateOptions options_;
+  int dim_;  // of the safety coordinates
+  std::optional<Heard> heard_;  // last
+  std::vector<Obstacle> all_;
   Digest digest_;
-  bool has_heard_ = false;
-  std::int64_t sequence_ = -1, utime_ = 0;  // of the message heard last
 };
 
 }  // namespace forereach

@@ -32,6 +32,11 @@ bool Sources::Source::Use(std::int64_t plan_id) {
   return true;
 }
 
+void Sources::Inherit(const Sources& before) {
+  sources_ = before.sources_;
+  lost_before_ = before.lost_before_;
+}
+
 Sources::Admission Sources::Admit(const candidate_plan_t& candidate, std::int64_t now_us) {
   const std::string name = NameOf(candidate);
   auto known = sources_.find(name);

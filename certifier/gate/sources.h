@@ -27,6 +27,9 @@ class Sources final {
   candidate stays fresh. */
   explicit Sources(std::int64_t forget_after_us) : forget_after_us_(forget_after_us) {}
 
+  /** Goes on where others' counting stops. How long a source is remembered stays as given to these. */
+  void Inherit(const Sources& before);
+
   /** Every candidate that decodes, once, before anything else is asked of it. In whatever order they are taken up: a source
   has begun to count anew if a later stamp has a smaller sequence. */
   void Hear(const candidate_plan_t& candidate, std::int64_t now_us);

@@ -2,15 +2,10 @@
 
 #include <cstdlib>
 
+#include "certifier/gate/stamp.h"
 #include "forereach/fault_t.hpp"
 
 namespace forereach {
-namespace {
-
-std::string Milliseconds(std::int64_t us) { return std::to_string(us / 1000) + " ms"; }
-
-}  // namespace
-
 void Watch::SeeRobot(std::int64_t now_us) { robot_seen_us_ = now_us; }
 
 void Watch::RobotHasFinished() { robot_seen_us_.reset(); }
@@ -21,12 +16,12 @@ std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t ste
   std::optional<Fault> found;
   if (std::abs(moved) > options_.max_clock_jump_us) {
     found = {fault_t::CLOCK_JUMP, now_us,
-             "the wall clock moved by " + Milliseconds(moved) + ", at most " + Milliseconds(options_.max_clock_jump_us) +
+             "the wall clock moved by " + Milliseconds(moved, 0) + ", at most " + Milliseconds(options_.max_clock_jump_us, 0) +
                  " are allowed"};
   } else if (options_.needs_robot_state && robot_seen_us_ && now_us - *robot_seen_us_ > options_.robot_timeout_us) {
     found = {fault_t::ROBOT_STATE_LOST, now_us,
-             "the robot's state was last heard " + Milliseconds(now_us - *robot_seen_us_) + " ago, at most " +
-                 Milliseconds(options_.robot_timeout_us) + " are allowed"};
+             "the robot's state was last heard " + Milliseconds(now_us, *robot_seen_us_) + " ago, at most " +
+                 Milliseconds(options_.robot_timeout_us, 0) + " are allowed"};
   }
   return found && Latch(*found) ? found : std::nullopt;
 }

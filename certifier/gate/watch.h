@@ -28,6 +28,9 @@ class Watch final {
 
   explicit Watch(const WatchOptions& options) : options_(options) {}
 
+  /** From here on by these. What was seen, and a fault, stay. */
+  void Follow(const WatchOptions& options) { options_ = options; }
+
   /** A usable state of the robot has been heard. */
   void SeeRobot(std::int64_t now_us);
   /** The robot has said that it ends: its silence is no fault. */
@@ -46,7 +49,7 @@ class Watch final {
   [[nodiscard]] const std::optional<Fault>& fault() const { return fault_; }
 
  private:
-  const WatchOptions options_;
+  WatchOptions options_;
   std::optional<Fault> fault_;
   std::optional<std::int64_t> robot_seen_us_;
   std::optional<std::int64_t> offset_us_;  // of the wall clock from the steady one, at the last call

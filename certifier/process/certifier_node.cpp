@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
+#include <initializer_list>
 #include <iostream>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +12,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 
+#include "certifier/gate/stamp.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -21,13 +23,19 @@ constexpr int kUnindexedAtMost = 128;
 constexpr std::size_t kIndexedAtOnce = 4096;
 
 WatchOptions OptionsOf(const GateOptions& gate) {
-  return {gate.needs_robot_state, std::llround(gate.robot_timeout_ms * 1e3), std::llround(gate.max_clock_jump_ms * 1e3)};
+  return {gate.needs_robot_state, Microseconds(gate.robot_timeout_ms), Microseconds(gate.max_clock_jump_ms)};
 }
 
 std::int64_t PageFaults() {
   rusage usage{};
   ::getrusage(RUSAGE_THREAD, &usage);
   return usage.ru_minflt + usage.ru_majflt;
+}
+
+// Of a candidate; of bytes that are none, never.
+std::int64_t StartOf(Bytes bytes) {
+  const auto candidate = Decoded<candidate_plan_t>(bytes);
+  return candidate ? candidate->start_utime : std::numeric_limits<std::int64_t>::max();
 }
 
 fault_t EmptyFault(std::int16_t cause) {
@@ -43,12 +51,13 @@ fault_t EmptyFault(std::int16_t cause) {
 CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
     : config_path_(config.path),
       channels_(config.bus),
-      queue_size_(static_cast<std::size_t>(config.gate.queue)),
+      realtime_(config.realtime),
       clocks_(std::move(clocks)),
       bus_(bus),
       sender_(bus),
       gate_(std::make_unique<Gate>(config)),
-      watch_(OptionsOf(config.gate)) {
+      watch_(OptionsOf(config.gate)),
+      reload_([path = config.path] { return Load(path); }) {
   if (const auto& violation = gate_->certifier().violation())
     spdlog::warn("observations {} and {} contradict the declaration: every candidate will be abstained from (F)",
                  violation->first, violation->second);
@@ -56,7 +65,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
     spdlog::warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
                  LipschitzEnvelope::kMaxExactColumns);
   bus.Subscribe(channels_.candidate, [this](const Received& received) {
-    queue_.emplace_back(received.bytes.begin(), received.bytes.end());
+    queue_.push_back({{received.bytes.begin(), received.bytes.end()}});
     high_water_ = std::max(high_water_, queue_.size());
   });
   bus.Subscribe(channels_.obstacles, [this](const Received& received) { OnObstacles(received); });
@@ -89,7 +98,10 @@ void CertifierNode::OnRobotState(const Received& received) {
   last_state_ = state;
   if (state.mode == robot_state_t::FINISHED) return watch_.RobotHasFinished();
   watch_.SeeRobot(received.utime);
-  const auto departure = conformance_.Check(state);
+  FailIfLeft(conformance_.Check(state));
+}
+
+void CertifierNode::FailIfLeft(const std::optional<Conformance::Departure>& departure) {
   if (!departure) return;
   fault_t fault = EmptyFault(fault_t::SLICE_LEFT);
   fault.plan_id = departure->plan_id;
@@ -104,13 +116,19 @@ void CertifierNode::OnRobotState(const Received& received) {
 }
 
 void CertifierNode::OnTransition(const Received& received) {
-  if (const auto transition = Decoded<transition_t>(received.bytes)) last_transition_ = *transition;
-  if (!gate_->learns()) return;
+  const auto transition = Decoded<transition_t>(received.bytes);
+  if (transition) last_transition_ = *transition;
+  if (gate_->options().learns) Learn(received.bytes);  // first: a false declaration is why a slice is left
+  if (transition) FailIfLeft(conformance_.Check(*transition));
+}
+
+void CertifierNode::Learn(Bytes transition) {
   const bool was_falsified = gate_->certifier().violation().has_value();
-  const std::string error = gate_->Learn(received.bytes);
+  const std::string error = gate_->Learn(transition);
   if (!error.empty()) return Refuse(channels_.transition, error);
   const auto& violation = gate_->certifier().violation();
   if (was_falsified || !violation) return;
+  falsified_.emplace(gate_->model_digest(), gate_->declaration_digest());
   fault_t fault = EmptyFault(fault_t::DECLARATION_FALSIFIED);
   fault.coordinate = static_cast<std::int16_t>(violation->coordinate);
   fault.first_observation = violation->first;
@@ -157,9 +175,15 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   fault.state = last_state_;
   fault.transition = last_transition_;
   SetText(fault.message, latched.why);
-  sender_.Send(channels_.fault, fault);
+  announced_ = fault;
+  SendFault();
   spdlog::error("fault {}: {}; nothing is certified until `forereach reset`", FaultName(latched.cause), latched.why);
   next_heartbeat_us_ = 0;
+}
+
+void CertifierNode::SendFault() {
+  next_announcement_us_ = clocks_.steady() + kHeartbeatUs;
+  sender_.Send(channels_.fault, announced_);
 }
 
 // ---- Candidates.
@@ -175,11 +199,25 @@ void CertifierNode::Tick(std::int64_t now_us) {
 
 void CertifierNode::AnswerWaiting() {
   for (int i = 0; i < kAtOnce && !queue_.empty(); ++i) {
-    const std::vector<std::uint8_t> newest = std::move(queue_.back());
+    const Waiting newest = std::move(queue_.back());
     queue_.pop_back();
-    Answer(newest, false);
+    Answer(newest.candidate, false);
+    AnswerDue();
   }
-  for (; queue_.size() > queue_size_; queue_.pop_front()) Answer(queue_.front(), true);
+  const auto most = static_cast<std::size_t>(gate_->options().queue);
+  for (; queue_.size() > most; queue_.pop_front()) Answer(queue_.front().candidate, true);
+}
+
+// Those for which another decision would take too long: while their start has not passed.
+void CertifierNode::AnswerDue() {
+  for (Waiting& waiting : queue_)
+    if (!waiting.start_utime) waiting.start_utime = StartOf(waiting.candidate);
+  const std::int64_t last_start = clocks_.wall() + Microseconds(gate_->options().decision_budget_ms);
+  std::erase_if(queue_, [&](const Waiting& waiting) {
+    if (*waiting.start_utime >= last_start) return false;
+    Answer(waiting.candidate, false);
+    return true;
+  });
 }
 
 GateAnswer CertifierNode::Decide(Bytes candidate) {
@@ -216,38 +254,51 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
 void CertifierNode::CompactIfDue() {
   if (gate_->certifier().num_unindexed() < kUnindexedAtMost) return;
   if (gate_->certifier().num_observations() <= kIndexedAtOnce) return gate_->Compact();
-  if (compaction_.valid() && compaction_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  if (compaction_.valid() && !IsReady(compaction_)) return;
   compaction_ = std::async(std::launch::async, [gate = gate_.get()] { gate->Compact(); });
 }
 
-void CertifierNode::Reload() {
-  if (reload_.valid()) return spdlog::warn("a reload is under way already");
-  spdlog::info("reloading {}", config_path_);
-  reload_ = std::async(std::launch::async, [path = config_path_, channels = channels_]() -> Loaded {
-    try {
-      const Config config = LoadConfig(path);
-      BusOptions bus = config.bus;
-      bus.url = channels.url, bus.key = channels.key;  // a command line may have given others
-      if (bus != channels) return {nullptr, path + ": bus.channels cannot change while the certifier runs"};
-      return {std::make_unique<Gate>(config), ""};
-    } catch (const std::exception& error) {
-      return {nullptr, error.what()};
-    }
-  });
+void CertifierNode::Reload() { reload_.Ask(); }
+
+CertifierNode::Loaded CertifierNode::Load(const std::string& path) try {
+  spdlog::info("reloading {}", path);
+  Loaded loaded{LoadConfig(path), nullptr, ""};
+  loaded.gate = std::make_unique<Gate>(loaded.config);
+  return loaded;
+} catch (const std::exception& error) {
+  return {{}, nullptr, error.what()};
+}
+
+std::string CertifierNode::WhyNotTaken(const Config& config) const {
+  const Problem &before = gate_->certifier().problem(), &after = *config.problem;
+  BusOptions bus = config.bus;
+  bus.url = channels_.url, bus.key = channels_.key;  // a command line may have given others
+  for (const auto& [changes, what] : std::initializer_list<std::pair<bool, const char*>>{
+           {bus != channels_, "bus.channels"},
+           {config.realtime != realtime_, "realtime"},
+           {after.model->num_states() != before.model->num_states(), "the number of states"},
+           {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},
+           {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
+    if (changes) return config.path + ": " + what + " cannot change while the certifier runs";
+  // What the robot has shown is not forgotten by reading the same file again.
+  if (falsified_.contains({config.model_digest, config.declaration_digest}))
+    return config.path + ": an executed transition contradicts its declaration; another has to be declared";
+  return "";
 }
 
 void CertifierNode::TakeReload() {
-  if (!reload_.valid() || reload_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-  Loaded loaded = reload_.get();
-  reload_error_ = loaded.error;
+  if (compaction_.valid() && !IsReady(compaction_)) return;  // it works on *gate_
+  std::optional<Loaded> loaded = reload_.Take();
+  if (!loaded) return;
+  reload_error_ = loaded->error.empty() ? WhyNotTaken(loaded->config) : loaded->error;
   next_heartbeat_us_ = 0;
-  if (!loaded.gate) {
+  if (!reload_error_.empty()) {
     ++failed_reloads_;
-    return spdlog::error("not reloaded, version {} stays in force: {}", version_, loaded.error);
+    return spdlog::error("not reloaded, version {} stays in force: {}", version_, reload_error_);
   }
-  if (compaction_.valid()) compaction_.wait();
-  loaded.gate->Inherit(*gate_);
-  gate_ = std::move(loaded.gate);
+  loaded->gate->Inherit(*gate_);
+  gate_ = std::move(loaded->gate);
+  watch_.Follow(OptionsOf(gate_->options()));
   spdlog::info("version {} of {} is in force", ++version_, config_path_);
 }
 
@@ -289,6 +340,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.elapsed_max_us = ElapsedPercentile(1);
   SetText(status.message, WhyNotOk());
   sender_.Send(channels_.status, status);
+  if (watch_.fault() && clocks_.steady() >= next_announcement_us_) SendFault();
 }
 
 double CertifierNode::ElapsedPercentile(double fraction) const {
@@ -301,15 +353,16 @@ double CertifierNode::ElapsedPercentile(double fraction) const {
 }
 
 void CertifierNode::Stop() {
+  while (!queue_.empty()) AnswerWaiting();
   const certifier_status_v2_t status = gate_->Status(0);
-  const auto abstained = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
+  const auto count = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
   std::cout << nlohmann::json{{"candidates", status.candidates},
-                              {"certified", abstained(decision_t::CERTIFIED)},
-                              {"abstained", {{"falsified", abstained(decision_t::ABSTAIN_FALSIFIED)},
-                                             {"domain", abstained(decision_t::ABSTAIN_DOMAIN)},
-                                             {"safety", abstained(decision_t::ABSTAIN_SAFETY)},
-                                             {"deadline", abstained(decision_t::ABSTAIN_DEADLINE)}}},
-                              {"rejected", abstained(decision_t::REJECTED)},
+                              {"certified", count(decision_t::CERTIFIED)},
+                              {"abstained", {{"falsified", count(decision_t::ABSTAIN_FALSIFIED)},
+                                             {"domain", count(decision_t::ABSTAIN_DOMAIN)},
+                                             {"safety", count(decision_t::ABSTAIN_SAFETY)},
+                                             {"deadline", count(decision_t::ABSTAIN_DEADLINE)}}},
+                              {"rejected", count(decision_t::REJECTED)},
                               {"observations", status.observations},
                               {"learned", status.learned},
                               {"faults", faults_},

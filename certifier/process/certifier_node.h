@@ -1,26 +1,32 @@
 /** The certifier on a bus: candidates in; decisions, certified plans and a heartbeat out.
 
-Every candidate is answered once. The newest is decided on first, since it is the one that a planner still wants; of those
-that wait more than `gate.queue` the oldest are rejected. What changes the grounds of decisions takes effect as it
-arrives: obstacles, the robot's state, executed transitions, commands.
+Every candidate is answered once. The newest is decided on first, since it is the one that a planner still wants. Those
+that wait are answered before their deadline passes, and of more than `gate.queue` the oldest are rejected. What changes
+the grounds of decisions takes effect as it arrives: obstacles, the robot's state, executed transitions, commands.
 
-Nothing is certified unless the robot's state is heard. A fault (watch.h, conformance.h, a falsified declaration) is sent
-on bus.channels.fault, and from then on every candidate is rejected until a person sends a reset. A reload reads the task
-file again, beside the running work, and takes it whole or not at all.
+Unless gate.arming is none, nothing is certified before the robot's state is heard. A fault (watch.h, conformance.h, a
+falsified declaration) is sent on bus.channels.fault, with every heartbeat again, and from then on every candidate is
+rejected until a person sends a reset. A reload reads the task file again, beside the running work, and takes it whole or
+not at all; what cannot change while it runs, WhyNotTaken says.
 
-An answer goes out before anything is counted or logged: first the certified plan, which the robot waits for, then the
-decision, so a planner that hears of a certificate knows that the plan was handed to the bus before. */
+First goes out the certified plan, which the robot waits for, then the decision: a planner that hears of a certificate
+knows that the plan was handed to the bus before. */
 #pragma once
 
 #include <array>
 #include <deque>
 #include <future>
 #include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "certifier/gate/conformance.h"
 #include "certifier/gate/gate.h"
 #include "certifier/gate/watch.h"
+#include "certifier/task/reloading.h"
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -45,7 +51,7 @@ class CertifierNode final : public Node {
   void Tick(std::int64_t now_us) override;
   [[nodiscard]] bool busy() const override { return !queue_.empty(); }
   void Reload() override;
-  /** Prints the counts as one line of JSON on standard output. */
+  /** Answers what waits still, and prints the counts as one line of JSON on standard output. */
   void Stop() override;
 
   [[nodiscard]] const Gate& gate() const { return *gate_; }
@@ -53,8 +59,9 @@ class CertifierNode final : public Node {
 
  private:
   struct Loaded {
+    Config config;
     std::unique_ptr<Gate> gate;
-    std::string error;
+    std::string error;  ///< Else there are a config and its gate.
   };
 
   void OnObstacles(const Received& received);
@@ -64,14 +71,21 @@ class CertifierNode final : public Node {
   void Obey(const command_t& command);
 
   void AnswerWaiting();
+  void AnswerDue();
   [[nodiscard]] GateAnswer Decide(Bytes candidate);
   void Answer(Bytes candidate, bool displaced);
   void CompactIfDue();
+  [[nodiscard]] static Loaded Load(const std::string& path);
   void TakeReload();
+  /** Why a task file, good in itself, cannot take the place of the one in force; empty if it can. */
+  [[nodiscard]] std::string WhyNotTaken(const Config& config) const;
 
   /** Latches and announces, unless a fault is latched already. */
   void Fail(fault_t fault, const std::string& why);
   void Announce(fault_t fault, const Watch::Fault& latched);
+  void SendFault();
+  void Learn(Bytes transition);
+  void FailIfLeft(const std::optional<Conformance::Departure>& departure);
   void Refuse(const std::string& channel, const std::string& why);
 
   void Heartbeat(std::int64_t now_us);
@@ -80,7 +94,7 @@ class CertifierNode final : public Node {
 
   const std::string config_path_;
   const BusOptions channels_;
-  const std::size_t queue_size_;
+  const RealtimeOptions realtime_;
   const Clocks clocks_;
   Bus& bus_;
   Sender sender_;
@@ -88,12 +102,21 @@ class CertifierNode final : public Node {
   Watch watch_;
   Conformance conformance_;
 
-  std::deque<std::vector<std::uint8_t>> queue_;  // candidates, the newest at the back
+  struct Waiting {
+    std::vector<std::uint8_t> candidate;
+    std::optional<std::int64_t> start_utime = {};  // known once another was decided on before it
+  };
+
+  std::deque<Waiting> queue_;  // the newest at the back
   robot_state_t last_state_{};
   transition_t last_transition_{};
 
-  std::future<Loaded> reload_;
+  fault_t announced_{};                // the last fault, sent again while it is latched: a datagram may be lost
+  std::int64_t next_announcement_us_ = 0;  // by the steady clock
+
+  Reloading<Loaded> reload_;
   std::future<void> compaction_;  // of *gate_
+  std::set<std::pair<Digest, Digest>> falsified_;  // model and declaration that an executed transition contradicted
   std::int64_t version_ = 1, failed_reloads_ = 0;
   std::string reload_error_;
 

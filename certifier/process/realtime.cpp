@@ -2,6 +2,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <string>
 
 #include <sched.h>
 #include <spdlog/spdlog.h>
@@ -20,9 +22,10 @@ void BecomeRealtime(const RealtimeOptions& options) {
   if (options.fifo_priority == 0) return;
   sched_param parameter{};
   parameter.sched_priority = options.fifo_priority;
-  if (::sched_setscheduler(0, SCHED_FIFO, &parameter) != 0)
-    throw BadInput(std::string("realtime.fifo_priority: ") + std::strerror(errno) +
-                   "; as root, or with `ulimit -r 99` or LimitRTPRIO=99");
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task"))
+    if (::sched_setscheduler(std::stoi(thread.path().filename()), SCHED_FIFO | SCHED_RESET_ON_FORK, &parameter) != 0)
+      throw BadInput(std::string("realtime.fifo_priority: ") + std::strerror(errno) +
+                     "; as root, or with `ulimit -r 99` or LimitRTPRIO=99");
 }
 
 }  // namespace forereach

@@ -41,6 +41,8 @@ struct RealtimeOptions {
   enum class Lock { kNo, kTry, kRequire };
   Lock lock_memory = Lock::kTry;
   int fifo_priority = 0;  ///< SCHED_FIFO, 1..99; 0 leaves the scheduler alone.
+
+  friend bool operator==(const RealtimeOptions&, const RealtimeOptions&) = default;
 };
 
 struct BusOptions {

@@ -77,6 +77,52 @@ TEST(ConformanceTest, TheSmallestSequenceDoesNotFollowTheLargest) {
   EXPECT_FALSE(conformance.Check(At(std::numeric_limits<std::int64_t>::min(), 99, 0, 100, 100)));
 }
 
+transition_t Step(std::int64_t utime, double x, double y) {
+  transition_t transition{};
+  transition.utime = utime;
+  transition.num_states = 2;
+  transition.next_state[0] = x;
+  transition.next_state[1] = y;
+  return transition;
+}
+
+TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheRobotStandsThere) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  const auto after = [&](std::int64_t sequence, int step, const transition_t& transition) {
+    robot_state_t state = At(10 * sequence, 7, step, step + 0.5, step + 0.5);  // each is judged by itself
+    state.utime = 100 * sequence;
+    EXPECT_FALSE(conformance.Check(state));
+    return conformance.Check(transition);
+  };
+  EXPECT_FALSE(after(1, 0, Step(100, 1, 2)));
+  const auto left = after(2, 0, Step(200, 1, std::nextafter(2.0, 3.0)));
+  ASSERT_TRUE(left);
+  EXPECT_EQ(left->step, 1);
+  EXPECT_EQ(left->coordinate, 1);
+  EXPECT_FALSE(after(3, 0, Step(299, 100, 100))) << "another step's";
+  EXPECT_EQ(after(4, 2, Step(400, 100, 100))->step, 3) << "the last slice too";
+  EXPECT_FALSE(after(5, 3, Step(500, 100, 100))) << "past the horizon";
+  transition_t odd = Step(600, 100, 100);
+  odd.num_states = 17;
+  EXPECT_FALSE(after(6, 0, odd));
+  robot_state_t standing = At(7, -1, -1, 0, 0);
+  standing.utime = 700;
+  EXPECT_FALSE(conformance.Check(standing));
+  EXPECT_FALSE(conformance.Check(Step(700, 100, 100)));
+}
+
+TEST(ConformanceTest, ThePlanThatIsExecutedIsNotForgotten) {
+  Conformance conformance;
+  const auto count = static_cast<std::int64_t>(Conformance::kPlans);
+  for (std::int64_t id = 0; id < count; ++id) conformance.Remember(Plan(id));
+  EXPECT_FALSE(conformance.Check(At(0, 0, 0, 0.5, 0.5)));
+  for (std::int64_t id = count; id < 3 * count; ++id) conformance.Remember(Plan(id));
+  EXPECT_TRUE(conformance.Check(At(10, 0, 1, 100, 100)));
+  EXPECT_TRUE(conformance.Check(At(20, 3 * count - 1, 0, 100, 100)));
+  EXPECT_FALSE(conformance.Check(At(30, 2 * count, 0, 100, 100))) << "the others are, in their order";
+}
+
 TEST(ConformanceTest, TheLastPlansAreRemembered) {
   Conformance conformance;
   const auto count = static_cast<std::int64_t>(Conformance::kPlans);

@@ -79,6 +79,16 @@ TEST(SourcesTest, SilentSourcesMakeRoomAndAHugeIdLocksNobodyOutForLong) {
   EXPECT_EQ(sources.Admit(From("17", 2), 2 * kForget + 2), Admission::kNew) << "what it sent then would be stale by now";
 }
 
+TEST(SourcesTest, WhoInheritsRemembersAsLongAsItIsToItself) {
+  Sources before(kForget), after(2 * kForget);
+  static_cast<void>(Take(before, 1, 1, 0, 0));
+  static_cast<void>(Take(before, 2, 3, 0, 0));
+  after.Inherit(before);
+  EXPECT_EQ(after.lost(), 1);
+  EXPECT_EQ(after.Admit(From("a", 2), kForget + 1), Admission::kUsed);
+  EXPECT_EQ(before.Admit(From("a", 2), kForget + 1), Admission::kNew);
+}
+
 TEST(SourcesTest, CountsGapsAndNotOrder) {
   Sources sources(kForget);
   constexpr std::int64_t kLater = 1000;

@@ -19,6 +19,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/gate/obstacle_message.h"
+#include "robot/sim_node.h"
 #include "tests/gate/small_task.h"
 #include "tests/scratch.h"
 
@@ -85,6 +86,34 @@ TEST_F(CertifierNodeTest, ACertificateComesBeforeItsDecision) {
   EXPECT_GT(decisions_[0].elapsed_us, 0);
   ASSERT_EQ(certified_.size(), 1u);
   EXPECT_EQ(certified_[0].plan.plan_id, 1);
+}
+
+TEST_F(CertifierNodeTest, WhatStillWaitsAtTheEndIsAnswered) {
+  for (int id = 1; id <= 20; ++id) bus_->Publish("PLAN_CANDIDATE", Candidate(id));
+  bus_->Dispatch(0);
+  testing::internal::CaptureStdout();
+  node_->Stop();
+  EXPECT_THAT(testing::internal::GetCapturedStdout(), testing::HasSubstr("\"candidates\":20"));
+  bus_->Dispatch(0);
+  EXPECT_EQ(decisions_.size(), 20u);
+}
+
+TEST_F(CertifierNodeTest, WhoWaitsIsAnsweredBeforeItsStart) {
+  for (int id = 1; id <= 12; ++id) {
+    candidate_plan_t candidate = Candidate(id);
+    if (id == 1) candidate.start_utime = now_us_ + 4999;  // gate.decision_budget_ms is 5
+    if (id == 2) candidate.start_utime = now_us_ + 5000;
+    bus_->Publish("PLAN_CANDIDATE", candidate);
+  }
+  Run();
+  ASSERT_GE(decisions_.size(), 2u);
+  EXPECT_EQ(decisions_[0].plan_id, 12) << "the newest first";
+  EXPECT_EQ(decisions_[1].plan_id, 1) << "then what would come too late";
+  EXPECT_EQ(decisions_[1].outcome, decision_t::ABSTAIN_DEADLINE);
+  for (int i = 0; i < 3; ++i) Run();
+  ASSERT_EQ(decisions_.size(), 12u);
+  EXPECT_EQ(decisions_.back().plan_id, 2);
+  EXPECT_EQ(decisions_.back().outcome, decision_t::CERTIFIED);
 }
 
 class RefusingBus final : public Bus {
@@ -356,13 +385,53 @@ TEST_F(ArmedNodeTest, AStateOutsideItsSliceLatchesAndNamesTheTransition) {
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
 }
 
-transition_t Executed(const Problem& problem, const Eigen::VectorXd& z, double error = 0) {
+// A robot that is not what its task says: its guard stops it, and the certifier has seen it too.
+TEST_F(ArmedNodeTest, ARobotThatLeavesItsSliceLatches) {
+  config_.gate.learns = false;  // else the first step falsifies the declaration
+  config_.robot.start = {0, 0, 1, 0.1};
+  config_.robot.step_period_ms = 150;
+  config_.robot.residual = "velocity_knee";
+  config_.robot.residual_parameters = {{"dt", 0.15}, {"damping", 4}, {"cross", 0.3}, {"knee", 0.1},
+                                       {"softplus_temperature", 0.14}, {"regularizer", 0.15}, {"smoothing", 1e-12}};
+  Restart();
+  bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+  std::vector<robot_state_t> states;
+  bus_->Subscribe("ROBOT_STATE", [&](const Received& r) { states.push_back(Decoded<robot_state_t>(r.bytes).value()); });
+  std::ostringstream summary;
+  RobotSimNode robot(config_, *bus_, summary);
+  const auto run_for = [&](std::int64_t us) {
+    for (const std::int64_t end = now_us_ + us; now_us_ < end; Pass(2000)) {
+      robot.Tick(now_us_);
+      Run();
+    }
+  };
+  run_for(10'000);
+  bus_->Publish("PLAN_CANDIDATE", Candidate(1, kAccelerationThatCertifies, now_us_));
+  run_for(2'000'000);
+  ASSERT_EQ(certified_.size(), 1u);
+  ASSERT_FALSE(faults_.empty());
+  EXPECT_EQ(faults_[0].cause, fault_t::SLICE_LEFT);
+  EXPECT_EQ(faults_[0].plan_id, 1);
+  EXPECT_EQ(faults_[0].step, faults_[0].state.executing_step + 1);
+  EXPECT_EQ(faults_[0].value, faults_[0].transition.next_state[faults_[0].coordinate]);
+  EXPECT_EQ(states.back().mode, robot_state_t::STANDING);
+  EXPECT_GT(faults_.size(), 1u) << "said again with the heartbeats";
+  for (const fault_t& fault : faults_) EXPECT_EQ(Encode(fault), Encode(faults_[0]));
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
+  const std::size_t said = faults_.size();
+  Reset();
+  run_for(2'000'000);
+  EXPECT_EQ(faults_.size(), said);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+transition_t Executed(const NominalModel& model, const Eigen::VectorXd& z, double error = 0) {
   transition_t transition{};
   transition.num_states = 4;
   transition.num_inputs = 2;
   std::copy_n(z.data(), 4, transition.state);
   std::copy_n(z.data() + 4, 2, transition.input);
-  problem.model->Evaluate({z.data(), 6}, {transition.next_state, 4});
+  model.Evaluate({z.data(), 6}, {transition.next_state, 4});
   transition.next_state[2] += error;
   return transition;
 }
@@ -371,14 +440,14 @@ TEST_F(ArmedNodeTest, ExecutedTransitionsAddToTheObservationsAndChangeTheirDiges
   SayState(State());
   const Digest before = GetDigest(Ask().observations_digest);
   const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
-  const transition_t transition = Executed(*config_.problem, z);
+  const transition_t transition = Executed(*config_.problem->model, z);
   bus_->Publish("TRANSITION", transition);
   Run();
   EXPECT_EQ(node_->gate().certifier().num_observations(), 3u);
   const decision_t after = Ask();
   EXPECT_EQ(after.outcome, decision_t::CERTIFIED);
   EXPECT_EQ(GetDigest(after.observations_digest), ChainedDigest(before, Encode(transition)));
-  bus_->Publish("TRANSITION", Executed(*config_.problem, z * 100));
+  bus_->Publish("TRANSITION", Executed(*config_.problem->model, z * 100));
   Run();
   EXPECT_EQ(node_->gate().certifier().num_observations(), 3u) << "outside the domain it says nothing";
 }
@@ -387,12 +456,12 @@ TEST_F(ArmedNodeTest, ATransitionThatContradictsTheDeclarationFalsifiesItForGood
   SayState(State());
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
   const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
-  bus_->Publish("TRANSITION", Executed(*config_.problem, z, 0.01));
+  bus_->Publish("TRANSITION", Executed(*config_.problem->model, z, 0.01));
   Run();
   ASSERT_EQ(faults_.size(), 1u);
   EXPECT_EQ(faults_[0].cause, fault_t::DECLARATION_FALSIFIED);
   EXPECT_EQ(faults_[0].second_observation, 2);
-  EXPECT_EQ(faults_[0].transition.next_state[2], Executed(*config_.problem, z, 0.01).next_state[2]);
+  EXPECT_EQ(faults_[0].transition.next_state[2], Executed(*config_.problem->model, z, 0.01).next_state[2]);
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
   Reset();
   SayState(State());
@@ -405,7 +474,7 @@ TEST_F(ArmedNodeTest, ManyTransitionsAreIndexedOnTheWay) {
   for (int i = 0; i < 1000; ++i) {
     Eigen::VectorXd z(6);
     for (double& x : z) x = anywhere(random);
-    bus_->Publish("TRANSITION", Executed(*config_.problem, z));
+    bus_->Publish("TRANSITION", Executed(*config_.problem->model, z));
     Run();
   }
   EXPECT_EQ(node_->gate().certifier().num_observations(), 1002u);
@@ -417,7 +486,7 @@ TEST_F(ArmedNodeTest, ManyTransitionsAreIndexedOnTheWay) {
 TEST_F(ArmedNodeTest, ATaskThatDoesNotLearnIgnoresThem) {
   config_.gate.learns = false;
   Restart();
-  bus_->Publish("TRANSITION", Executed(*config_.problem, Eigen::VectorXd::Zero(6), 0.01));
+  bus_->Publish("TRANSITION", Executed(*config_.problem->model, Eigen::VectorXd::Zero(6), 0.01));
   SayState(State());
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
 }
@@ -481,13 +550,29 @@ class ReloadTest : public testing::Test {
     text << std::ifstream(kShipped).rdbuf();
     Write(edit(std::regex_replace(text.str(), std::regex("data/"), FOREREACH_SOURCE_DIR "/config/data/")));
   }
+  // Reads the file again and waits for what comes of it.
   void Reload(CertifierNode& node) {
+    const std::int64_t version = status_.version, failed = status_.failed_reloads;
     node.Reload();
-    for (int i = 0; i < 5000 && status_.version == 1 && status_.failed_reloads == 0; ++i) {
+    TickUntil(node, [&] { return status_.version != version || status_.failed_reloads != failed; });
+  }
+  template <class Done>
+  void TickUntil(CertifierNode& node, Done done) {
+    for (int i = 0; i < 5000 && !done(); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
       node.Tick(kNow);
       bus_->Dispatch(0);
     }
+  }
+  // Of the shipped task, and heard.
+  std::unique_ptr<CertifierNode> Begin() {
+    Copy([](const std::string& text) { return text; });
+    auto node = std::make_unique<CertifierNode>(LoadConfig(path_), *bus_, Clocks{clock_, clock_});
+    bus_->Subscribe("CERTIFIER_STATUS",
+                    [this](const Received& r) { status_ = Decoded<certifier_status_v2_t>(r.bytes).value(); });
+    node->Tick(kNow);
+    bus_->Dispatch(0);
+    return node;
   }
 
   const std::string kShipped = FOREREACH_SOURCE_DIR "/config/point_mass.yaml";
@@ -499,35 +584,76 @@ class ReloadTest : public testing::Test {
 };
 
 TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
-  Copy([](const std::string& text) { return text; });
+  const auto node = Begin();
   const Config before = LoadConfig(path_);
-  CertifierNode node(before, *bus_, {clock_, clock_});
-  bus_->Subscribe("CERTIFIER_STATUS", [this](const Received& r) { status_ = Decoded<certifier_status_v2_t>(r.bytes).value(); });
-  node.Tick(kNow);
-  bus_->Dispatch(0);
   ASSERT_EQ(status_.version, 1);
 
   Copy([](const std::string& text) { return text + "\nnonsense: 3\n"; });
-  Reload(node);
+  Reload(*node);
   EXPECT_EQ(status_.failed_reloads, 1);
   EXPECT_EQ(status_.version, 1);
   EXPECT_EQ(GetDigest(status_.config_digest), before.digest);
   EXPECT_THAT(GetText(status_.message), testing::HasSubstr("nonsense"));
 
-  status_ = {};
-  status_.version = 1;
-  Copy([](const std::string& text) { return text + "\nbus: {channels: {decision: ELSEWHERE}}\n"; });
-  Reload(node);
-  EXPECT_EQ(status_.failed_reloads, 2) << "a channel cannot change under a running process";
+  for (const auto& [change, what] : {std::pair{"bus: {channels: {decision: ELSEWHERE}}", "bus.channels"},
+                                     std::pair{"realtime: {lock_memory: no}", "realtime"},
+                                     std::pair{"realtime: {fifo_priority: 3}", "realtime"}}) {
+    const std::int64_t failed = status_.failed_reloads;
+    Copy([&](const std::string& text) { return text + "\n" + change + "\n"; });
+    Reload(*node);
+    EXPECT_EQ(status_.failed_reloads, failed + 1);
+    EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what + std::string(" cannot change while")));
+  }
 
-  status_ = {};
-  status_.version = 1;
   Copy([](const std::string& text) { return "# another\n" + text; });
-  Reload(node);
+  Reload(*node);
   EXPECT_EQ(status_.version, 2);
   EXPECT_EQ(GetDigest(status_.config_digest), LoadConfig(path_).digest);
   EXPECT_EQ(GetText(status_.message), "waits for the robot's state");
-  std::filesystem::remove(path_);
+}
+
+TEST_F(ReloadTest, ArmingAndQueueAreTheNewFilesToo) {
+  const auto node = Begin();
+  EXPECT_EQ(node->watch().state(), Watch::State::kDisarmed);
+  Copy([](const std::string& text) { return text + "\ngate: {arming: none, queue: 1}\n"; });
+  Reload(*node);
+  EXPECT_EQ(node->watch().state(), Watch::State::kArmed);
+  std::map<int, int> causes;
+  bus_->Subscribe("PLAN_DECISION", [&](const Received& r) { ++causes[Decoded<decision_t>(r.bytes).value().cause]; });
+  for (int id = 1; id <= CertifierNode::kAtOnce + 3; ++id) bus_->Publish("PLAN_CANDIDATE", Candidate(id));
+  bus_->Dispatch(0);
+  node->Tick(kNow);
+  bus_->Dispatch(0);
+  EXPECT_EQ(causes[decision_t::CAUSE_QUEUE_FULL], 2);
+  Copy([](const std::string& text) { return text; });
+  Reload(*node);
+  EXPECT_EQ(node->watch().state(), Watch::State::kDisarmed);
+}
+
+TEST_F(ReloadTest, TheSameDeclarationDoesNotComeBackOnceATransitionHasContradictedIt) {
+  const auto node = Begin();
+  const Eigen::VectorXd z = (Eigen::VectorXd(6) << 0, 0, 2, 0.1, 0, 0).finished();
+  bus_->Publish("TRANSITION", Executed(*node->gate().certifier().problem().model, z, 1));
+  bus_->Dispatch(0);
+  ASSERT_TRUE(node->gate().certifier().violation());
+  Copy([](const std::string& text) { return "# another\n" + text; });
+  Reload(*node);
+  EXPECT_EQ(status_.failed_reloads, 1);
+  EXPECT_TRUE(node->gate().certifier().violation());
+  Copy([](const std::string& text) { return std::regex_replace(text, std::regex("noise_bound: \\[0, 0, 0"), "noise_bound: [0, 0, 2"); });
+  Reload(*node);
+  EXPECT_EQ(status_.version, 2);
+  EXPECT_FALSE(node->gate().certifier().violation());
+  Copy([](const std::string& text) { return text; });
+  Reload(*node);
+  EXPECT_EQ(status_.failed_reloads, 2) << "nor after another";
+}
+
+TEST_F(ReloadTest, OneThatIsAskedForMeanwhileComesAfter) {
+  const auto node = Begin();
+  for (int i = 0; i < 3; ++i) node->Reload();
+  TickUntil(*node, [&] { return status_.version >= 3; });
+  EXPECT_EQ(status_.version, 3) << "the first, and one for those asked for while it was under way";
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 // forereach-certifier as a process, fed good and bad messages over a real bus.
 #include <algorithm>
+#include <csignal>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <string>
@@ -8,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sched.h>
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/certified_plan_t.hpp"
@@ -48,6 +51,28 @@ class CertifierProcessTest : public testing::Test {
   std::int64_t next_plan_id_ = 1;
   std::map<std::string, std::string_view> expected_;  // cause by plan digest
 };
+
+TEST(CertifierRealtimeTest, AllItsThreadsAreUnderFifoAndWhatTheyStartIsNot) {
+  const ScratchDirectory scratch;
+  const std::string path = scratch.Write("task.yaml", PatientTask() + "realtime: {fifo_priority: 5}\n");
+  ChildProcess certifier({FOREREACH_CERTIFIER, "--config", path, "--lcm-url", PrivateBusUrl()});
+  if (!certifier.WaitForLog("ready on")) {
+    EXPECT_THAT(certifier.error(), testing::HasSubstr("realtime.fifo_priority: "));
+    EXPECT_EQ(certifier.WaitForExit(), 2);
+    GTEST_SKIP() << "this user may not ask for real time";
+  }
+  const std::filesystem::path tasks = "/proc/" + std::to_string(certifier.pid()) + "/task";
+  int threads = 0;
+  for (const auto& thread : std::filesystem::directory_iterator(tasks)) {
+    EXPECT_EQ(::sched_getscheduler(std::stoi(thread.path().filename())), SCHED_FIFO | SCHED_RESET_ON_FORK)
+        << "the flag: threads that it starts are ordinary";
+    ++threads;
+  }
+  EXPECT_GE(threads, 2) << "one that decides, one that receives";
+  certifier.Signal(SIGHUP);
+  EXPECT_TRUE(certifier.WaitForLog("is in force"));
+  EXPECT_EQ(certifier.Terminate(), 0) << certifier.error();
+}
 
 TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCertified) {
   Send(New(kGentle), decision_t::CAUSE_NONE);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/gate.h"
+#include "forereach/command_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
@@ -50,6 +51,24 @@ class RobotProcessTest : public testing::Test {
   BusProbe probe_{PrivateBusUrl(), {"ROBOT_STATE", "TRANSITION", "EXECUTION_EVENT"}};
   ChildProcess robot_{{FOREREACH_ROBOT_SIM, "--config", path_, "--lcm-url", PrivateBusUrl()}};
 };
+
+TEST_F(RobotProcessTest, AReloadMakesItTakePlansOfTheTaskAsItIsNow) {
+  scratch_.Write("task.yaml", "# changed\n" + PatientTask());
+  Gate changed(LoadConfig(path_));
+  candidate_plan_t candidate = CandidateFor(config_, 1, Eigen::Vector2d(0.5, 0), kSteps);
+  const GateAnswer answer = changed.Decide(Encode(candidate), WallClockUs());
+  ASSERT_TRUE(answer.certified);
+  probe_.bus().Publish("PLAN_CERTIFIED", *answer.certified);
+  ASSERT_TRUE(WaitForEvents(execution_event_t::REFUSED));
+  command_t reload{};
+  reload.utime = WallClockUs();
+  reload.kind = command_t::RELOAD;
+  probe_.bus().Publish("COMMAND", reload);
+  ASSERT_TRUE(robot_.WaitForLog("as it is now are accepted")) << robot_.error();
+  probe_.bus().Publish("PLAN_CERTIFIED", *answer.certified);
+  ASSERT_TRUE(WaitForEvents(execution_event_t::ACCEPTED));
+  EXPECT_EQ(Count(execution_event_t::REFUSED), 1);
+}
 
 TEST_F(RobotProcessTest, StandsUntilACertifiedPlanComesThenDrivesItToItsEnd) {
   EXPECT_EQ(Last().mode, robot_state_t::STANDING);

@@ -58,6 +58,25 @@ TEST(GuardAccept, APlanThatPassesIsPendingAndNotYetExecuting) {
   EXPECT_EQ(guard.executing(), nullptr);
 }
 
+TEST(GuardAccept, WhatItExpectsCanChange) {
+  Guard guard(TwoStates());
+  const auto cause = [&](std::int64_t plan_id, const char* config, const char* model) {
+    certified_plan_t certified = SmallPlan();
+    certified.plan.plan_id = plan_id;
+    SetDigest(certified.config_digest, DigestOf(config));
+    SetDigest(certified.model_digest, DigestOf(model));
+    return guard.Accept(Sealed(certified), kNow).cause;
+  };
+  EXPECT_EQ(cause(10, "another config", "model"), GuardCause::kConfigDigest);
+  guard.Expect(DigestOf("another config"), DigestOf("another model"));
+  EXPECT_EQ(cause(11, "another config", "model"), GuardCause::kConfigDigest);
+  EXPECT_EQ(cause(12, "config", "another model"), GuardCause::kModelDigest);
+  EXPECT_EQ(cause(13, "config", "model"), GuardCause::kNone) << "the certifier may have refused the new one";
+  EXPECT_EQ(cause(14, "another config", "another model"), GuardCause::kNone);
+  EXPECT_EQ(cause(15, "config", "model"), GuardCause::kConfigDigest) << "it has not";
+  EXPECT_EQ(cause(16, "another config", "another model"), GuardCause::kNone);
+}
+
 TEST(GuardAccept, RefusesAFlippedBitAnywhere) {
   const std::vector<std::uint8_t> good = Sealed(SmallPlan());
   Guard guard(TwoStates());

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/dynamics/models.h"
+#include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "tests/robot/sealed_plan.h"
@@ -262,6 +264,52 @@ TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {
   EXPECT_EQ(rig.Count(kStanding), 2);
   EXPECT_EQ(rig.Summary()["stops"], 2);
   EXPECT_GT(rig.StateAt(14)[0], rig.StateAt(8)[0]);
+}
+
+TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  const auto send = [&](const std::string& channel, const auto& message) { rig.SendRaw(channel, Bytes(Encode(message))); };
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin, 40));
+  rig.RunTo(2);
+  fault_t fault{};
+  fault.utime = BoundaryTime(2);
+  fault.cause = fault_t::ROBOT_STATE_LOST;
+  send("FAULT", fault);
+  rig.RunTo(3);
+  EXPECT_EQ(rig.states[3].mode, robot_state_t::EXECUTING) << "that is the certifier's own affair";
+  fault.cause = fault_t::DECLARATION_FALSIFIED;
+  send("FAULT", fault);
+  send("FAULT", fault);
+  rig.RunTo(20);
+  EXPECT_EQ(rig.states[4].mode, robot_state_t::STANDING);
+  EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
+  rig.Send(Plan(config, 2, 22, rig.StateAt(20)));
+  rig.RunTo(22);
+  EXPECT_EQ(rig.Count(kRefused), 1);
+  EXPECT_EQ(rig.states[22].mode, robot_state_t::STANDING);
+
+  command_t reset{};
+  reset.kind = command_t::RESET;
+  reset.utime = BoundaryTime(22) - 500'000;  // gate.max_age_ms is 500
+  send("COMMAND", reset);
+  rig.RunTo(23);
+  EXPECT_EQ(rig.Count(execution_event_t::RESET), 0);
+  reset.utime = BoundaryTime(23);
+  send("COMMAND", reset);
+  send("FAULT", fault);
+  rig.RunTo(24);
+  EXPECT_EQ(rig.Count(execution_event_t::RESET), 1);
+  EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
+  rig.Send(Plan(config, 3, 25, rig.StateAt(24)));
+  rig.RunTo(25);
+  EXPECT_EQ(rig.states[25].mode, robot_state_t::EXECUTING);
+  ++fault.sequence;
+  fault.cause = fault_t::SLICE_LEFT;
+  send("FAULT", fault);
+  rig.RunTo(26);
+  EXPECT_EQ(rig.Count(execution_event_t::HALTED), 2) << "another fault";
 }
 
 TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
