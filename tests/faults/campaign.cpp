@@ -7,11 +7,15 @@
 #include <iostream>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <sstream>
 #include <thread>
 
 #include <CLI/CLI.hpp>
+#include <fcntl.h>
+#include <sched.h>
 #include <sys/mount.h>
+#include <unistd.h>
 
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
@@ -28,13 +32,14 @@ using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
 constexpr std::chrono::seconds kAnewIfBackBy{-5};  // a shorter jump back is waited out
+constexpr std::chrono::seconds kSaysSoon{3};       // some heartbeats
 
 struct Row {
   std::string fault;
   int tries = 0;
-  std::size_t forbidden = 0;         // what may never happen, and did
-  std::int64_t lost_by_logger = 0;   // confirmed and not in the log
-  int recovered = 0, said_why = 0;   // of the tries
+  std::size_t forbidden = 0;                   // what may never happen, and did
+  std::optional<std::int64_t> lost_by_logger;  // confirmed and not in the log; nothing: not looked at
+  int recovered = 0, said_why = 0;             // of the tries
   std::string remark;
 };
 
@@ -59,7 +64,7 @@ class Campaign final {
         {"forgeries", [this] { Forgeries(); }},
         {"flood", [this] { Flood(); }},
         {"disks", [this] { Disks(); }},
-        {"route", [this] { NoNetwork(); }},
+        {"route", [this] { NoNetwork(), LostRoute(); }},
         {"reload", [this] { BadReload(); }}};
     for (const auto& [name, run] : all)
       if (options_.only.empty() || options_.only == name) run();
@@ -69,21 +74,28 @@ class Campaign final {
  private:
   int Below(int bound) { return static_cast<int>(random_() % static_cast<unsigned>(bound)); }
 
-  // `hurt` does something to a healthy system; then it has to heal.
-  void Try(Row& row, Rig& rig, const std::function<void()>& hurt, bool logger_hurt = false) {
+  // `hurt` does something to a healthy system; then it has to heal. Where the bus loses messages it may lose decisions.
+  void Try(Row& row, Rig& rig, const std::function<void()>& hurt, bool bus_loses) {
     ++row.tries;
-    const std::size_t before = rig.witness().violations().size();
+    const std::int64_t before = rig.witness().unheard();
     hurt();
-    if (logger_hurt) row.lost_by_logger += rig.LostByLogger();
+    DemandNothingForbidden(row, rig);
     const std::string why = rig.Heal();
-    for (std::size_t i = before; i < rig.witness().violations().size(); ++i)
-      std::cerr << row.fault << ": FORBIDDEN: " << rig.witness().violations()[i] << "\n";
-    row.forbidden += rig.witness().violations().size() - before;
+    DemandNothingForbidden(row, rig);
+    const std::int64_t unheard = rig.witness().unheard() - before;
+    Demand(row, bus_loses || unheard <= 0, std::to_string(unheard) + " candidates counted, their decisions not heard");
+    if (const auto lost = rig.TakeLost()) row.lost_by_logger = row.lost_by_logger.value_or(0) + *lost;
     if (why.empty())
       ++row.recovered;
     else
-      std::cerr << row.fault << ": " << why << "\n", row.remark = why;
+      std::cerr << row.fault << ": " << why << "\n", Remark(row, why);
     progress_->Advance();
+  }
+
+  // So many of them, with a system that is healthy at first.
+  void Tries(Row& row, Rig& rig, const std::function<void(int)>& hurt, int tries, bool bus_loses = false) {
+    if (!HealAtFirst(row, rig)) return;
+    for (int i = 0; i < tries; ++i) Try(row, rig, [&] { hurt(i); }, bus_loses);
   }
 
   // What has to be seen in a try.
@@ -93,11 +105,20 @@ class Campaign final {
     ++row.forbidden;
   }
 
-  // The system has to be healthy before it can be hurt.
+  // Nothing that the witness tells, and no process that ended by itself.
+  static void DemandNothingForbidden(Row& row, Rig& rig) {
+    for (const std::string& violation : rig.witness().TakeViolations()) Demand(row, false, violation);
+    for (const std::string& death : rig.TakeDeaths()) Demand(row, false, death);
+  }
+
+  // The system has to be healthy before it can be hurt; if it is not, that is a try it has not recovered from.
   static bool HealAtFirst(Row& row, Rig& rig) {
     const std::string why = rig.Heal();
-    if (!why.empty()) Remark(row, "never began: " + why);
-    return why.empty();
+    DemandNothingForbidden(row, rig);
+    if (why.empty()) return true;
+    ++row.tries;
+    Remark(row, "never began: " + why);
+    return false;
   }
 
   static void Remark(Row& row, const std::string& text) { row.remark += (row.remark.empty() ? "" : "; ") + text; }
@@ -112,20 +133,17 @@ class Campaign final {
   void Signals(const std::string& fault, int signal, int tries) {
     Rig rig(DemoTask());
     Row& row = Begin(fault, tries);
-    const bool began = HealAtFirst(row, rig);
-    for (int i = 0; i < tries && began; ++i) {
+    Tries(row, rig, [&](int i) {
       const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
-      Try(row, rig, [&] {
-        rig.Listen(milliseconds(Below(120)));
-        rig.Signal(role, signal);
-        if (signal == SIGKILL) {
-          static_cast<void>(rig.Reap(role));
-        } else {
-          rig.Listen(milliseconds(Below(2000)));
-          rig.Signal(role, SIGCONT);
-        }
-      }, role == Rig::kLogger);
-    }
+      rig.Listen(milliseconds(Below(120)));
+      rig.Signal(role, signal);
+      if (signal == SIGKILL) {
+        static_cast<void>(rig.Reap(role));
+      } else {
+        rig.Listen(milliseconds(Below(2000)));
+        rig.Signal(role, SIGCONT);
+      }
+    }, tries);
   }
 
   // 0.3 s to an hour, forward or backward.
@@ -151,15 +169,13 @@ class Campaign final {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin(std::string("The clock of the ") + Rig::kNames[role] + " jumps by 0.3 s to an hour, and back",
                      options_.others);
-    HealAtFirst(row, rig);
-    for (int i = 0; i < options_.others; ++i)
-      Try(row, rig, [&] {
-        rig.SetClock(role, Jump());
-        rig.Listen(milliseconds(1000));
-        rig.SetClock(role, microseconds(0));
-        rig.Listen(milliseconds(200));
-        if (role == Rig::kCertifier) DemandLatched(row, rig);
-      }, role == Rig::kLogger);
+    Tries(row, rig, [&](int) {
+      rig.SetClock(role, Jump());
+      rig.Listen(milliseconds(1000));
+      rig.SetClock(role, microseconds(0));
+      rig.Listen(milliseconds(200));
+      if (role == Rig::kCertifier) DemandLatched(row, rig);
+    }, options_.others);
   }
 
   // As when the machine's clock is set. Whoever begins after it went back signs with times that were used before it did, so
@@ -167,17 +183,15 @@ class Campaign final {
   void AllClocks() {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin("All clocks jump by 0.3 s to an hour, and stay", options_.others);
-    HealAtFirst(row, rig);
     microseconds offset(0);
     int anew = 0;
-    for (int i = 0; i < options_.others; ++i)
-      Try(row, rig, [&] {
-        const microseconds jump = Jump();
-        rig.SetClocks(offset += jump);
-        rig.Listen(milliseconds(1000));
-        DemandLatched(row, rig);
-        if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
-      }, true);
+    Tries(row, rig, [&](int) {
+      const microseconds jump = Jump();
+      rig.SetClocks(offset += jump);
+      rig.Listen(milliseconds(1000));
+      DemandLatched(row, rig);
+      if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
+    }, options_.others);
     Remark(row, std::to_string(anew) + " times back by more than 5 s: all started again");
   }
 
@@ -187,7 +201,8 @@ class Campaign final {
                                                                 {"one in five delayed by 60 ms", {.delay = 0.2}},
                                                                 {"one in five overtaken", {.swap = 0.2}},
                                                                 {"one in five with a bit flipped", {.corrupt = 0.2}},
-                                                                {"all of these", {0.1, 0.1, 0.1, 0.1, 0.1, 60}}};
+                                                                {"all of these", {0.1, 0.1, 0.1, 0.1, 0.1, 60}},
+                                                                {"none arrives for a second", {.drop = 1}}};
     for (const auto& [name, weather] : weathers) {
       Rig rig(DemoTask(), {.relayed = true});
       const BusOptions& channels = rig.config().bus;
@@ -209,12 +224,12 @@ class Campaign final {
         relay.SetWeather(now);
       };
       Row& row = Begin("Datagrams: " + name, options_.others);
-      for (int i = 0; i < options_.others; ++i)
-        Try(row, rig, [&] {
-          set(weather);
-          rig.Listen(milliseconds(1000));
-          set({});
-        });
+      Tries(row, rig, [&](int) {
+        set(weather);
+        rig.Listen(milliseconds(1000));
+        set({});
+        rig.Listen(milliseconds(100));  // no altered message is still on its way when the heartbeats are believed again
+      }, options_.others, true);
       stop = true;
       passing.join();
       Remark(row, std::to_string(relay.spoiled()) + " messages spoiled");
@@ -235,37 +250,35 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("A robot that lies about its state (signed)", options_.others);
     std::int64_t sequence = 1 << 30;
-    for (int i = 0; i < options_.others; ++i)
-      Try(row, rig, [&] {
-        for (int j = 0; j < 20; ++j) {
-          robot_state_t state = State(rig);
-          state.sequence = sequence++;
-          state.executing_plan_id = j % 2 == 0 ? WallClockUs() : -1;
-          for (int k = 0; k < state.num_states; ++k) state.state[k] = j % 5 == 4 ? 1e300 : Below(100) - 50;
-          rig.bus().Publish(rig.config().bus.robot_state, state);
-          rig.Listen(milliseconds(5));
-        }
-      });
+    Tries(row, rig, [&](int) {
+      for (int j = 0; j < 20; ++j) {
+        robot_state_t state = State(rig);
+        state.sequence = sequence++;
+        state.executing_plan_id = j % 2 == 0 ? WallClockUs() : -1;
+        for (int k = 0; k < state.num_states; ++k) state.state[k] = j % 5 == 4 ? 1e300 : Below(100) - 50;
+        rig.bus().Publish(rig.config().bus.robot_state, state);
+        rig.Listen(milliseconds(5));
+      }
+    }, options_.others);
   }
 
   void Nonsense() {
     Rig rig(DemoTask());
     Row& row = Begin("A planner that sends NaN, wrong sizes, garbage (signed)", options_.others);
     std::int64_t id = 1;
-    for (int i = 0; i < options_.others; ++i)
-      Try(row, rig, [&] {
-        for (int j = 0; j < 50; ++j) {
-          candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
-          SetText(candidate.source, "nonsense");
-          if (j % 3 == 0) candidate.control[Below(6)][Below(2)] = std::numeric_limits<double>::quiet_NaN();
-          if (j % 3 == 1) candidate.num_steps = static_cast<std::int16_t>(random_());
-          if (j % 3 == 2) candidate.initial_half_width[Below(6)] = -1;
-          std::vector<std::uint8_t> bytes = Encode(candidate);
-          if (j % 7 == 0) bytes.resize(static_cast<std::size_t>(Below(20'000)));
-          rig.bus().Publish(rig.config().bus.candidate, Bytes(bytes));
-          if (j % 10 == 0) rig.Listen(milliseconds(5));
-        }
-      });
+    Tries(row, rig, [&](int) {
+      for (int j = 0; j < 50; ++j) {
+        candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
+        SetText(candidate.source, "nonsense");
+        if (j % 3 == 0) candidate.control[Below(6)][Below(2)] = std::numeric_limits<double>::quiet_NaN();
+        if (j % 3 == 1) candidate.num_steps = static_cast<std::int16_t>(random_());
+        if (j % 3 == 2) candidate.initial_half_width[Below(6)] = -1;
+        std::vector<std::uint8_t> bytes = Encode(candidate);
+        if (j % 7 == 0) bytes.resize(static_cast<std::size_t>(Below(20'000)));
+        rig.bus().Publish(rig.config().bus.candidate, Bytes(bytes));
+        if (j % 10 == 0) rig.Listen(milliseconds(5));
+      }
+    }, options_.others);
   }
 
   // Whoever is on the network, without the key: new plans, certified plans, resets, and what was heard before.
@@ -278,24 +291,30 @@ class Campaign final {
       if (channels.signed_channels().contains(r.channel) && heard.size() < 2000)
         heard.push_back({r.channel, {r.bytes.begin(), r.bytes.end()}});
     });
-    for (int i = 0; i < options_.others; ++i)
-      Try(row, rig, [&] {
-        heard.clear();
-        rig.Listen(milliseconds(500));
-        const auto recorded = heard;
-        for (const auto& [channel, bytes] : recorded) {
-          rig.open_bus().Publish(channel, Bytes(bytes));                     // again
-          rig.open_bus().Publish(channel, WithoutSignature(Bytes(bytes)));  // unsigned
-          auto altered = bytes;
-          altered[altered.size() / 2] ^= 1;
-          rig.open_bus().Publish(channel, Bytes(altered));
-        }
-        rig.Listen(milliseconds(100));
-      });
+    Tries(row, rig, [&](int) {
+      heard.clear();
+      rig.Listen(milliseconds(500));
+      const auto recorded = heard;
+      const auto before = rig.witness().status().value_or(certifier_status_v2_t{});
+      for (const auto& [channel, bytes] : recorded) {
+        rig.open_bus().Publish(channel, Bytes(bytes));                     // again
+        rig.open_bus().Publish(channel, WithoutSignature(Bytes(bytes)));  // unsigned
+        auto altered = bytes;
+        altered[altered.size() / 2] ^= 1;
+        rig.open_bus().Publish(channel, Bytes(altered));
+      }
+      rig.Listen(milliseconds(100));
+      const auto refuses_all = [&] {  // whatever else it hears, the robot's states are among them
+        const auto& now = rig.witness().status();
+        return now && now->refused_unsigned > before.refused_unsigned && now->refused_forged > before.refused_forged &&
+               now->refused_replayed > before.refused_replayed;
+      };
+      Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
+    }, options_.others);
     if (rig.witness().status()) {
       const auto& s = *rig.witness().status();
-      row.remark += "refused by the certifier: " + std::to_string(s.refused_unsigned) + " unsigned, " +
-                    std::to_string(s.refused_forged) + " forged, " + std::to_string(s.refused_replayed) + " replayed";
+      Remark(row, "refused by the certifier: " + std::to_string(s.refused_unsigned) + " unsigned, " +
+                      std::to_string(s.refused_forged) + " forged, " + std::to_string(s.refused_replayed) + " replayed");
     }
   }
 
@@ -303,8 +322,7 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("A flood of " + std::to_string(options_.floods) + " candidates (signed)", 1);
     std::int64_t candidates = 0;
-    Try(row, rig, [&] {
-      static_cast<void>(rig.Heal());
+    Tries(row, rig, [&](int) {
       candidate_plan_t candidate = CandidateFor(rig.config(), 1, Eigen::Vector2d(0, 0), 12, milliseconds(500));
       SetText(candidate.source, "flood");
       const std::int64_t before = rig.witness().decisions();
@@ -318,15 +336,16 @@ class Campaign final {
       }
       rig.Listen(milliseconds(1500));
       candidates = rig.witness().decisions() - before;
-    });
+    }, 1, true);
     if (rig.witness().status())
-      row.remark = std::to_string(candidates) + " decisions heard; the certifier counts " +
-                   std::to_string(rig.witness().status()->candidates) + " decided on and " +
-                   std::to_string(rig.witness().status()->candidates_lost) + " that the bus lost";
+      Remark(row, std::to_string(candidates) + " decisions heard; the certifier counts " +
+                      std::to_string(rig.witness().status()->candidates) + " decided on and " +
+                      std::to_string(rig.witness().status()->candidates_lost) + " that the bus lost");
   }
 
   void Disks();
   void NoNetwork();
+  void LostRoute();
   void BadReload();
 
   const Options options_;
@@ -348,25 +367,39 @@ void Campaign::Disks() {
   {
     Rig rig(DemoTask("logger: {min_free_mb: 1}\n"));
     rig.SetDirectory(directory);
-    for (const bool full : {true, false}) {
+    const auto end_logger = [&] {
       rig.Signal(Rig::kLogger, SIGTERM);
       static_cast<void>(rig.Reap(Rig::kLogger));
-      rig.Start(Rig::kLogger);
-      Row& row = Begin(full ? "Full disk" : "Log directory read-only", options_.others);
-      for (int i = 0; i < options_.others; ++i)
-        Try(row, rig, [&] {
-          const std::string filler = directory + "/filler";  // as much as there is room for
-          if (full)
-            std::ofstream(filler) << std::string(32 << 20, 'x');
-          else
-            ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT | MS_RDONLY, kSize);
-          rig.Listen(milliseconds(700));
-          if (full)
-            std::filesystem::remove(filler);
-          else
-            ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT, kSize);
-        });
-    }
+    };
+    end_logger();  // it is started again there
+    Row& full = Begin("Full disk", options_.others);
+    Tries(full, rig, [&](int) {
+      const std::string filler = directory + "/filler";  // as much as there is room for
+      std::ofstream(filler) << std::string(32 << 20, 'x');
+      rig.Listen(milliseconds(700));
+      const auto says_so = [&] {
+        const auto& logger = rig.witness().logger_status();
+        return logger && logger->state == logger_status_t::ERROR;
+      };
+      Demand(full, rig.ListenUntil(says_so, kSaysSoon), "the disk was full, and the logger's state was not ERROR");
+      std::filesystem::remove(filler);
+    }, options_.others);
+
+    // While a file is open to be written the kernel refuses it, so it is done before the logger starts.
+    Row& read_only = Begin("Log directory read-only at the logger's start", options_.others);
+    const auto remount = [&](unsigned long how) {
+      Demand(read_only, ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT | how, kSize) == 0, "no remount");
+    };
+    Tries(read_only, rig, [&](int) {
+      end_logger();
+      remount(MS_RDONLY);
+      ChildProcess logger({FOREREACH_LOGGER, "--config", rig.task_path(), "--lcm-url", rig.url(Rig::kLogger),
+                           "--directory", directory});
+      const bool says_why = logger.WaitForExit(std::chrono::seconds(10)) == 2 &&
+                            logger.error().find(directory) != std::string::npos;
+      Demand(read_only, says_why, "the logger did not end with the reason: " + logger.error());
+      remount(0);
+    }, options_.others);
   }
   ::umount(directory.c_str());
 }
@@ -385,7 +418,59 @@ void Campaign::NoNetwork() {
     if (code == 2 && process.error().find("bus:") != std::string::npos) ++row.said_why;
     progress_->Advance();
   }
-  row.remark = "exit 2 and advice";
+  Remark(row, "exit 2 and advice");
+}
+
+// A network of its own for this thread and what it starts from now on: the machine's routes stay as they are.
+class OwnNetwork final {
+ public:
+  OwnNetwork() : machines_(::open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC)) {
+    entered_ = machines_ >= 0 && ::unshare(CLONE_NEWNET) == 0;
+    works_ = entered_ && Ip({"link", "set", "lo", "up"}) && SetRoute(true);
+  }
+  ~OwnNetwork() {
+    if (entered_) static_cast<void>(::setns(machines_, CLONE_NEWNET));
+    if (machines_ >= 0) ::close(machines_);
+  }
+  OwnNetwork(const OwnNetwork&) = delete;
+  OwnNetwork& operator=(const OwnNetwork&) = delete;
+
+  [[nodiscard]] bool works() const { return works_; }
+  /** The only one to multicast. */
+  [[nodiscard]] bool SetRoute(bool there) const {
+    return Ip({"route", there ? "add" : "del", "224.0.0.0/4", "dev", "lo"});
+  }
+
+ private:
+  static bool Ip(const std::vector<std::string>& arguments) {
+    std::vector<std::string> command{"/usr/bin/env", "ip"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    return ChildProcess(command).WaitForExit(std::chrono::seconds(10)) == 0;
+  }
+
+  const int machines_;
+  bool entered_ = false, works_ = false;
+};
+
+void Campaign::LostRoute() {
+  const std::string fault = "The multicast route goes for a second, and comes back";
+  const OwnNetwork network;
+  if (!network.works()) {
+    rows_.emplace_back().fault = fault;
+    rows_.back().remark = "not tried: a network of its own needs root and the command ip";
+    return;
+  }
+  Rig rig(DemoTask());
+  Row& row = Begin(fault, options_.others);
+  const auto not_sent = [&] { return rig.witness().status() ? rig.witness().status()->messages_not_sent : 0; };
+  Tries(row, rig, [&](int) {
+    const std::int64_t before = not_sent();
+    Demand(row, network.SetRoute(false), "the route stays");
+    rig.Listen(milliseconds(1000));
+    Demand(row, network.SetRoute(true), "the route does not come back");
+    const bool counted = rig.ListenUntil([&] { return not_sent() > before; }, kSaysSoon);
+    Demand(row, counted, "the certifier counts no message that the bus refused");
+  }, options_.others, true);
 }
 
 void Campaign::BadReload() {
@@ -394,19 +479,18 @@ void Campaign::BadReload() {
   const std::string path = rig.task_path();
   std::ostringstream good;
   good << std::ifstream(path).rdbuf();
-  for (int i = 0; i < options_.others; ++i)
-    Try(row, rig, [&] {
-      std::ofstream(path) << good.str().substr(0, static_cast<std::size_t>(Below(static_cast<int>(good.str().size()))));
-      if (i % 2 == 0)
-        rig.Signal(Rig::kCertifier, SIGHUP);
-      else
-        rig.Command(command_t::RELOAD);
-      rig.Listen(milliseconds(200));
-      std::ofstream(path) << good.str();
-    });
+  Tries(row, rig, [&](int i) {
+    std::ofstream(path) << good.str().substr(0, static_cast<std::size_t>(Below(static_cast<int>(good.str().size()))));
+    if (i % 2 == 0)
+      rig.Signal(Rig::kCertifier, SIGHUP);
+    else
+      rig.Command(command_t::RELOAD);
+    rig.Listen(milliseconds(200));
+    std::ofstream(path) << good.str();
+  }, options_.others);
   if (rig.witness().status())
-    row.remark = std::to_string(rig.witness().status()->failed_reloads) + " reloads refused, version " +
-                 std::to_string(rig.witness().status()->version) + " in force";
+    Remark(row, std::to_string(rig.witness().status()->failed_reloads) + " reloads refused, version " +
+                    std::to_string(rig.witness().status()->version) + " in force");
 }
 
 std::string Table(const std::vector<Row>& rows, const Options& options) {
@@ -414,14 +498,18 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
   text << "Made by `scripts/faults --kills " << options.kills << " --others " << options.others << " --flood "
        << options.floods << " --seed " << options.seed << (options.only.empty() ? "" : " --only " + options.only)
        << "`. *Forbidden*: an uncertified plan was executed, a control\n"
-       << "was not its plan's, a candidate was answered twice, or after a jump of its clock the certifier latched nothing or\n"
-       << "certified before the reset. *Lost*: events that the logger had confirmed and its log does not hold. *Recovered*:\n"
-       << "within 20 s, after a reset where a fault was latched, the certifier is OK and certifies and the logger records.\n"
+       << "was not its plan's or was applied outside its slice, a candidate was answered twice, or counted and not\n"
+       << "answered (not asked where the bus is made to lose messages), a process ended that nobody had ended, after\n"
+       << "a jump of its clock the certifier latched nothing or certified before the reset, or what had to be\n"
+       << "refused or said was not. *Lost*: events that the logger had confirmed and its log does not hold, looked at\n"
+       << "after each try; what a full disk keeps out is never confirmed; `-`: no logger ran. *Recovered*: within\n"
+       << "20 s, after a reset where a fault was latched, the certifier is OK and certifies and the logger records.\n"
        << "*Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows)
-    text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | " << row.lost_by_logger << " | "
-         << row.recovered << " | " << row.said_why << " | " << row.remark << " |\n";
+    text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | "
+         << (row.lost_by_logger ? std::to_string(*row.lost_by_logger) : "-") << " | " << row.recovered << " | "
+         << row.said_why << " | " << row.remark << " |\n";
   return text.str();
 }
 
@@ -439,7 +527,7 @@ int Main(int argc, char** argv) {
   const std::vector<Row> rows = Campaign(options).Run();
   Publish(options.report, "faults", Table(rows, options));
   const bool clean = std::ranges::all_of(rows, [](const Row& row) {
-    return row.forbidden == 0 && row.lost_by_logger == 0 && row.recovered + row.said_why == row.tries;
+    return row.forbidden == 0 && row.lost_by_logger.value_or(0) == 0 && row.recovered + row.said_why == row.tries;
   });
   return clean ? 0 : 1;
 }

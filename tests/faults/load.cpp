@@ -46,9 +46,18 @@ void Load::SendUntilStopped(double rate) {
   for (std::int64_t due = SteadyClockUs(); !stop_; due += period) {
     const std::int64_t now = SteadyClockUs();
     if (now - due > kMostBehindUs) due = now;
-    if (now < due) std::this_thread::sleep_for(std::chrono::microseconds(due - now));
+    if (now < due) {
+      std::this_thread::sleep_for(std::chrono::microseconds(due - now));
+      const std::scoped_lock lock(lateness_mutex_);
+      lateness_.push_back(static_cast<double>(SteadyClockUs() - due));
+    }
     Send();
   }
+}
+
+std::vector<double> Load::TakeLateness() {
+  const std::scoped_lock lock(lateness_mutex_);
+  return std::exchange(lateness_, {});
 }
 
 void Load::OnDecision(const Received& received) {

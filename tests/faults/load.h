@@ -5,8 +5,10 @@ thread of its own, so nothing that is done with the answers delays the next. */
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "certifier/task/config.h"
@@ -45,6 +47,9 @@ class Load final {
   /** Microseconds from each candidate's stamp, before it is encoded and signed, to the kernel's of its answer; since the last
   call. */
   [[nodiscard]] std::vector<double> TakeLatencies() { return std::exchange(latencies_, {}); }
+  /** By how many microseconds the sender's thread woke up too late, each time since the last call: what the machine does to a
+  thread that only sleeps. */
+  [[nodiscard]] std::vector<double> TakeLateness();
   [[nodiscard]] const certifier_status_v2_t& status() const { return status_; }
 
  private:
@@ -63,6 +68,8 @@ class Load final {
   std::int64_t answered_ = 0, answered_again_ = 0;
   std::int64_t decisions_ = 0, first_decision_ = 0, last_decision_ = -1;
   std::vector<double> latencies_;
+  std::mutex lateness_mutex_;
+  std::vector<double> lateness_;
   certifier_status_v2_t status_{};
   std::atomic<bool> stop_ = false;
   std::thread sender_;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
@@ -14,8 +15,10 @@ namespace forereach {
 namespace {
 
 constexpr std::chrono::seconds kRecovers{20};
-constexpr std::chrono::seconds kDriveAtMost{9};  // it is near its goal then
-constexpr std::chrono::seconds kSilent{5};       // a robot whose clock went back waits until it is where it was
+constexpr std::chrono::milliseconds kLastWords{50};  // what a process sent before it ended has been heard then
+constexpr std::chrono::seconds kDriveAtMost{9};      // it is near its goal then
+constexpr std::chrono::seconds kSilent{5};  // a robot whose clock went back waits until it is where it was
+constexpr std::size_t kTailBytes = 1000;
 
 const std::array<std::string, Rig::kRoles> kPrograms{FOREREACH_LOGGER, FOREREACH_CERTIFIER, FOREREACH_PLANNER,
                                                      FOREREACH_ROBOT_SIM};
@@ -25,11 +28,15 @@ std::string LastLine(std::string text) {
   return text.substr(text.rfind('\n') + 1);
 }
 
+std::string Tail(const std::string& text) {
+  return text.size() <= kTailBytes ? text : text.substr(text.size() - kTailBytes);
+}
+
 }  // namespace
 
 Rig::Rig(const std::string& task, const Options& options)
     : options_(options), task_path_(scratch_.Write("task.yaml", task)), key_path_(scratch_ / "key"),
-      directory_(scratch_ / "log") {
+      next_directory_(scratch_ / "log") {
   static int rigs = 0;
   const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 40'000;
   far_url_ = "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
@@ -40,7 +47,7 @@ Rig::Rig(const std::string& task, const Options& options)
   config_.bus.key = key_path_;
   heard_ = OpenBus(near_url_);
   signed_ = OpenBus(config_.bus, "campaign", [this] { return NowUs(); });
-  witness_ = std::make_unique<Witness>(*heard_, config_.bus, LoadKey(key_path_));
+  witness_ = std::make_unique<Witness>(*heard_, config_.bus, LoadKey(key_path_), options_.relayed);
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) Start(role);
 }
 
@@ -50,6 +57,12 @@ Rig::~Rig() {
 }
 
 void Rig::Start(Role role) {
+  LookAtEnd(role);
+  if (role == kLogger) {
+    CountLost();
+    lost_by_this_ = 0;
+    directory_ = next_directory_;
+  }
   std::vector<std::string> command;
   if (options_.settable_clocks) command = UnderClock(role);
   command.insert(command.end(), {kPrograms[role], "--config", task_path_, "--lcm-url", url(role), "--key", key_path_});
@@ -58,6 +71,7 @@ void Rig::Start(Role role) {
     earlier_logs_ = Logs();
   }
   if (role == kRobot) drive_began_ = std::chrono::steady_clock::now();
+  was_ended_[role] = is_judged_[role] = false;
   processes_[role] = std::make_unique<ChildProcess>(command);
 }
 
@@ -84,14 +98,35 @@ void Rig::SetClocks(std::chrono::microseconds offset) {
 }
 
 void Rig::Signal(Role role, int signal) {
-  if (processes_[role]) processes_[role]->Signal(signal);
+  if (!processes_[role]) return;
+  LookAtEnd(role);
+  if (signal == SIGKILL || signal == SIGTERM) was_ended_[role] = true;
+  processes_[role]->Signal(signal);
 }
 
 bool Rig::Reap(Role role) {
   if (!processes_[role]) return true;
   if (!processes_[role]->WaitForEnd(std::chrono::seconds(10))) return false;
+  LookAtEnd(role);
   processes_[role].reset();
   return true;
+}
+
+// A process that was told to end may do so well or by the signal, which may come before it listens to any.
+void Rig::LookAtEnd(Role role) {
+  if (!processes_[role] || is_judged_[role] || IsAlive(role)) return;
+  is_judged_[role] = true;
+  const std::optional<int> status = processes_[role]->WaitForExit(std::chrono::milliseconds(0));
+  const bool may_end_well = was_ended_[role] || role == kPlanner || role == kRobot;
+  if (status ? *status == 0 && may_end_well : was_ended_[role]) return;
+  deaths_.push_back(std::string("the ") + kNames[role] + " ended " +
+                    (status ? "with exit status " + std::to_string(*status) : "by a signal") + ": " +
+                    Tail(processes_[role]->error()));
+}
+
+std::vector<std::string> Rig::TakeDeaths() {
+  for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) LookAtEnd(role);
+  return std::exchange(deaths_, {});
 }
 
 bool Rig::IsAlive(Role role) const { return processes_[role] && !processes_[role]->WaitForEnd(std::chrono::milliseconds(0)); }
@@ -134,6 +169,7 @@ void Rig::EndAll() {
 }
 
 std::string Rig::Heal() {
+  Listen(kLastWords);
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot})
     if (!IsAlive(role)) Start(role);
   if (std::chrono::steady_clock::now() - drive_began_ > kDriveAtMost) DriveAnew();
@@ -154,7 +190,10 @@ std::string Rig::Heal() {
                witness_->logger_status() && witness_->logger_status()->state == logger_status_t::OK;
       },
       kRecovers);
-  if (healed) return "";
+  if (healed) {
+    witness_->ForgetFault();  // it was said again until the reset
+    return "";
+  }
   const auto& status = witness_->status();
   std::string why = status ? "certifier: " + GetText(status->message) : "no certifier is heard";
   why += witness_->logger_status() ? "; logger: " + GetText(witness_->logger_status()->message) : "; no logger is heard";
@@ -172,15 +211,23 @@ std::set<std::string> Rig::Logs() const {
   return logs;
 }
 
-std::int64_t Rig::LostByLogger() const {
-  if (!witness_->logger_status()) return 0;
+// What the present logger had confirmed, as far as was heard, against the logs since its start.
+void Rig::CountLost() {
+  if (!witness_->logger_status()) return;
   std::int64_t events = 0;
   for (const std::string& log : Logs()) {
     if (earlier_logs_.contains(log)) continue;
     EventLogReader reader(log);
     ForEachEvent(reader, [&](const LogEvent&) { ++events; });
   }
-  return std::max<std::int64_t>(witness_->logger_status()->events_written - events, 0);
+  const std::int64_t lost = witness_->logger_status()->events_written - events;
+  if (lost > lost_by_this_) untold_lost_ += lost - std::exchange(lost_by_this_, lost);
+}
+
+std::optional<std::int64_t> Rig::TakeLost() {
+  if (!witness_->logger_status()) return std::nullopt;
+  CountLost();
+  return std::exchange(untold_lost_, 0);
 }
 
 }  // namespace forereach

@@ -5,8 +5,10 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "tests/faults/clock_file.h"
 #include "tests/faults/witness.h"
@@ -33,6 +35,9 @@ class Rig final {
   void Signal(Role role, int signal);
   /** Waits for its end, and forgets it. @return true if it ended. */
   bool Reap(Role role);
+  /** One line for each process that has ended since the last call and should not have, or not so: nobody ended it from
+  here, and it is no planner or robot that was at its goal or out of time; or its exit status is not 0. */
+  [[nodiscard]] std::vector<std::string> TakeDeaths();
   [[nodiscard]] bool IsAlive(Role role) const;
 
   /** From now on the wall clock of a process is the machine's plus `offset`. @throws std::runtime_error if the process
@@ -53,8 +58,10 @@ class Rig final {
   /** Ends all four, for Heal to start. */
   void EndAll();
 
-  /** After the logger was hurt: events that it had confirmed and that its log does not hold. */
-  [[nodiscard]] std::int64_t LostByLogger() const;
+  /** Events that a logger had confirmed and that its logs do not hold, found since the last call: of the present one,
+  and of each before it when the next was started. Nothing while none is heard. What a logger cannot write it does not
+  confirm. */
+  [[nodiscard]] std::optional<std::int64_t> TakeLost();
 
   void Command(std::int16_t kind);
   [[nodiscard]] Bus& bus() { return *signed_; }      ///< Signs.
@@ -64,23 +71,28 @@ class Rig final {
   [[nodiscard]] std::string url(Role role) const { return options_.relayed && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
   /** From the logger's next start on. */
-  void SetDirectory(const std::string& directory) { directory_ = directory; }
+  void SetDirectory(const std::string& directory) { next_directory_ = directory; }
 
  private:
   [[nodiscard]] std::int64_t NowUs() const { return WallClockUs() + clock_offset_us_; }
   [[nodiscard]] std::vector<std::string> UnderClock(Role role);
   [[nodiscard]] std::set<std::string> Logs() const;
+  void LookAtEnd(Role role);
+  void CountLost();
 
   const Options options_;
   ScratchDirectory scratch_;
-  std::string task_path_, key_path_, near_url_, far_url_, directory_;
+  std::string task_path_, key_path_, near_url_, far_url_, next_directory_, directory_;
   Config config_;
   std::unique_ptr<Bus> heard_, signed_;
   std::unique_ptr<Witness> witness_;
   std::array<std::unique_ptr<ChildProcess>, kRoles> processes_;
+  std::array<bool, kRoles> was_ended_{}, is_judged_{};  // by this rig; by LookAtEnd
+  std::vector<std::string> deaths_;
   std::array<std::unique_ptr<ClockFile, UnmapClockFile>, kRoles> clocks_;
   std::int64_t clock_offset_us_ = 0;
-  std::set<std::string> earlier_logs_;  // of loggers before this one
+  std::set<std::string> earlier_logs_;               // of loggers before this one
+  std::int64_t lost_by_this_ = 0, untold_lost_ = 0;  // by the present logger; by all, not taken yet
   std::chrono::steady_clock::time_point drive_began_{};
 };
 

@@ -24,6 +24,9 @@ constexpr double kJudgedFromMinutes = 10;  // shorter runs are all warming up
 // The last fifth of the run against the second, by medians.
 constexpr double kCertifierMayGrowKb = 2048, kLoggerMayGrowKb = 8192;
 constexpr double kLatencyMayGrowBy = 1.5, kAndByUs = 100;
+// Between a candidate's stamp and its answer's two threads of the certifier wake up, and the kernel's own between them: the
+// 99th percentile may grow by three times what a thread that only sleeps is woken later.
+constexpr double kWakings = 3;
 
 struct Options {
   double minutes = 60, rate = 200;
@@ -31,7 +34,7 @@ struct Options {
 };
 
 struct Interval {
-  double ended_min = 0, p50_us = 0, p99_us = 0, worst_us = 0, certifier_kb = 0, logger_kb = 0;
+  double ended_min = 0, p50_us = 0, p99_us = 0, worst_us = 0, late_p99_us = 0, certifier_kb = 0, logger_kb = 0;
 };
 
 // What the logger's database knows of the certifier's decisions.
@@ -100,12 +103,12 @@ class Soak final {
   [[nodiscard]] std::filesystem::path log() const { return scratch_ / "log"; }
 
   void EndInterval(double minutes, pid_t certifier, pid_t logger) {
-    std::vector<double> latencies = load_->TakeLatencies();
+    std::vector<double> latencies = load_->TakeLatencies(), lateness = load_->TakeLateness();
     const Interval now{minutes, Percentile(latencies, 0.5), Percentile(latencies, 0.99), Percentile(latencies, 1),
-                       ResidentBytes(certifier) / 1024, ResidentBytes(logger) / 1024};
+                       Percentile(lateness, 0.99), ResidentBytes(certifier) / 1024, ResidentBytes(logger) / 1024};
     intervals_.push_back(now);
     if (intervals_.size() % (kIntervals / 12) == 0)
-      std::cerr << "minute " << minutes << ": p50 " << now.p50_us << " us, p99 " << now.p99_us << " us, certifier "
+      std::cerr << "minute " << minutes << ": p50 " << now.p50_us << " us, p99 " << now.p99_us << " us, a sleeper's " << now.late_p99_us << " us, certifier "
                 << now.certifier_kb << " kB, logger " << now.logger_kb << " kB\n";
   }
 
@@ -134,12 +137,14 @@ std::string Soak::Table(const std::vector<std::string>& faults) const {
   std::ostringstream text;
   text << "Made by `scripts/faults soak --minutes " << options_.minutes << " --rate " << options_.rate
        << "`: signed candidates of 12 steps, two of three certified, while the\n"
-       << "logger records. Microseconds from a candidate's stamp to the arrival of its answer; resident memory.\n\n"
-       << "| minute | p50 us | p99 us | worst us | certifier kB | logger kB |\n|---:|---:|---:|---:|---:|---:|\n";
+       << "logger records. Microseconds from a candidate's stamp to the arrival of its answer; by how much a thread that only\n"
+       << "sleeps wakes up too late on the same machine meanwhile; resident memory.\n\n"
+       << "| minute | p50 us | p99 us | worst us | sleeper p99 us | certifier kB | logger kB |\n"
+       << "|---:|---:|---:|---:|---:|---:|---:|\n";
   for (std::size_t i = 0; i < intervals_.size(); ++i)
     if (i == 0 || (i + 1) % (kIntervals / 6) == 0)
       text << "| " << intervals_[i].ended_min << " | " << intervals_[i].p50_us << " | " << intervals_[i].p99_us << " | "
-           << intervals_[i].worst_us << " | " << intervals_[i].certifier_kb << " | " << intervals_[i].logger_kb << " |\n";
+           << intervals_[i].worst_us << " | " << intervals_[i].late_p99_us << " | " << intervals_[i].certifier_kb << " | " << intervals_[i].logger_kb << " |\n";
   const certifier_status_v2_t& certifier = load_->status();
   text << "\nSent " << load_->sent() << ", answered " << load_->answered() << ", of these twice " << load_->answered_again()
        << "; answers lost on the way " << load_->answers_lost() << ".\nThe certifier counts " << certifier.candidates
@@ -184,7 +189,9 @@ std::vector<std::string> Soak::Judge() const {
   flat(&Interval::certifier_kb, 1, kCertifierMayGrowKb, "the certifier grows, kB");
   flat(&Interval::logger_kb, 1, kLoggerMayGrowKb, "the logger grows, kB");
   flat(&Interval::p50_us, kLatencyMayGrowBy, kAndByUs, "the median latency drifts, us");
-  flat(&Interval::p99_us, kLatencyMayGrowBy, kAndByUs, "the 99th percentile drifts, us");
+  const auto [sleeper_early, sleeper_late] = EarlyAndLate(&Interval::late_p99_us);
+  flat(&Interval::p99_us, kLatencyMayGrowBy, kAndByUs + kWakings * std::max(0.0, sleeper_late - sleeper_early),
+       "the 99th percentile drifts more than the machine does, us");
   return faults;
 }
 

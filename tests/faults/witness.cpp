@@ -1,24 +1,22 @@
 #include "tests/faults/witness.h"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 
 namespace forereach {
 
-Witness::Witness(Bus& bus, const BusOptions& channels, const Key256& key) : channels_(channels), authenticator_(key, 0) {
+Witness::Witness(Bus& bus, const BusOptions& channels, const Key256& key, bool spoiled)
+    : channels_(channels), spoiled_(spoiled), authenticator_(key, 0) {
   bus.SubscribeUnchecked(channels_.decision, [this](const Received& r) { OnDecision(r); });
   bus.SubscribeUnchecked(channels_.certified, [this](const Received& r) { OnCertified(r); });
   bus.SubscribeUnchecked(channels_.robot_state, [this](const Received& r) { OnState(r); });
   bus.SubscribeUnchecked(channels_.transition, [this](const Received& r) { OnTransition(r); });
-  bus.SubscribeUnchecked(channels_.fault, [this](const Received& r) {
-    fault_ = Decoded<fault_t>(WithoutSignature(r.bytes));
-    certificates_at_fault_ = certificates_;
-  });
-  bus.SubscribeUnchecked(channels_.status, [this](const Received& r) {
-    if (const auto status = Decoded<certifier_status_v2_t>(r.bytes)) status_ = status;
-  });
+  bus.SubscribeUnchecked(channels_.fault, [this](const Received& r) { OnFault(r); });
+  bus.SubscribeUnchecked(channels_.status, [this](const Received& r) { OnStatus(r); });
   bus.SubscribeUnchecked(channels_.logger_status, [this](const Received& r) {
     if (const auto status = Decoded<logger_status_t>(r.bytes)) logger_status_ = status;
   });
@@ -34,6 +32,39 @@ void Witness::OnDecision(const Received& received) {
   if (!is_new && known->second.decision != digest && decision->cause != decision_t::CAUSE_DUPLICATE)
     Violate("plan " + std::to_string(decision->plan_id) + " was answered twice: " +
             std::string(CauseName(known->second.cause)) + ", then " + std::string(CauseName(decision->cause)));
+  if (spoiled_) return;
+  const auto [numbered, is_new_number] = by_number_.emplace(decision->sequence, digest);
+  if (!is_new_number && numbered->second != digest)
+    Violate("two decisions have the number " + std::to_string(decision->sequence));
+}
+
+// One heartbeat is held against the last: what was counted then has been heard by now, what was heard then is counted
+// now. The certifier sends both from one thread, so a decision comes before the heartbeat that counts it.
+void Witness::OnStatus(const Received& received) {
+  const auto status = Decoded<certifier_status_v2_t>(received.bytes);
+  if (!status) return;
+  status_ = status;
+  if (spoiled_) return;
+  if (status->sequence == 0) {  // a certifier's first sign of life
+    earlier_unheard_ += std::exchange(unheard_, 0);
+    by_number_.clear();
+    counted_ = 0;
+    highest_ = -1;
+  }
+  unheard_ = counted_ - std::distance(by_number_.begin(), by_number_.lower_bound(counted_));
+  if (highest_ >= status->candidates)
+    Violate("decision " + std::to_string(highest_) + " is not among the " + std::to_string(status->candidates) +
+            " candidates that the certifier counts");
+  counted_ = status->candidates;
+  highest_ = by_number_.empty() ? -1 : by_number_.rbegin()->first;
+}
+
+// While it is latched it is said again and again.
+void Witness::OnFault(const Received& received) {
+  const auto fault = Decoded<fault_t>(WithoutSignature(received.bytes));
+  if (!fault || (fault_ && fault->utime == fault_->utime && fault->sequence == fault_->sequence)) return;
+  fault_ = fault;
+  certificates_at_fault_ = certificates_;
 }
 
 void Witness::OnCertified(const Received& received) {
@@ -60,10 +91,16 @@ void Witness::OnTransition(const Received& received) {
   if (applied == applied_.end()) return;  // its state did not reach this listener
   const auto plan = plans_.find(applied->second.plan_id);
   if (plan == plans_.end()) return;  // said already
-  const double* control = plan->second.plan.control[applied->second.step];
-  if (!std::equal(transition->input, transition->input + transition->num_inputs, control))
-    Violate("step " + std::to_string(applied->second.step) + " of plan " + std::to_string(applied->second.plan_id) +
-            " was driven with another control");
+  const certified_plan_t& certified = plan->second;
+  const int step = applied->second.step;
+  const std::string which = "step " + std::to_string(step) + " of plan " + std::to_string(applied->second.plan_id);
+  if (!std::equal(transition->input, transition->input + transition->num_inputs, certified.plan.control[step]))
+    Violate(which + " was driven with another control");
+  for (int k = 0; k < transition->num_states; ++k) {
+    const double x = transition->state[k];
+    if (!(certified.slice_lower[step][k] <= x && x <= certified.slice_upper[step][k]))
+      Violate(which + " was driven from outside its slice, in coordinate " + std::to_string(k));
+  }
 }
 
 }  // namespace forereach

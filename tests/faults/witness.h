@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "certifier/task/config.h"
@@ -22,16 +23,22 @@ namespace forereach {
 
 class Witness final {
  public:
-  /** @param key of the system; a plan that is not signed with it is no certified plan. */
-  Witness(Bus& bus, const BusOptions& channels, const Key256& key);
+  /** @param key of the system; a plan that is not signed with it is no certified plan.
+  @param spoiled if somebody between the certifier and this drops, repeats, delays or alters messages: the numbers of
+  decisions are then not judged. */
+  Witness(Bus& bus, const BusOptions& channels, const Key256& key, bool spoiled);
 
-  /** One line for each thing that may not happen and did:
+  /** One line for each thing that may not happen and did since the last call:
       - a robot executes a plan for which no certified plan, signed and sealed, was on the bus;
-      - a control is applied that is not the one of that plan and step;
-      - a candidate is answered twice by one certifier. */
-  [[nodiscard]] const std::vector<std::string>& violations() const { return violations_; }
+      - a control is applied that is not the one of that plan and step, or from a state outside that step's slice;
+      - a candidate is answered twice by one certifier, or two of its decisions have one number;
+      - a decision is not among the candidates that the certifier's heartbeat counts. */
+  [[nodiscard]] std::vector<std::string> TakeViolations() { return std::exchange(violations_, {}); }
 
   [[nodiscard]] std::int64_t decisions() const { return decisions_; }
+  /** Candidates that the certifiers had counted one heartbeat ago and whose decisions were not heard: never sent, or
+  lost on the way. */
+  [[nodiscard]] std::int64_t unheard() const { return earlier_unheard_ + unheard_; }
   /** Certified plans, signed and sealed. */
   [[nodiscard]] std::int64_t certificates() const { return certificates_; }
   /** The last one that the certifier has latched, and the certificates heard since. */
@@ -42,22 +49,29 @@ class Witness final {
   [[nodiscard]] const std::optional<certifier_status_v2_t>& status() const { return status_; }
   [[nodiscard]] const std::optional<logger_status_t>& logger_status() const { return logger_status_; }
   void Forget() { status_.reset(), logger_status_.reset(), fault_.reset(); }
+  void ForgetFault() { fault_.reset(); }
 
  private:
   void OnDecision(const Received& received);
+  void OnStatus(const Received& received);
+  void OnFault(const Received& received);
   void OnCertified(const Received& received);
   void OnState(const Received& received);
   void OnTransition(const Received& received);
   void Violate(const std::string& what) { violations_.push_back(what); }
 
   const BusOptions channels_;
+  const bool spoiled_;
   Authenticator authenticator_;
   std::map<std::int64_t, certified_plan_t> plans_;
   struct Answer {
     Digest decision;  // of the message
     std::int16_t cause;
   };
-  std::map<Digest, Answer> answers_;  // by the candidate
+  std::map<Digest, Answer> answers_;                // by the candidate
+  std::map<std::int64_t, Digest> by_number_;        // decisions of the present certifier
+  std::int64_t counted_ = 0, highest_ = -1;         // at its last heartbeat: candidates counted, highest number heard
+  std::int64_t unheard_ = 0, earlier_unheard_ = 0;  // of it, and of those before it
   struct Applied {
     std::int64_t plan_id;
     int step;
