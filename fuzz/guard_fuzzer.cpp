@@ -117,9 +117,10 @@ class Session final {
   void TryStart(FuzzedDataProvider& input) {
     const std::int64_t boundary = AnyInteger(input, kStart, 2 * kStepUs);
     const std::vector<double> state = State(input);
-    if (!guard_.TryStart(boundary, state).ok()) return;
+    const std::int64_t now = AnyInteger(input, kStart, 2 * kStepUs);
+    if (!guard_.TryStart(boundary, now, state).ok()) return;
     const certified_plan_t* plan = guard_.executing();
-    Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 && boundary <= plan->expires_utime);
+    Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 && now <= plan->expires_utime);
     RequireInSlice(*plan, 0, state);
     step_ = 0;
   }

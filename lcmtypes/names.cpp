@@ -64,6 +64,8 @@ std::string_view EventName(std::int16_t kind) {
   }
 }
 
+bool StopsTheRobot(std::int16_t cause) { return cause == fault_t::SLICE_LEFT || cause == fault_t::DECLARATION_FALSIFIED; }
+
 std::string_view FaultName(std::int16_t cause) {
   switch (cause) {
     case fault_t::ROBOT_STATE_LOST: return "robot_state_lost";

@@ -18,6 +18,9 @@ namespace forereach {
 /** "robot_state_lost", ... as fault_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view FaultName(std::int16_t cause);
 
+/** True of the faults that say that what the executing plan rests on does not hold: a robot stops. */
+[[nodiscard]] bool StopsTheRobot(std::int16_t cause);
+
 /** "OK", "STALE", "ERROR": the level of certifier_status_v2_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view LevelName(std::int16_t level);
 

@@ -1,11 +1,11 @@
 #include "robot/guard.h"
 
+#include <algorithm>
 #include <cinttypes>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <stdexcept>
-#include <tuple>
 
 #include "lcmtypes/seal.h"
 
@@ -176,8 +176,8 @@ void Guard::Halt() noexcept {
   executing_.reset();
 }
 
-void Guard::Expect(const Digest& config_digest, const Digest& model_digest) noexcept {
-  next_.emplace(config_digest, model_digest);
+void Guard::Expect(const Digest& config_digest, const Digest& model_digest) {
+  expected_.emplace_back(config_digest, model_digest);
 }
 
 // Takes the signature off.
@@ -203,13 +203,16 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     auto certified = std::make_unique<certified_plan_t>();
     const DecodeStatus status = Decode(certified_plan_bytes, *certified);
     if (status != DecodeStatus::kOk) return RefuseDecode(status, certified_plan_bytes.size());
+    if (now_us > last_expiry_) last_accepted_.reset();
     verdict = Examine(*certified, now_us);
     verdict.plan_id = certified->plan.plan_id;
     if (!verdict.ok()) return verdict;
     last_accepted_ = certified->plan.plan_id;
-    if (IsNext(*certified)) {
-      std::tie(options_.config_digest, options_.model_digest) = *next_;
-      next_.reset();
+    last_expiry_ = std::max(last_expiry_, certified->expires_utime);
+    if (IsExpected(*certified)) {
+      options_.config_digest = GetDigest(certified->config_digest);
+      options_.model_digest = GetDigest(certified->model_digest);
+      expected_.clear();
     }
     pending_ = std::move(certified);
   } catch (...) {
@@ -235,8 +238,9 @@ GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
   return {};
 }
 
-bool Guard::IsNext(const certified_plan_t& certified) const {
-  return next_ == std::pair(GetDigest(certified.config_digest), GetDigest(certified.model_digest));
+bool Guard::IsExpected(const certified_plan_t& certified) const {
+  const std::pair digests(GetDigest(certified.config_digest), GetDigest(certified.model_digest));
+  return std::ranges::find(expected_, digests) != expected_.end();
 }
 
 GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_us) const {
@@ -245,11 +249,11 @@ GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_
   if (verdict.ok()) verdict = CheckSeal(certified);
   if (verdict.ok()) verdict = ExamineNumbers(certified);
   if (verdict.ok()) verdict = CheckExpiry(certified, now_us);
-  const bool is_next = IsNext(certified);
-  if (verdict.ok() && options_.config_digest && !is_next)
+  const bool expected = IsExpected(certified);
+  if (verdict.ok() && options_.config_digest && !expected)
     verdict = CheckDigest(GuardCause::kConfigDigest, "config_digest", GetDigest(certified.config_digest),
                           *options_.config_digest);
-  if (verdict.ok() && options_.model_digest && !is_next)
+  if (verdict.ok() && options_.model_digest && !expected)
     verdict = CheckDigest(GuardCause::kModelDigest, "model_digest", GetDigest(certified.model_digest),
                           *options_.model_digest);
   if (verdict.ok() && last_accepted_ && plan.plan_id <= *last_accepted_)
@@ -282,10 +286,11 @@ GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
   return {};
 }
 
-GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::span<const double> measured_state) noexcept {
+GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
+                             std::span<const double> measured_state) noexcept {
   GuardVerdict verdict;
   try {
-    verdict = ExamineStart(boundary_utime, measured_state);
+    verdict = ExamineStart(boundary_utime, now_us, measured_state);
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
@@ -300,7 +305,8 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::span<const double
   return verdict;
 }
 
-GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::span<const double> state) const {
+GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
+                                 std::span<const double> state) const {
   if (!pending_) return Refuse(halted_ ? GuardCause::kHalted : GuardCause::kNothingPending, {});
   const candidate_plan_t& plan = pending_->plan;
   if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(options_.step_us / 2)) {
@@ -309,7 +315,7 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::span<const do
                   Sentence("plan %" PRId64 " starts at %" PRId64 " us, this boundary is %" PRId64 " us", plan.plan_id,
                            plan.start_utime, boundary_utime));
   }
-  GuardVerdict verdict = CheckExpiry(*pending_, boundary_utime);
+  GuardVerdict verdict = CheckExpiry(*pending_, now_us);
   if (!verdict.ok()) return verdict;
   verdict = ExamineStateSize(state);
   if (verdict.ok()) verdict = CheckInitialSet(plan, state);

@@ -29,6 +29,7 @@ Plan ids are compared whatever their source: a robot follows one planner. Single
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/authentic.h"
@@ -56,7 +57,7 @@ enum class GuardCause {
   kExpired,            ///< Also from TryStart.
   kConfigDigest,       ///< Certified under another configuration.
   kModelDigest,        ///< Certified for another model.
-  kReplayed,           ///< plan_id is not newer than the last accepted one.
+  kReplayed,           ///< plan_id is not newer than the last accepted one, while an accepted one may be valid still.
   // Accept and TryStart
   kHalted,             ///< Until Reset.
   // TryStart
@@ -109,16 +110,17 @@ class Guard final {
   In this order: not halted, signed where there is a key, decoded whole and nothing left over, dimensions, step period,
   the seal (lcmtypes/seal.h: plan digest, certificate digest, nothing in what is not in use), finite numbers, lower <=
   upper in every slice, not expired (now_us <= expires_utime), expected config and model digest, plan_id newer than the
-  last accepted. The seal covers every bit of the message. Cost: that of the seal, under 0.1 ms.
+  last accepted, unless all that were accepted have expired: no plan_id keeps later ones out for good. The seal covers every bit of the message. Cost: that of the seal, under 0.1 ms.
   @param now_us robot's clock. */
   [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
 
   /** Starts the pending plan at a step boundary if |start_utime - boundary_utime| <= step_us / 2, it has not expired
-  (boundary_utime <= expires_utime), and the measured state lies in X_0 = {x : |x - initial_center| <=
+  (now_us <= expires_utime: a robot that was held up comes to a boundary late), and the measured state lies in X_0 = {x : |x - initial_center| <=
   initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN lies in nothing.
   kNothingPending and kTooEarly change nothing; after any other refusal nothing is pending. Whatever the verdict, a plan
   that was executing goes on unless the new one started. No allocation if it passes. */
-  [[nodiscard]] GuardVerdict TryStart(std::int64_t boundary_utime, std::span<const double> measured_state) noexcept;
+  [[nodiscard]] GuardVerdict TryStart(std::int64_t boundary_utime, std::int64_t now_us,
+                                      std::span<const double> measured_state) noexcept;
 
   /** Checks the state measured after control step - 1 against the hull of slice `step`. To be called for step = 1, 2,
   .. T in turn. After any refusal nothing is executing. Cost O(n), no allocation if it passes. */
@@ -131,9 +133,9 @@ class Guard final {
   a person to call. */
   void Halt() noexcept;
   void Reset() noexcept { halted_ = false; }
-  /** The task has been read again: plans certified under this configuration and for this model are accepted too, and from
-  the first of them on no others. Till then it is not known whether the certifier has taken the new one. */
-  void Expect(const Digest& config_digest, const Digest& model_digest) noexcept;
+  /** The task has been read again: plans certified under this configuration and for this model are accepted too. It is not
+  known whether the certifier has taken it: from the first such plan on, only that configuration's are accepted. */
+  void Expect(const Digest& config_digest, const Digest& model_digest);
   [[nodiscard]] bool halted() const { return halted_; }
 
   /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check, Finish or Halt. */
@@ -143,18 +145,20 @@ class Guard final {
  private:
   [[nodiscard]] GuardVerdict Authenticated(Bytes& bytes);
   [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
-  [[nodiscard]] bool IsNext(const certified_plan_t& certified) const;
+  [[nodiscard]] bool IsExpected(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
   [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
-  [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::span<const double> state) const;
+  [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
+                                          std::span<const double> state) const;
   [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state) const;
   [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
 
   GuardOptions options_;
-  std::optional<std::pair<Digest, Digest>> next_;  // config and model, by Expect
+  std::vector<std::pair<Digest, Digest>> expected_;  // config and model, by Expect
   std::optional<Authenticator> authenticator_;
   bool halted_ = false;
-  std::optional<std::int64_t> last_accepted_;
+  std::optional<std::int64_t> last_accepted_;  // plan_id
+  std::int64_t last_expiry_ = INT64_MIN;       // the latest of those accepted
   std::unique_ptr<certified_plan_t> pending_, executing_;
   int last_step_ = 0;  // of the executing plan, the last one checked
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
@@ -13,6 +14,7 @@
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/names.h"
 
 namespace forereach {
 namespace {
@@ -79,7 +81,7 @@ void RobotSimNode::Tick(std::int64_t now_us) {
   TakeReload();
   if (!start_utime_) start_utime_ = now_us;
   while (!done() && *start_utime_ + boundaries_ * period_us_ <= now_us)
-    Boundary(*start_utime_ + boundaries_ * period_us_);
+    Boundary(*start_utime_ + boundaries_ * period_us_, now_us);
 }
 
 void RobotSimNode::OnCertified(const Received& received) {
@@ -91,9 +93,11 @@ void RobotSimNode::OnCertified(const Received& received) {
 
 void RobotSimNode::OnFault(const Received& received) {
   const auto fault = Decoded<fault_t>(received.bytes);
-  if (!fault || (fault->cause != fault_t::SLICE_LEFT && fault->cause != fault_t::DECLARATION_FALSIFIED)) return;
-  last_fault_ = FaultId(fault->utime, fault->sequence);
-  if (guard_.halted() || last_fault_ == cleared_fault_) return;
+  if (!fault || !StopsTheRobot(fault->cause)) return;
+  const FaultId id(fault->utime, fault->sequence);
+  if (std::exchange(last_fault_, id) == id) return;  // said again: it has halted the robot already
+  halted_utime_ = received.utime;
+  if (guard_.halted()) return;
   const std::int64_t plan_id = executing_plan_id();
   const int step = executing_step();
   if (executing()) Stand();
@@ -108,8 +112,9 @@ void RobotSimNode::OnCommand(const Received& received) {
     return spdlog::warn("{}: refused: {}", config_.bus.command, stamp.fault);
   if (command->kind == command_t::RELOAD) return Reload();
   if (command->kind != command_t::RESET || !guard_.halted()) return;
+  if (IsNotAfter(command->utime, halted_utime_, received.utime, config_.gate))
+    return spdlog::warn("{}: refused: a reset from before the robot was halted", config_.bus.command);
   guard_.Reset();
-  cleared_fault_ = last_fault_;
   PublishEvent(received.utime, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
 }
 
@@ -122,12 +127,12 @@ void RobotSimNode::TakeReload() {
   spdlog::info("plans certified under {} as it is now are accepted", config_.path);
 }
 
-void RobotSimNode::Boundary(std::int64_t utime) {
+void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   if (executing()) FinishStep(utime);
   ReportContacts(utime);
   ReportGoal(utime);
   ending_ = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
-  if (!ending_) StartPending(utime);
+  if (!ending_) StartPending(utime, now_us);
   if (executing()) ContinuePlan(utime);
   PublishState(utime);
   ++boundaries_;
@@ -159,6 +164,7 @@ void RobotSimNode::FinishStep(std::int64_t utime) {
   }
   PublishEvent(utime, execution_event_t::STEP_OUTSIDE, plan_id, step_, verdict.value,
                "emergency stop: " + verdict.message, verdict.coordinate);
+  halted_utime_ = utime;
   Stand();
 }
 
@@ -180,9 +186,9 @@ void RobotSimNode::ReportGoal(std::int64_t utime) {
                ToText(distance) + " m from the goal, it counts within " + ToText(config_.planner.goal_radius) + " m");
 }
 
-void RobotSimNode::StartPending(std::int64_t utime) {
+void RobotSimNode::StartPending(std::int64_t utime, std::int64_t now_us) {
   if (guard_.pending() == nullptr) return;
-  const GuardVerdict verdict = guard_.TryStart(utime, state_);
+  const GuardVerdict verdict = guard_.TryStart(utime, now_us, state_);
   if (verdict.cause == GuardCause::kTooEarly) return;
   if (!verdict.ok()) return PublishRefusal(utime, verdict);
   step_ = 0;

@@ -70,11 +70,11 @@ class RobotSimNode final : public Node {
   void OnFault(const Received& received);
   void OnCommand(const Received& received);
   void TakeReload();
-  void Boundary(std::int64_t utime);
+  void Boundary(std::int64_t utime, std::int64_t now_us);
   void FinishStep(std::int64_t utime);
   void ReportContacts(std::int64_t utime);
   void ReportGoal(std::int64_t utime);
-  void StartPending(std::int64_t utime);
+  void StartPending(std::int64_t utime, std::int64_t now_us);
   void ContinuePlan(std::int64_t utime);
   void Stand();
   void PublishState(std::int64_t utime);
@@ -101,7 +101,8 @@ class RobotSimNode final : public Node {
 
   std::vector<double> state_;
   using FaultId = std::pair<std::int64_t, std::int64_t>;  // utime, sequence: the certifier repeats a fault until the reset
-  std::optional<FaultId> last_fault_, cleared_fault_;
+  std::optional<FaultId> last_fault_;
+  std::int64_t halted_utime_ = 0;  // by a fault or the guard, the last time
   int step_ = 0;  // of the executing plan: the control applied from the last boundary on
   std::optional<std::int64_t> start_utime_;
   std::int64_t boundaries_ = 0, transitions_ = 0, events_ = 0;

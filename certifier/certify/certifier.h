@@ -28,6 +28,8 @@ class Certifier final {
   /** The pair of observations that contradicts the declaration, if there is one. Learned ones are numbered on from the
   problem's. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return known_.violation(); }
+  /** That pair's observations. @pre violation(). */
+  [[nodiscard]] Observations Contradiction() const { return known_.Contradiction(); }
   [[nodiscard]] std::size_t num_observations() const { return known_.size(); }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
   [[nodiscard]] bool uses_hull_distance() const { return known_.uses_hull_distance(); }

@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace forereach {
 
 void Conformance::Remember(const certified_plan_t& certified) {
+  if (const auto known = Find(certified.plan.plan_id); known != plans_.end()) {
+    if (certified.plan.plan_id != last_.plan_id) plans_[static_cast<std::size_t>(known - plans_.begin())] = certified;
+    return;
+  }
   const bool full = plans_.size() == kPlans;
-  if (full && last_plan_id_ >= 0 && plans_[next_].plan.plan_id == last_plan_id_) next_ = (next_ + 1) % kPlans;
+  if (full && last_.plan_id >= 0 && plans_[next_].plan.plan_id == last_.plan_id) next_ = (next_ + 1) % kPlans;
   if (!full)
     plans_.push_back(certified);
   else
@@ -18,28 +23,34 @@ void Conformance::Remember(const certified_plan_t& certified) {
 std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state) {
   const std::span<const double> measured(state.state, static_cast<std::size_t>(state.num_states));
   const bool executing = state.mode == robot_state_t::EXECUTING;
-  const bool follows = state.sequence > last_sequence_ && state.sequence - 1 == last_sequence_;  // any numbers: no overflow
+  const bool follows = state.sequence > last_.sequence && state.sequence - 1 == last_.sequence;  // any numbers: no overflow
   std::optional<Departure> departure;
-  if (executing && follows && last_plan_id_ >= 0) departure = Compare(last_plan_id_, last_step_ + 1, measured);
+  if (executing && follows && last_.plan_id >= 0) departure = Compare(last_.plan_id, last_.step + 1, measured);
   if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured);
-  last_sequence_ = state.sequence;
-  last_utime_ = state.utime;
-  last_plan_id_ = executing ? state.executing_plan_id : -1;
-  last_step_ = state.executing_step;
+  // A late one says nothing of where the robot is now; one that began anew counts from 0, at a later time.
+  if (state.sequence > last_.sequence || state.utime > last_.utime)
+    before_ = std::exchange(
+        last_, {state.sequence, state.utime, executing ? state.executing_plan_id : -1, state.executing_step});
   return departure;
 }
 
 std::optional<Conformance::Departure> Conformance::Check(const transition_t& transition) const {
-  if (last_plan_id_ < 0 || transition.utime != last_utime_ || transition.num_states < 0 ||
-      transition.num_states > static_cast<int>(std::size(transition.next_state)))
+  if (transition.num_states < 0 || transition.num_states > static_cast<int>(std::size(transition.next_state)))
     return std::nullopt;
-  return Compare(last_plan_id_, last_step_ + 1,
-                 {transition.next_state, static_cast<std::size_t>(transition.num_states)});
+  for (const Place& begin : {last_, before_})
+    if (begin.plan_id >= 0 && begin.utime == transition.utime)
+      return Compare(begin.plan_id, begin.step + 1,
+                     {transition.next_state, static_cast<std::size_t>(transition.num_states)});
+  return std::nullopt;
+}
+
+std::vector<certified_plan_t>::const_iterator Conformance::Find(std::int64_t plan_id) const {
+  return std::ranges::find(plans_, plan_id, [](const certified_plan_t& certified) { return certified.plan.plan_id; });
 }
 
 std::optional<Conformance::Departure> Conformance::Compare(std::int64_t plan_id, int step,
                                                            std::span<const double> state) const {
-  const auto known = std::ranges::find(plans_, plan_id, [](const certified_plan_t& c) { return c.plan.plan_id; });
+  const auto known = Find(plan_id);
   if (known == plans_.end() || step < 0 || step > known->plan.num_steps || std::ssize(state) != known->plan.num_states)
     return std::nullopt;
   for (int k = 0; k < known->plan.num_states; ++k) {

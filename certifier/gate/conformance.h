@@ -29,6 +29,7 @@ class Conformance final {
 
   Conformance() { plans_.reserve(kPlans); }
 
+  /** In the place of one of the same plan_id, unless that is the one which is executed: a guard takes no plan_id twice. */
   void Remember(const certified_plan_t& certified);
 
   /** Holds a usable state of the robot against the slice of the step that it says it is at, and, if it has gone on by one
@@ -36,17 +37,23 @@ class Conformance final {
   for its plan is remembered. Cost O(n). */
   [[nodiscard]] std::optional<Departure> Check(const robot_state_t& state);
 
-  /** Holds the end of the step that began with the last state heard against the slice after it. A robot that ends its plan
-  there, or whose guard stops it, stands from then on, and its states say nothing of slices. */
+  /** Holds the end of a step that began with one of the last two states heard against the slice after it. A robot that ends
+  its plan there, or whose guard stops it, stands from then on, and its states say nothing of slices; that it stands may be
+  heard first. */
   [[nodiscard]] std::optional<Departure> Check(const transition_t& transition) const;
 
  private:
+  struct Place {
+    std::int64_t sequence = -1, utime = -1, plan_id = -1;  // plan -1: not executing
+    int step = -1;
+  };
+
+  [[nodiscard]] std::vector<certified_plan_t>::const_iterator Find(std::int64_t plan_id) const;
   [[nodiscard]] std::optional<Departure> Compare(std::int64_t plan_id, int step, std::span<const double> state) const;
 
   std::vector<certified_plan_t> plans_;  // a ring
   std::size_t next_ = 0;
-  std::int64_t last_sequence_ = -1, last_utime_ = -1, last_plan_id_ = -1;  // of the state heard last; plan -1: not executing
-  int last_step_ = -1;
+  Place last_, before_;  // where the robot was by the newest state heard, and by the one before
 };
 
 }  // namespace forereach

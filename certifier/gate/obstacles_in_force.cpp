@@ -19,7 +19,7 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
   const auto message = Decoded<obstacles_t>(bytes);
   if (!message) return "not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) + " bytes";
   if (std::string fault = Judge(message->utime, now_us, options_).fault; !fault.empty()) return fault;
-  if (heard_ && message->sequence <= heard_->sequence && message->utime <= heard_->utime)
+  if (heard_ && message->sequence <= heard_->sequence && IsNotAfter(message->utime, heard_->utime, now_us, options_))
     return "sequence " + std::to_string(message->sequence) + " does not exceed the last, " +
            std::to_string(heard_->sequence) + ", nor does its stamp the last one's";
   try {

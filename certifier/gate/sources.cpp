@@ -1,6 +1,7 @@
 #include "certifier/gate/sources.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace forereach {
 
@@ -45,7 +46,7 @@ Sources::Admission Sources::Admit(const candidate_plan_t& candidate, std::int64_
     known = sources_.emplace(name, Source{}).first;
     known->second.StartCounting(candidate.sequence, candidate.utime);
     known->second.ForgetAllBut(candidate.plan_id);
-  } else if (now_us - known->second.heard_us > forget_after_us_) {
+  } else if (IsSilent(known->second, now_us)) {
     known->second.ForgetAllBut(candidate.plan_id);
   } else if (!known->second.Use(candidate.plan_id)) {
     return Admission::kUsed;
@@ -54,9 +55,12 @@ Sources::Admission Sources::Admit(const candidate_plan_t& candidate, std::int64_
   return Admission::kNew;
 }
 
+bool Sources::IsSilent(const Source& source, std::int64_t now_us) const {
+  return std::abs(now_us - source.heard_us) > forget_after_us_;
+}
+
 bool Sources::MakeRoom(std::int64_t now_us) {
-  const auto silent = std::ranges::find_if(
-      sources_, [&](const auto& entry) { return now_us - entry.second.heard_us > forget_after_us_; });
+  const auto silent = std::ranges::find_if(sources_, [&](const auto& entry) { return IsSilent(entry.second, now_us); });
   if (silent == sources_.end()) return false;
   lost_before_ += silent->second.lost();
   sources_.erase(silent);

@@ -57,6 +57,8 @@ class Sources final {
   };
 
   [[nodiscard]] static std::string NameOf(const candidate_plan_t& candidate);
+  /** For so long that it may be forgotten. A clock that was set back leaves no source remembered from the future. */
+  [[nodiscard]] bool IsSilent(const Source& source, std::int64_t now_us) const;
   bool MakeRoom(std::int64_t now_us);
 
   std::int64_t forget_after_us_;

@@ -22,6 +22,10 @@ Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options)
   return {freshness, ""};
 }
 
+bool IsNotAfter(std::int64_t utime, std::int64_t then_us, std::int64_t now_us, const GateOptions& options) {
+  return utime <= then_us && Judge(then_us, now_us, options).freshness != Freshness::kFuture;
+}
+
 std::int64_t Microseconds(double milliseconds) { return std::llround(milliseconds * 1e3); }
 
 std::string Milliseconds(std::int64_t later_us, std::int64_t earlier_us) {

@@ -4,6 +4,7 @@
 
 #include "certifier/gate/stamp.h"
 #include "forereach/fault_t.hpp"
+#include "lcmtypes/names.h"
 
 namespace forereach {
 void Watch::SeeRobot(std::int64_t now_us) { robot_seen_us_ = now_us; }
@@ -27,7 +28,7 @@ std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t ste
 }
 
 bool Watch::Latch(Fault fault) {
-  if (fault_) return false;
+  if (fault_ && (StopsTheRobot(fault_->cause) || !StopsTheRobot(fault.cause))) return false;
   fault_ = std::move(fault);
   return true;
 }

@@ -3,7 +3,8 @@
     disarmed --SeeRobot--> armed --RobotHasFinished--> disarmed
     any state --Latch, or what Advance notices--> fault --Reset--> disarmed
 
-Only a person clears a fault: what made it is looked at first. The first fault is kept; later ones change nothing. */
+Only a person clears a fault: what made it is looked at first. The first fault is kept, unless a later one stops the robot
+and it does not: then the later one takes its place. */
 #pragma once
 
 #include <cstdint>
@@ -40,7 +41,7 @@ class Watch final {
   CLOCK_JUMP. @return the fault if this call latched it. */
   std::optional<Fault> Advance(std::int64_t now_us, std::int64_t steady_us);
 
-  /** @return true if there was none before. */
+  /** @return true if it is the one that is latched now. */
   bool Latch(Fault fault);
   /** Clears a fault. True if there was one. */
   bool Reset();

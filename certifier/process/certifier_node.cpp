@@ -82,7 +82,10 @@ CertifierNode::~CertifierNode() {
 
 void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
   ++refused_;
-  spdlog::warn("{}: refused: {}", channel, why);
+  const std::int64_t now = clocks_.steady();
+  if (now < next_warning_us_) return;  // whoever floods the bus does not flood the log, nor wait for its reader
+  next_warning_us_ = now + kHeartbeatUs;
+  spdlog::warn("{}: refused: {} ({} messages in all)", channel, why, refused_);
 }
 
 void CertifierNode::OnObstacles(const Received& received) {
@@ -128,7 +131,7 @@ void CertifierNode::Learn(Bytes transition) {
   if (!error.empty()) return Refuse(channels_.transition, error);
   const auto& violation = gate_->certifier().violation();
   if (was_falsified || !violation) return;
-  falsified_.emplace(gate_->model_digest(), gate_->declaration_digest());
+  falsified_.push_back({gate_->model_digest(), gate_->certifier().Contradiction()});
   fault_t fault = EmptyFault(fault_t::DECLARATION_FALSIFIED);
   fault.coordinate = static_cast<std::int16_t>(violation->coordinate);
   fault.first_observation = violation->first;
@@ -146,12 +149,14 @@ void CertifierNode::OnCommand(const Received& received) {
   if (!command) return Refuse(channels_.command, "not a command_t");
   const std::string error = gate_->CheckFresh(command->utime, received.utime);
   if (!error.empty()) return Refuse(channels_.command, error);
-  Obey(*command);
+  Obey(*command, received.utime);
 }
 
-void CertifierNode::Obey(const command_t& command) {
+void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
   switch (command.kind) {
     case command_t::RESET:
+      if (watch_.fault() && IsNotAfter(command.utime, watch_.fault()->utime, now_us, gate_->options()))
+        return Refuse(channels_.command, "a reset from before the fault: nobody has seen it yet");
       if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));
       next_heartbeat_us_ = 0;
       return;
@@ -205,7 +210,12 @@ void CertifierNode::AnswerWaiting() {
     AnswerDue();
   }
   const auto most = static_cast<std::size_t>(gate_->options().queue);
-  for (; queue_.size() > most; queue_.pop_front()) Answer(queue_.front().candidate, true);
+  for (int i = 1; queue_.size() > most; ++i) {
+    const Waiting oldest = std::move(queue_.front());
+    queue_.pop_front();
+    Answer(oldest.candidate, true);
+    if (i % kAtOnce == 0) AnswerDue();  // a flood takes longer to answer than the kept ones have
+  }
 }
 
 // Those for which another decision would take too long: while their start has not passed.
@@ -255,7 +265,7 @@ void CertifierNode::CompactIfDue() {
   if (gate_->certifier().num_unindexed() < kUnindexedAtMost) return;
   if (gate_->certifier().num_observations() <= kIndexedAtOnce) return gate_->Compact();
   if (compaction_.valid() && !IsReady(compaction_)) return;
-  compaction_ = std::async(std::launch::async, [gate = gate_.get()] { gate->Compact(); });
+  compaction_ = Beside([gate = gate_.get()] { gate->Compact(); });
 }
 
 void CertifierNode::Reload() { reload_.Ask(); }
@@ -280,9 +290,10 @@ std::string CertifierNode::WhyNotTaken(const Config& config) const {
            {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},
            {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
     if (changes) return config.path + ": " + what + " cannot change while the certifier runs";
-  // What the robot has shown is not forgotten by reading the same file again.
-  if (falsified_.contains({config.model_digest, config.declaration_digest}))
-    return config.path + ": an executed transition contradicts its declaration; another has to be declared";
+  // What the robot has shown is not forgotten by reading a file.
+  for (const Falsified& falsified : falsified_)
+    if (falsified.model == config.model_digest && FindViolation(after.declaration, falsified.pair))
+      return config.path + ": a transition that was executed contradicts its declaration; another has to be declared";
   return "";
 }
 

@@ -6,7 +6,7 @@ the grounds of decisions takes effect as it arrives: obstacles, the robot's stat
 
 Unless gate.arming is none, nothing is certified before the robot's state is heard. A fault (watch.h, conformance.h, a
 falsified declaration) is sent on bus.channels.fault, with every heartbeat again, and from then on every candidate is
-rejected until a person sends a reset. A reload reads the task file again, beside the running work, and takes it whole or
+rejected until a person sends a reset, which has to be later than the fault. A reload reads the task file again, beside the running work, and takes it whole or
 not at all; what cannot change while it runs, WhyNotTaken says.
 
 First goes out the certified plan, which the robot waits for, then the decision: a planner that hears of a certificate
@@ -18,9 +18,7 @@ knows that the plan was handed to the bus before. */
 #include <future>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "certifier/gate/conformance.h"
@@ -68,7 +66,7 @@ class CertifierNode final : public Node {
   void OnRobotState(const Received& received);
   void OnTransition(const Received& received);
   void OnCommand(const Received& received);
-  void Obey(const command_t& command);
+  void Obey(const command_t& command, std::int64_t now_us);
 
   void AnswerWaiting();
   void AnswerDue();
@@ -80,7 +78,7 @@ class CertifierNode final : public Node {
   /** Why a task file, good in itself, cannot take the place of the one in force; empty if it can. */
   [[nodiscard]] std::string WhyNotTaken(const Config& config) const;
 
-  /** Latches and announces, unless a fault is latched already. */
+  /** Latches and announces, unless a fault as grave is latched already. */
   void Fail(fault_t fault, const std::string& why);
   void Announce(fault_t fault, const Watch::Fault& latched);
   void SendFault();
@@ -116,11 +114,15 @@ class CertifierNode final : public Node {
 
   Reloading<Loaded> reload_;
   std::future<void> compaction_;  // of *gate_
-  std::set<std::pair<Digest, Digest>> falsified_;  // model and declaration that an executed transition contradicted
+  struct Falsified {
+    Digest model;
+    Observations pair;  // with an executed transition
+  };
+  std::vector<Falsified> falsified_;  // one at most for each version of the task
   std::int64_t version_ = 1, failed_reloads_ = 0;
   std::string reload_error_;
 
-  std::int64_t next_heartbeat_us_ = 0;  // by the steady clock
+  std::int64_t next_heartbeat_us_ = 0, next_warning_us_ = 0;  // by the steady clock
   std::int64_t heartbeats_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
   std::size_t high_water_ = 0;
   std::array<double, 1024> elapsed_us_{};  // of the last decisions, a ring

@@ -71,6 +71,26 @@ std::size_t ObservationStore::Snapshot::size() const {
   return generation_->ids.size() + static_cast<std::size_t>(tail_size_);
 }
 
+Observations ObservationStore::Snapshot::Contradiction() const {
+  const auto rows_of = [this](const auto begin, const auto end) {
+    std::vector<int> rows;
+    for (const int id : {violation_->first, violation_->second})
+      if (const auto known = std::find(begin, end, id); known != end) rows.push_back(static_cast<int>(known - begin));
+    return rows;
+  };
+  const Observations indexed = Select(generation_->observations, rows_of(generation_->ids.begin(), generation_->ids.end()));
+  const auto tail = generation_->tail_ids.begin();
+  const Observations unindexed = Select(generation_->tail_observations, rows_of(tail, tail + tail_size_));
+  const auto stacked = [](const Eigen::MatrixXd& above, const Eigen::MatrixXd& below) {
+    Eigen::MatrixXd both(above.rows() + below.rows(), above.cols());
+    both.topRows(above.rows()) = above;
+    both.bottomRows(below.rows()) = below;
+    return both;
+  };
+  return {stacked(indexed.z, unindexed.z), stacked(indexed.lower, unindexed.lower),
+          stacked(indexed.upper, unindexed.upper)};
+}
+
 bool ObservationStore::Snapshot::uses_hull_distance() const { return generation_->envelope.uses_hull_distance(); }
 
 ObservationStore::ObservationStore(Declaration declaration, const Observations& observations,

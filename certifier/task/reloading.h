@@ -5,6 +5,8 @@
 #include <functional>
 #include <future>
 #include <optional>
+#include <system_error>
+#include <type_traits>
 #include <utility>
 
 namespace forereach {
@@ -15,26 +17,34 @@ template <class Result>
   return work.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
+/** The work in a thread of its own; not valid where the machine has none to give. */
+template <class Work>
+[[nodiscard]] std::future<std::invoke_result_t<Work>> Beside(Work work) try {
+  return std::async(std::launch::async, std::move(work));
+} catch (const std::system_error&) {
+  return {};
+}
+
 template <class Result>
 class Reloading final {
  public:
   /** @param read runs in a thread of its own, never twice at a time. */
   explicit Reloading(std::function<Result()> read) : read_(std::move(read)) {}
 
-  /** Reads; where it is under way already, once more after it: it may have read before what it is asked for was written. */
+  /** Reads; where it is under way already, once more after it: it may have read before what it is asked for was written.
+  A machine without another thread to give is asked again by each Take. */
   void Ask() {
-    if (under_way_.valid()) {
-      again_ = true;
-    } else {
-      under_way_ = std::async(std::launch::async, read_);
-    }
+    again_ = under_way_.valid();
+    if (again_) return;
+    under_way_ = Beside(read_);
+    again_ = !under_way_.valid();
   }
 
   /** What was read, once. Does not wait. */
   [[nodiscard]] std::optional<Result> Take() {
-    if (!under_way_.valid() || !IsReady(under_way_)) return std::nullopt;
-    std::optional<Result> result(under_way_.get());
-    if (std::exchange(again_, false)) Ask();
+    std::optional<Result> result;
+    if (under_way_.valid() && IsReady(under_way_)) result = under_way_.get();
+    if (again_ && !under_way_.valid()) Ask();
     return result;
   }
 

@@ -112,6 +112,38 @@ TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheRobotStandsThere) {
   EXPECT_FALSE(conformance.Check(Step(700, 100, 100)));
 }
 
+TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheNextStateOvertookIt) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  const auto hear = [&](std::int64_t sequence, std::int64_t plan_id, std::int64_t utime) {
+    robot_state_t state = At(sequence, plan_id, plan_id < 0 ? -1 : 0, 0.5, 0.5);
+    state.utime = utime;
+    EXPECT_FALSE(conformance.Check(state));
+  };
+  hear(0, 7, 100);
+  hear(1, -1, 200);
+  EXPECT_TRUE(conformance.Check(Step(100, 100, 100)));
+  EXPECT_FALSE(conformance.Check(Step(200, 100, 100))) << "it stood";
+  hear(0, 7, 100);
+  hear(2, -1, 300);
+  EXPECT_FALSE(conformance.Check(Step(100, 100, 100))) << "a state said again is not news, so the step is too long ago";
+  hear(0, 7, 400);
+  EXPECT_TRUE(conformance.Check(Step(400, 100, 100))) << "a robot that began anew counts anew";
+}
+
+TEST(ConformanceTest, ANewCertificateOfTheSameIdCountsUnlessTheOldOneIsExecuted) {
+  Conformance conformance;
+  conformance.Remember(Plan(7));
+  certified_plan_t again = Plan(7);
+  again.slice_upper[1][0] = 5;
+  EXPECT_FALSE(conformance.Check(At(0, 7, 0, 0.5, 0.5)));
+  conformance.Remember(again);
+  EXPECT_TRUE(conformance.Check(At(10, 7, 1, 4, 1))) << "the guard takes no plan_id twice";
+  EXPECT_FALSE(conformance.Check(At(20, -1, -1, 0, 0)));
+  conformance.Remember(again);
+  EXPECT_FALSE(conformance.Check(At(30, 7, 1, 4, 1)));
+}
+
 TEST(ConformanceTest, ThePlanThatIsExecutedIsNotForgotten) {
   Conformance conformance;
   const auto count = static_cast<std::int64_t>(Conformance::kPlans);

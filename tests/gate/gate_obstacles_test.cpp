@@ -100,6 +100,15 @@ TEST_F(GateObstaclesTest, ASenderThatBeganAnewIsTakenByItsStamp) {
   ExpectRefused(Encode(anew), "sequence 0 does not exceed the last, 0, nor does its stamp");
 }
 
+TEST_F(GateObstaclesTest, AClockThatWasSetBackKeepsNobodyOut) {
+  const std::int64_t later = kNow + 3'600'000'000;
+  obstacles_t before = Message(kFarAway, 7);
+  before.utime = later;
+  EXPECT_EQ(gate_.UpdateObstacles(Encode(before), later), "");
+  EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
+  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(kOnTheWay));
+}
+
 // A person who changes the task file does not know what is being seen.
 TEST_F(GateObstaclesTest, AReloadKeepsWhatWasHeardBesideTheTasks) {
   const std::vector<Obstacle> of_task = SmallTask().obstacles;

@@ -79,6 +79,13 @@ TEST(SourcesTest, SilentSourcesMakeRoomAndAHugeIdLocksNobodyOutForLong) {
   EXPECT_EQ(sources.Admit(From("17", 2), 2 * kForget + 2), Admission::kNew) << "what it sent then would be stale by now";
 }
 
+TEST(SourcesTest, AClockThatWasSetBackLocksNobodyOut) {
+  Sources sources(kForget);
+  EXPECT_EQ(sources.Admit(From("a", 1000), 1000 * kForget), Admission::kNew);
+  EXPECT_EQ(sources.Admit(From("a", 1000), 999 * kForget), Admission::kUsed);
+  EXPECT_EQ(sources.Admit(From("a", 10), 0), Admission::kNew);
+}
+
 TEST(SourcesTest, WhoInheritsRemembersAsLongAsItIsToItself) {
   Sources before(kForget), after(2 * kForget);
   static_cast<void>(Take(before, 1, 1, 0, 0));

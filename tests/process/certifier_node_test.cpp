@@ -67,7 +67,7 @@ class CertifierNodeTest : public testing::Test {
   std::int64_t now_us_ = kNow;
   Config config_ = SmallTask();
   const Clock clock_ = [this] { return now_us_; };
-  const Clocks clocks_{clock_, clock_};
+  Clocks clocks_{clock_, clock_};
   std::unique_ptr<Bus> bus_;
   std::unique_ptr<CertifierNode> node_;
   std::vector<decision_t> decisions_;
@@ -114,6 +114,25 @@ TEST_F(CertifierNodeTest, WhoWaitsIsAnsweredBeforeItsStart) {
   ASSERT_EQ(decisions_.size(), 12u);
   EXPECT_EQ(decisions_.back().plan_id, 2);
   EXPECT_EQ(decisions_.back().outcome, decision_t::CERTIFIED);
+}
+
+// Each answer takes its time, and those of a flood together longer than the few that may wait have.
+TEST_F(CertifierNodeTest, AFloodKeepsNobodyWaitingBeyondItsStart) {
+  const Clock slow = [this] { return now_us_ += 50; };
+  clocks_ = {slow, slow};
+  Restart();
+  constexpr int kFlood = 600;
+  for (int id = 1; id <= kFlood; ++id) {
+    candidate_plan_t candidate = Candidate(id);
+    candidate.start_utime = now_us_ + (id <= kFlood - CertifierNode::kAtOnce - config_.gate.queue ? 400'000 : 20'000);
+    bus_->Publish("PLAN_CANDIDATE", candidate);
+  }
+  Run();
+  Run();
+  ASSERT_EQ(decisions_.size(), static_cast<std::size_t>(kFlood));
+  const std::vector<int> causes = Causes();
+  EXPECT_GT(now_us_, kNow + 25'000) << "else nothing was at stake";
+  EXPECT_EQ(std::ranges::count(causes, decision_t::CAUSE_TOO_LATE), 0);
 }
 
 class RefusingBus final : public Bus {
@@ -261,12 +280,16 @@ class ArmedNodeTest : public CertifierNodeTest {
     bus_->Publish("ROBOT_STATE", state);
     Run();
   }
-  void Reset() {
+  void Reset(std::int64_t utime) {
     command_t command{};
-    command.utime = now_us_;
+    command.utime = utime;
     command.kind = command_t::RESET;
     bus_->Publish("COMMAND", command);
     Run();
+  }
+  void Reset() {
+    Pass(1);
+    Reset(now_us_);
   }
   decision_t Ask(double acceleration = kAccelerationThatCertifies) {
     bus_->Publish("PLAN_CANDIDATE", Candidate(next_plan_id_++, acceleration, now_us_));
@@ -312,6 +335,34 @@ TEST_F(ArmedNodeTest, LosingTheRobotLatchesUntilAReset) {
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
   SayState(State());
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(ArmedNodeTest, AResetFromBeforeTheFaultClearsNothing) {
+  SayState(State());
+  Pass(1'000'001);
+  Run();
+  ASSERT_EQ(faults_.size(), 1u);
+  Pass(10'000);
+  for (const std::int64_t utime : {faults_[0].utime - 1, faults_[0].utime}) {
+    Reset(utime);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT) << "it was meant for another";
+  }
+  Reset(faults_[0].utime + 1);
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+}
+
+TEST_F(ArmedNodeTest, AfterTheClockWasSetBackAResetNeedNotWaitForTheFaultsTime) {
+  std::int64_t steady = 0;
+  const auto node = std::make_unique<CertifierNode>(config_, *bus_, Clocks{clock_, [&] { return steady; }});
+  node->Tick(now_us_);
+  now_us_ += 3'600'000'000;
+  node->Tick(now_us_);
+  ASSERT_TRUE(node->watch().fault());
+  now_us_ -= 3'600'000'000;
+  node->Tick(now_us_);
+  ASSERT_GT(node->watch().fault()->utime, now_us_);
+  Reset();
+  EXPECT_FALSE(node->watch().fault());
 }
 
 TEST_F(ArmedNodeTest, ARobotThatHasFinishedIsNotLost) {
@@ -466,6 +517,29 @@ TEST_F(ArmedNodeTest, ATransitionThatContradictsTheDeclarationFalsifiesItForGood
   Reset();
   SayState(State());
   EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED) << "F from then on, whoever resets";
+}
+
+// A robot goes on where only the certifier has lost sight of it. What it rests on has to stop it all the same.
+TEST_F(ArmedNodeTest, AFaultThatStopsTheRobotTakesThePlaceOfOneThatDoesNot) {
+  const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
+  for (const bool lost_first : {true, false}) {
+    Restart();
+    faults_.clear();
+    bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+    SayState(State());
+    const auto lose_robot = [&] {
+      Pass(1'000'001);
+      Run();
+    };
+    if (lost_first) lose_robot();
+    bus_->Publish("TRANSITION", Executed(*config_.problem->model, z, 0.01));
+    Run();
+    if (!lost_first) lose_robot();
+    EXPECT_EQ(faults_.front().cause, lost_first ? fault_t::ROBOT_STATE_LOST : fault_t::DECLARATION_FALSIFIED);
+    EXPECT_EQ(faults_.back().cause, fault_t::DECLARATION_FALSIFIED);
+    EXPECT_EQ(faults_.back().sequence, lost_first ? 1 : 0);
+    EXPECT_EQ(status_.back().fault, fault_t::DECLARATION_FALSIFIED);
+  }
 }
 
 TEST_F(ArmedNodeTest, ManyTransitionsAreIndexedOnTheWay) {
@@ -630,23 +704,28 @@ TEST_F(ReloadTest, ArmingAndQueueAreTheNewFilesToo) {
   EXPECT_EQ(node->watch().state(), Watch::State::kDisarmed);
 }
 
-TEST_F(ReloadTest, TheSameDeclarationDoesNotComeBackOnceATransitionHasContradictedIt) {
+TEST_F(ReloadTest, NoDeclarationComesBackThatATransitionContradicts) {
   const auto node = Begin();
   const Eigen::VectorXd z = (Eigen::VectorXd(6) << 0, 0, 2, 0.1, 0, 0).finished();
   bus_->Publish("TRANSITION", Executed(*node->gate().certifier().problem().model, z, 1));
   bus_->Dispatch(0);
   ASSERT_TRUE(node->gate().certifier().violation());
-  Copy([](const std::string& text) { return "# another\n" + text; });
-  Reload(*node);
-  EXPECT_EQ(status_.failed_reloads, 1);
-  EXPECT_TRUE(node->gate().certifier().violation());
-  Copy([](const std::string& text) { return std::regex_replace(text, std::regex("noise_bound: \\[0, 0, 0"), "noise_bound: [0, 0, 2"); });
-  Reload(*node);
+  const auto reload_with = [&](const std::string& noise) {
+    Copy([&](const std::string& text) {
+      return std::regex_replace(text, std::regex("noise_bound: \\[.*\\]"), "noise_bound: [2, 2, " + noise + ", 2]");
+    });
+    Reload(*node);
+  };
+  for (const std::string noise : {"0", "0.1"}) {
+    reload_with(noise);
+    EXPECT_TRUE(node->gate().certifier().violation()) << noise;
+  }
+  EXPECT_EQ(status_.failed_reloads, 2);
+  reload_with("2");
   EXPECT_EQ(status_.version, 2);
   EXPECT_FALSE(node->gate().certifier().violation());
-  Copy([](const std::string& text) { return text; });
-  Reload(*node);
-  EXPECT_EQ(status_.failed_reloads, 2) << "nor after another";
+  reload_with("0.1");
+  EXPECT_EQ(status_.failed_reloads, 3) << "nor after another";
 }
 
 TEST_F(ReloadTest, OneThatIsAskedForMeanwhileComesAfter) {

@@ -38,13 +38,13 @@ GuardCause AcceptedBy(const certified_plan_t& certified, std::int64_t now = kNow
 GuardVerdict Start(const certified_plan_t& certified, const State& state, std::int64_t boundary = kStart) {
   Guard guard(TwoStates());
   EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kNone);
-  return guard.TryStart(boundary, state);
+  return guard.TryStart(boundary, boundary, state);
 }
 
 Guard Executing(const certified_plan_t& certified = SmallPlan()) {
   Guard guard(TwoStates());
   EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
-  EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
+  EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
   return guard;
 }
 
@@ -75,6 +75,20 @@ TEST(GuardAccept, WhatItExpectsCanChange) {
   EXPECT_EQ(cause(14, "another config", "another model"), GuardCause::kNone);
   EXPECT_EQ(cause(15, "config", "model"), GuardCause::kConfigDigest) << "it has not";
   EXPECT_EQ(cause(16, "another config", "another model"), GuardCause::kNone);
+}
+
+TEST(GuardAccept, EachTaskThatWasReadAgainMayBeTheOneInForce) {
+  Guard guard(TwoStates());
+  const auto cause = [&](std::int64_t plan_id, const char* config) {
+    certified_plan_t certified = SmallPlan(plan_id);
+    SetDigest(certified.config_digest, DigestOf(config));
+    return guard.Accept(Sealed(certified), kNow).cause;
+  };
+  guard.Expect(DigestOf("second"), DigestOf("model"));
+  guard.Expect(DigestOf("third"), DigestOf("model"));
+  EXPECT_EQ(cause(10, "second"), GuardCause::kNone) << "the certifier has refused the third";
+  EXPECT_EQ(cause(11, "third"), GuardCause::kConfigDigest);
+  EXPECT_EQ(cause(12, "second"), GuardCause::kNone);
 }
 
 TEST(GuardAccept, RefusesAFlippedBitAnywhere) {
@@ -218,8 +232,22 @@ TEST(GuardAccept, APlanIdIsAcceptedOnceAndOnlyUpwards) {
   EXPECT_EQ(guard.pending()->plan.plan_id, 7);
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
   EXPECT_EQ(guard.pending()->plan.plan_id, 8) << "the newest wins";
-  EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
+  EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
   EXPECT_EQ(guard.Accept(Sealed(SmallPlan(8)), kNow).cause, GuardCause::kReplayed) << "also once it has started";
+}
+
+TEST(GuardAccept, NoPlanIdKeepsLaterOnesOutForGood) {
+  Guard guard(TwoStates());
+  const auto accept = [&](std::int64_t plan_id, std::int64_t expires, std::int64_t now) {
+    certified_plan_t certified = SmallPlan(plan_id);
+    certified.expires_utime = expires;
+    return guard.Accept(Sealed(certified), now).cause;
+  };
+  EXPECT_EQ(accept(5, kNow + 100, kNow), GuardCause::kNone);
+  EXPECT_EQ(accept(INT64_MAX, kNow + 50, kNow), GuardCause::kNone);
+  EXPECT_EQ(accept(6, kNow + 200, kNow + 100), GuardCause::kReplayed) << "plan 5 could come again";
+  EXPECT_EQ(accept(5, kNow + 100, kNow + 101), GuardCause::kExpired);
+  EXPECT_EQ(accept(6, kNow + 200, kNow + 101), GuardCause::kNone);
 }
 
 TEST(GuardAccept, ARefusedPlanLeavesPendingAndLastIdAlone) {
@@ -288,7 +316,7 @@ TEST(GuardStart, RefusesStatesThatAreNoNumbersOrTooFew) {
   }
   Guard guard(TwoStates());
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
-  EXPECT_EQ(guard.TryStart(kStart, std::array{1.0}).cause, GuardCause::kWrongStateSize);
+  EXPECT_EQ(guard.TryStart(kStart, kStart, std::array{1.0}).cause, GuardCause::kWrongStateSize);
 }
 
 TEST(GuardStart, TheStateHasToLieInSliceZeroToo) {
@@ -320,26 +348,37 @@ TEST(GuardStart, ExpiryCountsAtTheBoundary) {
   EXPECT_EQ(Start(certified, {1, -2}, kStart + 1).cause, GuardCause::kExpired);
 }
 
+TEST(GuardStart, ARobotThatWasHeldUpDoesNotStartWhatHasExpiredMeanwhile) {
+  certified_plan_t certified = SmallPlan();
+  certified.expires_utime = kStart + 10 * kStep;
+  for (const std::int64_t late : {0, 1}) {
+    Guard guard(TwoStates());
+    ASSERT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
+    EXPECT_EQ(guard.TryStart(kStart, certified.expires_utime + late, State{1, -2}).cause,
+              late ? GuardCause::kExpired : GuardCause::kNone);
+  }
+}
+
 TEST(GuardStart, OnlyAnEarlyPlanIsKept) {
   Guard guard(TwoStates());
-  EXPECT_EQ(guard.TryStart(kStart, State{1, -2}).cause, GuardCause::kNothingPending);
+  EXPECT_EQ(guard.TryStart(kStart, kStart, State{1, -2}).cause, GuardCause::kNothingPending);
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
-  EXPECT_EQ(guard.TryStart(kStart - kStep, State{1, -2}).cause, GuardCause::kTooEarly);
-  EXPECT_EQ(guard.TryStart(kStart, State{2, -2}).cause, GuardCause::kOutsideInitialSet);
-  EXPECT_EQ(guard.TryStart(kStart, State{1, -2}).cause, GuardCause::kNothingPending);
+  EXPECT_EQ(guard.TryStart(kStart - kStep, kStart - kStep, State{1, -2}).cause, GuardCause::kTooEarly);
+  EXPECT_EQ(guard.TryStart(kStart, kStart, State{2, -2}).cause, GuardCause::kOutsideInitialSet);
+  EXPECT_EQ(guard.TryStart(kStart, kStart, State{1, -2}).cause, GuardCause::kNothingPending);
 }
 
 TEST(GuardStart, ANewPlanTakesOverAndARefusedOneDoesNot) {
   Guard guard = Executing(SmallPlan(7));
   EXPECT_TRUE(guard.Check(1, State{1, -2}).ok());
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
-  EXPECT_FALSE(guard.TryStart(kStart, State{9, -2}).ok());
+  EXPECT_FALSE(guard.TryStart(kStart, kStart, State{9, -2}).ok());
   ASSERT_NE(guard.executing(), nullptr);
   EXPECT_EQ(guard.executing()->plan.plan_id, 7);
   EXPECT_TRUE(guard.Check(2, State{1, -2}).ok()) << "the plan before goes on";
 
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(9)), kNow).ok());
-  EXPECT_TRUE(guard.TryStart(kStart, State{1, -2}).ok());
+  EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
   EXPECT_EQ(guard.executing()->plan.plan_id, 9);
   EXPECT_TRUE(guard.Check(1, State{1, -2}).ok()) << "the new plan begins at its own step 1";
 }
@@ -399,7 +438,7 @@ TEST(GuardHalt, AStateOutsideItsSliceHaltsUntilAReset) {
   EXPECT_TRUE(guard.halted());
   const auto next = Sealed(SmallPlan(8));
   EXPECT_EQ(guard.Accept(next, kNow).cause, GuardCause::kHalted);
-  EXPECT_EQ(guard.TryStart(kNow, State{0, 0}).cause, GuardCause::kHalted);
+  EXPECT_EQ(guard.TryStart(kNow, kNow, State{0, 0}).cause, GuardCause::kHalted);
   guard.Reset();
   EXPECT_TRUE(guard.Accept(next, kNow).ok());
 }

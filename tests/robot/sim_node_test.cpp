@@ -310,6 +310,13 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
   send("FAULT", fault);
   rig.RunTo(26);
   EXPECT_EQ(rig.Count(execution_event_t::HALTED), 2) << "another fault";
+  send("COMMAND", reset);
+  rig.RunTo(27);
+  EXPECT_EQ(rig.Count(execution_event_t::RESET), 1) << "it was sent before that one, and is fresh all the same";
+  reset.utime = BoundaryTime(27);
+  send("COMMAND", reset);
+  rig.RunTo(28);
+  EXPECT_EQ(rig.Count(execution_event_t::RESET), 2);
 }
 
 TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
@@ -459,9 +466,11 @@ TEST(RobotSim, ReportsContactAtEveryBoundaryInsideAnObstacle) {
 TEST(RobotSim, ALateTickGivesTheSameRun) {
   const Config config = PointMassTask();
   Rig prompt(config), late(config);
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
+  certified.expires_utime = BoundaryTime(4);
   for (Rig* rig : {&prompt, &late}) {
     rig->RunTo(0);
-    rig->Send(Plan(config, 1, 1, kOrigin));
+    rig->Send(certified);
     rig->RunTo(12, rig == &prompt ? 500 : 13 * kPeriod / 4);
   }
   ASSERT_EQ(late.states.size(), 10u) << "the fourth late tick is at boundary 9.8";
@@ -469,6 +478,16 @@ TEST(RobotSim, ALateTickGivesTheSameRun) {
     EXPECT_EQ(prompt.StateAt(j), late.StateAt(j)) << j;
     EXPECT_EQ(late.states[static_cast<std::size_t>(j)].utime, BoundaryTime(j));
   }
+}
+
+TEST(RobotSim, WhatExpiredWhileItWasHeldUpIsNotStarted) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(12, 13 * kPeriod / 4);
+  EXPECT_EQ(rig.Count(kStarted), 0);
+  EXPECT_EQ(rig.Summary()["plans_refused"]["expired"], 1);
 }
 
 TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {

@@ -168,8 +168,10 @@ TEST(ObservationStore, FindsTheContradictionWhereverItIs) {
     ASSERT_EQ(insertion.violation->coordinate, coordinate);
     ASSERT_EQ(insertion.violation->second, insertion.id);
     ASSERT_TRUE(TestPair(MakeDeclaration(), Join(samples), insertion.violation->first, insertion.id, coordinate));
+    ASSERT_TRUE(FindViolation(MakeDeclaration(), store.snapshot().Contradiction()));
     store.Compact();
     ASSERT_TRUE(store.snapshot().violation()) << "forgotten";
+    ASSERT_TRUE(FindViolation(MakeDeclaration(), store.snapshot().Contradiction()));
     ASSERT_TRUE(store.Remove(insertion.id));
     ASSERT_FALSE(store.snapshot().violation());
     samples.pop_back();
