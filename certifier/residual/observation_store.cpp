@@ -19,6 +19,30 @@ void SetRow(Eigen::MatrixXd& matrix, int row, std::span<const double> values) {
 
 }  // namespace
 
+// Observations and their ids, row by row.
+struct ObservationStore::Known {
+  Observations observations;
+  std::vector<int> ids;
+
+  void Append(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper) {
+    const int row = observations.size();
+    for (Eigen::MatrixXd* matrix : {&observations.z, &observations.lower, &observations.upper})
+      matrix->conservativeResize(row + 1, Eigen::NoChange);
+    SetRow(observations.z, row, z);
+    SetRow(observations.lower, row, lower);
+    SetRow(observations.upper, row, upper);
+    ids.push_back(id);
+  }
+
+  void Remove(int id) {
+    std::vector<int> others;
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      if (ids[i] != id) others.push_back(static_cast<int>(i));
+    observations = Select(observations, others);
+    std::erase(ids, id);
+  }
+};
+
 // An index and its tail. Entries of the tail below its size, and everything else, do not change any more.
 struct ObservationStore::Generation {
   Observations observations;  // of the index
@@ -51,6 +75,19 @@ struct ObservationStore::Generation {
     }
   }
 
+  // With the tail's first entries.
+  [[nodiscard]] Known All(int tail_size) const {
+    const Eigen::Index rows = observations.size() + tail_size;
+    Known all{{Eigen::MatrixXd(rows, observations.z.cols()), Eigen::MatrixXd(rows, observations.num_states()),
+               Eigen::MatrixXd(rows, observations.num_states())},
+              ids};
+    all.observations.z << observations.z, tail_observations.z.topRows(tail_size);
+    all.observations.lower << observations.lower, tail_observations.lower.topRows(tail_size);
+    all.observations.upper << observations.upper, tail_observations.upper.topRows(tail_size);
+    all.ids.insert(all.ids.end(), tail_ids.begin(), tail_ids.begin() + tail_size);
+    return all;
+  }
+
   [[nodiscard]] bool HasRoom() const { return tail.size() < tail.capacity(); }
 
   void Append(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper) {
@@ -72,23 +109,11 @@ std::size_t ObservationStore::Snapshot::size() const {
 }
 
 Observations ObservationStore::Snapshot::Contradiction() const {
-  const auto rows_of = [this](const auto begin, const auto end) {
-    std::vector<int> rows;
-    for (const int id : {violation_->first, violation_->second})
-      if (const auto known = std::find(begin, end, id); known != end) rows.push_back(static_cast<int>(known - begin));
-    return rows;
-  };
-  const Observations indexed = Select(generation_->observations, rows_of(generation_->ids.begin(), generation_->ids.end()));
-  const auto tail = generation_->tail_ids.begin();
-  const Observations unindexed = Select(generation_->tail_observations, rows_of(tail, tail + tail_size_));
-  const auto stacked = [](const Eigen::MatrixXd& above, const Eigen::MatrixXd& below) {
-    Eigen::MatrixXd both(above.rows() + below.rows(), above.cols());
-    both.topRows(above.rows()) = above;
-    both.bottomRows(below.rows()) = below;
-    return both;
-  };
-  return {stacked(indexed.z, unindexed.z), stacked(indexed.lower, unindexed.lower),
-          stacked(indexed.upper, unindexed.upper)};
+  const Known all = generation_->All(tail_size_);
+  std::vector<int> rows;
+  for (std::size_t i = 0; i < all.ids.size(); ++i)
+    if (all.ids[i] == violation_->first || all.ids[i] == violation_->second) rows.push_back(static_cast<int>(i));
+  return Select(all.observations, rows);
 }
 
 bool ObservationStore::Snapshot::uses_hull_distance() const { return generation_->envelope.uses_hull_distance(); }
@@ -112,7 +137,7 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
   next_id_ = observations.size();
   std::vector<int> ids(static_cast<std::size_t>(next_id_));
   std::iota(ids.begin(), ids.end(), 0);
-  current_ = Build(observations, std::move(ids));
+  current_ = Build({observations, std::move(ids)});
 }
 
 ObservationStore::~ObservationStore() = default;
@@ -141,38 +166,16 @@ void ObservationStore::Swap(std::shared_ptr<Generation> generation) {
   current_.swap(generation);  // the old one goes after the lock, if nobody holds it
 }
 
-std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Observations observations,
-                                                                      std::vector<int> ids) const {
+std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Known known) const {
   // A contradiction must not be forgotten for want of room.
-  if (ids.size() > options_.max_observations && !Violated()) {
-    const std::vector<int> kept = MostUseful(declaration_, observations, options_.max_observations);
-    observations = Select(observations, kept);
-    for (std::size_t i = 0; i < kept.size(); ++i) ids[i] = ids[static_cast<std::size_t>(kept[i])];
-    ids.resize(kept.size());
+  if (known.ids.size() > options_.max_observations && !Violated()) {
+    const std::vector<int> kept = MostUseful(declaration_, known.observations, options_.max_observations);
+    known.observations = Select(known.observations, kept);
+    for (std::size_t i = 0; i < kept.size(); ++i) known.ids[i] = known.ids[static_cast<std::size_t>(kept[i])];
+    known.ids.resize(kept.size());
   }
-  return std::make_shared<Generation>(declaration_, std::move(observations), std::move(ids), domain_lower_,
+  return std::make_shared<Generation>(declaration_, std::move(known.observations), std::move(known.ids), domain_lower_,
                                       domain_upper_, options_);
-}
-
-std::shared_ptr<ObservationStore::Generation> ObservationStore::Merge(const Generation& generation, int tail_size,
-                                                                      int removed) const {
-  const Observations &index = generation.observations, &tail = generation.tail_observations;
-  const Eigen::Index rows = index.size() + tail_size;
-  Observations all{Eigen::MatrixXd(rows, index.z.cols()), Eigen::MatrixXd(rows, index.num_states()),
-                   Eigen::MatrixXd(rows, index.num_states())};
-  all.z << index.z, tail.z.topRows(tail_size);
-  all.lower << index.lower, tail.lower.topRows(tail_size);
-  all.upper << index.upper, tail.upper.topRows(tail_size);
-  std::vector<int> ids = generation.ids;
-  ids.insert(ids.end(), generation.tail_ids.begin(), generation.tail_ids.begin() + tail_size);
-  if (const auto at = std::ranges::find(ids, removed); at != ids.end()) {
-    std::vector<int> others;
-    for (int i = 0; i < static_cast<int>(ids.size()); ++i)
-      if (i != at - ids.begin()) others.push_back(i);
-    all = Select(all, others);
-    ids.erase(at);
-  }
-  return Build(std::move(all), std::move(ids));
 }
 
 void ObservationStore::Compact() {
@@ -184,7 +187,7 @@ void ObservationStore::Compact() {
     old = current_;
     merged = old->tail.size();
   }
-  std::shared_ptr<Generation> fresh = Merge(*old, merged, -1);
+  std::shared_ptr<Generation> fresh = Build(old->All(merged));
   const std::lock_guard writing(writing_);
   // What came in meanwhile.
   const int size = old->tail.size();
@@ -192,7 +195,7 @@ void ObservationStore::Compact() {
   for (int i = merged; i < size; ++i) {
     const Eigen::VectorXd z = tail.z.row(i), lower = tail.lower.row(i), upper = tail.upper.row(i);
     if (!fresh->tail.Covers(View(lower), View(upper))) {  // rare enough to wait for
-      fresh = Merge(*old, size, -1);
+      fresh = Build(old->All(size));
       break;
     }
     fresh->Append(old->tail_ids[static_cast<std::size_t>(i)], View(z), View(lower), View(upper));
@@ -278,22 +281,6 @@ class ObservationStore::Newcomer {
   std::optional<Violation> found_;
 };
 
-// With an observation that is too large for the error bound of the index: into a new one at once.
-std::shared_ptr<ObservationStore::Generation> ObservationStore::MergeWith(std::span<const double> z,
-                                                                          std::span<const double> lower,
-                                                                          std::span<const double> upper, int id) const {
-  const std::shared_ptr<Generation> all = Merge(*current_, current_->tail.size(), -1);
-  std::vector<int> ids = all->ids, rows(ids.size() + 1, 0);
-  std::iota(rows.begin(), rows.end() - 1, 0);
-  Observations more = Select(all->observations, rows);
-  const int last = more.size() - 1;
-  SetRow(more.z, last, z);
-  SetRow(more.lower, last, lower);
-  SetRow(more.upper, last, upper);
-  ids.push_back(id);
-  return Build(std::move(more), std::move(ids));
-}
-
 ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, std::span<const double> lower,
                                                      std::span<const double> upper) {
   for (std::size_t l = 0; l < domain_lower_.size(); ++l)
@@ -312,8 +299,11 @@ ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, 
     }
     const std::lock_guard compacting(compacting_);
     const std::lock_guard again(writing_);
+    // Too large for the error bound of the index: into a new one at once.
     const Insertion insertion = Enlist(z, lower, upper);
-    Swap(MergeWith(z, lower, upper, insertion.id));
+    Known all = current_->All(current_->tail.size());
+    all.Append(insertion.id, z, lower, upper);
+    Swap(Build(std::move(all)));
     return insertion;
   }
   const Insertion insertion = Enlist(z, lower, upper);
@@ -339,7 +329,9 @@ bool ObservationStore::Remove(int id) {
   const bool known = std::ranges::find(current_->ids, id) != current_->ids.end() ||
                      std::find(current_->tail_ids.begin(), tail_end, id) != tail_end;
   if (!known || current_->ids.size() + static_cast<std::size_t>(current_->tail.size()) == 1) return false;
-  std::shared_ptr<Generation> fresh = Merge(*current_, current_->tail.size(), id);
+  Known others = current_->All(current_->tail.size());
+  others.Remove(id);
+  std::shared_ptr<Generation> fresh = Build(std::move(others));
   std::optional<Violation> violation = violation_;
   if (violation && (violation->first == id || violation->second == id)) {
     violation = FindViolation(declaration_, fresh->observations);

@@ -32,6 +32,7 @@ struct StoreOptions {
 
 class ObservationStore final {
  private:
+  struct Known;
   struct Generation;
   class Newcomer;
 
@@ -86,10 +87,7 @@ class ObservationStore final {
   [[nodiscard]] int tail_size() const;
 
  private:
-  std::shared_ptr<Generation> Build(Observations observations, std::vector<int> ids) const;
-  std::shared_ptr<Generation> Merge(const Generation& generation, int tail_size, int removed) const;
-  std::shared_ptr<Generation> MergeWith(std::span<const double> z, std::span<const double> lower,
-                                        std::span<const double> upper, int id) const;
+  std::shared_ptr<Generation> Build(Known known) const;
   Insertion Enlist(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
   bool Violated() const;
   void Swap(std::shared_ptr<Generation> generation);
