@@ -102,8 +102,9 @@ class Session final {
     const Bytes inside = WithoutSignature(message_.bytes);
     Require(Encode(plan) == std::vector(inside.begin(), inside.end()) && FindSealFaults(plan).empty());
     Require(GetDigest(plan.config_digest) == DigestOf("config") && GetDigest(plan.model_digest) == DigestOf("model"));
-    Require((!last_id_ || plan.plan.plan_id > *last_id_) && now <= plan.expires_utime);
+    Require((!last_id_ || plan.plan.plan_id > *last_id_ || now > last_expiry_) && now <= plan.expires_utime);
     last_id_ = plan.plan.plan_id;
+    last_expiry_ = std::max(last_expiry_, plan.expires_utime);
     RequireSane(plan);
   }
 
@@ -156,6 +157,7 @@ class Session final {
   const bool with_key_;
   Signer signer_{kKey, "certifier", kStart}, forger_{kOtherKey, "certifier", kStart};
   std::optional<std::int64_t> last_id_;
+  std::int64_t last_expiry_ = INT64_MIN;
   Message message_;
   int step_ = 0;
   bool has_executed_ = false;

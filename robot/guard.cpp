@@ -203,7 +203,6 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     auto certified = std::make_unique<certified_plan_t>();
     const DecodeStatus status = Decode(certified_plan_bytes, *certified);
     if (status != DecodeStatus::kOk) return RefuseDecode(status, certified_plan_bytes.size());
-    if (now_us > last_expiry_) last_accepted_.reset();
     verdict = Examine(*certified, now_us);
     verdict.plan_id = certified->plan.plan_id;
     if (!verdict.ok()) return verdict;
@@ -256,7 +255,7 @@ GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_
   if (verdict.ok() && options_.model_digest && !expected)
     verdict = CheckDigest(GuardCause::kModelDigest, "model_digest", GetDigest(certified.model_digest),
                           *options_.model_digest);
-  if (verdict.ok() && last_accepted_ && plan.plan_id <= *last_accepted_)
+  if (verdict.ok() && last_accepted_ && plan.plan_id <= *last_accepted_ && now_us <= last_expiry_)
     verdict = Refuse(GuardCause::kReplayed,
                      Sentence("plan %" PRId64 " is not newer than plan %" PRId64, plan.plan_id, *last_accepted_));
   return verdict;
