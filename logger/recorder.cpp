@@ -198,7 +198,8 @@ void Recorder::Rotate(std::int64_t now_us) {
 }
 
 void Recorder::Tick(std::int64_t now_us) {
-  if (age_.IsOver(now_us) && log_->next_number() > 0) Rotate(now_us);
+  // Where the quota has no room even this file may have to go, and only one that has ended may.
+  if ((age_.IsOver(now_us) || pause_ == "quota") && log_->next_number() > 0) Rotate(now_us);
   if (flush_.IsOver(now_us) || log_->pending_bytes() > kMaxBufferBytes) Flush(now_us);
 }
 
@@ -355,17 +356,26 @@ bool Recorder::HasRoom(std::int64_t bytes) const {
   return !options_.quota_mb || log_bytes() + bytes <= BytesOf(*options_.quota_mb);
 }
 
+// Deletes the oldest ended logs until there is room, and none if all of them together would not make it.
 bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
   if (HasRoom(bytes)) return true;
-  if (file_bytes() + bytes > BytesOf(*options_.quota_mb)) return false;
+  other_bytes_ = directory_.LogBytes(log_file_);
   try {
+    std::vector<std::pair<std::string, std::int64_t>> ended;
+    std::int64_t ended_bytes = 0;
     for (const RunRow& run : database_.Runs()) {
       const auto size = directory_.Bytes(run.log_file);
-      if (HasRoom(bytes) || !run.end_utime || run.log_file == log_file_ || !size) continue;
-      database_.MarkLogDeleted(run.log_file, now_us);
-      if (!directory_.Remove(run.log_file)) continue;
-      other_bytes_ -= *size;
-      spdlog::warn("{}, {} bytes, deleted for logger.quota_mb; its rows stay", run.log_file, *size);
+      if (!run.end_utime || run.log_file == log_file_ || !size) continue;
+      ended.emplace_back(run.log_file, *size);
+      ended_bytes += *size;
+    }
+    if (!HasRoom(bytes - ended_bytes)) return false;
+    for (const auto& [file, size] : ended) {
+      if (HasRoom(bytes)) break;
+      database_.MarkLogDeleted(file, now_us);
+      if (!directory_.Remove(file)) continue;
+      other_bytes_ -= size;
+      spdlog::warn("{}, {} bytes, deleted for logger.quota_mb; its rows stay", file, size);
     }
   } catch (const DatabaseError& error) {
     spdlog::error("no log is deleted for logger.quota_mb: {}", error.what());

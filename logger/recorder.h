@@ -9,7 +9,8 @@ makes them again. Gaps without an event, which no log holds, wait on, those of o
 count is not counted once more where the log is read again.
 
 **Files.** One row of the database's runs for each file. A file ends, and the next begins, before the event with which it
-would exceed logger.rotate_mb, and after logger.rotate_minutes; event numbers begin anew, sequence counts and waiting
+would exceed logger.rotate_mb, after logger.rotate_minutes, and when it finds no room within logger.quota_mb; event numbers
+begin anew, sequence counts and waiting
 candidates go on. A file that the database has not all rows of is not ended before it has.
 
 **Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes is
