@@ -15,7 +15,7 @@ void AddReportCommand(CLI::App& app, Action& action) {
   command->add_option("--picture", options->picture, "Obstacles, tubes and driven path: .svg or .png, both without ending")
       ->type_name("FILE");
   command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->footer("Example:\n  forereach report run/log/events-20260101-120000.lcmlog --config config/demo.yaml "
+  command->footer("Example:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --config config/demo.yaml "
                   "--picture run/demo");
   command->callback([options, &action] {
     action = [options] {

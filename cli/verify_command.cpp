@@ -162,7 +162,7 @@ void AddVerifyCommand(CLI::App& app, Action& action) {
       "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > "
       "decision.json\n"
       "  forereach verify decision.json\n"
-      "  forereach verify run/log/events-20260101-120000.lcmlog --config config/demo.yaml");
+      "  forereach verify run/log/events-20260101-120000-000000.lcmlog --config config/demo.yaml");
   command->callback([options, &action] { action = [options] { return Verify(*options); }; });
 }
 

@@ -15,7 +15,8 @@
 namespace forereach {
 namespace {
 
-constexpr const char* kEnding = ".lcmlog";
+constexpr const char *kBeginning = "events-", *kEnding = ".lcmlog";
+constexpr std::int64_t kSecond = 1'000'000;
 
 }  // namespace
 
@@ -27,11 +28,13 @@ LogDirectory::LogDirectory(std::string path) : path_(std::move(path)) {
 
 std::string LogDirectory::PathOf(const std::string& file) const { return (std::filesystem::path(path_) / file).string(); }
 
-std::string LogDirectory::FreeName(std::int64_t now_us, const std::function<bool(const std::string&)>& taken) const {
-  const std::string stem = fmt::format("events-{:%Y%m%d-%H%M%S}", fmt::gmtime(static_cast<std::time_t>(now_us / 1'000'000)));
-  std::string name = stem + kEnding;
-  for (int i = 2; Bytes(name) || taken(name); ++i) name = fmt::format("{}-{}{}", stem, i, kEnding);
-  return name;
+std::string LogDirectory::FreeName(std::int64_t& time_us, const std::function<bool(const std::string&)>& taken) const {
+  for (;; ++time_us) {
+    const auto seconds = static_cast<std::time_t>(time_us / kSecond);
+    std::string name =
+        fmt::format("{}{:%Y%m%d-%H%M%S}-{:06}{}", kBeginning, fmt::gmtime(seconds), time_us % kSecond, kEnding);
+    if (!Bytes(name) && !taken(name)) return name;
+  }
 }
 
 std::int64_t LogDirectory::LogBytes(const std::string& except) const {

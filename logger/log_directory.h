@@ -18,9 +18,9 @@ class LogDirectory final {
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::string PathOf(const std::string& file) const;
 
-  /** "events-20260101-120000.lcmlog" of the time in UTC, or with -2, -3, ... before the ending: the first name that no file
-  has and `taken` does not hold for. */
-  [[nodiscard]] std::string FreeName(std::int64_t now_us, const std::function<bool(const std::string&)>& taken) const;
+  /** "events-20260101-120000-000000.lcmlog" of a time in UTC with its microseconds, put off to the first whose name no file
+  has and `taken` does not hold for. Names sort as their times do. */
+  [[nodiscard]] std::string FreeName(std::int64_t& time_us, const std::function<bool(const std::string&)>& taken) const;
 
   /** Bytes of all .lcmlog files but `except`. Cost: one look at each file. */
   [[nodiscard]] std::int64_t LogBytes(const std::string& except = "") const;

@@ -62,7 +62,7 @@ class Recorder final {
   @throws LogError, DatabaseError if the directory cannot be written to, KeyError. */
   Recorder(const Config& config, FreeSpace free_space);
 
-  /** Opens the first log file, named after its time; the rest is to be called after it. @throws as the constructor. */
+  /** Opens the first log file, named after its time (log_directory.h); the rest is to be called after it. @throws as the constructor. */
   void Begin(std::int64_t now_us);
   [[nodiscard]] bool begun() const { return log_ != nullptr; }
 
@@ -136,6 +136,7 @@ class Recorder final {
   std::string log_path_, log_file_;
   std::unique_ptr<EventLogWriter> log_;
   int files_ = 0;
+  std::int64_t name_us_ = 0;  // the time that the last of them is named after
   Period flush_, age_, scan_, gaps_, retry_;
 
   std::map<std::string, std::int64_t> unflushed_;               // events in the log's buffer, by channel

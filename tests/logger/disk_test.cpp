@@ -146,6 +146,21 @@ TEST_F(DiskTest, AClockThatGoesBackStopsNothing) {
   Stop();
 }
 
+// More than ten within a second, then some an hour before: a shell lists them as they were written.
+TEST_F(DiskTest, NamesSortInTheOrderInWhichFilesWereMade) {
+  config_.logger.rotate_mb = kRecord * 1e-6;
+  Start();
+  for (int i = 0; i < 12; ++i) bus_.Publish("EXECUTION_EVENT", MakeEvent(fed_++, execution_event_t::STARTED));
+  node_->Tick(bus_.now_us);
+  bus_.now_us -= 60 * kMinuteUs;
+  Feed(3);
+  Stop();
+  std::vector<std::string> names;
+  for (const RunRow& run : Runs()) names.push_back(run.log_file);
+  EXPECT_EQ(names.size(), 15u);
+  EXPECT_TRUE(std::ranges::is_sorted(names)) << testing::PrintToString(names);
+}
+
 TEST_F(DiskTest, CountsGoOnFromFileToFile) {
   config_.logger.rotate_mb = 4 * kRecord * 1e-6;
   Start();

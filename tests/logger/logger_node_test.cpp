@@ -39,7 +39,7 @@ TEST_F(LoggerNodeTest, RecordsEverythingAndSummarises) {
     EXPECT_TRUE(node.recorder().recovered().empty());
     node.Tick(bus_.now_us);
     log_path = node.recorder().log_path();
-    EXPECT_THAT(log_path, testing::EndsWith("/events-20231114-221320.lcmlog"));
+    EXPECT_THAT(log_path, testing::EndsWith("/events-20231114-221320-000000.lcmlog"));
     const candidate_plan_t first = MakeCandidate(0, 100), second = MakeCandidate(1, 101);
     bus_.Publish("PLAN_CANDIDATE", first);
     bus_.now_us += 150;
@@ -62,7 +62,7 @@ TEST_F(LoggerNodeTest, RecordsEverythingAndSummarises) {
 
   const Rows rows = ReadRows();
   ASSERT_EQ(rows.decisions.size(), 2u);
-  EXPECT_EQ(rows.decisions[0].event.log_file, "events-20231114-221320.lcmlog");
+  EXPECT_EQ(rows.decisions[0].event.log_file, "events-20231114-221320-000000.lcmlog");
   EXPECT_EQ(rows.decisions[0].event.event_number, 1);
   EXPECT_EQ(rows.decisions[0].latency_us, 150);
   EXPECT_EQ(rows.decisions[0].outcome, "certified");
@@ -100,7 +100,7 @@ TEST_F(LoggerNodeTest, ARunNeverWritesIntoAnOlderFile) {
     EXPECT_EQ(ReadLog(node.recorder().log_path()).events.size(), 1u);
   }
   EXPECT_EQ(Runs().size(), 3u);
-  EXPECT_EQ(Runs()[2].log_file, "events-20231114-221320-3.lcmlog");
+  EXPECT_EQ(Runs()[2].log_file, "events-20231114-221320-000002.lcmlog");
 }
 
 TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
