@@ -11,6 +11,9 @@ namespace {
 
 constexpr int kApplicationId = 0x46524C47;  // "FRLG", so that no other program's file is taken for ours
 
+// With a write-ahead log: the disk need not confirm a transaction before the next begins.
+constexpr const char* kLazily = "PRAGMA synchronous = NORMAL";
+
 // Entry k brings schema version k to k + 1. Entries are only ever added.
 constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
   CREATE TABLE runs (
@@ -135,7 +138,8 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
     sqlite3_busy_timeout(handle, 2000);
     Migrate();
     // Where the file system allows no write-ahead log SQLite keeps its rollback journal, which is as safe and slower.
-    Execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL");
+    Execute("PRAGMA journal_mode = WAL");
+    Execute(kLazily);
     insert_decision_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO decisions VALUES
       (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
       ON CONFLICT (log_file, event_number) DO NOTHING)sql");
@@ -220,20 +224,29 @@ int Database::Insert(const GapRow& row) {
       .Run();
 }
 
+template <class... Values>
+void Database::RunDurably(const char* sql, const Values&... values) {
+  Execute("PRAGMA synchronous = FULL");
+  try {
+    Statement(handle_.get(), sql).Bind(values...).Run();
+  } catch (const DatabaseError&) {
+    Execute(kLazily);
+    throw;
+  }
+  Execute(kLazily);
+}
+
 void Database::BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues) {
-  Statement(handle_.get(), "INSERT INTO runs (log_file, start_utime, schema, continues) VALUES (?, ?, ?, ?)")
-      .Bind(log_file, start_utime, kSchemaVersion, continues)
-      .Run();
+  RunDurably("INSERT INTO runs (log_file, start_utime, schema, continues) VALUES (?, ?, ?, ?)", log_file, start_utime,
+             kSchemaVersion, continues);
 }
 
 void Database::EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered) {
-  Statement(handle_.get(), "UPDATE runs SET end_utime = ?, recovered = ? WHERE log_file = ?")
-      .Bind(end_utime, recovered, log_file)
-      .Run();
+  RunDurably("UPDATE runs SET end_utime = ?, recovered = ? WHERE log_file = ?", end_utime, recovered, log_file);
 }
 
 void Database::MarkLogDeleted(const std::string& log_file, std::int64_t utime) {
-  Statement(handle_.get(), "UPDATE runs SET log_deleted_utime = ? WHERE log_file = ?").Bind(utime, log_file).Run();
+  RunDurably("UPDATE runs SET log_deleted_utime = ? WHERE log_file = ?", utime, log_file);
 }
 
 std::vector<RunRow> Database::Runs() {

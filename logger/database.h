@@ -1,8 +1,9 @@
 /** The decision database: SQLite, one file for all runs of a directory. Only its source file sees SQL.
 
-Tables: `decisions`, `execution_events`, `gaps` as in rows.h, and `runs`, one row for each log file. The journal is a write-ahead log with
-synchronous=NORMAL: a transaction is there whole or not at all after a kill, and after a power cut too; the event log is
-always written first, so rows that a cut took are made again from it. */
+Tables: `decisions`, `execution_events`, `gaps` as in rows.h, and `runs`, one row for each log file. The journal is a
+write-ahead log: a transaction is there whole or not at all after a kill, and after a power cut too. What `runs` is told is
+on the disk when the call returns, with all that was written before. A cut may take the rows written since; the event log is
+always written first, so they are made again from it. */
 #pragma once
 
 #include <cstdint>
@@ -54,7 +55,7 @@ class Database final {
   @return the number of rows that are new, or nothing on failure; `problem` then says why. */
   [[nodiscard]] std::optional<int> Write(const Rows& rows, const std::string& log_file, std::int64_t events);
 
-  /** Each is a transaction of its own. @throws DatabaseError. */
+  /** Each is a transaction of its own, which the disk has confirmed. @throws DatabaseError. */
   void BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues = "");
   void EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered = "");
   void MarkLogDeleted(const std::string& log_file, std::int64_t utime);
@@ -80,6 +81,8 @@ class Database final {
   class Statement;
 
   void Execute(const char* sql);
+  template <class... Values>
+  void RunDurably(const char* sql, const Values&... values);
   void Migrate();
   int Insert(const DecisionRow& row);
   int Insert(const EventRow& row);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -30,6 +31,16 @@ void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t
 }
 
 std::string Reason(const std::string& what, const std::string& path) { return what + path + ": " + std::strerror(errno); }
+
+// Has the disk confirm that a file is in its directory. EINVAL: this file system knows no such thing.
+bool ConfirmEntry(const std::string& path) {
+  const std::string parent = std::filesystem::path(path).parent_path().string();
+  const int directory = ::open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory < 0) return false;
+  const bool confirmed = ::fsync(directory) == 0 || errno == EINVAL;
+  ::close(directory);
+  return confirmed;
+}
 
 }  // namespace
 
@@ -166,6 +177,7 @@ EventLogWriter::EventLogWriter(const std::string& path) : file_(::open(path.c_st
   if (file_ < 0) throw LogError(Reason("log: cannot write ", path));
   try {
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) throw LogError("log: " + path + " is being written by another process");
+    if (!ConfirmEntry(path)) throw LogError(Reason("log: cannot write ", path));
     Recover(path);
   } catch (...) {
     ::close(file_);
@@ -178,7 +190,7 @@ EventLogWriter::~EventLogWriter() { ::close(file_); }
 void EventLogWriter::Recover(const std::string& path) {
   EventLogReader reader(path);
   ForEachEvent(reader, [this](const LogEvent& event) {
-    ++recovery_.events;
+    if (recovery_.events++ == 0) recovery_.first_utime = event.utime;
     recovery_.last_utime = event.utime;
     next_number_ = std::max(next_number_, event.number + 1);
   });

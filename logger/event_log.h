@@ -108,13 +108,13 @@ struct LogRecovery {
   std::int64_t cut_bytes = 0;        ///< Of a cut tail, removed.
   std::int64_t corruptions = 0;      ///< Damaged places, left as they are.
   std::int64_t skipped_bytes = 0;    ///< In them.
-  std::int64_t last_utime = 0;       ///< Of the last whole record, 0 without one.
+  std::int64_t first_utime = 0, last_utime = 0;  ///< Of the first and last whole record, 0 without one.
 };
 
 class EventLogWriter final {
  public:
-  /** Creates the file, or recovers an existing one: keeps all whole records, removes a cut tail and nothing else, and
-  continues the event numbers. Holds a lock on the file while it lives.
+  /** Creates the file, and has the disk confirm that it is in its directory; or recovers an existing one: keeps all whole
+  records, removes a cut tail and nothing else, and continues the event numbers. Holds a lock on the file while it lives.
   @throws LogError if the file cannot be opened or another writer holds it. */
   explicit EventLogWriter(const std::string& path);
   ~EventLogWriter();

@@ -1,5 +1,6 @@
 #include "logger/log_directory.h"
 
+#include <algorithm>
 #include <ctime>
 #include <filesystem>
 #include <limits>
@@ -37,13 +38,27 @@ std::string LogDirectory::FreeName(std::int64_t& time_us, const std::function<bo
   }
 }
 
+std::vector<std::string> LogDirectory::Logs() const {
+  std::vector<std::string> names;
+  ForEachLog([&](const std::string& name) {
+    if (name.starts_with(kBeginning)) names.push_back(name);
+  });
+  std::ranges::sort(names);
+  return names;
+}
+
 std::int64_t LogDirectory::LogBytes(const std::string& except) const {
   std::int64_t bytes = 0;
+  ForEachLog([&](const std::string& name) {
+    if (name != except) bytes += Bytes(name).value_or(0);
+  });
+  return bytes;
+}
+
+void LogDirectory::ForEachLog(const std::function<void(const std::string&)>& visit) const {
   std::error_code error;
   for (std::filesystem::directory_iterator file(path_, error), end; !error && file != end; file.increment(error))
-    if (file->path().extension() == kEnding && file->path().filename() != except)
-      bytes += Bytes(file->path().filename().string()).value_or(0);
-  return bytes;
+    if (file->path().extension() == kEnding) visit(file->path().filename().string());
 }
 
 std::optional<std::int64_t> LogDirectory::Bytes(const std::string& file) const {

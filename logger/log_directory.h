@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace forereach {
 
@@ -22,6 +23,9 @@ class LogDirectory final {
   has and `taken` does not hold for. Names sort as their times do. */
   [[nodiscard]] std::string FreeName(std::int64_t& time_us, const std::function<bool(const std::string&)>& taken) const;
 
+  /** The files whose names could be FreeName's, now or before microseconds were part of them, in the order of their names. */
+  [[nodiscard]] std::vector<std::string> Logs() const;
+
   /** Bytes of all .lcmlog files but `except`. Cost: one look at each file. */
   [[nodiscard]] std::int64_t LogBytes(const std::string& except = "") const;
 
@@ -32,6 +36,8 @@ class LogDirectory final {
   bool Remove(const std::string& file) const;
 
  private:
+  void ForEachLog(const std::function<void(const std::string&)>& visit) const;
+
   std::string path_;
 };
 

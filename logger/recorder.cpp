@@ -86,8 +86,24 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
       scan_(kScanUs),
       gaps_(kGapsUs),
       retry_(kRetryUs) {
+  AdoptLogs();
   for (const RunRow& run : database_.Runs())
     if (!run.end_utime) Recover(run);
+}
+
+// Listed before the runs are read: another logger's file has its run by then, or is locked.
+void Recorder::AdoptLogs() {
+  const std::vector<std::string> logs = directory_.Logs();
+  const std::vector<RunRow> runs = database_.Runs();
+  for (const std::string& log : logs) {
+    if (std::ranges::find(runs, log, &RunRow::log_file) != runs.end()) continue;
+    try {
+      const EventLogWriter locked(directory_.PathOf(log));
+      database_.BeginRun(log, locked.recovery().first_utime);
+    } catch (const LogError& error) {
+      spdlog::warn("no run knows {}, and it is left alone: {}", log, error.what());
+    }
+  }
 }
 
 void Recorder::Recover(const RunRow& run) {

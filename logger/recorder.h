@@ -3,7 +3,9 @@
 **Loss window.** Take puts a message into the log's buffer. Every logger.flush_ms the buffer goes to the file (write, then
 fdatasync) and after it the rows of those events go to the database in one transaction. So the database never knows more
 than the log, and a recorder that is killed loses at most what came since the last flush; a machine that loses power the
-same. When it begins, log files that were not ended are mended: a cut tail is removed and missing rows are made again.
+same, for a log's entry in its directory and its run are on the disk before its first event. When it begins, log files that
+were not ended are mended: a cut tail is removed and missing rows are made again. So are files that are named like a
+logger's and that no run knows, but none that another logger writes.
 Rows that the database refuses wait. Beyond kMaxWaitingRows those that come from an event are dropped: the next start
 makes them again. Gaps without an event, which no log holds, wait on, those of one stream and reason as one. What they
 count is not counted once more where the log is read again.
@@ -104,6 +106,7 @@ class Recorder final {
     std::int64_t lost = 0, first_utime = 0;
   };
 
+  void AdoptLogs();
   void Recover(const RunRow& run);
   [[nodiscard]] std::string Mend(const RunRow& run, std::int64_t& end_utime);
   [[nodiscard]] Interpreter InterpreterFor(const RunRow& run) const;

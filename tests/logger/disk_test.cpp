@@ -223,6 +223,41 @@ TEST_F(DiskTest, RowsMadeAgainAreTheSame) {
   EXPECT_EQ(InWords(ReadRows()), live);
 }
 
+// As after a power cut that took the database's last words, or the database.
+TEST_F(DiskTest, ALogThatNoRunKnowsIsTakenAndItsRowsAreMade) {
+  config_.logger.rotate_mb = 10 * kRecord * 1e-6;
+  Start();
+  Feed(25);
+  Stop();
+  const std::vector<RunRow> before = Runs();
+  const std::vector<std::string> live = InWords(ReadRows());
+  Sql("DELETE FROM execution_events; DELETE FROM runs");
+  const std::string old_name = "events-20231114-221319.lcmlog";
+  std::filesystem::copy(PathOf(before[0]), scratch_ / ("log/" + old_name));
+  WriteBytes(scratch_ / "log/stray.lcmlog", {1, 2, 3});
+  { const LoggerNode recovery(config_, bus_, out_); }
+  std::vector<RunRow> runs = Runs();
+  ASSERT_EQ(runs.size(), 4u);
+  EXPECT_EQ(runs[0].log_file, old_name);
+  runs.erase(runs.begin());
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    EXPECT_EQ(runs[i].log_file, before[i].log_file);
+    EXPECT_EQ(runs[i].start_utime, kStart + static_cast<std::int64_t>(10'000 * i));
+    EXPECT_TRUE(runs[i].end_utime.has_value());
+  }
+  EXPECT_EQ(ReadRows().events.size(), 35u);
+  Sql(("DELETE FROM execution_events WHERE log_file = '" + old_name + "'").c_str());
+  EXPECT_EQ(InWords(ReadRows()), live);
+  EXPECT_EQ(std::filesystem::file_size(scratch_ / "log/stray.lcmlog"), 3u);
+}
+
+TEST_F(DiskTest, ALogThatAnotherLoggerWritesIsNotTaken) {
+  std::filesystem::create_directories(scratch_ / "log");
+  const EventLogWriter other(scratch_ / "log/events-20231114-221319-000000.lcmlog");
+  { const LoggerNode recovery(config_, bus_, out_); }
+  EXPECT_TRUE(Runs().empty());
+}
+
 TEST_F(DiskTest, TheQuotaTakesTheOldestEndedLogsAndKeepsTheirRows) {
   config_.logger.rotate_mb = 10 * kRecord * 1e-6;
   config_.logger.quota_mb = 35 * kRecord * 1e-6;
