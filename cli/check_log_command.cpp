@@ -5,6 +5,7 @@
 
 #include "cli/commands.h"
 #include "logger/check.h"
+#include "logger/json_text.h"
 
 namespace forereach {
 namespace {
@@ -16,7 +17,7 @@ struct Options {
 
 int RunCheckLog(const Options& options) {
   const std::vector<LogCheck> checks = CheckLogs(options.directory);
-  std::cout << (options.json ? ToJson(checks).dump() + "\n" : ToText(checks)) << std::flush;
+  std::cout << (options.json ? JsonText(ToJson(checks)) + "\n" : ToText(checks)) << std::flush;
   return std::ranges::all_of(checks, &LogCheck::whole_log) ? 0 : 1;
 }
 

@@ -1,10 +1,10 @@
 #include <iostream>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/replay.h"
+#include "logger/json_text.h"
 
 namespace forereach {
 namespace {
@@ -19,11 +19,11 @@ int RunReplay(const Options& options) {
   const Config config = LoadConfig(options.config);
   const ReplayResult result = Replay(options.logs, config);
   if (options.json) {
-    std::cout << nlohmann::json{{"candidates", result.candidates},
-                                {"agreed", result.agreed},
-                                {"circumstances", result.circumstances},
-                                {"corruptions", result.corruptions},
-                                {"differences", result.differences}}
+    std::cout << JsonText({{"candidates", result.candidates},
+                           {"agreed", result.agreed},
+                           {"circumstances", result.circumstances},
+                           {"corruptions", result.corruptions},
+                           {"differences", result.differences}})
               << std::endl;
   } else {
     for (const std::string& difference : result.differences) std::cout << difference << "\n";

@@ -10,6 +10,7 @@
 #include "cli/certificate_files.h"
 #include "cli/commands.h"
 #include "cli/progress.h"
+#include "logger/json_text.h"
 
 namespace forereach {
 namespace {
@@ -99,12 +100,12 @@ void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts
   nlohmann::json failures = nlohmann::json::array();
   for (std::size_t i = 0; i < verdicts.size(); ++i)
     if (verdicts[i].status != Status::kConfirmed) failures.push_back(ToJson(file.certificates[i], verdicts[i]));
-  std::cout << nlohmann::json{{"certificates", verdicts.size()},
-                              {"confirmed", summary.confirmed},
-                              {"refuted", summary.refuted},
-                              {"cannot_verify", summary.cannot_verify},
-                              {"not_certificates", file.not_certificates},
-                              {"failures", failures}}
+  std::cout << JsonText({{"certificates", verdicts.size()},
+                         {"confirmed", summary.confirmed},
+                         {"refuted", summary.refuted},
+                         {"cannot_verify", summary.cannot_verify},
+                         {"not_certificates", file.not_certificates},
+                         {"failures", failures}})
             << std::endl;
 }
 

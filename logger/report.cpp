@@ -24,6 +24,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "logger/event_log.h"
+#include "logger/json_text.h"
 
 namespace forereach {
 namespace {
@@ -277,7 +278,7 @@ void Report(const ReportOptions& options, std::ostream& out) {
     json["logs"] = options.logs;
     json["pictures"] = files;
     json["tubes_left_out"] = drawn.disagreements;
-    out << json.dump(2) << "\n";
+    out << JsonText(json, 2) << "\n";
     return;
   }
   out << ToText(summary);

@@ -123,7 +123,9 @@ void SummaryBuilder::SetTime(std::int64_t utime) {
 
 void SummaryBuilder::Add(const LogEvent& event) {
   SetTime(event.utime);
-  ++summary_.messages[event.channel];
+  auto& messages = summary_.messages;
+  ++messages[messages.size() < Summary::kMaxChannels || messages.contains(event.channel) ? event.channel : "*"];
+  if (event.channel == channels_.candidate) ++summary_.proposed;
   if (event.channel != channels_.robot_state) return;
   if (const auto state = Decoded<robot_state_t>(event.message()))
     SetState({state->state, state->state + std::clamp<int>(state->num_states, 0, 16)});
@@ -176,8 +178,7 @@ void SummaryBuilder::Add(const LogDamage& damage) {
 
 Summary SummaryBuilder::Finish() const {
   Summary summary = summary_;
-  const auto candidates = summary.messages.find(channels_.candidate);
-  summary.proposed = candidates != summary.messages.end() ? candidates->second : summary.decided;
+  if (summary.proposed == 0) summary.proposed = summary.decided;
   summary.latency_us = latency_.Get();
   summary.certify_us = certify_.Get();
   summary.duration_s = static_cast<double>(last_utime_ - first_utime_.value_or(last_utime_)) * 1e-6;

@@ -23,7 +23,10 @@ struct Quantiles {
 };
 
 struct Summary {
-  std::map<std::string, std::int64_t> messages;  ///< By channel. Empty if made from a database.
+  static constexpr std::size_t kMaxChannels = 256;  ///< A sender that invents channels must not fill the memory.
+
+  /** By channel; those beyond kMaxChannels as "*". Empty if made from a database. */
+  std::map<std::string, std::int64_t> messages;
   double duration_s = 0;                         ///< From the first message to the last.
   std::int64_t proposed = 0;                     ///< Candidates; from a database, decisions.
   std::int64_t decided = 0, certified = 0;

@@ -153,5 +153,13 @@ TEST_F(LogPictureTest, TheReportSaysWhatIsWrong) {
   EXPECT_EQ(out.str(), "");
 }
 
+// The name of a channel may be any bytes.
+TEST_F(LogPictureTest, TheReportIsJsonWhateverTheLogHolds) {
+  Append("CH\xff\xfe", MakeEvent(0, 0));
+  std::ostringstream out;
+  Report({{scratch_ / "log"}, FOREREACH_SOURCE_DIR "/tests/data/course.yaml", "", true}, out);
+  EXPECT_EQ(nlohmann::json::parse(out.str())["messages"].size(), 1u);
+}
+
 }  // namespace
 }  // namespace forereach

@@ -104,6 +104,16 @@ TEST(Summary, OfNothingIsUnknownNotZero) {
   EXPECT_THAT(ToText(summary), testing::HasSubstr("unknown"));
 }
 
+TEST(Summary, InventedChannelsAreCountedTogether) {
+  SummaryBuilder builder(GoalConfig());
+  for (int i = 0; i < 1000; ++i) builder.Add(LogEvent{i, i, "invented " + std::to_string(i), {}});
+  for (int i = 0; i < 3; ++i) builder.Add(LogEvent{1000 + i, i, "PLAN_CANDIDATE", {}});
+  const Summary summary = builder.Finish();
+  EXPECT_EQ(summary.messages.size(), Summary::kMaxChannels + 1);
+  EXPECT_EQ(summary.messages.at("*"), 1003 - static_cast<std::int64_t>(Summary::kMaxChannels));
+  EXPECT_EQ(summary.proposed, 3);
+}
+
 TEST(Summary, PassesDamageAndCountsIt) {
   const ScratchDirectory scratch;
   WriteRun(scratch / "log");

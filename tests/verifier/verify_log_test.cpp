@@ -6,12 +6,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
 #include "cli/certificate_files.h"
 #include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/seal.h"
+#include "tests/cli/program.h"
 #include "tests/logger/logs.h"
 
 namespace forereach {
@@ -120,6 +122,16 @@ TEST(VerifyLog, ChangedControlOfTheCertifiedPlan) {
   const auto file = ReadCertificates(path, kConfig);
   EXPECT_EQ(file.certificates[0].mismatches.size(), 2u);  // the plan's digest, and no such candidate was sent
   EXPECT_EQ(Judge(file, 0).failure.step, 5);
+}
+
+TEST(VerifyLog, AFileWhoseNameIsNoTextIsStillNamedInJson) {
+  ScratchDirectory scratch;
+  const std::string path = scratch / "\xff.lcmlog";
+  std::filesystem::rename(
+      EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1; }), path);
+  const Output output = Forereach("verify --json --config " + kConfig + " " + path + " " + path);
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(nlohmann::json::parse(output.text)["failures"][0]["certificate"], HasSubstr("\uFFFD.lcmlog event "));
 }
 
 TEST(VerifyLog, MissingCertifiedPlanIsNoticed) {
