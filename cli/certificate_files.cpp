@@ -21,6 +21,7 @@
 #include "lcmtypes/seal.h"
 #include "logger/database.h"
 #include "logger/event_log.h"
+#include "logger/log_authenticator.h"
 
 namespace forereach {
 namespace {
@@ -222,10 +223,14 @@ verifier::Certificate CertificateOf(const certified_plan_t& certified, const std
 
 class LogReading {
  public:
-  // Names the file of each certificate if `names` says so.
-  LogReading(const std::vector<std::string>& logs, bool names, const Config& config, LearnedHistory& learned,
-             std::vector<RecordedCertificate>& certificates)
-      : config_(config), obstacles_(config), learned_(learned), certificates_(certificates) {
+  // Adds what it finds to `file`; names the file of each certificate if `names` says so.
+  LogReading(const std::vector<std::string>& logs, bool names, LearnedHistory& learned, CertificateFile& file)
+      : config_(file.config),
+        authenticator_(config_.bus, KeyOf(config_.bus)),
+        obstacles_(config_),
+        learned_(learned),
+        certificates_(file.certificates),
+        passed_over_(file.passed_over) {
     const LogDamage damage = ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
       log_ = names ? std::filesystem::path(log).filename().string() + " " : "";
       Take(event);
@@ -236,17 +241,23 @@ class LogReading {
       if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
         certificates_.push_back(
             {"plan with digest " + ToHex(digest), {}, "decided as certified, but the log has no certified plan", {}});
+    file.not_certificates += static_cast<std::size_t>(
+        std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
+    Add(authenticator_.refusals(), passed_over_.not_authentic);
   }
 
-  [[nodiscard]] std::size_t abstentions() const {
-    return static_cast<std::size_t>(
-        std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
-  }
   [[nodiscard]] const std::map<Digest, std::int16_t>& outcomes() const { return outcomes_; }
   [[nodiscard]] const std::set<Digest>& plans() const { return plans_; }
 
  private:
+  static void Add(const Refusals& more, Refusals& sum) {
+    sum.unsigned_ones += more.unsigned_ones;
+    sum.forged += more.forged;
+    sum.replayed += more.replayed;
+  }
+
   void Take(const LogEvent& event) {
+    if (!authenticator_.IsAuthentic(event)) return;
     if (event.channel == config_.bus.obstacles) {
       obstacles_.Update(event);
     } else if (event.channel == config_.bus.transition) {
@@ -285,11 +296,15 @@ class LogReading {
   }
 
   void TakeCertified(const LogEvent& event) {
-    RecordedCertificate certificate;
     const auto certified = Decoded<certified_plan_t>(event.message());
+    if (!certified) {
+      ++passed_over_.undecodable;
+      return;
+    }
+    RecordedCertificate certificate;
     certificate.name = log_ + "event " + std::to_string(event.number);
-    if (!certified || !HasSizes(certified->plan)) {
-      certificate.missing = "not a certified_plan_t of this task's sizes";
+    if (!HasSizes(certified->plan)) {
+      certificate.missing = "not of this task's sizes";
       certificates_.push_back(std::move(certificate));
       return;
     }
@@ -330,10 +345,12 @@ class LogReading {
   }
 
   const Config& config_;
+  LogAuthenticator authenticator_;
   ObstacleHistory obstacles_;
   LearnedHistory& learned_;
   Restarts restarts_;
   std::vector<RecordedCertificate>& certificates_;
+  PassedOver& passed_over_;
   std::string log_;
   std::map<Digest, std::size_t> in_force_;  // when a candidate was sent
   std::map<Digest, std::int16_t> outcomes_;
@@ -345,7 +362,7 @@ CertificateFile FromLogs(const std::vector<std::string>& logs, Config config) {
   CertificateFile file;
   file.config = std::move(config);
   LearnedHistory learned(file.config);
-  file.not_certificates = LogReading(logs, logs.size() > 1, file.config, learned, file.certificates).abstentions();
+  const LogReading reading(logs, logs.size() > 1, learned, file);
   file.config.problem = learned.WithAll();
   return file;
 }
@@ -407,8 +424,7 @@ CertificateFile FromDatabase(const std::string& path, Config config) {
       }
     }
     if (logs.empty()) continue;
-    const LogReading reading(logs, true, file.config, learned, file.certificates);
-    file.not_certificates += reading.abstentions();
+    const LogReading reading(logs, true, learned, file);
     CheckRows(rows, reading, learned, file.config, file.certificates);
   }
   file.config.problem = learned.WithAll();
@@ -425,19 +441,21 @@ std::string FirstBytes(const std::string& path) {
   return bytes;
 }
 
-Config TaskGiven(const std::string& path, const std::string& config_path) {
+Config TaskGiven(const std::string& path, const std::string& config_path, const LogKey& key) {
   if (config_path.empty()) throw ConfigError(path + ": name its task with --config FILE");
-  return LoadConfig(config_path);
+  Config config = LoadConfig(config_path);
+  key.Override(config.bus);
+  return config;
 }
 
 }  // namespace
 
-CertificateFile ReadCertificates(const std::string& path, const std::string& config_path) {
+CertificateFile ReadCertificates(const std::string& path, const std::string& config_path, const LogKey& key) {
   const std::string first = FirstBytes(path);
   try {
     if (first.rfind(std::string("SQLite format 3\0", 16), 0) == 0)
-      return FromDatabase(path, TaskGiven(path, config_path));
-    if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLogs({path}, TaskGiven(path, config_path));
+      return FromDatabase(path, TaskGiven(path, config_path, key));
+    if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLogs({path}, TaskGiven(path, config_path, key));
     if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{') {
       std::ifstream stream = OpenForReading(path);
       return FromDecision(path, ParseJson<Json>(stream), config_path);
@@ -450,8 +468,8 @@ CertificateFile ReadCertificates(const std::string& path, const std::string& con
   throw ConfigError(path + ": neither a decision (JSON), nor an event log, nor a decision database");
 }
 
-CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path) {
-  return FromLogs(logs, TaskGiven(logs.front(), config_path));
+CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path, const LogKey& key) {
+  return FromLogs(logs, TaskGiven(logs.front(), config_path, key));
 }
 
 }  // namespace forereach

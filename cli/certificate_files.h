@@ -7,6 +7,7 @@ all that the verifier needs. Digests are held against the inputs here; the mathe
 #include <vector>
 
 #include "certifier/task/config.h"
+#include "cli/log_trust.h"
 #include "verifier/verifier.h"
 
 namespace forereach {
@@ -27,14 +28,17 @@ struct CertificateFile {
   Config config;
   std::vector<RecordedCertificate> certificates;
   std::size_t not_certificates = 0;  ///< Abstentions and rejections: nothing to verify.
+  PassedOver passed_over;            ///< In logs.
 };
 
 /** Reads any of the three; which one it is, is told from its first bytes.
-@param config_path the task; may be empty for a decision, which names its own.
-@throws BadInput if the file is none of the three, cannot be read, or needs a task file and has none. */
-[[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path);
+@param config_path the task; may be empty for a decision, which names its own. @param key for logs, of which only authentic
+messages count where there is one.
+@throws BadInput if the file is none of the three, it or the key cannot be read, or it needs a task file and has none. */
+[[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path, const LogKey& key = {});
 
 /** Of event logs that follow one another, as the files of one run do. @throws BadInput likewise. */
-[[nodiscard]] CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path);
+[[nodiscard]] CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path,
+                                       const LogKey& key = {});
 
 }  // namespace forereach

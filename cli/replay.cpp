@@ -13,6 +13,7 @@
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "logger/event_log.h"
+#include "logger/log_authenticator.h"
 
 namespace forereach {
 namespace {
@@ -51,10 +52,11 @@ bool IsCircumstance(std::int16_t cause) {
 
 class Replayer {
  public:
-  explicit Replayer(const Config& config) : config_(config) { Restart(); }
+  explicit Replayer(const Config& config) : config_(config), authenticator_(config.bus, KeyOf(config.bus)) { Restart(); }
 
   // `log` names the file where there are several.
   void Feed(const LogEvent& event, const std::string& log) {
+    if (!authenticator_.IsAuthentic(event)) return;
     const std::string name = log + "event " + std::to_string(event.number);
     if (event.channel == config_.bus.obstacles || event.channel == config_.bus.transition) {
       changes_.push_back({event.channel, {event.message().begin(), event.message().end()}, event.utime});
@@ -72,6 +74,7 @@ class Replayer {
 
   ReplayResult Finish(std::int64_t corruptions) {
     result_.corruptions = corruptions;
+    result_.passed_over.not_authentic = authenticator_.refusals();
     for (const auto& [digest, waiting] : candidates_)
       for (const Candidate& candidate : waiting) Differ(candidate.name, -1, "no decision recorded");
     return std::move(result_);
@@ -146,7 +149,10 @@ class Replayer {
 
   void CheckSeal(const LogEvent& event, const std::string& name) {
     const auto certified = Decoded<certified_plan_t>(event.message());
-    if (!certified) return Differ(name, -1, "not a certified_plan_t");
+    if (!certified) {
+      ++result_.passed_over.undecodable;
+      return;
+    }
     for (const SealFault& fault : FindSealFaults(*certified))
       Differ(name, certified->plan.plan_id,
              "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
@@ -157,6 +163,7 @@ class Replayer {
   }
 
   const Config& config_;
+  LogAuthenticator authenticator_;
   std::unique_ptr<Gate> gate_;
   std::map<Digest, std::deque<Candidate>> candidates_;  // not decided yet
   std::deque<Change> changes_;                          // logged, and perhaps not yet seen by the certifier

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "certifier/task/config.h"
+#include "cli/log_trust.h"
 
 namespace forereach {
 
@@ -15,6 +16,7 @@ struct ReplayResult {
   /** Recorded as displaced, out of time, not armed, in fault: a matter of the moment and not of the plan, not compared. */
   std::int64_t circumstances = 0;
   std::int64_t corruptions = 0;     ///< Damaged places in the log.
+  PassedOver passed_over;
   /** One line for each decision that differs, each candidate without a recorded decision, each recorded decision
   without a candidate, and each way in which the seal of a certified plan does not hold. */
   std::vector<std::string> differences;
@@ -23,7 +25,8 @@ struct ReplayResult {
 /** Feeds the candidates of logs that follow one another to a new gate, each at the time of its recorded decision and with the
 obstacles and executed transitions that the decision names by their digests, and compares what it says; certified plans have
 to be sealed (lcmtypes/seal.h). A certifier that was started again, or reloaded, within the logs begins with a new gate here
-too. @throws LogError if a log cannot be read, std::invalid_argument as Certifier does. */
+too. With bus.key only authentic messages count. @throws LogError if a log cannot be read, KeyError, std::invalid_argument as
+Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& config);
 
 }  // namespace forereach

@@ -12,17 +12,20 @@ namespace {
 struct Options {
   std::vector<std::string> logs;
   std::string config;
+  LogKey key;
   bool json = false;
 };
 
 int RunReplay(const Options& options) {
-  const Config config = LoadConfig(options.config);
+  Config config = LoadConfig(options.config);
+  options.key.Override(config.bus);
   const ReplayResult result = Replay(options.logs, config);
   if (options.json) {
     std::cout << JsonText({{"candidates", result.candidates},
                            {"agreed", result.agreed},
                            {"circumstances", result.circumstances},
                            {"corruptions", result.corruptions},
+                           {"passed_over", ToJson(result.passed_over)},
                            {"differences", result.differences}})
               << std::endl;
   } else {
@@ -32,7 +35,7 @@ int RunReplay(const Options& options) {
     if (result.circumstances > 0)
       std::cout << ", " << result.circumstances << " were refused for what no replay gives again (queue, time, not armed, fault)";
     if (result.corruptions > 0) std::cout << "; the log is damaged in " << result.corruptions << " places";
-    std::cout << std::endl;
+    std::cout << InWords(result.passed_over) << std::endl;
   }
   return result.differences.empty() && result.corruptions == 0 && result.candidates > 0 ? 0 : 1;
 }
@@ -45,6 +48,7 @@ void AddReplayCommand(CLI::App& app, Action& action) {
       "replay", "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1");
   command->add_option("logs", options->logs, kLogs)->required()->type_name("LOG");
   command->add_option("--config", options->config, "The task file it was recorded with")->required()->type_name("FILE");
+  options->key.AddTo(*command);
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->footer("Example:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog --config config/demo.yaml");
   command->callback([options, &action] { action = [options] { return RunReplay(*options); }; });

@@ -21,6 +21,7 @@ using verifier::Verdict;
 struct Options {
   std::vector<std::string> files;
   std::string config;
+  LogKey key;
   bool json = false;
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
@@ -105,6 +106,7 @@ void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts
                          {"refuted", summary.refuted},
                          {"cannot_verify", summary.cannot_verify},
                          {"not_certificates", file.not_certificates},
+                         {"passed_over", ToJson(file.passed_over)},
                          {"failures", failures}})
             << std::endl;
 }
@@ -119,12 +121,12 @@ void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& ver
             << summary.refuted << " refuted, " << summary.cannot_verify << " cannot be verified";
   if (file.not_certificates > 0)
     std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
-  std::cout << std::endl;
+  std::cout << InWords(file.passed_over) << std::endl;
 }
 
 int Verify(const Options& options) {
-  const CertificateFile file = options.files.size() == 1 ? ReadCertificates(options.files[0], options.config)
-                                                         : ReadLogs(options.files, options.config);
+  const CertificateFile file = options.files.size() == 1 ? ReadCertificates(options.files[0], options.config, options.key)
+                                                         : ReadLogs(options.files, options.config, options.key);
   RequireAcceptable(file.config);
   const std::vector<Verdict> verdicts = VerifyAll(file, options.jobs);
   const Summary summary = Count(verdicts);
@@ -153,6 +155,7 @@ void AddVerifyCommand(CLI::App& app, Action& action) {
       ->type_name("DECISION|LOG|DATABASE");
   command->add_option("--config", options->config, "The task file they were made with; a decision names its own")
       ->type_name("FILE");
+  options->key.AddTo(*command);
   command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->footer(

@@ -16,7 +16,7 @@
 namespace forereach {
 namespace {
 
-// By which a sender's clock may be ahead, or a message have been under way.
+// By which a sender's clock may be ahead.
 constexpr std::int64_t kApartUs = 1'000'000;
 
 template <class Message>
@@ -71,10 +71,7 @@ EventRow MakeRow(const execution_event_t& event, LogReference reference) {
 }  // namespace
 
 Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optional<Key256> key)
-    : channels_(std::move(channels)),
-      signed_channels_(channels_.signed_channels()),
-      log_file_(std::move(log_file)),
-      key_(key) {}
+    : channels_(std::move(channels)), log_file_(std::move(log_file)), authenticator_(channels_, key) {}
 
 std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
   const Stream plain{channel, ""};
@@ -95,7 +92,7 @@ std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::stri
 }
 
 void Interpreter::Observe(const LogEvent& event, Rows& rows) {
-  if (!IsAuthentic(event)) return;
+  if (!authenticator_.IsAuthentic(event)) return;
   const auto reference = [&] { return LogReference{log_file_, event.number, ToHex(DigestOf(event))}; };
   if (std::optional<GapRow> gap = CheckSequence(event)) {
     gap->event = reference();
@@ -119,12 +116,6 @@ void Interpreter::Observe(const LogEvent& event, Rows& rows) {
 void Interpreter::Forgive(const Stream& stream, std::int64_t lost) {
   const auto found = streams_.find(stream);
   if (found != streams_.end()) found->second.forgiven += lost;
-}
-
-bool Interpreter::IsAuthentic(const LogEvent& event) {
-  if (!key_ || !signed_channels_.contains(event.channel)) return true;
-  if (!authenticator_) authenticator_.emplace(*key_, std::max<std::int64_t>(event.utime, 0) - kApartUs);
-  return authenticator_->Check(event.channel, event.data).first == Authenticity::kAuthentic;
 }
 
 // 0 is a new beginning whatever its stamp, for the sender's clock may have been set back; but not the last 0 once more.

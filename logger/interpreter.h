@@ -5,8 +5,7 @@ Sequence numbers. A message ahead of its stream's count makes a gap "bus". One b
 none, unless its sender has begun anew: then its stamp is later than all of the stream, or its sequence is 0. A late
 message that a gap has counted as lost stays counted.
 
-With a key, messages on the signed channels that are not authentic make no rows and do not count: neither unsigned and
-forged ones, nor those that came before or were signed long before the first that this interpreter saw. */
+With a key, messages that are not authentic (log_authenticator.h) make no rows and do not count. */
 #pragma once
 
 #include <compare>
@@ -14,7 +13,6 @@ forged ones, nor those that came before or were signed long before the first tha
 #include <deque>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -22,6 +20,7 @@ forged ones, nor those that came before or were signed long before the first tha
 #include "lcmtypes/authentic.h"
 #include "lcmtypes/codec.h"
 #include "logger/event_log.h"
+#include "logger/log_authenticator.h"
 #include "logger/rows.h"
 
 namespace forereach {
@@ -40,7 +39,7 @@ struct Position {
 
 class Interpreter final {
  public:
-  /** @param key that `channels.signed_channels()` are signed with; nothing: every message is taken for authentic. */
+  /** @param key as LogAuthenticator's. */
   Interpreter(BusOptions channels, std::string log_file, std::optional<Key256> key = {});
 
   /** The stream of a message, and its place in it if it is one of a type that counts them. */
@@ -56,7 +55,7 @@ class Interpreter final {
   void Forgive(const Stream& stream, std::int64_t lost);
 
   /** Messages that were not authentic. */
-  [[nodiscard]] Refusals refusals() const { return authenticator_ ? authenticator_->refusals() : Refusals{}; }
+  [[nodiscard]] Refusals refusals() const { return authenticator_.refusals(); }
 
  private:
   static constexpr std::size_t kMaxStreams = 1024;     // a sender that invents sources must not fill the memory
@@ -71,15 +70,12 @@ class Interpreter final {
     [[nodiscard]] bool IsLateOrRepeated(const Position& behind) const;
   };
 
-  [[nodiscard]] bool IsAuthentic(const LogEvent& event);
   [[nodiscard]] std::optional<GapRow> CheckSequence(const LogEvent& event);  // without its event
   [[nodiscard]] double LatencyUs(const Digest& plan, std::int64_t utime);
 
   BusOptions channels_;
-  std::set<std::string> signed_channels_;
   std::string log_file_;
-  std::optional<Key256> key_;
-  std::optional<Authenticator> authenticator_;  // from the first message on a signed channel on
+  LogAuthenticator authenticator_;
   std::map<Stream, Count> streams_;
   std::deque<std::pair<Digest, std::int64_t>> candidates_;  // received and not yet decided
 };

@@ -7,19 +7,12 @@
 #include <fmt/format.h>
 
 #include "forereach/logger_status_t.hpp"
+#include "logger/log_authenticator.h"
 
 namespace forereach {
 namespace {
 
 constexpr std::size_t kMaxStreamsInOverflow = 256;
-
-// Empty if every message was authentic.
-std::string InWords(const Refusals& refusals) {
-  const auto& [unsigned_ones, forged, replayed] = refusals;
-  const std::int64_t all = unsigned_ones + forged + replayed;
-  if (all == 0) return "";
-  return fmt::format("{} (unsigned {}, forged {}, replayed {})", all, unsigned_ones, forged, replayed);
-}
 
 }  // namespace
 

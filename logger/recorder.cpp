@@ -75,7 +75,7 @@ std::int64_t BytesOf(double megabytes) { return static_cast<std::int64_t>(megaby
 Recorder::Recorder(const Config& config, FreeSpace free_space)
     : channels_(config.bus),
       options_(config.logger),
-      key_(channels_.key.empty() ? std::nullopt : std::optional(LoadKey(channels_.key))),
+      key_(KeyOf(channels_)),
       free_space_(std::move(free_space)),
       directory_(options_.directory),
       database_(directory_.PathOf(LogDirectory::kDatabase)),

@@ -100,6 +100,8 @@ TEST(BadInput, ExitsWithTwoAndOneLine) {
         "certify --config config/bicycle.yaml --plan none.csv",
         "certify --config config/bicycle.yaml --plan config/plans/point_mass_certified.csv",
         "plan --config config/bicycle.yaml --out /tmp/not_written.csv",
+        "replay tests/data/course.lcmlog --config tests/data/course.yaml --key none",
+        "verify tests/data/course.lcmlog --config tests/data/course.yaml --key none",
         "replay none.lcmlog --config config/bicycle.yaml", "report none.lcmlog --config config/bicycle.yaml"}) {
     const Output output = Forereach(std::string(arguments) + " 2>&1 >/dev/null");
     EXPECT_EQ(output.code, 2) << arguments;

@@ -14,6 +14,8 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "logger/event_log.h"
+#include "tests/cli/program.h"
+#include "tests/cli/signed_log.h"
 #include "tests/gate/small_task.h"
 #include "tests/scratch.h"
 
@@ -206,6 +208,49 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
     EXPECT_TRUE(writer.Flush());
   }
   ExpectAgreed(path, config, 2);
+}
+
+TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
+  const ScratchDirectory scratch;
+  const auto [key, log] = SignedLog(scratch, kLog);
+  Config config = LoadConfig(kConfig);
+  const ReplayResult before = Replay({kLog}, config), believed = Replay({log}, config);
+  EXPECT_EQ(believed.differences.size(), 4u) << "three candidates without a decision, and a certificate that was altered";
+  EXPECT_EQ(InWords(believed.passed_over), "");
+  config.bus.key = key;
+  const ReplayResult result = Replay({log}, config);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_EQ(result.agreed, before.agreed);
+  EXPECT_EQ(result.candidates, before.candidates);
+  EXPECT_EQ(result.passed_over.not_authentic.unsigned_ones, kUnsigned);
+  EXPECT_EQ(result.passed_over.not_authentic.forged, kForged);
+  EXPECT_EQ(result.passed_over.not_authentic.replayed, kRepeated);
+  EXPECT_EQ(InWords(result.passed_over), "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
+  config.bus.key = scratch / "none";
+  EXPECT_THROW((void)Replay({log}, config), KeyError);
+}
+
+TEST_F(ReplayTest, ThroughTheCommandWithAKeyAndWithout) {
+  const ScratchDirectory scratch;
+  const auto [key, log] = SignedLog(scratch, kLog);
+  const std::string replay = "replay " + log + " --config " + kConfig;
+  const Output judged = Forereach(replay + " --key " + key), believed = Forereach(replay + " --no-key");
+  EXPECT_EQ(judged.code, 0) << judged.text;
+  EXPECT_THAT(judged.text, HasSubstr("passed over: 5 (unsigned 2, forged 1, replayed 2)"));
+  EXPECT_EQ(believed.code, 1) << believed.text;
+}
+
+TEST_F(ReplayTest, WhatIsNoCertifiedPlanIsPassedOver) {
+  bool done = false;
+  const std::string path = Edited([&](LogEvent& event) {
+    if (event.channel != "PLAN_CERTIFIED" || done) return true;
+    done = true;
+    event.data = {1, 2, 3};
+    return true;
+  });
+  const ReplayResult result = Replay({path}, LoadConfig(kConfig));
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_EQ(InWords(result.passed_over), "; no certified plan and passed over: 1");
 }
 
 TEST_F(ReplayTest, AnotherTaskIsNoticed) {

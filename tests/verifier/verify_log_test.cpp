@@ -14,6 +14,7 @@
 #include "forereach/certified_plan_t.hpp"
 #include "lcmtypes/seal.h"
 #include "tests/cli/program.h"
+#include "tests/cli/signed_log.h"
 #include "tests/logger/logs.h"
 
 namespace forereach {
@@ -24,6 +25,7 @@ using testing::HasSubstr;
 using verifier::Status;
 using verifier::Verdict;
 
+constexpr std::int64_t kStart = 1'700'000'000'000'000;
 const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
 const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 
@@ -147,6 +149,36 @@ TEST(VerifyLog, MissingCertifiedPlanIsNoticed) {
   EXPECT_THAT(file.certificates.back().missing, HasSubstr("no certified plan"));
 }
 
+TEST(VerifyLog, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
+  ScratchDirectory scratch;
+  const auto [key, log] = SignedLog(scratch, kLog);
+  const auto is_whole = [](const RecordedCertificate& c) { return c.missing.empty() && c.mismatches.empty(); };
+  EXPECT_FALSE(std::ranges::all_of(ReadCertificates(log, kConfig).certificates, is_whole)) << "all are believed";
+  const auto whole = ReadCertificates(kLog, kConfig), file = ReadCertificates(log, kConfig, {key});
+  EXPECT_EQ(file.certificates.size(), whole.certificates.size());
+  EXPECT_TRUE(std::ranges::all_of(file.certificates, is_whole));
+  EXPECT_EQ(file.not_certificates, whole.not_certificates);
+  EXPECT_EQ(InWords(file.passed_over), "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
+  EXPECT_EQ(ReadLogs({log}, kConfig, {key}).passed_over.not_authentic.replayed, kRepeated);
+  EXPECT_THROW((void)ReadCertificates(log, kConfig, {scratch / "none"}), KeyError);
+  const Output output = Forereach("verify --json " + log + " --config " + kConfig + " --key " + key);
+  EXPECT_EQ(output.code, 0);
+  EXPECT_EQ(nlohmann::json::parse(output.text)["passed_over"]["not_authentic"]["forged"], kForged);
+}
+
+TEST(VerifyLog, WhatIsNoCertifiedPlanIsPassedOver) {
+  ScratchDirectory scratch;
+  const auto path = Edited(scratch, [](LogEvent&) { return true; });
+  {
+    EventLogWriter writer(path);
+    writer.Append(kStart, "PLAN_CERTIFIED", std::vector<std::uint8_t>{1, 2, 3});
+    ASSERT_TRUE(writer.Flush());
+  }
+  const auto file = ReadCertificates(path, kConfig);
+  EXPECT_EQ(file.certificates.size(), ReadCertificates(kLog, kConfig).certificates.size());
+  EXPECT_EQ(file.passed_over.undecodable, 1);
+}
+
 TEST(VerifyLog, DamageIsNoticed) {
   ScratchDirectory scratch;
   std::filesystem::copy(kLog, scratch / "damaged.lcmlog");
@@ -160,8 +192,6 @@ TEST(VerifyLog, DamageIsNoticed) {
 }
 
 // ---- Obstacles that come by the bus.
-
-constexpr std::int64_t kStart = 1'700'000'000'000'000;
 
 class VerifyObstacles : public testing::Test {
  protected:

@@ -1,0 +1,35 @@
+#include "cli/log_trust.h"
+
+#include <CLI/CLI.hpp>
+
+#include "logger/log_authenticator.h"
+
+namespace forereach {
+
+void LogKey::AddTo(CLI::App& command) {
+  CLI::Option* option =
+      command.add_option("--key", file, "Key file that the messages were signed with, which are passed over where they are not authentic; by "
+                                 "default the task file's bus.key")
+          ->type_name("FILE");
+  command.add_flag("--no-key", none, "Believe every message in a log, whoever sent it")->excludes(option);
+}
+
+void LogKey::Override(BusOptions& options) const {
+  if (none || !file.empty()) options.key = file;
+}
+
+std::string InWords(const PassedOver& passed_over) {
+  const std::string refused = InWords(passed_over.not_authentic);
+  std::string text;
+  if (!refused.empty()) text += "; not authentic and passed over: " + refused;
+  if (passed_over.undecodable > 0) text += "; no certified plan and passed over: " + std::to_string(passed_over.undecodable);
+  return text;
+}
+
+nlohmann::json ToJson(const PassedOver& passed_over) {
+  const auto& [unsigned_ones, forged, replayed] = passed_over.not_authentic;
+  return {{"not_authentic", {{"unsigned", unsigned_ones}, {"forged", forged}, {"replayed", replayed}}},
+          {"undecodable", passed_over.undecodable}};
+}
+
+}  // namespace forereach

@@ -1,0 +1,37 @@
+/** Which messages of a log a command believes: the key to judge them by, and those that it passed over. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/config.h"
+#include "lcmtypes/authentic.h"
+
+namespace CLI {
+class App;
+}
+
+namespace forereach {
+
+/** The command line's say in the key: by default that of the task file's bus.key. */
+struct LogKey {
+  std::string file;
+  bool none = false;  ///< Everything is believed, whoever sent it.
+
+  void AddTo(CLI::App& command);
+  void Override(BusOptions& options) const;
+};
+
+/** What nobody who was meant to hear it believed either. */
+struct PassedOver {
+  Refusals not_authentic;        ///< Where there is a key (logger/log_authenticator.h).
+  std::int64_t undecodable = 0;  ///< On the channel of certified plans, and none.
+};
+
+/** As the end of a sentence, empty if nothing was. */
+[[nodiscard]] std::string InWords(const PassedOver& passed_over);
+[[nodiscard]] nlohmann::json ToJson(const PassedOver& passed_over);
+
+}  // namespace forereach

@@ -1,0 +1,40 @@
+/** Which messages of a log are authentic. The log holds every message as it was heard; who reads it with the key believes
+what the robot's processes believed, and passes over the rest. */
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+
+#include "certifier/task/config.h"
+#include "lcmtypes/authentic.h"
+#include "logger/event_log.h"
+
+namespace forereach {
+
+class LogAuthenticator final {
+ public:
+  /** @param key that `channels.signed_channels()` are signed with; nothing: every message is taken for authentic. */
+  LogAuthenticator(const BusOptions& channels, std::optional<Key256> key)
+      : signed_channels_(channels.signed_channels()), key_(key) {}
+
+  /** Of the next event in the order of the log. On a signed channel neither unsigned and forged messages are authentic, nor
+  those that came before or were signed more than a second before the first that was heard here. */
+  [[nodiscard]] bool IsAuthentic(const LogEvent& event);
+
+  /** Messages that were not. */
+  [[nodiscard]] Refusals refusals() const { return authenticator_ ? authenticator_->refusals() : Refusals{}; }
+
+ private:
+  std::set<std::string> signed_channels_;
+  std::optional<Key256> key_;
+  std::optional<Authenticator> authenticator_;  // from the first message on a signed channel on
+};
+
+/** The key that bus.key names; nothing if it names none. @throws KeyError if it cannot be read. */
+[[nodiscard]] std::optional<Key256> KeyOf(const BusOptions& options);
+
+/** "3 (unsigned 1, forged 1, replayed 1)"; empty if there are none. */
+[[nodiscard]] std::string InWords(const Refusals& refusals);
+
+}  // namespace forereach
