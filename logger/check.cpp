@@ -56,6 +56,7 @@ std::string InWords(const LogCheck& check) {
   if (check.log == LogCheck::Log::kDeleted)
     return fmt::format("deleted for the quota, {} events of rows went with it", check.missing.size());
   if (check.log == LogCheck::Log::kMissing) return fmt::format("missing, {} rows have no event", check.missing.size());
+  if (check.log == LogCheck::Log::kUnknown) return "no run is its, the next start of the logger takes it";
   std::string text = fmt::format("{} events of rows whole", check.whole);
   const auto add = [&text](std::int64_t count, const char* what) {
     if (count > 0) text += fmt::format(", {} {}", count, what);
@@ -89,6 +90,13 @@ std::vector<LogCheck> CheckLogs(const std::string& path) {
   Database database(file);
   std::vector<LogCheck> checks;
   for (const RunRow& run : database.Runs()) checks.push_back(Check(database, directory, run));
+  for (const std::string& log : directory.Logs()) {
+    if (std::ranges::find(checks, log, &LogCheck::log_file) != checks.end()) continue;
+    LogCheck& check = checks.emplace_back();
+    check.log_file = log;
+    check.log = LogCheck::Log::kUnknown;
+    check.ended = false;
+  }
   return checks;
 }
 
@@ -110,6 +118,7 @@ nlohmann::json ToJson(const std::vector<LogCheck>& checks) {
     list.push_back({{"log", check.log_file},
                     {"state", check.log == LogCheck::Log::kThere     ? "there"
                               : check.log == LogCheck::Log::kDeleted ? "deleted"
+                              : check.log == LogCheck::Log::kUnknown ? "unknown"
                                                                      : "missing"},
                     {"ended", check.ended},
                     {"as_recorded", check.whole_log()},

@@ -14,7 +14,8 @@ namespace forereach {
 /** What became of the events of one log file that rows of the database come from. */
 struct LogCheck {
   std::string log_file;
-  enum class Log { kThere, kMissing, kDeleted } log = Log::kThere;  ///< kDeleted: for the quota, which is no fault.
+  /** kDeleted: for the quota, which is no fault. kUnknown: no run of the database is its. */
+  enum class Log { kThere, kMissing, kDeleted, kUnknown } log = Log::kThere;
   bool ended = true;
   std::int64_t whole = 0;                          ///< The log has the event, and its digest is the row's.
   std::int64_t unchecked = 0;                      ///< The log has it, but the row is older than digests.
@@ -27,7 +28,8 @@ struct LogCheck {
   [[nodiscard]] bool whole_log() const;
 };
 
-/** Checks every log that the database in `directory` knows, in the order of the runs. Cost: one pass over each log.
+/** Checks every log that the database in `directory` knows, in the order of the runs, and lists behind them those that
+are named like a logger's and that it does not know. Cost: one pass over each log it knows.
 A log that is being written may end in a cut tail, which is no fault of it.
 @throws BadInput if there is no database, it cannot be read, or a log cannot be. */
 [[nodiscard]] std::vector<LogCheck> CheckLogs(const std::string& directory);

@@ -70,6 +70,16 @@ TEST_F(CheckTest, ACutTailAndDamageAreSaid) {
   EXPECT_EQ(ToJson({check})[0]["missing"], (std::vector<int>{1, 4}));
 }
 
+TEST_F(CheckTest, ALogThatNoRunKnowsIsListed) {
+  std::filesystem::copy(log_, scratch_ / "events-20260101-120000-000000.lcmlog");
+  const std::vector<LogCheck> checks = CheckLogs(scratch_.path());
+  ASSERT_EQ(checks.size(), 2u);
+  EXPECT_EQ(checks[1].log, LogCheck::Log::kUnknown);
+  EXPECT_FALSE(checks[1].whole_log());
+  EXPECT_THAT(ToText(checks), HasSubstr("2 logs, 1 not as recorded"));
+  EXPECT_EQ(ToJson(checks)[1]["state"], "unknown");
+}
+
 TEST_F(CheckTest, AMissingLogIsAFaultADeletedOneIsNot) {
   std::filesystem::remove(log_);
   EXPECT_EQ(Check().log, LogCheck::Log::kMissing);
