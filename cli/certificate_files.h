@@ -32,10 +32,11 @@ struct CertificateFile {
 };
 
 /** Reads any of the three; which one it is, is told from its first bytes.
-@param config_path the task; may be empty for a decision, which names its own. @param key for logs, of which only authentic
-messages count where there is one.
-@throws BadInput if the file is none of the three, it or the key cannot be read, or it needs a task file and has none. */
-[[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path, const LogKey& key = {});
+@param config_path the task; may be empty for a decision, which names its own.
+@param key for logs, of which only authentic messages count where there is one.
+@throws BadInput if the file is none of the three, needs a task file and has none, or if it or the key cannot be read. */
+[[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path,
+                                               const LogKey& key = {});
 
 /** Of event logs that follow one another, as the files of one run do. @throws BadInput likewise. */
 [[nodiscard]] CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path,

@@ -7,11 +7,10 @@
 namespace forereach {
 
 void LogKey::AddTo(CLI::App& command) {
-  CLI::Option* option =
-      command.add_option("--key", file, "Key file that the messages were signed with, which are passed over where they are not authentic; by "
-                                 "default the task file's bus.key")
-          ->type_name("FILE");
-  command.add_flag("--no-key", none, "Believe every message in a log, whoever sent it")->excludes(option);
+  CLI::Option* option = command.add_option(
+      "--key", file, "Key file: messages of a log that it did not sign are passed over; by default the task file's bus.key");
+  option->type_name("FILE");
+  command.add_flag("--no-key", none, "Believe every message of a log, whoever sent it")->excludes(option);
 }
 
 void LogKey::Override(BusOptions& options) const {
@@ -22,7 +21,8 @@ std::string InWords(const PassedOver& passed_over) {
   const std::string refused = InWords(passed_over.not_authentic);
   std::string text;
   if (!refused.empty()) text += "; not authentic and passed over: " + refused;
-  if (passed_over.undecodable > 0) text += "; no certified plan and passed over: " + std::to_string(passed_over.undecodable);
+  if (passed_over.undecodable > 0)
+    text += "; no certified plan and passed over: " + std::to_string(passed_over.undecodable);
   return text;
 }
 

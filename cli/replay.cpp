@@ -52,7 +52,9 @@ bool IsCircumstance(std::int16_t cause) {
 
 class Replayer {
  public:
-  explicit Replayer(const Config& config) : config_(config), authenticator_(config.bus, KeyOf(config.bus)) { Restart(); }
+  explicit Replayer(const Config& config) : config_(config), authenticator_(config.bus, KeyOf(config.bus)) {
+    Restart();
+  }
 
   // `log` names the file where there are several.
   void Feed(const LogEvent& event, const std::string& log) {

@@ -25,8 +25,8 @@ struct ReplayResult {
 /** Feeds the candidates of logs that follow one another to a new gate, each at the time of its recorded decision and with the
 obstacles and executed transitions that the decision names by their digests, and compares what it says; certified plans have
 to be sealed (lcmtypes/seal.h). A certifier that was started again, or reloaded, within the logs begins with a new gate here
-too. With bus.key only authentic messages count. @throws LogError if a log cannot be read, KeyError, std::invalid_argument as
-Certifier does. */
+too. With bus.key only authentic messages count.
+@throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& config);
 
 }  // namespace forereach

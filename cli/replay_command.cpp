@@ -50,7 +50,8 @@ void AddReplayCommand(CLI::App& app, Action& action) {
   command->add_option("--config", options->config, "The task file it was recorded with")->required()->type_name("FILE");
   options->key.AddTo(*command);
   command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->footer("Example:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog --config config/demo.yaml");
+  command->footer(
+      "Example:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog --config config/demo.yaml");
   command->callback([options, &action] { action = [options] { return RunReplay(*options); }; });
 }
 

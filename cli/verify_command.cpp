@@ -125,8 +125,9 @@ void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& ver
 }
 
 int Verify(const Options& options) {
-  const CertificateFile file = options.files.size() == 1 ? ReadCertificates(options.files[0], options.config, options.key)
-                                                         : ReadLogs(options.files, options.config, options.key);
+  const CertificateFile file = options.files.size() == 1
+                                   ? ReadCertificates(options.files[0], options.config, options.key)
+                                   : ReadLogs(options.files, options.config, options.key);
   RequireAcceptable(file.config);
   const std::vector<Verdict> verdicts = VerifyAll(file, options.jobs);
   const Summary summary = Count(verdicts);

@@ -1,9 +1,9 @@
 /** The decision database: SQLite, one file for all runs of a directory. Only its source file sees SQL.
 
 Tables: `decisions`, `execution_events`, `gaps` as in rows.h, and `runs`, one row for each log file. The journal is a
-write-ahead log: a transaction is there whole or not at all after a kill, and after a power cut too. What `runs` is told is
-on the disk when the call returns, with all that was written before. A cut may take the rows written since; the event log is
-always written first, so they are made again from it. */
+write-ahead log: a transaction is there whole or not at all after a kill, and after a power cut too. What `runs` is told
+is on the disk when the call returns, with all that was written before. A cut may take the rows written since; the event
+log is always written first, so they are made again from it. */
 #pragma once
 
 #include <cstdint>

@@ -113,8 +113,9 @@ struct LogRecovery {
 
 class EventLogWriter final {
  public:
-  /** Creates the file, and has the disk confirm that it is in its directory; or recovers an existing one: keeps all whole
-  records, removes a cut tail and nothing else, and continues the event numbers. Holds a lock on the file while it lives.
+  /** Creates the file and has the disk confirm that it is in its directory, or recovers an existing one: keeps all whole
+  records, removes a cut tail and nothing else, and continues the event numbers. Holds a lock on the file while it
+  lives.
   @throws LogError if the file cannot be opened or another writer holds it. */
   explicit EventLogWriter(const std::string& path);
   ~EventLogWriter();

@@ -1,5 +1,5 @@
-/** Which messages of a log are authentic. The log holds every message as it was heard; who reads it with the key believes
-what the robot's processes believed, and passes over the rest. */
+/** Which messages of a log are authentic. The log holds every message as it was heard; who reads it with the key
+believes what the robot's processes believed, and passes over the rest. */
 #pragma once
 
 #include <optional>
@@ -18,8 +18,8 @@ class LogAuthenticator final {
   LogAuthenticator(const BusOptions& channels, std::optional<Key256> key)
       : signed_channels_(channels.signed_channels()), key_(key) {}
 
-  /** Of the next event in the order of the log. On a signed channel neither unsigned and forged messages are authentic, nor
-  those that came before or were signed more than a second before the first that was heard here. */
+  /** Of the next event in the order of the log. On a signed channel neither unsigned and forged messages are authentic,
+  nor those that came before or were signed more than a second before the first that was heard here. */
   [[nodiscard]] bool IsAuthentic(const LogEvent& event);
 
   /** Messages that were not. */

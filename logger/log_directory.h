@@ -19,11 +19,11 @@ class LogDirectory final {
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::string PathOf(const std::string& file) const;
 
-  /** "events-20260101-120000-000000.lcmlog" of a time in UTC with its microseconds, put off to the first whose name no file
-  has and `taken` does not hold for. Names sort as their times do. */
+  /** "events-20260101-120000-000000.lcmlog" of a time in UTC with its microseconds, put off to the first whose name no
+  file has and `taken` does not hold for. Names sort as their times do. */
   [[nodiscard]] std::string FreeName(std::int64_t& time_us, const std::function<bool(const std::string&)>& taken) const;
 
-  /** The files whose names could be FreeName's, now or before microseconds were part of them, in the order of their names. */
+  /** The files with names of this kind, with microseconds or, as they were before, without; sorted. */
   [[nodiscard]] std::vector<std::string> Logs() const;
 
   /** Bytes of all .lcmlog files but `except`. Cost: one look at each file. */

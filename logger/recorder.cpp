@@ -100,7 +100,7 @@ void Recorder::AdoptLogs() {
     try {
       const EventLogWriter locked(directory_.PathOf(log));
       database_.BeginRun(log, locked.recovery().first_utime);
-    } catch (const LogError& error) {
+    } catch (const BadInput& error) {
       spdlog::warn("no run knows {}, and it is left alone: {}", log, error.what());
     }
   }
@@ -177,8 +177,9 @@ void Recorder::Begin(std::int64_t now_us) {
 void Recorder::Open(std::int64_t now_us, const std::string& continues) {
   const std::vector<RunRow> runs = database_.Runs();
   name_us_ = std::max(now_us, name_us_);  // the clock may have been set back, and names are read in their order
-  const std::string file = directory_.FreeName(
-      name_us_, [&](const std::string& name) { return std::ranges::find(runs, name, &RunRow::log_file) != runs.end(); });
+  const std::string file = directory_.FreeName(name_us_, [&](const std::string& name) {
+    return std::ranges::find(runs, name, &RunRow::log_file) != runs.end();
+  });
   auto log = std::make_unique<EventLogWriter>(directory_.PathOf(file));
   try {
     database_.BeginRun(file, now_us, continues);

@@ -1,19 +1,19 @@
 /** Brings messages to log files and the database, rotates the files, keeps within the disk. Knows no bus.
 
-**Loss window.** Take puts a message into the log's buffer. Every logger.flush_ms the buffer goes to the file (write, then
-fdatasync) and after it the rows of those events go to the database in one transaction. So the database never knows more
-than the log, and a recorder that is killed loses at most what came since the last flush; a machine that loses power the
-same, for a log's entry in its directory and its run are on the disk before its first event. When it begins, log files that
-were not ended are mended: a cut tail is removed and missing rows are made again. So are files that are named like a
-logger's and that no run knows, but none that another logger writes.
-Rows that the database refuses wait. Beyond kMaxWaitingRows those that come from an event are dropped: the next start
-makes them again. Gaps without an event, which no log holds, wait on, those of one stream and reason as one. What they
-count is not counted once more where the log is read again.
+**Loss window.** Take puts a message into the log's buffer. Every logger.flush_ms the buffer goes to the file (write,
+then fdatasync) and after it the rows of those events go to the database in one transaction. So the database never knows
+more than the log, and a recorder that is killed loses at most what came since the last flush; a machine that loses
+power the same, for a log's entry in its directory and its run are on the disk before its first event. When it begins,
+log files that were not ended are mended: a cut tail is removed and missing rows are made again. So are files that are
+named like a logger's and that no run knows, but none that another logger writes. Rows that the database refuses wait.
+Beyond kMaxWaitingRows those that come from an event are dropped: the next start makes them again. Gaps without an
+event, which no log holds, wait on, those of one stream and reason as one. What they count is not counted once more
+where the log is read again.
 
-**Files.** One row of the database's runs for each file. A file ends, and the next begins, before the event with which it
-would exceed logger.rotate_mb, after logger.rotate_minutes, and when it finds no room within logger.quota_mb; event numbers
-begin anew, sequence counts and waiting
-candidates go on. A file that the database has not all rows of is not ended before it has.
+**Files.** One row of the database's runs for each file. A file ends, and the next begins, before the event with which
+it would exceed logger.rotate_mb, after logger.rotate_minutes, and when it finds no room within logger.quota_mb; event
+numbers begin anew, sequence counts and waiting candidates go on. A file that the database has not all rows of is not
+ended before it has.
 
 **Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes is
 counted by channel, and the counts become gaps. With a flush that fails it is the same for the events of that flush. Gaps
@@ -64,7 +64,7 @@ class Recorder final {
   @throws LogError, DatabaseError if the directory cannot be written to, KeyError. */
   Recorder(const Config& config, FreeSpace free_space);
 
-  /** Opens the first log file, named after its time (log_directory.h); the rest is to be called after it. @throws as the constructor. */
+  /** Opens the first log file, named after its time; the rest is to be called after it. @throws as the constructor. */
   void Begin(std::int64_t now_us);
   [[nodiscard]] bool begun() const { return log_ != nullptr; }
 

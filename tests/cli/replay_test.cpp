@@ -215,7 +215,7 @@ TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   const auto [key, log] = SignedLog(scratch, kLog);
   Config config = LoadConfig(kConfig);
   const ReplayResult before = Replay({kLog}, config), believed = Replay({log}, config);
-  EXPECT_EQ(believed.differences.size(), 4u) << "three candidates without a decision, and a certificate that was altered";
+  EXPECT_EQ(believed.differences.size(), 4u) << "three undecided candidates, an altered certificate";
   EXPECT_EQ(InWords(believed.passed_over), "");
   config.bus.key = key;
   const ReplayResult result = Replay({log}, config);

@@ -17,7 +17,7 @@ namespace forereach {
 /** What SignedLog has of each. */
 inline constexpr std::int64_t kUnsigned = 2, kForged = 1, kRepeated = 2;
 
-/** Makes a key and a log of what `path` holds, signed, with intruders on the channels of candidates and certified plans.
+/** Makes a key and a log of what `path` holds, signed, with others' candidates and certified plans among them.
 @return the paths of key and log. */
 inline std::pair<std::string, std::string> SignedLog(const ScratchDirectory& scratch, const std::string& path) {
   const std::string key = scratch / "key", log = scratch / "signed.lcmlog";
