@@ -19,6 +19,7 @@ add_library(ForeReach::options ALIAS forereach_options)
 set_target_properties(forereach_options PROPERTIES EXPORT_NAME options)
 target_compile_options(forereach_options INTERFACE
   $<BUILD_INTERFACE:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Woverloaded-virtual>
+  $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:Clang>:-Wno-psabi;-Wno-bitwise-instead-of-logical>>  # lanes, and tests without a branch
   -ffp-contract=off -fno-fast-math)
 if(FOREREACH_WERROR)
   target_compile_options(forereach_options INTERFACE $<BUILD_INTERFACE:-Werror>)
