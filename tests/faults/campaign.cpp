@@ -94,8 +94,10 @@ class Campaign final {
 
   // So many of them, with a system that is healthy at first.
   void Tries(Row& row, Rig& rig, const std::function<void(int)>& hurt, int tries, bool bus_loses = false) {
-    if (!HealAtFirst(row, rig)) return;
-    for (int i = 0; i < tries; ++i) Try(row, rig, [&] { hurt(i); }, bus_loses);
+    if (HealAtFirst(row, rig))
+      for (int i = 0; i < tries; ++i) Try(row, rig, [&] { hurt(i); }, bus_loses);
+    rig.EndAll();
+    DemandNothingForbidden(row, rig);
   }
 
   // What has to be seen in a try.
@@ -105,10 +107,10 @@ class Campaign final {
     ++row.forbidden;
   }
 
-  // Nothing that the witness tells, and no process that ended by itself.
+  // Nothing that the witness tells, and no process that ended by itself or badly.
   static void DemandNothingForbidden(Row& row, Rig& rig) {
     for (const std::string& violation : rig.witness().TakeViolations()) Demand(row, false, violation);
-    for (const std::string& death : rig.TakeDeaths()) Demand(row, false, death);
+    for (const std::string& ending : rig.TakeBadEndings()) Demand(row, false, ending);
   }
 
   // The system has to be healthy before it can be hurt; if it is not, that is a try it has not recovered from.
@@ -136,13 +138,10 @@ class Campaign final {
     Tries(row, rig, [&](int i) {
       const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
       rig.Listen(milliseconds(Below(120)));
+      if (signal == SIGKILL) return rig.End(role, SIGKILL);
       rig.Signal(role, signal);
-      if (signal == SIGKILL) {
-        static_cast<void>(rig.Reap(role));
-      } else {
-        rig.Listen(milliseconds(Below(2000)));
-        rig.Signal(role, SIGCONT);
-      }
+      rig.Listen(milliseconds(Below(2000)));
+      rig.Signal(role, SIGCONT);
     }, tries);
   }
 
@@ -367,11 +366,7 @@ void Campaign::Disks() {
   {
     Rig rig(DemoTask("logger: {min_free_mb: 1}\n"));
     rig.SetDirectory(directory);
-    const auto end_logger = [&] {
-      rig.Signal(Rig::kLogger, SIGTERM);
-      static_cast<void>(rig.Reap(Rig::kLogger));
-    };
-    end_logger();  // it is started again there
+    rig.End(Rig::kLogger);  // it is started again there
     Row& full = Begin("Full disk", options_.others);
     Tries(full, rig, [&](int) {
       const std::string filler = directory + "/filler";  // as much as there is room for
@@ -391,7 +386,7 @@ void Campaign::Disks() {
       Demand(read_only, ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT | how, kSize) == 0, "no remount");
     };
     Tries(read_only, rig, [&](int) {
-      end_logger();
+      rig.End(Rig::kLogger);
       remount(MS_RDONLY);
       ChildProcess logger({FOREREACH_LOGGER, "--config", rig.task_path(), "--lcm-url", rig.url(Rig::kLogger),
                            "--directory", directory});
@@ -499,11 +494,12 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << options.floods << " --seed " << options.seed << (options.only.empty() ? "" : " --only " + options.only)
        << "`. *Forbidden*: an uncertified plan was executed, a control\n"
        << "was not its plan's or was applied outside its slice, a candidate was answered twice, or counted and not\n"
-       << "answered (not asked where the bus is made to lose messages), a process ended that nobody had ended, after\n"
-       << "a jump of its clock the certifier latched nothing or certified before the reset, or what had to be\n"
-       << "refused or said was not. *Lost*: events that the logger had confirmed and its log does not hold, looked at\n"
-       << "after each try; what a full disk keeps out is never confirmed; `-`: no logger ran. *Recovered*: within\n"
-       << "20 s, after a reset where a fault was latched, the certifier is OK and certifies and the logger records.\n"
+       << "answered (not asked where the bus is made to lose messages), a process ended that nobody had ended or did\n"
+       << "not end well within 5 s of SIGTERM, after a jump of its clock the certifier latched nothing or certified\n"
+       << "before the reset, or what had to be refused or said was not. *Lost*: events that the logger had confirmed\n"
+       << "and its log does not hold, looked at after each try; what a full disk keeps out is never confirmed; `-`:\n"
+       << "no logger ran. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK and\n"
+       << "certifies and the logger records.\n"
        << "*Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows)

@@ -1,7 +1,6 @@
 #include "tests/faults/rig.h"
 
 #include <algorithm>
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
@@ -51,11 +50,6 @@ Rig::Rig(const std::string& task, const Options& options)
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) Start(role);
 }
 
-Rig::~Rig() {
-  for (const Role role : {kRobot, kPlanner, kCertifier, kLogger})
-    if (processes_[role]) static_cast<void>(processes_[role]->Terminate());
-}
-
 void Rig::Start(Role role) {
   LookAtEnd(role);
   if (role == kLogger) {
@@ -71,7 +65,8 @@ void Rig::Start(Role role) {
     earlier_logs_ = Logs();
   }
   if (role == kRobot) drive_began_ = std::chrono::steady_clock::now();
-  was_ended_[role] = is_judged_[role] = false;
+  ended_by_[role] = 0;
+  is_judged_[role] = false;
   processes_[role] = std::make_unique<ChildProcess>(command);
 }
 
@@ -98,35 +93,42 @@ void Rig::SetClocks(std::chrono::microseconds offset) {
 }
 
 void Rig::Signal(Role role, int signal) {
+  if (processes_[role]) processes_[role]->Signal(signal);
+}
+
+void Rig::End(Role role, int signal) {
   if (!processes_[role]) return;
+  if (signal == SIGTERM) static_cast<void>(processes_[role]->WaitForLog("ready on"));  // it listens to SIGTERM by then
   LookAtEnd(role);
-  if (signal == SIGKILL || signal == SIGTERM) was_ended_[role] = true;
+  ended_by_[role] = signal;
   processes_[role]->Signal(signal);
-}
-
-bool Rig::Reap(Role role) {
-  if (!processes_[role]) return true;
-  if (!processes_[role]->WaitForEnd(std::chrono::seconds(10))) return false;
-  LookAtEnd(role);
+  if (processes_[role]->WaitForEnd(kEndsWithin))
+    LookAtEnd(role);
+  else
+    BadEnding(role, "did not end");
   processes_[role].reset();
-  return true;
 }
 
-// A process that was told to end may do so well or by the signal, which may come before it listens to any.
+void Rig::EndAll() {
+  for (const Role role : {kRobot, kPlanner, kCertifier, kLogger}) End(role);
+}
+
 void Rig::LookAtEnd(Role role) {
   if (!processes_[role] || is_judged_[role] || IsAlive(role)) return;
   is_judged_[role] = true;
   const std::optional<int> status = processes_[role]->WaitForExit(std::chrono::milliseconds(0));
-  const bool may_end_well = was_ended_[role] || role == kPlanner || role == kRobot;
-  if (status ? *status == 0 && may_end_well : was_ended_[role]) return;
-  deaths_.push_back(std::string("the ") + kNames[role] + " ended " +
-                    (status ? "with exit status " + std::to_string(*status) : "by a signal") + ": " +
-                    Tail(processes_[role]->error()));
+  const bool may_end_well = ended_by_[role] == SIGTERM || role == kPlanner || role == kRobot;
+  if (status ? *status == 0 && may_end_well : ended_by_[role] == SIGKILL) return;
+  BadEnding(role, status ? "ended with exit status " + std::to_string(*status) : "ended by a signal");
 }
 
-std::vector<std::string> Rig::TakeDeaths() {
+void Rig::BadEnding(Role role, const std::string& how) {
+  bad_endings_.push_back(std::string("the ") + kNames[role] + " " + how + ": " + Tail(processes_[role]->error()));
+}
+
+std::vector<std::string> Rig::TakeBadEndings() {
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) LookAtEnd(role);
-  return std::exchange(deaths_, {});
+  return std::exchange(bad_endings_, {});
 }
 
 bool Rig::IsAlive(Role role) const { return processes_[role] && !processes_[role]->WaitForEnd(std::chrono::milliseconds(0)); }
@@ -153,19 +155,10 @@ void Rig::Command(std::int16_t kind) {
 }
 
 void Rig::DriveAnew() {
-  Signal(kRobot, SIGTERM);
-  static_cast<void>(Reap(kRobot));
-  Signal(kPlanner, SIGTERM);  // it ends with the drive
-  static_cast<void>(Reap(kPlanner));
+  End(kRobot);
+  End(kPlanner);  // it ends with the drive
   Start(kPlanner);
   Start(kRobot);
-}
-
-void Rig::EndAll() {
-  for (const Role role : {kRobot, kPlanner, kCertifier, kLogger}) {
-    Signal(role, SIGTERM);
-    static_cast<void>(Reap(role));
-  }
 }
 
 std::string Rig::Heal() {

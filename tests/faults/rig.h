@@ -3,6 +3,7 @@
 
 #include <array>
 #include <chrono>
+#include <csignal>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -29,15 +30,19 @@ class Rig final {
   /** @param task YAML of the task. */
   explicit Rig(const std::string& task) : Rig(task, Options()) {}
   Rig(const std::string& task, const Options& options);
-  ~Rig();
 
   void Start(Role role);
+  /** One that does not end it. */
   void Signal(Role role, int signal);
-  /** Waits for its end, and forgets it. @return true if it ended. */
-  bool Reap(Role role);
-  /** One line for each process that has ended since the last call and should not have, or not so: nobody ended it from
-  here, and it is no planner or robot that was at its goal or out of time; or its exit status is not 0. */
-  [[nodiscard]] std::vector<std::string> TakeDeaths();
+  /** Ends it, and forgets it. @param signal SIGKILL, or SIGTERM, which waits until the process is ready. */
+  void End(Role role, int signal = SIGTERM);
+  /** Ends all four, for Heal to start. */
+  void EndAll();
+  /** One line for each process that since the last call
+      - ended by itself, and is no planner or robot that was at its goal or out of time;
+      - ended with an exit status that is not 0, or by a signal that is not End's SIGKILL;
+      - did not end within kEndsWithin of End. */
+  [[nodiscard]] std::vector<std::string> TakeBadEndings();
   [[nodiscard]] bool IsAlive(Role role) const;
 
   /** From now on the wall clock of a process is the machine's plus `offset`. @throws std::runtime_error if the process
@@ -55,8 +60,6 @@ class Rig final {
   [[nodiscard]] std::string Heal();
   /** Ends the robot's drive and begins another. */
   void DriveAnew();
-  /** Ends all four, for Heal to start. */
-  void EndAll();
 
   /** Events that a logger had confirmed and that its logs do not hold, found since the last call: of the present one,
   and of each before it when the next was started. Nothing while none is heard. What a logger cannot write it does not
@@ -78,6 +81,7 @@ class Rig final {
   [[nodiscard]] std::vector<std::string> UnderClock(Role role);
   [[nodiscard]] std::set<std::string> Logs() const;
   void LookAtEnd(Role role);
+  void BadEnding(Role role, const std::string& how);
   void CountLost();
 
   const Options options_;
@@ -87,8 +91,9 @@ class Rig final {
   std::unique_ptr<Bus> heard_, signed_;
   std::unique_ptr<Witness> witness_;
   std::array<std::unique_ptr<ChildProcess>, kRoles> processes_;
-  std::array<bool, kRoles> was_ended_{}, is_judged_{};  // by this rig; by LookAtEnd
-  std::vector<std::string> deaths_;
+  std::array<int, kRoles> ended_by_{};     // End's signal
+  std::array<bool, kRoles> is_judged_{};  // by LookAtEnd
+  std::vector<std::string> bad_endings_;
   std::array<std::unique_ptr<ClockFile, UnmapClockFile>, kRoles> clocks_;
   std::int64_t clock_offset_us_ = 0;
   std::set<std::string> earlier_logs_;               // of loggers before this one
