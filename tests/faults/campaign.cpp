@@ -38,7 +38,7 @@ struct Row {
   std::string fault;
   int tries = 0;
   std::size_t forbidden = 0;                   // what may never happen, and did
-  std::optional<std::int64_t> lost_by_logger;  // confirmed and not in the log; nothing: not looked at
+  std::optional<std::int64_t> lost_by_logger;  // Rig::TakeLost; nothing: no logger ran
   int recovered = 0, said_why = 0;             // of the tries
   std::string remark;
 };
@@ -84,7 +84,7 @@ class Campaign final {
     DemandNothingForbidden(row, rig);
     const std::int64_t unheard = rig.witness().unheard() - before;
     Demand(row, bus_loses || unheard <= 0, std::to_string(unheard) + " candidates counted, their decisions not heard");
-    if (const auto lost = rig.TakeLost()) row.lost_by_logger = row.lost_by_logger.value_or(0) + *lost;
+    CountLost(row, rig);
     if (why.empty())
       ++row.recovered;
     else
@@ -97,8 +97,12 @@ class Campaign final {
     if (HealAtFirst(row, rig))
       for (int i = 0; i < tries; ++i) Try(row, rig, [&] { hurt(i); }, bus_loses);
     rig.EndAll();
+    CountLost(row, rig);
     DemandNothingForbidden(row, rig);
+    for (const std::string& amiss : rig.CheckRecords()) Demand(row, false, amiss);
   }
+
+  static void CountLost(Row& row, Rig& rig) { row.lost_by_logger = row.lost_by_logger.value_or(0) + rig.TakeLost(); }
 
   // What has to be seen in a try.
   static void Demand(Row& row, bool seen, const std::string& what) {

@@ -8,6 +8,7 @@
 
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
+#include "logger/check.h"
 #include "logger/event_log.h"
 
 namespace forereach {
@@ -25,6 +26,20 @@ const std::array<std::string, Rig::kRoles> kPrograms{FOREREACH_LOGGER, FOREREACH
 std::string LastLine(std::string text) {
   while (!text.empty() && text.back() == '\n') text.pop_back();
   return text.substr(text.rfind('\n') + 1);
+}
+
+std::set<std::string> LogsIn(const std::string& directory) {
+  std::set<std::string> logs;
+  std::error_code none_yet;
+  for (const auto& entry : std::filesystem::directory_iterator(directory, none_yet))
+    if (entry.path().extension() == ".lcmlog") logs.insert(entry.path().string());
+  return logs;
+}
+
+std::int64_t EventsIn(const std::set<std::string>& logs) {
+  std::int64_t events = 0;
+  ForEachEvent({logs.begin(), logs.end()}, [&events](const LogEvent&, const std::string&) { ++events; });
+  return events;
 }
 
 std::string Tail(const std::string& text) {
@@ -52,17 +67,19 @@ Rig::Rig(const std::string& task, const Options& options)
 
 void Rig::Start(Role role) {
   LookAtEnd(role);
-  if (role == kLogger) {
-    CountLost();
-    lost_by_this_ = 0;
-    directory_ = next_directory_;
-  }
   std::vector<std::string> command;
   if (options_.settable_clocks) command = UnderClock(role);
   command.insert(command.end(), {kPrograms[role], "--config", task_path_, "--lcm-url", url(role), "--key", key_path_});
   if (role == kLogger) {
+    if (!records_.empty()) {
+      LookAtLogs();
+      records_.back().due = std::max(records_.back().due, EventsIn(records_.back().logs));
+    }
+    directory_ = next_directory_;
+    directories_.insert(directory_);
+    earlier_logs_ = LogsIn(directory_);
+    records_.emplace_back();
     command.insert(command.end(), {"--directory", directory_});
-    earlier_logs_ = Logs();
   }
   if (role == kRobot) drive_began_ = std::chrono::steady_clock::now();
   ended_by_[role] = 0;
@@ -196,31 +213,35 @@ std::string Rig::Heal() {
          std::to_string(witness_->certificates() - certificates_before);
 }
 
-std::set<std::string> Rig::Logs() const {
-  std::set<std::string> logs;
-  std::error_code none_yet;
-  for (const auto& entry : std::filesystem::directory_iterator(directory_, none_yet))
-    if (entry.path().extension() == ".lcmlog") logs.insert(entry.path().string());
-  return logs;
+// Of the present logger.
+void Rig::LookAtLogs() {
+  Record& record = records_.back();
+  for (const std::string& log : LogsIn(directory_))
+    if (!earlier_logs_.contains(log)) record.logs.insert(log);
+  if (witness_->logger_status()) record.due = witness_->logger_status()->events_written;
 }
 
-// What the present logger had confirmed, as far as was heard, against the logs since its start.
-void Rig::CountLost() {
-  if (!witness_->logger_status()) return;
-  std::int64_t events = 0;
-  for (const std::string& log : Logs()) {
-    if (earlier_logs_.contains(log)) continue;
-    EventLogReader reader(log);
-    ForEachEvent(reader, [&](const LogEvent&) { ++events; });
+std::int64_t Rig::TakeLost() {
+  LookAtLogs();
+  std::int64_t newly_lost = 0;
+  for (Record& record : records_) {
+    const std::int64_t lost = std::max(record.lost, record.due - EventsIn(record.logs));
+    newly_lost += lost - std::exchange(record.lost, lost);
   }
-  const std::int64_t lost = witness_->logger_status()->events_written - events;
-  if (lost > lost_by_this_) untold_lost_ += lost - std::exchange(lost_by_this_, lost);
+  records_.erase(records_.begin(), records_.end() - 1);
+  return newly_lost;
 }
 
-std::optional<std::int64_t> Rig::TakeLost() {
-  if (!witness_->logger_status()) return std::nullopt;
-  CountLost();
-  return std::exchange(untold_lost_, 0);
+std::vector<std::string> Rig::CheckRecords() const {
+  std::vector<std::string> amiss;
+  for (const std::string& directory : directories_) try {
+      std::vector<LogCheck> checks = CheckLogs(directory);
+      std::erase_if(checks, [](const LogCheck& check) { return check.whole_log() && check.ended; });
+      if (!checks.empty()) amiss.push_back(directory + ": " + ToText(checks));
+    } catch (const BadInput& error) {
+      amiss.push_back(error.what());
+    }
+  return amiss;
 }
 
 }  // namespace forereach

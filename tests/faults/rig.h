@@ -61,10 +61,13 @@ class Rig final {
   /** Ends the robot's drive and begins another. */
   void DriveAnew();
 
-  /** Events that a logger had confirmed and that its logs do not hold, found since the last call: of the present one,
-  and of each before it when the next was started. Nothing while none is heard. What a logger cannot write it does not
-  confirm. */
-  [[nodiscard]] std::optional<std::int64_t> TakeLost();
+  /** Events that logs lack, found since the last call: of the present logger's those that it has confirmed, as far as was
+  heard; of one before it also those that stood in them when the next was started, once more after that one has mended
+  them. What a logger cannot write it does not confirm. */
+  [[nodiscard]] std::int64_t TakeLost();
+  /** Holds all logs against the databases of their directories (logger/check.h). No logger may run.
+  @return one entry for each directory in which something is amiss. */
+  [[nodiscard]] std::vector<std::string> CheckRecords() const;
 
   void Command(std::int16_t kind);
   [[nodiscard]] Bus& bus() { return *signed_; }      ///< Signs.
@@ -77,12 +80,16 @@ class Rig final {
   void SetDirectory(const std::string& directory) { next_directory_ = directory; }
 
  private:
+  struct Record {  // of one logger
+    std::set<std::string> logs;
+    std::int64_t due = 0, lost = 0;  // events that have to be in them, and that were not
+  };
+
   [[nodiscard]] std::int64_t NowUs() const { return WallClockUs() + clock_offset_us_; }
   [[nodiscard]] std::vector<std::string> UnderClock(Role role);
-  [[nodiscard]] std::set<std::string> Logs() const;
   void LookAtEnd(Role role);
   void BadEnding(Role role, const std::string& how);
-  void CountLost();
+  void LookAtLogs();
 
   const Options options_;
   ScratchDirectory scratch_;
@@ -96,8 +103,8 @@ class Rig final {
   std::vector<std::string> bad_endings_;
   std::array<std::unique_ptr<ClockFile, UnmapClockFile>, kRoles> clocks_;
   std::int64_t clock_offset_us_ = 0;
-  std::set<std::string> earlier_logs_;               // of loggers before this one
-  std::int64_t lost_by_this_ = 0, untold_lost_ = 0;  // by the present logger; by all, not taken yet
+  std::set<std::string> directories_, earlier_logs_;  // of all loggers; of loggers before this one
+  std::vector<Record> records_;  // of the present logger, the last, and of those before it that TakeLost has yet to see
   std::chrono::steady_clock::time_point drive_began_{};
 };
 
