@@ -502,8 +502,8 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "not end well within 5 s of SIGTERM, after a jump of its clock the certifier latched nothing or certified\n"
        << "before the reset, or what had to be refused or said was not. *Lost*: events that the logger had confirmed\n"
        << "and its log does not hold, looked at after each try; what a full disk keeps out is never confirmed; `-`:\n"
-       << "no logger ran. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK and\n"
-       << "certifies and the logger records.\n"
+       << "no logger ran. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK, the\n"
+       << "robot executes a plan that was certified since, and the logger records.\n"
        << "*Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows)

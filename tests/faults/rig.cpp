@@ -196,7 +196,7 @@ std::string Rig::Heal() {
         const bool silent = std::chrono::steady_clock::now() - std::max(witness_->robot_heard(), drive_began_) > kSilent;
         if (silent || !IsAlive(kRobot) || !IsAlive(kPlanner)) DriveAnew();
         return status && status->level == certifier_status_v2_t::OK &&
-               witness_->certificates() > certificates_before &&
+               witness_->executed() > certificates_before &&
                witness_->logger_status() && witness_->logger_status()->state == logger_status_t::OK;
       },
       kRecovers);
@@ -210,7 +210,8 @@ std::string Rig::Heal() {
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot})
     why += std::string("; ") + kNames[role] + (IsAlive(role) ? ": " + LastLine(processes_[role]->error()) : " ended");
   return why + "; decisions " + std::to_string(witness_->decisions() - before) + ", certificates " +
-         std::to_string(witness_->certificates() - certificates_before);
+         std::to_string(witness_->certificates() - certificates_before) +
+         (witness_->executed() > certificates_before ? "" : ", none of them executed");
 }
 
 // Of the present logger.

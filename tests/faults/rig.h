@@ -54,8 +54,8 @@ class Rig final {
   void Listen(std::chrono::milliseconds time);
   [[nodiscard]] bool ListenUntil(const std::function<bool()>& done, std::chrono::milliseconds patience);
 
-  /** Starts what is dead and the drive of a robot that is silent, resets what is latched, and waits until the certifier is OK
-  and certifies again, and the logger records.
+  /** Starts what is dead and the drive of a robot that is silent, resets what is latched, and waits until the certifier is
+  OK, the robot executes a plan that was certified since, and the logger records.
   @return empty, or what does not come back. */
   [[nodiscard]] std::string Heal();
   /** Ends the robot's drive and begins another. */

@@ -71,8 +71,7 @@ void Witness::OnCertified(const Received& received) {
   const auto [authenticity, message] = authenticator_.Check(channels_.certified, received.bytes);
   const auto plan = Decoded<certified_plan_t>(message);
   if (authenticity != Authenticity::kAuthentic || !plan || !FindSealFaults(*plan).empty()) return;
-  ++certificates_;
-  plans_[plan->plan.plan_id] = *plan;
+  plans_[plan->plan.plan_id] = {*plan, ++certificates_};
 }
 
 void Witness::OnState(const Received& received) {
@@ -80,8 +79,10 @@ void Witness::OnState(const Received& received) {
   const auto state = Decoded<robot_state_t>(WithoutSignature(received.bytes));
   if (!state || state->mode != robot_state_t::EXECUTING) return;
   applied_[state->utime] = {state->executing_plan_id, state->executing_step};
-  if (!plans_.contains(state->executing_plan_id))
-    Violate("plan " + std::to_string(state->executing_plan_id) + " is executing, and was never passed on");
+  const auto plan = plans_.find(state->executing_plan_id);
+  if (plan == plans_.end())
+    return Violate("plan " + std::to_string(state->executing_plan_id) + " is executing, and was never passed on");
+  executed_ = std::max(executed_, plan->second.number);
 }
 
 void Witness::OnTransition(const Received& received) {
@@ -91,7 +92,7 @@ void Witness::OnTransition(const Received& received) {
   if (applied == applied_.end()) return;  // its state did not reach this listener
   const auto plan = plans_.find(applied->second.plan_id);
   if (plan == plans_.end()) return;  // said already
-  const certified_plan_t& certified = plan->second;
+  const certified_plan_t& certified = plan->second.plan;
   const int step = applied->second.step;
   const std::string which = "step " + std::to_string(step) + " of plan " + std::to_string(applied->second.plan_id);
   if (!std::equal(transition->input, transition->input + transition->num_inputs, certified.plan.control[step]))

@@ -41,6 +41,8 @@ class Witness final {
   [[nodiscard]] std::int64_t unheard() const { return earlier_unheard_ + unheard_; }
   /** Certified plans, signed and sealed. */
   [[nodiscard]] std::int64_t certificates() const { return certificates_; }
+  /** The newest of them that a robot has executed, counted from 1 in the order in which they came; 0 for none. */
+  [[nodiscard]] std::int64_t executed() const { return executed_; }
   /** The last one that the certifier has latched, and the certificates heard since. */
   [[nodiscard]] const std::optional<fault_t>& fault() const { return fault_; }
   [[nodiscard]] std::int64_t certificates_since_fault() const { return certificates_ - certificates_at_fault_; }
@@ -63,7 +65,11 @@ class Witness final {
   const BusOptions channels_;
   const bool spoiled_;
   Authenticator authenticator_;
-  std::map<std::int64_t, certified_plan_t> plans_;
+  struct Certified {
+    certified_plan_t plan;
+    std::int64_t number;  // counts certificates from 1
+  };
+  std::map<std::int64_t, Certified> plans_;
   struct Answer {
     Digest decision;  // of the message
     std::int16_t cause;
@@ -81,7 +87,7 @@ class Witness final {
   std::optional<logger_status_t> logger_status_;
   std::chrono::steady_clock::time_point robot_heard_{};
   std::optional<fault_t> fault_;
-  std::int64_t decisions_ = 0, certificates_ = 0, certificates_at_fault_ = 0;
+  std::int64_t decisions_ = 0, certificates_ = 0, certificates_at_fault_ = 0, executed_ = 0;
   std::vector<std::string> violations_;
 };
 
