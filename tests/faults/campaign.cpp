@@ -1,5 +1,6 @@
 // The fault campaign: real processes on a real loopback bus are killed, stopped, lied to, flooded and cut off, and after each
 // try a witness says whether anything happened that may never happen. Writes a table.
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <csignal>
@@ -20,6 +21,7 @@
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
 #include "forereach/command_t.hpp"
+#include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/relay.h"
 #include "tests/faults/report.h"
@@ -155,10 +157,10 @@ class Campaign final {
     return microseconds(std::llround((Below(2) == 0 ? 1e6 : -1e6) * seconds));
   }
 
-  // A jump is said on FAULT, and nothing certified until the reset that Heal sends.
-  static void DemandLatched(Row& row, Rig& rig) {
+  // It is said on FAULT, and nothing certified until the reset that Heal sends.
+  static void DemandLatched(Row& row, Rig& rig, std::int16_t cause) {
     const auto& fault = rig.witness().fault();
-    Demand(row, fault && fault->cause == fault_t::CLOCK_JUMP, "its clock jumped and it latched no CLOCK_JUMP");
+    Demand(row, fault && fault->cause == cause, "the certifier latched no " + std::string(FaultName(cause)));
     Demand(row, rig.witness().certificates_since_fault() == 0, "it certified before the reset");
   }
 
@@ -177,7 +179,7 @@ class Campaign final {
       rig.Listen(milliseconds(1000));
       rig.SetClock(role, microseconds(0));
       rig.Listen(milliseconds(200));
-      if (role == Rig::kCertifier) DemandLatched(row, rig);
+      if (role == Rig::kCertifier) DemandLatched(row, rig, fault_t::CLOCK_JUMP);
     }, options_.others);
   }
 
@@ -192,7 +194,7 @@ class Campaign final {
       const microseconds jump = Jump();
       rig.SetClocks(offset += jump);
       rig.Listen(milliseconds(1000));
-      DemandLatched(row, rig);
+      DemandLatched(row, rig, fault_t::CLOCK_JUMP);
       if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
     }, options_.others);
     Remark(row, std::to_string(anew) + " times back by more than 5 s: all started again");
@@ -248,6 +250,22 @@ class Campaign final {
     return state;
   }
 
+  // It executes the plan certified last, from a state outside its slice, by the least or by some metres.
+  robot_state_t StateOutside(Rig& rig) {
+    robot_state_t state = State(rig);
+    const certified_plan_t& certified = *rig.witness().last_certified();
+    const int step = Below(certified.plan.num_steps), k = Below(state.num_states);
+    state.mode = robot_state_t::EXECUTING;
+    state.executing_plan_id = certified.plan.plan_id;
+    state.executing_step = static_cast<std::int16_t>(step);
+    std::copy_n(certified.slice_lower[step], state.num_states, state.state);
+    constexpr double kEverything = std::numeric_limits<double>::infinity();
+    const double by = Below(2) * 5.0;
+    state.state[k] = Below(2) == 0 ? std::nextafter(certified.slice_lower[step][k] - by, -kEverything)
+                                   : std::nextafter(certified.slice_upper[step][k] + by, kEverything);
+    return state;
+  }
+
   // Signed: the liar has the key.
   void Lies() {
     Rig rig(DemoTask());
@@ -262,6 +280,12 @@ class Campaign final {
         rig.bus().Publish(rig.config().bus.robot_state, state);
         rig.Listen(milliseconds(5));
       }
+      robot_state_t state = StateOutside(rig);
+      state.sequence = sequence++;
+      rig.bus().Publish(rig.config().bus.robot_state, state);
+      static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
+      rig.Listen(milliseconds(500));
+      DemandLatched(row, rig, fault_t::SLICE_LEFT);
     }, options_.others);
   }
 
@@ -499,11 +523,11 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "`. *Forbidden*: an uncertified plan was executed, a control\n"
        << "was not its plan's or was applied outside its slice, a candidate was answered twice, or counted and not\n"
        << "answered (not asked where the bus is made to lose messages), a process ended that nobody had ended or did\n"
-       << "not end well within 5 s of SIGTERM, after a jump of its clock the certifier latched nothing or certified\n"
-       << "before the reset, or what had to be refused or said was not. *Lost*: events that the logger had confirmed\n"
-       << "and its log does not hold, looked at after each try; what a full disk keeps out is never confirmed; `-`:\n"
-       << "no logger ran. *Recovered*: within 20 s, after a reset where a fault was latched, the certifier is OK, the\n"
-       << "robot executes a plan that was certified since, and the logger records.\n"
+       << "not end well within 5 s of SIGTERM, after a jump of its clock or a state outside its slice the certifier\n"
+       << "latched nothing or certified before the reset, or what had to be refused or said was not. *Lost*: events\n"
+       << "that the logger had confirmed and its log does not hold, looked at after each try; what a full disk keeps\n"
+       << "out is never confirmed; `-`: no logger ran. *Recovered*: within 20 s, after a reset where a fault was\n"
+       << "latched, the certifier is OK, the robot executes a plan that was certified since, and the logger records.\n"
        << "*Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows)

@@ -71,7 +71,9 @@ void Witness::OnCertified(const Received& received) {
   const auto [authenticity, message] = authenticator_.Check(channels_.certified, received.bytes);
   const auto plan = Decoded<certified_plan_t>(message);
   if (authenticity != Authenticity::kAuthentic || !plan || !FindSealFaults(*plan).empty()) return;
-  plans_[plan->plan.plan_id] = {*plan, ++certificates_};
+  Certified& certified = plans_[plan->plan.plan_id];
+  certified = {*plan, ++certificates_};
+  last_certified_ = &certified.plan;
 }
 
 void Witness::OnState(const Received& received) {

@@ -41,6 +41,7 @@ class Witness final {
   [[nodiscard]] std::int64_t unheard() const { return earlier_unheard_ + unheard_; }
   /** Certified plans, signed and sealed. */
   [[nodiscard]] std::int64_t certificates() const { return certificates_; }
+  [[nodiscard]] const certified_plan_t* last_certified() const { return last_certified_; }
   /** The newest of them that a robot has executed, counted from 1 in the order in which they came; 0 for none. */
   [[nodiscard]] std::int64_t executed() const { return executed_; }
   /** The last one that the certifier has latched, and the certificates heard since. */
@@ -70,6 +71,7 @@ class Witness final {
     std::int64_t number;  // counts certificates from 1
   };
   std::map<std::int64_t, Certified> plans_;
+  const certified_plan_t* last_certified_ = nullptr;  // in plans_
   struct Answer {
     Digest decision;  // of the message
     std::int16_t cause;
