@@ -138,6 +138,11 @@ class Campaign final {
     return rows_.back();
   }
 
+  void NotTried(const std::string& fault, const std::string& why) {
+    rows_.emplace_back().fault = fault;
+    Remark(rows_.back(), "not tried: " + why);
+  }
+
   void Signals(const std::string& fault, int signal, int tries) {
     Rig rig(DemoTask());
     Row& row = Begin(fault, tries);
@@ -386,11 +391,8 @@ void Campaign::Disks() {
   const ScratchDirectory scratch;
   const std::string directory = scratch.path();
   constexpr const char* kSize = "size=32m";
-  if (::mount("tmpfs", directory.c_str(), "tmpfs", 0, kSize) != 0) {
-    rows_.emplace_back().fault = "Full disk, read-only directory";
-    rows_.back().remark = "not tried: mounting a small file system needs root";
-    return;
-  }
+  if (::mount("tmpfs", directory.c_str(), "tmpfs", 0, kSize) != 0)
+    return NotTried("Full disk, read-only directory", "mounting a small file system needs root");
   {
     Rig rig(DemoTask("logger: {min_free_mb: 1}\n"));
     rig.SetDirectory(directory);
@@ -427,26 +429,11 @@ void Campaign::Disks() {
   ::umount(directory.c_str());
 }
 
-// A process that starts without a network says what to do, and ends.
-void Campaign::NoNetwork() {
-  const ScratchDirectory scratch;
-  const std::string task = scratch.Write("task.yaml", DemoTask());
-  Row& row = Begin("No multicast route at the start", 4);
-  for (const char* program : {FOREREACH_CERTIFIER, FOREREACH_PLANNER, FOREREACH_LOGGER, FOREREACH_ROBOT_SIM}) {
-    ++row.tries;
-    std::vector<std::string> command{program, "--config", task, "--lcm-url", "udpm://10.255.255.1:7667?ttl=0"};
-    if (program == std::string(FOREREACH_LOGGER)) command.insert(command.end(), {"--directory", scratch / "log"});
-    ChildProcess process(command);
-    const auto code = process.WaitForExit(std::chrono::seconds(10));
-    if (code == 2 && process.error().find("bus:") != std::string::npos) ++row.said_why;
-    progress_->Advance();
-  }
-  Remark(row, "exit 2 and advice");
-}
-
 // A network of its own for this thread and what it starts from now on: the machine's routes stay as they are.
 class OwnNetwork final {
  public:
+  static constexpr const char* kNeeds = "a network of its own needs root and the command ip";
+
   OwnNetwork() : machines_(::open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC)) {
     entered_ = machines_ >= 0 && ::unshare(CLONE_NEWNET) == 0;
     works_ = entered_ && Ip({"link", "set", "lo", "up"}) && SetRoute(true);
@@ -475,14 +462,33 @@ class OwnNetwork final {
   bool entered_ = false, works_ = false;
 };
 
+// A process that starts without a network says what to do, and ends.
+void Campaign::NoNetwork() {
+  const std::string fault = "No multicast route at the start";
+  const OwnNetwork network;
+  if (!network.works()) return NotTried(fault, OwnNetwork::kNeeds);
+  const ScratchDirectory scratch;
+  const std::string task = scratch.Write("task.yaml", DemoTask()), url = PrivateBusUrl();
+  Row& row = Begin(fault, Rig::kRoles);
+  Demand(row, network.SetRoute(false), "the route stays");
+  for (const char* program : {FOREREACH_CERTIFIER, FOREREACH_PLANNER, FOREREACH_LOGGER, FOREREACH_ROBOT_SIM}) {
+    ++row.tries;
+    std::vector<std::string> command{program, "--config", task, "--lcm-url", url};
+    if (program == std::string(FOREREACH_LOGGER)) command.insert(command.end(), {"--directory", scratch / "log"});
+    ChildProcess process(command);
+    const auto code = process.WaitForExit(std::chrono::seconds(10));
+    const std::string error = process.error();
+    const auto says = [&error](const std::string& what) { return error.find(what) != std::string::npos; };
+    if (code == 2 && says(url) && says("ip route add 224.0.0.0/4 dev lo") && !says("ready on")) ++row.said_why;
+    progress_->Advance();
+  }
+  Remark(row, "exit 2 and advice");
+}
+
 void Campaign::LostRoute() {
   const std::string fault = "The multicast route goes for a second, and comes back";
   const OwnNetwork network;
-  if (!network.works()) {
-    rows_.emplace_back().fault = fault;
-    rows_.back().remark = "not tried: a network of its own needs root and the command ip";
-    return;
-  }
+  if (!network.works()) return NotTried(fault, OwnNetwork::kNeeds);
   Rig rig(DemoTask());
   Row& row = Begin(fault, options_.others);
   const auto not_sent = [&] { return rig.witness().status() ? rig.witness().status()->messages_not_sent : 0; };
