@@ -35,6 +35,7 @@ using std::chrono::milliseconds;
 
 constexpr std::chrono::seconds kAnewIfBackBy{-5};  // a shorter jump back is waited out
 constexpr std::chrono::seconds kSaysSoon{3};       // some heartbeats
+constexpr milliseconds kHeartbeat{600};            // at least one
 
 struct Row {
   std::string fault;
@@ -289,7 +290,7 @@ class Campaign final {
       state.sequence = sequence++;
       rig.bus().Publish(rig.config().bus.robot_state, state);
       static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
-      rig.Listen(milliseconds(500));
+      rig.Listen(kHeartbeat);
       DemandLatched(row, rig, fault_t::SLICE_LEFT);
     }, options_.others);
   }
@@ -379,6 +380,7 @@ class Campaign final {
   void NoNetwork();
   void LostRoute();
   void BadReload();
+  [[nodiscard]] std::string Spoilt(const std::string& task, int way);
 
   const Options options_;
   std::mt19937 random_;
@@ -502,24 +504,53 @@ void Campaign::LostRoute() {
   }, options_.others, true);
 }
 
+// Certainly bad, each way in turn.
+std::string Campaign::Spoilt(const std::string& task, int way) {
+  const auto cut_before = [&](std::size_t end) { return task.substr(0, Below(static_cast<int>(end))); };
+  const auto with = [&task](const std::string& good, const std::string& bad) {
+    return std::string(task).replace(task.find(good), good.size(), bad);
+  };
+  switch (way % 4) {
+    case 0:
+      return cut_before(task.find("\ntask:"));  // which is required
+    case 1:
+      return cut_before(task.size()) + "\nno_such_key: 1\n";
+    case 2:
+      return with("dt: 0.1", "dt: .nan");
+    default:
+      return with("\ntransitions: ", "\ntransitions: /there_is_none");
+  }
+}
+
 void Campaign::BadReload() {
   Rig rig(DemoTask());
   Row& row = Begin("Reload of a bad task file", options_.others);
-  const std::string path = rig.task_path();
-  std::ostringstream good;
-  good << std::ifstream(path).rdbuf();
+  const std::string path = rig.task_path(), good = DemoTask();
   Tries(row, rig, [&](int i) {
-    std::ofstream(path) << good.str().substr(0, static_cast<std::size_t>(Below(static_cast<int>(good.str().size()))));
+    const certifier_status_v2_t before = *rig.witness().status();
+    const auto& now = rig.witness().status();
+    std::ofstream(path) << Spoilt(good, i / 2);
     if (i % 2 == 0)
       rig.Signal(Rig::kCertifier, SIGHUP);
     else
       rig.Command(command_t::RELOAD);
-    rig.Listen(milliseconds(200));
-    std::ofstream(path) << good.str();
+    const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
+    Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
+    const std::int64_t certificates = rig.witness().certificates();
+    const auto certifies = [&] { return rig.witness().certificates() > certificates; };
+    Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
+    rig.Listen(kHeartbeat);
+    Demand(row, now->failed_reloads == before.failed_reloads + 1, "it was not refused once");
+    Demand(row, GetText(now->message).starts_with("the last reload failed"), "the heartbeat does not say so");
+    Demand(row, now->version == before.version, "it raised the version");
+    const Digest digest = GetDigest(before.config_digest);
+    Demand(row, GetDigest(rig.witness().last_certified()->config_digest) == digest, "it is certified under another task");
+
+    std::ofstream(path) << good;
+    rig.Command(command_t::RELOAD);
+    const auto taken = [&] { return now->version > before.version; };
+    Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
   }, options_.others);
-  if (rig.witness().status())
-    Remark(row, std::to_string(rig.witness().status()->failed_reloads) + " reloads refused, version " +
-                    std::to_string(rig.witness().status()->version) + " in force");
 }
 
 std::string Table(const std::vector<Row>& rows, const Options& options) {
