@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::chrono::seconds kRecovers{20};
 constexpr std::chrono::milliseconds kLastWords{50};  // what a process sent before it ended has been heard then
-constexpr std::chrono::seconds kDriveAtMost{9};      // it is near its goal then
+constexpr std::chrono::seconds kDriveAtMost{6};      // at the next Heal; it takes ten, and a try and a Heal two each
 constexpr std::chrono::seconds kSilent{5};  // a robot whose clock went back waits until it is where it was
 constexpr std::size_t kTailBytes = 1000;
 
