@@ -54,15 +54,15 @@ class Rig final {
   void Listen(std::chrono::milliseconds time);
   [[nodiscard]] bool ListenUntil(const std::function<bool()>& done, std::chrono::milliseconds patience);
 
-  /** Starts what is dead and the drive of a robot that is silent, resets what is latched, and waits until the certifier is
-  OK, the robot executes a plan that was certified since, and the logger records.
+  /** Starts what is dead and the drive of a robot that is silent, resets what is latched, and waits until the certifier
+  is OK, the robot executes a plan that was certified since, and the logger records.
   @return empty, or what does not come back. */
   [[nodiscard]] std::string Heal();
   /** Ends the robot's drive and begins another. */
   void DriveAnew();
 
-  /** Events that logs lack, found since the last call: of the present logger's those that it has confirmed, as far as was
-  heard; of one before it also those that stood in them when the next was started, once more after that one has mended
+  /** Events that logs lack, found since the last call: of the present logger's those that it has confirmed, as far as
+  was heard; of one before it also those that stood in them when the next was started, once more after that one has mended
   them. What a logger cannot write it does not confirm. */
   [[nodiscard]] std::int64_t TakeLost();
   /** Holds all logs against the databases of their directories (logger/check.h). No logger may run.
@@ -98,7 +98,7 @@ class Rig final {
   std::unique_ptr<Bus> heard_, signed_;
   std::unique_ptr<Witness> witness_;
   std::array<std::unique_ptr<ChildProcess>, kRoles> processes_;
-  std::array<int, kRoles> ended_by_{};     // End's signal
+  std::array<int, kRoles> ended_by_{};    // End's signal
   std::array<bool, kRoles> is_judged_{};  // by LookAtEnd
   std::vector<std::string> bad_endings_;
   std::array<std::unique_ptr<ClockFile, UnmapClockFile>, kRoles> clocks_;
