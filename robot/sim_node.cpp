@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
@@ -94,9 +93,9 @@ void RobotSimNode::OnCertified(const Received& received) {
 void RobotSimNode::OnFault(const Received& received) {
   const auto fault = Decoded<fault_t>(received.bytes);
   if (!fault || !StopsTheRobot(fault->cause)) return;
-  const FaultId id(fault->utime, fault->sequence);
-  if (std::exchange(last_fault_, id) == id) return;  // said again: it has halted the robot already
-  halted_utime_ = received.utime;
+  // The certifier repeats a fault until it hears the reset, which the robot may have heard before.
+  if (IsNotAfter(fault->utime, reset_utime_, received.utime, config_.gate)) return;
+  halted_utime_ = fault->utime;
   if (guard_.halted()) return;
   const std::int64_t plan_id = executing_plan_id();
   const int step = executing_step();
@@ -111,9 +110,11 @@ void RobotSimNode::OnCommand(const Received& received) {
   if (const Stamp stamp = Judge(command->utime, received.utime, config_.gate); !stamp.fault.empty())
     return spdlog::warn("{}: refused: {}", config_.bus.command, stamp.fault);
   if (command->kind == command_t::RELOAD) return Reload();
-  if (command->kind != command_t::RESET || !guard_.halted()) return;
-  if (IsNotAfter(command->utime, halted_utime_, received.utime, config_.gate))
+  if (command->kind != command_t::RESET) return;
+  if (guard_.halted() && IsNotAfter(command->utime, halted_utime_, received.utime, config_.gate))
     return spdlog::warn("{}: refused: a reset from before the robot was halted", config_.bus.command);
+  reset_utime_ = command->utime;
+  if (!guard_.halted()) return;
   guard_.Reset();
   PublishEvent(received.utime, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
 }

@@ -100,9 +100,7 @@ class RobotSimNode final : public Node {
   Reloading<std::optional<Config>> reload_;
 
   std::vector<double> state_;
-  using FaultId = std::pair<std::int64_t, std::int64_t>;  // utime, sequence: the certifier repeats a fault until the reset
-  std::optional<FaultId> last_fault_;
-  std::int64_t halted_utime_ = 0;  // by a fault or the guard, the last time
+  std::int64_t halted_utime_ = 0, reset_utime_ = 0;  // the last time: by a fault or the guard; by a person
   int step_ = 0;  // of the executing plan: the control applied from the last boundary on
   std::optional<std::int64_t> start_utime_;
   std::int64_t boundaries_ = 0, transitions_ = 0, events_ = 0;

@@ -350,8 +350,9 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.elapsed_p99_us = ElapsedPercentile(0.99);
   status.elapsed_max_us = ElapsedPercentile(1);
   SetText(status.message, WhyNotOk());
-  sender_.Send(channels_.status, status);
+  // First what a robot that has just begun has to know, then what a person reads and resets.
   if (watch_.fault() && clocks_.steady() >= next_announcement_us_) SendFault();
+  sender_.Send(channels_.status, status);
 }
 
 double CertifierNode::ElapsedPercentile(double fraction) const {

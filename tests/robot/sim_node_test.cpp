@@ -306,6 +306,7 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
   rig.RunTo(25);
   EXPECT_EQ(rig.states[25].mode, robot_state_t::EXECUTING);
   ++fault.sequence;
+  fault.utime = BoundaryTime(25);
   fault.cause = fault_t::SLICE_LEFT;
   send("FAULT", fault);
   rig.RunTo(26);
@@ -317,6 +318,26 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
   send("COMMAND", reset);
   rig.RunTo(28);
   EXPECT_EQ(rig.Count(execution_event_t::RESET), 2);
+}
+
+// It begins while the certifier has a fault latched, and hears of the reset first.
+TEST(RobotSim, AFaultFromBeforeTheLastResetIsOver) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  const auto send = [&](const std::string& channel, const auto& message) { rig.SendRaw(channel, Bytes(Encode(message))); };
+  rig.RunTo(1);
+  command_t reset{};
+  reset.kind = command_t::RESET;
+  reset.utime = BoundaryTime(1);
+  send("COMMAND", reset);
+  fault_t fault{};
+  fault.cause = fault_t::SLICE_LEFT;
+  for (const std::int64_t after : {-1, 0, 1}) {
+    fault.utime = reset.utime + after;
+    send("FAULT", fault);
+    rig.RunTo(static_cast<int>(3 + after));
+    EXPECT_EQ(rig.Count(execution_event_t::HALTED), after > 0) << after;
+  }
 }
 
 TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
