@@ -184,7 +184,7 @@ void Recorder::Open(std::int64_t now_us, const std::string& continues) {
   try {
     database_.BeginRun(file, now_us, continues);
   } catch (const DatabaseError&) {
-    directory_.Remove(file);  // nothing is ever written to a log file that no run knows: it would not be mended
+    directory_.Remove(file);  // empty, and no run knows it
     throw;
   }
   log_ = std::move(log);
@@ -379,16 +379,22 @@ bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
   if (HasRoom(bytes)) return true;
   other_bytes_ = directory_.LogBytes(log_file_);
   try {
-    std::vector<std::pair<std::string, std::int64_t>> ended;
+    struct Ended {
+      std::int64_t start_utime;
+      std::string file;
+      std::int64_t bytes;
+    };
+    std::vector<Ended> ended;
     std::int64_t ended_bytes = 0;
     for (const RunRow& run : database_.Runs()) {
       const auto size = directory_.Bytes(run.log_file);
       if (!run.end_utime || run.log_file == log_file_ || !size) continue;
-      ended.emplace_back(run.log_file, *size);
+      ended.push_back({run.start_utime, run.log_file, *size});
       ended_bytes += *size;
     }
     if (!HasRoom(bytes - ended_bytes)) return false;
-    for (const auto& [file, size] : ended) {
+    std::ranges::stable_sort(ended, {}, &Ended::start_utime);  // an old log may have got its run late
+    for (const auto& [start_utime, file, size] : ended) {
       if (HasRoom(bytes)) break;
       database_.MarkLogDeleted(file, now_us);
       if (!directory_.Remove(file)) continue;

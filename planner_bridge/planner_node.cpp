@@ -71,7 +71,8 @@ void PlannerNode::OnRobotState(const Received& received) {
 
 // One from the future would keep out all that come before that time.
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
-  return state.num_states == config_.problem->model->num_states() && !IsNotAfter(state.utime, last_state_utime_, now_us, config_.gate) &&
+  return state.num_states == config_.problem->model->num_states() &&
+         !IsNotAfter(state.utime, last_state_utime_, now_us, config_.gate) &&
          Judge(state.utime, now_us, config_.gate).freshness != Freshness::kFuture &&
          robot_state_t::STANDING <= state.mode && state.mode <= robot_state_t::FINISHED &&
          std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });

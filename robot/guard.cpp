@@ -6,6 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <stdexcept>
+#include <tuple>
 
 #include "lcmtypes/seal.h"
 
@@ -208,10 +209,9 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     if (!verdict.ok()) return verdict;
     last_accepted_ = certified->plan.plan_id;
     last_expiry_ = std::max(last_expiry_, certified->expires_utime);
-    if (IsExpected(*certified)) {
-      options_.config_digest = GetDigest(certified->config_digest);
-      options_.model_digest = GetDigest(certified->model_digest);
-      expected_.clear();
+    if (const auto task = FindExpected(*certified); task != expected_.end()) {
+      std::tie(options_.config_digest, options_.model_digest) = *task;
+      expected_.erase(expected_.begin(), task + 1);
     }
     pending_ = std::move(certified);
   } catch (...) {
@@ -237,9 +237,8 @@ GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
   return {};
 }
 
-bool Guard::IsExpected(const certified_plan_t& certified) const {
-  const std::pair digests(GetDigest(certified.config_digest), GetDigest(certified.model_digest));
-  return std::ranges::find(expected_, digests) != expected_.end();
+std::vector<Guard::Task>::const_iterator Guard::FindExpected(const certified_plan_t& certified) const {
+  return std::ranges::find(expected_, Task(GetDigest(certified.config_digest), GetDigest(certified.model_digest)));
 }
 
 GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_us) const {
@@ -248,14 +247,16 @@ GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_
   if (verdict.ok()) verdict = CheckSeal(certified);
   if (verdict.ok()) verdict = ExamineNumbers(certified);
   if (verdict.ok()) verdict = CheckExpiry(certified, now_us);
-  const bool expected = IsExpected(certified);
+  const bool expected = FindExpected(certified) != expected_.end();
   if (verdict.ok() && options_.config_digest && !expected)
     verdict = CheckDigest(GuardCause::kConfigDigest, "config_digest", GetDigest(certified.config_digest),
                           *options_.config_digest);
   if (verdict.ok() && options_.model_digest && !expected)
     verdict = CheckDigest(GuardCause::kModelDigest, "model_digest", GetDigest(certified.model_digest),
                           *options_.model_digest);
-  if (verdict.ok() && last_accepted_ && plan.plan_id <= *last_accepted_ && now_us <= last_expiry_)
+  const bool executes = executing_ && plan.plan_id == executing_->plan.plan_id;
+  const bool is_older = last_accepted_ && plan.plan_id <= *last_accepted_;
+  if (verdict.ok() && (executes || (is_older && now_us <= last_expiry_)))
     verdict = Refuse(GuardCause::kReplayed,
                      Sentence("plan %" PRId64 " is not newer than plan %" PRId64, plan.plan_id, *last_accepted_));
   return verdict;

@@ -57,7 +57,7 @@ enum class GuardCause {
   kExpired,            ///< Also from TryStart.
   kConfigDigest,       ///< Certified under another configuration.
   kModelDigest,        ///< Certified for another model.
-  kReplayed,           ///< plan_id is not newer than the last accepted one, while an accepted one may be valid still.
+  kReplayed,           ///< plan_id is the executing plan's, or not newer than the last accepted one's, while one may be valid.
   // Accept and TryStart
   kHalted,             ///< Until Reset.
   // TryStart
@@ -109,14 +109,16 @@ class Guard final {
   /** Checks one message of PLAN_CERTIFIED; if it passes, it becomes the pending plan.
   In this order: not halted, signed where there is a key, decoded whole and nothing left over, dimensions, step period,
   the seal (lcmtypes/seal.h: plan digest, certificate digest, nothing in what is not in use), finite numbers, lower <=
-  upper in every slice, not expired (now_us <= expires_utime), expected config and model digest, plan_id newer than the
-  last accepted, unless all that were accepted have expired: no plan_id keeps later ones out for good. The seal covers every bit of the message. Cost: that of the seal, under 0.1 ms.
+  upper in every slice, not expired (now_us <= expires_utime), expected config and model digest, plan_id not that of the
+  executing plan and newer than the last accepted, unless all that were accepted have expired: no plan_id keeps later ones
+  out for good. The seal covers every bit of the message. Cost: that of the seal, under 0.1 ms.
   @param now_us robot's clock. */
   [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
 
   /** Starts the pending plan at a step boundary if |start_utime - boundary_utime| <= step_us / 2, it has not expired
-  (now_us <= expires_utime: a robot that was held up comes to a boundary late), and the measured state lies in X_0 = {x : |x - initial_center| <=
-  initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN lies in nothing.
+  (now_us <= expires_utime: a robot that was held up comes to a boundary late), and the measured state lies in
+  X_0 = {x : |x - initial_center| <= initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN
+  lies in nothing.
   kNothingPending and kTooEarly change nothing; after any other refusal nothing is pending. Whatever the verdict, a plan
   that was executing goes on unless the new one started. No allocation if it passes. */
   [[nodiscard]] GuardVerdict TryStart(std::int64_t boundary_utime, std::int64_t now_us,
@@ -133,8 +135,9 @@ class Guard final {
   a person to call. */
   void Halt() noexcept;
   void Reset() noexcept { halted_ = false; }
-  /** The task has been read again: plans certified under this configuration and for this model are accepted too. It is not
-  known whether the certifier has taken it: from the first such plan on, only that configuration's are accepted. */
+  /** The task has been read again: plans certified under this configuration and for this model are accepted too. It is
+  not known whether the certifier has taken it, or will: from the first such plan on, those of what was read before are
+  not accepted any more. */
   void Expect(const Digest& config_digest, const Digest& model_digest);
   [[nodiscard]] bool halted() const { return halted_; }
 
@@ -143,9 +146,11 @@ class Guard final {
   [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
 
  private:
+  using Task = std::pair<Digest, Digest>;  // config and model
+
   [[nodiscard]] GuardVerdict Authenticated(Bytes& bytes);
   [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
-  [[nodiscard]] bool IsExpected(const certified_plan_t& certified) const;
+  [[nodiscard]] std::vector<Task>::const_iterator FindExpected(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
   [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
@@ -154,7 +159,7 @@ class Guard final {
   [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
 
   GuardOptions options_;
-  std::vector<std::pair<Digest, Digest>> expected_;  // config and model, by Expect
+  std::vector<Task> expected_;  // by Expect
   std::optional<Authenticator> authenticator_;
   bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;  // plan_id

@@ -113,7 +113,7 @@ void RobotSimNode::OnCommand(const Received& received) {
   if (command->kind != command_t::RESET) return;
   if (guard_.halted() && IsNotAfter(command->utime, halted_utime_, received.utime, config_.gate))
     return spdlog::warn("{}: refused: a reset from before the robot was halted", config_.bus.command);
-  reset_utime_ = command->utime;
+  reset_utime_ = std::min(command->utime, received.utime);  // a clock that goes ahead clears no fault to come
   if (!guard_.halted()) return;
   guard_.Reset();
   PublishEvent(received.utime, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
@@ -129,7 +129,7 @@ void RobotSimNode::TakeReload() {
 }
 
 void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
-  if (executing()) FinishStep(utime);
+  if (executing()) FinishStep(utime, now_us);
   ReportContacts(utime);
   ReportGoal(utime);
   ending_ = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
@@ -147,7 +147,7 @@ void RobotSimNode::LogProgress(std::int64_t utime) {
                DistanceToGoal(), executing() ? "" : ", standing");
 }
 
-void RobotSimNode::FinishStep(std::int64_t utime) {
+void RobotSimNode::FinishStep(std::int64_t utime, std::int64_t now_us) {
   const candidate_plan_t& plan = guard_.executing()->plan;
   const std::int64_t plan_id = plan.plan_id;
   const std::span<const double> control(plan.control[step_], static_cast<std::size_t>(plan.num_inputs));
@@ -165,7 +165,7 @@ void RobotSimNode::FinishStep(std::int64_t utime) {
   }
   PublishEvent(utime, execution_event_t::STEP_OUTSIDE, plan_id, step_, verdict.value,
                "emergency stop: " + verdict.message, verdict.coordinate);
-  halted_utime_ = utime;
+  halted_utime_ = now_us;
   Stand();
 }
 

@@ -71,7 +71,7 @@ class RobotSimNode final : public Node {
   void OnCommand(const Received& received);
   void TakeReload();
   void Boundary(std::int64_t utime, std::int64_t now_us);
-  void FinishStep(std::int64_t utime);
+  void FinishStep(std::int64_t utime, std::int64_t now_us);
   void ReportContacts(std::int64_t utime);
   void ReportGoal(std::int64_t utime);
   void StartPending(std::int64_t utime, std::int64_t now_us);

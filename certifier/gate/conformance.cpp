@@ -27,8 +27,10 @@ std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& st
   std::optional<Departure> departure;
   if (executing && follows && last_.plan_id >= 0) departure = Compare(last_.plan_id, last_.step + 1, measured);
   if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured);
-  // A late one says nothing of where the robot is now; one that began anew counts from 0, at a later time.
-  if (state.sequence > last_.sequence || state.utime > last_.utime)
+  // A late one says nothing of where the robot is now. One that began anew counts from 0, perhaps by a clock set back.
+  const bool is_newer = state.sequence > last_.sequence || state.utime > last_.utime;
+  const auto behind = static_cast<std::uint64_t>(last_.sequence) - static_cast<std::uint64_t>(state.sequence);
+  if (is_newer || behind >= kLate)
     before_ = std::exchange(
         last_, {state.sequence, state.utime, executing ? state.executing_plan_id : -1, state.executing_step});
   return departure;

@@ -20,6 +20,7 @@ namespace forereach {
 class Conformance final {
  public:
   static constexpr std::size_t kPlans = 64;  ///< The last certified ones are remembered, and the one that is executed.
+  static constexpr int kLate = 16;           ///< A state is late by fewer messages; else the robot has begun anew.
 
   struct Departure {
     std::int64_t plan_id;
@@ -29,7 +30,7 @@ class Conformance final {
 
   Conformance() { plans_.reserve(kPlans); }
 
-  /** In the place of one of the same plan_id, unless that is the one which is executed: a guard takes no plan_id twice. */
+  /** In the place of one of the same plan_id, unless that is executed: a guard does not take the plan_id it executes. */
   void Remember(const certified_plan_t& certified);
 
   /** Holds a usable state of the robot against the slice of the step that it says it is at, and, if it has gone on by one

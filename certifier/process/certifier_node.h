@@ -6,8 +6,8 @@ the grounds of decisions takes effect as it arrives: obstacles, the robot's stat
 
 Unless gate.arming is none, nothing is certified before the robot's state is heard. A fault (watch.h, conformance.h, a
 falsified declaration) is sent on bus.channels.fault, with every heartbeat again, and from then on every candidate is
-rejected until a person sends a reset, which has to be later than the fault. A reload reads the task file again, beside the running work, and takes it whole or
-not at all; what cannot change while it runs, WhyNotTaken says.
+rejected until a person sends a reset, which has to be later than the fault. A reload reads the task file again, beside
+the running work, and takes it whole or not at all; what cannot change while it runs, WhyNotTaken says.
 
 First goes out the certified plan, which the robot waits for, then the decision: a planner that hears of a certificate
 knows that the plan was handed to the bus before. */

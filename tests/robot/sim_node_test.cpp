@@ -340,6 +340,43 @@ TEST(RobotSim, AFaultFromBeforeTheLastResetIsOver) {
   }
 }
 
+TEST(RobotSim, AResetFromAClockThatGoesAheadClearsNoFaultToCome) {
+  Rig rig(PointMassTask());
+  rig.RunTo(1);
+  command_t reset{};
+  reset.kind = command_t::RESET;
+  reset.utime = BoundaryTime(1) + 50'000;  // gate.max_ahead_ms is 50
+  rig.SendRaw("COMMAND", Bytes(Encode(reset)));
+  rig.RunTo(2);
+  fault_t fault{};
+  fault.cause = fault_t::SLICE_LEFT;
+  fault.utime = BoundaryTime(2);
+  ASSERT_LT(fault.utime, reset.utime);
+  rig.SendRaw("FAULT", Bytes(Encode(fault)));
+  rig.RunTo(3);
+  EXPECT_EQ(rig.Count(execution_event_t::HALTED), 1);
+}
+
+TEST(RobotSim, WhoHaltsLateIsResetBySomethingLaterStill) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
+  certified.slice_upper[2][2] = 0.2;  // its speed is 0.3 then
+  rig.Send(certified);
+  rig.RunTo(1);
+  rig.RunTo(6, 49 * kPeriod / 10);  // held up: boundary 3 is handled shortly before the sixth
+  ASSERT_EQ(rig.Count(kOutside), 1);
+  for (const int at : {4, 11}) {
+    command_t reset{};
+    reset.kind = command_t::RESET;
+    reset.utime = BoundaryTime(at);
+    rig.SendRaw("COMMAND", Bytes(Encode(reset)));
+    rig.RunTo(at + 8);
+    EXPECT_EQ(rig.Count(execution_event_t::RESET), at == 4 ? 0 : 1) << at;
+  }
+}
+
 TEST(RobotSim, ANewPlanTakesOverAtItsBoundaryInTheMiddleOfTheOld) {
   const Config config = PointMassTask();
   Rig rig(config);
