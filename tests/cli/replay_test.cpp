@@ -17,6 +17,7 @@
 #include "tests/cli/program.h"
 #include "tests/cli/signed_log.h"
 #include "tests/gate/small_task.h"
+#include "tests/logger/logs.h"
 #include "tests/scratch.h"
 
 namespace forereach {
@@ -48,16 +49,11 @@ class ReplayTest : public testing::Test {
   // The path of a log that is not there yet.
   std::string NewLog() { return scratch_ / std::to_string(logs_++); }
 
-  // Copies the log, each event changed by `edit`.
+  // A copy of the log, as CopyLog changes it.
   template <class Edit>
   std::string Edited(Edit edit) {
     const std::string path = NewLog();
-    EventLogReader reader(kLog);
-    EventLogWriter writer(path);
-    LogEvent event;
-    while (reader.Next(event) == LogStatus::kEvent)
-      if (edit(event)) writer.Append(event.utime, event.channel, event.data);
-    EXPECT_TRUE(writer.Flush());
+    CopyLog(kLog, path, edit);
     return path;
   }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
@@ -41,6 +43,17 @@ inline LogContents ReadLog(const std::string& path) {
   contents.corruptions = reader.corruptions();
   contents.skipped_bytes = reader.skipped_bytes();
   return contents;
+}
+
+/** Copies a log, each event changed by `edit`, which leaves it out where it returns false. */
+template <class Edit>
+void CopyLog(const std::string& from, const std::string& to, Edit edit) {
+  EventLogReader reader(from);
+  EventLogWriter writer(to);
+  LogEvent event;
+  while (reader.Next(event) == LogStatus::kEvent)
+    if (edit(event)) writer.Append(event.utime, event.channel, event.data);
+  EXPECT_TRUE(writer.Flush());
 }
 
 inline candidate_plan_t MakeCandidate(std::int64_t sequence, std::int64_t plan_id, const std::string& source = "test") {

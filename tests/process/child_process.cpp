@@ -2,15 +2,12 @@
 
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <system_error>
 #include <thread>
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -19,14 +16,6 @@ namespace forereach {
 namespace {
 
 constexpr std::chrono::milliseconds kPoll{5};
-
-std::string EmptyFile() {
-  std::string path = testing::TempDir() + "/forereach-output-XXXXXX";
-  const int file = mkstemp(path.data());
-  if (file < 0) throw std::system_error(errno, std::generic_category(), path);
-  close(file);
-  return path;
-}
 
 std::string TextOf(const std::string& path) {
   std::ifstream file(path);
@@ -45,7 +34,7 @@ std::string TextOf(const std::string& path) {
 }  // namespace
 
 ChildProcess::ChildProcess(const std::vector<std::string>& command)
-    : output_path_(EmptyFile()), error_path_(EmptyFile()) {
+    : output_path_(scratch_.Write("output", "")), error_path_(scratch_.Write("error", "")) {
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
@@ -59,9 +48,6 @@ ChildProcess::~ChildProcess() {
     kill(pid_, SIGKILL);
     waitpid(pid_, &status_, 0);
   }
-  std::error_code ignored;
-  std::filesystem::remove(output_path_, ignored);
-  std::filesystem::remove(error_path_, ignored);
 }
 
 bool ChildProcess::Reap() {

@@ -8,6 +8,8 @@
 
 #include <sys/types.h>
 
+#include "tests/scratch.h"
+
 namespace forereach {
 
 /** How long a test waits for something that has to happen before it fails. Generous: it only costs where it fails. */
@@ -46,7 +48,8 @@ class ChildProcess final {
  private:
   bool Reap();
 
-  std::string output_path_, error_path_;
+  const ScratchDirectory scratch_;
+  const std::string output_path_, error_path_;
   pid_t pid_ = -1;
   bool ended_ = false;
   int status_ = 0;

@@ -151,6 +151,20 @@ class Rig {
 
 const std::vector<double> kOrigin{0, 0, 0, 0};
 
+// Its speed is 0.3 at the second step, and may be 0.2.
+certified_plan_t PlanThatIsLeft(const Config& config) {
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
+  certified.slice_upper[2][2] = 0.2;
+  return certified;
+}
+
+command_t ResetAt(std::int64_t utime) {
+  command_t command{};
+  command.kind = command_t::RESET;
+  command.utime = utime;
+  return command;
+}
+
 TEST(RobotSim, StandsAndReportsAtEveryBoundary) {
   Rig rig(PointMassTask());
   rig.RunTo(5);
@@ -290,9 +304,7 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
   EXPECT_EQ(rig.Count(kRefused), 1);
   EXPECT_EQ(rig.states[22].mode, robot_state_t::STANDING);
 
-  command_t reset{};
-  reset.kind = command_t::RESET;
-  reset.utime = BoundaryTime(22) - 500'000;  // gate.max_age_ms is 500
+  command_t reset = ResetAt(BoundaryTime(22) - 500'000);  // gate.max_age_ms is 500
   send("COMMAND", reset);
   rig.RunTo(23);
   EXPECT_EQ(rig.Count(execution_event_t::RESET), 0);
@@ -326,9 +338,7 @@ TEST(RobotSim, AFaultFromBeforeTheLastResetIsOver) {
   Rig rig(config);
   const auto send = [&](const std::string& channel, const auto& message) { rig.SendRaw(channel, Bytes(Encode(message))); };
   rig.RunTo(1);
-  command_t reset{};
-  reset.kind = command_t::RESET;
-  reset.utime = BoundaryTime(1);
+  const command_t reset = ResetAt(BoundaryTime(1));
   send("COMMAND", reset);
   fault_t fault{};
   fault.cause = fault_t::SLICE_LEFT;
@@ -343,9 +353,7 @@ TEST(RobotSim, AFaultFromBeforeTheLastResetIsOver) {
 TEST(RobotSim, AResetFromAClockThatGoesAheadClearsNoFaultToCome) {
   Rig rig(PointMassTask());
   rig.RunTo(1);
-  command_t reset{};
-  reset.kind = command_t::RESET;
-  reset.utime = BoundaryTime(1) + 50'000;  // gate.max_ahead_ms is 50
+  const command_t reset = ResetAt(BoundaryTime(1) + 50'000);  // gate.max_ahead_ms is 50
   rig.SendRaw("COMMAND", Bytes(Encode(reset)));
   rig.RunTo(2);
   fault_t fault{};
@@ -361,17 +369,12 @@ TEST(RobotSim, WhoHaltsLateIsResetBySomethingLaterStill) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
-  certified.slice_upper[2][2] = 0.2;  // its speed is 0.3 then
-  rig.Send(certified);
+  rig.Send(PlanThatIsLeft(config));
   rig.RunTo(1);
   rig.RunTo(6, 49 * kPeriod / 10);  // held up: boundary 3 is handled shortly before the sixth
   ASSERT_EQ(rig.Count(kOutside), 1);
   for (const int at : {4, 11}) {
-    command_t reset{};
-    reset.kind = command_t::RESET;
-    reset.utime = BoundaryTime(at);
-    rig.SendRaw("COMMAND", Bytes(Encode(reset)));
+    rig.SendRaw("COMMAND", Bytes(Encode(ResetAt(BoundaryTime(at)))));
     rig.RunTo(at + 8);
     EXPECT_EQ(rig.Count(execution_event_t::RESET), at == 4 ? 0 : 1) << at;
   }
@@ -431,9 +434,7 @@ TEST(RobotSim, LeavingTheSliceStopsItAtOnce) {
   const Config config = PointMassTask();
   Rig rig(config);
   rig.RunTo(0);
-  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
-  certified.slice_upper[2][2] = 0.2;  // its speed is 0.3 then
-  rig.Send(certified);
+  rig.Send(PlanThatIsLeft(config));
   rig.RunTo(6);
   EXPECT_THAT(rig.EventKinds(), ElementsAre(kAccepted, kStarted, kInside, kOutside));
   const execution_event_t& outside = rig.First(kOutside);
