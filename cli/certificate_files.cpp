@@ -12,6 +12,7 @@
 #include "certifier/gate/transition_message.h"
 #include "certifier/task/files.h"
 #include "certifier/task/json_file.h"
+#include "certifier/task/key.h"
 #include "cli/decision_json.h"
 #include "cli/restarts.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -243,19 +244,13 @@ class LogReading {
             {"plan with digest " + ToHex(digest), {}, "decided as certified, but the log has no certified plan", {}});
     file.not_certificates += static_cast<std::size_t>(
         std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
-    Add(authenticator_.refusals(), passed_over_.not_authentic);
+    passed_over_.not_authentic += authenticator_.refusals();
   }
 
   [[nodiscard]] const std::map<Digest, std::int16_t>& outcomes() const { return outcomes_; }
   [[nodiscard]] const std::set<Digest>& plans() const { return plans_; }
 
  private:
-  static void Add(const Refusals& more, Refusals& sum) {
-    sum.unsigned_ones += more.unsigned_ones;
-    sum.forged += more.forged;
-    sum.replayed += more.replayed;
-  }
-
   void Take(const LogEvent& event) {
     if (!authenticator_.IsAuthentic(event)) return;
     if (event.channel == config_.bus.obstacles) {

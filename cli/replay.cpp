@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "certifier/gate/gate.h"
+#include "certifier/task/key.h"
 #include "cli/restarts.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"

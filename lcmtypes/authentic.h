@@ -67,6 +67,13 @@ enum class Authenticity { kAuthentic, kUnsigned, kForged, kReplayed };
 /** Messages refused, by reason. */
 struct Refusals {
   std::int64_t unsigned_ones = 0, forged = 0, replayed = 0;
+
+  Refusals& operator+=(const Refusals& more) {
+    unsigned_ones += more.unsigned_ones;
+    forged += more.forged;
+    replayed += more.replayed;
+    return *this;
+  }
 };
 
 class Authenticator final {

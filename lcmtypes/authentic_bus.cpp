@@ -40,11 +40,7 @@ class AuthenticBus final : public Bus {
   [[nodiscard]] std::int64_t dropped() const override { return bus_->dropped(); }
   [[nodiscard]] Refusals refusals() const override {
     Refusals sum;
-    for (const Authenticator& authenticator : authenticators_) {
-      sum.unsigned_ones += authenticator.refusals().unsigned_ones;
-      sum.forged += authenticator.refusals().forged;
-      sum.replayed += authenticator.refusals().replayed;
-    }
+    for (const Authenticator& authenticator : authenticators_) sum += authenticator.refusals();
     return sum;
   }
 

@@ -17,10 +17,6 @@ bool LogAuthenticator::IsAuthentic(const LogEvent& event) {
   return authenticator_->Check(event.channel, event.data).first == Authenticity::kAuthentic;
 }
 
-std::optional<Key256> KeyOf(const BusOptions& options) {
-  return options.key.empty() ? std::nullopt : std::optional(LoadKey(options.key));
-}
-
 std::string InWords(const Refusals& refusals) {
   const auto& [unsigned_ones, forged, replayed] = refusals;
   const std::int64_t all = unsigned_ones + forged + replayed;

@@ -31,9 +31,6 @@ class LogAuthenticator final {
   std::optional<Authenticator> authenticator_;  // from the first message on a signed channel on
 };
 
-/** The key that bus.key names; nothing if it names none. @throws KeyError if it cannot be read. */
-[[nodiscard]] std::optional<Key256> KeyOf(const BusOptions& options);
-
 /** "3 (unsigned 1, forged 1, replayed 1)"; empty if there are none. */
 [[nodiscard]] std::string InWords(const Refusals& refusals);
 

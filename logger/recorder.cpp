@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "certifier/task/key.h"
+
 namespace forereach {
 namespace {
 

@@ -9,6 +9,7 @@
 
 #include "certifier/gate/stamp.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/key.h"
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -34,7 +35,7 @@ GuardOptions OptionsOf(const Config& config) {
   options.step_us = Microseconds(config.robot.step_period_ms);
   options.config_digest = config.digest;
   options.model_digest = config.model_digest;
-  if (!config.bus.key.empty()) options.key = LoadKey(config.bus.key);
+  options.key = KeyOf(config.bus);
   options.channel = config.bus.certified;
   return options;
 }

@@ -77,7 +77,6 @@ class Gate final {
   /** Counts so far and the digests in force; the rest is the caller's. */
   [[nodiscard]] certifier_status_v2_t Status(std::int64_t now_us) const;
   [[nodiscard]] const Digest& model_digest() const { return model_digest_; }
-  [[nodiscard]] const Digest& declaration_digest() const { return declaration_digest_; }
   [[nodiscard]] Digest observations_digest() const { return observations_digest_; }
   [[nodiscard]] Digest obstacles_digest() const { return obstacles_.digest(); }
 

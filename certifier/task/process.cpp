@@ -6,6 +6,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "certifier/task/key.h"
 #include "lcmtypes/authentic_bus.h"
 
 namespace forereach {
@@ -24,8 +25,9 @@ int Guarded(const std::string& name, const std::function<int()>& body) {
 
 std::unique_ptr<Bus> OpenBus(const BusOptions& options, const std::string& name, Clock clock) {
   std::unique_ptr<Bus> bus = OpenBus(options.url, clock);
-  if (options.key.empty()) return bus;
-  return Authenticate(std::move(bus), LoadKey(options.key), name, options.signed_channels(), std::move(clock));
+  const std::optional<Key256> key = KeyOf(options);
+  if (!key) return bus;
+  return Authenticate(std::move(bus), *key, name, options.signed_channels(), std::move(clock));
 }
 
 void BusArguments::AddTo(CLI::App& app) {
