@@ -20,6 +20,7 @@
 #include "certifier/task/config.h"
 #include "cli/commands.h"
 #include "lcmtypes/bus.h"
+#include "lcmtypes/udp_receiver.h"
 
 namespace forereach {
 namespace {
@@ -119,17 +120,12 @@ Check CheckRoundTrip(const std::string& url) {
           "messages are lost: raise the receive buffer limit, see above"};
 }
 
-std::string GroupOf(const std::string& url) {
-  const std::size_t begin = url.find("//"), end = url.find(':', begin);
-  return begin == std::string::npos || end == std::string::npos ? "239.255.76.67" : url.substr(begin + 2, end - begin - 2);
-}
-
 int Diagnose(const std::string& url, bool json) {
   const std::map<std::string, std::string> versions{
       {"forereach", FOREREACH_VERSION}, {"lcm", BusVersion()}, {"compiler", __VERSION__},
       {"eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
                     std::to_string(EIGEN_MINOR_VERSION)}};
-  const std::vector<Check> checks{CheckLoopback(), CheckRoute(GroupOf(url)), CheckBuffer(), CheckRoundTrip(url)};
+  const std::vector<Check> checks{CheckLoopback(), CheckRoute(ParseMulticastUrl(url).group), CheckBuffer(), CheckRoundTrip(url)};
   const bool good = std::ranges::all_of(checks, &Check::good);
   if (json) {
     nlohmann::json document{{"good", good}, {"versions", versions}, {"checks", nlohmann::json::array()}};

@@ -66,7 +66,7 @@ class WitnessBus final : public Bus {
 
   void Deliver(const std::string& channel, Bytes bytes, std::int64_t now_us) {
     if (channel == "PLAN_CANDIDATE") ++unanswered_[DigestOf(bytes)];
-    handlers_.at(channel)({channel, bytes, now_us});
+    handlers_.at(channel)({channel, bytes, now_us, bytes});
   }
 
   void RequireAllAnswered() const {

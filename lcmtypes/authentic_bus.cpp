@@ -23,7 +23,7 @@ class AuthenticBus final : public Bus {
     Authenticator& authenticator = authenticators_.emplace_back(key_, begun_us_);
     bus_->Subscribe(channel, [&authenticator, handler = std::move(handler)](const Received& received) {
       const auto [authenticity, message] = authenticator.Check(received.channel, received.bytes);
-      if (authenticity == Authenticity::kAuthentic) handler({received.channel, message, received.utime});
+      if (authenticity == Authenticity::kAuthentic) handler({received.channel, message, received.utime, received.bytes});
     });
   }
 
@@ -38,6 +38,7 @@ class AuthenticBus final : public Bus {
 
   int Dispatch(int timeout_ms) override { return bus_->Dispatch(timeout_ms); }
   [[nodiscard]] std::int64_t dropped() const override { return bus_->dropped(); }
+  [[nodiscard]] DatagramCounts datagrams() const override { return bus_->datagrams(); }
   [[nodiscard]] Refusals refusals() const override {
     Refusals sum;
     for (const Authenticator& authenticator : authenticators_) sum += authenticator.refusals();

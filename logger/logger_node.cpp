@@ -29,10 +29,10 @@ LoggerNode::LoggerNode(const Config& config, Bus& bus, std::ostream& out, FreeSp
 void LoggerNode::Receive(const Received& received) {
   if (received.channel != channels_.logger_status) last_heard_us_ = now_us_;
   if (queue_.size() < queue_size_) {
-    queue_.push_back({-1, received.utime, received.channel, {received.bytes.begin(), received.bytes.end()}});
+    queue_.push_back({-1, received.utime, received.channel, {received.raw.begin(), received.raw.end()}});
     return;
   }
-  Stream stream = recorder_.interpreter().Identify(received.channel, WithoutSignature(received.bytes)).first;
+  Stream stream = recorder_.interpreter().Identify(received.channel, WithoutSignature(received.raw)).first;
   if (overflow_.size() >= kMaxStreamsInOverflow && !overflow_.contains(stream)) stream = {"*", ""};
   ++overflow_[stream];
 }

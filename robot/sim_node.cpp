@@ -85,7 +85,7 @@ void RobotSimNode::Tick(std::int64_t now_us) {
 }
 
 void RobotSimNode::OnCertified(const Received& received) {
-  const GuardVerdict verdict = guard_.Accept(received.bytes, received.utime);
+  const GuardVerdict verdict = guard_.Accept(received.raw, received.utime);
   if (!verdict.ok()) return PublishRefusal(received.utime, verdict);
   ++accepted_;
   PublishEvent(received.utime, execution_event_t::ACCEPTED, verdict.plan_id, -1, 0, "the plan waits for its start");

@@ -318,7 +318,7 @@ class Campaign final {
     std::vector<std::pair<std::string, std::vector<std::uint8_t>>> heard;
     rig.open_bus().SubscribeUnchecked(".*", [&](const Received& r) {
       if (channels.signed_channels().contains(r.channel) && heard.size() < 2000)
-        heard.push_back({r.channel, {r.bytes.begin(), r.bytes.end()}});
+        heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
     });
     Tries(row, rig, [&](int) {
       heard.clear();

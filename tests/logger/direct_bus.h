@@ -24,7 +24,7 @@ class DirectBus final : public Bus {
       return true;
     }
     for (const auto& [pattern, handler] : handlers_)
-      if (pattern == ".*" || pattern == channel) handler({channel, bytes, now_us});
+      if (pattern == ".*" || pattern == channel) handler({channel, bytes, now_us, bytes});
     return true;
   }
   void Disconnect() { handlers_.clear(); }

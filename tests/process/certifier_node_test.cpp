@@ -142,7 +142,7 @@ class RefusingBus final : public Bus {
   bool Publish(const std::string&, Bytes) override { return false; }
   int Dispatch(int) override { return 0; }
   [[nodiscard]] std::int64_t dropped() const override { return 0; }
-  void Deliver(const std::string& channel, Bytes bytes) { handlers_.at(channel)(Received{channel, bytes, kNow}); }
+  void Deliver(const std::string& channel, Bytes bytes) { handlers_.at(channel)(Received{channel, bytes, kNow, bytes}); }
 
  private:
   std::map<std::string, Handler> handlers_;

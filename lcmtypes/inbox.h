@@ -1,0 +1,75 @@
+/** What has arrived on a bus and waits to be handed out: subscriptions, the screen, and two bounded queues. */
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lcmtypes/bus.h"
+
+namespace forereach {
+
+class Inbox final {
+ public:
+  /** @param screen null: every message is admitted. */
+  explicit Inbox(std::shared_ptr<Screen> screen) : screen_(std::move(screen)) {}
+
+  /** As Bus::Subscribe and, with `unchecked`, Bus::SubscribeUnchecked. */
+  void Subscribe(const std::string& channel, Bus::Handler handler, bool unchecked);
+
+  /** Takes a message in, if somebody wants it. From any one thread at a time. */
+  void Put(std::string_view channel, Bytes raw, std::int64_t utime) noexcept;
+
+  /** As Bus::Dispatch, for what has been put. */
+  int HandOut(int timeout_ms);
+
+  /** Gives the memory of a burst that has been handed out back to the system. That takes some milliseconds, so it is for who
+  has time. Of the thread that hands out. */
+  void GiveBack();
+
+  [[nodiscard]] std::int64_t dropped() const { return admitted_.dropped; }
+  [[nodiscard]] std::int64_t refused_dropped() const { return refused_.dropped; }
+
+ private:
+  struct Subscription {
+    std::string channel;
+    Bus::Handler handler;
+    bool unchecked;
+  };
+  using Subscriptions = std::vector<const Subscription*>;
+  struct Stored {
+    std::uint64_t number;  // in the order of arrival
+    std::string channel;
+    std::vector<std::uint8_t> raw;
+    std::size_t message_begin, message_bytes;  // inside raw
+    std::int64_t utime;
+    Subscriptions for_whom;
+  };
+  struct Queue {
+    const std::size_t max_messages, max_bytes;
+    std::deque<Stored> messages = {};
+    std::size_t bytes = 0;
+    std::atomic<std::int64_t> dropped = 0;
+
+    void Push(Stored stored);
+  };
+
+  [[nodiscard]] Subscriptions Wanting(std::string_view channel);
+
+  const std::shared_ptr<Screen> screen_;
+  std::mutex mutex_;  // guards subscriptions_, the queues and next_number_
+  std::condition_variable arrived_;
+  std::deque<Subscription> subscriptions_;  // grows only: what points into it stays
+  Queue admitted_{4096, std::size_t{32} << 20};  // 800 certified plans
+  Queue refused_{256, std::size_t{4} << 20};
+  std::uint64_t next_number_ = 0;
+  bool was_in_burst_ = false, is_in_burst_ = false;  // of the thread that hands out
+};
+
+}  // namespace forereach
