@@ -87,14 +87,14 @@ TEST_F(UdpReceiverTest, CountsWhatItRefusesByItsCause) {
 
 TEST_F(UdpReceiverTest, HearsItsGroupAndPortAlone) {
   const MulticastUrl own = ParseMulticastUrl(url_);
-  const std::string port = std::to_string(own.port), next_port = std::to_string(own.port + 1);
+  const std::string port = std::to_string(own.port), other = std::to_string(own.port - 5000);
   // A neighbour that has joined another group on this port, and one that has this group's other port.
   const UdpReceiver other_group(ParseMulticastUrl("udpm://239.255.76.68:" + port), [](auto, auto, auto) {});
-  const UdpReceiver other_port(ParseMulticastUrl("udpm://239.255.76.67:" + next_port), [](auto, auto, auto) {});
+  const UdpReceiver other_port(ParseMulticastUrl("udpm://239.255.76.67:" + other), [](auto, auto, auto) {});
   const Bytes message = Bytes();
   EXPECT_TRUE(sender_.SendToHost(Bytes(ShortMessage("TO_HOST", message))));
   EXPECT_TRUE(RawSender("udpm://239.255.76.68:" + port).Send(Bytes(ShortMessage("OTHER_GROUP", message))));
-  EXPECT_TRUE(RawSender("udpm://239.255.76.67:" + next_port).Send(Bytes(ShortMessage("OTHER_PORT", message))));
+  EXPECT_TRUE(RawSender("udpm://239.255.76.67:" + other).Send(Bytes(ShortMessage("OTHER_PORT", message))));
   EXPECT_TRUE(sender_.Send(Bytes(ShortMessage("OURS", message))));
   ASSERT_TRUE(HeardLast("OURS"));
   EXPECT_THAT(heard(), ElementsAre("OURS"));
