@@ -252,8 +252,8 @@ std::string Gate::Learn(Bytes bytes) {
   return {};
 }
 
-certifier_status_v2_t Gate::Status(std::int64_t now_us) const {
-  certifier_status_v2_t status = counts_;
+certifier_status_v3_t Gate::Status(std::int64_t now_us) const {
+  certifier_status_v3_t status = counts_;
   status.utime = now_us;
   status.shadow = options_.shadow;
   status.candidates_lost = sources_.lost();

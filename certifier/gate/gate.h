@@ -17,7 +17,7 @@ error inside. Whether the world is fit for certificates at all is for others to 
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/codec.h"
@@ -75,7 +75,7 @@ class Gate final {
   void Inherit(const Gate& before);
 
   /** Counts so far and the digests in force; the rest is the caller's. */
-  [[nodiscard]] certifier_status_v2_t Status(std::int64_t now_us) const;
+  [[nodiscard]] certifier_status_v3_t Status(std::int64_t now_us) const;
   [[nodiscard]] const Digest& model_digest() const { return model_digest_; }
   [[nodiscard]] Digest observations_digest() const { return observations_digest_; }
   [[nodiscard]] Digest obstacles_digest() const { return obstacles_.digest(); }
@@ -108,7 +108,7 @@ class Gate final {
   ObstaclesInForce obstacles_;
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;
-  certifier_status_v2_t counts_{};
+  certifier_status_v3_t counts_{};
   Tube tube_;
 };
 

@@ -324,12 +324,12 @@ std::string CertifierNode::WhyNotOk() const {
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
   next_heartbeat_us_ = clocks_.steady() + kHeartbeatUs;
-  certifier_status_v2_t status = gate_->Status(now_us);
+  certifier_status_v3_t status = gate_->Status(now_us);
   const bool error = watch_.fault() || gate_->certifier().violation();
   status.sequence = heartbeats_++;
   status.state = static_cast<std::int16_t>(watch_.state());
-  status.level = error ? certifier_status_v2_t::ERROR
-                 : watch_.state() == Watch::State::kArmed ? certifier_status_v2_t::OK : certifier_status_v2_t::STALE;
+  status.level = error ? certifier_status_v3_t::ERROR
+                 : watch_.state() == Watch::State::kArmed ? certifier_status_v3_t::OK : certifier_status_v3_t::STALE;
   if (watch_.fault()) {
     status.fault = watch_.fault()->cause;
     status.fault_utime = watch_.fault()->utime;
@@ -366,7 +366,7 @@ double CertifierNode::ElapsedPercentile(double fraction) const {
 
 void CertifierNode::Stop() {
   while (!queue_.empty()) AnswerWaiting();
-  const certifier_status_v2_t status = gate_->Status(0);
+  const certifier_status_v3_t status = gate_->Status(0);
   const auto count = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
   std::cout << nlohmann::json{{"candidates", status.candidates},
                               {"certified", count(decision_t::CERTIFIED)},

@@ -50,7 +50,7 @@ class CertifierNodeTest : public testing::Test {
       order_ += 'c';
     });
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_v2_t>(r.bytes).value()); });
+                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_v3_t>(r.bytes).value()); });
   }
 
   void Run() {
@@ -72,7 +72,7 @@ class CertifierNodeTest : public testing::Test {
   std::unique_ptr<CertifierNode> node_;
   std::vector<decision_t> decisions_;
   std::vector<certified_plan_t> certified_;
-  std::vector<certifier_status_v2_t> status_;
+  std::vector<certifier_status_v3_t> status_;
   std::string order_;
 };
 
@@ -244,7 +244,7 @@ TEST_F(CertifierNodeTest, BeatsTwiceASecondWithItsCounts) {
     EXPECT_EQ(status_[i].candidates, is_first ? 0 : 2);
     EXPECT_EQ(status_[i].by_outcome[decision_t::CERTIFIED], is_first ? 0 : 1);
     EXPECT_EQ(status_[i].by_cause[decision_t::CAUSE_OBSTACLE], is_first ? 0 : 1);
-    EXPECT_EQ(status_[i].level, certifier_status_v2_t::OK);
+    EXPECT_EQ(status_[i].level, certifier_status_v3_t::OK);
     EXPECT_EQ(status_[i].elapsed_p50_us > 0, !is_first);
     EXPECT_GE(status_[i].elapsed_p99_us, status_[i].elapsed_p50_us);
     EXPECT_EQ(GetDigest(status_[i].config_digest), config_.digest);
@@ -303,7 +303,7 @@ class ArmedNodeTest : public CertifierNodeTest {
 
 TEST_F(ArmedNodeTest, CertifiesNothingBeforeItHasHeardTheRobot) {
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
-  EXPECT_EQ(status_.back().level, certifier_status_v2_t::STALE);
+  EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
   robot_state_t bad = State();
   bad.state[1] = std::numeric_limits<double>::quiet_NaN();
   SayState(bad);
@@ -330,7 +330,7 @@ TEST_F(ArmedNodeTest, LosingTheRobotLatchesUntilAReset) {
   EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
   SayState(State());
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT) << "that it is back does not clear it";
-  EXPECT_EQ(status_.back().level, certifier_status_v2_t::ERROR);
+  EXPECT_EQ(status_.back().level, certifier_status_v3_t::ERROR);
   Reset();
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
   SayState(State());
@@ -643,7 +643,7 @@ class ReloadTest : public testing::Test {
     Copy([](const std::string& text) { return text; });
     auto node = std::make_unique<CertifierNode>(LoadConfig(path_), *bus_, Clocks{clock_, clock_});
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_ = Decoded<certifier_status_v2_t>(r.bytes).value(); });
+                    [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
     node->Tick(kNow);
     bus_->Dispatch(0);
     return node;
@@ -654,7 +654,7 @@ class ReloadTest : public testing::Test {
   const std::string path_ = scratch_ / "task.yaml";
   const Clock clock_ = [] { return kNow; };
   std::unique_ptr<Bus> bus_ = OpenBus("memq://", clock_);
-  certifier_status_v2_t status_{};
+  certifier_status_v3_t status_{};
 };
 
 TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
