@@ -41,6 +41,8 @@ class Gate final {
   [[nodiscard]] const Certifier& certifier() const { return certifier_; }
   [[nodiscard]] const GateOptions& options() const { return options_; }
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
+  /** Why these may not be all there are at this time (obstacles_in_force.h); empty if they are. */
+  [[nodiscard]] std::string WhyObstaclesUnknown(std::int64_t now_us) const { return obstacles_.WhyUnknown(now_us); }
   /** The tube of the last candidate that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
@@ -54,8 +56,8 @@ class Gate final {
   /** Rejects a candidate without certifying it, for a cause that lies outside it. What is wrong with itself goes before. */
   [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why) noexcept;
 
-  /** Replaces the obstacles by those of an obstacles_t. Whole or not at all: returns what is wrong with the message, and
-  the obstacles in force stay, or an empty text. */
+  /** Takes the obstacles of an obstacles_t, as gate.obstacles says (obstacles_in_force.h). Whole or not at all: returns what is
+  wrong with the message, or an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
   /** Adds an executed transition to the observations, if the task has it learn, and chains observations_digest:

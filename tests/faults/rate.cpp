@@ -20,7 +20,7 @@ namespace {
 
 // Without a robot, and patient with a busy machine.
 constexpr const char* kGate =
-    "gate: {max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000}\n";
+    "gate: {max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000, obstacles: task}\n";
 
 struct Options {
   double seconds = 20, rate = 1000;
