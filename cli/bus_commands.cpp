@@ -11,7 +11,7 @@
 
 #include "certifier/task/process.h"
 #include "cli/commands.h"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
 #include "lcmtypes/authentic.h"
 #include "lcmtypes/names.h"
@@ -34,12 +34,12 @@ class Line final {
     options.bus.Override(channels_);
     bus_ = OpenBus(channels_, "forereach");
     bus_->Subscribe(channels_.status, [this](const Received& received) {
-      if (const auto status = Decoded<certifier_status_v2_t>(received.bytes)) heard_.push_back(*status);
+      if (const auto status = Decoded<certifier_status_v3_t>(received.bytes)) heard_.push_back(*status);
     });
   }
 
   // The first heartbeat from now on that passes, or nothing.
-  std::optional<certifier_status_v2_t> Await(const std::function<bool(const certifier_status_v2_t&)>& passes) {
+  std::optional<certifier_status_v3_t> Await(const std::function<bool(const certifier_status_v3_t&)>& passes) {
     const std::int64_t end = SteadyClockUs() + kPatienceMs * 1000;
     for (heard_.clear(); SteadyClockUs() < end; bus_->Dispatch(50)) {
       const auto found = std::ranges::find_if(heard_, passes);
@@ -47,7 +47,7 @@ class Line final {
     }
     return std::nullopt;
   }
-  std::optional<certifier_status_v2_t> Await() {
+  std::optional<certifier_status_v3_t> Await() {
     return Await([](const auto&) { return true; });
   }
 
@@ -57,10 +57,10 @@ class Line final {
  private:
   BusOptions channels_;
   std::unique_ptr<Bus> bus_;
-  std::vector<certifier_status_v2_t> heard_;
+  std::vector<certifier_status_v3_t> heard_;
 };
 
-nlohmann::ordered_json ToJson(const certifier_status_v2_t& status) {
+nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
   nlohmann::ordered_json by_outcome, by_cause;
   for (std::int16_t i = 0; i < 16; ++i)
     if (status.by_outcome[i] > 0) by_outcome[std::string(OutcomeName(i))] = status.by_outcome[i];
@@ -88,7 +88,7 @@ nlohmann::ordered_json ToJson(const certifier_status_v2_t& status) {
           {"elapsed_us", {{"p50", status.elapsed_p50_us}, {"p99", status.elapsed_p99_us}, {"max", status.elapsed_max_us}}}};
 }
 
-void Print(const certifier_status_v2_t& status, bool json) {
+void Print(const certifier_status_v3_t& status, bool json) {
   if (json) {
     std::cout << ToJson(status) << std::endl;
     return;
@@ -113,7 +113,7 @@ int ShowStatus(const Options& options) {
   const auto status = line.Await();
   if (!status) return NobodyAnswers(line.channels());
   Print(*status, options.json);
-  return status->level == certifier_status_v2_t::OK ? 0 : 1;
+  return status->level == certifier_status_v3_t::OK ? 0 : 1;
 }
 
 // Sends a command, and shows the heartbeat that answers it.
@@ -126,17 +126,17 @@ int Command(const Options& options, std::int16_t kind) {
   command.kind = kind;
   SetText(command.source, "forereach");
   line.Send(command);
-  const auto refused = [](const certifier_status_v2_t& status) {
+  const auto refused = [](const certifier_status_v3_t& status) {
     return status.messages_refused + status.refused_unsigned + status.refused_forged + status.refused_replayed;
   };
-  const auto after = line.Await([&](const certifier_status_v2_t& status) {
+  const auto after = line.Await([&](const certifier_status_v3_t& status) {
     if (refused(status) > refused(*before)) return true;
     return kind == command_t::RESET ? status.utime >= command.utime
                                     : status.version != before->version || status.failed_reloads != before->failed_reloads;
   });
   if (!after) return NobodyAnswers(line.channels());
   Print(*after, options.json);
-  const bool done = kind == command_t::RESET ? after->state != certifier_status_v2_t::FAULT : after->version > before->version;
+  const bool done = kind == command_t::RESET ? after->state != certifier_status_v3_t::FAULT : after->version > before->version;
   if (!done && refused(*after) > refused(*before))
     std::cerr << "forereach: the certifier refused the command; is it signed with its key (--key)?" << std::endl;
   return done ? 0 : 1;

@@ -3,8 +3,7 @@
 
 #include <cstdint>
 
-#include "forereach/certifier_status_v2_t.hpp"
-#include "lcmtypes/codec.h"
+#include "lcmtypes/heartbeat.h"
 
 namespace forereach {
 
@@ -17,10 +16,11 @@ class Restarts final {
   };
 
   /** What has happened between the heartbeat before and this message of CERTIFIER_STATUS. A process counts heartbeats from
-  0, and versions up by each reload. A log may begin in the middle of its life, which is no beginning. */
+  0, and versions up by each reload. A log may begin in the middle of its life, which is no beginning. Heartbeats of a
+  certifier that is not in charge mean nothing here: when it takes charge it counts from 0. */
   [[nodiscard]] Kind Notice(Bytes message) {
-    const auto status = Decoded<certifier_status_v2_t>(message);
-    if (!status) return Kind::kNone;
+    const auto status = ReadHeartbeat(message);
+    if (!status || !status->in_charge) return Kind::kNone;
     const bool began = status->sequence == 0 || status->sequence < last_sequence_;
     const bool reloaded = last_sequence_ >= 0 && status->version != last_version_;
     last_sequence_ = status->sequence;

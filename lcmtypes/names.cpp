@@ -1,6 +1,6 @@
 #include "lcmtypes/names.h"
 
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -43,6 +43,8 @@ std::string_view CauseName(std::int16_t cause) {
     case decision_t::CAUSE_NOT_ARMED: return "not_armed";
     case decision_t::CAUSE_FAULT: return "fault";
     case decision_t::CAUSE_SHADOW: return "shadow";
+    case decision_t::CAUSE_NO_OBSTACLES: return "no_obstacles";
+    case decision_t::CAUSE_SECOND_CERTIFIER: return "second_certifier";
     default: return "unknown";
   }
 }
@@ -78,18 +80,37 @@ std::string_view FaultName(std::int16_t cause) {
 
 std::string_view LevelName(std::int16_t level) {
   switch (level) {
-    case certifier_status_v2_t::OK: return "OK";
-    case certifier_status_v2_t::STALE: return "STALE";
-    case certifier_status_v2_t::ERROR: return "ERROR";
+    case certifier_status_v3_t::OK: return "OK";
+    case certifier_status_v3_t::STALE: return "STALE";
+    case certifier_status_v3_t::ERROR: return "ERROR";
     default: return "unknown";
   }
 }
 
 std::string_view StateName(std::int16_t state) {
   switch (state) {
-    case certifier_status_v2_t::DISARMED: return "disarmed";
-    case certifier_status_v2_t::ARMED: return "armed";
-    case certifier_status_v2_t::FAULT: return "fault";
+    case certifier_status_v3_t::DISARMED: return "disarmed";
+    case certifier_status_v3_t::ARMED: return "armed";
+    case certifier_status_v3_t::FAULT: return "fault";
+    case certifier_status_v3_t::LISTENING: return "listening";
+    case certifier_status_v3_t::STANDBY: return "standby";
+    default: return "unknown";
+  }
+}
+
+std::string_view LatchName(std::int16_t latch) {
+  switch (latch) {
+    case certifier_status_v3_t::NO_LATCH: return "none";
+    case certifier_status_v3_t::LATCH_WRITTEN: return "written";
+    case certifier_status_v3_t::LATCH_UNWRITABLE: return "unwritable";
+    default: return "unknown";
+  }
+}
+
+std::string_view ObstaclesSourceName(std::int16_t source) {
+  switch (source) {
+    case certifier_status_v3_t::OBSTACLES_TASK: return "task";
+    case certifier_status_v3_t::OBSTACLES_BUS: return "bus";
     default: return "unknown";
   }
 }

@@ -21,10 +21,16 @@ namespace forereach {
 /** True of the faults that say that what the executing plan rests on does not hold: a robot stops. */
 [[nodiscard]] bool StopsTheRobot(std::int16_t cause);
 
-/** "OK", "STALE", "ERROR": the level of certifier_status_v2_t; "unknown" for any other number. */
+/** "OK", "STALE", "ERROR": the level of certifier_status_v3_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view LevelName(std::int16_t level);
 
-/** "disarmed", "armed", "fault": the state of certifier_status_v2_t; "unknown" for any other number. */
+/** "disarmed", "armed", "fault", "listening", "standby": the state of certifier_status_v3_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view StateName(std::int16_t state);
+
+/** "none", "written", "unwritable": the latch of certifier_status_v3_t; "unknown" for any other number. */
+[[nodiscard]] std::string_view LatchName(std::int16_t latch);
+
+/** "task", "bus": the obstacles_source of certifier_status_v3_t; "unknown" for any other number. */
+[[nodiscard]] std::string_view ObstaclesSourceName(std::int16_t source);
 
 }  // namespace forereach

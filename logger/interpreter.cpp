@@ -4,13 +4,13 @@
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/heartbeat.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -84,7 +84,11 @@ std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::stri
   if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
   if (channel == channels_.robot_state) return {plain, PositionOf<robot_state_t>(bytes)};
   if (channel == channels_.transition) return {plain, PositionOf<transition_t>(bytes)};
-  if (channel == channels_.status) return {plain, PositionOf<certifier_status_v2_t>(bytes)};
+  if (channel == channels_.status) {
+    const auto heartbeat = ReadHeartbeat(bytes);
+    if (!heartbeat || !heartbeat->in_charge) return {plain, std::nullopt};  // a second certifier counts for itself
+    return {plain, Position{heartbeat->sequence, heartbeat->utime}};
+  }
   if (channel == channels_.fault) return {plain, PositionOf<fault_t>(bytes)};
   if (channel == channels_.event) return {plain, PositionOf<execution_event_t>(bytes)};
   if (channel == channels_.logger_status) return {plain, PositionOf<logger_status_t>(bytes)};

@@ -252,12 +252,19 @@ std::string Gate::Learn(Bytes bytes) {
   return {};
 }
 
-certifier_status_v2_t Gate::Status(std::int64_t now_us) const {
-  certifier_status_v2_t status = counts_;
+certifier_status_v3_t Gate::Status(std::int64_t now_us) const {
+  certifier_status_v3_t status = counts_;
   status.utime = now_us;
   status.shadow = options_.shadow;
   status.candidates_lost = sources_.lost();
   status.observations = static_cast<std::int64_t>(certifier_.num_observations());
+  status.obstacles_source = options_.obstacles == ObstaclesSource::kBus ? certifier_status_v3_t::OBSTACLES_BUS
+                                                                        : certifier_status_v3_t::OBSTACLES_TASK;
+  status.obstacles_known = obstacles_.WhyUnknown(now_us).empty();
+  status.obstacles_in_force = static_cast<std::int32_t>(obstacles_.all().size());
+  status.obstacles_utime = obstacles_.stamp().value_or(0);
+  status.obstacles_age_us = obstacles_.stamp() ? now_us - *obstacles_.stamp() : -1;
+  status.obstacles_lost = obstacles_.lost();
   SetDigests(status);
   return status;
 }

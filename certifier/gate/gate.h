@@ -17,7 +17,7 @@ error inside. Whether the world is fit for certificates at all is for others to 
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/codec.h"
@@ -41,6 +41,8 @@ class Gate final {
   [[nodiscard]] const Certifier& certifier() const { return certifier_; }
   [[nodiscard]] const GateOptions& options() const { return options_; }
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
+  /** Why these may not be all there are at this time (obstacles_in_force.h); empty if they are. */
+  [[nodiscard]] std::string WhyObstaclesUnknown(std::int64_t now_us) const { return obstacles_.WhyUnknown(now_us); }
   /** The tube of the last candidate that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
@@ -54,8 +56,8 @@ class Gate final {
   /** Rejects a candidate without certifying it, for a cause that lies outside it. What is wrong with itself goes before. */
   [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why) noexcept;
 
-  /** Replaces the obstacles by those of an obstacles_t. Whole or not at all: returns what is wrong with the message, and
-  the obstacles in force stay, or an empty text. */
+  /** Takes the obstacles of an obstacles_t, as gate.obstacles says (obstacles_in_force.h). Whole or not at all: returns what is
+  wrong with the message, or an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
   /** Adds an executed transition to the observations, if the task has it learn, and chains observations_digest:
@@ -75,7 +77,7 @@ class Gate final {
   void Inherit(const Gate& before);
 
   /** Counts so far and the digests in force; the rest is the caller's. */
-  [[nodiscard]] certifier_status_v2_t Status(std::int64_t now_us) const;
+  [[nodiscard]] certifier_status_v3_t Status(std::int64_t now_us) const;
   [[nodiscard]] const Digest& model_digest() const { return model_digest_; }
   [[nodiscard]] Digest observations_digest() const { return observations_digest_; }
   [[nodiscard]] Digest obstacles_digest() const { return obstacles_.digest(); }
@@ -108,7 +110,7 @@ class Gate final {
   ObstaclesInForce obstacles_;
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;
-  certifier_status_v2_t counts_{};
+  certifier_status_v3_t counts_{};
   Tube tube_;
 };
 

@@ -1,15 +1,44 @@
 #include "certifier/gate/watch.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "certifier/gate/stamp.h"
+#include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "lcmtypes/names.h"
 
 namespace forereach {
-void Watch::SeeRobot(std::int64_t now_us) { robot_seen_us_ = now_us; }
+namespace {
 
-void Watch::RobotHasFinished() { robot_seen_us_.reset(); }
+constexpr std::array<std::int16_t, Watch::kNeeds> kCauses{
+    decision_t::CAUSE_SECOND_CERTIFIER, decision_t::CAUSE_NOT_ARMED, decision_t::CAUSE_NO_OBSTACLES};
+
+}  // namespace
+
+Watch::Watch(const WatchOptions& options) : options_(options) { LookForRobot(); }
+
+void Watch::Follow(const WatchOptions& options) {
+  options_ = options;
+  LookForRobot();
+}
+
+void Watch::Set(Need need, std::string why_not) { lacking_[static_cast<std::size_t>(need)] = std::move(why_not); }
+
+void Watch::LookForRobot() {
+  Set(Need::kRobotState, robot_seen_us_ || !options_.needs_robot_state ? "" : "waits for the robot's state");
+}
+
+void Watch::SeeRobot(std::int64_t now_us) {
+  robot_seen_us_ = now_us;
+  LookForRobot();
+}
+
+void Watch::RobotHasFinished() {
+  robot_seen_us_.reset();
+  LookForRobot();
+}
 
 std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t steady_us) {
   const std::int64_t offset = now_us - steady_us, moved = offset - offset_us_.value_or(offset);
@@ -36,13 +65,26 @@ bool Watch::Latch(Fault fault) {
 bool Watch::Reset() {
   if (!fault_) return false;
   fault_.reset();
-  robot_seen_us_.reset();
+  RobotHasFinished();
   return true;
 }
 
 Watch::State Watch::state() const {
   if (fault_) return State::kFault;
-  return robot_seen_us_ || !options_.needs_robot_state ? State::kArmed : State::kDisarmed;
+  return std::ranges::all_of(lacking_, &std::string::empty) ? State::kArmed : State::kDisarmed;
+}
+
+std::optional<Watch::Refusal> Watch::WhyNot() const {
+  if (fault_) return Refusal{decision_t::CAUSE_FAULT, "fault: " + fault_->why};
+  std::optional<Refusal> refusal;
+  for (std::size_t need = 0; need < kNeeds; ++need) {
+    if (lacking_[need].empty()) continue;
+    if (!refusal)
+      refusal = {kCauses[need], lacking_[need]};
+    else
+      refusal->why += "; " + lacking_[need];
+  }
+  return refusal;
 }
 
 }  // namespace forereach

@@ -1,12 +1,13 @@
-/** Whether anything may be certified at all: a state machine over what is heard of the world. No bus, no clock in it.
+/** Whether anything may be certified at all: a state machine over what is known of the world. No bus, no clock in it.
 
-    disarmed --SeeRobot--> armed --RobotHasFinished--> disarmed
+    disarmed --all needs are met--> armed --one is lacking--> disarmed
     any state --Latch, or what Advance notices--> fault --Reset--> disarmed
 
 Only a person clears a fault: what made it is looked at first. The first fault is kept, unless a later one stops the robot
 and it does not: then the later one takes its place. */
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -20,21 +21,33 @@ struct WatchOptions {
 
 class Watch final {
  public:
-  enum class State { kDisarmed = 1, kArmed = 2, kFault = 3 };  // certifier_status_v2_t's numbers
+  enum class State { kDisarmed = 1, kArmed = 2, kFault = 3 };  // certifier_status_v3_t's numbers
   struct Fault {
     std::int16_t cause;  ///< fault_t's
     std::int64_t utime;
     std::string why;
   };
+  /** What has to hold before anything is certified. Of several that are lacking the first gives the cause. To add one: an
+  entry here, its cause in watch.cpp. */
+  enum class Need { kCharge, kRobotState, kObstacles };
+  static constexpr std::size_t kNeeds = 3;
+  struct Refusal {
+    std::int16_t cause;  ///< decision_t's
+    std::string why;     ///< Names everything that is lacking.
+  };
 
-  explicit Watch(const WatchOptions& options) : options_(options) {}
+  explicit Watch(const WatchOptions& options);
 
   /** From here on by these. What was seen, and a fault, stay. */
-  void Follow(const WatchOptions& options) { options_ = options; }
+  void Follow(const WatchOptions& options);
+
+  /** @param why_not a clause that says why the need is not met; empty: it is met. Every need but the robot's state is met at
+  first, and the robot's state is this class's own affair. */
+  void Set(Need need, std::string why_not);
 
   /** A usable state of the robot has been heard. */
   void SeeRobot(std::int64_t now_us);
-  /** The robot has said that it ends: its silence is no fault. */
+  /** The robot has said that it ends, or what was heard of it counts no more: its silence is no fault. */
   void RobotHasFinished();
 
   /** Time has passed: `now_us` by the wall clock, `steady_us` by one that nobody sets. Latches ROBOT_STATE_LOST and
@@ -47,11 +60,16 @@ class Watch final {
   bool Reset();
 
   [[nodiscard]] State state() const;
+  /** Why nothing may be certified now; nothing if it is armed. */
+  [[nodiscard]] std::optional<Refusal> WhyNot() const;
   [[nodiscard]] const std::optional<Fault>& fault() const { return fault_; }
 
  private:
+  void LookForRobot();
+
   WatchOptions options_;
   std::optional<Fault> fault_;
+  std::array<std::string, kNeeds> lacking_;  // why, by Need
   std::optional<std::int64_t> robot_seen_us_;
   std::optional<std::int64_t> offset_us_;  // of the wall clock from the steady one, at the last call
 };

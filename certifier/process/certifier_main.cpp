@@ -7,10 +7,11 @@ int main(int argc, char** argv) {
   return RunProcess(argc, argv,
                     {"forereach-certifier",
                      "Certifies candidate plans on the bus, or abstains and says why. Each candidate gets exactly one "
-                     "decision; only certified plans are passed on. SIGHUP reads the task file again.",
+                     "decision; only certified plans are passed on. Of several certifiers on one bus one is in charge, the "
+                     "others stand by. SIGHUP reads the task file again.",
                      "forereach-certifier --config config/demo.yaml"},
                     [](const Config& config, Bus& bus) {
-                      auto node = std::make_unique<CertifierNode>(config, bus);
+                      auto node = std::make_unique<CertifierNode>(config, bus, Clocks(), Charge::kListenUs);
                       BecomeRealtime(config.realtime);
                       return node;
                     });

@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <iostream>
 #include <limits>
+#include <random>
 #include <utility>
 
 #include <fmt/format.h>
@@ -46,10 +47,32 @@ fault_t EmptyFault(std::int16_t cause) {
   return fault;
 }
 
+Config Checked(const Config& config) {
+  RequireObstaclesSource(config);
+  return config;
+}
+
+std::int64_t RandomInstance() {
+  std::random_device random;
+  const std::uint64_t bits = std::uint64_t{random()} << 32 | random();
+  return static_cast<std::int64_t>(bits >> 1) | 1;
+}
+
+Charge::State ChargeOf(std::int16_t state) {
+  switch (state) {
+    case certifier_status_v3_t::LISTENING:
+      return Charge::State::kListening;
+    case certifier_status_v3_t::STANDBY:
+      return Charge::State::kStandingBy;
+    default:
+      return Charge::State::kInCharge;
+  }
+}
+
 }  // namespace
 
-CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
-    : config_path_(config.path),
+CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std::int64_t listen_us)
+    : config_(Checked(config)),
       channels_(config.bus),
       realtime_(config.realtime),
       clocks_(std::move(clocks)),
@@ -57,6 +80,8 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
       sender_(bus),
       gate_(std::make_unique<Gate>(config)),
       watch_(OptionsOf(config.gate)),
+      charge_({clocks_.wall(), RandomInstance()}, listen_us),
+      has_begun_(is_in_charge()),
       reload_([path = config.path] { return Load(path); }) {
   if (const auto& violation = gate_->certifier().violation())
     spdlog::warn("observations {} and {} contradict the declaration: every candidate will be abstained from (F)",
@@ -64,10 +89,8 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
   if (gate_->certifier().uses_hull_distance())
     spdlog::warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
                  LipschitzEnvelope::kMaxExactColumns);
-  bus.Subscribe(channels_.candidate, [this](const Received& received) {
-    queue_.push_back({{received.bytes.begin(), received.bytes.end()}});
-    high_water_ = std::max(high_water_, queue_.size());
-  });
+  bus.Subscribe(channels_.status, [this](const Received& received) { OnStatus(received); });
+  bus.Subscribe(channels_.candidate, [this](const Received& received) { OnCandidate(received); });
   bus.Subscribe(channels_.obstacles, [this](const Received& received) { OnObstacles(received); });
   bus.Subscribe(channels_.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(channels_.transition, [this](const Received& received) { OnTransition(received); });
@@ -76,6 +99,84 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
 
 CertifierNode::~CertifierNode() {
   if (compaction_.valid()) compaction_.wait();  // it works on *gate_
+}
+
+// ---- Who is in charge.
+
+void CertifierNode::OnStatus(const Received& received) {
+  const auto status = Decoded<certifier_status_v3_t>(received.bytes);
+  if (!status || status->instance == charge_.self().instance) return;
+  const std::string error = gate_->CheckFresh(status->utime, received.utime);
+  if (!error.empty()) return Refuse(channels_.status, error);
+  const Charge::State before = charge_.state(), its_state = ChargeOf(status->state);
+  charge_.Hear({status->started_utime, status->instance}, its_state);
+  if (its_state == Charge::State::kInCharge) {
+    fault_of_other_.reset();
+    if (status->fault != 0) fault_of_other_ = {status->fault, status->fault_utime, GetText(status->message)};
+  }
+  FollowCharge(before);
+  // It has to hear of this one before it takes charge.
+  if (is_in_charge()) next_heartbeat_us_ = std::min(next_heartbeat_us_, last_heartbeat_us_ + kHeartbeatToOthersUs);
+}
+
+void CertifierNode::FollowCharge(Charge::State before) {
+  watch_.Set(Watch::Need::kCharge, WhyNotInCharge());
+  if (charge_.state() == before) return;
+  next_heartbeat_us_ = 0;
+  if (charge_.state() == Charge::State::kStandingBy) StandBy();
+  if (is_in_charge()) TakeCharge();
+}
+
+std::string CertifierNode::WhyNotInCharge() const {
+  switch (charge_.state()) {
+    case Charge::State::kListening:
+      return "listens whether another certifier is on this bus";
+    case Charge::State::kStandingBy:
+      return charge_.other() ? fmt::format("another certifier, instance {:016x}, is in charge on this bus: this one decides "
+                                           "nothing", charge_.other()->instance)
+                             : "another certifier was in charge on this bus, and has fallen silent";
+    case Charge::State::kInCharge:
+      break;
+  }
+  return "";
+}
+
+void CertifierNode::TakeCharge() {
+  spdlog::info("in charge, as instance {:016x}", charge_.self().instance);
+  has_begun_ = true;
+  if (!fault_of_other_) return;
+  Fail(EmptyFault(fault_of_other_->cause), "latched by the certifier that was in charge before: " + fault_of_other_->why);
+  fault_of_other_.reset();
+}
+
+// What was learned and heard while it was in charge it forgets: another has been since. A contradiction it keeps.
+void CertifierNode::StandBy() {
+  spdlog::warn("{}", WhyNotInCharge());
+  LeaveWaiting();
+  watch_.RobotHasFinished();
+  if (!std::exchange(has_begun_, false) || gate_->certifier().violation()) return;
+  if (compaction_.valid()) compaction_.wait();  // it works on *gate_
+  gate_ = std::make_unique<Gate>(config_);
+  conformance_ = {};
+  heartbeats_ = 0;
+  decided_ = 0;
+}
+
+void CertifierNode::LeaveWaiting() {
+  left_to_other_ += std::ssize(queue_);
+  queue_.clear();
+}
+
+void CertifierNode::OnCandidate(const Received& received) {
+  if (charge_.state() == Charge::State::kStandingBy) {
+    ++left_to_other_;
+    return;
+  }
+  queue_.push_back({{received.bytes.begin(), received.bytes.end()}});
+  high_water_ = std::max(high_water_, queue_.size());
+  if (is_in_charge() || queue_.size() <= kHeldAtMost) return;
+  queue_.pop_front();
+  ++left_to_other_;
 }
 
 // ---- What changes the grounds of decisions.
@@ -89,11 +190,21 @@ void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
 }
 
 void CertifierNode::OnObstacles(const Received& received) {
+  if (!has_begun_) return;
   const std::string error = gate_->UpdateObstacles(received.bytes, received.utime);
-  if (!error.empty()) Refuse(channels_.obstacles, error + "; the obstacles in force stay");
+  LookForObstacles(received.utime);
+  if (error.empty()) return;
+  obstacles_refused_ = true;
+  Refuse(channels_.obstacles, error);
+}
+
+void CertifierNode::LookForObstacles(std::int64_t now_us) {
+  const std::string why = gate_->WhyObstaclesUnknown(now_us);
+  watch_.Set(Watch::Need::kObstacles, why.empty() ? "" : "waits for " + channels_.obstacles + ": " + why);
 }
 
 void CertifierNode::OnRobotState(const Received& received) {
+  if (!has_begun_) return;
   robot_state_t state;
   if (Decode(received.bytes, state) != DecodeStatus::kOk) return Refuse(channels_.robot_state, "not a robot_state_t");
   const std::string error = gate_->CheckRobotState(state, received.utime);
@@ -119,6 +230,7 @@ void CertifierNode::FailIfLeft(const std::optional<Conformance::Departure>& depa
 }
 
 void CertifierNode::OnTransition(const Received& received) {
+  if (!has_begun_) return;
   const auto transition = Decoded<transition_t>(received.bytes);
   if (transition) last_transition_ = *transition;
   if (gate_->options().learns) Learn(received.bytes);  // first: a false declaration is why a slice is left
@@ -187,6 +299,7 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
 }
 
 void CertifierNode::SendFault() {
+  if (!is_in_charge()) return;
   next_announcement_us_ = clocks_.steady() + kHeartbeatUs;
   sender_.Send(channels_.fault, announced_);
 }
@@ -194,7 +307,11 @@ void CertifierNode::SendFault() {
 // ---- Candidates.
 
 void CertifierNode::Tick(std::int64_t now_us) {
-  if (heartbeats_ == 0) Heartbeat(now_us);  // says that nothing has been decided or learned yet
+  const Charge::State before = charge_.state();
+  charge_.Advance(clocks_.steady());
+  FollowCharge(before);
+  LookForObstacles(now_us);
+  if (heartbeats_ == 0 && is_in_charge()) Heartbeat(now_us);  // says that nothing has been decided or learned yet
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) Announce(EmptyFault(fault->cause), *fault);
   TakeReload();
   AnswerWaiting();
@@ -203,6 +320,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
 }
 
 void CertifierNode::AnswerWaiting() {
+  if (!is_in_charge()) return;
   for (int i = 0; i < kAtOnce && !queue_.empty(); ++i) {
     const Waiting newest = std::move(queue_.back());
     queue_.pop_back();
@@ -231,14 +349,9 @@ void CertifierNode::AnswerDue() {
 }
 
 GateAnswer CertifierNode::Decide(Bytes candidate) {
-  switch (watch_.state()) {
-    case Watch::State::kDisarmed:
-      return gate_->Refuse(candidate, clocks_.wall(), decision_t::CAUSE_NOT_ARMED, "the robot's state is not known yet");
-    case Watch::State::kFault:
-      return gate_->Refuse(candidate, clocks_.wall(), decision_t::CAUSE_FAULT, "fault: " + watch_.fault()->why);
-    case Watch::State::kArmed:
-      break;
-  }
+  const std::int64_t now = clocks_.wall();
+  LookForObstacles(now);
+  if (const auto refusal = watch_.WhyNot()) return gate_->Refuse(candidate, now, refusal->cause, refusal->why);
   const std::int64_t before = PageFaults();
   GateAnswer answer = gate_->Decide(candidate, clocks_.wall);
   if (decided_ > 0) page_faults_ += PageFaults() - before;
@@ -272,7 +385,7 @@ void CertifierNode::Reload() { reload_.Ask(); }
 
 CertifierNode::Loaded CertifierNode::Load(const std::string& path) try {
   spdlog::info("reloading {}", path);
-  Loaded loaded{LoadConfig(path), nullptr, ""};
+  Loaded loaded{Checked(LoadConfig(path)), nullptr, ""};
   loaded.gate = std::make_unique<Gate>(loaded.config);
   return loaded;
 } catch (const std::exception& error) {
@@ -286,6 +399,7 @@ std::string CertifierNode::WhyNotTaken(const Config& config) const {
   for (const auto& [changes, what] : std::initializer_list<std::pair<bool, const char*>>{
            {bus != channels_, "bus.channels"},
            {config.realtime != realtime_, "realtime"},
+           {config.gate.obstacles != config_.gate.obstacles, "gate.obstacles"},
            {after.model->num_states() != before.model->num_states(), "the number of states"},
            {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},
            {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
@@ -309,27 +423,41 @@ void CertifierNode::TakeReload() {
   }
   loaded->gate->Inherit(*gate_);
   gate_ = std::move(loaded->gate);
+  config_ = std::move(loaded->config);
   watch_.Follow(OptionsOf(gate_->options()));
-  spdlog::info("version {} of {} is in force", ++version_, config_path_);
+  LookForObstacles(clocks_.wall());
+  spdlog::info("version {} of {} is in force", ++version_, config_.path);
 }
 
 // ---- The heartbeat.
 
 std::string CertifierNode::WhyNotOk() const {
+  if (!is_in_charge()) return WhyNotInCharge();
   if (watch_.fault()) return std::string(FaultName(watch_.fault()->cause)) + ": " + watch_.fault()->why;
   if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F";
   if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
-  return watch_.state() == Watch::State::kDisarmed ? "waits for the robot's state" : "";
+  if (const auto refusal = watch_.WhyNot()) return refusal->why;
+  if (charge_.other()) return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing", charge_.other()->instance);
+  if (gate_->options().obstacles == ObstaclesSource::kBus) return "";
+  return fmt::format("gate.obstacles is task: the {} of the task file are all there are{}", gate_->obstacles().size(),
+                     obstacles_refused_ ? "; " + channels_.obstacles + " is refused" : "");
 }
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
-  next_heartbeat_us_ = clocks_.steady() + kHeartbeatUs;
-  certifier_status_v2_t status = gate_->Status(now_us);
-  const bool error = watch_.fault() || gate_->certifier().violation();
-  status.sequence = heartbeats_++;
+  last_heartbeat_us_ = clocks_.steady();
+  next_heartbeat_us_ = last_heartbeat_us_ + (charge_.state() == Charge::State::kListening ? kHeartbeatToOthersUs : kHeartbeatUs);
+  certifier_status_v3_t status = gate_->Status(now_us);
+  const bool error = is_in_charge() && (watch_.fault() || gate_->certifier().violation());
+  status.sequence = is_in_charge() ? heartbeats_++ : heartbeats_aside_++;
+  status.instance = charge_.self().instance;
+  status.started_utime = charge_.self().started_utime;
+  status.other_instance = charge_.other() ? charge_.other()->instance : 0;
   status.state = static_cast<std::int16_t>(watch_.state());
-  status.level = error ? certifier_status_v2_t::ERROR
-                 : watch_.state() == Watch::State::kArmed ? certifier_status_v2_t::OK : certifier_status_v2_t::STALE;
+  if (charge_.state() == Charge::State::kListening) status.state = certifier_status_v3_t::LISTENING;
+  if (charge_.state() == Charge::State::kStandingBy) status.state = certifier_status_v3_t::STANDBY;
+  status.level = error ? certifier_status_v3_t::ERROR
+                 : status.state == certifier_status_v3_t::ARMED ? certifier_status_v3_t::OK : certifier_status_v3_t::STALE;
+  status.by_cause[decision_t::CAUSE_SECOND_CERTIFIER] += left_to_other_;
   if (watch_.fault()) {
     status.fault = watch_.fault()->cause;
     status.fault_utime = watch_.fault()->utime;
@@ -350,6 +478,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.elapsed_p99_us = ElapsedPercentile(0.99);
   status.elapsed_max_us = ElapsedPercentile(1);
   SetText(status.message, WhyNotOk());
+  obstacles_refused_ = false;
   // First what a robot that has just begun has to know, then what a person reads and resets.
   if (watch_.fault() && clocks_.steady() >= next_announcement_us_) SendFault();
   sender_.Send(channels_.status, status);
@@ -365,8 +494,9 @@ double CertifierNode::ElapsedPercentile(double fraction) const {
 }
 
 void CertifierNode::Stop() {
+  if (!is_in_charge()) LeaveWaiting();
   while (!queue_.empty()) AnswerWaiting();
-  const certifier_status_v2_t status = gate_->Status(0);
+  const certifier_status_v3_t status = gate_->Status(0);
   const auto count = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
   std::cout << nlohmann::json{{"candidates", status.candidates},
                               {"certified", count(decision_t::CERTIFIED)},
@@ -377,6 +507,7 @@ void CertifierNode::Stop() {
                               {"rejected", count(decision_t::REJECTED)},
                               {"observations", status.observations},
                               {"learned", status.learned},
+                              {"left_to_another_certifier", left_to_other_},
                               {"faults", faults_},
                               {"messages_refused", refused_},
                               {"messages_not_sent", sender_.refused()},

@@ -9,6 +9,9 @@ falsified declaration) is sent on bus.channels.fault, with every heartbeat again
 rejected until a person sends a reset, which has to be later than the fault. A reload reads the task file again, beside
 the running work, and takes it whole or not at all; what cannot change while it runs, WhyNotTaken says.
 
+Of several certifiers on one bus one is in charge (charge.h). The others say nothing but their heartbeat. What they hear
+before they take charge they do not learn: one that takes charge knows as much as one that has just been started.
+
 First goes out the certified plan, which the robot waits for, then the decision: a planner that hears of a certificate
 knows that the plan was handed to the bus before. */
 #pragma once
@@ -21,6 +24,7 @@ knows that the plan was handed to the bus before. */
 #include <string>
 #include <vector>
 
+#include "certifier/gate/charge.h"
 #include "certifier/gate/conformance.h"
 #include "certifier/gate/gate.h"
 #include "certifier/gate/watch.h"
@@ -41,19 +45,24 @@ struct Clocks {
 class CertifierNode final : public Node {
  public:
   static constexpr std::int64_t kHeartbeatUs = 500'000;
+  static constexpr std::int64_t kHeartbeatToOthersUs = 100'000;  ///< While it listens for others, and to one that does.
+  static constexpr std::size_t kHeldAtMost = 4096;  ///< Candidates that wait while it listens for others.
   static constexpr int kAtOnce = 8;  ///< Candidates decided on before the bus is looked at again.
 
-  CertifierNode(const Config& config, Bus& bus, Clocks clocks = {});
+  /** @param listen_us how long it listens for another certifier before it takes charge; Charge::kListenUs on a bus that others
+  can be on. @throws ConfigError if the task does not say gate.obstacles. */
+  CertifierNode(const Config& config, Bus& bus, Clocks clocks = {}, std::int64_t listen_us = 0);
   ~CertifierNode() override;
 
   void Tick(std::int64_t now_us) override;
-  [[nodiscard]] bool busy() const override { return !queue_.empty(); }
+  [[nodiscard]] bool busy() const override { return !queue_.empty() && is_in_charge(); }
   void Reload() override;
   /** Answers what waits still, and prints the counts as one line of JSON on standard output. */
   void Stop() override;
 
   [[nodiscard]] const Gate& gate() const { return *gate_; }
   [[nodiscard]] const Watch& watch() const { return watch_; }
+  [[nodiscard]] const Charge& charge() const { return charge_; }
 
  private:
   struct Loaded {
@@ -61,6 +70,16 @@ class CertifierNode final : public Node {
     std::unique_ptr<Gate> gate;
     std::string error;  ///< Else there are a config and its gate.
   };
+
+  [[nodiscard]] bool is_in_charge() const { return charge_.state() == Charge::State::kInCharge; }
+  void OnCandidate(const Received& received);
+  void OnStatus(const Received& received);
+  void FollowCharge(Charge::State before);
+  void TakeCharge();
+  void StandBy();
+  void LeaveWaiting();
+  [[nodiscard]] std::string WhyNotInCharge() const;
+  void LookForObstacles(std::int64_t now_us);
 
   void OnObstacles(const Received& received);
   void OnRobotState(const Received& received);
@@ -90,7 +109,7 @@ class CertifierNode final : public Node {
   [[nodiscard]] std::string WhyNotOk() const;
   [[nodiscard]] double ElapsedPercentile(double fraction) const;
 
-  const std::string config_path_;
+  Config config_;  // in force
   const BusOptions channels_;
   const RealtimeOptions realtime_;
   const Clocks clocks_;
@@ -98,6 +117,11 @@ class CertifierNode final : public Node {
   Sender sender_;
   std::unique_ptr<Gate> gate_;
   Watch watch_;
+  Charge charge_;
+  bool has_begun_ = false;  // has been in charge, and no other since
+  std::optional<Watch::Fault> fault_of_other_;  // of the one in charge, by its last heartbeat
+  std::int64_t left_to_other_ = 0;              // candidates
+  bool obstacles_refused_ = false;              // since the last heartbeat, for gate.obstacles is task
   Conformance conformance_;
 
   struct Waiting {
@@ -123,7 +147,8 @@ class CertifierNode final : public Node {
   std::string reload_error_;
 
   std::int64_t next_heartbeat_us_ = 0, next_warning_us_ = 0;  // by the steady clock
-  std::int64_t heartbeats_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
+  std::int64_t last_heartbeat_us_ = 0;
+  std::int64_t heartbeats_ = 0, heartbeats_aside_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
   std::size_t high_water_ = 0;
   std::array<double, 1024> elapsed_us_{};  // of the last decisions, a ring
   std::size_t decided_ = 0;

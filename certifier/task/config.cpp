@@ -178,6 +178,9 @@ GateOptions ReadGate(const Document& file) {
   read("gate.arming", "robot_state", gate.needs_robot_state);
   file.Read("gate.robot_timeout_ms", gate.robot_timeout_ms);
   file.Read("gate.max_clock_jump_ms", gate.max_clock_jump_ms);
+  if (file.Has("gate.obstacles"))
+    gate.obstacles = file.Text("gate.obstacles") == "bus" ? ObstaclesSource::kBus : ObstaclesSource::kTask;
+  file.Read("gate.obstacles_timeout_ms", gate.obstacles_timeout_ms);
   read("gate.learn", "executed", gate.learns);
   return gate;
 }
@@ -429,6 +432,14 @@ Config LoadConfig(const std::string& path, TransitionsFile transitions) {
   config.robot = ReadRobot(file, *problem.model);
   config.logger = ReadLogger(file);
   return config;
+}
+
+void RequireObstaclesSource(const Config& config) {
+  if (config.gate.obstacles != ObstaclesSource::kUnsaid) return;
+  throw ConfigError(config.path +
+                    ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those that OBSTACLES says on "
+                    "the bus; nothing is certified before they are heard, nor while they are silent. `task`: the obstacles "
+                    "of this file are all there are");
 }
 
 Transitions LoadTransitions(const std::string& path, const NominalModel& model) {

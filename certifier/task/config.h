@@ -23,6 +23,13 @@ class ConfigError : public BadInput {
   using BadInput::BadInput;
 };
 
+/** Where the obstacles of a task are known from. */
+enum class ObstaclesSource {
+  kUnsaid,  ///< Of tasks before the key: the file's, until some are heard on the bus. Read to replay old logs.
+  kBus,     ///< The file's and, besides, those that OBSTACLES says; nothing is certified while it says none.
+  kTask,    ///< The file's alone.
+};
+
 struct GateOptions {
   double max_age_ms = 500;
   double max_ahead_ms = 50;
@@ -33,6 +40,8 @@ struct GateOptions {
   bool needs_robot_state = true;   ///< Certify only while the robot's state is heard.
   double robot_timeout_ms = 1000;  ///< It counts as lost after this.
   double max_clock_jump_ms = 200;
+  ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
+  double obstacles_timeout_ms = 1000;  ///< Those heard on the bus are no longer known after this.
   bool learns = true;  ///< Executed transitions add to the observations.
 };
 
@@ -128,6 +137,10 @@ enum class TransitionsFile { kRead, kIgnore };
 /** Reads a task file and the transitions it names.
 @throws ConfigError for a missing file, an unknown or missing key, a wrong size, a non-finite or out-of-range number. */
 [[nodiscard]] Config LoadConfig(const std::string& path, TransitionsFile transitions = TransitionsFile::kRead);
+
+/** @throws ConfigError, which says what to write, where the task does not say gate.obstacles: whoever certifies on a bus needs
+to know where its obstacles come from. */
+void RequireObstaclesSource(const Config& config);
 
 /** Reads transitions: CSV with a column for each state, each input and each state's successor `<state>_next`, in any
 order, one row a transition. @throws ConfigError, also if there is none. */

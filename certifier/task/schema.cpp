@@ -205,7 +205,7 @@ std::vector<Key> TaskKeys() {
       Required(Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
                        "P as a matrix: 1 to 3 rows, one entry for each state.")),
       Required(List("task.obstacles", Between(0, kMaxObstacles),
-                    "The unsafe sets, closed. `[]` for none. OBSTACLES on the bus replaces them.")),
+                    "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those on the bus count besides.")),
       Map("task.obstacles[]", "One of circle, box, polygon and half_plane."),
       Map("task.obstacles[].circle", "A disc; the projection has to have 2 rows."),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
@@ -262,6 +262,14 @@ std::vector<Key> CertifierKeys() {
              "The robot's state counts as lost after this time without one."),
       Number("gate.max_clock_jump_ms", "ms", UpTo(kHourMs), gate.max_clock_jump_ms,
              "A wall clock that moves by more than this against the time that has passed latches a fault."),
+      Optional(Word("gate.obstacles", {"bus", "task"},
+                    "bus: the obstacles are task.obstacles and, besides, those that OBSTACLES says; nothing is certified "
+                    "before it is heard, nor while it is silent. task: task.obstacles are all, OBSTACLES is refused. "
+                    "forereach-certifier and `forereach run` do not start without this key."),
+               "not said"),
+      Number("gate.obstacles_timeout_ms", "ms", UpTo(kHourMs), gate.obstacles_timeout_ms,
+             "With `obstacles: bus`: the obstacles heard are no longer known this long after their stamp. Send the whole "
+             "set at least every third of it."),
       Optional(Word("gate.learn", {"executed", "none"},
                     "executed: transitions that the robot reports add to the observations while it drives; "
                     "declaration.noise_bound has to cover their errors. none: the file's transitions are all."),
@@ -289,9 +297,9 @@ std::vector<Key> BusKeys() {
       Channel("decision", bus.decision, "decision_t, one for each candidate."),
       Channel("certified", bus.certified, "certified_plan_t, what a robot may execute."),
       Channel("robot_state", bus.robot_state, "robot_state_t, from the robot."),
-      Channel("obstacles", bus.obstacles, "obstacles_t, replaces those in force."),
+      Channel("obstacles", bus.obstacles, "obstacles_t, all obstacles that are seen, again and again."),
       Channel("transition", bus.transition, "transition_t, executed steps."),
-      Channel("status", bus.status, "certifier_status_v2_t, the certifier's heartbeat."),
+      Channel("status", bus.status, "certifier_status_v3_t, the certifier's heartbeat."),
       Channel("event", bus.event, "execution_event_t, what the robot's guard does."),
       Channel("logger_status", bus.logger_status, "logger_status_t, the logger's heartbeat."),
       Channel("fault", bus.fault, "fault_t, why the certifier has stopped certifying."),

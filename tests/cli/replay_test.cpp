@@ -10,7 +10,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "cli/replay.h"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "logger/event_log.h"
@@ -167,7 +167,7 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
     if (heartbeat > 0) {
       EXPECT_EQ(gate.UpdateObstacles(Encode(on_the_way), kNow), "");
     }
-    certifier_status_v2_t status{};
+    certifier_status_v3_t status{};
     status.sequence = heartbeat;
     const std::string path = NewLog();
     {
@@ -188,7 +188,7 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
   obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
   far_away.utime = kNow;
   Gate before(config), after(config);
-  certifier_status_v2_t first{}, second{};
+  certifier_status_v3_t first{}, second{};
   second.sequence = 1;
   first.version = 1, second.version = 2;
   const std::string path = NewLog();

@@ -1,6 +1,7 @@
 // What a good task file means.
 #include "certifier/task/config.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "certifier/task/schema.h"
@@ -71,7 +72,8 @@ TEST(LoadConfig, ReadsEveryOption) {
   const Config config = files.Load(
       std::string(kTask) +
       "certifier: {method: paper, zonotope_order: 7}\n"
-      "gate: {max_age_ms: 1, max_ahead_ms: 0, certificate_lifetime_ms: 3, queue: 4}\n"
+      "gate: {max_age_ms: 1, max_ahead_ms: 0, certificate_lifetime_ms: 3, queue: 4, obstacles: bus,\n"
+      "  obstacles_timeout_ms: 5}\n"
       "bus:\n"
       "  url: memq://\n"
       "  channels: {candidate: A, decision: B, certified: C, robot_state: D, obstacles: E, transition: F, status: G, "
@@ -86,6 +88,8 @@ TEST(LoadConfig, ReadsEveryOption) {
   const GateOptions& gate = config.gate;
   EXPECT_EQ(std::tie(gate.max_age_ms, gate.max_ahead_ms, gate.certificate_lifetime_ms, gate.queue),
             std::make_tuple(1.0, 0.0, 3.0, 4));
+  EXPECT_EQ(gate.obstacles, ObstaclesSource::kBus);
+  EXPECT_EQ(gate.obstacles_timeout_ms, 5);
   const BusOptions& bus = config.bus;
   EXPECT_EQ(bus.url, "memq://");
   EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
@@ -110,6 +114,25 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(std::tie(logger.queue, logger.flush_ms, logger.rotate_mb, logger.rotate_minutes, logger.min_free_mb),
             std::make_tuple(16, 17.0, 18.0, 19.0, 21.0));
   EXPECT_EQ(logger.quota_mb, 20);
+}
+
+TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
+  const TaskFiles files;
+  const Config unsaid = files.Load(kTask);
+  EXPECT_EQ(unsaid.gate.obstacles, ObstaclesSource::kUnsaid) << "`forereach certify` needs none";
+  try {
+    RequireObstaclesSource(unsaid);
+    ADD_FAILURE() << "taken";
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles: missing"),
+                                             testing::HasSubstr("`bus`"), testing::HasSubstr("`task`")));
+  }
+  for (const auto& [word, source] : std::initializer_list<std::pair<std::string, ObstaclesSource>>{
+           {"bus", ObstaclesSource::kBus}, {"task", ObstaclesSource::kTask}}) {
+    const Config config = files.Load(std::string(kTask) + "gate: {obstacles: " + word + "}\n");
+    EXPECT_EQ(config.gate.obstacles, source);
+    EXPECT_NO_THROW(RequireObstaclesSource(config));
+  }
 }
 
 TEST(LoadConfig, ResidualsHaveTheModelsStepAndTheResidualsOwnDefaults) {

@@ -27,7 +27,8 @@ TEST_F(ErrorTest, UnknownKeys) {
   EXPECT_EQ(
       ErrorAfter("gate: {colour: 3}\n"),
       "task.yaml:19: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
-            "decision_budget_ms, queue, mode, arming, robot_timeout_ms, max_clock_jump_ms, learn");
+            "decision_budget_ms, queue, mode, arming, robot_timeout_ms, max_clock_jump_ms, "
+            "obstacles, obstacles_timeout_ms, learn");
   EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
             "task.yaml:9: declaration.lipschitz.theta: unknown key; known here: px, py, vx, vy");
   EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: 0.1, v_y"),

@@ -324,7 +324,7 @@ class Campaign final {
       heard.clear();
       rig.Listen(milliseconds(500));
       const auto recorded = heard;
-      const auto before = rig.witness().status().value_or(certifier_status_v2_t{});
+      const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
       for (const auto& [channel, bytes] : recorded) {
         rig.open_bus().Publish(channel, Bytes(bytes));                     // again
         rig.open_bus().Publish(channel, WithoutSignature(Bytes(bytes)));  // unsigned
@@ -530,7 +530,7 @@ void Campaign::BadReload() {
   Row& row = Begin("Reload of a bad task file", options_.others);
   const std::string path = rig.task_path(), good = DemoTask();
   Tries(row, rig, [&](int i) {
-    const certifier_status_v2_t before = *rig.witness().status();
+    const certifier_status_v3_t before = *rig.witness().status();
     const auto& now = rig.witness().status();
     std::ofstream(path) << Spoilt(good, i / 2);
     if (i % 2 == 0)

@@ -22,7 +22,7 @@ Load::Load(const Config& config, Make make)
       base_id_(WallClockUs()) {
   bus_->Subscribe(config_.bus.decision, [this](const Received& r) { OnDecision(r); });
   bus_->Subscribe(config_.bus.status, [this](const Received& r) {
-    if (const auto status = Decoded<certifier_status_v2_t>(r.bytes)) status_ = *status;
+    if (const auto status = Decoded<certifier_status_v3_t>(r.bytes)) status_ = *status;
   });
 }
 

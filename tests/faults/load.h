@@ -13,7 +13,7 @@ thread of its own, so nothing that is done with the answers delays the next. */
 
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "lcmtypes/bus.h"
 
 namespace forereach {
@@ -50,7 +50,7 @@ class Load final {
   /** By how many microseconds the sender's thread woke up too late, each time since the last call: what the machine does to a
   thread that only sleeps. */
   [[nodiscard]] std::vector<double> TakeLateness();
-  [[nodiscard]] const certifier_status_v2_t& status() const { return status_; }
+  [[nodiscard]] const certifier_status_v3_t& status() const { return status_; }
 
  private:
   void Send();
@@ -70,7 +70,7 @@ class Load final {
   std::vector<double> latencies_;
   std::mutex lateness_mutex_;
   std::vector<double> lateness_;
-  certifier_status_v2_t status_{};
+  certifier_status_v3_t status_{};
   std::atomic<bool> stop_ = false;
   std::thread sender_;
 };

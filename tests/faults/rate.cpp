@@ -20,7 +20,7 @@ namespace {
 
 // Without a robot, and patient with a busy machine.
 constexpr const char* kGate =
-    "gate: {max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000}\n";
+    "gate: {max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000, obstacles: task}\n";
 
 struct Options {
   double seconds = 20, rate = 1000;
@@ -32,7 +32,7 @@ struct Row {
   double asked = 0;
   std::int64_t sent = 0, answered = 0, again = 0, answers_lost = 0;
   double p50_us = 0, p99_us = 0, worst_us = 0;
-  certifier_status_v2_t status{};
+  certifier_status_v3_t status{};
 };
 
 candidate_plan_t Standing(const Config& config, int steps) {
@@ -73,7 +73,7 @@ Row Measure(const Options& options, const std::string& name, Config config, int 
 }
 
 // Counted by cause.
-std::string OtherAnswers(const certifier_status_v2_t& status) {
+std::string OtherAnswers(const certifier_status_v3_t& status) {
   std::string text;
   for (std::size_t cause = 1; cause < std::size(status.by_cause); ++cause)
     if (status.by_cause[cause] > 0)
@@ -91,7 +91,7 @@ std::string Table(const Options& options, int steps, const std::vector<Row>& row
        << "| | sent | certified | other answers | answered twice | lost there | lost back | unaccounted | p50 us | p99 us "
        << "| worst us | gate p50 us | gate p99 us |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Row& row : rows) {
-    const certifier_status_v2_t& status = row.status;
+    const certifier_status_v3_t& status = row.status;
     const std::int64_t unaccounted = row.sent - row.answered - status.candidates_lost - row.answers_lost;
     text << "| " << row.name << " | " << row.sent << " | " << status.by_outcome[decision_t::CERTIFIED] << " | "
          << OtherAnswers(status) << " | " << row.again << " | " << status.candidates_lost << " | " << row.answers_lost

@@ -41,7 +41,7 @@ void Witness::OnDecision(const Received& received) {
 // One heartbeat is held against the last: what was counted then has been heard by now, what was heard then is counted
 // now. The certifier sends both from one thread, so a decision comes before the heartbeat that counts it.
 void Witness::OnStatus(const Received& received) {
-  const auto status = Decoded<certifier_status_v2_t>(received.raw);
+  const auto status = Decoded<certifier_status_v3_t>(received.raw);
   if (!status) return;
   status_ = status;
   if (spoiled_) return;

@@ -10,7 +10,7 @@
 
 #include "certifier/task/config.h"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
@@ -49,7 +49,7 @@ class Witness final {
   [[nodiscard]] std::int64_t certificates_since_fault() const { return certificates_ - certificates_at_fault_; }
   /** The last time a state was heard. */
   [[nodiscard]] std::chrono::steady_clock::time_point robot_heard() const { return robot_heard_; }
-  [[nodiscard]] const std::optional<certifier_status_v2_t>& status() const { return status_; }
+  [[nodiscard]] const std::optional<certifier_status_v3_t>& status() const { return status_; }
   [[nodiscard]] const std::optional<logger_status_t>& logger_status() const { return logger_status_; }
   void Forget() { status_.reset(), logger_status_.reset(), fault_.reset(); }
   void ForgetFault() { fault_.reset(); }
@@ -85,7 +85,7 @@ class Witness final {
     int step;
   };
   std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
-  std::optional<certifier_status_v2_t> status_;
+  std::optional<certifier_status_v3_t> status_;
   std::optional<logger_status_t> logger_status_;
   std::chrono::steady_clock::time_point robot_heard_{};
   std::optional<fault_t> fault_;

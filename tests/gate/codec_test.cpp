@@ -11,6 +11,7 @@
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_t.hpp"
 #include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
@@ -37,7 +38,7 @@ const std::map<std::string, Contract> kContracts = {
     {"obstacles_t", {0x9c72b610dc35fea7, 25498}},      {"robot_state_t", {0xe3677d78a66b57da, 166}},
     {"transition_t", {0xa599cda800864690, 348}},       {"logger_status_t", {0x2a2438623a759ef0, 260}},
     {"certifier_status_v2_t", {0xc45b41cd96d85653, 1144}}, {"command_t", {0x1b315e627593a95f, 58}},
-    {"fault_t", {0xdcbd63f7ef2c91dd, 728}},
+    {"fault_t", {0xdcbd63f7ef2c91dd, 728}},         {"certifier_status_v3_t", {0xf224554c7bae02b5, 1220}},
 };
 
 template <class Message>
@@ -55,8 +56,8 @@ class MessageTest : public testing::Test {
   std::mt19937 random_{seed_};
 };
 
-using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_t, certifier_status_v2_t, command_t,
-                                decision_t, execution_event_t, fault_t, logger_status_t, obstacle_t, obstacles_t,
+using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_t, certifier_status_v2_t,
+                                certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t, obstacle_t, obstacles_t,
                                 robot_state_t, transition_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 

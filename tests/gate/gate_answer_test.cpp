@@ -131,7 +131,7 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
       EXPECT_EQ(answer.certified->sequence, certificates++);
     }
   }
-  const certifier_status_v2_t status = gate_.Status(kNow + 5);
+  const certifier_status_v3_t status = gate_.Status(kNow + 5);
   EXPECT_EQ(status.utime, kNow + 5);
   EXPECT_EQ(status.candidates, 50);
   EXPECT_EQ(status.by_outcome[decision_t::CERTIFIED], 10);

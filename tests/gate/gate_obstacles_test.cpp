@@ -37,8 +37,7 @@ class GateObstaclesTest : public testing::Test {
     return gate_.Decide(Encode(Candidate(next_plan_id_++, acceleration)), kNow).decision;
   }
 
-  // The update is refused with a text that contains `why`, what was in force stays, and the same sequence serves for a
-  // good update afterwards.
+  // The update is refused with a text that contains `why`, and the obstacles in force stay.
   void ExpectRefused(const std::vector<std::uint8_t>& bytes, const std::string& why) {
     const Digest before = GetDigest(gate_.Status(kNow).obstacles_digest);
     const std::size_t count = gate_.obstacles().size();
@@ -47,47 +46,204 @@ class GateObstaclesTest : public testing::Test {
     EXPECT_EQ(GetDigest(Decide().obstacles_digest), before);
     EXPECT_EQ(gate_.obstacles().size(), count);
   }
+  // The same, nothing is known after it, and a good one with the same sequence serves.
   void ExpectRefused(const std::string& why, const std::function<void(obstacles_t&)>& corrupt) {
     obstacles_t message = Message(kOnTheWay, next_sequence_);
     corrupt(message);
     ExpectRefused(Encode(message), why);
+    EXPECT_THAT(Why(), HasSubstr("the last message was refused: ")) << why;
+    EXPECT_THAT(Why(), HasSubstr(why));
     EXPECT_EQ(Update(Message(kFarAway, next_sequence_++)), "") << "good again";
+    EXPECT_EQ(Why(), "");
+  }
+  std::string Why(std::int64_t now_us = kNow) const { return gate_.WhyObstaclesUnknown(now_us); }
+  // Good, in whatever order.
+  void Say(std::int64_t sequence, std::int64_t utime = kNow) {
+    obstacles_t message = Message(kFarAway, sequence);
+    message.utime = utime;
+    EXPECT_EQ(Update(message), "") << sequence;
   }
 
-  Gate gate_{SmallTask()};
+  const std::vector<Obstacle> of_task_ = SmallTask().obstacles;
+
+  Gate gate_{SmallTaskOnTheBus()};
   std::int64_t next_plan_id_ = 1, next_sequence_ = 0;
 };
 
-TEST_F(GateObstaclesTest, AnUpdateReplacesAllAndDecisionsAreBoundToIt) {
-  EXPECT_EQ(Decide().outcome, decision_t::CERTIFIED);
+std::vector<Obstacle> Both(std::vector<Obstacle> some, const std::vector<Obstacle>& others) {
+  some.insert(some.end(), others.begin(), others.end());
+  return some;
+}
+
+TEST_F(GateObstaclesTest, ThoseHeardCountBesideTheTasksAndDecisionsAreBoundToThem) {
   EXPECT_EQ(Decide(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
 
   EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
   const decision_t blocked = Decide();
   EXPECT_EQ(blocked.outcome, decision_t::ABSTAIN_SAFETY);
-  EXPECT_EQ(blocked.obstacle, 1);
-  EXPECT_EQ(GetDigest(blocked.obstacles_digest), ObstaclesDigest(kOnTheWay));
+  EXPECT_EQ(blocked.obstacle, 2) << "the task's come first";
+  EXPECT_EQ(GetDigest(blocked.obstacles_digest), ObstaclesDigest(Both(of_task_, kOnTheWay)));
 
   EXPECT_EQ(Update(Message(kFarAway, 1)), "");
-  const GateAnswer clear = gate_.Decide(Encode(Candidate(next_plan_id_++, kAccelerationIntoTheCircle)), kNow);
-  EXPECT_EQ(clear.decision.outcome, decision_t::CERTIFIED) << "the circle of the config is gone";
-  EXPECT_EQ(GetDigest(clear.decision.obstacles_digest), ObstaclesDigest(kFarAway));
+  EXPECT_EQ(Decide(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY) << "the circle of the config stands";
+  const GateAnswer clear = gate_.Decide(Encode(Candidate(next_plan_id_++)), kNow);
+  EXPECT_EQ(clear.decision.outcome, decision_t::CERTIFIED);
+  EXPECT_EQ(GetDigest(clear.decision.obstacles_digest), ObstaclesDigest(Both(of_task_, kFarAway)));
   ASSERT_TRUE(clear.certified);
-  EXPECT_EQ(GetDigest(clear.certified->obstacles_digest), ObstaclesDigest(kFarAway));
+  EXPECT_EQ(GetDigest(clear.certified->obstacles_digest), ObstaclesDigest(Both(of_task_, kFarAway)));
 
   EXPECT_EQ(Update(Message({}, 2)), "");
-  const decision_t empty = Decide();
-  EXPECT_EQ(empty.outcome, decision_t::CERTIFIED);
-  EXPECT_EQ(empty.obstacle, -1);
-  EXPECT_EQ(GetDigest(empty.obstacles_digest), ObstaclesDigest({}));
+  EXPECT_EQ(Decide(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
+  EXPECT_EQ(GetDigest(Decide().obstacles_digest), ObstaclesDigest(of_task_));
+}
+
+// As logs from before gate.obstacles were made.
+TEST(GateOldLogsTest, WhereNothingIsSaidThoseHeardReplaceTheTasks) {
+  Config config = SmallTask();
+  config.gate.obstacles = ObstaclesSource::kUnsaid;
+  Gate gate(config);
+  EXPECT_EQ(gate.obstacles_digest(), config.obstacles_digest);
+  EXPECT_EQ(gate.UpdateObstacles(Encode(Message(kFarAway, 3)), kNow), "");
+  EXPECT_EQ(gate.obstacles_digest(), ObstaclesDigest(kFarAway));
+  EXPECT_NE(gate.UpdateObstacles({}, kNow), "");
+  EXPECT_EQ(gate.UpdateObstacles(Encode(Message({}, 7)), kNow), "");
+  EXPECT_EQ(gate.obstacles_digest(), ObstaclesDigest({}));
+  EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
+}
+
+TEST(GateTaskObstaclesTest, WhereTheTaskIsTheWorldTheBusIsNotHeard) {
+  Gate gate(SmallTask());
+  EXPECT_THAT(gate.UpdateObstacles(Encode(Message(kOnTheWay, 0)), kNow), HasSubstr("gate.obstacles is task"));
+  EXPECT_THAT(gate.UpdateObstacles({}, kNow), HasSubstr("gate.obstacles is task"));
+  EXPECT_EQ(gate.obstacles_digest(), SmallTask().obstacles_digest);
+  EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
+  const certifier_status_v3_t status = gate.Status(kNow);
+  EXPECT_EQ(status.obstacles_source, certifier_status_v3_t::OBSTACLES_TASK);
+  EXPECT_EQ(status.obstacles_known, 1);
+  EXPECT_EQ(status.obstacles_in_force, 1);
+  EXPECT_EQ(status.obstacles_age_us, -1);
+}
+
+// ---- When all obstacles are known.
+
+TEST_F(GateObstaclesTest, NothingIsKnownBeforeTheFirstMessage) {
+  EXPECT_EQ(Why(), "none has been heard yet");
+  EXPECT_EQ(gate_.Status(kNow).obstacles_known, 0);
+  EXPECT_EQ(gate_.Status(kNow).obstacles_source, certifier_status_v3_t::OBSTACLES_BUS);
+  Say(41);
+  EXPECT_EQ(Why(), "") << "a certifier may start while somebody sends";
+  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_known, 1);
+  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_age_us, 7);
+  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_utime, kNow);
+  EXPECT_EQ(gate_.Status(kNow + 7).obstacles_in_force, 2);
+}
+
+TEST_F(GateObstaclesTest, TheyAreKnownUntilTheTimeoutAndNotLonger) {
+  Say(0);
+  EXPECT_EQ(Why(kNow + 1'000'000), "");
+  EXPECT_THAT(Why(kNow + 1'000'001), HasSubstr("1000 ms old, at most 1000 ms are allowed"));
+  EXPECT_EQ(Why(kNow - 50'000), "");
+  EXPECT_THAT(Why(kNow - 50'001), HasSubstr("the clock was set back"));
+  EXPECT_EQ(Why(), "");
+}
+
+TEST_F(GateObstaclesTest, TheAgeCountsFromTheStampNotFromTheArrival) {
+  Say(0, kNow - 400'000);
+  EXPECT_EQ(Why(kNow + 600'000), "");
+  EXPECT_NE(Why(kNow + 600'001), "");
+}
+
+TEST_F(GateObstaclesTest, AGapMakesThemUnknownUntilTheNextInOrder) {
+  Say(0);
+  Say(1);
+  Say(3);
+  EXPECT_THAT(Why(), HasSubstr("sequence 3 came out of order"));
+  EXPECT_EQ(gate_.Status(kNow).obstacles_lost, 1);
+  EXPECT_EQ(gate_.Status(kNow).obstacles_utime, kNow) << "it is taken all the same";
+  Say(4);
+  EXPECT_EQ(Why(), "");
+  Say(9);
+  EXPECT_NE(Why(), "");
+  Say(12);
+  EXPECT_NE(Why(), "") << "another gap";
+  Say(13);
+  EXPECT_EQ(Why(), "");
+  EXPECT_EQ(gate_.Status(kNow).obstacles_lost, 1 + 4 + 2);
+}
+
+TEST_F(GateObstaclesTest, AMessageThatComesLateOrTwiceChangesNothing) {
+  Say(0);
+  Say(1);
+  for (const std::int64_t sequence : {0, 1}) ExpectRefused(Encode(Message(kOnTheWay, sequence)), "does not exceed the last");
+  EXPECT_EQ(Why(), "");
+  obstacles_t old = Message(kOnTheWay, 1);
+  old.utime = kNow - 3'000'000;
+  ExpectRefused(Encode(old), "does not exceed the last");
+  EXPECT_EQ(Why(), "") << "replayed";
+  Say(3);
+  ExpectRefused(Encode(Message(kOnTheWay, 2)), "does not exceed the last");
+  EXPECT_NE(Why(), "") << "overtaken, it fills no gap";
+}
+
+TEST_F(GateObstaclesTest, ASenderThatBeginsAnewAtZeroIsTakenAtOnce) {
+  Say(100);
+  Say(0, kNow + 1);
+  EXPECT_EQ(Why(), "");
+  Say(1, kNow + 2);
+  EXPECT_EQ(Why(), "");
+}
+
+TEST_F(GateObstaclesTest, TwoSendersAreNeverKnownTogether) {
+  struct { std::int64_t first, second; const char* what; } const starts[] = {
+      {100, 0, "the second has just begun"}, {100, 7, "it was there before"}, {50, 50, "in step"}, {50, 49, "one behind"}};
+  for (const auto& [first, second, what] : starts) {
+    Gate gate(SmallTaskOnTheBus());
+    for (int i = 0; i < 20; ++i) {
+      for (const bool is_second : {false, true}) {
+        obstacles_t message = Message(is_second ? kOnTheWay : kFarAway, (is_second ? second : first) + i);
+        message.utime = kNow + 10 * i + (is_second ? 5 : 0);
+        static_cast<void>(gate.UpdateObstacles(Encode(message), kNow + 10 * i + 5));
+        if (i >= 1) {
+          EXPECT_NE(gate.WhyObstaclesUnknown(kNow + 10 * i + 5), "") << what << " " << i;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(GateObstaclesTest, OneThatIsRefusedMakesThemUnknownUntilAGoodOne) {
+  Say(0);
+  ExpectRefused({1, 2, 3}, "not an obstacles_t");
+  EXPECT_NE(Why(), "");
+  ExpectRefused(Encode(Message(kFarAway, 0)), "does not exceed the last");
+  EXPECT_NE(Why(), "") << "an old good one ends nothing";
+  Say(1);
+  EXPECT_EQ(Why(), "");
+  obstacles_t bad = Message(kFarAway, 2);
+  bad.num_obstacles = 65;
+  ExpectRefused(Encode(bad), "must be 0 to 64");
+  EXPECT_NE(Why(), "");
+  Say(3);
+  EXPECT_EQ(Why(), "") << "the refused one was heard, no gap";
+  EXPECT_EQ(gate_.Status(kNow).obstacles_lost, 0);
+}
+
+TEST_F(GateObstaclesTest, TheLastSequenceOfAllIsTaken) {
+  Say(0);
+  Say(std::numeric_limits<std::int64_t>::max());
+  EXPECT_NE(Why(), "");
+  Say(0, kNow + 1);
+  EXPECT_EQ(Why(), "");
 }
 
 TEST_F(GateObstaclesTest, OnlyANewerSequenceReplaces) {
   EXPECT_EQ(Update(Message(kFarAway, 7)), "");
   ExpectRefused(Encode(Message(kOnTheWay, 7)), "sequence 7");
   ExpectRefused(Encode(Message(kOnTheWay, 6)), "sequence 6");
-  ExpectRefused(Encode(Message(kOnTheWay, -1)), "sequence -1");
+  EXPECT_EQ(Why(), "");
+  ExpectRefused(Encode(Message(kOnTheWay, -1)), "sequence -1 is negative");
   EXPECT_EQ(Update(Message(kOnTheWay, 8)), "");
+  EXPECT_EQ(Why(), "");
 }
 
 TEST_F(GateObstaclesTest, ASenderThatBeganAnewIsTakenByItsStamp) {
@@ -96,7 +252,7 @@ TEST_F(GateObstaclesTest, ASenderThatBeganAnewIsTakenByItsStamp) {
   ExpectRefused(Encode(anew), "nor does its stamp");
   anew.utime = kNow + 1;
   EXPECT_EQ(Update(anew), "");
-  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(kOnTheWay));
+  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(Both(of_task_, kOnTheWay)));
   ExpectRefused(Encode(anew), "sequence 0 does not exceed the last, 0, nor does its stamp");
 }
 
@@ -105,33 +261,38 @@ TEST_F(GateObstaclesTest, AClockThatWasSetBackKeepsNobodyOut) {
   obstacles_t before = Message(kFarAway, 7);
   before.utime = later;
   EXPECT_EQ(gate_.UpdateObstacles(Encode(before), later), "");
+  EXPECT_NE(Why(), "");
   EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
-  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(kOnTheWay));
+  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(Both(of_task_, kOnTheWay)));
+  EXPECT_EQ(Why(), "");
 }
 
 // A person who changes the task file does not know what is being seen.
 TEST_F(GateObstaclesTest, AReloadKeepsWhatWasHeardBesideTheTasks) {
-  const std::vector<Obstacle> of_task = SmallTask().obstacles;
   const auto reloaded = [](const Gate& before) {
-    auto gate = std::make_unique<Gate>(SmallTask());
+    auto gate = std::make_unique<Gate>(SmallTaskOnTheBus());
     gate->Inherit(before);
     return gate;
   };
-  EXPECT_EQ(reloaded(gate_)->obstacles_digest(), ObstaclesDigest(of_task)) << "nothing was heard";
+  EXPECT_EQ(reloaded(gate_)->obstacles_digest(), ObstaclesDigest(of_task_)) << "nothing was heard";
+  EXPECT_EQ(reloaded(gate_)->WhyObstaclesUnknown(kNow), "none has been heard yet");
 
   EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
-  std::vector<Obstacle> both = of_task;
-  both.insert(both.end(), kOnTheWay.begin(), kOnTheWay.end());
   const auto once = reloaded(gate_), twice = reloaded(*once);
   for (Gate* gate : {once.get(), twice.get()}) {
-    EXPECT_EQ(gate->obstacles_digest(), ObstaclesDigest(both));
+    EXPECT_EQ(gate->obstacles_digest(), ObstaclesDigest(Both(of_task_, kOnTheWay)));
+    EXPECT_EQ(gate->WhyObstaclesUnknown(kNow), "");
+    EXPECT_NE(gate->WhyObstaclesUnknown(kNow + 1'000'001), "");
     const decision_t decision = gate->Decide(Encode(Candidate(next_plan_id_++)), kNow).decision;
     EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_SAFETY);
     EXPECT_EQ(decision.obstacle, 2);
     EXPECT_NE(gate->UpdateObstacles(Encode(Message(kFarAway, 0)), kNow), "") << "as old as the one before";
   }
   EXPECT_EQ(once->UpdateObstacles(Encode(Message(kFarAway, 1)), kNow), "");
-  EXPECT_EQ(once->obstacles_digest(), ObstaclesDigest(kFarAway));
+  EXPECT_EQ(once->obstacles_digest(), ObstaclesDigest(Both(of_task_, kFarAway)));
+
+  ExpectRefused({}, "not an obstacles_t");
+  EXPECT_NE(reloaded(gate_)->WhyObstaclesUnknown(kNow), "") << "a refused one is not forgotten either";
 }
 
 TEST_F(GateObstaclesTest, OldOrFutureOnesAreRefused) {
@@ -184,7 +345,7 @@ TEST_F(GateObstaclesTest, SixtyFourObstaclesFit) {
   std::vector<Obstacle> many(64, kFarAway[0]);
   many.back() = kOnTheWay[1];
   EXPECT_EQ(Update(Message(many, 0)), "");
-  EXPECT_EQ(Decide().obstacle, 63);
+  EXPECT_EQ(Decide().obstacle, 64) << "behind the task's";
 }
 
 TEST(ObstacleMessageTest, EveryKindGoesThroughTheBus) {

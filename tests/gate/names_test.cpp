@@ -73,12 +73,24 @@ TEST(NamesTest, EveryFaultHasItsName) { ExpectNamed(ConstantsOf("fault_t"), Faul
 TEST(NamesTest, EveryEventHasItsName) { ExpectNamed(ConstantsOf("execution_event_t"), EventName); }
 
 TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {
-  Constants states = ConstantsOf("certifier_status_v2_t");
+  Constants states = ConstantsOf("certifier_status_v3_t");
   for (const std::string level : {"OK", "STALE", "ERROR"}) {
     ASSERT_TRUE(states.contains(level));
     EXPECT_EQ(LevelName(static_cast<std::int16_t>(states[level])), level);
     states.erase(level);
   }
+  const auto take = [&states](const std::string& name, const std::string& key) {
+    Constants taken;
+    for (const auto& [constant, number] : Constants(states))
+      if (constant.find(key) != std::string::npos) {
+        states.erase(constant);
+        taken[constant == "NO_" + key ? "none" : constant.substr(key.size() + 1)] = number;
+      }
+    EXPECT_FALSE(taken.empty()) << name;
+    return taken;
+  };
+  ExpectNamed(take("the latch", "LATCH"), LatchName);
+  ExpectNamed(take("the source of obstacles", "OBSTACLES"), ObstaclesSourceName);
   ExpectNamed(states, StateName);
   for (const std::int16_t other : {std::int16_t{0}, std::int16_t{4}, std::int16_t{-1}}) EXPECT_EQ(LevelName(other), "unknown");
 }
@@ -113,7 +125,9 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                {"OVERRUN", 23},
                                {"NOT_ARMED", 24},
                                {"FAULT", 25},
-                               {"SHADOW", 26}}));
+                               {"SHADOW", 26},
+                               {"NO_OBSTACLES", 27},
+                               {"SECOND_CERTIFIER", 28}}));
   EXPECT_EQ(ConstantsOf("execution_event_t"), (Constants{{"ACCEPTED", 1},
                                                          {"REFUSED", 2},
                                                          {"STARTED", 3},
@@ -129,6 +143,10 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},
                                                {"DECLARATION_FALSIFIED", 4}}));
+  EXPECT_EQ(ConstantsOf("certifier_status_v3_t"),
+            (Constants{{"OK", 1}, {"STALE", 2}, {"ERROR", 3}, {"DISARMED", 1}, {"ARMED", 2}, {"FAULT", 3},
+                       {"LISTENING", 4}, {"STANDBY", 5}, {"NO_LATCH", 0}, {"LATCH_WRITTEN", 1}, {"LATCH_UNWRITABLE", 2},
+                       {"OBSTACLES_TASK", 1}, {"OBSTACLES_BUS", 2}}));
   EXPECT_EQ(ConstantsOf("certifier_status_v2_t"),
             (Constants{{"OK", 1}, {"STALE", 2}, {"ERROR", 3}, {"DISARMED", 1}, {"ARMED", 2}, {"FAULT", 3}}));
   EXPECT_EQ(ConstantsOf("command_t"), (Constants{{"RESET", 1}, {"RELOAD", 2}}));

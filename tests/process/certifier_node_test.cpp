@@ -50,7 +50,7 @@ class CertifierNodeTest : public testing::Test {
       order_ += 'c';
     });
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_v2_t>(r.bytes).value()); });
+                    [this](const Received& r) { status_.push_back(Decoded<certifier_status_v3_t>(r.bytes).value()); });
   }
 
   void Run() {
@@ -72,7 +72,7 @@ class CertifierNodeTest : public testing::Test {
   std::unique_ptr<CertifierNode> node_;
   std::vector<decision_t> decisions_;
   std::vector<certified_plan_t> certified_;
-  std::vector<certifier_status_v2_t> status_;
+  std::vector<certifier_status_v3_t> status_;
   std::string order_;
 };
 
@@ -195,30 +195,6 @@ TEST_F(CertifierNodeTest, AFloodOfCandidatesIsAnsweredOnceEach) {
   EXPECT_EQ(certified_.size(), 20u * 12) << "8 at once, and the 4 that may wait";
 }
 
-TEST_F(CertifierNodeTest, ObstaclesOvertakeCandidatesThatWait) {
-  obstacles_t obstacles = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
-  obstacles.utime = kNow;
-  bus_->Publish("PLAN_CANDIDATE", Candidate(1));
-  bus_->Publish("OBSTACLES", obstacles);
-  bus_->Publish("PLAN_CANDIDATE", Candidate(2));
-  Run();
-  EXPECT_THAT(Causes(), ElementsAre(4, 4)) << "4 is obstacle";
-  EXPECT_EQ(GetDigest(decisions_[0].obstacles_digest), GetDigest(decisions_[1].obstacles_digest));
-}
-
-TEST_F(CertifierNodeTest, ABadObstaclesMessageLeavesThoseInForce) {
-  obstacles_t obstacles = ToMessage({});
-  obstacles.utime = kNow;
-  obstacles.num_obstacles = -1;
-  bus_->Publish("OBSTACLES", obstacles);
-  bus_->Publish("PLAN_CANDIDATE", Candidate(1, kAccelerationIntoTheCircle));
-  Run();
-  EXPECT_THAT(Causes(), ElementsAre(4));
-  testing::internal::CaptureStdout();
-  node_->Stop();
-  EXPECT_THAT(testing::internal::GetCapturedStdout(), testing::HasSubstr("\"messages_refused\":1"));
-}
-
 TEST_F(CertifierNodeTest, OnlyCertifiedPlansArePassedOn) {
   bus_->Publish("PLAN_CANDIDATE", Candidate(1, kAccelerationIntoTheCircle));
   bus_->Publish("PLAN_CANDIDATE", Candidate(2, kAccelerationOutsideDomain));
@@ -244,12 +220,388 @@ TEST_F(CertifierNodeTest, BeatsTwiceASecondWithItsCounts) {
     EXPECT_EQ(status_[i].candidates, is_first ? 0 : 2);
     EXPECT_EQ(status_[i].by_outcome[decision_t::CERTIFIED], is_first ? 0 : 1);
     EXPECT_EQ(status_[i].by_cause[decision_t::CAUSE_OBSTACLE], is_first ? 0 : 1);
-    EXPECT_EQ(status_[i].level, certifier_status_v2_t::OK);
+    EXPECT_EQ(status_[i].level, certifier_status_v3_t::OK);
     EXPECT_EQ(status_[i].elapsed_p50_us > 0, !is_first);
     EXPECT_GE(status_[i].elapsed_p99_us, status_[i].elapsed_p50_us);
     EXPECT_EQ(GetDigest(status_[i].config_digest), config_.digest);
   }
 }
+
+// ---- Where the obstacles come from.
+
+class ObstaclesNodeTest : public CertifierNodeTest {
+ protected:
+  ObstaclesNodeTest() {
+    config_.gate.obstacles = ObstaclesSource::kBus;
+    Restart();
+  }
+
+  obstacles_t Seen(const std::vector<Obstacle>& obstacles) {
+    obstacles_t message = ToMessage(obstacles);
+    message.utime = now_us_;
+    message.sequence = next_sequence_++;
+    return message;
+  }
+  void Say(const std::vector<Obstacle>& obstacles) { bus_->Publish("OBSTACLES", Seen(obstacles)); }
+  decision_t Ask(double acceleration = kAccelerationThatCertifies) {
+    bus_->Publish("PLAN_CANDIDATE", Candidate(next_plan_id_++, acceleration, now_us_));
+    Run();
+    return decisions_.back();
+  }
+  // The decision and the heartbeat say so.
+  void ExpectUnknown(const std::string& why) {
+    const decision_t decision = Ask();
+    EXPECT_EQ(decision.outcome, decision_t::REJECTED);
+    EXPECT_EQ(decision.cause, decision_t::CAUSE_NO_OBSTACLES);
+    EXPECT_THAT(GetText(decision.message), testing::HasSubstr("rejected: waits for OBSTACLES: " + why));
+    now_us_ += CertifierNode::kHeartbeatUs;
+    Run();
+    EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
+    EXPECT_EQ(status_.back().state, certifier_status_v3_t::DISARMED);
+    EXPECT_EQ(status_.back().obstacles_known, 0);
+    EXPECT_THAT(GetText(status_.back().message), testing::HasSubstr("waits for OBSTACLES: " + why));
+  }
+
+  const std::vector<Obstacle> kOnTheWay{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)};
+  std::int64_t next_sequence_ = 0, next_plan_id_ = 1;
+};
+
+TEST_F(ObstaclesNodeTest, NothingIsCertifiedBeforeTheyAreHeardNorAfterARestart) {
+  for (int start = 0; start < 2; ++start) {
+    ExpectUnknown("none has been heard yet");
+    EXPECT_TRUE(certified_.empty());
+    Say(kOnTheWay);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_OBSTACLE);
+    Say({});
+    EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+    certified_.clear();
+    Say(kOnTheWay);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_OBSTACLE);
+    Restart();  // as after SIGKILL: it forgets
+  }
+}
+
+TEST_F(ObstaclesNodeTest, SilenceNeverBecomesNoObstacles) {
+  Say({});
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  now_us_ += 1'000'000;
+  Run();
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << "just in time";
+  now_us_ += 1;
+  ExpectUnknown("the last message is ");
+  now_us_ += 3'600'000'000;
+  ExpectUnknown("the last message is ");
+  Say({});
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << "nobody has to reset it";
+}
+
+// What is decided on late in a tick is held to the time of its decision.
+TEST_F(ObstaclesNodeTest, TheTimeoutCountsWithinATick) {
+  const Clock slow = [this] { return now_us_ += 10; };
+  clocks_ = {slow, slow};
+  Restart();
+  Say({});
+  Run();
+  now_us_ += 999'900;
+  for (int id = 1; id <= 8; ++id) {
+    candidate_plan_t candidate = Candidate(id, kAccelerationThatCertifies, now_us_);
+    bus_->Publish("PLAN_CANDIDATE", candidate);
+  }
+  Run();
+  ASSERT_EQ(decisions_.size(), 8u);
+  EXPECT_EQ(decisions_.front().outcome, decision_t::CERTIFIED);
+  EXPECT_EQ(decisions_.back().cause, decision_t::CAUSE_NO_OBSTACLES);
+}
+
+TEST_F(ObstaclesNodeTest, OneThatIsRefusedOrMissingMakesThemUnknown) {
+  Say({});
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  obstacles_t bad = Seen(kOnTheWay);
+  bad.num_obstacles = -1;
+  bus_->Publish("OBSTACLES", bad);
+  ExpectUnknown("the last message was refused: obstacles: -1, must be 0 to 64");
+  Say({});
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  static_cast<void>(Seen({}));  // lost
+  Say({});
+  ExpectUnknown("sequence 4 came out of order");
+  EXPECT_EQ(status_.back().obstacles_lost, 1);
+  EXPECT_EQ(status_.back().messages_refused, 1);
+  Say({});
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+}
+
+TEST_F(ObstaclesNodeTest, TheyOvertakeCandidatesThatWait) {
+  bus_->Publish("PLAN_CANDIDATE", Candidate(1));
+  Say(kOnTheWay);
+  bus_->Publish("PLAN_CANDIDATE", Candidate(2));
+  Run();
+  EXPECT_THAT(Causes(), ElementsAre(4, 4)) << "4 is obstacle";
+  EXPECT_EQ(GetDigest(decisions_[0].obstacles_digest), GetDigest(decisions_[1].obstacles_digest));
+}
+
+TEST_F(ObstaclesNodeTest, AllThatIsMissingIsNamed) {
+  config_.gate.needs_robot_state = true;
+  Restart();
+  const decision_t decision = Ask();
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_NOT_ARMED);
+  EXPECT_EQ(GetText(decision.message),
+            "rejected: waits for the robot's state; waits for OBSTACLES: none has been heard yet");
+  EXPECT_EQ(GetText(status_.back().message), "waits for the robot's state; waits for OBSTACLES: none has been heard yet");
+  Say({});
+  EXPECT_EQ(GetText(Ask().message), "rejected: waits for the robot's state");
+}
+
+TEST_F(ObstaclesNodeTest, WhereTheTaskIsTheWorldOthersAreRefusedAndTheHeartbeatSaysSo) {
+  config_.gate.obstacles = ObstaclesSource::kTask;
+  Restart();
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  EXPECT_EQ(GetText(status_.back().message), "gate.obstacles is task: the 1 of the task file are all there are");
+  EXPECT_EQ(status_.back().obstacles_source, certifier_status_v3_t::OBSTACLES_TASK);
+  Say(kOnTheWay);
+  EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  now_us_ += CertifierNode::kHeartbeatUs;
+  Run();
+  EXPECT_EQ(status_.back().level, certifier_status_v3_t::OK);
+  EXPECT_EQ(status_.back().messages_refused, 1);
+  EXPECT_THAT(GetText(status_.back().message), testing::HasSubstr("; OBSTACLES is refused"));
+}
+
+TEST_F(ObstaclesNodeTest, ATaskThatDoesNotSayWhereTheyComeFromIsRefused) {
+  config_.gate.obstacles = ObstaclesSource::kUnsaid;
+  config_.path = "task.yaml";
+  try {
+    CertifierNode node(config_, *bus_, clocks_);
+    ADD_FAILURE() << "it began";
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(error.what(), testing::StartsWith("task.yaml: gate.obstacles: missing. `bus`: "));
+  }
+}
+
+// ---- Two certifiers on one bus.
+
+class TwoCertifiersTest : public ObstaclesNodeTest {
+ protected:
+  // Each hears the robot's obstacles, and both are run in turn, unless paused.
+  void Start(std::size_t i) {
+    nodes_[i] = std::make_unique<CertifierNode>(config_, buses_[i], clocks_, Charge::kListenUs);
+    nodes_[i]->Tick(now_us_);
+  }
+  TwoCertifiersTest() {
+    node_.reset();
+    for (SharedBus& bus : buses_) bus.others = &buses_;
+    listener_.others = &buses_;
+  }
+
+  void Pass(std::int64_t us) {
+    for (const std::int64_t end = now_us_ + us; now_us_ < end; now_us_ += 2000) {
+      if (now_us_ >= next_seen_us_) {
+        next_seen_us_ = now_us_ + 200'000;
+        listener_.Publish("OBSTACLES", Seen(says_));
+      }
+      for (std::size_t i = 0; i < 2; ++i) {
+        if (!nodes_[i] || paused_[i]) continue;
+        buses_[i].Dispatch(0);
+        nodes_[i]->Tick(now_us_);
+      }
+    }
+  }
+  // Answers that come to one candidate, by both.
+  std::vector<decision_t> Answers() {
+    const std::int64_t id = next_plan_id_++;
+    listener_.Publish("PLAN_CANDIDATE", Candidate(id, kAccelerationThatCertifies, now_us_));
+    Pass(400'000);
+    std::vector<decision_t> answers;
+    for (SharedBus& bus : buses_)
+      for (const auto& [channel, bytes] : bus.sent)
+        if (const auto decision = Decoded<decision_t>(bytes); decision && decision->plan_id == id) answers.push_back(*decision);
+    return answers;
+  }
+  certifier_status_v3_t Status(std::size_t i) const {
+    certifier_status_v3_t status{};
+    for (const auto& [channel, bytes] : buses_[i].sent)
+      if (const auto decoded = Decoded<certifier_status_v3_t>(bytes)) status = *decoded;
+    return status;
+  }
+  std::array<Charge::State, 2> States() const { return {nodes_[0]->charge().state(), nodes_[1]->charge().state()}; }
+
+  // What one says reaches all, itself too, as multicast does.
+  struct SharedBus final : Bus {
+    using Bus::Publish;
+    void Subscribe(const std::string& channel, Handler handler) override { handlers[channel] = std::move(handler); }
+    bool Publish(const std::string& channel, Bytes bytes) override {
+      sent.push_back({channel, {bytes.begin(), bytes.end()}});
+      for (SharedBus& bus : *others) bus.arrived.push_back(sent.back());
+      return true;
+    }
+    int Dispatch(int) override {
+      const auto now = std::exchange(arrived, {});
+      for (const auto& [channel, bytes] : now)
+        if (handlers.contains(channel)) handlers[channel](Received{channel, bytes, clock()});
+      return static_cast<int>(now.size());
+    }
+    [[nodiscard]] std::int64_t dropped() const override { return 0; }
+
+    std::array<SharedBus, 2>* others = nullptr;
+    std::map<std::string, Handler> handlers;
+    std::vector<std::pair<std::string, std::vector<std::uint8_t>>> sent, arrived;
+    Clock clock;
+  };
+
+  std::array<SharedBus, 2> buses_;
+  SharedBus listener_;  // sends only
+  std::array<std::unique_ptr<CertifierNode>, 2> nodes_;
+  std::array<bool, 2> paused_{};
+  std::int64_t next_seen_us_ = 0;
+  std::vector<Obstacle> says_;
+};
+
+using Charged = std::array<Charge::State, 2>;
+constexpr auto kInCharge = Charge::State::kInCharge, kStandingBy = Charge::State::kStandingBy;
+
+#define FOREREACH_START_BOTH() \
+  for (SharedBus& bus : buses_) bus.clock = clock_; \
+  Start(0); \
+  Pass(1'000'000); \
+  Start(1); \
+  Pass(1'000'000)
+
+TEST_F(TwoCertifiersTest, TheLaterOneRefusesToArmAndAnswersNobody) {
+  FOREREACH_START_BOTH();
+  EXPECT_EQ(States(), (Charged{kInCharge, kStandingBy}));
+  for (int i = 0; i < 5; ++i) {
+    const auto answers = Answers();
+    ASSERT_EQ(answers.size(), 1u);
+    EXPECT_EQ(answers[0].outcome, decision_t::CERTIFIED);
+  }
+  for (const auto& [channel, bytes] : buses_[1].sent) EXPECT_EQ(channel, "CERTIFIER_STATUS");
+  Pass(600'000);
+  const certifier_status_v3_t first = Status(0), second = Status(1);
+  EXPECT_EQ(first.level, certifier_status_v3_t::OK);
+  EXPECT_EQ(first.other_instance, second.instance);
+  EXPECT_THAT(GetText(first.message), testing::HasSubstr("another certifier"));
+  EXPECT_EQ(second.level, certifier_status_v3_t::STALE);
+  EXPECT_EQ(second.state, certifier_status_v3_t::STANDBY);
+  EXPECT_EQ(second.other_instance, first.instance);
+  EXPECT_EQ(second.candidates, 0);
+  EXPECT_EQ(second.by_cause[decision_t::CAUSE_SECOND_CERTIFIER], 5);
+  EXPECT_THAT(GetText(second.message), testing::HasSubstr("is in charge on this bus: this one decides nothing"));
+  EXPECT_LT(first.started_utime, second.started_utime);
+}
+
+TEST_F(TwoCertifiersTest, OfTwoThatStartTogetherOneTakesChargeAndCandidatesWaitForIt) {
+  for (SharedBus& bus : buses_) bus.clock = clock_;
+  Start(0);
+  Start(1);
+  const auto answers = Answers();
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_EQ(answers[0].cause, decision_t::CAUSE_NO_OBSTACLES) << "it has not listened to anything before";
+  const bool first = Status(0).instance < Status(1).instance;
+  EXPECT_EQ(States(), first ? (Charged{kInCharge, kStandingBy}) : (Charged{kStandingBy, kInCharge}));
+  EXPECT_EQ(Answers().size(), 1u);
+}
+
+TEST_F(TwoCertifiersTest, TheLaterOneTakesOverOnceTheFirstIsSilentAndItsOwnWorldIsKnown) {
+  says_ = kOnTheWay;
+  FOREREACH_START_BOTH();
+  EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_OBSTACLE);
+  nodes_[0].reset();
+  Pass(Charge::kSilenceUs - 500'000);
+  EXPECT_TRUE(Answers().empty()) << "nobody is in charge";
+  Pass(1'000'000);
+  EXPECT_EQ(nodes_[1]->charge().state(), kInCharge);
+  EXPECT_EQ(Status(1).level, certifier_status_v3_t::OK);
+  EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_OBSTACLE);
+  for (SharedBus& bus : buses_)
+    for (const auto& [channel, bytes] : bus.sent) EXPECT_NE(channel, "PLAN_CERTIFIED");
+}
+
+TEST_F(TwoCertifiersTest, OneThatTakesOverWithoutObstaclesCertifiesNothing) {
+  FOREREACH_START_BOTH();
+  nodes_[0].reset();
+  next_seen_us_ = INT64_MAX;  // who sees them has died too
+  Pass(3'000'000);
+  EXPECT_EQ(nodes_[1]->charge().state(), kInCharge);
+  EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_NO_OBSTACLES);
+}
+
+TEST_F(TwoCertifiersTest, TheFirstWasPausedAndFindsTheSecondInCharge) {
+  FOREREACH_START_BOTH();
+  paused_[0] = true;
+  Pass(4'000'000);
+  EXPECT_EQ(nodes_[1]->charge().state(), kInCharge);
+  paused_[0] = false;
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(Answers().size(), 1u);
+  EXPECT_EQ(States(), (Charged{kStandingBy, kInCharge}));
+  EXPECT_EQ(Status(0).observations, static_cast<std::int64_t>(config_.problem->transitions.size()));
+}
+
+TEST_F(TwoCertifiersTest, APauseThatIsShorterThanTheTakeoverChangesNothing) {
+  FOREREACH_START_BOTH();
+  for (const std::int64_t pause : {1'400'000, 1'600'000}) {
+    paused_[0] = true;
+    Pass(pause);
+    paused_[0] = false;
+    Pass(1'500'000);
+    EXPECT_EQ(States(), (Charged{kInCharge, kStandingBy})) << pause;
+    EXPECT_EQ(Answers().size(), 1u);
+  }
+}
+
+// Where heartbeats are lost both may be in charge; the later one gives way, and forgets what it was certifying on.
+TEST_F(TwoCertifiersTest, BothInChargeTheLaterGivesWay) {
+  for (SharedBus& bus : buses_) bus.clock = clock_;
+  Start(0);
+  Pass(1'000'000);
+  std::array<SharedBus, 2> elsewhere;  // a cable is out
+  for (SharedBus& bus : elsewhere) bus.others = &elsewhere, bus.clock = clock_;
+  Start(1);
+  buses_[0].others = &elsewhere;
+  for (int i = 0; i < 500; ++i) {
+    now_us_ += 2000;
+    nodes_[1]->Tick(now_us_);
+  }
+  ASSERT_EQ(nodes_[1]->charge().state(), kInCharge);
+  buses_[0].others = &buses_;
+  Pass(700'000);
+  EXPECT_EQ(States(), (Charged{kInCharge, kStandingBy}));
+  EXPECT_EQ(Answers().size(), 1u);
+  EXPECT_EQ(Status(1).candidates, 0);
+}
+
+TEST_F(TwoCertifiersTest, AFaultThatTheFirstHadLatchedIsTakenOver) {
+  FOREREACH_START_BOTH();
+  transition_t wrong{};
+  wrong.num_states = 4, wrong.num_inputs = 2;
+  wrong.utime = now_us_;
+  wrong.next_state[2] = 1;  // rest, and moved by itself
+  listener_.Publish("TRANSITION", wrong);
+  Pass(700'000);
+  ASSERT_EQ(Status(0).fault, fault_t::DECLARATION_FALSIFIED);
+  EXPECT_EQ(Status(1).fault, 0);
+  nodes_[0].reset();
+  Pass(3'000'000);
+  EXPECT_EQ(Status(1).state, certifier_status_v3_t::FAULT);
+  EXPECT_EQ(Status(1).fault, fault_t::DECLARATION_FALSIFIED);
+  EXPECT_THAT(GetText(Status(1).message), testing::HasSubstr("latched by the certifier that was in charge before"));
+  EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_FAULT);
+}
+
+TEST_F(TwoCertifiersTest, AnOldHeartbeatIsNoCertifier) {
+  for (SharedBus& bus : buses_) bus.clock = clock_;
+  Start(0);
+  Pass(1'000'000);
+  certifier_status_v3_t recorded = Status(0);
+  recorded.instance = 7;
+  recorded.started_utime -= 3'600'000'000;
+  recorded.utime -= 3'600'000'000;
+  listener_.Publish("CERTIFIER_STATUS", recorded);  // by somebody who plays a log
+  Pass(100'000);
+  EXPECT_EQ(nodes_[0]->charge().state(), kInCharge);
+  EXPECT_EQ(Answers().size(), 1u);
+}
+
+#undef FOREREACH_START_BOTH
 
 // ---- Arming, faults, learning, reload.
 
@@ -303,7 +655,7 @@ class ArmedNodeTest : public CertifierNodeTest {
 
 TEST_F(ArmedNodeTest, CertifiesNothingBeforeItHasHeardTheRobot) {
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
-  EXPECT_EQ(status_.back().level, certifier_status_v2_t::STALE);
+  EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
   robot_state_t bad = State();
   bad.state[1] = std::numeric_limits<double>::quiet_NaN();
   SayState(bad);
@@ -330,7 +682,7 @@ TEST_F(ArmedNodeTest, LosingTheRobotLatchesUntilAReset) {
   EXPECT_EQ(faults_[0].cause, fault_t::ROBOT_STATE_LOST);
   SayState(State());
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT) << "that it is back does not clear it";
-  EXPECT_EQ(status_.back().level, certifier_status_v2_t::ERROR);
+  EXPECT_EQ(status_.back().level, certifier_status_v3_t::ERROR);
   Reset();
   EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
   SayState(State());
@@ -643,7 +995,7 @@ class ReloadTest : public testing::Test {
     Copy([](const std::string& text) { return text; });
     auto node = std::make_unique<CertifierNode>(LoadConfig(path_), *bus_, Clocks{clock_, clock_});
     bus_->Subscribe("CERTIFIER_STATUS",
-                    [this](const Received& r) { status_ = Decoded<certifier_status_v2_t>(r.bytes).value(); });
+                    [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
     node->Tick(kNow);
     bus_->Dispatch(0);
     return node;
@@ -654,7 +1006,7 @@ class ReloadTest : public testing::Test {
   const std::string path_ = scratch_ / "task.yaml";
   const Clock clock_ = [] { return kNow; };
   std::unique_ptr<Bus> bus_ = OpenBus("memq://", clock_);
-  certifier_status_v2_t status_{};
+  certifier_status_v3_t status_{};
 };
 
 TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
@@ -679,6 +1031,15 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
     EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what + std::string(" cannot change while")));
   }
 
+  for (const auto& [gate, what] : {std::pair{"gate: {obstacles: bus}", "gate.obstacles cannot change while"},
+                                   std::pair{"gate: {}", "gate.obstacles: missing"}}) {
+    const std::int64_t failed = status_.failed_reloads;
+    Copy([&](const std::string& text) { return std::regex_replace(text, std::regex("gate: \\{obstacles: task\\}"), gate); });
+    Reload(*node);
+    EXPECT_EQ(status_.failed_reloads, failed + 1);
+    EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what));
+  }
+
   Copy([](const std::string& text) { return "# another\n" + text; });
   Reload(*node);
   EXPECT_EQ(status_.version, 2);
@@ -689,7 +1050,9 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
 TEST_F(ReloadTest, ArmingAndQueueAreTheNewFilesToo) {
   const auto node = Begin();
   EXPECT_EQ(node->watch().state(), Watch::State::kDisarmed);
-  Copy([](const std::string& text) { return text + "\ngate: {arming: none, queue: 1}\n"; });
+  Copy([](const std::string& text) {
+    return std::regex_replace(text, std::regex("gate: \\{"), "gate: {arming: none, queue: 1, ");
+  });
   Reload(*node);
   EXPECT_EQ(node->watch().state(), Watch::State::kArmed);
   std::map<int, int> causes;

@@ -14,7 +14,7 @@
 
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/names.h"
@@ -130,7 +130,7 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   }
   EXPECT_TRUE(std::ranges::any_of(certified, [&](const auto& plan) { return Encode(plan.plan) == Encode(good); }));
 
-  const auto status = probe_.Heard<certifier_status_v2_t>("CERTIFIER_STATUS");
+  const auto status = probe_.Heard<certifier_status_v3_t>("CERTIFIER_STATUS");
   ASSERT_FALSE(status.empty());
   EXPECT_EQ(status.back().candidates, 15);
   EXPECT_EQ(status.back().by_outcome[decision_t::CERTIFIED], 3);
@@ -200,7 +200,7 @@ TEST_F(CertifierProcessTest, FiveHundredCandidatesInABurstAreAnsweredExactlyOnce
   EXPECT_EQ(overrun, 0u);
   EXPECT_EQ(certified, kCandidates / 2);
 #endif
-  EXPECT_EQ(probe_.Heard<certifier_status_v2_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
+  EXPECT_EQ(probe_.Heard<certifier_status_v3_t>("CERTIFIER_STATUS").back().candidates, kCandidates);
 }
 
 TEST_F(CertifierProcessTest, StopsInTheMiddleOfAFlood) {

@@ -1,0 +1,78 @@
+#include "certifier/gate/obstacle_sender.h"
+
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "certifier/gate/gate.h"
+#include "certifier/gate/obstacle_message.h"
+#include "tests/gate/small_task.h"
+
+namespace forereach {
+namespace {
+
+const std::vector<Obstacle> kOne{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)};
+
+TEST(ObstacleSenderTest, SaysNothingBeforeItKnowsAndThenTheWholeSetEachPeriod) {
+  ObstacleSender sender(1000);
+  EXPECT_FALSE(sender.Due(0));
+  sender.Set(kOne);
+  int said = 0;
+  for (std::int64_t now = 10; now <= 10'010; now += 10) {
+    const auto message = sender.Due(now);
+    EXPECT_EQ(message.has_value(), (now - 10) % 1000 == 0) << now;
+    if (!message) continue;
+    EXPECT_EQ(message->sequence, said++);
+    EXPECT_EQ(message->utime, now);
+    EXPECT_EQ(ObstaclesDigest(FromMessage(*message, 2)), ObstaclesDigest(kOne));
+  }
+  EXPECT_EQ(said, 11);
+}
+
+TEST(ObstacleSenderTest, AChangeIsDueAtOnceAndTheSameSetIsNot) {
+  ObstacleSender sender(1000);
+  sender.Set(kOne);
+  ASSERT_TRUE(sender.Due(0));
+  sender.Set(kOne);
+  EXPECT_FALSE(sender.Due(1));
+  sender.Set({});
+  const auto none = sender.Due(2);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->num_obstacles, 0) << "nothing of those before is left";
+  EXPECT_EQ(none->obstacle[0].num_points, 0);
+  EXPECT_EQ(none->sequence, 1);
+}
+
+TEST(ObstacleSenderTest, AClockThatWasSetBackDelaysNothing) {
+  ObstacleSender sender(1000);
+  sender.Set(kOne);
+  ASSERT_TRUE(sender.Due(3'600'000'000));
+  EXPECT_TRUE(sender.Due(5));
+}
+
+TEST(ObstacleSenderTest, WhatCannotBeSaidIsRefused) {
+  ObstacleSender sender(1000);
+  sender.Set(std::vector<Obstacle>(64, kOne[0]));
+  EXPECT_THROW(sender.Set(std::vector<Obstacle>(65, kOne[0])), std::invalid_argument);
+  EXPECT_EQ(sender.Due(0)->num_obstacles, 64) << "those before stay";
+  for (const std::int64_t period : {0, -1}) EXPECT_THROW(ObstacleSender{period}, std::invalid_argument);
+}
+
+TEST(ObstacleSenderTest, AtItsPeriodAGateKnowsWhereTwoMessagesInARowAreLost) {
+  const Config config = SmallTaskOnTheBus();
+  Gate gate(config);
+  ObstacleSender sender(ObstacleSender::PeriodUs(config.gate));
+  sender.Set(kOne);
+  EXPECT_LE(3 * ObstacleSender::PeriodUs(config.gate), 1'000'000);
+  int said = 0;
+  for (std::int64_t now = kNow; now <= kNow + 10'000'000; now += 2000) {
+    const auto message = sender.Due(now);
+    if (message && ++said % 5 < 3) {
+      EXPECT_EQ(gate.UpdateObstacles(Encode(*message), now), "");
+    }
+    EXPECT_EQ(gate.WhyObstaclesUnknown(now).find(" old, "), std::string::npos) << now - kNow;
+  }
+}
+
+}  // namespace
+}  // namespace forereach
