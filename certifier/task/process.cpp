@@ -1,6 +1,7 @@
 #include "certifier/task/process.h"
 
 #include <iostream>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -10,6 +11,45 @@
 #include "lcmtypes/authentic_bus.h"
 
 namespace forereach {
+namespace {
+
+constexpr std::int64_t kSaysAgainAfterUs = 10'000'000;
+
+// Runs a node, and says what comes from the network that is no message: when it begins, and every ten seconds while it goes
+// on. It has no field in any heartbeat, since whoever is on the network can send as much of it as he likes.
+class DatagramWatch final : public Node {
+ public:
+  DatagramWatch(Node& node, const Bus& bus) : node_(node), bus_(bus) {}
+
+  void Tick(std::int64_t now_us) override {
+    node_.Tick(now_us);
+    if (const std::int64_t now = SteadyClockUs(); now >= next_us_ && Say()) next_us_ = now + kSaysAgainAfterUs;
+  }
+  [[nodiscard]] bool busy() const override { return node_.busy(); }
+  void Reload() override { node_.Reload(); }
+  [[nodiscard]] bool done() const override { return node_.done(); }
+  void Stop() override {
+    Say();
+    node_.Stop();
+  }
+
+ private:
+  bool Say() {
+    const DatagramCounts counts = bus_.datagrams();
+    const std::int64_t amiss = counts.refused() + counts.lost_by_kernel + counts.receive_errors;
+    if (amiss == std::exchange(said_, amiss)) return false;
+    spdlog::warn("from the network, since the start: {} datagrams refused{}{}; {} lost to a full receive buffer; {} errors",
+                 counts.refused(), counts.refused() > 0 ? ": " : "", RefusedInWords(counts), counts.lost_by_kernel,
+                 counts.receive_errors);
+    return true;
+  }
+
+  Node& node_;
+  const Bus& bus_;
+  std::int64_t said_ = 0, next_us_ = 0;
+};
+
+}  // namespace
 
 int Guarded(const std::string& name, const std::function<int()>& body) {
   try {
@@ -63,7 +103,8 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.name);
     const std::unique_ptr<Node> node = make_node(config, *bus);
     spdlog::info("ready on {} with {}{}", config.bus.url, config_path, config.bus.key.empty() ? "" : ", signed");
-    RunNode(*node, *bus);
+    DatagramWatch watched(*node, *bus);
+    RunNode(watched, *bus);
     return 0;
   });
 }

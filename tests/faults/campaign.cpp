@@ -1,6 +1,7 @@
 // The fault campaign: real processes on a real loopback bus are killed, stopped, lied to, flooded and cut off, and after each
 // try a witness says whether anything happened that may never happen. Writes a table.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <csignal>
@@ -26,6 +27,7 @@
 #include "tests/faults/relay.h"
 #include "tests/faults/report.h"
 #include "tests/faults/rig.h"
+#include "tests/process/raw_datagrams.h"
 
 namespace forereach {
 namespace {
@@ -36,6 +38,8 @@ using std::chrono::milliseconds;
 constexpr std::chrono::seconds kAnewIfBackBy{-5};  // a shorter jump back is waited out
 constexpr std::chrono::seconds kSaysSoon{3};       // some heartbeats
 constexpr milliseconds kHeartbeat{600};            // at least one
+constexpr std::size_t kMostHeard = 2000;           // messages that are kept to be sent again
+constexpr double kMayGrowBy = 48 << 20;            // a queue full of honest messages is in it
 
 struct Row {
   std::string fault;
@@ -68,6 +72,8 @@ class Campaign final {
   }
 
  private:
+  using Heard = std::vector<std::pair<std::string, std::vector<std::uint8_t>>>;  // channel, bytes
+
   int Below(int bound) { return static_cast<int>(random_() % static_cast<unsigned>(bound)); }
 
   // `hurt` does something to a healthy system; then it has to heal. Where the bus loses messages it may lose decisions.
@@ -315,9 +321,9 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("Forged and replayed messages (no key)", options_.others);
     const BusOptions& channels = rig.config().bus;
-    std::vector<std::pair<std::string, std::vector<std::uint8_t>>> heard;
+    Heard heard;
     rig.open_bus().SubscribeUnchecked(".*", [&](const Received& r) {
-      if (channels.signed_channels().contains(r.channel) && heard.size() < 2000)
+      if (channels.signed_channels().contains(r.channel) && heard.size() < kMostHeard)
         heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
     });
     Tries(row, rig, [&](int) {
@@ -372,6 +378,58 @@ class Campaign final {
                       std::to_string(rig.witness().status()->candidates_lost) + " that the bus lost");
   }
 
+  // A stranger's, whatever their content: they do no more than any noise.
+  void Throw(const std::string& what, const std::function<void(const RawSender&, const Heard&)>& send) {
+    Rig rig(DemoTask());
+    Row& row = Begin("Raw datagrams: " + what, options_.others);
+    const BusOptions& channels = rig.config().bus;
+    const RawSender sender(rig.url(Rig::kCertifier));
+    Heard heard;
+    rig.open_bus().SubscribeUnchecked(Bus::kEveryChannel, [&](const Received& r) {
+      if (channels.signed_channels().contains(r.channel) && heard.size() < kMostHeard)
+        heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
+    });
+    double most_grown = 0;
+    Tries(row, rig, [&](int) {
+      heard.clear();
+      rig.Listen(milliseconds(300));
+      std::array<double, Rig::kRoles> before{};
+      for (int role = 0; role < Rig::kRoles; ++role) before[static_cast<std::size_t>(role)] = rig.Resident(Rig::Role(role));
+      send(sender, Heard(heard));
+      rig.Listen(kHeartbeat);
+      for (int role = 0; role < Rig::kRoles; ++role) {
+        const double grown = rig.Resident(Rig::Role(role)) - before[static_cast<std::size_t>(role)];
+        most_grown = std::max(most_grown, grown);
+        Demand(row, grown < kMayGrowBy, std::string("the ") + Rig::kNames[static_cast<std::size_t>(role)] + " grew by " +
+                                            std::to_string(std::lround(grown / (1 << 20))) + " MB");
+      }
+    }, options_.others, true);
+    Remark(row, "no process grew by more than " + std::to_string(std::lround(std::ceil(most_grown / (1 << 20)))) + " MB in a try");
+  }
+
+  // Each of the first three ended LCM's own receiver, or took it memory by the gigabyte.
+  void Datagrams() {
+    const std::vector<std::string> channels{"ROBOT_STATE", "PLAN_CERTIFIED", "PLAN_CANDIDATE"};  // each process hears one
+    const auto on_each = [&](auto make) {
+      return [&channels, make](const RawSender& sender, const Heard&) {
+        for (const std::string& channel : channels) sender.Send(make(channel));
+      };
+    };
+    Throw("a fragment that wraps around 2^32", on_each(WrappingFragment));
+    Throw("fragments that claim 256 MB", on_each(HugeClaims));
+    Throw("channels without an end", [](const RawSender& sender, const Heard&) { sender.Send(EndlessNames()); });
+    Throw("10000 fragments and 10000 of random bytes", [&](const RawSender& sender, const Heard&) {
+      for (std::size_t i = 0; i < 10'000; ++i) {
+        sender.Send(Bytes(RandomFragment(random_, channels[i % channels.size()])));
+        sender.Send(Bytes(RandomBytes(random_, 1500)));
+      }
+    });
+    Throw("what was heard, mutated, 50 times each", [&](const RawSender& sender, const Heard& heard) {
+      for (const auto& [channel, bytes] : heard)
+        for (int i = 0; i < 50; ++i) sender.Send(Bytes(Mutated(random_, ShortMessage(channel, bytes))));
+    });
+  }
+
   void Disks();
   void Routes() { NoNetwork(), LostRoute(); }
   void NoNetwork();
@@ -388,7 +446,8 @@ class Campaign final {
 const std::vector<Campaign::Kind> Campaign::kKinds{
     {"kill", &Campaign::Kills},           {"clock", &Campaign::Clocks},        {"stop", &Campaign::Stops},
     {"network", &Campaign::BadNetwork},   {"lies", &Campaign::Lies},           {"nonsense", &Campaign::Nonsense},
-    {"forgeries", &Campaign::Forgeries},  {"flood", &Campaign::Flood},         {"disks", &Campaign::Disks},
+    {"forgeries", &Campaign::Forgeries},  {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
+    {"disks", &Campaign::Disks},
     {"route", &Campaign::Routes},         {"reload", &Campaign::BadReload}};
 
 // A small file system of its own for the log, filled, made read-only, and given back.
@@ -570,7 +629,7 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "not hold, looked at after each try, those of a logger that ended once the next one has mended its logs;\n"
        << "what a full disk keeps out is never confirmed; `-`: no logger ran. *Recovered*: within 20 s, after a reset\n"
        << "where a fault was latched, the certifier is OK, the robot executes a plan that was certified since, and the logger\n"
-       << "records. *Said why*: a process that cannot start exits with the reason.\n\n"
+       << "records. Under raw datagrams it is forbidden too that a process grows by 48 MB. *Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows)
     text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | "

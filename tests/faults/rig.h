@@ -44,6 +44,8 @@ class Rig final {
       - did not end within kEndsWithin of End. */
   [[nodiscard]] std::vector<std::string> TakeBadEndings();
   [[nodiscard]] bool IsAlive(Role role) const;
+  /** Bytes of memory that it holds; 0 if it is not there. */
+  [[nodiscard]] double Resident(Role role) const { return processes_[role] ? ResidentBytes(processes_[role]->pid()) : 0; }
 
   /** From now on the wall clock of a process is the machine's plus `offset`. @throws std::runtime_error if the process
   does not look at it. */

@@ -120,6 +120,7 @@ TEST_P(HostileDatagramsTest, EveryProcessLivesOnAndWorks) {
   for (Process& process : processes_) {
     EXPECT_FALSE(HasEnded(process)) << "what speaks on " << process.channel << " ended: " << process.child.error();
     const double grown = ResidentBytes(process.child.pid()) - process.resident_before;
+    EXPECT_TRUE(process.child.WaitForLog("datagrams refused: ")) << "it says so";
     EXPECT_LT(grown / kMegabyte, kMayGrowBy / kMegabyte) << process.channel << " grew by so many MB";
   }
   EXPECT_GT(probe_.Heard<logger_status_t>("LOGGER_STATUS").back().events_written, events_before);
