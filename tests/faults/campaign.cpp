@@ -379,7 +379,7 @@ class Campaign final {
   }
 
   // A stranger's, whatever their content: they do no more than any noise.
-  void Throw(const std::string& what, const std::function<void(const RawSender&, const Heard&)>& send) {
+  void Throw(const std::string& what, const std::function<void(Rig&, const RawSender&, const Heard&)>& send) {
     Rig rig(DemoTask());
     Row& row = Begin("Raw datagrams: " + what, options_.others);
     const BusOptions& channels = rig.config().bus;
@@ -395,7 +395,7 @@ class Campaign final {
       rig.Listen(milliseconds(300));
       std::array<double, Rig::kRoles> before{};
       for (int role = 0; role < Rig::kRoles; ++role) before[static_cast<std::size_t>(role)] = rig.Resident(Rig::Role(role));
-      send(sender, Heard(heard));
+      send(rig, sender, Heard(heard));
       rig.Listen(kHeartbeat);
       for (int role = 0; role < Rig::kRoles; ++role) {
         const double grown = rig.Resident(Rig::Role(role)) - before[static_cast<std::size_t>(role)];
@@ -411,22 +411,25 @@ class Campaign final {
   void Datagrams() {
     const std::vector<std::string> channels{"ROBOT_STATE", "PLAN_CERTIFIED", "PLAN_CANDIDATE"};  // each process hears one
     const auto on_each = [&](auto make) {
-      return [&channels, make](const RawSender& sender, const Heard&) {
+      return [&channels, make](Rig&, const RawSender& sender, const Heard&) {
         for (const std::string& channel : channels) sender.Send(make(channel));
       };
     };
     Throw("a fragment that wraps around 2^32", on_each(WrappingFragment));
     Throw("fragments that claim 256 MB", on_each(HugeClaims));
-    Throw("channels without an end", [](const RawSender& sender, const Heard&) { sender.Send(EndlessNames()); });
-    Throw("10000 fragments and 10000 of random bytes", [&](const RawSender& sender, const Heard&) {
+    Throw("channels without an end", [](Rig&, const RawSender& sender, const Heard&) { sender.Send(EndlessNames()); });
+    Throw("10000 fragments and 10000 of random bytes", [&](Rig& rig, const RawSender& sender, const Heard&) {
       for (std::size_t i = 0; i < 10'000; ++i) {
         sender.Send(Bytes(RandomFragment(random_, channels[i % channels.size()])));
         sender.Send(Bytes(RandomBytes(random_, 1500)));
+        if (i % 16 == 0) rig.open_bus().Dispatch(0);
       }
     });
-    Throw("what was heard, mutated, 50 times each", [&](const RawSender& sender, const Heard& heard) {
-      for (const auto& [channel, bytes] : heard)
+    Throw("what was heard, mutated, 50 times each", [&](Rig& rig, const RawSender& sender, const Heard& heard) {
+      for (const auto& [channel, bytes] : heard) {
         for (int i = 0; i < 50; ++i) sender.Send(Bytes(Mutated(random_, ShortMessage(channel, bytes))));
+        rig.open_bus().Dispatch(0);
+      }
     });
   }
 

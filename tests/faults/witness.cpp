@@ -22,6 +22,11 @@ Witness::Witness(Bus& bus, const BusOptions& channels, const Key256& key, bool s
   });
 }
 
+Bytes Witness::Authentic(const Received& received) {
+  const auto [authenticity, message] = authenticator_.Check(received.channel, received.raw);
+  return authenticity == Authenticity::kAuthentic ? message : Bytes();
+}
+
 void Witness::OnDecision(const Received& received) {
   const auto decision = Decoded<decision_t>(received.raw);
   if (!decision) return;
@@ -61,16 +66,15 @@ void Witness::OnStatus(const Received& received) {
 
 // While it is latched it is said again and again.
 void Witness::OnFault(const Received& received) {
-  const auto fault = Decoded<fault_t>(WithoutSignature(received.raw));
+  const auto fault = Decoded<fault_t>(Authentic(received));
   if (!fault || (fault_ && fault->utime == fault_->utime && fault->sequence == fault_->sequence)) return;
   fault_ = fault;
   certificates_at_fault_ = certificates_;
 }
 
 void Witness::OnCertified(const Received& received) {
-  const auto [authenticity, message] = authenticator_.Check(channels_.certified, received.raw);
-  const auto plan = Decoded<certified_plan_t>(message);
-  if (authenticity != Authenticity::kAuthentic || !plan || !FindSealFaults(*plan).empty()) return;
+  const auto plan = Decoded<certified_plan_t>(Authentic(received));
+  if (!plan || !FindSealFaults(*plan).empty()) return;
   Certified& certified = plans_[plan->plan.plan_id];
   certified = {*plan, ++certificates_};
   last_certified_ = &certified.plan;
@@ -78,7 +82,7 @@ void Witness::OnCertified(const Received& received) {
 
 void Witness::OnState(const Received& received) {
   robot_heard_ = std::chrono::steady_clock::now();
-  const auto state = Decoded<robot_state_t>(WithoutSignature(received.raw));
+  const auto state = Decoded<robot_state_t>(Authentic(received));
   if (!state || state->mode != robot_state_t::EXECUTING) return;
   applied_[state->utime] = {state->executing_plan_id, state->executing_step};
   const auto plan = plans_.find(state->executing_plan_id);
@@ -88,7 +92,7 @@ void Witness::OnState(const Received& received) {
 }
 
 void Witness::OnTransition(const Received& received) {
-  const auto transition = Decoded<transition_t>(WithoutSignature(received.raw));
+  const auto transition = Decoded<transition_t>(Authentic(received));
   if (!transition) return;
   const auto applied = applied_.find(transition->utime);
   if (applied == applied_.end()) return;  // its state did not reach this listener

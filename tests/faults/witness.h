@@ -55,6 +55,8 @@ class Witness final {
   void ForgetFault() { fault_.reset(); }
 
  private:
+  /** The message, if its sender has the key and it came once; else nothing, which no type decodes. */
+  [[nodiscard]] Bytes Authentic(const Received& received);
   void OnDecision(const Received& received);
   void OnStatus(const Received& received);
   void OnFault(const Received& received);
