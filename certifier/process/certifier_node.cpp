@@ -182,7 +182,8 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   SetText(fault.message, latched.why);
   announced_ = fault;
   SendFault();
-  spdlog::error("fault {}: {}; nothing is certified until `forereach reset`", FaultName(latched.cause), latched.why);
+  spdlog::error("fault {}: {}; nothing is certified. What to do: {}", FaultName(latched.cause), latched.why,
+                FaultAdvice(latched.cause));
   next_heartbeat_us_ = 0;
 }
 
@@ -317,7 +318,8 @@ void CertifierNode::TakeReload() {
 
 std::string CertifierNode::WhyNotOk() const {
   if (watch_.fault()) return std::string(FaultName(watch_.fault()->cause)) + ": " + watch_.fault()->why;
-  if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F";
+  if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a reset "
+           "does not help";
   if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
   return watch_.state() == Watch::State::kDisarmed ? "waits for the robot's state" : "";
 }

@@ -182,6 +182,29 @@ TEST(BadInput, UsageExitsWithTwo) {
     EXPECT_EQ(Forereach(std::string(arguments) + " >/dev/null 2>&1").code, 2) << arguments;
 }
 
+TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
+  const struct {
+    const char *arguments, *sentence;
+  } cases[] = {{"certfy --config x", "forereach: unknown command certfy; did you mean certify?"},
+               {"cetrify", "unknown command cetrify; did you mean certify?"},
+               {"verfiy x", "unknown command verfiy; did you mean verify?"},
+               {"replya", "unknown command replya; did you mean replay?"},
+               {"check_log x", "unknown command check_log; did you mean check-log?"},
+               {"nonsense", "unknown command nonsense; known here: certify, plan, declare"},
+               {"--verison", "unknown option --verison; did you mean --version?"},
+               {"certify --confg x --plan y", "unknown option --confg of certify; did you mean --config?"},
+               {"certify --config x --plan y --jsn", "unknown option --jsn of certify; did you mean --json?"},
+               {"certify --config x --plan y --jsn=3", "unknown option --jsn of certify; did you mean --json?"},
+               {"certify --config x --plan y z", "unexpected argument z of certify"},
+               {"certify --config x --plan y \"$(printf '\\033[2J')\"", "unexpected argument ?[2J of certify"},
+               {"", "A subcommand is required"}};
+  for (const auto& [arguments, sentence] : cases) {
+    const Output output = Forereach(std::string(arguments) + " 2>&1 >/dev/null");
+    EXPECT_EQ(output.code, 2) << arguments;
+    EXPECT_THAT(output.text, HasSubstr(sentence)) << arguments;
+  }
+}
+
 TEST(Help, ExitsWithZeroAndShowsAnExample) {
   for (const char* command : {"", "certify ", "plan ", "replay ", "report ", "run "}) {
     const Output output = Forereach(std::string(command) + "--help");
