@@ -70,6 +70,7 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
           {"state", StateName(status.state)},
           {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
           {"message", GetText(status.message)},
+          {"advice", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultAdvice(status.fault))},
           {"shadow", status.shadow != 0},
           {"version", status.version},
           {"failed_reloads", status.failed_reloads},
@@ -95,6 +96,7 @@ void Print(const certifier_status_v3_t& status, bool json) {
   }
   std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");
   if (const std::string message = GetText(status.message); !message.empty()) std::cout << ": " << message;
+  if (status.fault != 0) std::cout << "\nwhat to do: " << FaultAdvice(status.fault);
   std::cout << "\nversion " << status.version << ", " << status.observations << " observations, of these " << status.learned
             << " learned; " << status.candidates << " candidates:";
   for (std::int16_t i = 0; i < 16; ++i)

@@ -1,3 +1,5 @@
+#include <optional>
+
 #include <CLI/CLI.hpp>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -10,7 +12,6 @@ int main(int argc, char** argv) {
   CLI::App app("ForeReach certifies planned control sequences before a robot executes them.", "forereach");
   app.footer("Try:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv\n"
              "  forereach doctor\n  forereach certify --help");
-  app.set_version_flag("--version", "forereach " FOREREACH_VERSION);
   app.require_subcommand(1);
   Action action;
   AddCertifyCommand(app, action);
@@ -24,11 +25,7 @@ int main(int argc, char** argv) {
   AddDoctorCommand(app, action);
   AddKeysCommand(app, action);
   AddBusCommands(app, action);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitBadInput;
-  }
+  if (const std::optional<int> code = ParseCommandLine(app, argc, argv)) return *code;
   spdlog::set_default_logger(spdlog::stderr_color_mt("forereach"));
   return Guarded("forereach", action);
 }

@@ -78,6 +78,23 @@ std::string_view FaultName(std::int16_t cause) {
   }
 }
 
+std::string_view FaultAdvice(std::int16_t cause) {
+  switch (cause) {
+    case fault_t::ROBOT_STATE_LOST:
+      return "bring the robot's state messages back, then `forereach reset`";
+    case fault_t::CLOCK_JUMP:
+      return "set the clock right and keep it from jumping again, then `forereach reset`";
+    case fault_t::SLICE_LEFT:
+      return "find what is not true (declaration, domain, noise bound or initial set), correct the task file, "
+             "`forereach reload`, then `forereach reset`; after a reset alone it happens again";
+    case fault_t::DECLARATION_FALSIFIED:
+      return "a reset alone does not help, every candidate stays F: declare a larger bound in the task file, "
+             "`forereach reload`, then `forereach reset`";
+    default:
+      return "find the reason, then `forereach reset`";
+  }
+}
+
 std::string_view LevelName(std::int16_t level) {
   switch (level) {
     case certifier_status_v3_t::OK: return "OK";

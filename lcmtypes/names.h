@@ -18,6 +18,9 @@ namespace forereach {
 /** "robot_state_lost", ... as fault_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view FaultName(std::int16_t cause);
 
+/** What a person does about a fault, as words that follow "what to do: ". Says so where a reset alone does not help. */
+[[nodiscard]] std::string_view FaultAdvice(std::int16_t cause);
+
 /** True of the faults that say that what the executing plan rests on does not hold: a robot stops. */
 [[nodiscard]] bool StopsTheRobot(std::int16_t cause);
 

@@ -1,6 +1,7 @@
 /** forereach-robot-sim: the simulated robot on the bus, or a transitions file made with its target. */
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -74,11 +75,7 @@ int RunWriteTransitions(int argc, char** argv) {
   SampleOptions options;
   app.add_option("--config", config_path, "The task file (YAML)")->required()->type_name("FILE");
   AddSampleOptions(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitBadInput;
-  }
+  if (const std::optional<int> code = ParseCommandLine(app, argc, argv)) return *code;
   return Guarded(kName, [&] {
     WriteTransitions(config_path, options);
     return 0;

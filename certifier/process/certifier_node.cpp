@@ -294,7 +294,8 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   SetText(fault.message, latched.why);
   announced_ = fault;
   SendFault();
-  spdlog::error("fault {}: {}; nothing is certified until `forereach reset`", FaultName(latched.cause), latched.why);
+  spdlog::error("fault {}: {}; nothing is certified. What to do: {}", FaultName(latched.cause), latched.why,
+                FaultAdvice(latched.cause));
   next_heartbeat_us_ = 0;
 }
 
@@ -434,7 +435,8 @@ void CertifierNode::TakeReload() {
 std::string CertifierNode::WhyNotOk() const {
   if (!is_in_charge()) return WhyNotInCharge();
   if (watch_.fault()) return std::string(FaultName(watch_.fault()->cause)) + ": " + watch_.fault()->why;
-  if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F";
+  if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a reset "
+           "does not help";
   if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
   if (const auto refusal = watch_.WhyNot()) return refusal->why;
   if (charge_.other()) return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing", charge_.other()->instance);

@@ -9,6 +9,7 @@
 #include "certifier/numerics/text.h"
 #include "certifier/task/config.h"
 #include "certifier/task/files.h"
+#include "certifier/task/nearest.h"
 #include "certifier/task/number.h"
 
 namespace forereach {
@@ -31,12 +32,6 @@ void Split(std::string_view line, std::vector<std::string_view>& fields) {
   for (std::size_t comma; (comma = line.find(',')) != std::string_view::npos; line.remove_prefix(comma + 1))
     fields.push_back(Trim(line.substr(0, comma)));
   fields.push_back(Trim(line));
-}
-
-std::string Joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 // For each field of the header, the column it is of.

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <cmath>
 #include <map>
-#include <numeric>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -13,6 +14,7 @@
 
 #include "certifier/task/config.h"
 #include "certifier/task/files.h"
+#include "certifier/task/nearest.h"
 #include "certifier/task/number.h"
 
 namespace forereach {
@@ -27,38 +29,8 @@ int LineOf(const YAML::Mark& mark) { return mark.line + 1; }
 
 std::string At(const std::string& path, int line) { return path + ":" + std::to_string(line) + ": "; }
 
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 bool Contains(const std::vector<std::string>& words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();
-}
-
-std::size_t EditDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
-// What a wrong word was probably meant to be, and what it may be.
-std::string Suggestion(std::string_view word, const std::vector<std::string>& known) {
-  const auto closer = [&](const std::string& a, const std::string& b) {
-    return EditDistance(word, a) < EditDistance(word, b);
-  };
-  const auto nearest = std::min_element(known.begin(), known.end(), closer);
-  const bool near = nearest != known.end() && EditDistance(word, *nearest) <= 1 + nearest->size() / 4;
-  return near ? "did you mean " + *nearest + "?" : "known here: " + Joined(known);
 }
 
 // The last key of a path, and the path of the map it stands in.
@@ -128,6 +100,67 @@ std::string FormName(Type type) {
   return "";
 }
 
+bool IsNumber(Type type) { return type == Type::kNumber || type == Type::kInteger; }
+
+// Of a number, or of the numbers of a list.
+std::string NumberName(Type type) { return FormName(type == Type::kInteger ? Type::kInteger : Type::kNumber); }
+
+// ", its unit is s"; empty for a pure number, and where each entry of a list has a unit of its own.
+std::string UnitOf(const Key& row) {
+  return row.unit.empty() || row.unit.starts_with("of ") ? "" : ", its unit is " + row.unit;
+}
+
+// What a number has to be: "write a number in (0, 60], its unit is s".
+std::string Wanted(const Key& row) {
+  return "write " + NumberName(row.type) + " in " + row.range.text() + UnitOf(row);
+}
+
+bool Reads(const std::string& token, Type type) {
+  return type == Type::kInteger ? ParseInteger(token).problem.empty() : ParseNumber(token).problem.empty();
+}
+
+std::string Without(std::string token, std::string_view letters) {
+  std::erase_if(token, [&](char c) { return letters.find(c) != std::string_view::npos; });
+  return token;
+}
+
+bool IsDigit(char c) { return '0' <= c && c <= '9'; }
+
+// The number that a token begins with, without its unit.
+std::string Leading(const std::string& token) { return token.substr(0, token.find_last_of("0123456789.") + 1); }
+
+std::string WithoutLeadingZeros(std::string token) {
+  const std::size_t begin = token.starts_with('-') ? 1 : 0;
+  while (token.size() > begin + 1 && token[begin] == '0' && IsDigit(token[begin + 1])) token.erase(begin, 1);
+  return token;
+}
+
+// 1e3 and 64.0 as integers are written.
+std::string AsInteger(const std::string& token) {
+  constexpr double kLargest = 1e15;  // exact in a double
+  const Parsed<double> whole = ParseNumber(token);
+  const bool is_one = whole.problem.empty() && std::abs(whole.value) < kLargest && std::trunc(whole.value) == whole.value;
+  return is_one ? std::to_string(static_cast<long long>(whole.value)) : token;
+}
+
+// What to write instead of a token that is not the number it should be.
+std::string Correction(const std::string& token, const Key& row) {
+  const std::string digits = Without(token, "+-");
+  if (digits.size() > 1 && digits[0] == '0' && std::isalpha(static_cast<unsigned char>(digits[1])) != 0 && digits[1] != 'e')
+    return "write it in decimal";
+  std::string with_point = token;
+  std::ranges::replace(with_point, ',', '.');
+  const std::pair<std::string, std::string> tries[] = {
+      {WithoutLeadingZeros(token), ", or its decimal value if octal was meant"},
+      {with_point, ", with a point"},
+      {Without(token, "_ '"), ""},
+      {row.type == Type::kInteger ? AsInteger(token) : token, ""},
+      {Leading(token), " alone" + UnitOf(row)}};
+  for (const auto& [other, remark] : tries)
+    if (other != token && Reads(other, row.type)) return "write " + other + remark;
+  return Wanted(row);
+}
+
 class Checker {
  public:
   Checker(const std::string& path, const SchemaScope& scope, Values& values)
@@ -173,6 +206,8 @@ class Checker {
       forms += (last ? " or " : "") + FormName(row.type);
       last = &row;
     }
+    // What is wrong with a number is explained where numbers are read.
+    if (last && forms == FormName(last->type) && IsNumber(last->type)) return *last;
     // A list of a wrong kind is best explained entry by entry.
     if (last && node.IsSequence() && (last->type == Type::kVectors || last->type == Type::kNames)) return *last;
     Fail(node, key, Shown(node) + " is not " + forms);
@@ -181,19 +216,20 @@ class Checker {
   void CheckMap(const YAML::Node& node, const std::string& pattern, const std::string& key) {
     const YAML::Node name = node["name"];
     const std::string kind = name && name.IsScalar() ? name.Scalar() : "";
-    std::vector<std::string> seen;
+    std::map<std::string, int> seen;  // the line of each
     for (const auto& entry : node) {
       if (!entry.first.IsScalar()) Fail(entry.first, key, Shown(entry.first) + " is not a key");
       const std::string word = entry.first.Scalar(), child = Below(key, word);
       const Key& row = ChildRow(entry.first, pattern, key);
-      if (Contains(seen, word)) Fail(entry.first, child, "stands twice");
+      const auto [first, is_new] = seen.emplace(word, LineOf(entry.first.Mark()));
+      if (!is_new)
+        Fail(entry.first, child, "stands twice, first in line " + std::to_string(first->second) + "; delete one of them");
       if (!row.only.empty() && row.only != kind) Fail(entry.first, child, "is for " + row.only + ", not for " + kind);
-      seen.push_back(word);
       Check(entry.second, row.path, child);
     }
     for (const Key& row : Schema())
       if (row.required && IsChild(row, pattern) && (row.only.empty() || row.only == kind) &&
-          !Contains(seen, Leaf(row.path)) && !Leaf(row.path).starts_with('<'))
+          !seen.contains(std::string(Leaf(row.path))) && !Leaf(row.path).starts_with('<'))
         Fail(node, Below(key, Leaf(row.path)), "missing: " + row.meaning);
   }
 
@@ -212,18 +248,26 @@ class Checker {
         known.push_back(leaf);
       }
     }
+    if (const std::size_t colon = word.find(':'); colon != std::string::npos && Contains(known, word.substr(0, colon)))
+      Fail(entry, Below(key, word), "unknown key; write a space after the colon: " + word.substr(0, colon) + ": " +
+                                        word.substr(colon + 1));
     Fail(entry, Below(key, word), "unknown key; " + Suggestion(word, known));
   }
 
   void CheckNumber(const YAML::Node& node, const Key& row, const std::string& key) {
-    const bool integer = row.type == Type::kInteger;
-    if (!HasForm(node, Type::kNumber))
-      Fail(node, key, Shown(node) + " is not " + (integer ? "an integer" : "a number"));
-    values_.insert_or_assign(key, node);
+    const std::string not_one = " is not " + NumberName(row.type);
+    if (node.IsNull()) Fail(node, key, "has no value; " + Wanted(row));
+    if (!node.IsScalar()) Fail(node, key, Shown(node) + not_one + "; " + Wanted(row));
     const std::string& token = node.Scalar();
+    if (!HasForm(node, Type::kNumber))
+      Fail(node, key, "\"" + Shown(node) + "\" is " + (node.Tag() == "!" ? "quoted text" : "tagged " + node.Tag()) +
+                          ", not " + NumberName(row.type) + "; " +
+                          (Reads(token, row.type) ? "write " + token + (node.Tag() == "!" ? " without quotes" : " alone")
+                                                  : Wanted(row)));
+    values_.insert_or_assign(key, node);
     const Parsed<double> number = ParseNumber(token);
-    const std::string_view problem = integer ? ParseInteger(token).problem : number.problem;
-    if (!problem.empty()) Fail(node, key, Shown(node) + " " + std::string(problem));
+    const std::string_view problem = row.type == Type::kInteger ? ParseInteger(token).problem : number.problem;
+    if (!problem.empty()) Fail(node, key, Shown(node) + " " + std::string(problem) + "; " + Correction(token, row));
     if (!row.range.Contains(number.value)) Fail(node, key, token + " is outside " + row.range.text());
   }
 
@@ -314,6 +358,18 @@ class Nobody final : public YAML::EventHandler {
   void OnMapEnd() override {}
 };
 
+// YAML allows no tabs before a key.
+std::string TabAdvice(const std::string& text, int line) {
+  std::istringstream lines(text);
+  std::string at;
+  for (int i = 0; i <= line && std::getline(lines, at); ++i) {
+    const std::string blank = at.substr(0, at.find_first_not_of(" \t"));
+    if (blank.find('\t') != std::string::npos)
+      return "; line " + std::to_string(i + 1) + " is indented with a tab, write spaces";
+  }
+  return "";
+}
+
 // Not by YAML::LoadAll: of a lone comma it reads empty documents without end.
 YAML::Node Parse(const std::string& path, const std::string& text) {
   try {
@@ -324,7 +380,7 @@ YAML::Node Parse(const std::string& path, const std::string& text) {
     if (parser.HandleNextDocument(nobody)) throw ConfigError(At(path, 1) + "has several YAML documents, has to have one");
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw ConfigError(At(path, LineOf(error.mark)) + "not valid YAML: " + error.msg);
+    throw ConfigError(At(path, LineOf(error.mark)) + "not valid YAML: " + error.msg + TabAdvice(text, error.mark.line));
   }
 }
 

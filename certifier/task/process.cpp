@@ -1,6 +1,7 @@
 #include "certifier/task/process.h"
 
 #include <iostream>
+#include <optional>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -89,11 +90,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   app.add_option("--config", config_path, "The task file (YAML)")->required()->type_name("FILE");
   bus_arguments.AddTo(app);
   if (add_options) add_options(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitBadInput;
-  }
+  if (const std::optional<int> code = ParseCommandLine(app, argc, argv)) return *code;
   spdlog::set_default_logger(spdlog::stderr_color_mt(description.name));
   spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$: %v");
   CatchStopSignals();

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "certifier/task/command_line.h"
 #include "certifier/task/config.h"
 #include "lcmtypes/node.h"
 
@@ -13,8 +14,6 @@ class App;
 }
 
 namespace forereach {
-
-inline constexpr int kExitBadInput = 2;
 
 struct ProcessDescription {
   std::string name;     ///< "forereach-certifier"

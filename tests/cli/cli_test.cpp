@@ -2,9 +2,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <regex>
 #include <set>
 #include <sstream>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -60,7 +64,11 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(CertifyJsonTest, HasExactlyTheKeysOfTheContract) {
   const Json decision = CertifyJson("bicycle", "bicycle_certified");
   EXPECT_EQ(KeysOf(decision),
-            (std::set<std::string>{"outcome", "step", "cause", "message", "capped", "inputs", "tube", "digests", "elapsed_us"}));
+            (std::set<std::string>{"outcome", "step", "cause", "coordinate", "exit", "first_observation",
+                                   "second_observation", "obstacle", "closest_step", "margin", "threshold", "message",
+                                   "capped", "inputs", "tube", "digests", "elapsed_us"}));
+  const std::string page = Read(FOREREACH_SOURCE_DIR "/docs/decision.md");
+  for (const std::string& key : KeysOf(decision)) EXPECT_THAT(page, HasSubstr("\n| `" + key + "` |"));
   EXPECT_EQ(KeysOf(decision["digests"]),
             (std::set<std::string>{"plan", "tube", "config", "model", "declaration", "observations", "obstacles"}));
   const Json& tube = decision["tube"];
@@ -73,6 +81,66 @@ TEST(CertifyJsonTest, HasExactlyTheKeysOfTheContract) {
   EXPECT_EQ(tube[0]["center"].size(), 6u);
   EXPECT_EQ(tube[0]["generators"].size(), 6u);
   for (const Json& slice : tube) EXPECT_GT(slice["clearance"][0].get<double>(), 0);
+}
+
+// The witness fields that are not null.
+std::set<std::string> WitnessOf(const Json& decision) {
+  std::set<std::string> present;
+  for (const char* key : {"step", "coordinate", "exit", "first_observation", "second_observation", "obstacle",
+                          "closest_step", "margin", "threshold"})
+    if (!decision.at(key).is_null()) present.insert(key);
+  return present;
+}
+
+using Keys = std::set<std::string>;
+
+TEST(CertifyJsonTest, ACertificateNamesItsClosestObstacle) {
+  const Json decision = CertifyJson("bicycle", "bicycle_certified");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"obstacle", "closest_step", "margin", "threshold"}));
+  EXPECT_EQ(decision["obstacle"], 0);
+  const auto step = decision["closest_step"].get<std::size_t>();
+  EXPECT_EQ(decision["threshold"], 1.0);
+  double least = std::numeric_limits<double>::infinity();
+  for (const Json& slice : decision["tube"]) least = std::min(least, slice["clearance"][0].get<double>());
+  EXPECT_EQ(decision["tube"][step]["clearance"][0], least);
+  EXPECT_NEAR(decision["margin"].get<double>() - decision["threshold"].get<double>(), least, 1e-12);
+}
+
+TEST(CertifyJsonTest, AnAbstentionSNamesTheObstacleAndWhatIsMissing) {
+  const Json decision = CertifyJson("bicycle", "bicycle_safety");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"step", "obstacle", "closest_step", "margin", "threshold"}));
+  EXPECT_EQ(decision["obstacle"], 0);
+  EXPECT_EQ(decision["closest_step"], decision["step"]);
+  EXPECT_LT(decision["margin"].get<double>(), decision["threshold"].get<double>());
+}
+
+TEST(CertifyJsonTest, AnAbstentionDNamesCoordinateValueAndBound) {
+  const Json decision = CertifyJson("bicycle", "bicycle_domain");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"step", "coordinate", "exit", "margin", "threshold"}));
+  EXPECT_EQ(decision["coordinate"], 4) << "a, of x, y, theta, v, a, delta";
+  EXPECT_EQ(decision["exit"], "upper");
+  EXPECT_EQ(decision["threshold"], 3.0);
+  EXPECT_GT(decision["margin"].get<double>(), 3.0);
+}
+
+TEST(CertifyJsonTest, AnAbstentionFNamesThePairAndWhatTheDeclarationAllows) {
+  const Json decision = CertifyJson("bicycle_falsified", "bicycle_certified");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"coordinate", "first_observation", "second_observation", "margin", "threshold"}));
+  EXPECT_EQ(decision["first_observation"], 0);
+  EXPECT_EQ(decision["second_observation"], 6);
+  EXPECT_EQ(decision["coordinate"], 2);
+  EXPECT_GT(decision["margin"].get<double>(), decision["threshold"].get<double>());
+}
+
+TEST(CertifyJsonTest, WithoutObstaclesThereIsNoClosestOne) {
+  const forereach::ScratchDirectory scratch;
+  std::string text = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+  text = std::regex_replace(text, std::regex("obstacles:\n *- circle.*"), "obstacles: []");
+  text = std::regex_replace(text, std::regex("transitions: data"), "transitions: " FOREREACH_SOURCE_DIR "/config/data");
+  const Json decision = Json::parse(Forereach("certify --json --config " + scratch.Write("task.yaml", text) +
+                                              " --plan config/plans/bicycle_certified.csv").text);
+  EXPECT_EQ(decision["outcome"], "certified");
+  EXPECT_EQ(WitnessOf(decision), Keys{});
 }
 
 TEST(CertifyJsonTest, TubeEndsWhereDEndedIt) {
@@ -114,6 +182,29 @@ TEST(BadInput, UsageExitsWithTwo) {
     EXPECT_EQ(Forereach(std::string(arguments) + " >/dev/null 2>&1").code, 2) << arguments;
 }
 
+TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
+  const struct {
+    const char *arguments, *sentence;
+  } cases[] = {{"certfy --config x", "forereach: unknown command certfy; did you mean certify?"},
+               {"cetrify", "unknown command cetrify; did you mean certify?"},
+               {"verfiy x", "unknown command verfiy; did you mean verify?"},
+               {"replya", "unknown command replya; did you mean replay?"},
+               {"check_log x", "unknown command check_log; did you mean check-log?"},
+               {"nonsense", "unknown command nonsense; known here: certify, plan, declare"},
+               {"--verison", "unknown option --verison; did you mean --version?"},
+               {"certify --confg x --plan y", "unknown option --confg of certify; did you mean --config?"},
+               {"certify --config x --plan y --jsn", "unknown option --jsn of certify; did you mean --json?"},
+               {"certify --config x --plan y --jsn=3", "unknown option --jsn of certify; did you mean --json?"},
+               {"certify --config x --plan y z", "unexpected argument z of certify"},
+               {"certify --config x --plan y \"$(printf '\\033[2J')\"", "unexpected argument ?[2J of certify"},
+               {"", "A subcommand is required"}};
+  for (const auto& [arguments, sentence] : cases) {
+    const Output output = Forereach(std::string(arguments) + " 2>&1 >/dev/null");
+    EXPECT_EQ(output.code, 2) << arguments;
+    EXPECT_THAT(output.text, HasSubstr(sentence)) << arguments;
+  }
+}
+
 TEST(Help, ExitsWithZeroAndShowsAnExample) {
   for (const char* command : {"", "certify ", "plan ", "replay ", "report ", "run "}) {
     const Output output = Forereach(std::string(command) + "--help");
@@ -122,14 +213,86 @@ TEST(Help, ExitsWithZeroAndShowsAnExample) {
   }
 }
 
-TEST(Plan, WritesACsvThatCertifyReads) {
+// ---- plan: what it suggests passes.
+
+class PlanCommand : public testing::TestWithParam<std::tuple<const char*, int>> {};
+
+std::string LineAfter(const std::string& text, const std::string& mark) {
+  const std::size_t at = text.find(mark);
+  if (at == std::string::npos) return "";
+  const std::size_t begin = at + mark.size();
+  return text.substr(begin, text.find('\n', begin) - begin);
+}
+
+TEST_P(PlanCommand, SuggestsACommandThatExitsWithZero) {
+  const auto& [task, seed] = GetParam();
   const forereach::ScratchDirectory scratch;
-  const std::string file = scratch / "plan.csv";
-  const Output planned = Forereach("plan --config config/demo.yaml --out " + file);
+  const std::string file = scratch / "a plan's.csv", config = std::string("config/") + task + ".yaml";
+  const Output planned =
+      Forereach("plan --config " + config + " --out \"" + file + "\" --seed " + std::to_string(seed));
   ASSERT_EQ(planned.code, 0) << planned.text;
-  const Output certified = Forereach("certify --json --config config/demo.yaml --plan " + file);
-  EXPECT_LE(certified.code, 1);
-  EXPECT_NE(Json::parse(certified.text)["outcome"], "abstain_falsified");
+  const std::string suggested = LineAfter(planned.text, "now: forereach ");
+  ASSERT_NE(suggested, "") << planned.text;
+  const Output certified = Forereach(suggested);
+  EXPECT_EQ(certified.code, 0) << planned.text << certified.text;
+  // What it says of the plan is what certify says.
+  const std::string sentence = certified.text.substr(0, certified.text.find('\n'));
+  EXPECT_THAT(planned.text, HasSubstr(sentence));
+  // The tube ends in a stop: around zero speed, acceleration and steering.
+  const Json tube = Json::parse(Forereach(suggested + " --json").text)["tube"];
+  for (const std::size_t rests : {3u, 4u, 5u})
+    EXPECT_NEAR(tube.back()["center"][rests].get<double>(), 0, 1e-9) << "state " << rests;
+  EXPECT_GT(tube.back()["center"][0].get<double>(), 1) << "it drives";
+}
+
+INSTANTIATE_TEST_SUITE_P(ShippedTasks, PlanCommand,
+                         testing::Combine(testing::Values("demo", "policy"), testing::Range(0, 12)));
+
+TEST(Plan, TheSameSeedGivesTheSamePlan) {
+  const forereach::ScratchDirectory scratch;
+  for (const char* file : {"a.csv", "b.csv"})
+    ASSERT_EQ(Forereach("plan --config config/demo.yaml --seed 5 --out " + (scratch / file)).code, 0);
+  EXPECT_EQ(Read(scratch / "a.csv"), Read(scratch / "b.csv"));
+}
+
+using Replacements = std::vector<std::pair<std::string, std::string>>;
+
+// The demo with parts of its text replaced.
+std::string DemoWith(const forereach::ScratchDirectory& scratch, const Replacements& replacements) {
+  std::string text = Read(FOREREACH_SOURCE_DIR "/config/demo.yaml");
+  const auto replace = [&text](const std::string& what, const std::string& with) {
+    const std::size_t at = text.find(what);
+    ASSERT_NE(at, std::string::npos) << what;
+    text.replace(at, what.size(), with);
+  };
+  replace("transitions: data/", "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
+  for (const auto& [what, with] : replacements) replace(what, with);
+  return scratch.Write("task.yaml", text);
+}
+
+TEST(Plan, SaysWhyWhenThereIsNone) {
+  const std::string first = "{center: [18, 3], radius: 2.5}", speed_noise = "noise_bound: [0, 0, 0, 0";
+  const struct {
+    Replacements task;
+    int code;
+    const char* sentence;
+  } cases[] = {
+      {{{first, "{center: [0, 0], radius: 2.5}"}}, 1, "searches found a candidate"},
+      {{{first, "{center: [4.5, 0], radius: 2}"}, {"half_width: [0.05, 0.05", "half_width: [3, 3"}}, 1,
+       "not certified, the last: abstain S"},
+      {{{speed_noise, "noise_bound: [0, 0, 0, 1"}}, 1, "not certified, the last: abstain D"},
+      {{{"delta: 0.609638820", "delta: 0.0001"}}, 1, "1 candidate was not certified, the last: abstain F"},
+      {{{"  goal: [120, 0]\n", ""}}, 2, "planner.goal: missing"},
+      {{{"algorithm: kpiece", "algorithm: magic"}}, 2, "planner.algorithm: magic"}};
+  for (const auto& c : cases) {
+    const forereach::ScratchDirectory scratch;
+    const std::string out = scratch / "plan.csv";
+    const Output output = Forereach("plan --config " + DemoWith(scratch, c.task) + " --out " + out + " 2>&1");
+    EXPECT_EQ(output.code, c.code) << output.text;
+    EXPECT_THAT(output.text, HasSubstr(c.sentence));
+    EXPECT_THAT(output.text, testing::Not(HasSubstr("now:")));
+    EXPECT_FALSE(std::ifstream(out).good()) << "nothing is written";
+  }
 }
 
 TEST(Doctor, PrintsOneJsonDocument) {

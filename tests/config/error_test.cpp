@@ -69,8 +69,8 @@ TEST_F(ErrorTest, MissingKeys) {
 }
 
 TEST_F(ErrorTest, DoubleKeys) {
-  EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"), "task.yaml:9: declaration.lipschitz.vx.vx: stands twice");
-  EXPECT_EQ(ErrorAfter("transitions: other.csv\n"), "task.yaml:19: transitions: stands twice");
+  EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"), "task.yaml:9: declaration.lipschitz.vx.vx: stands twice, first in line 9; delete one of them");
+  EXPECT_EQ(ErrorAfter("transitions: other.csv\n"), "task.yaml:19: transitions: stands twice, first in line 12; delete one of them");
 }
 
 TEST_F(ErrorTest, SizesThatDoNotFit) {
@@ -104,14 +104,10 @@ TEST_F(ErrorTest, MatricesThatDoNotFit) {
 }
 
 TEST_F(ErrorTest, NumbersThatAreNotFinite) {
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: .nan"), "task.yaml:1: model.dt: .nan is not a finite number");
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: inf"), "task.yaml:1: model.dt: inf is not a finite number");
-  EXPECT_EQ(files_.ErrorWith("upper: [20, 20, 5.4, 5.4]", "upper: [20, .inf, 5.4, 5.4]"),
-            "task.yaml:5: domain.state.upper[1]: .inf is not a finite number");
-  EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: NaN, vy"),
-            "task.yaml:9: declaration.lipschitz.vx.vx: NaN is not a finite number");
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 1e999"),
-            "task.yaml:1: model.dt: 1e999 is too large or too small to represent");
+  EXPECT_THAT(files_.ErrorWith("upper: [20, 20, 5.4, 5.4]", "upper: [20, .inf, 5.4, 5.4]"),
+              StartsWith("task.yaml:5: domain.state.upper[1]: .inf is not a finite number; write a number in "));
+  EXPECT_THAT(files_.ErrorWith("{vx: 0.1, vy", "{vx: NaN, vy"),
+              StartsWith("task.yaml:9: declaration.lipschitz.vx.vx: NaN is not a finite number; write a number in [0, inf)"));
 }
 
 TEST_F(ErrorTest, NumbersOutsideTheirRange) {
@@ -137,17 +133,72 @@ TEST_F(ErrorTest, NumbersOutsideTheirRange) {
 
 TEST_F(ErrorTest, TheLargestOrderIsAccepted) { EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 26}\n"), ""); }
 
+// Each says what was found and what to write.
+TEST_F(ErrorTest, NumbersThatAreWrittenOtherwise) {
+  const struct {
+    const char *written, *error;
+  } of_dt[] = {
+      {"'0.15'", "\"0.15\" is quoted text, not a number; write 0.15 without quotes"},
+      {"\"0.1\"", "\"0.1\" is quoted text, not a number; write 0.1 without quotes"},
+      {"!!str 0.1", "\"0.1\" is tagged tag:yaml.org,2002:str, not a number; write 0.1 alone"},
+      {"'fast'", "\"fast\" is quoted text, not a number; write a number in (0, 60], its unit is s"},
+      {"fast", "fast is not a number; write a number in (0, 60], its unit is s"},
+      {"yes", "yes is not a number; write a number in (0, 60], its unit is s"},
+      {"true", "true is not a number; write a number in (0, 60], its unit is s"},
+      {"", "has no value; write a number in (0, 60], its unit is s"},
+      {"~", "has no value; write a number in (0, 60], its unit is s"},
+      {"[0.15]", "a list is not a number; write a number in (0, 60], its unit is s"},
+      {"{a: 1}", "a map is not a number; write a number in (0, 60], its unit is s"},
+      {"0x10", "0x10 is not a number; write it in decimal"},
+      {"0o17", "0o17 is not a number; write it in decimal"},
+      {"0b11", "0b11 is not a number; write it in decimal"},
+      {"010", "010 has a leading zero; write 10, or its decimal value if octal was meant"},
+      {"00.5", "00.5 has a leading zero; write 0.5, or its decimal value if octal was meant"},
+      {"0.15s", "0.15s is not a number; write 0.15 alone, its unit is s"},
+      {"150 ms", "150 ms is not a number; write 150 alone, its unit is s"},
+      {"1_000", "1_000 is not a number; write 1000"},
+      {".nan", ".nan is not a finite number; write a number in (0, 60], its unit is s"},
+      {"inf", "inf is not a finite number; write a number in (0, 60], its unit is s"},
+      {"-.inf", "-.inf is not a finite number; write a number in (0, 60], its unit is s"},
+      {"1e999", "1e999 is too large or too small to represent; write a number in (0, 60], its unit is s"},
+      {"--1", "--1 is not a number; write a number in (0, 60], its unit is s"},
+      {"1e5", "1e5 is outside (0, 60]"},
+      {"-0.1", "-0.1 is outside (0, 60]"}};
+  for (const auto& [written, error] : of_dt)
+    EXPECT_EQ(files_.ErrorWith("dt: 0.15", std::string("dt: ") + written), std::string("task.yaml:1: model.dt: ") + error);
+  for (const char* written : {".15", "+0.15", "15e-2", "1.", "5e-1", "0"})
+    EXPECT_EQ(files_.ErrorWith("dt: 0.15", std::string("dt: ") + written).empty(), std::string(written) != "0") << written;
+  const struct {
+    const char *written, *error;
+  } of_queue[] = {{"1.5", "1.5 is not an integer; write an integer in [1, 65536]"},
+                  {"1e3", "1e3 is not an integer; write 1000"},
+                  {"64.0", "64.0 is not an integer; write 64"},
+                  {"yes", "yes is not an integer; write an integer in [1, 65536]"},
+                  {"'64'", "\"64\" is quoted text, not an integer; write 64 without quotes"},
+                  {"64k", "64k is not an integer; write 64 alone"},
+                  {"0064", "0064 has a leading zero; write 64, or its decimal value if octal was meant"},
+                  {"{a: 1}", "a map is not an integer; write an integer in [1, 65536]"},
+                  {"99999999999999999999", "99999999999999999999 is too large or too small to represent; write an "
+                                           "integer in [1, 65536]"}};
+  for (const auto& [written, error] : of_queue)
+    EXPECT_EQ(ErrorAfter(std::string("gate: {queue: ") + written + "}\n"), std::string("task.yaml:19: gate.queue: ") + error);
+  EXPECT_EQ(files_.ErrorWith("    upper: [20, 20, 5.4, 5.4]", "    upper: [20, '20', 5.4, 5.4]"),
+            "task.yaml:5: domain.state.upper[1]: \"20\" is quoted text, not a number; write 20 without quotes");
+}
+
+TEST_F(ErrorTest, YamlThatReadsOtherwiseThanItLooks) {
+  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt:0.15"),
+            "task.yaml:1: model.dt:0.15: unknown key; write a space after the colon: dt: 0.15");
+  EXPECT_THAT(files_.ErrorWith("  lipschitz:", "\tlipschitz:"),
+              testing::EndsWith("; line 8 is indented with a tab, write spaces"));
+  EXPECT_EQ(ErrorAfter("robot:\n  time_limit_s: 0,5\n"),
+            "task.yaml:20: robot.time_limit_s: 0,5 is not a number; write 0.5, with a point");
+}
+
 TEST_F(ErrorTest, ValuesOfAnotherType) {
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: '0.15'"), "task.yaml:1: model.dt: 0.15 is not a number");
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0x10"), "task.yaml:1: model.dt: 0x10 is not a number");
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 010"), "task.yaml:1: model.dt: 010 has a leading zero");
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: [0.15]"), "task.yaml:1: model.dt: a list is not a number");
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: "), "task.yaml:1: model.dt: nothing is not a number");
-  EXPECT_EQ(ErrorAfter("gate: {queue: 1.5}\n"), "task.yaml:19: gate.queue: 1.5 is not an integer");
   EXPECT_EQ(ErrorAfter("gate: 3\n"), "task.yaml:19: gate: 3 is not a map");
-  EXPECT_EQ(ErrorAfter("gate: {queue: {a: 1}}\n"), "task.yaml:19: gate.queue: a map is not an integer");
   EXPECT_EQ(files_.ErrorWith("center: [0, 0, 1, 0]", "center: [0, 0, fast, 0]"),
-            "task.yaml:15: task.initial_set.center[2]: fast is not a number");
+            "task.yaml:15: task.initial_set.center[2]: fast is not a number; write a number in (-inf, inf)");
   EXPECT_EQ(files_.ErrorWith("center: [0, 0, 1, 0]", "center: 1"),
             "task.yaml:15: task.initial_set.center: 1 is not a list of numbers");
 }

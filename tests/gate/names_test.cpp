@@ -70,6 +70,26 @@ TEST(NamesTest, EveryCauseHasItsName) { ExpectNamed(OutcomesAndCauses().second, 
 
 TEST(NamesTest, EveryFaultHasItsName) { ExpectNamed(ConstantsOf("fault_t"), FaultName); }
 
+TEST(NamesTest, EveryFaultHasAnAdvice) {
+  for (const auto& [name, number] : ConstantsOf("fault_t")) {
+    const std::string advice(FaultAdvice(static_cast<std::int16_t>(number)));
+    EXPECT_THAT(advice, testing::HasSubstr("`forereach reset`")) << name;
+  }
+  for (const int stays : {3, 4})  // what made it is still there after a reset
+    EXPECT_THAT(std::string(FaultAdvice(static_cast<std::int16_t>(stays))), testing::HasSubstr("reset alone"));
+}
+
+TEST(NamesTest, TheAdviceIsThatOfTheDocument) {
+  std::ifstream file(FOREREACH_SOURCE_DIR "/docs/reliability.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  for (std::int16_t cause = 1; cause <= 4; ++cause) {
+    const std::size_t row = page.find("fault `" + std::string(FaultName(cause)) + "` |");
+    ASSERT_NE(row, std::string::npos) << cause;
+    const std::string line = page.substr(row, page.find('\n', row) - row);
+    EXPECT_THAT(line, testing::EndsWith("| " + std::string(FaultAdvice(cause)) + " |"));
+  }
+}
+
 TEST(NamesTest, EveryEventHasItsName) { ExpectNamed(ConstantsOf("execution_event_t"), EventName); }
 
 TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {

@@ -50,7 +50,21 @@ TEST_P(UsageTest, WithoutConfigItSaysSo) {
 TEST_P(UsageTest, AnUnknownOptionIsNamed) {
   ChildProcess process({program(), "--config", "x", "--nonsense"});
   EXPECT_EQ(process.WaitForExit(), 2);
-  EXPECT_THAT(process.error(), HasSubstr("--nonsense"));
+  EXPECT_THAT(process.error(), HasSubstr("unknown option --nonsense; known here: --"));
+}
+
+TEST_P(UsageTest, AnUnknownOptionBringsTheOneThatWasMeant) {
+  ChildProcess process({program(), "--confg", "x"});
+  EXPECT_EQ(process.WaitForExit(), 2);
+  EXPECT_THAT(process.error(), HasSubstr("unknown option --confg; did you mean --config?"));
+}
+
+TEST_P(UsageTest, VersionIsNameAndVersion) {
+  ChildProcess process({program(), "--version"});
+  EXPECT_EQ(process.WaitForExit(), 0);
+  const std::string name = program().substr(program().rfind('/') + 1);
+  EXPECT_EQ(process.output(), name + " " FOREREACH_VERSION "\n");
+  EXPECT_EQ(process.error(), "");
 }
 
 TEST_P(UsageTest, AMissingFileIsNamedInOneLine) {
