@@ -6,6 +6,8 @@ A program that gets one says the text in one line and exits with 2. */
 
 #include <stdexcept>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 class BadInput : public std::runtime_error {

@@ -15,6 +15,8 @@ Nothing here looks at values; whoever receives a message validates them. Needs n
 #include <string_view>
 #include <vector>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 using Bytes = std::span<const std::uint8_t>;

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 /** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected", "abstain_deadline"; "unknown" for any other number. */

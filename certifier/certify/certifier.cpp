@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/numerics/arithmetic.h"
 #include "certifier/safety/separation.h"
 
 namespace forereach {
@@ -15,6 +16,7 @@ void RequireThat(bool good, const std::string& what) {
 }
 
 const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
+  RequireExactArithmetic();
   RequireThat(problem && problem->model, "problem: no model");
   const int n = problem->model->num_states(), variables = problem->model->num_variables();
   problem->domain.Validate(n, problem->model->num_inputs());

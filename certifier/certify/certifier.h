@@ -20,7 +20,9 @@ namespace forereach {
 class Certifier final {
  public:
   /** @throws std::invalid_argument naming the part of the problem that does not fit: sizes, non-finite numbers, no
-  transitions, a transition outside the domain, an order out of range. */
+  transitions, a transition outside the domain, an order out of range.
+  @throws std::runtime_error saying what to change if this program or thread does not compute as bounds need it
+  (certifier/numerics/arithmetic.h). */
   explicit Certifier(std::shared_ptr<const Problem> problem);
 
   [[nodiscard]] const Problem& problem() const { return *problem_; }

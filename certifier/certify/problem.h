@@ -4,8 +4,6 @@ holds, and which coordinates safety is judged in. */
 
 #include <memory>
 
-#include <Eigen/Core>
-
 #include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/model.h"
 #include "certifier/reach/domain.h"
@@ -13,6 +11,7 @@ holds, and which coordinates safety is judged in. */
 #include "certifier/residual/transitions.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/sets/box.h"
+#include "certifier/sets/eigen.h"
 
 namespace forereach {
 

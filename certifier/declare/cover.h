@@ -4,6 +4,8 @@ further. Plain data: whoever checks it needs to know nothing of how it was found
 
 #include <vector>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 /** A binary tree; node 0 stands for the whole box. An inner node cuts its box at w_argument = at into one part with

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/numerics/arithmetic.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -303,6 +304,7 @@ double SlopeBound::gap() const {
 
 SlopeBound BoundSlope(const ResidualSlopes& slopes, const Domain& domain, std::span<const Interval> parameters, int row,
                       int column, const SlopeBoundOptions& options, const SlopeProgress& progress) {
+  RequireExactArithmetic();
   domain.Validate(slopes.num_states(), slopes.num_variables() - slopes.num_states());
   Require(parameters.size() == slopes.parameter_names().size(),
           std::to_string(parameters.size()) + " parameter ranges for " +

@@ -8,6 +8,8 @@
 #include "certifier/dynamics/model.h"
 #include "certifier/dynamics/remainder.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
 
 template <class Equations>
@@ -43,3 +45,5 @@ class EquationsModel final : public NominalModel {
 };
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -9,6 +9,8 @@ step uses expand.h instead. */
 #include "certifier/dynamics/program.h"
 #include "certifier/numerics/interval.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
 
 template <class T>
@@ -52,3 +54,5 @@ void Evaluate(const Program& program, const std::array<bool, Program::kMaxOperat
 }
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -11,6 +11,8 @@ box. */
 #include "certifier/dynamics/expansion.h"
 #include "certifier/numerics/lanes.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
 
 namespace internal {
@@ -184,3 +186,5 @@ inline void Expand(std::span<const double> parameters, std::span<const double> z
 }
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

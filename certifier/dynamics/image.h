@@ -12,6 +12,8 @@ that is known at compile time. One pass over the generators, four at a time, als
 #include "certifier/numerics/lanes.h"
 #include "certifier/sets/zonotope.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
 namespace internal {
 
@@ -145,3 +147,5 @@ void MapGenerators(const Expansion& expansion, const StepError& error, const Zon
 }
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <span>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 struct KinematicBicycle {

@@ -4,6 +4,8 @@ of their outputs may depend on; the others' derivatives are zero by construction
 
 #include <cstdint>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 class Occurrence final {

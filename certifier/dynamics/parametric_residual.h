@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 /** {r(.; theta) : lower <= theta <= upper}, r one of residuals.h by name. */

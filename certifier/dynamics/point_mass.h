@@ -4,6 +4,8 @@
 #include <array>
 #include <span>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 struct PointMass {

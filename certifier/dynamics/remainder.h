@@ -13,6 +13,8 @@ in the interval Hessian over its hull. As straight-line code for a program that 
 #include "certifier/numerics/lanes.h"
 #include "certifier/sets/zonotope.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
 namespace internal {
 
@@ -253,3 +255,5 @@ void EncloseRemainder(Method method, const Zonotope& slice, const double* half_w
 }
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

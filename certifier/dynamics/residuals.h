@@ -11,6 +11,9 @@ SmoothGate and Softplus. */
 
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/numerics/compilation.h"
+
+FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
@@ -118,3 +121,5 @@ struct VelocityKnee {
 };
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

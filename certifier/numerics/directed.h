@@ -11,9 +11,9 @@ written so that NaN fails it. */
 #include <cstdint>
 #include <limits>
 
-#ifdef __FAST_MATH__
-#error "bounds need IEEE arithmetic: compile without -ffast-math"
-#endif
+#include "certifier/numerics/arithmetic.h"
+
+FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
@@ -126,3 +126,5 @@ product that may have underflowed. */
 }
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

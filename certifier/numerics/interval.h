@@ -9,6 +9,8 @@ the end. `lower <= upper` always holds; there is no empty interval. */
 
 #include "certifier/numerics/directed.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
 
 struct Interval {
@@ -95,3 +97,5 @@ argument is too large to reduce; tan over an interval that may meet a pole gives
 [[nodiscard]] Interval tan(const Interval& x);
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -1,21 +1,26 @@
 /** Four doubles at a time, by the compiler's vectors: the same bits on every instruction set, since only +, -, *, /,
-max, abs and comparisons are used and sums are always taken in the same order. */
+max, abs and comparisons are used and sums are always taken in the same order.
+
+How a vector is passed by value depends on the instruction set of the two functions. A hot function is compiled for AVX2
+beside its baseline (simd.h), so a vector never enters or leaves a function that may not be inlined: functions and lambdas
+that take or return one are marked FOREREACH_INLINE, which also holds without optimisation, and one vector is seen as another
+by Bits and FromBits, where std::bit_cast would be a call. */
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 
 #include "certifier/numerics/simd.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
 
 inline constexpr std::size_t kLaneCount = 4;
 
-// Passing these between functions depends on the instruction set, so everything here is inlined.
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wpsabi"
+#if !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wpsabi"  // g++ gives it where a template is instantiated
 #endif
 
 using Lanes [[gnu::vector_size(32)]] = double;
@@ -39,8 +44,10 @@ FOREREACH_INLINE void StoreAll(const double (&numbers)[N], double* to) {
   for (std::size_t i = 0; i < N; i += kLaneCount) StoreLanes(Lanes{at(i), at(i + 1), at(i + 2), at(i + 3)}, to + i);
 }
 FOREREACH_INLINE Lanes AllLanes(double x) { return Lanes{x, x, x, x}; }
+FOREREACH_INLINE LaneMask Bits(const Lanes& x) { return reinterpret_cast<LaneMask>(x); }
+FOREREACH_INLINE Lanes FromBits(const LaneMask& x) { return reinterpret_cast<Lanes>(x); }
 FOREREACH_INLINE Lanes Abs(const Lanes& x) {
-  return std::bit_cast<Lanes>(std::bit_cast<LaneMask>(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
+  return FromBits(Bits(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
 /** b where a is NaN, as Max. */
@@ -86,13 +93,13 @@ class Packing {
     __builtin_memcpy(&from_, internal::kPacking[left_out].data(), sizeof from_);
   }
   FOREREACH_INLINE Lanes operator()(const Lanes& x) const {
-    const auto halves = std::bit_cast<Halves>(x);
+    const auto halves = reinterpret_cast<Halves>(x);
 #ifdef __clang__  // has no shuffle by a variable
     Halves packed;
     for (std::size_t i = 0; i < 2 * kLaneCount; ++i) packed[i] = halves[from_[i]];
-    return std::bit_cast<Lanes>(packed);
+    return reinterpret_cast<Lanes>(packed);
 #else
-    return std::bit_cast<Lanes>(__builtin_shuffle(halves, from_));
+    return reinterpret_cast<Lanes>(__builtin_shuffle(halves, from_));
 #endif
   }
 
@@ -118,6 +125,8 @@ FOREREACH_INLINE bool HoldsForFirst(std::size_t n, Test test) {
 }
 
 /** What the hot functions outside of classes run on: the best there is, unless a test chooses. */
-inline InstructionSet active_instruction_set = BestInstructionSet();
+extern InstructionSet active_instruction_set;
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -1,6 +1,8 @@
 /** The largest sizes anything has, so that the certify step needs no heap. They are those of the bus contract. */
 #pragma once
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 inline constexpr int kMaxStates = 16;

@@ -9,6 +9,8 @@
 #include <thread>
 #include <vector>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 /** Calls work(i, thread) once for each i below `count`, in no fixed order, thread being below min(threads, count). The

@@ -12,12 +12,16 @@ of the class that owns them holds the InstructionSet and chooses. */
 #include <cstdint>
 #include <limits>
 
+#include "certifier/numerics/compilation.h"
+
 #define FOREREACH_FLATTEN [[gnu::flatten]]
 #if defined(__x86_64__)
 #define FOREREACH_AVX2 [[gnu::target("avx2"), gnu::flatten]]
 #else
 #define FOREREACH_AVX2 [[gnu::flatten]]
 #endif
+
+FOREREACH_ARITHMETIC_BEGIN
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"  // nothing here is ever called: all of it is inlined
@@ -129,3 +133,5 @@ place at most, for which the largest of eight says where it stands. */
 }  // namespace forereach
 
 #pragma GCC diagnostic pop
+
+FOREREACH_ARITHMETIC_END

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 /** The shortest decimal that reads back as the same double. */

@@ -6,12 +6,13 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/sets/box.h"
+#include "certifier/sets/eigen.h"
+
+FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
@@ -104,3 +105,5 @@ class DomainTest final {
 };
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -1,7 +1,7 @@
 /** The supplied side information, Assumption 1: |r_k(z) - r_k(z')| <= sum_l L_kl |z_l - z'_l|, and the noise bound. */
 #pragma once
 
-#include <Eigen/Core>
+#include "certifier/sets/eigen.h"
 
 namespace forereach {
 

@@ -5,10 +5,9 @@ observation error on top of sigma. So [lower, upper] contains x_i+ - f0(z_i) +- 
 satisfies  lower_ik - sigma_k <= r_k(z_i) <= upper_ik + sigma_k. */
 #pragma once
 
-#include <Eigen/Core>
-
 #include "certifier/dynamics/model.h"
 #include "certifier/residual/transitions.h"
+#include "certifier/sets/eigen.h"
 
 namespace forereach {
 

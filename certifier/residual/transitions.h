@@ -1,7 +1,7 @@
 /** The observed one-step transitions D_N = {(z_i, x_i+)}, z = (x, u). */
 #pragma once
 
-#include <Eigen/Core>
+#include "certifier/sets/eigen.h"
 
 namespace forereach {
 

@@ -7,10 +7,9 @@ Each is a core, the convex hull of points or a half-space, grown by a radius:
 #include <span>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/sets/eigen.h"
 
 namespace forereach {
 

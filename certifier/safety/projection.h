@@ -3,9 +3,8 @@
 
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "certifier/safety/separation.h"
+#include "certifier/sets/eigen.h"
 #include "certifier/sets/linear_map.h"
 
 namespace forereach {

@@ -1,7 +1,7 @@
 /** An axis-aligned box {x : lower <= x <= upper}, closed, not empty. */
 #pragma once
 
-#include <Eigen/Core>
+#include "certifier/sets/eigen.h"
 
 namespace forereach {
 

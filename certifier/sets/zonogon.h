@@ -3,8 +3,7 @@
 
 #include <vector>
 
-#include <Eigen/Core>
-
+#include "certifier/sets/eigen.h"
 #include "certifier/sets/zonotope.h"
 
 namespace forereach {

@@ -223,7 +223,7 @@ FOREREACH_INLINE void DropFromRows(Zonotope& set, std::size_t k, const double* s
     for (std::size_t i = 0; i < kRows; ++i) {
       double* row = set.mutable_row(static_cast<int>(k + i));
       const Lanes four = LoadLanes(row + j);
-      sums[i] += std::bit_cast<Lanes>(std::bit_cast<LaneMask>(four) & absolute);
+      sums[i] += FromBits(Bits(four) & absolute);
       StoreLanes(packing(four), row + to);
     }
     to += kLaneCount - static_cast<std::size_t>(std::popcount(bits));

@@ -14,12 +14,13 @@ generators runs along memory, four at a time. */
 #include <cstdint>
 #include <span>
 
-#include <Eigen/Core>
-
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/sets/box.h"
+#include "certifier/sets/eigen.h"
+
+FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
@@ -120,11 +121,11 @@ class ColumnScores {
     /** From the sums and the largest of the next four columns' absolute values. */
     FOREREACH_INLINE void Add(std::size_t first_column, const Lanes& sum, const Lanes& largest) {
       const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so that bits of it are no NaN
-      const LaneMask bits = (std::bit_cast<LaneMask>(score) & ~LaneMask{127, 127, 127, 127}) | index_;
+      const LaneMask bits = (Bits(score) & ~LaneMask{127, 127, 127, 127}) | index_;
       const LaneMask nonzero = largest > AllLanes(0);
       nonzero_ -= nonzero;
       index_ -= LaneMask{4, 4, 4, 4};
-      StoreLanes(nonzero ? std::bit_cast<Lanes>(bits) : AllLanes(-1), &scores_.scores_[first_column]);
+      StoreLanes(nonzero ? FromBits(bits) : AllLanes(-1), &scores_.scores_[first_column]);
     }
     /** After all `count` columns. */
     FOREREACH_INLINE void Finish(std::size_t count) {
@@ -161,3 +162,5 @@ void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* fi
 void ReduceOrder(Zonotope& set, int order) noexcept;
 
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END
