@@ -64,7 +64,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     const std::unique_ptr<Node> node = make_node(config, *bus);
     spdlog::info("ready on {} with {}{}", config.bus.url, config_path, config.bus.key.empty() ? "" : ", signed");
     RunNode(*node, *bus);
-    return 0;
+    return node->failed() ? 1 : 0;
   });
 }
 
