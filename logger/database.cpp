@@ -291,10 +291,21 @@ std::vector<LogReference> Database::References(const std::string& log_file) {
       UNION SELECT event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
       ORDER BY event_number)sql");
   for (select.Bind(log_file); select.Step();) {
-    LogReference& reference = references.emplace_back(LogReference{log_file});
+    LogReference& reference = references.emplace_back(LogReference{log_file, -1, {}});
     select.Read(reference.event_number, reference.digest);
   }
   return references;
+}
+
+std::set<std::string> Database::ConfigDigests(const std::string& log_file) {
+  std::set<std::string> digests;
+  Statement select(handle_.get(), "SELECT DISTINCT config_digest FROM decisions WHERE log_file = ?");
+  for (select.Bind(log_file); select.Step();) {
+    std::string digest;
+    select.Read(digest);
+    digests.insert(digest);
+  }
+  return digests;
 }
 
 std::set<std::int64_t> Database::EventsBehindGaps(const std::string& log_file) {

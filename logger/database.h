@@ -70,6 +70,9 @@ class Database final {
   /** The events that rows of one log file come from, by number; twice if rows differ in the digest. @throws DatabaseError. */
   [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);
 
+  /** The config digests of a log file's decisions. @throws DatabaseError. */
+  [[nodiscard]] std::set<std::string> ConfigDigests(const std::string& log_file);
+
   /** The events of a log file that have a gap before them. @throws DatabaseError. */
   [[nodiscard]] std::set<std::int64_t> EventsBehindGaps(const std::string& log_file);
 

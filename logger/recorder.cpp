@@ -9,12 +9,14 @@
 #include <spdlog/spdlog.h>
 
 #include "certifier/task/key.h"
+#include "forereach/certifier_status_v2_t.hpp"
 
 namespace forereach {
 namespace {
 
 constexpr std::int64_t kMaxBufferBytes = 4 << 20;
 constexpr std::size_t kMaxLosses = 256, kMaxChannels = 256;  // a sender that invents channels must not fill the memory
+constexpr std::size_t kMaxTasks = 16, kMaxTasksInUse = 256;
 constexpr int kEventsPerTransaction = 4096;
 constexpr double kScanUs = 1e6, kGapsUs = 10e6, kRetryUs = 1e6;
 
@@ -97,6 +99,9 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
       database_(std::make_unique<Database>(database_path_)),
       summary_(config),
       interpreter_(channels_, "", key_),
+      task_path_(config.path),
+      kept_tasks_(options_.directory),
+      task_reading_(kRetryUs),
       flush_(options_.flush_ms * 1e3),
       age_(options_.rotate_minutes * 60e6),
       scan_(kScanUs),
@@ -104,6 +109,7 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
       retry_(kRetryUs),
       anew_(kRetryUs),
       database_anew_(kRetryUs) {
+  if (!task_path_.empty()) AddTask(config);
   AdoptLogs();
   for (const RunRow& run : database_->Runs())
     if (!run.end_utime) Recover(run);
@@ -224,6 +230,65 @@ void Recorder::Open(std::int64_t now_us, const std::string& continues) {
   ++files_;
   age_.Start(now_us);
   spdlog::info("recording to {}", log_path_);
+  KeepTasks();
+}
+
+void Recorder::AddTask(const Config& config) {
+  try {
+    const bool is_known = std::ranges::any_of(tasks_, [&](const TaskCopy& task) {
+      return task.digest == config.digest && task.observations_digest == config.observations_digest;
+    });
+    if (is_known) return;
+    if (tasks_.size() >= kMaxTasks) tasks_.erase(tasks_.begin());
+    tasks_.push_back(CopyTask(config));
+    tasks_in_use_.insert(ToHex(config.digest));
+  } catch (const BadInput& error) {
+    spdlog::error("the task is not kept beside the log: {}", error.what());
+  }
+}
+
+void Recorder::KeepTasks() const {
+  for (const TaskCopy& task : tasks_) try {
+      kept_tasks_.Keep(task);
+    } catch (const BadInput& error) {
+      spdlog::error("the task {} is not kept beside the log: {}", ToHex(task.digest), error.what());
+    }
+}
+
+// A reload may bring other transitions with the same task file, which only the version tells.
+void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
+  if (task_path_.empty() || event.channel != channels_.status) return;
+  const auto status = Decoded<certifier_status_v2_t>(event.message());
+  if (!status) return;
+  const std::pair heard{GetDigest(status->config_digest), status->version};
+  if (heard == heard_task_) return;
+  const bool is_first = !heard_task_ && !tasks_.empty() && tasks_.back().digest == heard.first;
+  if (!is_first && !task_reading_.IsOver(now_us)) return;
+  heard_task_ = heard;
+  if (tasks_in_use_.size() < kMaxTasksInUse) tasks_in_use_.insert(ToHex(heard.first));
+  if (is_first) return;
+  task_reading_.Start(now_us);
+  try {
+    const Config config = LoadConfig(task_path_);
+    if (config.digest != heard.first)
+      throw ConfigError(task_path_ + " is another, of config digest " + ToHex(config.digest));
+    AddTask(config);
+    KeepTasks();
+  } catch (const BadInput& error) {
+    spdlog::warn("the certifier's task, config digest {}, is not kept beside the log: {}", ToHex(heard.first), error.what());
+  }
+}
+
+// Those that no log names any more. A run that was not ended may lack rows, and with them what it needs.
+void Recorder::ForgetTasksOf(const std::string& log) {
+  std::set<std::string> forgotten = database().ConfigDigests(log);
+  for (const RunRow& run : database().Runs()) {
+    if (!directory_.Bytes(run.log_file)) continue;
+    if (!run.end_utime && run.log_file != log_file_) return;
+    for (const std::string& digest : database().ConfigDigests(run.log_file)) forgotten.erase(digest);
+  }
+  for (const std::string& digest : forgotten)
+    if (!tasks_in_use_.contains(digest)) kept_tasks_.Remove(digest);
 }
 
 void Recorder::Rotate(std::int64_t now_us) {
@@ -255,6 +320,7 @@ void Recorder::Tick(std::int64_t now_us) {
 }
 
 void Recorder::Take(LogEvent event, std::int64_t now_us) {
+  NoticeTask(event, now_us);
   if (event.data.size() > kMaxLogDataBytes || event.channel.size() > kMaxLogChannelBytes || event.channel.empty())
     return CountLoss({event.channel, ""}, 1, event.utime, "disk");
   const std::int64_t bytes = RecordBytes(event);
@@ -550,6 +616,7 @@ bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
       earlier_files_.erase(file);
       if (!directory_.Remove(file)) continue;
       other_bytes_ -= size;
+      ForgetTasksOf(file);
       spdlog::warn("{}, {} bytes, deleted for logger.quota_mb; its rows stay", file, size);
     }
   } catch (const DatabaseError& error) {

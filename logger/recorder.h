@@ -22,6 +22,10 @@ already. The directory is made again if need be; where no new file can be made r
 A database that is no longer in its place is opened or made anew. What it lacks of logs that are there is made again
 by the next start; gaps without an event that it alone held are lost.
 
+**Tasks.** The task file and the files that it names are kept beside the logs (logger/kept_tasks.h), so that a log can be read
+without them. When the certifier's heartbeats tell of a reload the task file is read again, and kept too if it is the one that
+they name. A kept task is deleted with the last log whose decisions name it.
+
 **Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes is
 counted by channel, and the counts become gaps. With a flush that fails it is the same for the events of that flush. Gaps
 of this kind are written when recording goes on, and until then every ten seconds. For the quota the logs of ended runs are
@@ -33,6 +37,7 @@ deleted, nor is any if that would not make room. */
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,6 +47,7 @@ deleted, nor is any if that would not make room. */
 #include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/interpreter.h"
+#include "logger/kept_tasks.h"
 #include "logger/log_directory.h"
 #include "logger/summary.h"
 
@@ -141,6 +147,11 @@ class Recorder final {
   void WriteRows();
   void Report();
 
+  void NoticeTask(const LogEvent& event, std::int64_t now_us);
+  void AddTask(const Config& config);
+  void KeepTasks() const;
+  void ForgetTasksOf(const std::string& log);
+
   void WatchDisk(std::int64_t now_us);
   [[nodiscard]] bool HasRoom(std::int64_t bytes) const;
   [[nodiscard]] bool MakeRoom(std::int64_t bytes, std::int64_t now_us);
@@ -155,6 +166,13 @@ class Recorder final {
   SummaryBuilder summary_;
   Interpreter interpreter_;
   std::vector<std::string> recovered_;
+
+  const std::string task_path_;
+  const KeptTasks kept_tasks_;
+  std::vector<TaskCopy> tasks_;                                  // of this run, the last kMaxTasks
+  std::optional<std::pair<Digest, std::int64_t>> heard_task_;    // config digest and version of the last heartbeat
+  std::set<std::string> tasks_in_use_;                           // config digests of this run, in hexadecimal
+  Period task_reading_;
 
   std::string log_path_, log_file_;
   std::unique_ptr<EventLogWriter> log_;
