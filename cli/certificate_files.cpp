@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -23,6 +25,9 @@
 #include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/log_authenticator.h"
+#include "logger/log_directory.h"
+#include "logger/log_survey.h"
+#include "logger/log_tasks.h"
 
 namespace forereach {
 namespace {
@@ -222,11 +227,22 @@ verifier::Certificate CertificateOf(const certified_plan_t& certified, const std
   return certificate;
 }
 
+// Which decisions are judged under a task: those of its config digest, and under the first task those of digests without one.
+struct Share {
+  const Digest& digest;
+  const std::set<Digest>& all;
+  bool is_first;
+
+  [[nodiscard]] bool Has(const Digest& other) const { return other == digest || (is_first && !all.contains(other)); }
+};
+
 class LogReading {
  public:
   // Adds what it finds to `file`; names the file of each certificate if `names` says so.
-  LogReading(const std::vector<std::string>& logs, bool names, LearnedHistory& learned, CertificateFile& file)
+  LogReading(const std::vector<std::string>& logs, bool names, const Share& share, LearnedHistory& learned,
+             CertificateFile& file)
       : config_(file.config),
+        share_(share),
         authenticator_(config_.bus, KeyOf(config_.bus)),
         obstacles_(config_),
         learned_(learned),
@@ -236,7 +252,7 @@ class LogReading {
       log_ = names ? std::filesystem::path(log).filename().string() + " " : "";
       Take(event);
     });
-    if (damage.places > 0)
+    if (damage.places > 0 && share.is_first)
       certificates_.push_back({logs[0], {}, "the log is damaged in " + std::to_string(damage.places) + " places", {}});
     for (const auto& [digest, outcome] : outcomes_)
       if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
@@ -244,7 +260,7 @@ class LogReading {
             {"plan with digest " + ToHex(digest), {}, "decided as certified, but the log has no certified plan", {}});
     file.not_certificates += static_cast<std::size_t>(
         std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
-    passed_over_.not_authentic += authenticator_.refusals();
+    if (share.is_first) passed_over_.not_authentic += authenticator_.refusals();
   }
 
   [[nodiscard]] const std::map<Digest, std::int16_t>& outcomes() const { return outcomes_; }
@@ -285,6 +301,7 @@ class LogReading {
     const auto decision = Decoded<decision_t>(event.message());
     if (!decision) return;
     NoticeRestart(decision->sequence, last_decision_);
+    if (!share_.Has(GetDigest(decision->config_digest))) return;
     // A candidate that comes twice is rejected the second time: the certificate is the first's.
     std::int16_t& outcome = outcomes_[GetDigest(decision->plan_digest)];
     if (outcome != decision_t::CERTIFIED) outcome = decision->outcome;
@@ -293,7 +310,11 @@ class LogReading {
   void TakeCertified(const LogEvent& event) {
     const auto certified = Decoded<certified_plan_t>(event.message());
     if (!certified) {
-      ++passed_over_.undecodable;
+      passed_over_.undecodable += share_.is_first;
+      return;
+    }
+    if (!share_.Has(GetDigest(certified->config_digest))) {
+      NoticeRestart(certified->sequence, last_certified_);
       return;
     }
     RecordedCertificate certificate;
@@ -340,6 +361,7 @@ class LogReading {
   }
 
   const Config& config_;
+  const Share share_;
   LogAuthenticator authenticator_;
   ObstacleHistory obstacles_;
   LearnedHistory& learned_;
@@ -353,24 +375,35 @@ class LogReading {
   std::int64_t last_decision_ = -1, last_certified_ = -1;
 };
 
-CertificateFile FromLogs(const std::vector<std::string>& logs, Config config) {
-  CertificateFile file;
-  file.config = std::move(config);
-  LearnedHistory learned(file.config);
-  const LogReading reading(logs, logs.size() > 1, learned, file);
-  file.config.problem = learned.WithAll();
-  return file;
+std::set<Digest> DigestsOf(const std::vector<Config>& tasks) {
+  std::set<Digest> digests;
+  for (const Config& task : tasks) digests.insert(task.digest);
+  return digests;
+}
+
+std::vector<CertificateFile> FromLogs(const std::vector<std::string>& logs, std::vector<Config> tasks) {
+  const std::set<Digest> digests = DigestsOf(tasks);
+  std::vector<CertificateFile> files;
+  for (Config& task : tasks) {
+    CertificateFile& file = files.emplace_back();
+    file.config = std::move(task);
+    LearnedHistory learned(file.config);
+    const LogReading reading(logs, logs.size() > 1, {file.config.digest, digests, files.size() == 1}, learned, file);
+    file.config.problem = learned.WithAll();
+  }
+  return files;
 }
 
 // ---- A decision database: its logs lie beside it, and its rows have to say what they say.
 
-void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const LearnedHistory& learned, const Config& config,
-               std::vector<RecordedCertificate>& certificates) {
+void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const Share& share, const std::set<std::string>& tasks,
+               const LearnedHistory& learned, const Config& config, std::vector<RecordedCertificate>& certificates) {
   std::set<std::string> certified;
   for (const auto& [digest, outcome] : log.outcomes())
     if (outcome == decision_t::CERTIFIED) certified.insert(ToHex(digest));
   for (const DecisionRow& row : rows) {
     if (row.outcome != OutcomeName(decision_t::CERTIFIED)) continue;
+    if (row.config_digest != ToHex(share.digest) && (!share.is_first || tasks.contains(row.config_digest))) continue;
     RecordedCertificate certificate;
     certificate.name = row.event.log_file + " event " + std::to_string(row.event.event_number) + " in the database";
     if (certified.erase(row.plan_digest) == 0) certificate.missing = "the log has no such certificate";
@@ -390,6 +423,20 @@ void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, cons
     certificates.push_back({"plan with digest " + digest, {}, "certified in the log, but not in the database", {}});
 }
 
+// Of the files of one run; what is amiss in one of them is for the reading to say.
+LogSurvey SurveyChain(const std::vector<std::string>& logs) {
+  LogSurvey all;
+  for (const std::string& log : logs) {
+    LogSurvey one = Survey({log});
+    for (const Digest& digest : one.order) {
+      if (!all.configs.contains(digest)) all.order.push_back(digest);
+      all.configs[digest].decisions += one.configs[digest].decisions;
+      all.configs[digest].observations.merge(one.configs[digest].observations);
+    }
+  }
+  return all;
+}
+
 // The files of each run: what a file does not know, the one before does.
 std::vector<std::vector<RunRow>> Chains(Database& database) {
   std::vector<std::vector<RunRow>> chains;
@@ -400,11 +447,29 @@ std::vector<std::vector<RunRow>> Chains(Database& database) {
   return chains;
 }
 
-CertificateFile FromDatabase(const std::string& path, Config config) {
+// What is read under one task, whichever run it is of.
+struct Group {
   CertificateFile file;
-  file.config = std::move(config);
+  std::unique_ptr<LearnedHistory> learned;
+};
+
+std::vector<CertificateFile> FromDatabase(const std::string& path, const std::string& config_path, const LogKey& key) {
+  const std::string directory = std::filesystem::path(path).parent_path().string();
+  std::optional<Digest> given;
+  if (!config_path.empty()) given = LoadConfig(config_path).digest;
+  std::vector<std::unique_ptr<Group>> groups;
+  std::vector<RecordedCertificate> without_task;
+  std::string why_none = path + ": no run in it has a log with decisions";
+  const auto group_of = [&](const Config& task) -> Group& {
+    for (const auto& group : groups)
+      if (group->file.config.digest == task.digest && group->file.config.observations_digest == task.observations_digest)
+        return *group;
+    Group& group = *groups.emplace_back(std::make_unique<Group>());
+    group.file.config = task;
+    group.learned = std::make_unique<LearnedHistory>(group.file.config);
+    return group;
+  };
   Database database(path);
-  LearnedHistory learned(file.config);
   for (const std::vector<RunRow>& chain : Chains(database)) {
     std::vector<std::string> logs;
     std::vector<DecisionRow> rows;
@@ -415,45 +480,68 @@ CertificateFile FromDatabase(const std::string& path, Config config) {
         std::ranges::move(database.Read(run.log_file).decisions, std::back_inserter(rows));
       } else {
         const char* why = run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not beside the database";
-        file.certificates.push_back({run.log_file, {}, why, {}});
+        without_task.push_back({run.log_file, {}, why, {}});
       }
     }
-    if (logs.empty()) continue;
-    const LogReading reading(logs, true, learned, file);
-    CheckRows(rows, reading, learned, file.config, file.certificates);
+    const LogSurvey survey = SurveyChain(logs);
+    if (survey.order.empty() && rows.empty()) continue;
+    std::vector<Config> tasks;
+    try {
+      tasks = TasksOf(survey, logs.front(), directory, given && survey.configs.contains(*given) ? config_path : "");
+      key.Override(tasks, config_path);
+    } catch (const ConfigError& error) {
+      without_task.push_back({logs.front(), {}, why_none = error.what(), {}});
+      continue;
+    }
+    const std::set<Digest> digests = DigestsOf(tasks);
+    std::set<std::string> digests_in_hex;
+    for (const Digest& digest : digests) digests_in_hex.insert(ToHex(digest));
+    for (const Config& task : tasks) {
+      Group& group = group_of(task);
+      const Share share{task.digest, digests, &task == &tasks.front()};
+      const LogReading reading(logs, true, share, *group.learned, group.file);
+      CheckRows(rows, reading, share, digests_in_hex, *group.learned, group.file.config, group.file.certificates);
+    }
   }
-  file.config.problem = learned.WithAll();
-  return file;
+  if (groups.empty()) throw ConfigError(why_none);
+  std::vector<CertificateFile> files;
+  for (const auto& group : groups) {
+    group->file.config.problem = group->learned->WithAll();
+    files.push_back(std::move(group->file));
+  }
+  std::ranges::move(without_task, std::back_inserter(files.front().certificates));
+  return files;
 }
 
 // ---- Which of the three.
 
-std::string FirstBytes(const std::string& path) {
-  std::ifstream file = OpenForReading(path);
-  std::string bytes(16, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  return bytes;
-}
-
-Config TaskGiven(const std::string& path, const std::string& config_path, const LogKey& key) {
-  if (config_path.empty()) throw ConfigError(path + ": name its task with --config FILE");
-  Config config = LoadConfig(config_path);
-  key.Override(config.bus);
-  return config;
+std::vector<Config> TasksFor(const std::vector<std::string>& logs, const std::string& config_path, const LogKey& key) {
+  std::vector<Config> tasks = TasksOf(logs, config_path);
+  key.Override(tasks, config_path);
+  return tasks;
 }
 
 }  // namespace
 
-CertificateFile ReadCertificates(const std::string& path, const std::string& config_path, const LogKey& key) {
-  const std::string first = FirstBytes(path);
+std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const std::string& config_path, const LogKey& key) {
+  std::string path = given;
+  if (KindOf(path) == FileKind::kDirectory) {
+    path = (std::filesystem::path(path) / LogDirectory::kDatabase).string();
+    if (!std::filesystem::is_regular_file(path)) throw ConfigError(given + ": no decision database in this directory");
+  }
   try {
-    if (first.rfind(std::string("SQLite format 3\0", 16), 0) == 0)
-      return FromDatabase(path, TaskGiven(path, config_path, key));
-    if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLogs({path}, TaskGiven(path, config_path, key));
-    if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{') {
-      std::ifstream stream = OpenForReading(path);
-      return FromDecision(path, ParseJson<Json>(stream), config_path);
+    switch (KindOf(path)) {
+      case FileKind::kDatabase:
+        return FromDatabase(path, config_path, key);
+      case FileKind::kJson: {
+        std::ifstream stream = OpenForReading(path);
+        return {FromDecision(path, ParseJson<Json>(stream), config_path)};
+      }
+      case FileKind::kOther:
+        if (Survey({path}).events == 0) break;
+        [[fallthrough]];
+      default:
+        return FromLogs({path}, TasksFor({path}, config_path, key));
     }
   } catch (const Json::exception& error) {
     throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());
@@ -463,8 +551,17 @@ CertificateFile ReadCertificates(const std::string& path, const std::string& con
   throw ConfigError(path + ": neither a decision (JSON), nor an event log, nor a decision database");
 }
 
+std::vector<CertificateFile> ReadAllLogs(const std::vector<std::string>& logs, const std::string& config_path,
+                                         const LogKey& key) {
+  return FromLogs(logs, TasksFor(logs, config_path, key));
+}
+
+CertificateFile ReadCertificates(const std::string& path, const std::string& config_path, const LogKey& key) {
+  return std::move(ReadAllCertificates(path, config_path, key).front());
+}
+
 CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path, const LogKey& key) {
-  return FromLogs(logs, TaskGiven(logs.front(), config_path, key));
+  return std::move(ReadAllLogs(logs, config_path, key).front());
 }
 
 }  // namespace forereach

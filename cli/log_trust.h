@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -22,6 +23,9 @@ struct LogKey {
 
   void AddTo(CLI::App& command);
   void Override(BusOptions& options) const;
+  /** Of a task that the logger kept, beside which there is no key. @throws ConfigError if it has one and the command line
+  does not say which. */
+  void Override(std::vector<Config>& tasks, const std::string& given) const;
 };
 
 /** What nobody who was meant to hear it believed either. */

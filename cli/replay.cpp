@@ -1,5 +1,6 @@
 #include "cli/replay.h"
 
+#include <algorithm>
 #include <deque>
 #include <filesystem>
 #include <map>
@@ -53,7 +54,8 @@ bool IsCircumstance(std::int16_t cause) {
 
 class Replayer {
  public:
-  explicit Replayer(const Config& config) : config_(config), authenticator_(config.bus, KeyOf(config.bus)) {
+  explicit Replayer(const std::vector<Config>& tasks)
+      : tasks_(tasks), config_(tasks.front()), now_(&config_), authenticator_(config_.bus, KeyOf(config_.bus)) {
     Restart();
   }
 
@@ -94,22 +96,44 @@ class Replayer {
     std::int64_t utime;
   };
 
+  // The task of a config digest; where there is one task it stands for all.
+  [[nodiscard]] const Config* TaskOf(const Digest& digest) const {
+    if (tasks_.size() == 1) return &config_;
+    const auto found = std::ranges::find(tasks_, digest, &Config::digest);
+    return found == tasks_.end() ? nullptr : &*found;
+  }
+
+  void SetTask(const Digest& digest) {
+    if (const Config* task = TaskOf(digest)) now_ = task;
+  }
+
   void Restart() {
-    gate_ = std::make_unique<Gate>(config_);
+    gate_ = std::make_unique<Gate>(*now_);
     changes_.clear();
     last_sequence_ = -1;
   }
 
   void Reload() {
     while (!changes_.empty()) TakeChange();
-    const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(config_));
+    const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(*now_));
     gate_->Inherit(*before);
   }
 
   void FeedStatus(const LogEvent& event) {
     const Restarts::Kind kind = restarts_.Notice(event.message());
+    if (kind == Restarts::Kind::kNone) return;
+    const bool is_known = std::exchange(reloaded_ahead_, false) && now_->digest == restarts_.config();
+    SetTask(restarts_.config());
     if (kind == Restarts::Kind::kBegin) Restart();
-    if (kind == Restarts::Kind::kReload) Reload();
+    if (kind == Restarts::Kind::kReload && !is_known) Reload();
+  }
+
+  // A decision may be the first word of a reload.
+  void FollowReload(const Config& task) {
+    if (&task == now_) return;
+    now_ = &task;
+    Reload();
+    reloaded_ahead_ = true;
   }
 
   void FeedDecision(const LogEvent& event, const std::string& name) {
@@ -121,6 +145,12 @@ class Replayer {
     if (waiting.empty()) return Differ(name, recorded->plan_id, "decided, but its candidate is not in the log");
     const Candidate candidate = std::move(waiting.front());
     waiting.pop_front();
+    const Config* task = TaskOf(GetDigest(recorded->config_digest));
+    if (!task)
+      return Differ(candidate.name, recorded->plan_id,
+                    "decided under another task, of config digest " + ToHex(GetDigest(recorded->config_digest)) +
+                        ", which is not kept beside the log");
+    FollowReload(*task);
     CatchUp(*recorded);
     if (IsCircumstance(recorded->cause)) {
       static_cast<void>(gate_->Refuse(candidate.bytes, recorded->utime, recorded->cause, ""));
@@ -165,7 +195,10 @@ class Replayer {
     result_.differences.push_back(event + ", plan " + std::to_string(plan_id) + ": " + what);
   }
 
-  const Config& config_;
+  const std::vector<Config>& tasks_;
+  const Config& config_;  // of channels and key
+  const Config* now_;     // in force
+  bool reloaded_ahead_ = false;  // of the heartbeat that will tell of it
   LogAuthenticator authenticator_;
   std::unique_ptr<Gate> gate_;
   std::map<Digest, std::deque<Candidate>> candidates_;  // not decided yet
@@ -178,7 +211,11 @@ class Replayer {
 }  // namespace
 
 ReplayResult Replay(const std::vector<std::string>& logs, const Config& config) {
-  Replayer replayer(config);
+  return Replay(logs, std::vector<Config>{config});
+}
+
+ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
+  Replayer replayer(tasks);
   const auto name = [&logs](const std::string& log) {
     return logs.size() == 1 ? "" : std::filesystem::path(log).filename().string() + " ";
   };

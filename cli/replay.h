@@ -29,4 +29,8 @@ too. With bus.key only authentic messages count.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& config);
 
+/** As the other, each decision under the task of its own config digest. A decision of another digest than these differs; with
+one task alone it is held against that. @param tasks at least one; channels and key are those of the first. */
+[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
+
 }  // namespace forereach

@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/replay.h"
 #include "logger/json_text.h"
+#include "logger/log_tasks.h"
 
 namespace forereach {
 namespace {
@@ -13,13 +14,19 @@ struct Options {
   std::vector<std::string> logs;
   std::string config;
   LogKey key;
-  bool json = false;
+  bool json = false, other_task = false;
 };
 
 int RunReplay(const Options& options) {
-  Config config = LoadConfig(options.config);
-  options.key.Override(config.bus);
-  const ReplayResult result = Replay(options.logs, config);
+  std::vector<Config> tasks;
+  if (options.other_task) {
+    static_cast<void>(SurveyRun(options.logs));
+    tasks.push_back(LoadConfig(options.config));
+  } else {
+    tasks = TasksOf(options.logs, options.config);
+  }
+  options.key.Override(tasks, options.config);
+  const ReplayResult result = Replay(options.logs, tasks);
   if (options.json) {
     std::cout << JsonText({{"candidates", result.candidates},
                            {"agreed", result.agreed},
@@ -47,11 +54,17 @@ void AddReplayCommand(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand(
       "replay", "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1");
   command->add_option("logs", options->logs, kLogs)->required()->type_name("LOG");
-  command->add_option("--config", options->config, "The task file it was recorded with")->required()->type_name("FILE");
+  CLI::Option* config = command->add_option("--config", options->config, kTaskOfLogs);
+  config->type_name("FILE");
+  command
+      ->add_flag("--other-task", options->other_task,
+                 "Put it through the gate of another task, the one of --config: what would it have decided?")
+      ->needs(config);
   options->key.AddTo(*command);
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->footer(
-      "Example:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog --config config/demo.yaml");
+      "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
+      "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config config/demo.yaml");
   command->callback([options, &action] { action = [options] { return RunReplay(*options); }; });
 }
 

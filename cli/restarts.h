@@ -25,10 +25,15 @@ class Restarts final {
     const bool reloaded = last_sequence_ >= 0 && status->version != last_version_;
     last_sequence_ = status->sequence;
     last_version_ = status->version;
+    config_ = GetDigest(status->config_digest);
     return began ? Kind::kBegin : reloaded ? Kind::kReload : Kind::kNone;
   }
 
+  /** The config digest of the last heartbeat. */
+  [[nodiscard]] const Digest& config() const { return config_; }
+
  private:
+  Digest config_{};
   std::int64_t last_sequence_ = -1, last_version_ = 0;
 };
 

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <iostream>
+#include <iterator>
 #include <sstream>
 #include <thread>
 
@@ -125,11 +127,19 @@ void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& ver
 }
 
 int Verify(const Options& options) {
-  const CertificateFile file = options.files.size() == 1
-                                   ? ReadCertificates(options.files[0], options.config, options.key)
-                                   : ReadLogs(options.files, options.config, options.key);
-  RequireAcceptable(file.config);
-  const std::vector<Verdict> verdicts = VerifyAll(file, options.jobs);
+  std::vector<CertificateFile> files = options.files.size() == 1
+                                           ? ReadAllCertificates(options.files[0], options.config, options.key)
+                                           : ReadAllLogs(options.files, options.config, options.key);
+  for (const CertificateFile& each : files) RequireAcceptable(each.config);
+  CertificateFile file;  // all of them
+  std::vector<Verdict> verdicts;
+  for (CertificateFile& each : files) {
+    std::ranges::move(VerifyAll(each, options.jobs), std::back_inserter(verdicts));
+    std::ranges::move(each.certificates, std::back_inserter(file.certificates));
+    file.not_certificates += each.not_certificates;
+    file.passed_over.not_authentic += each.passed_over.not_authentic;
+    file.passed_over.undecodable += each.passed_over.undecodable;
+  }
   const Summary summary = Count(verdicts);
   if (options.json)
     PrintJson(file, verdicts, summary);
@@ -151,10 +161,13 @@ void AddVerifyCommand(CLI::App& app, Action& action) {
       ->add_option(
           "files", options->files,
           "What holds the certificates: a decision (the output of certify --json), an LCM event log (several if the run "
-          "was recorded in several, in their order), or a decision database with its logs beside it")
+          "was recorded in several, in their order), or a decision database with its logs beside it, or the directory of both")
       ->required()
-      ->type_name("DECISION|LOG|DATABASE");
-  command->add_option("--config", options->config, "The task file they were made with; a decision names its own")
+      ->type_name("DECISION|LOG|DATABASE|DIRECTORY");
+  command
+      ->add_option("--config", options->config,
+                   "The task file they were made with; by default the one that a decision names, or that the logger kept "
+                   "beside a log, in tasks/")
       ->type_name("FILE");
   options->key.AddTo(*command);
   command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();
@@ -167,7 +180,8 @@ void AddVerifyCommand(CLI::App& app, Action& action) {
       "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > "
       "decision.json\n"
       "  forereach verify decision.json\n"
-      "  forereach verify run/log/events-20260101-120000-000000.lcmlog --config config/demo.yaml");
+      "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
+      "  forereach verify run/log");
   command->callback([options, &action] { action = [options] { return Verify(*options); }; });
 }
 

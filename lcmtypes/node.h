@@ -29,6 +29,9 @@ class Node {
 
   /** Called once before the process ends: flush, close, print a summary. */
   virtual void Stop() {}
+
+  /** Asked after Stop: whether its process ends with exit status 1, because something that it was there to keep is lost. */
+  [[nodiscard]] virtual bool failed() const { return false; }
 };
 
 /** A node's way out: sends, and counts what the bus refused. */

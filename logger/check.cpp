@@ -9,6 +9,7 @@
 #include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/log_directory.h"
+#include "logger/log_survey.h"
 
 namespace forereach {
 namespace {
@@ -85,7 +86,13 @@ bool LogCheck::whole_log() const {
 
 std::vector<LogCheck> CheckLogs(const std::string& path) {
   const std::string file = (std::filesystem::path(path) / LogDirectory::kDatabase).string();
-  if (!std::filesystem::is_regular_file(file)) throw LogError("no decision database: " + file);
+  std::error_code error;
+  if (std::filesystem::is_regular_file(path, error))
+    throw LogError(path + ": is a file; name the logger's directory, in which it lies");
+  if (!std::filesystem::is_directory(path, error)) throw LogError(path + ": there is no such directory");
+  if (!std::filesystem::is_regular_file(file, error))
+    throw LogError(path + ": is no logger's directory: no decision database: " + file);
+  if (KindOf(file) != FileKind::kDatabase) throw LogError(file + ": is no decision database");
   const LogDirectory directory(path);
   Database database(file);
   std::vector<LogCheck> checks;

@@ -1,6 +1,7 @@
 #include "logger/database.h"
 
 #include <array>
+#include <cerrno>
 #include <string_view>
 
 #include <nlohmann/json.hpp>
@@ -148,6 +149,7 @@ Database::Database(const std::string& path) : path_(path), handle_(nullptr, &sql
     insert_gap_ = std::make_unique<Statement>(handle, R"sql(INSERT INTO gaps VALUES
       (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (log_file, event_number, reason) DO NOTHING)sql");
     set_events_ = std::make_unique<Statement>(handle, "UPDATE runs SET events = ? WHERE log_file = ?");
+    static_cast<void>(FindDisplaced());
   } catch (const DatabaseError& error) {
     throw DatabaseError("database: " + path + ": " + error.what());
   }
@@ -181,6 +183,23 @@ void Database::Migrate() {
   Execute(("PRAGMA user_version = " + std::to_string(kSchemaVersion)).c_str());
   Execute("COMMIT");
 }
+
+std::optional<std::string> Database::FindDisplaced() {
+  for (const char* ending : {"", "-wal", "-shm"}) {
+    errno = 0;
+    const std::optional<FileIdentity> found = IdentityOf(path_ + ending);
+    if (!found && errno != ENOENT && errno != ENOTDIR) continue;  // it cannot be looked at
+    const auto known = files_.find(ending);
+    if (known == files_.end()) {
+      if (found) files_.emplace(ending, *found);  // those of the write-ahead log come with the first transaction
+    } else if (found != known->second) {
+      return path_ + ending + (found ? " was replaced" : " was deleted or moved");
+    }
+  }
+  return std::nullopt;
+}
+
+void Database::Checkpoint() { sqlite3_wal_checkpoint_v2(handle_.get(), nullptr, SQLITE_CHECKPOINT_FULL, nullptr, nullptr); }
 
 std::optional<int> Database::Write(const Rows& rows, const std::string& log_file, std::int64_t events) {
   int written = 0;
@@ -257,6 +276,9 @@ std::vector<RunRow> Database::Runs() {
     RunRow& run = runs.emplace_back();
     select.Read(run.log_file, run.start_utime, run.end_utime, run.events, run.schema, run.recovered, run.continues,
                 run.log_deleted_utime);
+    for (const std::string& file : {run.log_file, run.continues})
+      if (file.find_first_of(std::string_view("/\0", 2)) != std::string::npos || file == "." || file == "..")
+        throw DatabaseError("database: " + path_ + ": a run names a log that is not beside it: " + file);
   }
   return runs;
 }
@@ -269,10 +291,21 @@ std::vector<LogReference> Database::References(const std::string& log_file) {
       UNION SELECT event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
       ORDER BY event_number)sql");
   for (select.Bind(log_file); select.Step();) {
-    LogReference& reference = references.emplace_back(LogReference{log_file});
+    LogReference& reference = references.emplace_back(LogReference{log_file, -1, {}});
     select.Read(reference.event_number, reference.digest);
   }
   return references;
+}
+
+std::set<std::string> Database::ConfigDigests(const std::string& log_file) {
+  std::set<std::string> digests;
+  Statement select(handle_.get(), "SELECT DISTINCT config_digest FROM decisions WHERE log_file = ?");
+  for (select.Bind(log_file); select.Step();) {
+    std::string digest;
+    select.Read(digest);
+    digests.insert(digest);
+  }
+  return digests;
 }
 
 std::set<std::int64_t> Database::EventsBehindGaps(const std::string& log_file) {

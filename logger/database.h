@@ -15,6 +15,7 @@ log is always written first, so they are made again from it. */
 #include <vector>
 
 #include "lcmtypes/bad_input.h"
+#include "logger/event_log.h"
 #include "logger/rows.h"
 
 struct sqlite3;
@@ -59,7 +60,8 @@ class Database final {
   void BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues = "");
   void EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered = "");
   void MarkLogDeleted(const std::string& log_file, std::int64_t utime);
-  /** In the order in which they began. */
+  /** In the order in which they began. @throws DatabaseError, also if one names its log with anything but a file name:
+  the database may come from elsewhere, and its logs are looked for beside it. */
   [[nodiscard]] std::vector<RunRow> Runs();
 
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
@@ -68,11 +70,20 @@ class Database final {
   /** The events that rows of one log file come from, by number; twice if rows differ in the digest. @throws DatabaseError. */
   [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);
 
+  /** The config digests of a log file's decisions. @throws DatabaseError. */
+  [[nodiscard]] std::set<std::string> ConfigDigests(const std::string& log_file);
+
   /** The events of a log file that have a gap before them. @throws DatabaseError. */
   [[nodiscard]] std::set<std::int64_t> EventsBehindGaps(const std::string& log_file);
 
   /** Messages that a log file's gaps without an event count as lost, by channel. @throws DatabaseError. */
   [[nodiscard]] std::map<std::string, std::int64_t> LossesWithoutEvents(const std::string& log_file);
+
+  /** Whether what is written gets to the database's path: nothing, or what is no longer in its place, in words. Cost:
+  three looks at the file system. */
+  [[nodiscard]] std::optional<std::string> FindDisplaced();
+  /** Brings what stands in the write-ahead log into the database file, where that is possible. */
+  void Checkpoint();
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] const std::string& problem() const { return problem_; }
@@ -89,6 +100,7 @@ class Database final {
   int Insert(const GapRow& row);
 
   std::string path_, problem_;
+  std::map<std::string, FileIdentity> files_;  // of the database, by the end of their names; as they were first seen
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> handle_;
   std::unique_ptr<Statement> insert_decision_, insert_event_, insert_gap_, set_events_;
 };

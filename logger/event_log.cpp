@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -173,7 +174,14 @@ LogDamage ForEachEvent(const std::vector<std::string>& logs,
   return damage;
 }
 
-EventLogWriter::EventLogWriter(const std::string& path) : file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+std::optional<FileIdentity> IdentityOf(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return FileIdentity{status.st_dev, status.st_ino};
+}
+
+EventLogWriter::EventLogWriter(const std::string& path)
+    : path_(path), file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
   if (file_ < 0) throw LogError(Reason("log: cannot write ", path));
   try {
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) throw LogError("log: " + path + " is being written by another process");
@@ -209,6 +217,34 @@ std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& chann
   return next_number_++;
 }
 
+FilePlace EventLogWriter::Look() const {
+  struct stat status {};
+  if (::fstat(file_, &status) != 0) return FilePlace::kUnknown;
+  if (status.st_nlink == 0) return FilePlace::kDeleted;
+  const std::optional<FileIdentity> found = IdentityOf(path_);
+  if (!found && errno != ENOENT && errno != ENOTDIR) return FilePlace::kUnknown;
+  if (found != FileIdentity{status.st_dev, status.st_ino}) return FilePlace::kElsewhere;
+  return status.st_size < offset_ || !MarkStands() ? FilePlace::kCut : FilePlace::kThere;
+}
+
+// A file that was cut and has grown again, by a write behind the cut, has zeros where its last records were.
+bool EventLogWriter::MarkStands() const {
+  std::array<std::uint8_t, kHeaderBytes> bytes{};
+  return ::pread(file_, bytes.data(), mark_.size(), mark_at_) == std::ssize(mark_) &&
+         std::equal(mark_.begin(), mark_.end(), bytes.begin());
+}
+
+void EventLogWriter::TakeOver(EventLogWriter& lost) {
+  buffer_ = std::exchange(lost.buffer_, {});
+  next_number_ = lost.next_number_;
+}
+
+void EventLogWriter::Abandon() {
+  buffer_.clear();
+  mark_.clear();
+  offset_ = 0;
+}
+
 bool EventLogWriter::Flush() {
   if (buffer_.empty()) return true;
   const std::int64_t end = offset_ + pending_bytes();
@@ -220,9 +256,13 @@ bool EventLogWriter::Flush() {
     at += count;
   }
   const bool confirmed = at == end && (!is_torn_ || ::ftruncate(file_, end) == 0) && ::fdatasync(file_) == 0;
-  if (confirmed) {
-    offset_ = end;
+  const bool is_cut = !MarkStands();  // since the last look
+  if (confirmed && !is_cut) {
+    mark_.assign(buffer_.begin(), buffer_.begin() + kHeaderBytes);
+    mark_at_ = std::exchange(offset_, end);
     is_torn_ = false;
+  } else if (is_cut) {
+    problem_ = "log: " + path_ + " was cut short while it was written";
   } else {
     problem_ = std::string("log: cannot write: ") + std::strerror(errno);
     // A torn record in the middle of the file would read as damage.
@@ -230,7 +270,7 @@ bool EventLogWriter::Flush() {
     if (is_torn_) problem_ += std::string("; cannot put the file back: ") + std::strerror(errno);
   }
   buffer_.clear();
-  return confirmed;
+  return confirmed && !is_cut;
 }
 
 }  // namespace forereach

@@ -12,6 +12,7 @@ every length before it allocates, tells the end, a cut tail and damage apart, an
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -111,6 +112,24 @@ struct LogRecovery {
   std::int64_t first_utime = 0, last_utime = 0;  ///< Of the first and last whole record, 0 without one.
 };
 
+/** What became of a file that is being written: it may be moved, deleted, replaced or cut while its descriptor still works. */
+enum class FilePlace {
+  kThere,     ///< Its path leads to it.
+  kDeleted,   ///< No name leads to it any more.
+  kElsewhere, ///< It has a name, but its path leads to nothing or to another file.
+  kCut,       ///< Its path leads to it, but some of what the disk has confirmed is gone from it.
+  kUnknown,   ///< Its path cannot be looked at, as without the permission to do so.
+};
+
+/** Which file a path leads to. */
+struct FileIdentity {
+  std::uint64_t device = 0, inode = 0;
+  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
+};
+
+/** Nothing if the path leads to no file or cannot be looked at; errno then says why. */
+[[nodiscard]] std::optional<FileIdentity> IdentityOf(const std::string& path);
+
 class EventLogWriter final {
  public:
   /** Creates the file and has the disk confirm that it is in its directory, or recovers an existing one: keeps all whole
@@ -128,8 +147,19 @@ class EventLogWriter final {
 
   /** Writes everything appended so far and has the disk confirm it. On failure the file is put back to its last
   whole record, the events since are lost and false is returned; `problem` then says why. Where it cannot be put back,
-  the next Flush writes over what was left and confirms nothing before the file ends with its own last record. */
+  the next Flush writes over what was left and confirms nothing before the file ends with its own last record. A file that
+  was cut by somebody else is left as it is. */
   [[nodiscard]] bool Flush();
+
+  /** Whether what Flush confirms can be read at the path. Cost: two looks at the file system and 28 bytes read. */
+  [[nodiscard]] FilePlace Look() const;
+
+  /** Takes over what `lost` holds in memory, with its event numbers; `lost` holds nothing afterwards. To be called
+  before the first Append. */
+  void TakeOver(EventLogWriter& lost);
+
+  /** Forgets what waits in memory, and what the file held: it is lost. */
+  void Abandon();
 
   [[nodiscard]] const LogRecovery& recovery() const { return recovery_; }
   [[nodiscard]] const std::string& problem() const { return problem_; }
@@ -140,10 +170,14 @@ class EventLogWriter final {
 
  private:
   void Recover(const std::string& path);
+  [[nodiscard]] bool MarkStands() const;
 
+  const std::string path_;
   int file_ = -1;
   bool is_torn_ = false;  // something may stand behind offset_
   std::vector<std::uint8_t> buffer_;
+  std::vector<std::uint8_t> mark_;  // the header of a record that the last Flush has written, which is not all zero
+  std::int64_t mark_at_ = 0;
   std::int64_t offset_ = 0, next_number_ = 0;
   LogRecovery recovery_;
   std::string problem_;

@@ -21,7 +21,9 @@ constexpr std::int64_t kSecond = 1'000'000;
 
 }  // namespace
 
-LogDirectory::LogDirectory(std::string path) : path_(std::move(path)) {
+LogDirectory::LogDirectory(std::string path) : path_(std::move(path)) { Make(); }
+
+void LogDirectory::Make() const {
   std::error_code error;
   std::filesystem::create_directories(path_, error);
   if (error) throw LogError("logger: cannot make the directory " + path_ + ": " + error.message());

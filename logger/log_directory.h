@@ -15,6 +15,8 @@ class LogDirectory final {
 
   /** Makes it if need be. @throws LogError if it cannot. */
   explicit LogDirectory(std::string path);
+  /** Makes it again if it is gone. @throws LogError if it cannot. */
+  void Make() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::string PathOf(const std::string& file) const;

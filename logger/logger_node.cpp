@@ -80,6 +80,7 @@ void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
   status.failed_flushes = static_cast<std::int16_t>(recorder_.failed_flushes());
   SetText(status.message, !trouble.empty()   ? trouble
                           : !silence.empty() ? silence
+                          : !recorder_.gone().empty() ? "recording; " + recorder_.gone()
                           : !refused.empty() ? "recording; not authentic and in no row: " + refused
                                              : "recording");
   bus_.Publish(channels_.logger_status, status);
@@ -96,7 +97,8 @@ void LoggerNode::Stop() {
   recorder_.End(now_us_);
   out_ << "log                       " << recorder_.log_path();
   if (recorder_.files() > 1) out_ << ", the last of " << recorder_.files();
-  out_ << "\ndatabase                  " << recorder_.database().path() << "\n" << ToText(recorder_.summary());
+  out_ << "\ndatabase                  " << recorder_.database_path() << "\n" << ToText(recorder_.summary());
+  if (!recorder_.gone().empty()) out_ << "gone                      " << recorder_.gone() << "\n";
   const std::string refused = InWords(recorder_.interpreter().refusals());
   if (!refused.empty()) out_ << "not authentic             " << refused << ", in the log and in no row\n";
   out_ << std::flush;

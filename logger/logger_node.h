@@ -33,6 +33,8 @@ class LoggerNode final : public Node {
   /** The first call opens the log file, named after its time. @throws LogError, DatabaseError if it cannot. */
   void Tick(std::int64_t now_us) override;
   void Stop() override;
+  /** Something that was on the disk is gone, see Recorder::gone. */
+  [[nodiscard]] bool failed() const override { return !recorder_.gone().empty(); }
 
   [[nodiscard]] const Recorder& recorder() const { return recorder_; }
 

@@ -9,12 +9,14 @@
 #include <spdlog/spdlog.h>
 
 #include "certifier/task/key.h"
+#include "forereach/certifier_status_v2_t.hpp"
 
 namespace forereach {
 namespace {
 
 constexpr std::int64_t kMaxBufferBytes = 4 << 20;
-constexpr std::size_t kMaxLosses = 256;  // a sender that invents channels must not fill the memory
+constexpr std::size_t kMaxLosses = 256, kMaxChannels = 256;  // a sender that invents channels must not fill the memory
+constexpr std::size_t kMaxTasks = 16, kMaxTasksInUse = 256;
 constexpr int kEventsPerTransaction = 4096;
 constexpr double kScanUs = 1e6, kGapsUs = 10e6, kRetryUs = 1e6;
 
@@ -32,6 +34,19 @@ bool IsMore(GapRow& gap, std::map<std::string, std::int64_t>& counted) {
   known->second -= again;
   gap.lost -= again;
   return gap.lost > 0 || gap.reason == "restart";
+}
+
+void Count(std::map<std::string, std::int64_t>& counts, const std::string& channel, std::int64_t events) {
+  counts[counts.size() < kMaxChannels || counts.contains(channel) ? channel : "*"] += events;
+}
+
+const char* InWords(FilePlace place) {
+  switch (place) {
+    case FilePlace::kDeleted: return "was deleted or replaced";
+    case FilePlace::kElsewhere: return "was moved";
+    case FilePlace::kCut: return "was cut short";
+    default: return "is not to be seen";
+  }
 }
 
 // Of gaps found in events that are in no log.
@@ -80,28 +95,35 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
       key_(KeyOf(channels_)),
       free_space_(std::move(free_space)),
       directory_(options_.directory),
-      database_(directory_.PathOf(LogDirectory::kDatabase)),
+      database_path_(directory_.PathOf(LogDirectory::kDatabase)),
+      database_(std::make_unique<Database>(database_path_)),
       summary_(config),
       interpreter_(channels_, "", key_),
+      task_path_(config.path),
+      kept_tasks_(options_.directory),
+      task_reading_(kRetryUs),
       flush_(options_.flush_ms * 1e3),
       age_(options_.rotate_minutes * 60e6),
       scan_(kScanUs),
       gaps_(kGapsUs),
-      retry_(kRetryUs) {
+      retry_(kRetryUs),
+      anew_(kRetryUs),
+      database_anew_(kRetryUs) {
+  if (!task_path_.empty()) AddTask(config);
   AdoptLogs();
-  for (const RunRow& run : database_.Runs())
+  for (const RunRow& run : database_->Runs())
     if (!run.end_utime) Recover(run);
 }
 
 // Listed before the runs are read: another logger's file has its run by then, or is locked.
 void Recorder::AdoptLogs() {
   const std::vector<std::string> logs = directory_.Logs();
-  const std::vector<RunRow> runs = database_.Runs();
+  const std::vector<RunRow> runs = database_->Runs();
   for (const std::string& log : logs) {
     if (std::ranges::find(runs, log, &RunRow::log_file) != runs.end()) continue;
     try {
       const EventLogWriter locked(directory_.PathOf(log));
-      database_.BeginRun(log, locked.recovery().first_utime);
+      database_->BeginRun(log, locked.recovery().first_utime);
     } catch (const BadInput& error) {
       spdlog::warn("no run knows {}, and it is left alone: {}", log, error.what());
     }
@@ -117,7 +139,7 @@ void Recorder::Recover(const RunRow& run) {
       spdlog::warn("{} was not ended and is left alone: {}", run.log_file, error.what());
       return;
     }
-  database_.EndRun(run.log_file, end_utime, text);
+  database_->EndRun(run.log_file, end_utime, text);
   recovered_.push_back(run.log_file + ": " + text);
   spdlog::warn("recovered {}", recovered_.back());
 }
@@ -127,13 +149,13 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
   const EventLogWriter mended(path);  // removes a cut tail, and keeps others from doing the same meanwhile
   EventLogReader reader(path);
   Interpreter interpreter = InterpreterFor(run);
-  const std::set<std::int64_t> known = database_.EventsBehindGaps(run.log_file);
-  std::map<std::string, std::int64_t> counted = database_.LossesWithoutEvents(run.log_file);
+  const std::set<std::int64_t> known = database_->EventsBehindGaps(run.log_file);
+  std::map<std::string, std::int64_t> counted = database_->LossesWithoutEvents(run.log_file);
   Rows rows;
   std::int64_t new_rows = 0, unwritten = 0, events = run.events;
   const auto write = [&] {
-    const auto written = database_.Write(rows, run.log_file, events);
-    if (!written) throw DatabaseError(database_.problem());
+    const auto written = database_->Write(rows, run.log_file, events);
+    if (!written) throw DatabaseError(database_->problem());
     new_rows += *written;
     unwritten = 0;
     rows = {};
@@ -176,39 +198,113 @@ void Recorder::Begin(std::int64_t now_us) {
   Report();
 }
 
+Database& Recorder::database() {
+  if (!database_) throw DatabaseError(database_problem_);
+  return *database_;
+}
+
 void Recorder::Open(std::int64_t now_us, const std::string& continues) {
-  const std::vector<RunRow> runs = database_.Runs();
+  const std::vector<RunRow> runs = database().Runs();
   name_us_ = std::max(now_us, name_us_);  // the clock may have been set back, and names are read in their order
   const std::string file = directory_.FreeName(name_us_, [&](const std::string& name) {
     return std::ranges::find(runs, name, &RunRow::log_file) != runs.end();
   });
   auto log = std::make_unique<EventLogWriter>(directory_.PathOf(file));
   try {
-    database_.BeginRun(file, now_us, continues);
+    database().BeginRun(file, now_us, continues);
   } catch (const DatabaseError&) {
     directory_.Remove(file);  // empty, and no run knows it
     throw;
   }
+  if (log_ && log_->pending_bytes() > 0) log->TakeOver(*log_);
   log_ = std::move(log);
   log_file_ = file;
   log_path_ = directory_.PathOf(file);
   interpreter_.Continue(file);
   other_bytes_ = directory_.LogBytes(file);
-  rows_lost_ = false;
+  continues_ = continues;
+  begun_us_ = now_us;
+  confirmed_.clear();
+  told_events_ = 0;
+  rows_lost_ = needs_new_file_ = false;
   ++files_;
   age_.Start(now_us);
   spdlog::info("recording to {}", log_path_);
+  KeepTasks();
+}
+
+void Recorder::AddTask(const Config& config) {
+  try {
+    const bool is_known = std::ranges::any_of(tasks_, [&](const TaskCopy& task) {
+      return task.digest == config.digest && task.observations_digest == config.observations_digest;
+    });
+    if (is_known) return;
+    if (tasks_.size() >= kMaxTasks) tasks_.erase(tasks_.begin());
+    tasks_.push_back(CopyTask(config));
+    tasks_in_use_.insert(ToHex(config.digest));
+  } catch (const BadInput& error) {
+    spdlog::error("the task is not kept beside the log: {}", error.what());
+  }
+}
+
+void Recorder::KeepTasks() const {
+  for (const TaskCopy& task : tasks_) try {
+      kept_tasks_.Keep(task);
+    } catch (const BadInput& error) {
+      spdlog::error("the task {} is not kept beside the log: {}", ToHex(task.digest), error.what());
+    }
+}
+
+// A reload may bring other transitions with the same task file, which only the version tells.
+void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
+  if (task_path_.empty() || event.channel != channels_.status) return;
+  const auto status = Decoded<certifier_status_v2_t>(event.message());
+  if (!status) return;
+  const std::pair heard{GetDigest(status->config_digest), status->version};
+  if (heard == heard_task_) return;
+  const bool is_first = !heard_task_ && !tasks_.empty() && tasks_.back().digest == heard.first;
+  if (!is_first && !task_reading_.IsOver(now_us)) return;
+  heard_task_ = heard;
+  if (tasks_in_use_.size() < kMaxTasksInUse) tasks_in_use_.insert(ToHex(heard.first));
+  if (is_first) return;
+  task_reading_.Start(now_us);
+  try {
+    const Config config = LoadConfig(task_path_);
+    if (config.digest != heard.first)
+      throw ConfigError(task_path_ + " is another, of config digest " + ToHex(config.digest));
+    AddTask(config);
+    KeepTasks();
+  } catch (const BadInput& error) {
+    spdlog::warn("the certifier's task, config digest {}, is not kept beside the log: {}", ToHex(heard.first), error.what());
+  }
+}
+
+// Those that no log names any more. A run that was not ended may lack rows, and with them what it needs.
+void Recorder::ForgetTasksOf(const std::string& log) {
+  std::set<std::string> forgotten = database().ConfigDigests(log);
+  for (const RunRow& run : database().Runs()) {
+    if (!directory_.Bytes(run.log_file)) continue;
+    if (!run.end_utime && run.log_file != log_file_) return;
+    for (const std::string& digest : database().ConfigDigests(run.log_file)) forgotten.erase(digest);
+  }
+  for (const std::string& digest : forgotten)
+    if (!tasks_in_use_.contains(digest)) kept_tasks_.Remove(digest);
 }
 
 void Recorder::Rotate(std::int64_t now_us) {
   if (!retry_.IsOver(now_us)) return;
+  const std::string before = log_file_;
   const bool flushed = Flush(now_us);
+  if (is_log_lost_ || log_file_ != before) return;  // it was gone
   const std::string ended = log_file_;
   const bool whole = !rows_lost_;
+  std::int64_t events = 0;
+  for (const auto& [channel, confirmed] : confirmed_) events += confirmed;
   try {
     if (!flushed || !flushed_rows_.empty()) throw LogError("the events and rows of this one cannot be written");
     Open(now_us, ended);
-    if (whole) database_.EndRun(ended, now_us);
+    earlier_files_[ended] = events;
+    if (whole) database().EndRun(ended, now_us);
     WatchDisk(now_us);  // the ended file may go for the quota
     rotation_problem_.clear();
   } catch (const BadInput& error) {
@@ -219,11 +315,12 @@ void Recorder::Rotate(std::int64_t now_us) {
 
 void Recorder::Tick(std::int64_t now_us) {
   // Where the quota has no room even this file may have to go, and only one that has ended may.
-  if ((age_.IsOver(now_us) || pause_ == "quota") && log_->next_number() > 0) Rotate(now_us);
+  if ((age_.IsOver(now_us) || pause_ == "quota" || needs_new_file_) && log_->next_number() > 0) Rotate(now_us);
   if (flush_.IsOver(now_us) || log_->pending_bytes() > kMaxBufferBytes) Flush(now_us);
 }
 
 void Recorder::Take(LogEvent event, std::int64_t now_us) {
+  NoticeTask(event, now_us);
   if (event.data.size() > kMaxLogDataBytes || event.channel.size() > kMaxLogChannelBytes || event.channel.empty())
     return CountLoss({event.channel, ""}, 1, event.utime, "disk");
   const std::int64_t bytes = RecordBytes(event);
@@ -232,7 +329,7 @@ void Recorder::Take(LogEvent event, std::int64_t now_us) {
   if (!pause_.empty()) return Miss(std::move(event));
   event.utime = std::max<std::int64_t>(event.utime, 0);
   event.number = log_->Append(event.utime, event.channel, event.data);
-  ++unflushed_[event.channel];
+  Count(unflushed_, event.channel, 1);
   interpreter_.Observe(event, rows_);
   summary_.Add(event);
 }
@@ -272,9 +369,118 @@ void Recorder::MakeGaps(std::int64_t now_us) {
   gaps_.Start(now_us);
 }
 
+// Whoever has deleted or moved what is being written, the descriptors still work: only the path tells.
+void Recorder::WatchFiles(std::int64_t now_us) {
+  WatchDatabase(now_us);
+  if (!is_log_lost_) {
+    const FilePlace place = log_->Look();
+    is_log_hidden_ = place == FilePlace::kUnknown;
+    if (place == FilePlace::kThere || place == FilePlace::kUnknown) return;
+    GiveUpLog(place, now_us);
+  }
+  if (anew_.IsOver(now_us)) StartAnew(now_us);
+}
+
+void Recorder::GiveUpLog(FilePlace place, std::int64_t now_us) {
+  is_log_lost_ = true;
+  Counts left;
+  if (place == FilePlace::kCut) try {
+      EventLogReader reader(log_path_);
+      ForEachEvent(reader, [&](const LogEvent& event) { ++left[confirmed_.contains(event.channel) ? event.channel : "*"]; });
+    } catch (const LogError& error) {
+      spdlog::error("{}: what is left of it cannot be read: {}", log_file_, error.what());
+    }
+  std::int64_t events = CountEarlierFilesGone(now_us);
+  for (const auto& [channel, confirmed] : std::exchange(confirmed_, {})) {
+    const std::int64_t lost = std::max<std::int64_t>(confirmed - left[channel], 0);
+    if (lost > 0) CountLoss({channel, ""}, lost, now_us, "gone");
+    events += lost;
+  }
+  if (events > 0) gone_ = fmt::format("{} {}, {} confirmed events are gone", log_file_, InWords(place), events);
+  spdlog::error("{} {} while it was written: {} confirmed events are gone", log_path_, InWords(place), events);
+}
+
+// Those for the quota are not among them.
+std::int64_t Recorder::CountEarlierFilesGone(std::int64_t now_us) {
+  std::int64_t gone = 0;
+  std::erase_if(earlier_files_, [&](const auto& entry) {
+    const auto& [file, events] = entry;
+    if (directory_.Bytes(file)) return false;
+    CountLoss({"*", ""}, events, now_us, "gone");
+    gone += events;
+    return true;
+  });
+  if (gone > 0) gone_ = fmt::format("earlier logs of this run were deleted or moved, {} confirmed events are gone", gone);
+  return gone;
+}
+
+void Recorder::StartAnew(std::int64_t now_us) {
+  const std::string lost = log_file_;
+  try {
+    directory_.Make();
+    Open(now_us, lost);
+    is_log_lost_ = false;
+    const auto move_to_new = [this](auto& rows) {
+      for (auto& row : rows) row.event.log_file = log_file_;
+    };
+    move_to_new(rows_.decisions);
+    move_to_new(rows_.events);
+    move_to_new(rows_.gaps);
+    database().EndRun(lost, now_us, gone_.empty() ? "the log was lost while it was written" : gone_);
+  } catch (const BadInput& error) {
+    if (!is_log_lost_) {
+      spdlog::error("{} is left to the next start to end: {}", lost, error.what());
+      return;
+    }
+    log_->Abandon();
+    for (const auto& [channel, events] : std::exchange(unflushed_, {})) CountLoss({channel, ""}, events, now_us, "gone");
+    rows_.decisions.clear();
+    rows_.events.clear();
+    WithoutEvents(rows_.gaps);
+    pause_ = "gone";
+    anew_problem_ = std::string("the log is gone, and there is no new one: ") + error.what();
+    anew_.Start(now_us);
+  }
+}
+
+void Recorder::WatchDatabase(std::int64_t now_us) {
+  if (database_) {
+    const std::optional<std::string> displaced = database_->FindDisplaced();
+    if (!displaced) return;
+    spdlog::error("database: {}; it is opened anew", *displaced);
+    database_problem_ = displaced_ = "database: " + *displaced;
+    database_->Checkpoint();
+    database_.reset();
+  }
+  if (!database_anew_.IsOver(now_us)) return;
+  try {
+    OpenDatabaseAnew();
+  } catch (const BadInput& error) {
+    database_problem_ = error.what();
+    database_anew_.Start(now_us);
+  }
+}
+
+void Recorder::OpenDatabaseAnew() {
+  directory_.Make();
+  auto database = std::make_unique<Database>(database_path_);
+  const std::vector<RunRow> runs = database->Runs();
+  const auto run = std::ranges::find(runs, log_file_, &RunRow::log_file);
+  const bool lacks_rows = run == runs.end() || run->events < told_events_;
+  if (run == runs.end()) database->BeginRun(log_file_, begun_us_, continues_);
+  database_ = std::move(database);
+  if (!lacks_rows) return;
+  gone_ = displaced_ + ", with the gaps that only it held";
+  rows_lost_ = needs_new_file_ = true;
+  are_rows_behind_ |= std::ranges::any_of(directory_.Logs(), [&](const std::string& log) {
+    return log == log_file_ || std::ranges::find(runs, log, &RunRow::log_file) == runs.end();
+  });
+}
+
 bool Recorder::Flush(std::int64_t now_us) {
   const auto begun = std::chrono::steady_clock::now();
   flush_.Start(now_us);
+  WatchFiles(now_us);
   // With nothing to write there is nothing to learn of the disk: a failure lasts until something has been written.
   const bool learns = log_->pending_bytes() > 0 || !pause_.empty();
   const bool flushed = FlushLog(now_us);
@@ -303,12 +509,13 @@ bool Recorder::FlushLog(std::int64_t now_us) {
     rows_.events.clear();
     WithoutEvents(rows_.gaps);
   }
-  for (const auto& [channel, events] : unflushed_)
-    if (flushed)
+  for (const auto& [channel, events] : std::exchange(unflushed_, {}))
+    if (flushed) {
       written_ += events;
-    else
+      Count(confirmed_, channel, events);
+    } else {
       CountLoss({channel, ""}, events, now_us, "disk");
-  unflushed_.clear();
+    }
   return flushed;
 }
 
@@ -316,8 +523,9 @@ void Recorder::WriteRows() {
   const std::size_t waiting = flushed_rows_.decisions.size() + flushed_rows_.events.size() + flushed_rows_.gaps.size();
   if (waiting == 0) return;
   const std::int64_t events = rows_lost_ ? 0 : log_->next_number();
-  if (database_.Write(flushed_rows_, log_file_, events)) {
+  if (database_ && database_->Write(flushed_rows_, log_file_, events)) {
     flushed_rows_ = {};
+    told_events_ = events;
   } else if (waiting > kMaxWaitingRows) {
     rows_lost_ = true;
     flushed_rows_ = {{}, {}, MergedWithoutEvents(flushed_rows_.gaps)};
@@ -326,10 +534,13 @@ void Recorder::WriteRows() {
 
 std::string Recorder::trouble() const {
   if (pause_ == "quota") return fmt::format("paused: the logs have reached logger.quota_mb, {}", *options_.quota_mb);
+  if (pause_ == "gone") return anew_problem_;
   if (!pause_.empty()) return fmt::format("paused: less than logger.min_free_mb, {}, is free", options_.min_free_mb);
   if (failed_flushes_ > 0) return log_->problem();
-  if (!flushed_rows_.empty()) return database_.problem();
-  if (rows_lost_) return "rows are missing in the database, the next start makes them again";
+  if (!database_) return database_problem_;
+  if (!flushed_rows_.empty()) return database_->problem();
+  if (rows_lost_ || are_rows_behind_) return "rows are missing in the database, the next start makes them again";
+  if (is_log_hidden_) return "whether " + log_path_ + " is in its place cannot be seen";
   return rotation_problem_;
 }
 
@@ -344,6 +555,7 @@ void Recorder::Report() {
 }
 
 void Recorder::End(std::int64_t now_us) {
+  static_cast<void>(CountEarlierFilesGone(now_us));
   MakeGaps(now_us);
   if (Flush(now_us); !losses_.empty()) {  // of this last flush
     MakeGaps(now_us);
@@ -351,7 +563,7 @@ void Recorder::End(std::int64_t now_us) {
   }
   // A run with rows missing stays open, so that the next start makes them again from the log.
   if (flushed_rows_.empty() && !rows_lost_) try {
-      database_.EndRun(log_file_, now_us);
+      database().EndRun(log_file_, now_us);
     } catch (const DatabaseError& error) {
       spdlog::error("{} is left to the next start to end: {}", log_file_, error.what());
     }
@@ -366,7 +578,9 @@ void Recorder::WatchDisk(std::int64_t now_us) {
   }
   const std::int64_t floor = BytesOf(options_.min_free_mb), quota = BytesOf(options_.quota_mb.value_or(0));
   const bool was_quota = pause_ == "quota";
-  if (free_bytes_ < floor + (pause_ == "disk" ? floor / 8 : 0))
+  if (is_log_lost_)
+    pause_ = "gone";
+  else if (free_bytes_ < floor + (pause_ == "disk" ? floor / 8 : 0))
     pause_ = "disk";
   else
     pause_ = MakeRoom(was_quota ? quota / 8 : 0, now_us) ? "" : "quota";
@@ -388,7 +602,7 @@ bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
     };
     std::vector<Ended> ended;
     std::int64_t ended_bytes = 0;
-    for (const RunRow& run : database_.Runs()) {
+    for (const RunRow& run : database().Runs()) {
       const auto size = directory_.Bytes(run.log_file);
       if (!run.end_utime || run.log_file == log_file_ || !size) continue;
       ended.push_back({run.start_utime, run.log_file, *size});
@@ -398,9 +612,11 @@ bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
     std::ranges::stable_sort(ended, {}, &Ended::start_utime);  // an old log may have got its run late
     for (const auto& [start_utime, file, size] : ended) {
       if (HasRoom(bytes)) break;
-      database_.MarkLogDeleted(file, now_us);
+      database().MarkLogDeleted(file, now_us);
+      earlier_files_.erase(file);
       if (!directory_.Remove(file)) continue;
       other_bytes_ -= size;
+      ForgetTasksOf(file);
       spdlog::warn("{}, {} bytes, deleted for logger.quota_mb; its rows stay", file, size);
     }
   } catch (const DatabaseError& error) {

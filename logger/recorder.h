@@ -15,6 +15,17 @@ it would exceed logger.rotate_mb, after logger.rotate_minutes, and when it finds
 numbers begin anew, sequence counts and waiting candidates go on. A file that the database has not all rows of is not
 ended before it has.
 
+**Files that go while they are written.** At each flush the log and the database are looked at. A log that was deleted,
+moved, replaced or cut short is given up: what the disk had confirmed of it and cannot be read at its place any more is
+counted as gaps "gone", and a new file goes on with the events that wait in memory, under the numbers that they have
+already. The directory is made again if need be; where no new file can be made recording pauses and it is tried every second.
+A database that is no longer in its place is opened or made anew. What it lacks of logs that are there is made again
+by the next start; gaps without an event that it alone held are lost.
+
+**Tasks.** The task file and the files that it names are kept beside the logs (logger/kept_tasks.h), so that a log can be read
+without them. When the certifier's heartbeats tell of a reload the task file is read again, and kept too if it is the one that
+they name. A kept task is deleted with the last log whose decisions name it.
+
 **Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes is
 counted by channel, and the counts become gaps. With a flush that fails it is the same for the events of that flush. Gaps
 of this kind are written when recording goes on, and until then every ten seconds. For the quota the logs of ended runs are
@@ -26,6 +37,7 @@ deleted, nor is any if that would not make room. */
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +47,7 @@ deleted, nor is any if that would not make room. */
 #include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/interpreter.h"
+#include "logger/kept_tasks.h"
 #include "logger/log_directory.h"
 #include "logger/summary.h"
 
@@ -78,7 +91,7 @@ class Recorder final {
   void End(std::int64_t now_us);
 
   [[nodiscard]] const Interpreter& interpreter() const { return interpreter_; }
-  [[nodiscard]] const Database& database() const { return database_; }
+  [[nodiscard]] const std::string& database_path() const { return database_path_; }
   [[nodiscard]] Summary summary() const { return summary_.Finish(); }
   /** One line for each earlier run that was mended. */
   [[nodiscard]] const std::vector<std::string>& recovered() const { return recovered_; }
@@ -91,7 +104,10 @@ class Recorder final {
   [[nodiscard]] std::string trouble() const;
   /** Flushes in a row that failed or found recording paused. */
   [[nodiscard]] int failed_flushes() const { return failed_flushes_; }
-  /** Events that the disk confirmed, and messages that are in no log. */
+  /** What was on the disk and is no more, of the files that this run has written; the last such event in words, empty if
+  there was none. */
+  [[nodiscard]] const std::string& gone() const { return gone_; }
+  /** Events that the disk confirmed, and messages that are in no log: gone from it, or never written. */
   [[nodiscard]] std::int64_t written() const { return written_; }
   [[nodiscard]] std::int64_t lost() const { return lost_; }
   [[nodiscard]] std::int64_t file_bytes() const { return log_->offset() + log_->pending_bytes(); }
@@ -105,6 +121,7 @@ class Recorder final {
   struct Loss {
     std::int64_t lost = 0, first_utime = 0;
   };
+  using Counts = std::map<std::string, std::int64_t>;  // by channel, the channels bounded in number
 
   void AdoptLogs();
   void Recover(const RunRow& run);
@@ -117,10 +134,23 @@ class Recorder final {
   void CountLoss(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason);
   void MakeGaps(std::int64_t now_us);
 
+  void WatchFiles(std::int64_t now_us);
+  void WatchDatabase(std::int64_t now_us);
+  void OpenDatabaseAnew();
+  void GiveUpLog(FilePlace place, std::int64_t now_us);
+  void StartAnew(std::int64_t now_us);
+  [[nodiscard]] std::int64_t CountEarlierFilesGone(std::int64_t now_us);
+  [[nodiscard]] Database& database();
+
   bool Flush(std::int64_t now_us);
   [[nodiscard]] bool FlushLog(std::int64_t now_us);
   void WriteRows();
   void Report();
+
+  void NoticeTask(const LogEvent& event, std::int64_t now_us);
+  void AddTask(const Config& config);
+  void KeepTasks() const;
+  void ForgetTasksOf(const std::string& log);
 
   void WatchDisk(std::int64_t now_us);
   [[nodiscard]] bool HasRoom(std::int64_t bytes) const;
@@ -131,23 +161,41 @@ class Recorder final {
   const std::optional<Key256> key_;
   const FreeSpace free_space_;
   const LogDirectory directory_;
-  Database database_;
+  const std::string database_path_;
+  std::unique_ptr<Database> database_;  // nothing while it cannot be opened anew
   SummaryBuilder summary_;
   Interpreter interpreter_;
   std::vector<std::string> recovered_;
+
+  const std::string task_path_;
+  const KeptTasks kept_tasks_;
+  std::vector<TaskCopy> tasks_;                                  // of this run, the last kMaxTasks
+  std::optional<std::pair<Digest, std::int64_t>> heard_task_;    // config digest and version of the last heartbeat
+  std::set<std::string> tasks_in_use_;                           // config digests of this run, in hexadecimal
+  Period task_reading_;
 
   std::string log_path_, log_file_;
   std::unique_ptr<EventLogWriter> log_;
   int files_ = 0;
   std::int64_t name_us_ = 0;  // the time that the last of them is named after
-  Period flush_, age_, scan_, gaps_, retry_;
+  std::string continues_;
+  std::int64_t begun_us_ = 0;
+  Period flush_, age_, scan_, gaps_, retry_, anew_, database_anew_;
 
-  std::map<std::string, std::int64_t> unflushed_;               // events in the log's buffer, by channel
+  Counts unflushed_;                                            // events in the log's buffer
+  Counts confirmed_;                                            // events that the disk has confirmed of this file
+  std::map<std::string, std::int64_t> earlier_files_;           // of this run, with their events
+  bool is_log_lost_ = false;                                    // and no new one could be made
+  bool is_log_hidden_ = false;                                  // whether it is in its place cannot be seen
+  std::string gone_;
   Rows flushed_rows_, rows_;                                    // of events on disk; of events in the log's buffer
   bool rows_lost_ = false;                                      // some of this file, to be made again by the next start
   std::map<std::pair<std::string, Stream>, Loss> losses_;       // by reason; no gaps yet
   std::string pause_;                                           // the reason of the gaps it makes; empty while recording
-  std::string rotation_problem_, reported_;
+  std::int64_t told_events_ = 0;                                // of this file, to the database
+  bool needs_new_file_ = false;                                 // the database has not all rows of this one
+  bool are_rows_behind_ = false;                                // of earlier files, to be made again by the next start
+  std::string rotation_problem_, anew_problem_, database_problem_, displaced_, reported_;
   int failed_flushes_ = 0;
   std::int64_t written_ = 0, lost_ = 0, other_bytes_ = 0, free_bytes_ = 0;
   double flush_us_ = 0, worst_flush_us_ = 0;

@@ -25,6 +25,7 @@
 #include "forereach/robot_state_t.hpp"
 #include "logger/event_log.h"
 #include "logger/json_text.h"
+#include "logger/log_tasks.h"
 
 namespace forereach {
 namespace {
@@ -34,8 +35,13 @@ constexpr std::size_t kBatch = 256;
 
 class PictureMaker final {
  public:
-  explicit PictureMaker(const Config& config)
-      : channels_(config.bus),
+  /** @param tasks nothing: every decision is of this config. Else those that other makers draw, and the digests of others
+  still are this one's if it `counts_unknown`. */
+  explicit PictureMaker(const Config& config, const std::vector<Config>* tasks = nullptr, bool counts_unknown = true)
+      : digest_(config.digest),
+        tasks_(tasks),
+        counts_unknown_(counts_unknown),
+        channels_(config.bus),
         certifier_(config.problem),
         obstacles_(config),
         learns_(config.gate.learns) {
@@ -88,10 +94,16 @@ class PictureMaker final {
     if (found == candidates_.end()) return;
     const auto candidate = Decoded<candidate_plan_t>(found->second);
     candidates_.erase(found);
+    if (!IsMine(GetDigest(decision.config_digest))) return;
     const bool certified = decision.outcome == decision_t::CERTIFIED;
     if (!candidate || (!certified && decision.outcome != decision_t::ABSTAIN_SAFETY)) return;
     decided_.push_back({*candidate, decision.outcome, decision.step});
     if (decided_.size() >= kBatch) CertifyAgain();
+  }
+
+  [[nodiscard]] bool IsMine(const Digest& digest) const {
+    if (!tasks_ || digest == digest_) return true;
+    return counts_unknown_ && std::ranges::find(*tasks_, digest, &Config::digest) == tasks_->end();
   }
 
   // As the gate did, so that what comes after is decided on with it.
@@ -204,6 +216,9 @@ class PictureMaker final {
     return hull;
   }
 
+  const Digest digest_;
+  const std::vector<Config>* tasks_;
+  const bool counts_unknown_;
   BusOptions channels_;
   Certifier certifier_;
   ObstaclesInForce obstacles_;
@@ -255,14 +270,33 @@ LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& c
   return maker.Finish();
 }
 
+LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
+  if (tasks.size() == 1) return PictureFromLogs(logs, tasks.front());
+  LogPicture all;
+  for (const Config& task : tasks) {
+    const bool is_last = &task == &tasks.back();
+    PictureMaker maker(task, &tasks, is_last);
+    ForEachEvent(logs, [&maker](const LogEvent& event, const std::string&) { maker.Add(event); });
+    LogPicture drawn = maker.Finish();
+    const auto add = [](auto& to, auto& from) { to.insert(to.begin(), from.begin(), from.end()); };
+    add(drawn.picture.certified, all.picture.certified);
+    add(drawn.picture.executed, all.picture.executed);
+    add(drawn.picture.abstained, all.picture.abstained);
+    drawn.disagreements += all.disagreements;
+    all = std::move(drawn);
+  }
+  return all;
+}
+
 void Report(const ReportOptions& options, std::ostream& out) {
   const std::vector<std::string> files =
       options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
-  const Config config = LoadConfig(options.config);
+  const std::vector<Config> tasks = TasksOf(options.logs, options.config);
+  const Config& config = tasks.back();
   const Summary summary = SummarizeLogs(options.logs, config);
   LogPicture drawn;
   if (!files.empty()) {
-    drawn = PictureFromLogs(options.logs, config);
+    drawn = PictureFromLogs(options.logs, tasks);
     drawn.picture.title = TitleOf(config);
     drawn.picture.key_numbers = KeyNumbers(summary);
   }

@@ -23,10 +23,13 @@ is to draw: the tubes of certified plans and of abstentions S, the measured path
 Without title and key numbers. Cost: one certify call a plan.
 @throws LogError if a log cannot be read, PictureError if the task's safety coordinates are not planar. */
 [[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config);
+/** The same, each plan under the task of its decision's config digest; plans of other digests are left out and counted.
+@param tasks at least one; path, goal and obstacles are those of the last. */
+[[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
 
 struct ReportOptions {
   std::vector<std::string> logs;  ///< Files of one run, in their order.
-  std::string config;
+  std::string config;             ///< Task file; empty: the tasks that were kept beside the logs.
   std::string picture;  ///< As PictureFiles takes it; none if empty.
   bool json = false;
   int width = 1200, height = 800;  ///< Pixels.

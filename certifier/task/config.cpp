@@ -14,6 +14,7 @@
 #include "certifier/numerics/text.h"
 #include "certifier/task/csv.h"
 #include "certifier/task/document.h"
+#include "certifier/task/named_files.h"
 #include "certifier/task/number.h"
 
 namespace forereach {
@@ -220,11 +221,11 @@ BusOptions ReadBus(const Document& file) {
   return bus;
 }
 
-PlannerOptions ReadPlanner(const Document& file) {
+PlannerOptions ReadPlanner(const Document& file, const NamedFiles& instead) {
   PlannerOptions planner;
   file.Read("planner.source", planner.source);
   if (file.Has("planner.policy"))
-    planner.policy = RelativeTo(file.path(), file.Text("planner.policy"));
+    planner.policy = instead.policy.empty() ? RelativeTo(file.path(), file.Text("planner.policy")) : instead.policy;
   else if (planner.source == "policy")
     file.Fail("planner.policy", "missing: a policy's file, for planner.source: policy");
   file.Read("planner.algorithm", planner.algorithm);
@@ -385,7 +386,7 @@ void RequireInside(const std::string& path, const Transitions& transitions, cons
   }
 }
 
-std::shared_ptr<const Problem> ReadProblem(Document& file, TransitionsFile transitions) {
+std::shared_ptr<const Problem> ReadProblem(Document& file, TransitionsFile transitions, const NamedFiles& instead) {
   file.Check({});
   const auto problem = std::make_shared<Problem>();
   problem->model = ReadModel(file);
@@ -403,19 +404,18 @@ std::shared_ptr<const Problem> ReadProblem(Document& file, TransitionsFile trans
   file.Read("certifier.zonotope_order", problem->zonotope_order);
   RequireOrder(file, problem->zonotope_order, model.num_states());
   if (transitions == TransitionsFile::kIgnore) return problem;
-  const std::string path = RelativeTo(file.path(), file.Text("transitions"));
+  const std::string path =
+      instead.transitions.empty() ? RelativeTo(file.path(), file.Text("transitions")) : instead.transitions;
   problem->transitions = ReadTransitions(path, model, file.Place("transitions"));
   RequireInside(path, problem->transitions, problem->domain, model);
   return problem;
 }
 
-}  // namespace
-
-Config LoadConfig(const std::string& path, TransitionsFile transitions) {
+Config Load(const std::string& path, TransitionsFile transitions, const NamedFiles& instead) {
   Document file(path);
   Config config;
   config.path = path;
-  config.problem = ReadProblem(file, transitions);
+  config.problem = ReadProblem(file, transitions, instead);
   const Problem& problem = *config.problem;
   config.digest = DigestOf(file.text());
   config.model_digest = ModelDigest(*problem.model);
@@ -428,10 +428,27 @@ Config LoadConfig(const std::string& path, TransitionsFile transitions) {
   config.gate = ReadGate(file);
   config.realtime = ReadRealtime(file);
   config.bus = ReadBus(file);
-  config.planner = ReadPlanner(file);
+  config.planner = ReadPlanner(file, instead);
   config.robot = ReadRobot(file, *problem.model);
   config.logger = ReadLogger(file);
   return config;
+}
+
+}  // namespace
+
+Config LoadConfig(const std::string& path, TransitionsFile transitions) { return Load(path, transitions, {}); }
+
+Config LoadConfig(const std::string& path, const NamedFiles& instead) {
+  return Load(path, TransitionsFile::kRead, instead);
+}
+
+NamedFiles FilesNamedBy(const std::string& path) {
+  Document file(path);
+  file.Check({});
+  const auto named = [&file](const char* key) {
+    return file.Has(key) ? RelativeTo(file.path(), file.Text(key)) : std::string();
+  };
+  return {named("transitions"), named("planner.policy")};
 }
 
 void RequireObstaclesSource(const Config& config) {

@@ -102,7 +102,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     spdlog::info("ready on {} with {}{}", config.bus.url, config_path, config.bus.key.empty() ? "" : ", signed");
     DatagramWatch watched(*node, *bus);
     RunNode(watched, *bus);
-    return 0;
+    return node->failed() ? 1 : 0;
   });
 }
 
