@@ -212,13 +212,16 @@ void PlannerNode::Learn(const decision_t& decision) {
   auto& counts = decision.outcome == decision_t::REJECTED ? rejected_ : abstained_;
   ++counts[std::string(CauseName(decision.cause))];
   // No candidate can pass before the world has changed.
-  if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_FAULT) return EndRound(false);
+  if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_FAULT ||
+      decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE)
+    return EndRound(false);
   switch (decision.outcome) {
     case decision_t::ABSTAIN_SAFETY:
       round_->clearance += config_.planner.clearance_step;
       break;
     case decision_t::ABSTAIN_DOMAIN:
-      ++round_->domain_exits;
+      // A plan that does not stop is no nearer to the domain's bounds than one that does.
+      if (decision.cause != decision_t::CAUSE_NO_STOP) ++round_->domain_exits;
       break;
     case decision_t::ABSTAIN_FALSIFIED:
       EndRound(false);
