@@ -10,15 +10,14 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <sched.h>
 #include <sqlite3.h>
-#include <sys/mount.h>
 #include <unistd.h>
 
 #include "forereach/logger_status_t.hpp"
 #include "logger/logger_node.h"
 #include "tests/logger/direct_bus.h"
 #include "tests/logger/logs.h"
+#include "tests/small_disk.h"
 
 namespace forereach {
 
@@ -86,26 +85,6 @@ class DiskTest : public testing::Test {
   std::ostringstream out_;
   std::int64_t free_bytes_ = std::int64_t{1} << 40, fed_ = 0;
   std::optional<LoggerNode> node_;
-};
-
-/** A small file system of this process's own on a directory; `mounted` is false where that is not allowed. */
-class SmallDisk final {
- public:
-  SmallDisk(const std::string& path, const std::string& options) : path_(path) {
-    std::filesystem::create_directories(path);
-    mounted = ::unshare(CLONE_NEWNS) == 0 && ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
-              ::mount("tmpfs", path.c_str(), "tmpfs", 0, options.c_str()) == 0;
-  }
-  ~SmallDisk() {
-    if (mounted) ::umount2(path_.c_str(), MNT_DETACH);
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
-  bool mounted = false;
-
- private:
-  std::string path_;
 };
 
 }  // namespace forereach
