@@ -428,14 +428,6 @@ CertificateFile FromDatabase(const std::string& path, Config config) {
 
 // ---- Which of the three.
 
-std::string FirstBytes(const std::string& path) {
-  std::ifstream file = OpenForReading(path);
-  std::string bytes(16, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  return bytes;
-}
-
 Config TaskGiven(const std::string& path, const std::string& config_path, const LogKey& key) {
   if (config_path.empty()) throw ConfigError(path + ": name its task with --config FILE");
   Config config = LoadConfig(config_path);
@@ -446,15 +438,13 @@ Config TaskGiven(const std::string& path, const std::string& config_path, const 
 }  // namespace
 
 CertificateFile ReadCertificates(const std::string& path, const std::string& config_path, const LogKey& key) {
-  const std::string first = FirstBytes(path);
+  const std::string first = ReadBeginning(path, 16);
   try {
     if (first.rfind(std::string("SQLite format 3\0", 16), 0) == 0)
       return FromDatabase(path, TaskGiven(path, config_path, key));
     if (first.rfind("\xED\xA1\xDA\x01", 0) == 0) return FromLogs({path}, TaskGiven(path, config_path, key));
-    if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{') {
-      std::ifstream stream = OpenForReading(path);
-      return FromDecision(path, ParseJson<Json>(stream), config_path);
-    }
+    if (const auto begin = first.find_first_not_of(" \t\r\n"); begin != std::string::npos && first[begin] == '{')
+      return FromDecision(path, ParseJson<Json>(ReadWhole(path, kLargestJsonFile)), config_path);
   } catch (const Json::exception& error) {
     throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());
   } catch (const std::invalid_argument& error) {
