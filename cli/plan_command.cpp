@@ -1,11 +1,14 @@
+#include <cstddef>
 #include <iostream>
+#include <sstream>
 #include <stdexcept>
 
 #include <CLI/CLI.hpp>
 
+#include "certifier/certify/explain.h"
 #include "certifier/task/config.h"
 #include "cli/commands.h"
-#include "planner_bridge/proposal.h"
+#include "planner_bridge/certified_plan.h"
 
 namespace forereach {
 namespace {
@@ -15,33 +18,62 @@ struct Options {
   std::uint32_t seed = 1;
 };
 
-// A task that certifies need not be one that plans: no goal, or a model that nobody has taught to brake.
-Planner PlannerOf(const Config& config) {
+// A task that certifies need not be one that plans: it may have no goal, or a model without a way to brake.
+std::unique_ptr<Proposer> ProposerOf(const Config& config) {
+  if (config.planner.goal.empty())
+    throw ConfigError(config.path + ": planner.goal: missing: where the plan is to go, in the safety coordinates");
   try {
-    return {config.problem, config.planner, config.obstacles};
+    return MakeProposer(config);
   } catch (const std::invalid_argument& error) {
     throw ConfigError(config.path + ": " + error.what());
   }
 }
 
+// As a shell reads it back.
+std::string Quoted(const std::string& word) {
+  constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-./=:,+@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+std::string InWords(const Eigen::VectorXd& position) {
+  std::ostringstream text;
+  text.precision(4);
+  for (Eigen::Index k = 0; k < position.size(); ++k) text << (k == 0 ? "(" : ", ") << position(k);
+  return text.str() + ")";
+}
+
+int ReportFailure(const Options& options, const Config& config, const CertifiedPlan& plan) {
+  std::cerr << "forereach plan: no certified plan from task.initial_set with seed " << options.seed << ": ";
+  if (plan.candidates == 0)
+    std::cerr << "none of " << config.planner.candidates << " searches found a candidate; a smaller planner.clearance or "
+              << "a larger planner.time_limit_ms may help";
+  else
+    std::cerr << plan.candidates << (plan.candidates == 1 ? " candidate was" : " candidates were")
+              << " not certified, the last: " << Explain(plan.decision, *config.problem);
+  std::cerr << "; " << options.out << " is not written" << std::endl;
+  return 1;
+}
+
 int MakePlan(const Options& options) {
   const Config config = LoadConfig(options.config);
-  Planner planner = PlannerOf(config);
-  PlanRequest request;
-  request.state = (config.initial_set.lower() + config.initial_set.upper()) / 2;
-  request.clearance = config.planner.clearance;
-  request.seed = options.seed;
-  const auto proposal = planner.ProposeToGoal(request);
-  if (!proposal) {
-    std::cerr << "forereach plan: no plan found from the initial set with seed " << options.seed
-              << "; try another --seed, a smaller planner.clearance or a larger planner.time_limit_ms" << std::endl;
-    return 1;
-  }
-  SavePlan(options.out, *config.problem->model, proposal->controls);
-  const Eigen::VectorXd end = config.problem->projection * proposal->states.rightCols<1>();
-  std::cout << options.out << ": " << proposal->controls.cols() << " steps, the last "
-            << proposal->controls.cols() - proposal->progress_steps << " brake to a stand at " << end.transpose()
-            << "\n  now: forereach certify --config " << options.config << " --plan " << options.out << std::endl;
+  const auto proposer = ProposerOf(config);
+  const Certifier certifier(config.problem);
+  const CertifiedPlan plan = FindCertifiedPlan(*proposer, certifier, config, options.seed);
+  if (plan.controls.cols() == 0) return ReportFailure(options, config, plan);
+  SavePlan(options.out, *config.problem->model, plan.controls);
+  const auto& goal = config.planner.goal;
+  const double away = (plan.end - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm();
+  std::cout << options.out << ": " << plan.controls.cols() << " steps, the last "
+            << plan.controls.cols() - plan.progress_steps << " brake to a stand at about " << InWords(plan.end) << "\n  "
+            << Explain(plan.decision, *config.problem) << "\n";
+  if (!plan.reaches_goal)
+    std::cout << "  The goal is " << away << " m further. This is as far as a single plan was certified; `forereach run "
+              << "--config " << Quoted(options.config) << "` drives on with a new plan every few steps.\n";
+  std::cout << "  now: forereach certify --config " << Quoted(options.config) << " --plan " << Quoted(options.out)
+            << std::endl;
   return 0;
 }
 
@@ -49,11 +81,16 @@ int MakePlan(const Options& options) {
 
 void AddPlanCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("plan", "Let OMPL plan from the initial set towards planner.goal: a CSV file");
+  CLI::App* command = app.add_subcommand(
+      "plan", "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a CSV file, 1 if none was "
+              "found, 2 bad input");
   command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
   command->add_option("--out", options->out, "Where to write the controls")->required()->type_name("FILE.csv");
   command->add_option("--seed", options->seed, "The same seed gives the same plan")->capture_default_str();
-  command->footer("Example:\n  forereach plan --config config/demo.yaml --out plan.csv");
+  command->footer(
+      "The task's planner proposes, the task's certifier decides on each candidate. The plan that is written is certified\n"
+      "and ends in a stop. It goes as far towards the goal as a plan could be certified.\n\n"
+      "Example:\n  forereach plan --config config/demo.yaml --out plan.csv");
   command->callback([options, &action] { action = [options] { return MakePlan(*options); }; });
 }
 

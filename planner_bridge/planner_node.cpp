@@ -126,7 +126,7 @@ void PlannerNode::BeginRound(const robot_state_t& state) {
   const std::optional<Eigen::VectorXd> center = PredictStart(state);
   if (!center) return;
   ++rounds_;
-  round_ = Round{state.utime + config_.planner.lead_steps * period_us_, *center, config_.planner.clearance};
+  round_ = Round{state.utime + config_.planner.lead_steps * period_us_, *center, Lessons(config_.planner)};
 }
 
 void PlannerNode::EndRound(bool certified) {
@@ -156,15 +156,10 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
   plans_[candidate.plan_id] = candidate;
 }
 
-// After each D the margin grows by as much as the tube is certain to reach beyond its center, or, for a position, by
-// what an S would add.
 PlanRequest PlannerNode::RequestOf(const Round& round) const {
-  const Eigen::MatrixXd& projection = config_.problem->projection;
-  Eigen::VectorXd margin = round.domain_exits * 2 * half_width_;
-  for (Eigen::Index k = 0; k < margin.size(); ++k)
-    if (projection.col(k).any()) margin(k) = round.domain_exits * config_.planner.clearance_step;
   constexpr std::uint32_t kSpread = 1'000'003;
-  return {round.center, round.clearance, margin,
+  return {round.center, round.lessons.clearance(),
+          round.lessons.DomainMargin(half_width_, config_.problem->projection),
           static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1};
 }
@@ -213,19 +208,8 @@ void PlannerNode::Learn(const decision_t& decision) {
   ++counts[std::string(CauseName(decision.cause))];
   // No candidate can pass before the world has changed.
   if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_FAULT) return EndRound(false);
-  switch (decision.outcome) {
-    case decision_t::ABSTAIN_SAFETY:
-      round_->clearance += config_.planner.clearance_step;
-      break;
-    case decision_t::ABSTAIN_DOMAIN:
-      ++round_->domain_exits;
-      break;
-    case decision_t::ABSTAIN_FALSIFIED:
-      EndRound(false);
-      break;
-    default:
-      break;
-  }
+  if (decision.outcome == decision_t::ABSTAIN_FALSIFIED) return EndRound(false);
+  round_->lessons.Learn(static_cast<Outcome>(decision.outcome));
 }
 
 void PlannerNode::OnObstacles(const Received& received) {

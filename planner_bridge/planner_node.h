@@ -33,6 +33,7 @@ and ignored. */
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/node.h"
+#include "planner_bridge/lessons.h"
 #include "planner_bridge/proposer.h"
 #include "planner_bridge/residual_estimate.h"
 
@@ -60,8 +61,8 @@ class PlannerNode final : public Node {
   struct Round {
     std::int64_t start_utime;
     Eigen::VectorXd center;  // of X_0
-    double clearance;
-    int domain_exits = 0, searches = 0;
+    Lessons lessons;
+    int searches = 0;
     std::int64_t awaited_plan = -1;  // whose decision is to come, -1 if none
   };
 

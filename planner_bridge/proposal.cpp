@@ -163,7 +163,6 @@ class Planner::Impl {
   }
 
   std::optional<Proposal> Propose(const PlanRequest& request);
-  std::optional<Proposal> ProposeToGoal(const PlanRequest& request);
 
   std::shared_ptr<const Problem> problem_;
   PlannerOptions options_;
@@ -486,31 +485,6 @@ std::optional<Proposal> Planner::Impl::Propose(const PlanRequest& request) {
   return std::nullopt;
 }
 
-std::optional<Proposal> Planner::Impl::ProposeToGoal(const PlanRequest& request) {
-  const double reached = kShareOfRadius * options_.goal_radius;
-  std::optional<Proposal> whole;
-  PlanRequest next = request;
-  while (!whole || whole->progress_steps + options_.progress_steps + options_.tail_steps <= kMaxSteps) {
-    std::optional<Proposal> part = Propose(next);
-    ++next.seed;
-    if (!part) break;
-    if (!whole) {
-      whole = std::move(part);
-    } else {
-      const int before = whole->progress_steps;
-      whole->controls.conservativeResize(Eigen::NoChange, before + part->controls.cols());
-      whole->states.conservativeResize(Eigen::NoChange, before + part->states.cols());
-      whole->controls.rightCols(part->controls.cols()) = part->controls;
-      whole->states.rightCols(part->states.cols()) = part->states;
-      whole->progress_steps += part->progress_steps;
-    }
-    const Eigen::MatrixXd positions = problem_->projection * whole->states.leftCols(whole->progress_steps + 1);
-    if ((positions.colwise() - goal_).colwise().norm().minCoeff() <= reached) break;
-    next.state = whole->states.col(whole->progress_steps);
-  }
-  return whole;
-}
-
 Planner::Planner(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles)
     : impl_(std::make_unique<Impl>(std::move(problem), std::move(options), std::move(obstacles))) {}
 Planner::~Planner() = default;
@@ -518,6 +492,5 @@ Planner::~Planner() = default;
 void Planner::SetObstacles(std::vector<Obstacle> obstacles) { impl_->SetObstacles(std::move(obstacles)); }
 const Motion& Planner::motion() const { return *impl_->motion_; }
 std::optional<Proposal> Planner::Propose(const PlanRequest& request) { return impl_->Propose(request); }
-std::optional<Proposal> Planner::ProposeToGoal(const PlanRequest& request) { return impl_->ProposeToGoal(request); }
 
 }  // namespace forereach

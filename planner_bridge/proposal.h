@@ -30,10 +30,6 @@ class Planner final : public Proposer {
   Single-threaded, for the whole process: OMPL's seed is global. */
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
 
-  /** Appends progress parts until the goal is reached or no more fit, then one braking tail: one plan of at most
-  kMaxSteps controls from request.state to the goal, or as far as they take it. */
-  [[nodiscard]] std::optional<Proposal> ProposeToGoal(const PlanRequest& request);
-
   static constexpr int kStepsPerMs = 400;
 
  private:

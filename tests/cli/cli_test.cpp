@@ -5,6 +5,9 @@
 #include <regex>
 #include <set>
 #include <sstream>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -122,14 +125,86 @@ TEST(Help, ExitsWithZeroAndShowsAnExample) {
   }
 }
 
-TEST(Plan, WritesACsvThatCertifyReads) {
+// ---- plan: what it suggests passes.
+
+class PlanCommand : public testing::TestWithParam<std::tuple<const char*, int>> {};
+
+std::string LineAfter(const std::string& text, const std::string& mark) {
+  const std::size_t at = text.find(mark);
+  if (at == std::string::npos) return "";
+  const std::size_t begin = at + mark.size();
+  return text.substr(begin, text.find('\n', begin) - begin);
+}
+
+TEST_P(PlanCommand, SuggestsACommandThatExitsWithZero) {
+  const auto& [task, seed] = GetParam();
   const forereach::ScratchDirectory scratch;
-  const std::string file = scratch / "plan.csv";
-  const Output planned = Forereach("plan --config config/demo.yaml --out " + file);
+  const std::string file = scratch / "a plan's.csv", config = std::string("config/") + task + ".yaml";
+  const Output planned =
+      Forereach("plan --config " + config + " --out \"" + file + "\" --seed " + std::to_string(seed));
   ASSERT_EQ(planned.code, 0) << planned.text;
-  const Output certified = Forereach("certify --json --config config/demo.yaml --plan " + file);
-  EXPECT_LE(certified.code, 1);
-  EXPECT_NE(Json::parse(certified.text)["outcome"], "abstain_falsified");
+  const std::string suggested = LineAfter(planned.text, "now: forereach ");
+  ASSERT_NE(suggested, "") << planned.text;
+  const Output certified = Forereach(suggested);
+  EXPECT_EQ(certified.code, 0) << planned.text << certified.text;
+  // What it says of the plan is what certify says.
+  const std::string sentence = certified.text.substr(0, certified.text.find('\n'));
+  EXPECT_THAT(planned.text, HasSubstr(sentence));
+  // The tube ends in a stop: around zero speed, acceleration and steering.
+  const Json tube = Json::parse(Forereach(suggested + " --json").text)["tube"];
+  for (const std::size_t rests : {3u, 4u, 5u})
+    EXPECT_NEAR(tube.back()["center"][rests].get<double>(), 0, 1e-9) << "state " << rests;
+  EXPECT_GT(tube.back()["center"][0].get<double>(), 1) << "it drives";
+}
+
+INSTANTIATE_TEST_SUITE_P(ShippedTasks, PlanCommand,
+                         testing::Combine(testing::Values("demo", "policy"), testing::Range(0, 12)));
+
+TEST(Plan, TheSameSeedGivesTheSamePlan) {
+  const forereach::ScratchDirectory scratch;
+  for (const char* file : {"a.csv", "b.csv"})
+    ASSERT_EQ(Forereach("plan --config config/demo.yaml --seed 5 --out " + (scratch / file)).code, 0);
+  EXPECT_EQ(Read(scratch / "a.csv"), Read(scratch / "b.csv"));
+}
+
+using Replacements = std::vector<std::pair<std::string, std::string>>;
+
+// The demo with parts of its text replaced.
+std::string DemoWith(const forereach::ScratchDirectory& scratch, const Replacements& replacements) {
+  std::string text = Read(FOREREACH_SOURCE_DIR "/config/demo.yaml");
+  const auto replace = [&text](const std::string& what, const std::string& with) {
+    const std::size_t at = text.find(what);
+    ASSERT_NE(at, std::string::npos) << what;
+    text.replace(at, what.size(), with);
+  };
+  replace("transitions: data/", "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
+  for (const auto& [what, with] : replacements) replace(what, with);
+  return scratch.Write("task.yaml", text);
+}
+
+TEST(Plan, SaysWhyWhenThereIsNone) {
+  const std::string first = "{center: [18, 3], radius: 2.5}", speed_noise = "noise_bound: [0, 0, 0, 0";
+  const struct {
+    Replacements task;
+    int code;
+    const char* sentence;
+  } cases[] = {
+      {{{first, "{center: [0, 0], radius: 2.5}"}}, 1, "searches found a candidate"},
+      {{{first, "{center: [4.5, 0], radius: 2}"}, {"half_width: [0.05, 0.05", "half_width: [3, 3"}}, 1,
+       "not certified, the last: abstain S"},
+      {{{speed_noise, "noise_bound: [0, 0, 0, 1"}}, 1, "not certified, the last: abstain D"},
+      {{{"delta: 0.609638820", "delta: 0.0001"}}, 1, "1 candidate was not certified, the last: abstain F"},
+      {{{"  goal: [120, 0]\n", ""}}, 2, "planner.goal: missing"},
+      {{{"algorithm: kpiece", "algorithm: magic"}}, 2, "planner.algorithm: magic"}};
+  for (const auto& c : cases) {
+    const forereach::ScratchDirectory scratch;
+    const std::string out = scratch / "plan.csv";
+    const Output output = Forereach("plan --config " + DemoWith(scratch, c.task) + " --out " + out + " 2>&1");
+    EXPECT_EQ(output.code, c.code) << output.text;
+    EXPECT_THAT(output.text, HasSubstr(c.sentence));
+    EXPECT_THAT(output.text, testing::Not(HasSubstr("now:")));
+    EXPECT_FALSE(std::ifstream(out).good()) << "nothing is written";
+  }
 }
 
 TEST(Doctor, PrintsOneJsonDocument) {

@@ -155,28 +155,6 @@ TEST(Planner, ObstaclesCanBeReplaced) {
   ExpectSound(config, blocked, *proposal, {3, 4, 5});
 }
 
-TEST(Planner, OnePlanTakesItToTheGoal) {
-  Config config = PointMass();
-  config.planner.tail_steps = 20;
-  Planner planner = PlannerOf(config);
-  const PlanRequest request = From(Vec({0, 0, 0, 0}), 6);
-  const auto proposal = planner.ProposeToGoal(request);
-  ASSERT_TRUE(proposal);
-  ExpectSound(config, request, *proposal, {2, 3});
-  const Eigen::MatrixXd positions = proposal->states.topRows(2);
-  EXPECT_LE((positions.colwise() - Eigen::Vector2d(12, 0)).colwise().norm().minCoeff(), config.planner.goal_radius);
-}
-
-TEST(Planner, ALongWayTakesAsManyStepsAsThereAre) {
-  Config config = Bicycle();
-  Planner planner = PlannerOf(config);
-  const PlanRequest request = From(Vec({0, 0, 0, 0, 0, 0}), 6);
-  const auto proposal = planner.ProposeToGoal(request);
-  ASSERT_TRUE(proposal);
-  ExpectSound(config, request, *proposal, {3, 4, 5});
-  EXPECT_GT(proposal->progress_steps, config.planner.progress_steps);
-}
-
 TEST(Planner, RefusesOptionsThatDoNotFit) {
   for (const auto& spoil : std::vector<void (*)(PlannerOptions&)>{
            [](PlannerOptions& options) { options.algorithm = "astar"; },
