@@ -47,6 +47,35 @@ Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obst
   return slices;
 }
 
+Json IndexJson(int index) { return index < 0 ? Json(nullptr) : Json(index); }
+Json NumberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+const char* KindName(DomainExit::Kind kind) {
+  switch (kind) {
+    case DomainExit::Kind::kLower: return "lower";
+    case DomainExit::Kind::kUpper: return "upper";
+    case DomainExit::Kind::kInequality: return "inequality";
+    case DomainExit::Kind::kBall: return "ball";
+    case DomainExit::Kind::kNone: break;
+  }
+  return nullptr;
+}
+
+// Adds what the outcome rests on.
+void AddWitness(const Decision& decision, Json& document) {
+  const char* const exit = KindName(decision.exit.kind);
+  document["step"] = IndexJson(decision.step);
+  document["coordinate"] = IndexJson(decision.coordinate);
+  document["exit"] = exit ? Json(exit) : Json(nullptr);
+  document["first_observation"] = IndexJson(decision.first_observation);
+  document["second_observation"] = IndexJson(decision.second_observation);
+  document["obstacle"] = IndexJson(decision.obstacle);
+  document["closest_step"] = IndexJson(decision.closest_step);
+  document["margin"] = NumberJson(decision.margin);
+  const bool without_obstacles = decision.outcome == Outcome::kCertified && decision.obstacle < 0;
+  document["threshold"] = without_obstacles ? Json(nullptr) : NumberJson(decision.threshold);
+}
+
 Json InputsJson(const Eigen::MatrixXd& controls, const Config& config) {
   Json steps = Json::array();
   for (const auto column : controls.colwise()) steps.push_back(std::vector(column.begin(), column.end()));
@@ -99,7 +128,7 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   const bool before_any_step = decision.outcome == Outcome::kFalsified && decision.step < 0;
   Json document;
   document["outcome"] = OutcomeName(static_cast<std::int16_t>(decision.outcome));
-  document["step"] = decision.step < 0 ? Json(nullptr) : Json(decision.step);
+  AddWitness(decision, document);
   document["cause"] =
       decision.cause == Cause::kNone ? Json(nullptr) : Json(CauseName(static_cast<std::int16_t>(decision.cause)));
   document["capped"] = decision.capped;

@@ -23,11 +23,8 @@ struct CertifyResult {
 /** Of every number in the document's `tube`, so that none can be altered unnoticed. What is infinite counts as null. */
 [[nodiscard]] Digest TubeDigest(const nlohmann::json& tube);
 
-/** Keys: outcome, step, cause, message, inputs, tube, digests, elapsed_us. With `inputs` (config {given, absolute},
-controls {a list a step}, initial_set {lower, upper}) the document can be verified by itself. `tube` has an object for each X_t that was computed:
-center, half_width (of the interval hull), generators (list of columns), clearance (per obstacle, a lower bound on the
-distance to it in metres, negative where none was proven), radius (of the projected slice, metres), and for each
-completed step also envelope {lower, upper} and remainder. Numbers that are infinite are null. */
+/** docs/decision.md lists the keys. With `inputs` the document can be verified by itself. Numbers that are infinite, and
+keys that do not apply to the outcome, are null. */
 [[nodiscard]] nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certifier& certifier,
                                     const Config& config);
 

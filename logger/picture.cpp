@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <memory>
+#include <system_error>
 #include <utility>
 
+#include <cairo-pdf.h>
 #include <cairo-svg.h>
 #include <cairo.h>
 #include <fmt/format.h>
@@ -328,14 +331,35 @@ void Check(cairo_status_t status, const std::string& path) {
 
 }  // namespace
 
+std::vector<std::string> PictureFiles(const std::string& name) {
+  const std::filesystem::path path(name);
+  if (!path.has_filename()) throw PictureError("picture: '" + name + "' names no file");
+  const std::string ending = path.extension();
+  if (!ending.empty() && ending != ".svg" && ending != ".png" && ending != ".pdf")
+    throw PictureError("picture: " + name + " ends in " + ending +
+                       "; it has to end in .svg, .png or .pdf, or have no ending: then a .svg and a .png are written");
+  const std::filesystem::path directory = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(directory, ignored))
+    throw PictureError("picture: " + name + ": there is no directory " + directory.string());
+  const std::vector<std::string> files =
+      ending.empty() ? std::vector{name + ".svg", name + ".png"} : std::vector{name};
+  for (const std::string& file : files)
+    if (std::filesystem::is_directory(file, ignored))
+      throw PictureError("picture: " + file + " is a directory, not a file");
+  return files;
+}
+
 void DrawPicture(const Picture& picture, const std::string& path, int width, int height) {
-  const bool svg = path.ends_with(".svg");
-  if (!svg && !path.ends_with(".png")) throw PictureError("picture: " + path + " has to end in .svg or .png");
+  const bool svg = path.ends_with(".svg"), png = path.ends_with(".png");
+  if (!svg && !png && !path.ends_with(".pdf"))
+    throw PictureError("picture: " + path + " has to end in .svg, .png or .pdf");
   if (width < 200 || width > 10000 || height < 200 || height > 10000)
     throw PictureError(fmt::format("picture: {} x {} pixels is not within 200 to 10000", width, height));
   const std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> surface(
-      svg ? cairo_svg_surface_create(path.c_str(), width, height)
-          : cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height),
+      png   ? cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)
+      : svg ? cairo_svg_surface_create(path.c_str(), width, height)
+            : cairo_pdf_surface_create(path.c_str(), width, height),
       &cairo_surface_destroy);
   Check(cairo_surface_status(surface.get()), path);
   if (svg) cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
@@ -344,7 +368,7 @@ void DrawPicture(const Picture& picture, const std::string& path, int width, int
     Painter(cairo.get(), picture, width, height).Paint();
     Check(cairo_status(cairo.get()), path);
   }
-  if (!svg) Check(cairo_surface_write_to_png(surface.get(), path.c_str()), path);
+  if (png) Check(cairo_surface_write_to_png(surface.get(), path.c_str()), path);
   cairo_surface_finish(surface.get());
   Check(cairo_surface_status(surface.get()), path);
 }

@@ -48,8 +48,13 @@ struct Picture {
   std::optional<Circle> goal;
 };
 
-/** Writes `picture` to a .svg or .png file, by the same drawing code.
-@param width, height pixels, 200 to 10000 each.
+/** The files that a picture of this name is written to: the name itself if it ends in .svg, .png or .pdf; NAME.svg and
+NAME.png if it has no ending. Touches no file.
+@throws PictureError for another ending, for a directory, or if the directory of the file does not exist. */
+[[nodiscard]] std::vector<std::string> PictureFiles(const std::string& name);
+
+/** Writes `picture` to a .svg, .png or .pdf file, by the same drawing code.
+@param width, height pixels (of a .pdf points), 200 to 10000 each.
 @throws PictureError for another ending or size, or if the file cannot be written. */
 void DrawPicture(const Picture& picture, const std::string& path, int width = 1200, int height = 800);
 

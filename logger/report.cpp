@@ -240,17 +240,11 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   add(abstained("pairwise"), "abstained F");
   add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
   add(abstained("obstacle"), "abstained S");
-  if (!std::isnan(summary.latency_us.p50))
+  if (summary.latency_us.WasMeasured())
     numbers.push_back(fmt::format("decided in {} (p50), {} (p99)", InWords(summary.latency_us.p50), InWords(summary.latency_us.p99)));
   numbers.push_back(fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
   numbers.push_back(fmt::format("{} contacts", summary.contacts));
   return numbers;
-}
-
-std::vector<std::string> PictureFiles(const std::string& name) {
-  if (name.empty()) return {};
-  if (name.ends_with(".svg") || name.ends_with(".png")) return {name};
-  return {name + ".svg", name + ".png"};
 }
 
 }  // namespace
@@ -262,9 +256,10 @@ LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& c
 }
 
 void Report(const ReportOptions& options, std::ostream& out) {
+  const std::vector<std::string> files =
+      options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
   const Config config = LoadConfig(options.config);
   const Summary summary = SummarizeLogs(options.logs, config);
-  const std::vector<std::string> files = PictureFiles(options.picture);
   LogPicture drawn;
   if (!files.empty()) {
     drawn = PictureFromLogs(options.logs, config);

@@ -27,7 +27,7 @@ Without title and key numbers. Cost: one certify call a plan.
 struct ReportOptions {
   std::vector<std::string> logs;  ///< Files of one run, in their order.
   std::string config;
-  std::string picture;  ///< .svg or .png; without such an ending both are written; none if empty.
+  std::string picture;  ///< As PictureFiles takes it; none if empty.
   bool json = false;
   int width = 1200, height = 800;  ///< Pixels.
 };

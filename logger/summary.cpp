@@ -30,12 +30,20 @@ std::string Listed(const std::map<std::string, std::int64_t>& counts) {
 }
 
 std::string Microseconds(const Quantiles& quantiles) {
-  if (std::isnan(quantiles.p50)) return "unknown";
+  if (!quantiles.WasMeasured()) return "not measured";
   return fmt::format("p50 {:.1f} us, p99 {:.1f} us", quantiles.p50, quantiles.p99);
 }
 
+// A robot that has been at the goal may have driven on.
+std::string DistanceToGoal(const Summary& summary) {
+  const double distance = *summary.distance_to_goal_m;
+  if (!summary.goal_reached) return fmt::format("{:.2f} m (goal not reached)", distance);
+  if (distance <= summary.goal_radius_m) return fmt::format("{:.2f} m (goal reached)", distance);
+  return fmt::format("{:.2f} m at the end (the goal was reached before, within {:g} m)", distance, summary.goal_radius_m);
+}
+
 nlohmann::json ToJson(const Quantiles& quantiles) {
-  if (std::isnan(quantiles.p50)) return {{"p50", nullptr}, {"p99", nullptr}};
+  if (!quantiles.WasMeasured()) return {{"p50", nullptr}, {"p99", nullptr}};
   return {{"p50", quantiles.p50}, {"p99", quantiles.p99}};
 }
 
@@ -52,9 +60,7 @@ std::string ToText(const Summary& summary) {
   line("  rejected", std::to_string(Total(summary.rejected)) + Listed(summary.rejected));
   line("decision latency", Microseconds(summary.latency_us));
   line("certify step", Microseconds(summary.certify_us));
-  if (summary.distance_to_goal_m)
-    line("distance to goal",
-         fmt::format("{:.2f} m{}", *summary.distance_to_goal_m, summary.goal_reached ? " (goal reached)" : ""));
+  if (summary.distance_to_goal_m) line("distance to goal", DistanceToGoal(summary));
   line("contacts", std::to_string(summary.contacts));
   line("steps in certified slice",
        fmt::format("{} of {}", summary.steps_inside, summary.steps_inside + summary.steps_outside));
@@ -96,7 +102,8 @@ nlohmann::json ToJson(const Summary& summary) {
   return json;
 }
 
-SummaryBuilder::SummaryBuilder(const Config& config) : channels_(config.bus), goal_(config.planner.goal) {
+SummaryBuilder::SummaryBuilder(const Config& config)
+    : channels_(config.bus), goal_(config.planner.goal), goal_radius_m_(config.planner.goal_radius) {
   latency_.values.reserve(kMaxSamples);
   certify_.values.reserve(kMaxSamples);
   if (config.problem) projection_ = config.problem->projection;
@@ -179,6 +186,7 @@ void SummaryBuilder::Add(const LogDamage& damage) {
 Summary SummaryBuilder::Finish() const {
   Summary summary = summary_;
   if (summary.proposed == 0) summary.proposed = summary.decided;
+  summary.goal_radius_m = goal_radius_m_;
   summary.latency_us = latency_.Get();
   summary.certify_us = certify_.Get();
   summary.duration_s = static_cast<double>(last_utime_ - first_utime_.value_or(last_utime_)) * 1e-6;

@@ -20,6 +20,9 @@ namespace forereach {
 /** Nearest-rank quantiles of some microseconds, NaN without any. */
 struct Quantiles {
   double p50 = kUnknown, p99 = kUnknown;
+
+  /** False also if all of them are zero: the simulated clock of `forereach run` stands still while something is computed. */
+  [[nodiscard]] bool WasMeasured() const { return p99 > 0; }
 };
 
 struct Summary {
@@ -34,7 +37,8 @@ struct Summary {
   Quantiles latency_us;                          ///< From a candidate's receipt to its decision's, both at the logger.
   Quantiles certify_us;                          ///< The certify step alone.
   std::optional<double> distance_to_goal_m;      ///< Of the last known state; nothing without goal or state.
-  bool goal_reached = false;
+  double goal_radius_m = 0;                      ///< The goal counts as reached within this.
+  bool goal_reached = false;                     ///< At some time; the robot may have driven on since.
   std::int64_t contacts = 0;
   std::int64_t steps_inside = 0, steps_outside = 0;  ///< Of the slice certified for that step.
   /** Before the goal: braking tails begun, and times the robot came to stand, by a plan's end or a step outside. */
@@ -81,6 +85,7 @@ class SummaryBuilder final {
   BusOptions channels_;
   Eigen::MatrixXd projection_;
   std::vector<double> goal_;
+  double goal_radius_m_;
   Summary summary_;
   Samples latency_, certify_;
   std::optional<std::int64_t> first_utime_;

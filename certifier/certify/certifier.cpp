@@ -120,19 +120,25 @@ Certifier::Learned Certifier::Learn(std::span<const double> z, std::span<const d
 
 void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
   const NominalModel& model = *problem_->model;
-  RequireThat(plan.num_inputs == model.num_inputs() && plan.stride >= plan.num_inputs,
-              "plan: " + std::to_string(plan.num_inputs) + " inputs, the model has " +
-                  std::to_string(model.num_inputs()));
+  const auto number = [](auto value) { return std::to_string(value); };
+  RequireThat(plan.num_inputs == model.num_inputs(),
+              "plan: " + number(plan.num_inputs) + " inputs, the model has " + number(model.num_inputs()));
+  RequireThat(plan.stride >= plan.num_inputs,
+              "plan: stride " + number(plan.stride) + ", must be at least its " + number(plan.num_inputs) + " inputs");
   RequireThat(1 <= plan.num_steps && plan.num_steps <= kMaxSteps,
-              "plan: " + std::to_string(plan.num_steps) + " steps, must be 1 to " + std::to_string(kMaxSteps));
+              "plan: " + number(plan.num_steps) + " steps, must be 1 to " + number(kMaxSteps));
+  RequireThat(plan.controls != nullptr, "plan: no controls, its pointer is null");
   for (int t = 0; t < plan.num_steps; ++t)
-    for (const double u : plan.input(t))
-      RequireThat(std::isfinite(u), "plan: step " + std::to_string(t) + " is not finite");
+    for (std::size_t k = 0; k < plan.input(t).size(); ++k)
+      RequireThat(std::isfinite(plan.input(t)[k]), "plan: step " + number(t) + ": " + model.input_names()[k] + " is " +
+                                                       number(plan.input(t)[k]) + ", must be finite");
   RequireThat(initial_set.dim() == model.num_states(),
-              "initial set: dimension " + std::to_string(initial_set.dim()) + ", the model has " +
-                  std::to_string(model.num_states()) + " states");
-  RequireThat(initial_set.num_generators() <= problem_->zonotope_order * model.num_states(),
-              "initial set: more generators than the zonotope order allows");
+              "initial set: dimension " + number(initial_set.dim()) + ", the model has " + number(model.num_states()) +
+                  " states");
+  const int most = problem_->zonotope_order * model.num_states();
+  RequireThat(initial_set.num_generators() <= most,
+              "initial set: " + number(initial_set.num_generators()) + " generators, must be at most " + number(most) +
+                  ", the zonotope order times the states");
   for (std::size_t o = 0; o < obstacles.size(); ++o)
     RequireThat(obstacles[o].dim() == projection_.dim(),
                 "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -63,7 +64,11 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(CertifyJsonTest, HasExactlyTheKeysOfTheContract) {
   const Json decision = CertifyJson("bicycle", "bicycle_certified");
   EXPECT_EQ(KeysOf(decision),
-            (std::set<std::string>{"outcome", "step", "cause", "message", "capped", "inputs", "tube", "digests", "elapsed_us"}));
+            (std::set<std::string>{"outcome", "step", "cause", "coordinate", "exit", "first_observation",
+                                   "second_observation", "obstacle", "closest_step", "margin", "threshold", "message",
+                                   "capped", "inputs", "tube", "digests", "elapsed_us"}));
+  const std::string page = Read(FOREREACH_SOURCE_DIR "/docs/decision.md");
+  for (const std::string& key : KeysOf(decision)) EXPECT_THAT(page, HasSubstr("\n| `" + key + "` |"));
   EXPECT_EQ(KeysOf(decision["digests"]),
             (std::set<std::string>{"plan", "tube", "config", "model", "declaration", "observations", "obstacles"}));
   const Json& tube = decision["tube"];
@@ -76,6 +81,66 @@ TEST(CertifyJsonTest, HasExactlyTheKeysOfTheContract) {
   EXPECT_EQ(tube[0]["center"].size(), 6u);
   EXPECT_EQ(tube[0]["generators"].size(), 6u);
   for (const Json& slice : tube) EXPECT_GT(slice["clearance"][0].get<double>(), 0);
+}
+
+// The witness fields that are not null.
+std::set<std::string> WitnessOf(const Json& decision) {
+  std::set<std::string> present;
+  for (const char* key : {"step", "coordinate", "exit", "first_observation", "second_observation", "obstacle",
+                          "closest_step", "margin", "threshold"})
+    if (!decision.at(key).is_null()) present.insert(key);
+  return present;
+}
+
+using Keys = std::set<std::string>;
+
+TEST(CertifyJsonTest, ACertificateNamesItsClosestObstacle) {
+  const Json decision = CertifyJson("bicycle", "bicycle_certified");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"obstacle", "closest_step", "margin", "threshold"}));
+  EXPECT_EQ(decision["obstacle"], 0);
+  const auto step = decision["closest_step"].get<std::size_t>();
+  EXPECT_EQ(decision["threshold"], 1.0);
+  double least = std::numeric_limits<double>::infinity();
+  for (const Json& slice : decision["tube"]) least = std::min(least, slice["clearance"][0].get<double>());
+  EXPECT_EQ(decision["tube"][step]["clearance"][0], least);
+  EXPECT_NEAR(decision["margin"].get<double>() - decision["threshold"].get<double>(), least, 1e-12);
+}
+
+TEST(CertifyJsonTest, AnAbstentionSNamesTheObstacleAndWhatIsMissing) {
+  const Json decision = CertifyJson("bicycle", "bicycle_safety");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"step", "obstacle", "closest_step", "margin", "threshold"}));
+  EXPECT_EQ(decision["obstacle"], 0);
+  EXPECT_EQ(decision["closest_step"], decision["step"]);
+  EXPECT_LT(decision["margin"].get<double>(), decision["threshold"].get<double>());
+}
+
+TEST(CertifyJsonTest, AnAbstentionDNamesCoordinateValueAndBound) {
+  const Json decision = CertifyJson("bicycle", "bicycle_domain");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"step", "coordinate", "exit", "margin", "threshold"}));
+  EXPECT_EQ(decision["coordinate"], 4) << "a, of x, y, theta, v, a, delta";
+  EXPECT_EQ(decision["exit"], "upper");
+  EXPECT_EQ(decision["threshold"], 3.0);
+  EXPECT_GT(decision["margin"].get<double>(), 3.0);
+}
+
+TEST(CertifyJsonTest, AnAbstentionFNamesThePairAndWhatTheDeclarationAllows) {
+  const Json decision = CertifyJson("bicycle_falsified", "bicycle_certified");
+  EXPECT_EQ(WitnessOf(decision), (Keys{"coordinate", "first_observation", "second_observation", "margin", "threshold"}));
+  EXPECT_EQ(decision["first_observation"], 0);
+  EXPECT_EQ(decision["second_observation"], 6);
+  EXPECT_EQ(decision["coordinate"], 2);
+  EXPECT_GT(decision["margin"].get<double>(), decision["threshold"].get<double>());
+}
+
+TEST(CertifyJsonTest, WithoutObstaclesThereIsNoClosestOne) {
+  const forereach::ScratchDirectory scratch;
+  std::string text = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+  text = std::regex_replace(text, std::regex("obstacles:\n *- circle.*"), "obstacles: []");
+  text = std::regex_replace(text, std::regex("transitions: data"), "transitions: " FOREREACH_SOURCE_DIR "/config/data");
+  const Json decision = Json::parse(Forereach("certify --json --config " + scratch.Write("task.yaml", text) +
+                                              " --plan config/plans/bicycle_certified.csv").text);
+  EXPECT_EQ(decision["outcome"], "certified");
+  EXPECT_EQ(WitnessOf(decision), Keys{});
 }
 
 TEST(CertifyJsonTest, TubeEndsWhereDEndedIt) {

@@ -1,5 +1,7 @@
 #include "logger/picture.h"
 
+#include <filesystem>
+#include <iterator>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -65,6 +67,36 @@ TEST(Picture, SaysWhatItCannotWrite) {
   EXPECT_THROW(DrawPicture({}, scratch / "a.png", 100, 800), PictureError);
   EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.png"), PictureError);
   EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.svg"), PictureError);
+}
+
+TEST(Picture, FilesAreThoseOfTheNameOrRefusedWithASentence) {
+  using Files = std::vector<std::string>;
+  const ScratchDirectory scratch;
+  const auto in = [&](const std::string& name) { return scratch / name; };
+  EXPECT_EQ(PictureFiles(in("a.svg")), Files{in("a.svg")});
+  EXPECT_EQ(PictureFiles(in("a.png")), Files{in("a.png")});
+  EXPECT_EQ(PictureFiles(in("a.pdf")), Files{in("a.pdf")});
+  EXPECT_EQ(PictureFiles(in("a")), (Files{in("a.svg"), in("a.png")}));
+  const auto refused = [](const std::string& name, const std::string& why) {
+    EXPECT_THAT([&] { (void)PictureFiles(name); }, testing::ThrowsMessage<PictureError>(testing::HasSubstr(why)));
+  };
+  for (const char* ending : {".jpg", ".PNG", ".v2", "."})
+    refused(in(std::string("a") + ending), std::string("ends in ") + ending + "; it has to end in .svg, .png or .pdf");
+  refused(in("none/a.svg"), "there is no directory " + in("none"));
+  refused(in(""), "names no file");
+  refused("", "names no file");
+  std::filesystem::create_directory(in("b.svg"));
+  refused(in("b.svg"), "b.svg is a directory");
+  refused(in("b"), "b.svg is a directory");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1) << "no file is touched";
+}
+
+TEST(Picture, APdfIsAPdf) {
+  const ScratchDirectory scratch;
+  DrawPicture(Sample(), scratch / "a.pdf");
+  const std::vector<std::uint8_t> bytes = ReadBytes(scratch / "a.pdf");
+  ASSERT_GT(bytes.size(), 500u);
+  EXPECT_EQ(std::string(bytes.begin(), bytes.begin() + 5), "%PDF-");
 }
 
 }  // namespace

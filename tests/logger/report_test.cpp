@@ -153,6 +153,12 @@ TEST_F(LogPictureTest, TheReportSaysWhatIsWrong) {
   EXPECT_EQ(out.str(), "");
 }
 
+TEST_F(LogPictureTest, TheReportRefusesAPictureItCannotWriteBeforeItReadsAnything) {
+  std::ostringstream out;
+  EXPECT_THAT([&] { Report({{"none.lcmlog"}, "none.yaml", scratch_ / "x.gif"}, out); },
+              testing::ThrowsMessage<BadInput>(testing::HasSubstr("x.gif ends in .gif")));
+}
+
 // The name of a channel may be any bytes.
 TEST_F(LogPictureTest, TheReportIsJsonWhateverTheLogHolds) {
   Append("CH\xff\xfe", MakeEvent(0, 0));

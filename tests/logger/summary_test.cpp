@@ -101,7 +101,36 @@ TEST(Summary, OfNothingIsUnknownNotZero) {
   const nlohmann::json json = ToJson(summary);
   EXPECT_TRUE(json["decision_latency_us"]["p50"].is_null());
   EXPECT_TRUE(json["distance_to_goal_m"].is_null());
-  EXPECT_THAT(ToText(summary), testing::HasSubstr("unknown"));
+  EXPECT_THAT(ToText(summary), testing::HasSubstr("not measured"));
+}
+
+// A robot that has been at the goal may have driven on.
+TEST(Summary, SaysHowFarTheGoalIsAndWhetherItWasReached) {
+  Summary summary;
+  summary.goal_radius_m = 3;
+  const auto line = [&](double distance, bool reached) {
+    summary.distance_to_goal_m = distance;
+    summary.goal_reached = reached;
+    const std::string text = ToText(summary);
+    const std::size_t at = text.find("distance to goal") + 26;
+    return text.substr(at, text.find('\n', at) - at);
+  };
+  EXPECT_EQ(line(0.78, true), "0.78 m (goal reached)");
+  EXPECT_EQ(line(3, true), "3.00 m (goal reached)");
+  EXPECT_EQ(line(5.49, true), "5.49 m at the end (the goal was reached before, within 3 m)");
+  EXPECT_EQ(line(5.49, false), "5.49 m (goal not reached)");
+}
+
+// The simulated clock of `forereach run` stands still while something is computed.
+TEST(Summary, TimesOfASimulatedClockAreNotMeasurements) {
+  Summary summary;
+  summary.latency_us = summary.certify_us = {0, 0};
+  const std::string text = ToText(summary);
+  EXPECT_THAT(text, testing::HasSubstr("decision latency          not measured\n"));
+  EXPECT_THAT(text, testing::HasSubstr("certify step              not measured\n"));
+  EXPECT_TRUE(ToJson(summary)["decision_latency_us"]["p50"].is_null());
+  summary.latency_us = {0, 3};
+  EXPECT_THAT(ToText(summary), testing::HasSubstr("p50 0.0 us, p99 3.0 us"));
 }
 
 TEST(Summary, InventedChannelsAreCountedTogether) {

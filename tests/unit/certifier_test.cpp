@@ -19,7 +19,7 @@
 namespace forereach {
 namespace {
 
-using testing::HasSubstr;
+using testing::Eq, testing::HasSubstr;
 using testing::ThrowsMessage;
 
 const double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -402,20 +402,30 @@ TEST(Certifier, RequireNamesWhatItCannotJudge) {
   const Certifier certifier(std::make_shared<Problem>(PointMassProblem()));
   const std::vector<double> controls(2 * (kMaxSteps + 1), 0.0);
   const Zonotope start = PointSet(Eigen::VectorXd::Zero(4));
-  const auto refuses = [&](const Plan& plan, const Zonotope& set, const std::vector<Obstacle>& obstacles, const char* part) {
-    EXPECT_THAT([&] { certifier.Require(plan, set, obstacles); }, ThrowsMessage<std::invalid_argument>(HasSubstr(part)));
+  const auto refuses = [&](const Plan& plan, const Zonotope& set, const std::vector<Obstacle>& obstacles,
+                           const char* message) {
+    EXPECT_THAT([&] { certifier.Require(plan, set, obstacles); }, ThrowsMessage<std::invalid_argument>(Eq(message)));
   };
   const Plan good{controls.data(), 2, kMaxSteps, 2};
   EXPECT_NO_THROW(certifier.Require(good, start, {}));
-  refuses({controls.data(), 2, kMaxSteps + 1, 2}, start, {}, "129 steps");
-  refuses({controls.data(), 2, 0, 2}, start, {}, "0 steps");
-  refuses({controls.data(), 1, 1, 1}, start, {}, "1 inputs");
-  refuses({controls.data(), 2, 1, 1}, start, {}, "plan");
-  const std::vector<double> nan{0, 0, 0, kNan};
-  refuses({nan.data(), 2, 2, 2}, start, {}, "step 1 is not finite");
-  refuses(good, PointSet(Vec({0, 0})), {}, "initial set: dimension 2");
-  refuses(good, Zonotope(Eigen::VectorXd::Zero(4), Eigen::MatrixXd::Ones(4, 21)), {}, "initial set: more generators");
-  refuses(good, start, {Obstacle::Circle(Vec({0, 0}), 1), Obstacle::HalfSpace(Eigen::VectorXd::Ones(3), 1)}, "obstacle 1: dimension 3");
+  EXPECT_NO_THROW(certifier.Require({controls.data(), 2, 3, 5}, start, {}));
+  refuses({controls.data(), 2, kMaxSteps + 1, 2}, start, {}, "plan: 129 steps, must be 1 to 128");
+  refuses({controls.data(), 2, 0, 2}, start, {}, "plan: 0 steps, must be 1 to 128");
+  refuses({controls.data(), 2, -1, 2}, start, {}, "plan: -1 steps, must be 1 to 128");
+  refuses({controls.data(), 1, 1, 1}, start, {}, "plan: 1 inputs, the model has 2");
+  refuses({controls.data(), 3, 1, 3}, start, {}, "plan: 3 inputs, the model has 2");
+  refuses({controls.data(), 2, 1, 1}, start, {}, "plan: stride 1, must be at least its 2 inputs");
+  refuses({controls.data(), 2, 1, 0}, start, {}, "plan: stride 0, must be at least its 2 inputs");
+  refuses({controls.data(), 2, 1, -2}, start, {}, "plan: stride -2, must be at least its 2 inputs");
+  refuses({nullptr, 2, 1, 2}, start, {}, "plan: no controls, its pointer is null");
+  const std::vector<double> nan{0, 0, 0, kNan}, infinite{-kInfinity, 0};
+  refuses({nan.data(), 2, 2, 2}, start, {}, "plan: step 1: ay is nan, must be finite");
+  refuses({infinite.data(), 2, 1, 2}, start, {}, "plan: step 0: ax is -inf, must be finite");
+  refuses(good, PointSet(Vec({0, 0})), {}, "initial set: dimension 2, the model has 4 states");
+  refuses(good, Zonotope(Eigen::VectorXd::Zero(4), Eigen::MatrixXd::Ones(4, 21)), {},
+          "initial set: 21 generators, must be at most 20, the zonotope order times the states");
+  refuses(good, start, {Obstacle::Circle(Vec({0, 0}), 1), Obstacle::HalfSpace(Eigen::VectorXd::Ones(3), 1)},
+          "obstacle 1: dimension 3, the projection has 2");
 }
 
 TEST(Certifier, WorksAtTheLargestOrderAndHorizon) {
