@@ -533,10 +533,8 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const
     switch (KindOf(path)) {
       case FileKind::kDatabase:
         return FromDatabase(path, config_path, key);
-      case FileKind::kJson: {
-        std::ifstream stream = OpenForReading(path);
-        return {FromDecision(path, ParseJson<Json>(stream), config_path)};
-      }
+      case FileKind::kJson:
+        return {FromDecision(path, ParseJson<Json>(ReadWhole(path, kLargestJsonFile)), config_path)};
       case FileKind::kOther:
         if (Survey({path}).events == 0) break;
         [[fallthrough]];

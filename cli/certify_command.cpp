@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "certifier/certify/explain.h"
+#include "certifier/numerics/text.h"
 #include "cli/commands.h"
 #include "cli/decision_json.h"
 
@@ -23,7 +24,7 @@ void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifi
   } else {
     std::cout << "  tube: " << tube.length() << " steps; half-width of its last slice:";
     for (std::size_t k = 0; k < names.size(); ++k)
-      std::cout << " " << names[k] << " " << tube.slice(tube.length()).HalfWidthUpper(static_cast<int>(k));
+      std::cout << " " << names[k] << " " << RoundedUp(tube.slice(tube.length()).HalfWidthUpper(static_cast<int>(k)));
   }
   std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
 }

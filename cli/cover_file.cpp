@@ -140,11 +140,11 @@ void SaveCover(const std::string& path, const Config& config, const std::vector<
 }
 
 CoverFile LoadCover(const std::string& path, const Config& config) {
-  std::ifstream stream = OpenForReading(path);
+  const std::string text = ReadWhole(path, kLargestJsonFile);
   const std::vector<std::string> names = ArgumentNames(config);
   CoverFile file;
   try {
-    const Json document = Json::parse(stream);
+    const Json document = Json::parse(text);
     for (const Json& entry : document.at("entries"))
       file.claims.push_back({IndexOf(names, entry.at("row").get<std::string>()),
                              IndexOf(names, entry.at("column").get<std::string>()), entry.at("bound").get<double>(),

@@ -1,9 +1,10 @@
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
+#include <functional>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -11,7 +12,7 @@
 
 #include "certifier/declare/slope_bound.h"
 #include "certifier/numerics/parallel.h"
-#include "certifier/task/number.h"
+#include "certifier/numerics/text.h"
 #include "cli/commands.h"
 #include "cli/cover_file.h"
 #include "cli/progress.h"
@@ -64,15 +65,42 @@ std::vector<SlopeBound> BoundAll(const Config& config, const Options& options) {
   return bounds;
 }
 
-// In decimal with ten digits, no less than x when it is read back.
-std::string RoundedUp(double x) {
+bool IsFree(const Config& config, std::size_t parameter) {
+  return config.residual->parameters[parameter].lower < config.residual->parameters[parameter].upper;
+}
+
+constexpr int kDigits = 10;  // of a bound
+
+std::string BoxInWords(const std::vector<Interval>& box, const std::vector<std::string>& names,
+                       const std::function<bool(std::size_t)>& counts) {
   std::string text;
-  for (double y = x; text.empty() || ParseNumber(text).value < x; y *= 1 + 5e-11) {
-    char digits[32];
-    std::snprintf(digits, sizeof digits, "%.10g", y);
-    text = digits;
-  }
+  for (std::size_t i = 0; i < box.size(); ++i)
+    if (counts(i))
+      text += (text.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(box[i].lower, kDigits) + ", " +
+              RoundedUp(box[i].upper, kDigits) + "]";
   return text;
+}
+
+// A slope without a finite bound declares nothing. @throws std::runtime_error that names it and a box.
+void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, const ResidualSlopes& slopes) {
+  const std::vector<std::string> names = ArgumentNames(config);
+  const std::size_t parameters_begin = names.size() - config.residual->parameters.size();
+  for (const SlopeBound& bound : bounds) {
+    if (!bound.unbounded.empty())
+      throw std::runtime_error(
+          "no finite bound for the slope of " + names[static_cast<std::size_t>(bound.row)] + " by " +
+          names[static_cast<std::size_t>(bound.column)] + ": " + config.residual->name + " has none over " +
+          BoxInWords(bound.unbounded, names,
+                     [&](std::size_t i) {
+                       return slopes.Occurs(bound.row, static_cast<int>(i)) &&
+                              (i < parameters_begin || IsFree(config, i - parameters_begin));
+                     }) +
+          ", found after " + std::to_string(bound.boxes) + " boxes; take this box out of `domain` in " + config.path +
+          " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, or raise --max-boxes "
+          "if the box is wide");
+    if (std::ranges::all_of(bound.cover.nodes, [](const auto& node) { return node.outside || node.argument >= 0; }))
+      throw ConfigError(config.path + ": domain: its inequalities and balls leave no point of its box");
+  }
 }
 
 // What goes into a task file's `declaration`.
@@ -139,10 +167,6 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
             {"residual", ToHex(ResidualDigest(config))}}}};
 }
 
-bool IsFree(const Config& config, std::size_t parameter) {
-  return config.residual->parameters[parameter].lower < config.residual->parameters[parameter].upper;
-}
-
 void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
   const auto slopes = MakeResidualSlopes(config.residual->name);
   const std::vector<std::string> names = ArgumentNames(config);
@@ -150,14 +174,14 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
   const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
   std::ostringstream text;
   text << std::left << "declare: " << config.residual->name << " over the domain, "
-       << (AllReached(bounds) ? "to a gap of " : "stopped at a gap of ") << std::setprecision(2) << LargestGap(bounds)
+       << (AllReached(bounds) ? "to a gap of " : "stopped at a gap of ") << RoundedUp(LargestGap(bounds), 2)
        << "\n  " << std::setw(8) << "row" << std::setw(8) << "column" << std::setw(18) << "certified bound"
        << std::setw(18) << "largest found" << std::setw(10) << "gap" << std::setw(9) << "boxes"
        << " at\n";
   for (const SlopeBound& bound : bounds) {
     text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)
-         << RoundedUp(bound.upper) << std::setprecision(10) << std::setw(18) << bound.lower << std::setprecision(2)
-         << std::setw(10) << bound.gap() << std::setw(9) << bound.boxes << std::setprecision(6);
+         << RoundedUp(bound.upper, kDigits) << std::setw(18) << RoundedDown(bound.lower, kDigits) << std::setw(10)
+         << RoundedUp(bound.gap(), 2) << std::setw(9) << bound.boxes << std::setprecision(6);
     for (std::size_t i = 0; i < bound.point.size(); ++i)
       if (slopes->Occurs(bound.row, static_cast<int>(i)) &&
           (i < parameters_begin || IsFree(config, i - parameters_begin)))
@@ -173,6 +197,7 @@ int Declare(const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<SlopeBound> bounds = BoundAll(config, options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  RequireFinite(bounds, config, *MakeResidualSlopes(config.residual->name));
   if (!options.cover.empty()) {
     std::vector<verifier::SlopeClaim> claims;
     for (const SlopeBound& bound : bounds) claims.push_back({bound.row, bound.column, bound.upper, bound.cover});

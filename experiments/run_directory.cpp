@@ -8,6 +8,7 @@
 
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/files.h"
 #include "cli/progress.h"
 
 namespace forereach::experiments {
@@ -16,13 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
-std::string ReadFile(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) throw std::runtime_error(path.string() + ": cannot be read");
-  return text.str();
-}
+std::string ReadFile(const fs::path& path) { return ReadWhole(path.string(), kLargestJsonFile); }
 
 // The counts of a tally by name, for writing and reading alike.
 template <class Tally, class Visit>

@@ -95,6 +95,9 @@ std::string_view FaultAdvice(std::int16_t cause) {
     case fault_t::DECLARATION_FALSIFIED:
       return "a reset alone does not help, every candidate stays F: declare a larger bound in the task file, "
              "`forereach reload`, then `forereach reset`";
+    case fault_t::UNCERTIFIED_PLAN:
+      return "find out what made the robot execute a plan that was not certified, before it moves again; then "
+             "`forereach reset`";
     default:
       return "find the reason, then `forereach reset`";
   }

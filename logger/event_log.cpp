@@ -56,7 +56,9 @@ std::int64_t RecordBytes(const LogEvent& event) {
   return kHeaderBytes + std::ssize(event.channel) + std::ssize(event.data);
 }
 
-EventLogReader::EventLogReader(const std::string& path) : file_(std::fopen(path.c_str(), "rb"), &std::fclose) {
+EventLogReader::EventLogReader(const std::string& path)
+    // Opening a pipe without a writer may not wait.
+    : file_(::fdopen(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK), "rb"), &std::fclose) {
   struct stat status {};
   if (!file_ || ::fstat(::fileno(file_.get()), &status) != 0) throw LogError(Reason("log: cannot read ", path));
   if (!S_ISREG(status.st_mode)) throw LogError("log: cannot read " + path + ": not a regular file");

@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <iterator>
 #include <vector>
 
 #include <fcntl.h>
@@ -21,22 +20,14 @@ namespace fs = std::filesystem;
 
 constexpr const char *kTasks = "tasks", *kTask = "task.yaml";
 constexpr std::string_view kTransitions = "transitions-", kTransitionsEnding = ".csv", kPolicy = "policy-";
-constexpr std::size_t kLargestFile = std::size_t{1} << 28;
+constexpr std::int64_t kLargestFile = 256 * kMegabyte;
 constexpr std::size_t kHexDigits = 64;
 
 bool IsDigest(std::string_view text) {
   return text.size() == kHexDigits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
-std::string BytesOf(const std::string& path) {
-  std::ifstream file = OpenForReading(path);
-  std::string bytes;
-  for (std::istreambuf_iterator<char> at(file), end; at != end; ++at) {
-    if (bytes.size() == kLargestFile) throw ConfigError(path + ": has more than 2^28 bytes");
-    bytes.push_back(*at);
-  }
-  return bytes;
-}
+std::string BytesOf(const std::string& path) { return ReadWhole(path, kLargestFile); }
 
 [[noreturn]] void FailToWrite(const std::string& path) {
   throw ConfigError(path + ": cannot be written: " + std::strerror(errno));

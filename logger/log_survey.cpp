@@ -112,12 +112,7 @@ FileKind KindOf(const std::string& path) {
   if (fs::is_directory(path, error)) return FileKind::kDirectory;
   if (fs::exists(path, error) && !fs::is_regular_file(path, error))
     throw LogError("log: cannot read " + path + ": not a regular file");
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw LogError("log: cannot read " + path + ": " + std::strerror(errno));
-  std::string bytes(16, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  const std::string bytes = ReadBeginning(path, 16);
   if (bytes.empty()) return FileKind::kEmpty;
   if (bytes == std::string_view("SQLite format 3\0", 16)) return FileKind::kDatabase;
   if (bytes.starts_with("\xED\xA1\xDA\x01")) return FileKind::kEventLog;

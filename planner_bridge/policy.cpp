@@ -10,6 +10,8 @@
 
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/config.h"
+#include "certifier/task/files.h"
 #include "certifier/task/json_file.h"
 
 namespace forereach {
@@ -183,11 +185,11 @@ Eigen::MatrixXd Policy::Act(const Eigen::VectorXd& features) const {
 }
 
 Policy LoadPolicy(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw PolicyError(path + ": cannot be read");
   Json json;
   try {
-    json = ParseJson<Json>(file);
+    json = ParseJson<Json>(ReadWhole(path, kLargestJsonFile));
+  } catch (const ConfigError& error) {
+    throw PolicyError(error.what());
   } catch (const Json::exception& error) {
     throw PolicyError(path + ": " + error.what());
   }

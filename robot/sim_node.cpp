@@ -120,10 +120,13 @@ void RobotSimNode::OnCommand(const Received& received) {
   PublishEvent(received.utime, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
 }
 
-void RobotSimNode::Reload() { reload_.Ask(); }
+void RobotSimNode::Reload() {
+  if (!reload_.Ask()) spdlog::error("not reloaded: the reloads before have not ended; it is read again once one has");
+}
 
 void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
+  if (reload_.TakeStall()) spdlog::error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
   guard_.Expect(config->digest, config->model_digest);
   spdlog::info("plans certified under {} as it is now are accepted", config_.path);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "verifier/containment.h"
 #include "verifier/separation.h"
 
 namespace forereach::verifier {
@@ -51,6 +52,7 @@ class SliceCheck {
 
   [[nodiscard]] std::optional<Failure> Run() {
     for (int k = 0; k < slice_.dim() && !failure_; ++k) CheckHull(k);
+    if (!failure_ && recorded_.has_generators) CheckGenerators();
     for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
     if (!step_) CheckRest();
     if (!failure_) CheckSafety();
@@ -78,6 +80,18 @@ class SliceCheck {
     claims_.AtMost(sum, half_width, half_width,
                    [&] { return "the recorded generators stay in the recorded hull in " + name(k); });
     contains("the hull of the recorded generators", center - sum, center + sum);
+  }
+
+  void CheckGenerators() {
+    const Containment inside = IsInside(slice_, recorded_.center, recorded_.generators);
+    if (inside.answer == Answer::kYes) return;
+    const int k = inside.coordinate;
+    const Real scale = k < 0 ? inside.bound : abs(slice_.center[Index(k)]) + slice_.HalfWidth(k);
+    claims_.Judge(inside.answer, inside.found, inside.bound, scale, "at most", [&] {
+      return k < 0 ? "the set that the recorded generators span contains the slice"
+                   : "the set that the recorded generators span contains the slice, by " + name(k) +
+                         " of what differs from them";
+    });
   }
 
   void CheckStep(int k) {

@@ -1,16 +1,9 @@
 #include "certifier/certify/explain.h"
 
-#include <array>
-#include <cstdio>
+#include "certifier/numerics/text.h"
 
 namespace forereach {
 namespace {
-
-std::string Short(double value) {
-  std::array<char, 32> text;
-  std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
 
 std::string VariableName(const NominalModel& model, int index) {
   const int n = model.num_states();
@@ -21,7 +14,10 @@ std::string VariableName(const NominalModel& model, int index) {
 
 std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
   using Kind = DomainExit::Kind;
-  const std::string value = Short(exit.value), bound = Short(exit.bound);
+  // What is reached, away from the bound; the bound itself, towards it.
+  const bool below = exit.kind == Kind::kLower;
+  const std::string value = below ? RoundedDown(exit.value) : RoundedUp(exit.value);
+  const std::string bound = below ? RoundedUp(exit.bound) : RoundedDown(exit.bound);
   switch (exit.kind) {
     case Kind::kLower:
       return VariableName(model, exit.index) + " reaches " + value + ", below its bound " + bound;
@@ -40,19 +36,17 @@ std::string ExplainFalsified(const Decision& decision, const NominalModel& model
     return "abstain F: at step " + std::to_string(decision.step) + " no residual in " + coordinate +
            " agrees with all observations and the declaration";
   return "abstain F: observations " + std::to_string(decision.first_observation) + " and " +
-         std::to_string(decision.second_observation) + " differ in " + coordinate + " by " + Short(decision.margin) +
-         ", the declaration allows " + Short(decision.threshold);
+         std::to_string(decision.second_observation) + " differ in " + coordinate + " by " + RoundedDown(decision.margin) +
+         ", the declaration allows " + RoundedUp(decision.threshold);
 }
 
 std::string ExplainSafety(const Decision& decision) {
   const std::string obstacle = "obstacle " + std::to_string(decision.obstacle);
-  const double clearance = decision.margin - decision.threshold;
+  const double clearance = SubDown(decision.margin, decision.threshold);
   if (decision.outcome == Outcome::kSafety)
     return "abstain S: at step " + std::to_string(decision.step) + " the tube may touch " + obstacle + " (by " +
-           Short(-clearance) + " m)";
-  if (decision.obstacle < 0) return "certified: no obstacles";
-  return "certified: every slice stays clear, closest at step " + std::to_string(decision.closest_step) + ", " +
-         Short(clearance) + " m from " + obstacle;
+           RoundedUp(-clearance) + " m)";
+  return ExplainCertificate(decision.closest_step, decision.obstacle, clearance);
 }
 
 std::string Sentence(const Decision& decision, const Problem& problem) {
@@ -79,8 +73,14 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
 
 }  // namespace
 
+std::string ExplainCertificate(int closest_step, int obstacle, double clearance) {
+  if (obstacle < 0) return "certified: no obstacles";
+  return "certified: every slice stays clear, closest at step " + std::to_string(closest_step) + ", " +
+         RoundedDown(clearance) + " m from obstacle " + std::to_string(obstacle);
+}
+
 std::string Explain(const Decision& decision, const Problem& problem) {
-  return Sentence(decision, problem) + (decision.capped ? "; a search met max_leaf_visits" : "");
+  return Sentence(decision, problem) + (decision.capped ? kCapped : "");
 }
 
 }  // namespace forereach

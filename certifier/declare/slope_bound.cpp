@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <queue>
 #include <stdexcept>
 #include <string>
@@ -77,12 +78,24 @@ void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z)
 
 // ---- The search.
 
+// At least 0; what is not a number bounds nothing.
+double NonNegative(double bound) { return std::isnan(bound) ? kInfinity : std::max(0.0, bound); }
+
+// Of two numbers that are not negative, for comparisons only: positive where both are, and finite.
+double Product(double a, double b) {
+  return a > 0 && b > 0 ? std::clamp(a * b, std::numeric_limits<double>::denorm_min(), kMaxDouble) : 0;
+}
+
 struct Part {
   double bound;
   int node, cut;
   Arguments box;
 
-  bool operator<(const Part& other) const { return bound < other.bound || (bound == other.bound && node > other.node); }
+  // Of infinite bounds the newest part goes first: it is cut down to a box that shows where, or to finite ones.
+  bool operator<(const Part& other) const {
+    if (bound != other.bound) return bound < other.bound;
+    return bound < kInfinity ? node > other.node : node < other.node;
+  }
 };
 
 class Search {
@@ -117,6 +130,7 @@ class Search {
       if (progress && result_.boxes % kBetweenReports < 2) progress(Closed(part.bound));
     }
     if (!parts_.empty()) result_.upper = std::max(result_.upper, parts_.top().bound);
+    if (!parts_.empty() && result_.upper == kInfinity) result_.unbounded = parts_.top().box;
     result_.reached = result_.upper <= Enough();
     if (progress) progress(1);
     return std::move(result_);
@@ -131,7 +145,8 @@ class Search {
     const double gap = upper / result_.lower - 1;
     if (!(gap < kInfinity)) return closed_;
     if (first_gap_ == 0) first_gap_ = std::max(gap, 2 * options_.gap);
-    return closed_ = std::clamp(std::log(first_gap_ / gap) / std::log(first_gap_ / options_.gap), closed_, 1.0);
+    const double closed = std::log(first_gap_ / gap) / std::log(first_gap_ / options_.gap);
+    return closed_ = closed > closed_ ? std::min(closed, 1.0) : closed_;
   }
 
   void Bisect(const Part& part) {
@@ -175,7 +190,7 @@ class Search {
     double bound = kInfinity;
     while (true) {
       const Jet jet = slopes_.Enclose(result_.row, result_.column, rest, active_);
-      bound = std::min(bound, std::max(0.0, sign > 0 ? jet.slope.upper : -jet.slope.lower));
+      bound = std::min(bound, NonNegative(sign > 0 ? jet.slope.upper : -jet.slope.lower));
       if (bound <= Enough()) return bound;
       const auto rises = std::span(jet.curvature).first(active_.size());
       if (!std::ranges::all_of(rises, [](const Interval& c) { return c.IsFinite(); })) {
@@ -184,7 +199,7 @@ class Search {
         return bound;
       }
       if (!ShrinkToLargest(rises, sign, box, inside, rest))
-        return std::min(bound, std::max(0.0, MeanValueBound(rises, sign, rest, inside)));
+        return std::min(bound, NonNegative(MeanValueBound(rises, sign, rest, inside)));
     }
   }
 
@@ -200,7 +215,7 @@ class Search {
       moved = true;
       // The better end may lie outside the domain: then cutting helps all the same.
       if (!inside && constrained_[Place(active_[i])])
-        Prefer(active_[i], rise.Magnitude() * Width(box[Place(active_[i])]), box, cut_, cut_score_);
+        Prefer(active_[i], Product(rise.Magnitude(), Width(box[Place(active_[i])])), box, cut_, cut_score_);
     }
     return moved;
   }
@@ -216,10 +231,11 @@ class Search {
       const Interval rise = sign > 0 ? rises[i] : -rises[i];
       double& w = point[Place(active_[i])];
       const double share = rise.upper / (rise.upper - rise.lower);
-      w = std::clamp(range.lower + share * (range.upper - range.lower), range.lower, range.upper);
+      const double best = range.lower + share * (range.upper - range.lower);
+      w = range.Contains(best) ? best : range.Middle();  // the sum may overflow
       const double cost = std::max(MulUp(rise.upper, SubUp(range.upper, w)), MulUp(-rise.lower, SubUp(w, range.lower)));
       excess = AddUp(excess, cost);
-      Prefer(active_[i], rise.Magnitude() * Width(range), rest, cut_, cut_score_);
+      Prefer(active_[i], Product(rise.Magnitude(), Width(range)), rest, cut_, cut_score_);
     }
     return AddUp(At(point, inside, sign).upper, excess);
   }
@@ -258,7 +274,7 @@ class Search {
     double best_score = 0;
     for (int i = 0; i < static_cast<int>(box.size()); ++i)
       if (std::ranges::count(active_, i) > 0 || (!inside && constrained_[Place(i)]))
-        Prefer(i, Width(box[Place(i)]) / Width(root_[Place(i)]), box, best, best_score);
+        Prefer(i, ShareOf(box[Place(i)], root_[Place(i)]), box, best, best_score);
     return best;
   }
 
@@ -270,7 +286,11 @@ class Search {
     best_score = score;
   }
 
-  static double Width(const Interval& range) { return range.upper - range.lower; }
+  static double Width(const Interval& range) { return std::min(range.upper - range.lower, kMaxDouble); }
+  static double ShareOf(const Interval& part, const Interval& whole) {
+    if (whole.upper - whole.lower < kInfinity) return Width(part) / Width(whole);
+    return (part.upper / 2 - part.lower / 2) / (whole.upper / 2 - whole.lower / 2);
+  }
 
   static std::vector<double> Middle(const Arguments& box) {
     std::vector<double> point(box.size());

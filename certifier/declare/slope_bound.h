@@ -32,6 +32,9 @@ struct SlopeBound {
   std::vector<double> point;  ///< w = (z, theta), in the domain; empty if no point of it was found.
   std::size_t boxes = 0;      ///< Evaluated.
   bool reached = false;       ///< Whether the gap was.
+  /** Where `upper` is infinite: a box w without a finite bound, cut until it could not be cut further or `max_boxes`
+  came. Empty where `upper` is finite. */
+  std::vector<Interval> unbounded;
   Cover cover;                ///< Of the domain's box and the parameters' together.
 
   /** (upper - lower) / lower, rounded up; infinite where lower is zero and upper is not. */

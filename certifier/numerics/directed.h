@@ -96,6 +96,12 @@ inline constexpr double kSafeProduct = 0x1p-960;
   return internal::UpIfBelow(root, std::fma(-root, root, x));
 }
 
+/** The least double >= x / 2: halving rounds where x is subnormal and odd. */
+[[nodiscard]] inline double HalfUp(double x) noexcept {
+  const double half = x / 2;
+  return 2 * half < x ? NextUp(half) : half;
+}
+
 [[nodiscard]] inline double SubUp(double a, double b) noexcept { return AddUp(a, -b); }
 [[nodiscard]] inline double AddDown(double a, double b) noexcept { return -AddUp(-a, -b); }
 [[nodiscard]] inline double SubDown(double a, double b) noexcept { return -AddUp(-a, b); }

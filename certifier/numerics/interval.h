@@ -33,7 +33,7 @@ struct Interval {
   /** An upper bound on |x - y| over x inside, for a given double y. */
   [[nodiscard]] double DistanceUpper(double y) const { return std::max(SubUp(upper, y), SubUp(y, lower)); }
   /** An upper bound on half the width. */
-  [[nodiscard]] double HalfWidthUpper() const { return AddUp(upper / 2, -lower / 2); }
+  [[nodiscard]] double HalfWidthUpper() const { return AddUp(HalfUp(upper), HalfUp(-lower)); }
   /** The largest |x| over x inside. */
   [[nodiscard]] double Magnitude() const { return std::max(std::abs(lower), std::abs(upper)); }
 

@@ -487,7 +487,16 @@ void CertifierNode::CompactIfDue() {
   compaction_ = Beside([gate = gate_.get()] { gate->Compact(); });
 }
 
-void CertifierNode::Reload() { reload_.Ask(); }
+void CertifierNode::Reload() {
+  if (!reload_.Ask()) NotReloaded("the reloads before it have not ended; the task file is read again once one has");
+}
+
+void CertifierNode::NotReloaded(const std::string& why) {
+  reload_error_ = why;
+  ++failed_reloads_;
+  next_heartbeat_us_ = 0;
+  spdlog::error("not reloaded, version {} stays in force: {}", version_, why);
+}
 
 CertifierNode::Loaded CertifierNode::Load(const std::string& path) try {
   spdlog::info("reloading {}", path);
@@ -520,13 +529,12 @@ std::string CertifierNode::WhyNotTaken(const Config& config) const {
 void CertifierNode::TakeReload() {
   if (compaction_.valid() && !IsReady(compaction_)) return;  // it works on *gate_
   std::optional<Loaded> loaded = reload_.Take();
+  if (reload_.TakeStall()) NotReloaded("it has not ended yet: a file that it reads does not answer");
   if (!loaded) return;
-  reload_error_ = loaded->error.empty() ? WhyNotTaken(loaded->config) : loaded->error;
+  if (const std::string why = loaded->error.empty() ? WhyNotTaken(loaded->config) : loaded->error; !why.empty())
+    return NotReloaded(why);
+  reload_error_.clear();
   next_heartbeat_us_ = 0;
-  if (!reload_error_.empty()) {
-    ++failed_reloads_;
-    return spdlog::error("not reloaded, version {} stays in force: {}", version_, reload_error_);
-  }
   loaded->gate->Inherit(*gate_);
   gate_ = std::move(loaded->gate);
   config_ = std::move(loaded->config);

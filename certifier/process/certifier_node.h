@@ -103,6 +103,7 @@ class CertifierNode final : public Node {
   void CompactIfDue();
   [[nodiscard]] static Loaded Load(const std::string& path);
   void TakeReload();
+  void NotReloaded(const std::string& why);
   /** Why a task file, good in itself, cannot take the place of the one in force; empty if it can. */
   [[nodiscard]] std::string WhyNotTaken(const Config& config) const;
 

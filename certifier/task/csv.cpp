@@ -52,15 +52,49 @@ std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<
   return order;
 }
 
+constexpr std::size_t kLongestLine = std::size_t{1} << 20;
+
+// Line by line: a file of ten million rows is larger than what is kept of it.
+class LineReader {
+ public:
+  LineReader(const std::string& path, const std::string& named_by)
+      : path_(path), file_(path, kLargestCsvFile, named_by), chunk_(1 << 16, '\0') {}
+
+  // As std::getline does: the last line need not end. False at the end.
+  bool Next(std::string& text, int line) {
+    text.clear();
+    while (true) {
+      if (begin_ == end_) {
+        begin_ = 0;
+        end_ = file_.Read(chunk_.data(), chunk_.size());
+        if (end_ == 0) return !text.empty();
+      }
+      const std::string_view rest(chunk_.data() + begin_, end_ - begin_);
+      const std::size_t length = std::min(rest.find('\n'), rest.size());
+      if (text.size() + length > kLongestLine)
+        FailAt(path_, line, "longer than " + std::to_string(kLongestLine) + " bytes, which no row of numbers is");
+      text.append(rest.substr(0, length));
+      begin_ += std::min(length + 1, rest.size());
+      if (length < rest.size()) return true;
+    }
+  }
+
+ private:
+  const std::string& path_;
+  InputFile file_;
+  std::string chunk_;
+  std::size_t begin_ = 0, end_ = 0;
+};
+
 class Reader {
  public:
   Reader(const std::string& path, const std::vector<std::string>& columns) : path_(path), columns_(columns) {}
 
-  Eigen::MatrixXd Read(std::ifstream in) {
+  Eigen::MatrixXd Read(LineReader in) {
     std::vector<Eigen::Index> order;
     std::vector<std::string_view> fields;
     int line = 0;
-    for (std::string text; std::getline(in, text);) {
+    for (std::string text; in.Next(text, line + 1);) {
       std::string_view content = text;
       if (++line == 1 && content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
       Split(content, fields);
@@ -70,7 +104,6 @@ class Reader {
         AddRow(line, fields, order);
       }
     }
-    if (in.bad()) throw ConfigError(path_ + ": reading failed after line " + std::to_string(line));
     if (line == 0)
       throw ConfigError(path_ + ":1: the file is empty; it has to begin with the header " + Joined(columns_));
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -101,7 +134,7 @@ class Reader {
 }  // namespace
 
 Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns, const std::string& named_by) {
-  return Reader(path, columns).Read(OpenForReading(path, named_by));
+  return Reader(path, columns).Read(LineReader(path, named_by));
 }
 
 void WriteCsv(const std::string& path, const std::vector<std::string>& columns, const Eigen::MatrixXd& rows) {

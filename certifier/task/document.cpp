@@ -23,8 +23,6 @@ namespace {
 using Type = Key::Type;
 using Values = std::map<std::string, YAML::Node, std::less<>>;
 
-constexpr std::size_t kLargestFile = std::size_t{1} << 24;
-
 int LineOf(const YAML::Mark& mark) { return mark.line + 1; }
 
 std::string At(const std::string& path, int line) { return path + ":" + std::to_string(line) + ": "; }
@@ -330,20 +328,6 @@ class Checker {
   Values& values_;
 };
 
-std::string ReadAll(const std::string& path) {
-  std::ifstream in = OpenForReading(path);
-  std::string text;
-  std::array<char, 1 << 16> chunk;
-  while (text.size() <= kLargestFile && in) {
-    in.read(chunk.data(), chunk.size());
-    text.append(chunk.data(), static_cast<std::size_t>(in.gcount()));
-  }
-  if (in.bad()) throw ConfigError(path + ": reading failed");
-  if (text.size() > kLargestFile)
-    throw ConfigError(path + ": larger than " + std::to_string(kLargestFile) + " bytes, which no task file is");
-  return text;
-}
-
 class Nobody final : public YAML::EventHandler {
   using Mark = YAML::Mark;
   using Anchor = YAML::anchor_t;
@@ -414,7 +398,7 @@ std::vector<std::string> SchemaScope::variables() const {
 }
 
 Document::Document(const std::string& path)
-    : path_(path), text_(ReadAll(path)), tree_(std::make_unique<Tree>(Tree{Parse(path, text_), {}})) {}
+    : path_(path), text_(ReadWhole(path, kLargestTaskFile)), tree_(std::make_unique<Tree>(Tree{Parse(path, text_), {}})) {}
 
 Document::~Document() = default;
 

@@ -1,5 +1,6 @@
 #include "certifier/task/process.h"
 
+#include <cstdlib>
 #include <iostream>
 #include <optional>
 #include <utility>
@@ -9,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "certifier/task/key.h"
+#include "certifier/task/reloading.h"
 #include "lcmtypes/authentic_bus.h"
 
 namespace forereach {
@@ -94,7 +96,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   spdlog::set_default_logger(spdlog::stderr_color_mt(description.name));
   spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$: %v");
   CatchStopSignals();
-  return Guarded(description.name, [&] {
+  const int code = Guarded(description.name, [&] {
     Config config = LoadConfig(config_path);
     bus_arguments.Override(config.bus);
     const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.name);
@@ -104,6 +106,11 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     RunNode(watched, *bus);
     return node->failed() ? 1 : 0;
   });
+  if (reloads_under_way == 0) return code;
+  // A thread that reads from a mount that stalls does not end, and may wake while static objects go.
+  std::cout.flush();
+  spdlog::default_logger()->flush();
+  std::_Exit(code);
 }
 
 }  // namespace forereach

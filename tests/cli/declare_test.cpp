@@ -1,4 +1,5 @@
 // `forereach declare`: its matrix, its cover, and what --check says of covers whole and tampered with.
+#include <filesystem>
 #include <fstream>
 #include <regex>
 
@@ -98,6 +99,39 @@ TEST_F(DeclareTest, StopsAtTheWorkLimitWithABoundAndSaysSo) {
   EXPECT_EQ(output.code, 1);
   EXPECT_THAT(output.text, HasSubstr("stopped at a gap of"));
   EXPECT_EQ(Check().code, 0) << Check().text;
+}
+
+// Every residual there is, over a domain or parameters without a finite slope: a sentence, not a search without end.
+TEST_F(DeclareTest, SaysWhereThereIsNoFiniteBound) {
+  const std::string bicycle = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+  const auto expect = [&](const std::string& text, std::initializer_list<const char*> words, const char* options = "") {
+    std::ofstream(task_) << text;
+    const Output output = Declare(std::string("--jobs 1 ") + options);
+    EXPECT_EQ(output.code, 1) << output.text;
+    for (const char* word : words) EXPECT_THAT(output.text, HasSubstr(word));
+    EXPECT_EQ(std::count(output.text.begin(), output.text.end(), '\n'), 1) << output.text;
+  };
+  const std::string pole = std::regex_replace(bicycle, std::regex("0\\.48\\]"), "1.6]");
+  const std::string words = "no finite bound for the slope of theta by v";
+  for (const char* options : {"", "--json", "--max-boxes 100000000", "--gap 1e-12", "--max-boxes 5"})
+    expect(pole, {words.c_str(), "delta in [", "heading_saturation", "domain", task_.c_str()}, options);
+  expect(std::regex_replace(bicycle, std::regex("gate_temperature: 0.1"), "gate_temperature: [0, 1]"),
+         {"no finite bound", "gate_temperature in [0, "});
+  expect(std::regex_replace(bicycle, std::regex("\\[-40, -40(.*)0, -3, -0.48\\]"), "[-40, -40$010, -3, -1e308]"),
+         {"no finite bound"});
+  EXPECT_FALSE(std::filesystem::exists(cover_));
+  std::ofstream(task_) << pole;
+  EXPECT_EQ(Declare("--cover " + cover_).code, 1);
+  EXPECT_FALSE(std::filesystem::exists(cover_)) << "a cover without a bound proves nothing";
+}
+
+TEST_F(DeclareTest, ADomainWithoutAPointIsBadInput) {
+  const std::string bicycle = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+  std::ofstream(task_) << std::regex_replace(bicycle, std::regex("domain:\n"),
+                                             "domain:\n  inequalities:\n    - {coefficients: {v: 1}, bound: -1}\n");
+  const Output output = Declare();
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("leave no point"));
 }
 
 TEST_F(DeclareTest, CoverIsConfirmed) {

@@ -291,7 +291,7 @@ TEST_F(ErrorTest, FilesThatAreNotTasks) {
   EXPECT_EQ(files_.Error("just words\n"), "task.yaml:1: just words is not a map");
   EXPECT_EQ(files_.Error("? [a, b]\n: 1\n"), "task.yaml:1: a list is not a key");
   EXPECT_THAT(files_.Error(std::string(100000, '[')), HasSubstr("task.yaml:1: not valid YAML: "));
-  EXPECT_THAT(files_.Error(std::string((1 << 24) + 1, ' ')), HasSubstr("task.yaml: larger than 16777216 bytes"));
+  EXPECT_THAT(files_.Error(std::string((1 << 24) + 1, ' ')), HasSubstr("task.yaml: is larger than 16 MiB"));
 }
 
 TEST_F(ErrorTest, FilesThatAreNotThere) {

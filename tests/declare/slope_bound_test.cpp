@@ -111,6 +111,87 @@ TEST(SlopeBound, AtTheWorkLimitHoldsAndSaysSo) {
   EXPECT_LE(bound.boxes, 502u);
 }
 
+// r_0 = 1 / (z0 - c): no finite slope where the domain holds the pole.
+struct Pole {
+  using Nominal = TwoStates;
+  static constexpr const char* kName = "pole";
+  static constexpr std::array<const char*, 1> kParameterNames{"c"};
+
+  template <class T>
+  static void Evaluate(std::span<const T> parameters, std::span<const T> z, std::span<T> residual) {
+    residual[0] = T(1) / (z[0] - parameters[0]);
+    residual[1] = z[0] * z[1] * (z[2] * z[2]);
+  }
+};
+
+// A pole is found at once, not after 2^d boxes around it, however many are allowed.
+TEST(SlopeBound, OverAPoleNamesABoxAndEnds) {
+  for (const double pole : {0.0, 0.3, 2.0, -2.0, 0x1p-1074}) {
+    const Interval c(pole);
+    const SlopeBound bound = BoundSlope(EquationsSlopes<Pole>(), Square(2), {&c, 1}, 0, 0, {1e-7, 100'000'000});
+    EXPECT_EQ(bound.upper, kInfinity);
+    EXPECT_FALSE(bound.reached);
+    EXPECT_LT(bound.boxes, 10'000u) << pole;
+    ASSERT_EQ(bound.unbounded.size(), 4u);
+    EXPECT_LT(bound.unbounded[0].DistanceUpper(pole), 1e-12);  // beside it the slope is no double either
+    EXPECT_LT(bound.unbounded[0].upper - bound.unbounded[0].lower, 1e-12);
+  }
+}
+
+TEST(SlopeBound, OfAPoleAmongTheParametersNamesABoxAndEnds) {
+  const SlopeBound bound = Bound<Pole>(Square(2), 0, 0, {1, 5});
+  EXPECT_EQ(bound.upper, kInfinity);
+  EXPECT_FALSE(bound.unbounded.empty());
+}
+
+TEST(SlopeBound, BesideAPoleIsFinite) {
+  ExpectSupremum(Bound<Pole>(Square(2), 0, 0, {2.5, 4}), 4);
+  Domain domain = Square(2);  // the pole at 1 is in the box, not in the domain
+  Eigen::VectorXd coefficients(3);
+  coefficients << 1, 0, 0;
+  domain.inequalities.push_back({coefficients, 0.5});
+  const SlopeBound bound = Bound<Pole>(domain, 0, 0, {1, 1});
+  ExpectSupremum(bound, 4);
+  EXPECT_TRUE(bound.unbounded.empty());
+}
+
+// Widths that overflow, that are subnormal, that have no double between their ends: it ends, and what it says holds.
+TEST(SlopeBound, EndsOnEveryScale) {
+  const Interval one(1, 1);
+  for (const double size : {kMaxDouble, 0x1p+1000, 0x1p+400, 1e-300, 0x1p-1022, 0x3p-1074, 0x1p-1074, 0.0}) {
+    const Domain domain = Square(size);
+    for (const auto& [row, column] : {std::pair{0, 0}, {0, 1}, {1, 0}, {1, 1}, {1, 2}}) {
+      const SlopeBound wave = BoundSlope(EquationsSlopes<Wave>(), domain, {&one, 1}, row, column, {1e-7, 3000});
+      const SlopeBound cubic = BoundSlope(EquationsSlopes<Cubic>(), domain, {&one, 1}, row, column, {1e-7, 3000});
+      for (const SlopeBound& bound : {wave, cubic}) {
+        EXPECT_LE(bound.boxes, 3002u);
+        EXPECT_GE(bound.upper, bound.lower) << size;
+        EXPECT_EQ(bound.unbounded.empty(), bound.upper < kInfinity);
+      }
+      if (row == 0 && column == 0) {
+        EXPECT_GE(wave.upper, std::cos(size) * std::cos(size) * (1 - 1e-15));  // at a corner
+        EXPECT_GE(cubic.upper, 3 * (size * size) * (1 - 1e-15));
+      }
+      if (row == 1 && column == 0) {
+        EXPECT_GE(cubic.upper, 1);
+        EXPECT_GE(wave.upper, std::min(2 * size, kMaxDouble));  // |z0 + z1|
+      }
+    }
+  }
+}
+
+// Slopes that are finite up to the largest double, over ranges whose width overflows: none may come out as nothing.
+TEST(SlopeBound, NextToOverflowNothingIsTakenForZero) {
+  const Interval one(1, 1);
+  for (const double size : {0x1p+341, 0x1p+511, 0x1p+512, 0x1p+600}) {
+    const Domain domain = Square(size);
+    for (int column = 0; column < 2; ++column) {
+      const SlopeBound bound = BoundSlope(EquationsSlopes<Pole>(), domain, {&one, 1}, 1, column, {1e-7, 3000});
+      EXPECT_GE(bound.upper, size);  // |z_other z2^2|, |z2| <= 1
+    }
+  }
+}
+
 TEST(SlopeBound, RefusesWhatDoesNotFit) {
   const Family family = Bicycle();
   EXPECT_THROW((void)family.Bound(6, 0), std::invalid_argument);

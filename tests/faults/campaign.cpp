@@ -745,6 +745,49 @@ void Campaign::BadReload() {
     const auto taken = [&] { return now->version > before.version; };
     Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
   }, options_.others);
+  ReloadOfNoFile(rig);
+}
+
+// Each would make a plain open or read of it wait for ever, never end, or fail.
+void Campaign::PutNoFile(const std::string& path, int way) {
+  std::filesystem::remove_all(path);
+  switch (way % 4) {
+    case 0:
+      if (::mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error(path + ": no pipe can be made");
+      return;
+    case 1:
+      return std::filesystem::create_symlink("/dev/zero", path);
+    case 2:
+      return (void)std::filesystem::create_directory(path);
+    default:
+      return std::filesystem::create_symlink(path, path);  // cannot be read, not even by root
+  }
+}
+
+void Campaign::ReloadOfNoFile(Rig& rig) {
+  Row& row = Begin("Reload of a pipe, /dev/zero, a directory, an unreadable file", options_.others);
+  const std::string path = rig.task_path(), good = DemoTask();
+  Tries(row, rig, [&](int i) {
+    const certifier_status_v2_t before = *rig.witness().status();
+    const auto& now = rig.witness().status();
+    PutNoFile(path, i);
+    rig.Signal(Rig::kRobot, SIGHUP);
+    rig.Command(command_t::RELOAD);
+    const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
+    Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
+    Demand(row, now->version == before.version, "it raised the version");
+    const std::int64_t certificates = rig.witness().certificates();
+    const auto certifies = [&] { return rig.witness().certificates() > certificates; };
+    Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
+    const bool ends = i / 4 % 2 == 1;
+    if (ends) rig.End(Rig::kCertifier);  // that it ends in time is looked at after each try
+    std::filesystem::remove_all(path);
+    std::ofstream(path) << good;
+    if (ends) return;
+    rig.Command(command_t::RELOAD);
+    const auto taken = [&] { return now->version > before.version; };
+    Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
+  }, options_.others);
 }
 
 std::string Table(const std::vector<Row>& rows, const Options& options) {

@@ -95,6 +95,44 @@ TEST_P(IntervalOperation, OfNanOrInfinityHasNoFiniteBound) {
 
 INSTANTIATE_TEST_SUITE_P(All, IntervalOperation, testing::Values('+', '-', '*', '/'));
 
+// Halving is not exact where an end is an odd subnormal, and a width may overflow.
+TEST(Interval, HalfWidthAndMiddleHoldAtEveryScale) {
+  Random random(203);
+  SCOPED_TRACE(random.trace());
+  const auto small = [&] { return random.Sign() * random.Integer(0, 9) * 0x1p-1074; };
+  const auto huge = [&] { return random.Sign() * (kMaxDouble - random.Integer(0, 9) * 0x1p+970); };
+  for (int trial = 0; trial < 60000; ++trial) {
+    const auto end = [&] { return trial % 3 == 0 ? small() : trial % 3 == 1 ? huge() : random.Double(); };
+    const double a = end(), b = random.Coin(0.1) ? a : random.Coin(0.1) ? random.Near(a) : end();
+    const Interval x(std::min(a, b), std::max(a, b));
+    const Rational half = (Rational(x.upper) - Rational(x.lower)) / 2;
+    SCOPED_TRACE(testing::Message() << std::hexfloat << "[" << x.lower << ", " << x.upper << "]");
+    ASSERT_TRUE(AtMost(half, x.HalfWidthUpper())) << x.HalfWidthUpper();
+    ASSERT_LE(x.HalfWidthUpper(), Up(Ceiling(half), 2));
+    ASSERT_TRUE(x.Contains(x.Middle()));
+    for (const double y : {x.Middle(), x.lower, x.upper}) {
+      const Rational reach = std::max(Rational(Rational(x.upper) - Rational(y)), Rational(Rational(y) - Rational(x.lower)));
+      ASSERT_TRUE(AtMost(reach, x.DistanceUpper(y))) << x.DistanceUpper(y);
+    }
+  }
+  EXPECT_EQ(Interval(0, 0x1p-1074).HalfWidthUpper(), 0x1p-1074);
+  EXPECT_EQ(Interval(-0x1p-1074, 0).HalfWidthUpper(), 0x1p-1074);
+  EXPECT_EQ(Interval(-kMaxDouble, kMaxDouble).HalfWidthUpper(), kMaxDouble);
+  EXPECT_EQ(Interval(-1, 2).HalfWidthUpper(), 1.5);
+}
+
+TEST(Directed, HalfUpIsTheLeastDoubleThatIsNotBelowTheHalf) {
+  Random random(204);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 60000; ++trial) {
+    const double x = trial % 2 == 0 ? random.Double() : random.Sign() * random.Integer(0, 1000) * 0x1p-1074;
+    ASSERT_EQ(HalfUp(x), Ceiling(Rational(x) / 2)) << std::hexfloat << x;
+  }
+  EXPECT_EQ(HalfUp(kInfinity), kInfinity);
+  EXPECT_EQ(HalfUp(-kInfinity), -kInfinity);
+  EXPECT_TRUE(std::isnan(HalfUp(kNan)));
+}
+
 TEST(Interval, SquareIsTheRangeUpToTwoDoubles) {
   Random random(202);
   SCOPED_TRACE(random.trace());

@@ -120,6 +120,26 @@ TEST(RemainderOracle, ContainsThemWhereProductsUnderflow) {
   }
 }
 
+// Lower and upper ends that are odd subnormals, so that neither half of their sum nor of their difference is a double.
+TEST(RemainderOracle, ContainsThemWhereHalvingRounds) {
+  Random random(616);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5);
+  for (int trial = 0; trial < 3000 && !testing::Test::HasFatalFailure(); ++trial) {
+    Case c(random, model->program());
+    Eigen::MatrixXd generators = Eigen::MatrixXd::Identity(6, 6);
+    for (int k = 0; k < 6; ++k) generators(k, k) = random.Coin() ? 1 : std::ldexp(random.Integer(1, 3), -random.Integer(0, 3));
+    c.slice = Zonotope(Eigen::VectorXd::Zero(6), generators);
+    Propagator::HalfWidths(c.slice, c.half_width.data());
+    for (PlainInterval& h : c.hessian) {
+      const double a = random.Integer(-5, 5) * 0x1p-1074, b = random.Coin() ? a : random.Integer(-5, 5) * 0x1p-1074;
+      h = {std::min(a, b), std::max(a, b)};
+    }
+    std::ranges::fill(c.error, 0);
+    ExpectContainsForms(random, c, *model);
+  }
+}
+
 TEST(RemainderOracle, SeesANumberThatIsNone) {
   Random random(615);
   const auto model = MakeKinematicBicycle(0.1, 2.5);

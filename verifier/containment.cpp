@@ -1,0 +1,131 @@
+#include "verifier/containment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <vector>
+
+namespace forereach::verifier {
+namespace {
+
+std::size_t Index(Eigen::Index k) { return static_cast<std::size_t>(k); }
+
+// The coordinate of a column's only entry that is not zero, -1 if it has several or none.
+template <class Column, class IsZero>
+int AxisOf(const Column& column, int dim, const IsZero& is_zero) {
+  int axis = -1;
+  for (int k = 0; k < dim; ++k) {
+    if (is_zero(column[Index(k)])) continue;
+    if (axis >= 0) return -1;
+    axis = k;
+  }
+  return axis;
+}
+
+class Search {
+ public:
+  Search(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators)
+      : inner_(inner), center_(center), generators_(generators), taken_(Index(generators.cols())) {
+    for (const auto& column : inner.columns) {
+      Eigen::VectorXd& rounded = rounded_.emplace_back(inner.dim());
+      for (int k = 0; k < inner.dim(); ++k) rounded[k] = column[Index(k)].ToDouble();
+    }
+    pairs_.resize(rounded_.size());
+    for (Eigen::Index i = 0; i < generators.cols(); ++i) {
+      axis_.push_back(AxisOf(generators.col(i), inner.dim(), [](double g) { return g == 0; }));
+      taken_[Index(i)] = axis_.back() >= 0;  // those make up for the rest
+    }
+  }
+
+  [[nodiscard]] Containment Run() {
+    // First those that are the same up to rounding, then whatever helps.
+    for (const double worst : {1e-6, 1.0})
+      for (std::size_t j = 0; j < rounded_.size(); ++j)
+        if (!pairs_[j] && !IsAlongAnAxis(j)) TakeNearest(j, worst);
+    // A column along an axis here may have got a tiny second entry there.
+    for (std::size_t j = 0; j < rounded_.size(); ++j)
+      if (!pairs_[j]) TakeNearest(j, 1e-3);
+    for (int k = 0; k < inner_.dim(); ++k)
+      if (const auto uncovered = Uncovered(k)) return Refuted().value_or(*uncovered);
+    return {};
+  }
+
+ private:
+  struct Pair {
+    Eigen::Index generator;
+    double gamma;
+  };
+
+  [[nodiscard]] bool IsAlongAnAxis(std::size_t j) const {
+    return AxisOf(inner_.columns[j], inner_.dim(), [](const Real& entry) { return entry.IsZero(); }) >= 0;
+  }
+
+  void TakeNearest(std::size_t j, double worst) {
+    const Eigen::VectorXd& d = rounded_[j];
+    double least = worst * d.lpNorm<1>();
+    for (Eigen::Index i = 0; i < generators_.cols(); ++i) {
+      if (taken_[Index(i)]) continue;
+      const auto g = generators_.col(i);
+      double gamma = std::clamp(d.dot(g) / g.squaredNorm(), -1.0, 1.0);
+      if (std::abs(gamma) > 1 - 1e-9) gamma = gamma < 0 ? -1 : 1;
+      const double rest = (d - gamma * g).lpNorm<1>();
+      if (!(rest < least)) continue;  // NaN, where a product under- or overflowed, is no choice
+      least = rest;
+      pairs_[j] = Pair{i, gamma};
+    }
+    if (pairs_[j]) taken_[Index(pairs_[j]->generator)] = true;
+  }
+
+  [[nodiscard]] std::optional<Containment> Uncovered(int k) const {
+    Real need = abs(inner_.center[Index(k)] - Real(center_[k])), room;
+    for (std::size_t j = 0; j < pairs_.size(); ++j) {
+      const Real& d = inner_.columns[j][Index(k)];
+      if (!pairs_[j]) {
+        if (!d.IsZero()) need += abs(d);
+        continue;
+      }
+      const double g = generators_(k, pairs_[j]->generator);
+      if (g != 0 || !d.IsZero()) need += abs(d - Real(pairs_[j]->gamma) * Real(g));
+    }
+    for (Eigen::Index i = 0; i < generators_.cols(); ++i)
+      if (axis_[Index(i)] == k) room += Real(std::abs(generators_(k, i)));
+    if (CertainlyAtMost(need, room)) return std::nullopt;
+    return Containment{Answer::kUnknown, k, need, room};
+  }
+
+  // Along e_i / r_i +- e_k / r_k, with r the half-widths there: where two coordinates are tied together that are not here.
+  [[nodiscard]] std::optional<Containment> Refuted() const {
+    const Eigen::VectorXd half_width = generators_.cwiseAbs().rowwise().sum();
+    for (int i = 0; i < inner_.dim(); ++i)
+      for (int k = i + 1; k < inner_.dim(); ++k)
+        for (const double sign : {1.0, -1.0}) {
+          const double a = 1 / half_width[i], b = sign / half_width[k];
+          if (!std::isfinite(a) || !std::isfinite(b)) continue;
+          const Real along_i(a), along_k(b);
+          const Real away = along_i * (inner_.center[Index(i)] - Real(center_[i])) +
+                            along_k * (inner_.center[Index(k)] - Real(center_[k]));
+          Real reach = abs(away), bound;
+          for (const auto& column : inner_.columns) reach += abs(along_i * column[Index(i)] + along_k * column[Index(k)]);
+          for (const auto g : generators_.colwise()) bound += abs(along_i * Real(g[i]) + along_k * Real(g[k]));
+          if (CertainlyBelow(bound, reach)) return Containment{Answer::kNo, -1, reach, bound};
+        }
+    return std::nullopt;
+  }
+
+  const Slice& inner_;
+  const Eigen::VectorXd& center_;
+  const Eigen::MatrixXd& generators_;
+  std::vector<Eigen::VectorXd> rounded_;  // inner's columns
+  std::vector<int> axis_;                 // of each generator
+  std::vector<bool> taken_;               // each generator
+  std::vector<std::optional<Pair>> pairs_;  // of each column of inner
+};
+
+}  // namespace
+
+Containment IsInside(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators) {
+  return Search(inner, center, generators).Run();
+}
+
+}  // namespace forereach::verifier
