@@ -591,6 +591,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.messages_refused = refused_;
   status.messages_not_sent = sender_.refused();
   status.bus_dropped = bus_.dropped();
+  status.datagrams_refused = bus_.datagrams().refused();
   const Refusals refusals = bus_.refusals();
   status.refused_unsigned = refusals.unsigned_ones;
   status.refused_forged = refusals.forged;

@@ -18,8 +18,8 @@ namespace {
 
 constexpr std::int64_t kSaysAgainAfterUs = 10'000'000;
 
-// Runs a node, and says what comes from the network that is no message: when it begins, and every ten seconds while it goes
-// on. It has no field in any heartbeat, since whoever is on the network can send as much of it as he likes.
+// Runs a node, and warns of what comes from the network that is no message: when it begins, and at most every ten seconds
+// while it goes on, since anybody on the network can send as much of it as he likes.
 class DatagramWatch final : public Node {
  public:
   DatagramWatch(Node& node, const Bus& bus) : node_(node), bus_(bus) {}

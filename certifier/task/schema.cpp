@@ -300,7 +300,10 @@ std::vector<Key> BusKeys() {
   const BusOptions bus;
   return {
       Optional(Map("bus", "Where messages go."), "all defaults"),
-      Optional(Text("bus.url", "LCM provider; `--lcm-url` takes precedence."), bus.url),
+      Optional(Text("bus.url",
+                    "Where the bus is, as LCM writes it: multicast group and port, options `ttl` and `recv_buf_size`. "
+                    "`--lcm-url` takes precedence."),
+               bus.url),
       Optional(Text("bus.key", "Key file, relative to this file: what makes the robot move is then signed, and refused "
                     "unsigned. `forereach keygen` makes one; `--key` takes precedence."),
                "none, nothing is signed"),

@@ -1,5 +1,5 @@
 // Preloaded into a process (LD_PRELOAD), moves its wall clock by what the file FOREREACH_CLOCK_FILE says, from one reading to
-// the next: what std::chrono and GLib read, and the kernel's stamps of datagrams, which LCM takes for the time a message
+// the next: what std::chrono and GLib read, and the kernel's stamps of datagrams, which are the times messages
 // came. The steady clock stays as it is.
 #include <cstdio>
 #include <cstdlib>
