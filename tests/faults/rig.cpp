@@ -70,7 +70,8 @@ Rig::Rig(const std::string& task, const Options& options)
 
 void Rig::StartSecondCertifier() {
   second_ = std::make_unique<ChildProcess>(std::vector<std::string>{
-      FOREREACH_CERTIFIER, "--config", task_path_, "--lcm-url", url(kCertifier), "--key", key_path_});
+      FOREREACH_CERTIFIER, "--config", task_path_, "--lcm-url", url(kCertifier), "--key", key_path_, "--state",
+      state_ + " of the second"});
 }
 
 void Rig::EndSecondCertifier() {

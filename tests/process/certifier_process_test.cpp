@@ -160,9 +160,9 @@ class CertifierObstaclesTest : public testing::Test {
     path_ = scratch_.Write("task.yaml", task);
     config_ = LoadConfig(path_);
   }
-  std::unique_ptr<ChildProcess> StartCertifier() const {
-    auto certifier = std::make_unique<ChildProcess>(
-        std::vector<std::string>{FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", PrivateBusUrl()});
+  std::unique_ptr<ChildProcess> StartCertifier(const std::string& state = "state") const {
+    auto certifier = std::make_unique<ChildProcess>(std::vector<std::string>{
+        FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", PrivateBusUrl(), "--state", scratch_ / state});
     EXPECT_TRUE(certifier->WaitForLog("ready on")) << certifier->error();
     return certifier;
   }
@@ -230,7 +230,7 @@ TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
   auto first = StartCertifier();
   EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
   const std::int64_t instance = StatusOf(0).instance;
-  auto second = StartCertifier();
+  auto second = StartCertifier("another state");
   const certifier_status_v3_t other = StatusOf(instance);
   EXPECT_NE(other.instance, instance);
   ASSERT_TRUE(second->WaitForLog("is in charge on this bus: this one decides nothing")) << second->error();
