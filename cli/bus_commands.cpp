@@ -27,6 +27,10 @@ struct Options {
   bool json = false;
 };
 
+bool IsInCharge(const certifier_status_v3_t& status) {
+  return status.state != certifier_status_v3_t::LISTENING && status.state != certifier_status_v3_t::STANDBY;
+}
+
 // A line to the certifier: commands to it, heartbeats from it.
 class Line final {
  public:
@@ -47,8 +51,10 @@ class Line final {
     }
     return std::nullopt;
   }
+  // Of the certifier in charge; where none is heard, of any.
   std::optional<certifier_status_v3_t> Await() {
-    return Await([](const auto&) { return true; });
+    if (auto status = Await(IsInCharge)) return status;
+    return heard_.empty() ? std::nullopt : std::optional(heard_.back());
   }
 
   void Send(const command_t& command) { bus_->Publish(channels_.command, command); }
@@ -77,11 +83,25 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
           {"candidates", status.candidates},
           {"by_outcome", by_outcome},
           {"by_cause", by_cause},
+          {"instance", status.instance},
+          {"started_utime", status.started_utime},
+          {"other_instance", status.other_instance == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.other_instance)},
+          {"obstacles",
+           {{"source", ObstaclesSourceName(status.obstacles_source)},
+            {"known", status.obstacles_known != 0},
+            {"in_force", status.obstacles_in_force},
+            {"utime", status.obstacles_utime == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_utime)},
+            {"age_us", status.obstacles_age_us < 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_age_us)},
+            {"lost", status.obstacles_lost}}},
+          {"latch", LatchName(status.latch)},
+          {"unsigned", status.is_unsigned != 0},
           {"candidates_lost", status.candidates_lost},
           {"messages_refused", status.messages_refused},
           {"refused_unsigned", status.refused_unsigned},
           {"refused_forged", status.refused_forged},
           {"refused_replayed", status.refused_replayed},
+          {"refused_foreign", status.refused_foreign},
+          {"datagrams_refused", status.datagrams_refused},
           {"bus_dropped", status.bus_dropped},
           {"observations", status.observations},
           {"learned", status.learned},
@@ -101,6 +121,10 @@ void Print(const certifier_status_v3_t& status, bool json) {
             << " learned; " << status.candidates << " candidates:";
   for (std::int16_t i = 0; i < 16; ++i)
     if (status.by_outcome[i] > 0) std::cout << " " << status.by_outcome[i] << " " << OutcomeName(i);
+  std::cout << "\n" << status.obstacles_in_force << " obstacles in force, from the "
+            << (status.obstacles_source == certifier_status_v3_t::OBSTACLES_BUS ? "task file and the bus" : "task file");
+  if (status.obstacles_age_us >= 0) std::cout << "; the last message is " << status.obstacles_age_us / 1000 << " ms old";
+  if (!status.obstacles_known) std::cout << "; not all are known";
   std::cout << std::endl;
 }
 
@@ -132,6 +156,7 @@ int Command(const Options& options, std::int16_t kind) {
     return status.messages_refused + status.refused_unsigned + status.refused_forged + status.refused_replayed;
   };
   const auto after = line.Await([&](const certifier_status_v3_t& status) {
+    if (status.instance != before->instance) return false;
     if (refused(status) > refused(*before)) return true;
     return kind == command_t::RESET ? status.utime >= command.utime
                                     : status.version != before->version || status.failed_reloads != before->failed_reloads;

@@ -133,7 +133,11 @@ class ObstacleHistory {
   // As the gate takes them.
   void Update(const LogEvent& event) {
     ObstaclesInForce after = versions_.back();
-    if (after.Update(event.message(), event.utime).empty()) versions_.push_back(std::move(after));
+    if (!after.Update(event.message(), event.utime).empty()) return;
+    if (after.digest() == versions_.back().digest())  // the whole set is sent again and again
+      versions_.back() = std::move(after);
+    else
+      versions_.push_back(std::move(after));
   }
 
   [[nodiscard]] std::size_t now() const { return versions_.size() - 1; }

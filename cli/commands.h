@@ -26,6 +26,7 @@ void AddReplayCommand(CLI::App& app, Action& action);
 void AddReportCommand(CLI::App& app, Action& action);
 void AddCheckLogCommand(CLI::App& app, Action& action);
 void AddRunCommand(CLI::App& app, Action& action);
+void AddObstaclesCommand(CLI::App& app, Action& action);
 void AddDoctorCommand(CLI::App& app, Action& action);
 void AddKeysCommand(CLI::App& app, Action& action);
 /** status, reset, reload and keygen. */

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   AddReportCommand(app, action);
   AddCheckLogCommand(app, action);
   AddRunCommand(app, action);
+  AddObstaclesCommand(app, action);
   AddDoctorCommand(app, action);
   AddKeysCommand(app, action);
   AddBusCommands(app, action);

@@ -49,6 +49,7 @@ bool IsCircumstance(const decision_t& decision) {
     case decision_t::CAUSE_NOT_ARMED:
     case decision_t::CAUSE_FAULT:
     case decision_t::CAUSE_LATCH_UNWRITABLE:
+    case decision_t::CAUSE_NO_OBSTACLES:
       return true;
     default:
       return false;
@@ -58,7 +59,7 @@ bool IsCircumstance(const decision_t& decision) {
 class Replayer {
  public:
   explicit Replayer(const std::vector<Config>& tasks)
-      : tasks_(tasks), config_(tasks.front()), now_(&config_), authenticator_(config_.bus, KeyOf(config_.bus)) {
+      : tasks_(tasks), config_(tasks.front()), now_(&config_), authenticator_(config_.bus, KeyOf(config_.bus)), logged_obstacles_(config_) {
     Restart();
   }
 
@@ -67,7 +68,8 @@ class Replayer {
     if (!authenticator_.IsAuthentic(event)) return;
     const std::string name = log + "event " + std::to_string(event.number);
     if (event.channel == config_.bus.obstacles || event.channel == config_.bus.transition) {
-      changes_.push_back({event.channel, {event.message().begin(), event.message().end()}, event.utime});
+      if (event.channel == config_.bus.transition || ChangesObstacles(event))
+        changes_.push_back({event.channel, {event.message().begin(), event.message().end()}, event.utime});
     } else if (event.channel == config_.bus.candidate) {
       ++result_.candidates;
       candidates_[DigestOf(event.message())].push_back({{event.message().begin(), event.message().end()}, name});
@@ -110,8 +112,15 @@ class Replayer {
     if (const Config* task = TaskOf(digest)) now_ = task;
   }
 
+  // The whole set is sent again and again: only what is another set than before has to be kept.
+  bool ChangesObstacles(const LogEvent& event) {
+    const Digest before = logged_obstacles_.digest();
+    return logged_obstacles_.Update(event.message(), event.utime).empty() && logged_obstacles_.digest() != before;
+  }
+
   void Restart() {
     gate_ = std::make_unique<Gate>(*now_);
+    logged_obstacles_ = ObstaclesInForce(*now_);
     changes_.clear();
     last_sequence_ = -1;
   }
@@ -120,6 +129,9 @@ class Replayer {
     while (!changes_.empty()) TakeChange();
     const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(*now_));
     gate_->Inherit(*before);
+    ObstaclesInForce after(*now_);
+    after.Inherit(logged_obstacles_);
+    logged_obstacles_ = std::move(after);
   }
 
   void FeedStatus(const LogEvent& event) {
@@ -204,6 +216,7 @@ class Replayer {
   bool reloaded_ahead_ = false;  // of the heartbeat that will tell of it
   LogAuthenticator authenticator_;
   std::unique_ptr<Gate> gate_;
+  ObstaclesInForce logged_obstacles_;  // by all that was logged so far
   std::map<Digest, std::deque<Candidate>> candidates_;  // not decided yet
   std::deque<Change> changes_;                          // logged, and perhaps not yet seen by the certifier
   Restarts restarts_;

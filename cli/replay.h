@@ -13,7 +13,7 @@ namespace forereach {
 struct ReplayResult {
   std::int64_t candidates = 0;      ///< In the log.
   std::int64_t agreed = 0;          ///< Same outcome, step, cause and digests as recorded.
-  /** Recorded as displaced, out of time, not armed, in fault: a matter of the moment and not of the plan, not compared. */
+  /** Recorded as displaced, out of time, not armed, without known obstacles, in fault: a matter of the moment and not of the plan, not compared. */
   std::int64_t circumstances = 0;
   std::int64_t corruptions = 0;     ///< Damaged places in the log.
   PassedOver passed_over;

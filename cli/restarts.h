@@ -25,7 +25,7 @@ class Restarts final {
     const bool reloaded = last_sequence_ >= 0 && status->version != last_version_;
     last_sequence_ = status->sequence;
     last_version_ = status->version;
-    config_ = GetDigest(status->config_digest);
+    config_ = status->config_digest;
     return began ? Kind::kBegin : reloaded ? Kind::kReload : Kind::kNone;
   }
 

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
@@ -37,10 +38,13 @@ int Run(const Options& options) {
   CertifierNode certifier(config, *bus, {clock, clock});
   PlannerNode planner(config, *bus);
   RobotSimNode robot(config, *bus);
+  ObstacleSender perception(ObstacleSender::PeriodUs(config.gate));  // nobody else can speak on this bus
+  if (config.gate.obstacles == ObstaclesSource::kBus) perception.Set(config.obstacles);
   certifier.Tick(now);  // as a process does before it hears anything
   Deliver(*bus);
   const auto last = now + static_cast<std::int64_t>((config.robot.time_limit_s + 60) * 1e6);
   for (; !robot.done() && now < last; now += kClockStepUs) {
+    if (const auto seen = perception.Due(now)) static_cast<void>(bus->Publish(config.bus.obstacles, *seen));
     for (Node* node : std::initializer_list<Node*>{&robot, &planner, &certifier, &logger}) {
       node->Tick(now);
       Deliver(*bus);

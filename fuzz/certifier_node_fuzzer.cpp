@@ -1,5 +1,5 @@
 // Every inbound type in any order through the certifier's node: each candidate is answered once, a certified plan goes out
-// right before its decision, and none while a fault is latched or the robot's state is not known.
+// right before its decision, and none while a fault is latched or the robot's state or the obstacles are not known.
 #include <cstdlib>
 #include <map>
 #include <new>
@@ -199,7 +199,9 @@ std::vector<Config> Tasks() {
   watchful.gate.needs_robot_state = true;
   stubborn.gate.learns = false;
   stubborn.gate.queue = 1;
-  return {watchful, SmallTask(), stubborn};
+  Config seeing = SmallTaskOnTheBus();
+  seeing.gate.needs_robot_state = true;
+  return {watchful, SmallTask(), stubborn, seeing};
 }
 
 }  // namespace

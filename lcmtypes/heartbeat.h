@@ -12,6 +12,7 @@ struct Heartbeat {
   std::int64_t utime, sequence, version;
   /** False while the certifier listens for another one, or stands by: it then decides nothing. */
   bool in_charge;
+  Digest config_digest;
 };
 
 /** Reads a certifier_status_v3_t or a certifier_status_v2_t; nothing for other bytes. */

@@ -8,6 +8,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
+#include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/heartbeat.h"
@@ -92,7 +93,8 @@ std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::stri
   if (channel == channels_.fault) return {plain, PositionOf<fault_t>(bytes)};
   if (channel == channels_.event) return {plain, PositionOf<execution_event_t>(bytes)};
   if (channel == channels_.logger_status) return {plain, PositionOf<logger_status_t>(bytes)};
-  return {plain, std::nullopt};  // obstacles_t's sequence only has to grow
+  if (channel == channels_.obstacles) return {plain, PositionOf<obstacles_t>(bytes)};
+  return {plain, std::nullopt};
 }
 
 void Interpreter::Observe(const LogEvent& event, Rows& rows) {

@@ -60,8 +60,10 @@ class PictureMaker final {
     } else if (event.channel == channels_.decision) {
       if (const auto decision = Decoded<decision_t>(event.message())) AddDecision(*decision);
     } else if (event.channel == channels_.obstacles) {
-      CertifyAgain();
-      static_cast<void>(obstacles_.Update(event.message(), event.utime));  // as the gate, but for the time between both
+      ObstaclesInForce after = obstacles_;
+      if (!after.Update(event.message(), event.utime).empty()) return;  // as the gate, but for the time between both
+      if (after.digest() != obstacles_.digest()) CertifyAgain();
+      obstacles_ = std::move(after);
     } else if (event.channel == channels_.transition) {
       if (const auto transition = Decoded<transition_t>(event.message()); transition && learns_) Learn(*transition);
     } else if (event.channel == channels_.robot_state) {

@@ -54,7 +54,9 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
 
 void PlannerNode::Tick(std::int64_t now_us) {
   if (next_plan_id_ == 0) next_plan_id_ = now_us;
-  if (round_ && round_->awaited_plan < 0) SearchOnce(now_us);
+  if (!round_ || round_->awaited_plan >= 0) return;
+  if (!obstacles_.WhyUnknown(now_us).empty()) return EndRound(false);
+  SearchOnce(now_us);
 }
 
 void PlannerNode::OnRobotState(const Received& received) {
@@ -66,7 +68,8 @@ void PlannerNode::OnRobotState(const Received& received) {
   if (finished_) return;
   last_state_utime_ = state.utime;
   Follow(state);
-  if (!arrived_ && !finished_ && !round_ && !waiting_start_ && NextPlanIsDue(state)) BeginRound(state);
+  if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() && NextPlanIsDue(state))
+    BeginRound(state);
 }
 
 // One from the future would keep out all that come before that time.
@@ -207,8 +210,8 @@ void PlannerNode::Learn(const decision_t& decision) {
   auto& counts = decision.outcome == decision_t::REJECTED ? rejected_ : abstained_;
   ++counts[std::string(CauseName(decision.cause))];
   // No candidate can pass before the world has changed.
-  if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_FAULT ||
-      decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE)
+  if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_NO_OBSTACLES ||
+      decision.cause == decision_t::CAUSE_FAULT || decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE)
     return EndRound(false);
   if (decision.outcome == decision_t::ABSTAIN_FALSIFIED) return EndRound(false);
   // A plan that does not stop is no nearer to the domain's bounds than one that does.

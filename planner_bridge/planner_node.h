@@ -9,10 +9,12 @@ candidate at a time and waits for its decision:
     abstention D       -> the next candidate keeps further inside the domain's bounds
                            (a policy's follows another reference instead, policy_proposer.h)
     abstention F       -> the round ends: no candidate can pass
-    rejected           -> the next candidate; the round ends where the certifier is not armed or has latched a fault
+    rejected           -> the next candidate; the round ends where the certifier is not armed, does not know the
+                           obstacles, or has latched a fault
     abstained, no time -> the next candidate
 It ends without a certificate after `candidates` searches, or when too little time is left until its start; the next
-state begins another. All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has
+state begins another. Where gate.obstacles is bus, no round begins before the obstacles are known, and a round ends when
+they are not known any more (obstacles_in_force.h). All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has
 said FINISHED, no round begins any more.
 
 Messages that do not decode, contain what is not finite, are stamped ahead of the clock by more than gate.max_ahead_ms,

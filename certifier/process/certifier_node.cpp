@@ -138,9 +138,9 @@ std::string CertifierNode::WhyNotInCharge() const {
     case Charge::State::kListening:
       return "listens whether another certifier is on this bus";
     case Charge::State::kStandingBy:
-      return charge_.other() ? fmt::format("another certifier, instance {:016x}, is in charge on this bus: this one decides "
-                                           "nothing", charge_.other()->instance)
-                             : "another certifier was in charge on this bus, and has fallen silent";
+      if (!charge_.other()) return "another certifier was in charge on this bus, and has fallen silent";
+      return fmt::format("another certifier, instance {:016x}, is in charge on this bus: this one decides nothing",
+                         charge_.other()->instance);
     case Charge::State::kInCharge:
       break;
   }
@@ -558,7 +558,8 @@ std::string CertifierNode::WhyNotOk() const {
            "does not help";
   if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
   if (const auto refusal = watch_.WhyNot()) return refusal->why;
-  if (charge_.other()) return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing", charge_.other()->instance);
+  if (charge_.other())
+    return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing", charge_.other()->instance);
   if (gate_->options().obstacles == ObstaclesSource::kBus) return "";
   return fmt::format("gate.obstacles is task: the {} of the task file are all there are{}", gate_->obstacles().size(),
                      obstacles_refused_ ? "; " + channels_.obstacles + " is refused" : "");

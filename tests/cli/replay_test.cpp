@@ -159,7 +159,8 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
 // A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if the
 // certifier itself began after them.
 TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
-  const Config config = SmallTask();
+  Config config = SmallTask();
+  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
   obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
   on_the_way.utime = kNow;
   for (const std::int64_t heartbeat : {0, 7}) {
@@ -184,7 +185,8 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
 
 // What was heard before a reload counts after it, beside the task's own.
 TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
-  const Config config = SmallTask();
+  Config config = SmallTask();
+  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
   obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
   far_away.utime = kNow;
   Gate before(config), after(config);
@@ -204,6 +206,49 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
     EXPECT_TRUE(writer.Flush());
   }
   ExpectAgreed(path, config, 2);
+}
+
+// The whole set comes again and again; a second certifier's heartbeats are none of the one that decides; where the obstacles
+// were not known nothing is compared.
+TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
+  const Config config = SmallTaskOnTheBus();
+  const std::string path = NewLog();
+  int decided = 0;
+  {
+    EventLogWriter writer(path);
+    certifier_status_v3_t mine{}, others{};
+    mine.state = certifier_status_v3_t::ARMED, mine.instance = 1;
+    others.state = certifier_status_v3_t::STANDBY, others.instance = 2;
+    std::int64_t id = 1;
+    for (int start = 0; start < 2; ++start) {  // it is killed, and starts again
+      Gate gate(config);
+      mine.sequence = 0;
+      writer.Append(kNow, config.bus.status, Encode(mine));
+      const auto unknown = Encode(Candidate(id++));
+      writer.Append(kNow, config.bus.candidate, unknown);
+      writer.Append(kNow, config.bus.decision, Encode(gate.Refuse(unknown, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
+      for (int i = 0; i < 12; ++i) {
+        obstacles_t message = ToMessage(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
+                                                   : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
+        message.utime = kNow + 100 * start + i;
+        message.sequence = 20 * start + i;
+        writer.Append(kNow, config.bus.obstacles, Encode(message));
+        EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
+        others.sequence = 3 + i % 5;
+        writer.Append(kNow, config.bus.status, Encode(others));
+        DecideAndLog(gate, Encode(Candidate(id++)), i / 4 == 1 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED, config,
+                     writer);
+        ++decided;
+        ++mine.sequence;
+        writer.Append(kNow, config.bus.status, Encode(mine));
+      }
+    }
+    EXPECT_TRUE(writer.Flush());
+  }
+  const ReplayResult result = Replay({path}, config);
+  EXPECT_TRUE(result.differences.empty()) << result.differences.front();
+  EXPECT_EQ(result.agreed, decided);
+  EXPECT_EQ(result.circumstances, 2);
 }
 
 TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {

@@ -501,6 +501,94 @@ class Campaign final {
     });
   }
 
+  // What a candidate is answered that would be certified from rest at the start; nothing if it is not answered.
+  std::optional<std::int16_t> CauseOfACandidate(Rig& rig) {
+    candidate_plan_t candidate = CandidateFor(rig.config(), next_own_id_++, Eigen::Vector2d(0, 0), 6, milliseconds(400));
+    SetText(candidate.source, "campaign");
+    rig.bus().Publish(rig.config().bus.candidate, candidate);
+    const Digest digest = DigestOf(Encode(candidate));
+    static_cast<void>(rig.ListenUntil([&] { return rig.witness().CauseOf(digest).has_value(); }, milliseconds(600)));
+    return rig.witness().CauseOf(digest);
+  }
+
+  // The obstacles that are sent are not known to the certifier: every candidate is rejected for that.
+  void DemandUnknown(Row& row, Rig& rig, const std::string& when) {
+    const auto cause = CauseOfACandidate(rig);
+    const bool rejected = cause == decision_t::CAUSE_NO_OBSTACLES || cause == decision_t::CAUSE_NOT_ARMED ||
+                          cause == decision_t::CAUSE_FAULT;
+    Demand(row, rejected, "a candidate was answered " + std::string(cause ? CauseName(*cause) : "nothing") + " " + when);
+    if (cause == decision_t::CAUSE_NO_OBSTACLES) ++told_unknown_;
+  }
+
+  // One rig whose obstacles are on the bus alone: any certificate under others, or none, is forbidden.
+  void ObstacleTries(const std::string& fault, const std::function<void(Row&, Rig&, int)>& hurt) {
+    const Config world = LoadConfig(world_.Write("world.yaml", DemoTask()));
+    Rig rig(DemoTaskOnTheBus(), {.seen = world.obstacles});
+    rig.witness().SetWorld(world.obstacles_digest);
+    Row& row = Begin(fault, options_.others);
+    told_unknown_ = 0;
+    Tries(row, rig, [&](int i) { hurt(row, rig, i); }, options_.others);
+    if (told_unknown_ > 0) Remark(row, std::to_string(told_unknown_) + " candidates rejected as no_obstacles");
+  }
+
+  void Obstacles() {
+    ObstacleTries("The certifier is killed and starts while nobody sends OBSTACLES", [&](Row& row, Rig& rig, int) {
+      rig.End(Rig::kCertifier, SIGKILL);
+      rig.perception().SetSilent(true);
+      rig.Start(Rig::kCertifier);
+      rig.witness().Forget();
+      static_cast<void>(rig.ListenUntil([&] { return rig.witness().status().has_value(); }, std::chrono::seconds(10)));
+      const std::int64_t before = rig.witness().certificates();
+      rig.Listen(milliseconds(Below(500)));
+      DemandUnknown(row, rig, "before the obstacles were heard");
+      Demand(row, rig.witness().certificates() == before, "it certified before it had heard the obstacles");
+      rig.perception().SetSilent(false);
+    });
+    ObstacleTries("OBSTACLES fall silent", [&](Row& row, Rig& rig, int) {
+      rig.perception().SetSilent(true);
+      rig.Listen(milliseconds(1100));  // gate.obstacles_timeout_ms is 1000
+      const std::int64_t before = rig.witness().certificates();
+      for (int j = 0; j < 3; ++j) DemandUnknown(row, rig, "after the timeout");
+      Demand(row, rig.witness().certificates() == before, "it certified after the timeout");
+      rig.perception().SetSilent(false);
+    });
+    ObstacleTries("OBSTACLES with gaps, NaN, wrong counts, from the future (signed)", [&](Row& row, Rig& rig, int i) {
+      rig.perception().SetSilent(true);
+      rig.perception().SayNow([](obstacles_t&) { return true; });
+      rig.perception().SayNow([&](obstacles_t& message) {
+        switch (i % 5) {
+          case 0: return false;  // lost: the next one is a gap
+          case 1: message.obstacle[0].point[0][1] = std::numeric_limits<double>::quiet_NaN(); break;
+          case 2: message.num_obstacles = 65; break;
+          case 3: message.utime += 60'000'000; break;
+          default: message.obstacle[message.num_obstacles - 1].kind = 99; break;
+        }
+        return true;
+      });
+      if (i % 5 == 0) rig.perception().SayNow([](obstacles_t&) { return true; });
+      rig.Listen(milliseconds(50));
+      DemandUnknown(row, rig, "after a message that was lost or refused");
+      rig.perception().SetSilent(false);
+    });
+    ObstacleTries("Two certifiers; one of them is killed or stopped for 3 s", [&](Row&, Rig& rig, int i) {
+      if (!rig.SecondCertifierIsAlive()) rig.StartSecondCertifier();
+      rig.Listen(milliseconds(1000 + Below(500)));
+      switch (i % 3) {
+        case 0:
+          rig.End(Rig::kCertifier, SIGKILL);
+          break;
+        case 1:
+          rig.EndSecondCertifier();
+          break;
+        default:
+          rig.Signal(Rig::kCertifier, SIGSTOP);
+          rig.Listen(milliseconds(3000));
+          rig.Signal(Rig::kCertifier, SIGCONT);
+      }
+      rig.Listen(milliseconds(Below(500)));
+    });
+  }
+
   void Disks();
   void Routes() { NoNetwork(), LostRoute(); }
   void NoNetwork();
@@ -509,6 +597,9 @@ class Campaign final {
   [[nodiscard]] std::string Spoilt(const std::string& task, int way);
 
   const Options options_;
+  const ScratchDirectory world_;
+  std::int64_t next_own_id_ = 1;
+  int told_unknown_ = 0;
   std::mt19937 random_;
   std::vector<Row> rows_;
   std::unique_ptr<Progress> progress_;
@@ -518,6 +609,7 @@ const std::vector<Campaign::Kind> Campaign::kKinds{
     {"kill", &Campaign::Kills},           {"clock", &Campaign::Clocks},        {"stop", &Campaign::Stops},
     {"network", &Campaign::BadNetwork},   {"lies", &Campaign::Lies},           {"nonsense", &Campaign::Nonsense},
     {"latch", &Campaign::LatchedKills},   {"statedisk", &Campaign::StateDisks}, {"strangers", &Campaign::Strangers},
+    {"obstacles", &Campaign::Obstacles},
     {"forgeries", &Campaign::Forgeries},  {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
     {"disks", &Campaign::Disks},
     {"route", &Campaign::Routes},         {"reload", &Campaign::BadReload}};
@@ -799,9 +891,10 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "was not its plan's or was applied outside its slice, a candidate was answered twice, or counted and not\n"
        << "answered (not asked where the bus is made to lose messages), a process ended that nobody had ended or did\n"
        << "not end well within 5 s of SIGTERM, after a jump of its clock or a state outside its slice the certifier\n"
-       << "latched nothing or certified before the reset, what had to be refused or said was not, or at the end the\n"
-       << "logs were not what the database has of them. *Lost*: events that the logger had confirmed and its log does\n"
-       << "not hold, looked at after each try, those of a logger that ended once the next one has mended its logs;\n"
+       << "latched nothing or certified before the reset, a plan was certified under other obstacles than are seen, what\n"
+       << "had to be refused or said was not, or at the end the logs were not what the database has of them.\n"
+       << "*Lost*: events that the logger had confirmed and its log does not hold, looked at after each try,\n"
+       << "those of a logger that ended once the next one has mended its logs;\n"
        << "what a full disk keeps out is never confirmed; `-`: no logger ran. *Recovered*: within 20 s, after a reset\n"
        << "where a fault was latched, the certifier is OK, the robot executes a plan that was certified since, and the logger\n"
        << "records. Under raw datagrams it is forbidden too that a process grows by 48 MB. *Said why*: a process that cannot start exits with the reason.\n\n"

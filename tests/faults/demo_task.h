@@ -17,4 +17,13 @@ inline std::string DemoTask(const std::string& more = "") {
   return task + "\n" + more;
 }
 
+/** The same with its obstacles taken out: they are on the bus only. */
+inline std::string DemoTaskOnTheBus() {
+  std::string task = DemoTask();
+  const std::size_t begin = task.find("  obstacles:\n"), end = task.find("\n\n", begin);
+  task.replace(begin, end - begin, "  obstacles: []");
+  const std::string of_task = "{obstacles: task}";
+  return task.replace(task.find(of_task), of_task.size(), "{obstacles: bus}");
+}
+
 }  // namespace forereach

@@ -62,7 +62,23 @@ Rig::Rig(const std::string& task, const Options& options)
   heard_ = OpenBus(near_url_);
   signed_ = OpenBus(config_.bus, "campaign", [this] { return NowUs(); });
   witness_ = std::make_unique<Witness>(*heard_, config_.bus, LoadKey(key_path_), options_.relayed);
+  if (config_.gate.obstacles == ObstaclesSource::kBus)
+    perception_ = std::make_unique<Perception>(OpenBus(config_.bus, "perception"), config_.bus.obstacles, config_.gate,
+                                               options.seen);
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) Start(role);
+}
+
+void Rig::StartSecondCertifier() {
+  second_ = std::make_unique<ChildProcess>(std::vector<std::string>{
+      FOREREACH_CERTIFIER, "--config", task_path_, "--lcm-url", url(kCertifier), "--key", key_path_, "--state",
+      state_ + " of the second"});
+}
+
+void Rig::EndSecondCertifier() {
+  if (!second_) return;
+  if (!SecondCertifierIsAlive())
+    bad_endings_.push_back("the second certifier ended by itself: " + Tail(second_->error()));
+  second_.reset();
 }
 
 void Rig::Start(Role role) {
@@ -128,6 +144,7 @@ void Rig::End(Role role, int signal) {
 }
 
 void Rig::EndAll() {
+  EndSecondCertifier();
   for (const Role role : {kRobot, kPlanner, kCertifier, kLogger}) End(role);
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/faults/clock_file.h"
+#include "tests/faults/perception.h"
 #include "tests/faults/witness.h"
 #include "tests/process/process_fixture.h"
 
@@ -25,6 +26,7 @@ class Rig final {
   struct Options {
     bool relayed = false;          ///< Certifier and logger are on a bus of their own: somebody has to relay.
     bool settable_clocks = false;  ///< SetClock may be called.
+    std::vector<Obstacle> seen;    ///< Of a task whose gate.obstacles is bus: what is sent.
   };
 
   /** @param task YAML of the task. */
@@ -36,6 +38,12 @@ class Rig final {
   void Signal(Role role, int signal);
   /** Ends it, and forgets it. @param signal SIGKILL, or SIGTERM, which waits until the process is ready. */
   void End(Role role, int signal = SIGTERM);
+  /** A second certifier beside the first, and its end by SIGKILL. */
+  void StartSecondCertifier();
+  void EndSecondCertifier();
+  [[nodiscard]] bool SecondCertifierIsAlive() const {
+    return second_ && !second_->WaitForEnd(std::chrono::milliseconds(0));
+  }
   /** Ends all four, for Heal to start. */
   void EndAll();
   /** One line for each process that since the last call
@@ -75,6 +83,7 @@ class Rig final {
   [[nodiscard]] Bus& bus() { return *signed_; }      ///< Signs.
   [[nodiscard]] Bus& open_bus() { return *heard_; }  ///< Does not.
   [[nodiscard]] Witness& witness() { return *witness_; }
+  [[nodiscard]] Perception& perception() { return *perception_; }
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] std::string url(Role role) const { return options_.relayed && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
@@ -102,6 +111,8 @@ class Rig final {
   std::unique_ptr<Bus> heard_, signed_;
   std::unique_ptr<Witness> witness_;
   std::array<std::unique_ptr<ChildProcess>, kRoles> processes_;
+  std::unique_ptr<ChildProcess> second_;
+  std::unique_ptr<Perception> perception_;
   std::array<int, kRoles> ended_by_{};    // End's signal
   std::array<bool, kRoles> is_judged_{};  // by LookAtEnd
   std::vector<std::string> bad_endings_;

@@ -47,7 +47,8 @@ void Witness::OnDecision(const Received& received) {
 // now. The certifier sends both from one thread, so a decision comes before the heartbeat that counts it.
 void Witness::OnStatus(const Received& received) {
   const auto status = Decoded<certifier_status_v3_t>(received.raw);
-  if (!status) return;
+  // A certifier that is not in charge decides nothing.
+  if (!status || status->state == certifier_status_v3_t::LISTENING || status->state == certifier_status_v3_t::STANDBY) return;
   status_ = status;
   if (spoiled_) return;
   if (status->sequence == 0) {  // a certifier's first sign of life
@@ -75,6 +76,8 @@ void Witness::OnFault(const Received& received) {
 void Witness::OnCertified(const Received& received) {
   const auto plan = Decoded<certified_plan_t>(Authentic(received));
   if (!plan || !FindSealFaults(*plan).empty()) return;
+  if (world_ && GetDigest(plan->obstacles_digest) != *world_)
+    Violate("plan " + std::to_string(plan->plan.plan_id) + " was certified under other obstacles than there are");
   Certified& certified = plans_[plan->plan.plan_id];
   certified = {*plan, ++certificates_};
   last_certified_ = &certified.plan;

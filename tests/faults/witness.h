@@ -36,6 +36,14 @@ class Witness final {
   [[nodiscard]] std::vector<std::string> TakeViolations() { return std::exchange(violations_, {}); }
 
   [[nodiscard]] std::int64_t decisions() const { return decisions_; }
+  /** What a candidate with this digest was answered. */
+  [[nodiscard]] std::optional<std::int16_t> CauseOf(const Digest& candidate) const {
+    const auto answer = answers_.find(candidate);
+    return answer == answers_.end() ? std::nullopt : std::optional(answer->second.cause);
+  }
+  /** From now on it may not happen either that a plan is certified under any other obstacles than these. */
+  void SetWorld(const Digest& obstacles) { world_ = obstacles; }
+
   /** Candidates that the certifiers had counted one heartbeat ago and whose decisions were not heard: never sent, or
   lost on the way. */
   [[nodiscard]] std::int64_t unheard() const { return earlier_unheard_ + unheard_; }
@@ -87,6 +95,7 @@ class Witness final {
     int step;
   };
   std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
+  std::optional<Digest> world_;
   std::optional<certifier_status_v3_t> status_;
   std::optional<logger_status_t> logger_status_;
   std::chrono::steady_clock::time_point robot_heard_{};

@@ -118,7 +118,7 @@ TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
   candidate(1, "a");
   bus_.Publish("OBSTACLES", [] {
     obstacles_t obstacles{};
-    obstacles.sequence = 5;  // only has to grow
+    obstacles.sequence = 5;
     return obstacles;
   }());
   bus_.Publish("OBSTACLES", [] {
@@ -129,7 +129,9 @@ TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
   node.Tick(kStart);
   node.Stop();
   const Rows rows = ReadRows();
-  ASSERT_EQ(rows.gaps.size(), 2u);
+  ASSERT_EQ(rows.gaps.size(), 3u);
+  EXPECT_EQ(rows.gaps[2].channel, "OBSTACLES");
+  EXPECT_EQ(rows.gaps[2].lost, 3);
   EXPECT_EQ(rows.gaps[0].channel, "PLAN_CANDIDATE");
   EXPECT_EQ(rows.gaps[0].source, "a");
   EXPECT_EQ(rows.gaps[0].expected, 9);

@@ -364,6 +364,56 @@ TEST_F(PlannerNodeTest, AStateFromTheFutureDoesNotKeepOutThoseOfNow) {
   EXPECT_EQ(candidates_.size(), 1u);
 }
 
+TEST_F(PlannerNodeTest, PlansOnlyWhileTheObstaclesOnTheBusAreKnown) {
+  Config config = Bicycle();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  Start(config);
+  obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)});
+  const auto see = [&] {
+    message.utime = now_;
+    ASSERT_TRUE(bus_->Publish(config_.bus.obstacles, message));
+    ++message.sequence;
+    Deliver();
+  };
+  const auto round = [&] {
+    Say(Standing());
+    Run(3);
+  };
+  round();
+  EXPECT_TRUE(candidates_.empty()) << "none has been heard";
+  see();
+  round();
+  ASSERT_EQ(candidates_.size(), 1u);
+  EXPECT_GT(Clearance(candidates_.back()), config_.planner.clearance);
+  Run(1001);
+  round();
+  EXPECT_EQ(candidates_.size(), 1u) << "they have fallen silent";
+  see();
+  round();
+  EXPECT_EQ(candidates_.size(), 2u);
+  ++message.sequence;  // one is lost
+  see();
+  Run(200);
+  round();
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
+  Say(Standing());
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 1u);
+  decision_t decision{};
+  decision.plan_id = candidates_.back().plan_id;
+  SetText(decision.source, PlannerNode::kSource);
+  decision.outcome = decision_t::REJECTED;
+  decision.cause = decision_t::CAUSE_NO_OBSTACLES;
+  ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
+  Deliver();
+  Run(20);
+  EXPECT_EQ(candidates_.size(), 1u) << "no other candidate before the next state";
+  EXPECT_EQ(Summary()["rejected"], nlohmann::json({{"no_obstacles", 1}}));
+}
+
 // As the gate does: else the planner would go on around the obstacles of before, and the gate refuse what it finds.
 TEST_F(PlannerNodeTest, HearsAPublisherOfObstaclesThatBeganAnew) {
   obstacles_t message = ToMessage({Obstacle::Circle(Vec({12, 0}), 2)});

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -144,34 +145,116 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   EXPECT_EQ(summary["certified"], 3);
 }
 
-TEST_F(CertifierProcessTest, ObstaclesFromTheBusReplaceThoseOfTheFile) {
-  Send(New(kIntoTheCircle), decision_t::CAUSE_OBSTACLE);
-  ASSERT_TRUE(WaitForDecisions(1));
+// ---- Obstacles from the bus.
 
-  obstacles_t none{};
-  none.utime = WallClockUs();
-  probe_.bus().Publish("OBSTACLES", none);
-  Send(New(kIntoTheCircle), decision_t::CAUSE_NONE);
-  ASSERT_TRUE(WaitForDecisions(2));
+class CertifierObstaclesTest : public testing::Test {
+ protected:
+  // The file has no obstacles: all are on the bus.
+  CertifierObstaclesTest() {
+    std::string task = PatientTask();
+    const std::string none = "obstacles:\n    - circle: {center: [0, 2], radius: 0.8}\n";
+    EXPECT_NE(task.find(none), std::string::npos);
+    world_ = scratch_.Write("world.yaml", task);
+    task.replace(task.find(none), none.size(), "obstacles: []\n");
+    task.replace(task.find("obstacles: task}"), 16, "obstacles: bus}");
+    path_ = scratch_.Write("task.yaml", task);
+    config_ = LoadConfig(path_);
+  }
+  std::unique_ptr<ChildProcess> StartCertifier(const std::string& state = "state") const {
+    auto certifier = std::make_unique<ChildProcess>(std::vector<std::string>{
+        FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", PrivateBusUrl(), "--state", scratch_ / state});
+    EXPECT_TRUE(certifier->WaitForLog("ready on")) << certifier->error();
+    return certifier;
+  }
+  std::unique_ptr<ChildProcess> StartPerception() const {
+    return std::make_unique<ChildProcess>(
+        std::vector<std::string>{FOREREACH_PROGRAM, "obstacles", "--config", world_, "--lcm-url", PrivateBusUrl()});
+  }
+  // The answer to a candidate that drives into the circle.
+  decision_t Ask() {
+    const std::size_t before = probe_.heard("PLAN_DECISION").size();
+    probe_.bus().Publish("PLAN_CANDIDATE", CandidateFor(config_, next_plan_id_++, kIntoTheCircle, 12));
+    if (!probe_.WaitUntil([&] { return probe_.heard("PLAN_DECISION").size() > before; })) {
+      ADD_FAILURE() << "no answer";
+      return {};
+    }
+    return probe_.Heard<decision_t>("PLAN_DECISION").back();
+  }
+  // Asks until the cause is another.
+  std::int16_t AskUntilNot(std::int16_t cause) {
+    std::int16_t now = cause;
+    for (int i = 0; i < 200 && now == cause; ++i) {
+      now = Ask().cause;
+      probe_.ListenFor(std::chrono::milliseconds(20));
+    }
+    return now;
+  }
+  [[nodiscard]] certifier_status_v3_t StatusOf(std::int64_t other_than) {
+    certifier_status_v3_t found{};
+    EXPECT_TRUE(probe_.WaitUntil([&] {
+      const auto all = probe_.Heard<certifier_status_v3_t>("CERTIFIER_STATUS");
+      if (all.empty() || all.back().instance == other_than) return false;
+      found = all.back();
+      return true;
+    }));
+    return found;
+  }
 
-  obstacles_t wall = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.5)});
-  wall.utime = WallClockUs();
-  wall.sequence = 1;
-  probe_.bus().Publish("OBSTACLES", wall);
-  wall.sequence = 2;
-  wall.obstacle[0].kind = 99;  // refused: the wall stays
-  probe_.bus().Publish("OBSTACLES", wall);
-  Send(New(kGentle), decision_t::CAUSE_OBSTACLE);
-  ASSERT_TRUE(WaitForDecisions(3));
+  const ScratchDirectory scratch_;
+  std::string path_, world_;
+  Config config_;
+  BusProbe probe_{PrivateBusUrl(), {"PLAN_DECISION", "PLAN_CERTIFIED", "CERTIFIER_STATUS"}};
+  std::int64_t next_plan_id_ = 1;
+};
 
-  const auto decisions = probe_.Heard<decision_t>("PLAN_DECISION");
-  for (const decision_t& decision : decisions)
-    EXPECT_EQ(CauseName(decision.cause), expected_.at(ToHex(GetDigest(decision.plan_digest))))
-        << GetText(decision.message);
-  EXPECT_EQ(GetDigest(decisions[0].obstacles_digest), config_.obstacles_digest);
-  EXPECT_EQ(GetDigest(decisions[1].obstacles_digest), ObstaclesDigest({}));
-  EXPECT_EQ(certifier_.Terminate(), 0);
-  EXPECT_THAT(certifier_.error(), testing::HasSubstr("OBSTACLES: refused"));
+// Before: S; SIGKILL; restart: "certified: no obstacles".
+TEST_F(CertifierObstaclesTest, ARestartedCertifierCertifiesNothingBeforeItHasHeardThem) {
+  auto perception = StartPerception();
+  auto certifier = StartCertifier();
+  EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
+  certifier->Signal(SIGKILL);
+  ASSERT_TRUE(certifier->WaitForEnd(kPatience));
+  EXPECT_EQ(perception->Terminate(), 0) << perception->error();
+  certifier = StartCertifier();
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(CauseName(Ask().cause), "no_obstacles");
+  perception = StartPerception();
+  EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
+  EXPECT_EQ(perception->Terminate(), 0) << perception->error();
+  EXPECT_EQ(AskUntilNot(decision_t::CAUSE_OBSTACLE), decision_t::CAUSE_NO_OBSTACLES) << "silence";
+  EXPECT_TRUE(probe_.heard("PLAN_CERTIFIED").empty());
+  EXPECT_EQ(certifier->Terminate(), 0) << certifier->error();
+}
+
+TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
+  const auto perception = StartPerception();
+  auto first = StartCertifier();
+  EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
+  const std::int64_t instance = StatusOf(0).instance;
+  auto second = StartCertifier("another state");
+  const certifier_status_v3_t other = StatusOf(instance);
+  EXPECT_NE(other.instance, instance);
+  ASSERT_TRUE(second->WaitForLog("is in charge on this bus: this one decides nothing")) << second->error();
+  const std::size_t before = probe_.heard("PLAN_DECISION").size();
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(Ask().cause, decision_t::CAUSE_OBSTACLE);
+  probe_.ListenFor(std::chrono::milliseconds(300));
+  EXPECT_EQ(probe_.heard("PLAN_DECISION").size(), before + 5) << "one answer each";
+  first->Signal(SIGKILL);
+  ASSERT_TRUE(second->WaitForLog("in charge, as instance")) << second->error();
+  EXPECT_EQ(AskUntilNot(decision_t::CAUSE_NO_OBSTACLES), decision_t::CAUSE_OBSTACLE);
+  EXPECT_EQ(second->Terminate(), 0) << second->error();
+}
+
+TEST_F(CertifierObstaclesTest, ATaskThatDoesNotSayWhereTheyComeFromIsRefused) {
+  std::string task = PatientTask();
+  task.replace(task.find(", obstacles: task"), 17, "");
+  const std::string path = scratch_.Write("unsaid.yaml", task);
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{FOREREACH_CERTIFIER, "--config", path, "--lcm-url", PrivateBusUrl()},
+        {FOREREACH_PROGRAM, "run", "--config", path, "--directory", scratch_ / "log"}}) {
+    ChildProcess process(command);
+    EXPECT_EQ(process.WaitForExit(), 2);
+    EXPECT_THAT(process.error(), testing::HasSubstr(path + ": gate.obstacles: missing. `bus`: "));
+  }
 }
 
 // As fast as it can, with no more under way than the kernel's smallest buffer holds: UDP may drop what a buffer cannot

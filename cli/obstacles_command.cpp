@@ -1,0 +1,88 @@
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <spdlog/spdlog.h>
+
+#include "certifier/gate/obstacle_sender.h"
+#include "certifier/gate/stamp.h"
+#include "certifier/task/process.h"
+#include "cli/commands.h"
+
+namespace forereach {
+namespace {
+
+constexpr double kMaxPeriodMs = 3.6e6;
+
+struct Options {
+  std::string config;
+  BusArguments bus;
+  double period_ms = 0;  // 0: of the task
+};
+
+// Stands in for perception: it sees what a task file says.
+class ObstaclesNode final : public Node {
+ public:
+  ObstaclesNode(const Config& config, Bus& bus, std::int64_t period_us)
+      : path_(config.path), channel_(config.bus.obstacles), bus_(bus), sender_(period_us) {
+    sender_.Set(config.obstacles);
+  }
+
+  void Tick(std::int64_t now_us) override {
+    if (const auto message = sender_.Due(now_us); message && !bus_.Publish(channel_, *message) && !warned_) {
+      warned_ = true;
+      spdlog::warn("the bus refused a message; receivers see a gap");
+    }
+  }
+
+  void Reload() override try {
+    sender_.Set(LoadConfig(path_, TransitionsFile::kIgnore).obstacles);
+    spdlog::info("the obstacles of {} from now on", path_);
+  } catch (const std::exception& error) {
+    spdlog::error("not reloaded, the obstacles of before are sent: {}", error.what());
+  }
+
+ private:
+  const std::string path_, channel_;
+  Bus& bus_;
+  ObstacleSender sender_;
+  bool warned_ = false;
+};
+
+int Send(const Options& options) {
+  Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
+  options.bus.Override(config.bus);
+  const std::unique_ptr<Bus> bus = OpenBus(config.bus, "forereach-obstacles");
+  const std::int64_t period_us =
+      options.period_ms > 0 ? Microseconds(options.period_ms) : ObstacleSender::PeriodUs(config.gate);
+  if (3 * period_us > Microseconds(config.gate.obstacles_timeout_ms))
+    spdlog::warn("every {} ms is less often than three times in gate.obstacles_timeout_ms: one lost message stops the robot",
+                 static_cast<double>(period_us) / 1e3);
+  ObstaclesNode node(config, *bus, period_us);
+  spdlog::info("{} obstacles of {} on {} every {} ms", config.obstacles.size(), config.path, config.bus.url,
+               static_cast<double>(period_us) / 1e3);
+  RunNode(node, *bus);
+  return 0;
+}
+
+}  // namespace
+
+void AddObstaclesCommand(CLI::App& app, Action& action) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "obstacles", "Send a task file's obstacles on the bus, again and again, until SIGTERM: stands in for perception. "
+                   "SIGHUP reads the file again");
+  command->add_option("--config", options->config, "Task file (YAML) that has the obstacles and names the bus")
+      ->required()
+      ->type_name("FILE");
+  options->bus.AddTo(*command);
+  command->add_option("--period-ms", options->period_ms, "From one message to the next; by default a quarter of "
+                                                         "gate.obstacles_timeout_ms")
+      ->check(CLI::Range(1.0, kMaxPeriodMs))
+      ->type_name("MS");
+  command->footer("Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nA certifier whose task says "
+                  "gate.obstacles: bus certifies nothing before it has heard them, nor when they have fallen silent.");
+  command->callback([options, &action] { action = [options] { return Send(*options); }; });
+}
+
+}  // namespace forereach

@@ -1,0 +1,60 @@
+/** Somebody who sees obstacles: sends them by a thread of its own, and can fall silent, lose messages and talk nonsense. */
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "certifier/gate/obstacle_sender.h"
+#include "lcmtypes/bus.h"
+
+namespace forereach {
+
+class Perception final {
+ public:
+  Perception(std::unique_ptr<Bus> bus, std::string channel, const GateOptions& options, const std::vector<Obstacle>& obstacles)
+      : bus_(std::move(bus)), channel_(std::move(channel)), sender_(ObstacleSender::PeriodUs(options)) {
+    sender_.Set(obstacles);
+    thread_ = std::thread([this] {
+      for (; !stop_; std::this_thread::sleep_for(std::chrono::milliseconds(5))) {
+        const std::lock_guard lock(mutex_);
+        if (silent_) continue;
+        if (const auto message = sender_.Due(WallClockUs())) bus_->Publish(channel_, *message);
+      }
+    });
+  }
+  ~Perception() {
+    stop_ = true;
+    thread_.join();
+  }
+  Perception(const Perception&) = delete;
+  Perception& operator=(const Perception&) = delete;
+
+  void SetSilent(bool silent) {
+    const std::lock_guard lock(mutex_);
+    silent_ = silent;
+  }
+  /** The next message now, as `spoil` leaves it; true if it was sent. */
+  template <class Spoil>
+  void SayNow(Spoil spoil) {
+    const std::lock_guard lock(mutex_);
+    auto message = *sender_.Due(INT64_MIN);  // as if the clock had been set back: due
+    message.utime = WallClockUs();
+    if (spoil(message)) bus_->Publish(channel_, message);
+  }
+
+ private:
+  const std::unique_ptr<Bus> bus_;
+  const std::string channel_;
+  std::mutex mutex_;
+  ObstacleSender sender_;
+  bool silent_ = false;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;
+};
+
+}  // namespace forereach
