@@ -300,7 +300,13 @@ void AddDeclareCommand(CLI::App& app, Action& action) {
   command
       ->add_option("--gap", options->search.gap,
                    "Ends when no bound is above the largest slope found by more than this part")
-      ->check(CLI::Range(1e-12, 1e3))
+      ->check(CLI::Validator(  // CLI::Range takes NaN
+          [](const std::string& text) {
+            double gap = 0;
+            const bool good = CLI::detail::lexical_cast(text, gap) && 1e-12 <= gap && gap <= 1e3;
+            return good ? std::string() : "Value " + text + " not in range 1e-12 to 1000";
+          },
+          "FLOAT in [1e-12 - 1000]"))
       ->capture_default_str();
   command->add_option("--max-boxes", options->search.max_boxes, "Ends here too, for each bound; what it has then holds")
       ->check(CLI::Range(1u, 100'000'000u))

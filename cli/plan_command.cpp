@@ -1,5 +1,7 @@
 #include <cstddef>
+#include <cstdint>
 #include <iostream>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -20,8 +22,6 @@ struct Options {
 
 // A task that certifies need not be one that plans: it may have no goal, or a model without a way to brake.
 std::unique_ptr<Proposer> ProposerOf(const Config& config) {
-  if (config.planner.goal.empty())
-    throw ConfigError(config.path + ": planner.goal: missing: where the plan is to go, in the safety coordinates");
   try {
     return MakeProposer(config);
   } catch (const std::invalid_argument& error) {
@@ -86,7 +86,9 @@ void AddPlanCommand(CLI::App& app, Action& action) {
               "found, 2 bad input");
   command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
   command->add_option("--out", options->out, "Where to write the controls")->required()->type_name("FILE.csv");
-  command->add_option("--seed", options->seed, "The same seed gives the same plan")->capture_default_str();
+  command->add_option("--seed", options->seed, "The same seed gives the same plan")
+      ->check(CLI::Range(std::uint32_t{0}, std::numeric_limits<std::uint32_t>::max()))
+      ->capture_default_str();
   command->footer(
       "The task's planner proposes, the task's certifier decides on each candidate. The plan that is written is certified\n"
       "and ends in a stop. It goes as far towards the goal as a plan could be certified.\n\n"

@@ -15,6 +15,9 @@ std::unique_ptr<Proposer> MakeProposer(const Config& config) {
 }
 
 void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options) {
+  if (options.goal.empty())
+    throw std::invalid_argument("planner.goal: missing: where to go, an entry for each of the " +
+                                std::to_string(problem.projection.rows()) + " safety coordinates");
   if (std::ssize(options.goal) != problem.projection.rows())
     throw std::invalid_argument("planner.goal: " + std::to_string(options.goal.size()) + " entries, it has to have " +
                                 std::to_string(problem.projection.rows()));

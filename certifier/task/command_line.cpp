@@ -48,19 +48,33 @@ std::string UnknownArgument(const CLI::App& app) {
   return left.empty() ? "" : "unexpected argument " + Shown(left.front()) + of;
 }
 
+// The first option that was given an empty value, which no option of ours takes. Empty if there is none.
+std::string EmptyOption(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    if (option->get_expected_max() > 0 && std::ranges::count(option->results(), "") > 0)
+      return option->get_name() + ": the value is empty; write a " + option->get_type_name();
+  for (const CLI::App* command : app.get_subcommands())
+    if (const std::string empty = EmptyOption(*command); !empty.empty()) return empty;
+  return "";
+}
+
+int Refuse(const CLI::App& app, const std::string& why) {
+  std::cerr << app.get_name() << ": " << why << "\nRun with --help for more information." << std::endl;
+  return kExitBadInput;
+}
+
 }  // namespace
 
 std::optional<int> ParseCommandLine(CLI::App& app, int argc, const char* const* argv) {
   app.set_version_flag("--version", app.get_name() + " " FOREREACH_VERSION, "Print name and version");
   try {
     app.parse(argc, argv);
+    if (const std::string empty = EmptyOption(app); !empty.empty()) return Refuse(app, empty);
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
     const std::string unknown = UnknownArgument(app);
-    std::cerr << app.get_name() << ": " << (unknown.empty() ? Shown(error.what()) : unknown) << "\n"
-              << "Run with --help for more information." << std::endl;
-    return kExitBadInput;
+    return Refuse(app, unknown.empty() ? Shown(error.what()) : unknown);
   }
 }
 
