@@ -10,9 +10,10 @@ as_root() {
   if [[ $(id -u) == 0 ]]; then "$@"; elif command -v sudo >/dev/null; then sudo "$@"; else return 126; fi
 }
 
+# install_packages [FILE...]: those that the files list, by default scripts/packages.txt.
 install_packages() {
   local wanted missing=()
-  mapfile -t wanted < <(grep -v '^#' scripts/packages.txt)
+  mapfile -t wanted < <(grep -hv '^#' "${@:-scripts/packages.txt}")
   for package in "${wanted[@]}"; do
     [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || missing+=("$package")
   done
