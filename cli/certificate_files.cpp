@@ -45,6 +45,7 @@ std::string Altered(const std::string& what) { return "the record was altered af
 CertificateFile FromDecision(const std::string& path, const Json& document, const std::string& config_path) {
   const std::string task = TaskOf(path, document);
   CertificateFile file;
+  file.of_decision = true;
   file.config = LoadConfig(config_path.empty() ? task : config_path);
   if (!IsCertificate(path, document)) {
     file.not_certificates = 1;

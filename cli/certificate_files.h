@@ -23,6 +23,7 @@ struct RecordedCertificate {
 struct CertificateFile {
   Config config;
   std::vector<RecordedCertificate> certificates;
+  bool of_decision = false;  ///< Of one decision's document, not of logs.
   std::size_t not_certificates = 0;  ///< Abstentions and rejections: nothing to verify.
   PassedOver passed_over;            ///< In logs.
 };

@@ -39,20 +39,10 @@ class Search {
   }
 
   [[nodiscard]] Containment Run() {
-    // First those that are nearly the same, then any of which a part helps: of parallel ones each takes its own. A column
-    // along an axis here may have got a tiny second entry there.
-    for (const bool whole : {true, false})
-      for (std::size_t j = 0; j < rounded_.size(); ++j)
-        if (!pairs_[j]) TakeNearest(j, whole, whole || IsAlongAnAxis(j) ? 1e-3 : 1.0);
-    // A generator that is a little longer is not taken whole; one that differs by rounding alone is, for a coordinate
-    // with nothing to make up for it has to agree exactly. Where to draw the line is tried.
-    std::optional<Containment> first;
-    for (const double line : {1e-13, 1e-15, 1e-11, 1.0, 0.0}) {
-      const std::optional<Containment> uncovered = Uncovered(line);
-      if (!uncovered) return {};
-      if (!first) first = uncovered;
-    }
-    return Refuted().value_or(*first);
+    if (PairByOrder() && !Uncovered()) return {};
+    PairByNearness();
+    if (const auto uncovered = Uncovered()) return Refuted().value_or(*uncovered);
+    return {};
   }
 
  private:
@@ -61,6 +51,44 @@ class Search {
     double gamma;
     double rest;  // of the column, relative to it
   };
+
+  // As whoever made the record by the same rules has them. False if the numbers differ.
+  bool PairByOrder() {
+    Eigen::Index i = 0;
+    for (std::size_t j = 0; j < rounded_.size(); ++j) {
+      if (IsAlongAnAxis(j)) continue;
+      while (i < generators_.cols() && axis_[Index(i)] >= 0) ++i;
+      if (i == generators_.cols()) return false;
+      const double gamma = rounded_[j].dot(generators_.col(i)) < 0 ? -1 : 1;
+      const double rest = (rounded_[j] - gamma * generators_.col(i)).lpNorm<1>();
+      pairs_[j] = Pair{i++, gamma, rest == 0 ? 0 : rest / rounded_[j].lpNorm<1>()};
+    }
+    return true;
+  }
+
+  // First those that are the same up to rounding, so that of nearly parallel ones each takes its own, at last any of which a
+  // part helps. A column along an axis here may have got a tiny second entry there.
+  void PairByNearness() {
+    std::ranges::fill(pairs_, std::nullopt);
+    const auto take = [&](bool whole, double worst, double worst_of_axis) {
+      for (std::size_t j = 0; j < rounded_.size(); ++j)
+        if (!pairs_[j]) TakeNearest(j, whole, IsAlongAnAxis(j) ? worst_of_axis : worst);
+    };
+    for (const double worst : {1e-14, 1e-13, 1e-11, 1e-9, 1e-6, 1e-3}) take(true, worst, worst);
+    take(false, 1.0, 1e-3);
+  }
+
+  [[nodiscard]] std::optional<Containment> Uncovered() const {
+    // A generator that is a little longer is not taken whole; one that differs by rounding alone is, for a coordinate
+    // with nothing to make up for it has to agree exactly. Where to draw the line is tried.
+    std::optional<Containment> first;
+    for (const double line : {1e-13, 1e-15, 1e-11, 1.0, 0.0}) {
+      const std::optional<Containment> uncovered = Uncovered(line);
+      if (!uncovered) return {};
+      if (!first) first = uncovered;
+    }
+    return first;
+  }
 
   [[nodiscard]] bool IsAlongAnAxis(std::size_t j) const {
     return AxisOf(inner_.columns[j], inner_.dim(), [](const Real& entry) { return entry.IsZero(); }) >= 0;

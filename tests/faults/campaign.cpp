@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -16,6 +17,7 @@
 #include <fcntl.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "certifier/gate/candidate_message.h"
@@ -378,6 +380,8 @@ class Campaign final {
   void LostRoute();
   void BadReload();
   [[nodiscard]] std::string Spoilt(const std::string& task, int way);
+  void ReloadOfNoFile(Rig& rig);
+  static void PutNoFile(const std::string& path, int way);
 
   const Options options_;
   std::mt19937 random_;
