@@ -1,6 +1,7 @@
 #include "cli/certificate_files.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -10,12 +11,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "certifier/certify/explain.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/transition_message.h"
+#include "certifier/numerics/text.h"
 #include "certifier/task/files.h"
 #include "certifier/task/json_file.h"
 #include "certifier/task/key.h"
-#include "cli/decision_json.h"
 #include "cli/restarts.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
@@ -45,73 +47,17 @@ std::string Altered(const std::string& what) { return "the record was altered af
 
 // ---- A decision's document.
 
-Eigen::VectorXd VectorOf(const Json& list) {
-  const auto numbers = list.get<std::vector<double>>();
-  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
-}
-
-Eigen::MatrixXd ColumnsOf(const Json& lists, Eigen::Index rows) {
-  Eigen::MatrixXd matrix(rows, static_cast<Eigen::Index>(lists.size()));
-  for (std::size_t j = 0; j < lists.size(); ++j) {
-    const Eigen::VectorXd column = VectorOf(lists[j]);
-    if (column.size() != rows)
-      throw ConfigError("a list of " + std::to_string(column.size()) + " numbers, must have " + std::to_string(rows));
-    matrix.col(static_cast<Eigen::Index>(j)) = column;
-  }
-  return matrix;
-}
-
-verifier::RecordedSlice SliceOf(const Json& slice) {
-  verifier::RecordedSlice recorded;
-  recorded.center = VectorOf(slice.at("center"));
-  recorded.half_width = VectorOf(slice.at("half_width"));
-  recorded.generators = ColumnsOf(slice.at("generators"), recorded.center.size());
-  recorded.has_generators = true;
-  recorded.clearance = slice.at("clearance").get<std::vector<double>>();
-  if (const Json& radius = slice.at("radius"); !radius.is_null())
-    recorded.radius = radius.get<double>();  // else infinite
-  if (!slice.contains("envelope")) return recorded;
-  recorded.envelope_lower = VectorOf(slice["envelope"].at("lower"));
-  recorded.envelope_upper = VectorOf(slice["envelope"].at("upper"));
-  recorded.remainder = VectorOf(slice.at("remainder"));
-  return recorded;
-}
-
-std::string TaskOf(const Json& inputs) {
-  const auto absolute = inputs.at("config").at("absolute").get<std::string>();
-  std::error_code no_path;
-  return std::filesystem::exists(absolute, no_path) ? absolute : inputs["config"].at("given").get<std::string>();
-}
-
 CertificateFile FromDecision(const std::string& path, const Json& document, const std::string& config_path) {
-  const Json& inputs = document.at("inputs");
+  const std::string task = TaskOf(path, document);
   CertificateFile file;
-  file.config = LoadConfig(config_path.empty() ? TaskOf(inputs) : config_path);
-  if (document.at("outcome") != "certified") {
+  file.of_decision = true;
+  file.config = LoadConfig(config_path.empty() ? task : config_path);
+  if (!IsCertificate(path, document)) {
     file.not_certificates = 1;
     return file;
   }
-  RecordedCertificate& certificate = file.certificates.emplace_back();
-  certificate.name = path;
-  verifier::Certificate& recorded = certificate.certificate;
-  recorded.controls = ColumnsOf(inputs.at("controls"), file.config.problem->model->num_inputs());
-  recorded.initial_set.lower = VectorOf(inputs.at("initial_set").at("lower"));
-  recorded.initial_set.upper = VectorOf(inputs["initial_set"].at("upper"));
-  recorded.obstacles = file.config.obstacles;
-  for (const Json& slice : document.at("tube")) recorded.slices.push_back(SliceOf(slice));
-
-  const Json& digests = document.at("digests");
-  const auto compare = [&](const std::string& what, const std::string& name, const Digest& digest) {
-    Compare(certificate, what + name, ToHex(digest), digests.at(name).get<std::string>());
-  };
-  compare(Altered("digest of "), "tube", TubeDigest(document["tube"]));
-  compare(Altered("digest of "), "plan",
-          PlanDigest(recorded.controls, Box(recorded.initial_set.lower, recorded.initial_set.upper)));
-  compare(kOtherInput, "config", file.config.digest);
-  compare(kOtherInput, "model", file.config.model_digest);
-  compare(kOtherInput, "declaration", file.config.declaration_digest);
-  compare(kOtherInput, "observations", file.config.observations_digest);
-  compare(kOtherInput, "obstacles", file.config.obstacles_digest);
+  DecisionRecord record = ReadCertificate(path, document, file.config);
+  file.certificates.push_back({path, std::move(record.mismatches), "", std::move(record.certificate)});
   return file;
 }
 
@@ -258,6 +204,9 @@ class LogReading {
     });
     if (damage.places > 0 && share.is_first)
       certificates_.push_back({logs[0], {}, "the log is damaged in " + std::to_string(damage.places) + " places", {}});
+    for (const decision_t& decision : decisions_)
+      if (const auto plan = of_plan_.find(GetDigest(decision.plan_digest)); plan != of_plan_.end())
+        CheckDecision(decision, plan->second);
     for (const auto& [digest, outcome] : outcomes_)
       if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
         certificates_.push_back(
@@ -307,6 +256,7 @@ class LogReading {
     NoticeRestart(decision->sequence, last_decision_);
     if (!share_.Has(GetDigest(decision->config_digest))) return;
     // A candidate that comes twice is rejected the second time: the certificate is the first's.
+    if (decision->outcome == decision_t::CERTIFIED) decisions_.push_back(*decision);
     std::int16_t& outcome = outcomes_[GetDigest(decision->plan_digest)];
     if (outcome != decision_t::CERTIFIED) outcome = decision->outcome;
   }
@@ -331,6 +281,7 @@ class LogReading {
     NoticeRestart(certified->sequence, last_certified_);
     certificate.name += ", plan " + std::to_string(certified->plan.plan_id) + " of " + GetText(certified->plan.source);
     CheckDigests(*certified, certificate);
+    of_plan_[DigestOf(Encode(certified->plan))] = {certificates_.size(), *certified};
     certificates_.push_back(std::move(certificate));
   }
 
@@ -364,6 +315,74 @@ class LogReading {
       certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
   }
 
+  struct Plan {
+    std::size_t certificate;  // its place
+    certified_plan_t certified;
+  };
+
+  // The decision that goes with a certified plan: it names the same inputs, and its numbers and its sentence follow from a
+  // clearance that the verifier then derives for every slice.
+  void CheckDecision(const decision_t& decision, const Plan& plan) {
+    RecordedCertificate& certificate = certificates_[plan.certificate];
+    const auto compare = [&](const std::string& field, const std::string& expected, const std::string& found) {
+      Compare(certificate, Altered("its decision's " + field), expected, found);
+    };
+    const auto compare_digest = [&](const char* field, const auto& expected, const auto& found) {
+      compare(field, ToHex(GetDigest(expected)), ToHex(GetDigest(found)));
+    };
+    const certified_plan_t& certified = plan.certified;
+    compare_digest("config_digest", certified.config_digest, decision.config_digest);
+    compare_digest("model_digest", certified.model_digest, decision.model_digest);
+    compare_digest("declaration_digest", certified.declaration_digest, decision.declaration_digest);
+    compare_digest("observations_digest", certified.observations_digest, decision.observations_digest);
+    compare_digest("obstacles_digest", certified.obstacles_digest, decision.obstacles_digest);
+    compare("plan_id", std::to_string(certified.plan.plan_id), std::to_string(decision.plan_id));
+    compare("source", GetText(certified.plan.source), GetText(decision.source));
+    compare("candidate_utime", std::to_string(certified.plan.utime), std::to_string(decision.candidate_utime));
+    compare("cause", std::to_string(decision_t::CAUSE_NONE), std::to_string(decision.cause));
+    for (const auto& [field, value] : {std::pair{"step", static_cast<int>(decision.step)},
+                                       {"coordinate", decision.coordinate},
+                                       {"first_observation", decision.first_observation},
+                                       {"second_observation", decision.second_observation}})
+      compare(field, "-1", std::to_string(value));
+
+    verifier::Certificate& derived = certificate.certificate;
+    const int count = static_cast<int>(derived.obstacles.size());
+    if (count == 0 ? decision.obstacle != -1 : decision.obstacle < 0 || decision.obstacle >= count)
+      return compare("obstacle", count == 0 ? "-1" : "0 to " + std::to_string(count - 1), std::to_string(decision.obstacle));
+    double clearance = kInfinity;
+    if (count > 0) {
+      const double radius = derived.obstacles[static_cast<std::size_t>(decision.obstacle)].radius();
+      compare("threshold", ToText(radius), ToText(decision.threshold));
+      clearance = SubDown(decision.margin, radius);
+      if (!(clearance > 0 && clearance < kInfinity)) compare("margin", "above " + ToText(radius), ToText(decision.margin));
+    } else {
+      compare("margin", ToText(kInfinity), ToText(decision.margin));
+      compare("threshold", "0", ToText(decision.threshold));
+    }
+    // The closest slice of all is no closer than that.
+    for (verifier::RecordedSlice& slice : derived.slices)
+      slice.clearance.assign(static_cast<std::size_t>(count), clearance);
+    CompareMessage(decision, static_cast<int>(certified.plan.num_steps), clearance, certificate);
+  }
+
+  // Only the message of a log says which slice is the closest. Older records have the clearance rounded to nearest.
+  static void CompareMessage(const decision_t& decision, int steps, double clearance, RecordedCertificate& certificate) {
+    const std::string found = GetText(decision.message);
+    char nearest[32];
+    std::snprintf(nearest, sizeof nearest, "%.6g", clearance);
+    const auto is = [&](const std::string& sentence) { return found == sentence || found == sentence + kCapped; };
+    for (int t = 0; t <= steps; ++t) {
+      std::string sentence = ExplainCertificate(t, decision.obstacle, clearance);
+      if (is(sentence)) return;
+      const std::string down = " " + RoundedDown(clearance) + " m ";
+      const std::size_t at = sentence.find(down);
+      if (at != std::string::npos && is(sentence.replace(at, down.size(), " " + std::string(nearest) + " m "))) return;
+    }
+    Compare(certificate, Altered("its decision's message"), ExplainCertificate(0, decision.obstacle, clearance) +
+                                                                (decision.obstacle < 0 ? "" : ", or another step"), found);
+  }
+
   const Config& config_;
   const Share share_;
   LogAuthenticator authenticator_;
@@ -376,6 +395,8 @@ class LogReading {
   std::map<Digest, std::size_t> in_force_;  // when a candidate was sent
   std::map<Digest, std::int16_t> outcomes_;
   std::set<Digest> plans_;
+  std::vector<decision_t> decisions_;  // those that say CERTIFIED
+  std::map<Digest, Plan> of_plan_;
   std::int64_t last_decision_ = -1, last_certified_ = -1;
 };
 

@@ -7,15 +7,11 @@ all that the verifier needs. Digests are held against the inputs here; the mathe
 #include <vector>
 
 #include "certifier/task/config.h"
+#include "cli/decision_record.h"
 #include "cli/log_trust.h"
 #include "verifier/verifier.h"
 
 namespace forereach {
-
-/** Something recorded that is not what it has to be. */
-struct Mismatch {
-  std::string what, expected, found;
-};
 
 struct RecordedCertificate {
   std::string name;                  ///< Which one, for a person.
@@ -27,6 +23,7 @@ struct RecordedCertificate {
 struct CertificateFile {
   Config config;
   std::vector<RecordedCertificate> certificates;
+  bool of_decision = false;  ///< Of one decision's document, not of logs.
   std::size_t not_certificates = 0;  ///< Abstentions and rejections: nothing to verify.
   PassedOver passed_over;            ///< In logs.
 };

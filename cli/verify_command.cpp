@@ -113,6 +113,18 @@ void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts
             << std::endl;
 }
 
+// What "confirmed" means.
+std::string Extent(const CertificateFile& file) {
+  if (file.certificates.empty()) return "  checked: nothing, for there are no certificates";
+  if (file.of_decision)
+    return "  checked: every field of the decision but elapsed_us and capped: digests against the task and its data; hull,\n"
+           "  generators, envelope, remainder, radius and clearance of each slice against a tube derived anew; the witness\n"
+           "  and the sentence against the clearances";
+  return "  checked: of each certified plan its digests, its candidate, the obstacles in force, the hull of each slice against\n"
+         "  a tube derived anew, and that this keeps clear of every obstacle; of its decision, where the log has it, inputs,\n"
+         "  witness, margin and sentence. Not checked: times, sequence numbers, elapsed_us, which step is the closest";
+}
+
 void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& verdicts, const Summary& summary) {
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i].status == Status::kConfirmed) continue;
@@ -123,7 +135,7 @@ void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& ver
             << summary.refuted << " refuted, " << summary.cannot_verify << " cannot be verified";
   if (file.not_certificates > 0)
     std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
-  std::cout << InWords(file.passed_over) << std::endl;
+  std::cout << InWords(file.passed_over) << "\n" << Extent(file) << std::endl;
 }
 
 int Verify(const Options& options) {

@@ -39,15 +39,9 @@ class Search {
   }
 
   [[nodiscard]] Containment Run() {
-    // First those that are the same up to rounding, then whatever helps.
-    for (const double worst : {1e-6, 1.0})
-      for (std::size_t j = 0; j < rounded_.size(); ++j)
-        if (!pairs_[j] && !IsAlongAnAxis(j)) TakeNearest(j, worst);
-    // A column along an axis here may have got a tiny second entry there.
-    for (std::size_t j = 0; j < rounded_.size(); ++j)
-      if (!pairs_[j]) TakeNearest(j, 1e-3);
-    for (int k = 0; k < inner_.dim(); ++k)
-      if (const auto uncovered = Uncovered(k)) return Refuted().value_or(*uncovered);
+    if (PairByOrder() && !Uncovered()) return {};
+    PairByNearness();
+    if (const auto uncovered = Uncovered()) return Refuted().value_or(*uncovered);
     return {};
   }
 
@@ -55,29 +49,88 @@ class Search {
   struct Pair {
     Eigen::Index generator;
     double gamma;
+    double rest;  // of the column, relative to it
   };
+
+  // As whoever made the record by the same rules has them. False if the numbers differ.
+  bool PairByOrder() {
+    Eigen::Index i = 0;
+    for (std::size_t j = 0; j < rounded_.size(); ++j) {
+      if (IsAlongAnAxis(j)) continue;
+      while (i < generators_.cols() && axis_[Index(i)] >= 0) ++i;
+      if (i == generators_.cols()) return false;
+      const double gamma = rounded_[j].dot(generators_.col(i)) < 0 ? -1 : 1;
+      const double rest = (rounded_[j] - gamma * generators_.col(i)).lpNorm<1>();
+      pairs_[j] = Pair{i++, gamma, rest == 0 ? 0 : rest / rounded_[j].lpNorm<1>()};
+    }
+    return true;
+  }
+
+  // First those that are the same up to rounding, so that of nearly parallel ones each takes its own, at last any of which a
+  // part helps. A column along an axis here may have got a tiny second entry there.
+  void PairByNearness() {
+    std::ranges::fill(pairs_, std::nullopt);
+    const auto take = [&](bool whole, double worst, double worst_of_axis) {
+      for (std::size_t j = 0; j < rounded_.size(); ++j)
+        if (!pairs_[j]) TakeNearest(j, whole, IsAlongAnAxis(j) ? worst_of_axis : worst);
+    };
+    for (const double worst : {1e-14, 1e-13, 1e-11, 1e-9, 1e-6, 1e-3}) take(true, worst, worst);
+    take(false, 1.0, 1e-3);
+  }
+
+  [[nodiscard]] std::optional<Containment> Uncovered() const {
+    // A generator that is a little longer is not taken whole; one that differs by rounding alone is, for a coordinate
+    // with nothing to make up for it has to agree exactly. Where to draw the line is tried.
+    std::optional<Containment> first;
+    for (const double line : {1e-13, 1e-15, 1e-11, 1.0, 0.0}) {
+      const std::optional<Containment> uncovered = Uncovered(line);
+      if (!uncovered) return {};
+      if (!first) first = uncovered;
+    }
+    return first;
+  }
 
   [[nodiscard]] bool IsAlongAnAxis(std::size_t j) const {
     return AxisOf(inner_.columns[j], inner_.dim(), [](const Real& entry) { return entry.IsZero(); }) >= 0;
   }
 
-  void TakeNearest(std::size_t j, double worst) {
+  // What is left may be `worst` times the column, in the sum of its entries. @param whole take all of a generator.
+  void TakeNearest(std::size_t j, bool whole, double worst) {
     const Eigen::VectorXd& d = rounded_[j];
     double least = worst * d.lpNorm<1>();
     for (Eigen::Index i = 0; i < generators_.cols(); ++i) {
       if (taken_[Index(i)]) continue;
       const auto g = generators_.col(i);
-      double gamma = std::clamp(d.dot(g) / g.squaredNorm(), -1.0, 1.0);
-      if (std::abs(gamma) > 1 - 1e-9) gamma = gamma < 0 ? -1 : 1;
+      const double along = d.dot(g);
+      const double gamma = whole ? (along < 0 ? -1 : 1) : std::clamp(along / g.squaredNorm(), -1.0, 1.0);
       const double rest = (d - gamma * g).lpNorm<1>();
       if (!(rest < least)) continue;  // NaN, where a product under- or overflowed, is no choice
       least = rest;
-      pairs_[j] = Pair{i, gamma};
+      pairs_[j] = Pair{i, gamma, rest / d.lpNorm<1>()};
     }
     if (pairs_[j]) taken_[Index(pairs_[j]->generator)] = true;
   }
 
-  [[nodiscard]] std::optional<Containment> Uncovered(int k) const {
+  // The gamma of a pair, |gamma| <= 1 for certain.
+  [[nodiscard]] Real Gamma(std::size_t j, double line) const {
+    const auto& [generator, gamma, rest] = *pairs_[j];
+    if (std::abs(gamma) < 1 || rest <= line) return gamma;
+    Eigen::Index k = 0;
+    generators_.col(generator).cwiseAbs().maxCoeff(&k);
+    const Real share = (inner_.columns[j][Index(k)] / Real(generators_(k, generator))).middle();
+    return CertainlyAtMost(abs(share), 1.0) ? share : Real(gamma);
+  }
+
+  // The first coordinate that is not covered.
+  [[nodiscard]] std::optional<Containment> Uncovered(double line) const {
+    std::vector<Real> gamma;
+    for (std::size_t j = 0; j < pairs_.size(); ++j) gamma.push_back(pairs_[j] ? Gamma(j, line) : Real());
+    for (int k = 0; k < inner_.dim(); ++k)
+      if (const auto uncovered = Uncovered(k, gamma)) return uncovered;
+    return std::nullopt;
+  }
+
+  [[nodiscard]] std::optional<Containment> Uncovered(int k, const std::vector<Real>& gamma) const {
     Real need = abs(inner_.center[Index(k)] - Real(center_[k])), room;
     for (std::size_t j = 0; j < pairs_.size(); ++j) {
       const Real& d = inner_.columns[j][Index(k)];
@@ -86,7 +139,7 @@ class Search {
         continue;
       }
       const double g = generators_(k, pairs_[j]->generator);
-      if (g != 0 || !d.IsZero()) need += abs(d - Real(pairs_[j]->gamma) * Real(g));
+      if (g != 0 || !d.IsZero()) need += abs(d - gamma[j] * Real(g));
     }
     for (Eigen::Index i = 0; i < generators_.cols(); ++i)
       if (axis_[Index(i)] == k) room += Real(std::abs(generators_(k, i)));

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -17,6 +18,7 @@
 #include <fcntl.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "certifier/gate/candidate_message.h"
@@ -595,6 +597,8 @@ class Campaign final {
   void LostRoute();
   void BadReload();
   [[nodiscard]] std::string Spoilt(const std::string& task, int way);
+  void ReloadOfNoFile(Rig& rig);
+  static void PutNoFile(const std::string& path, int way);
 
   const Options options_;
   const ScratchDirectory world_;
