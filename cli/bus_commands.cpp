@@ -15,6 +15,7 @@
 #include "forereach/command_t.hpp"
 #include "lcmtypes/authentic.h"
 #include "lcmtypes/names.h"
+#include "lcmtypes/printable.h"
 
 namespace forereach {
 namespace {
@@ -69,7 +70,7 @@ nlohmann::ordered_json ToJson(const certifier_status_v2_t& status) {
   return {{"level", LevelName(status.level)},
           {"state", StateName(status.state)},
           {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
-          {"message", GetText(status.message)},
+          {"message", Printable(GetText(status.message))},
           {"shadow", status.shadow != 0},
           {"version", status.version},
           {"failed_reloads", status.failed_reloads},
@@ -94,7 +95,7 @@ void Print(const certifier_status_v2_t& status, bool json) {
     return;
   }
   std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");
-  if (const std::string message = GetText(status.message); !message.empty()) std::cout << ": " << message;
+  if (const std::string message = Printable(GetText(status.message)); !message.empty()) std::cout << ": " << message;
   std::cout << "\nversion " << status.version << ", " << status.observations << " observations, of these " << status.learned
             << " learned; " << status.candidates << " candidates:";
   for (std::int16_t i = 0; i < 16; ++i)

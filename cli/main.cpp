@@ -1,6 +1,4 @@
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 
 #include "certifier/task/process.h"
 #include "cli/commands.h"
@@ -29,6 +27,6 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitBadInput;
   }
-  spdlog::set_default_logger(spdlog::stderr_color_mt("forereach"));
+  SetUpLog("forereach");
   return Guarded("forereach", action);
 }
