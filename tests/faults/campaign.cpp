@@ -607,7 +607,7 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "latched nothing or certified before the reset, what had to be refused or said was not, or at the end the\n"
        << "logs were not what the database has of them. *Lost*: events that the logger had confirmed and its log does\n"
        << "not hold, looked at after each try, those of a logger that ended once the next one has mended its logs;\n"
-       << "what a full disk keeps out is never confirmed; `-`: no logger ran. *Recovered*: within 20 s, after a reset\n"
+       << "what a full disk keeps out is never confirmed; `-`: no logger ran, or its logs were taken away. *Recovered*: within 20 s, after a reset\n"
        << "where a fault was latched, the certifier is OK, the robot executes a plan that was certified since, and the logger\n"
        << "records. *Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";

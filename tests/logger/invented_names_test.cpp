@@ -13,6 +13,8 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
+const std::vector<std::uint8_t> kData{1, 2, 3};
+
 std::int64_t ResidentBytes() {
   std::ifstream file("/proc/self/statm");
   std::int64_t all = 0, resident = 0;
@@ -26,7 +28,7 @@ class InventedNamesTest : public DiskTest {
   void Invent(int from, int to) {
     for (int i = from; i < to; ++i) {
       const std::string name = "invented channel of forty and more bytes " + std::to_string(i);
-      bus_.Publish(name, std::vector<std::uint8_t>{1, 2, 3});
+      bus_.Publish(name, Bytes(kData));
       bus_.Publish("PLAN_CANDIDATE", MakeCandidate(i, i, "source " + std::to_string(i)));
       free_bytes_ = i % 1000 < 100 ? 0 : std::int64_t{1} << 40;
       if (i % 100 == 0) node_->Tick(bus_.now_us += 10'000);
@@ -49,7 +51,7 @@ TEST_F(InventedNamesTest, DoNotFillTheMemory) {
 
 TEST_F(InventedNamesTest, DoNotReachTheTerminal) {
   Start();
-  bus_.Publish("CLEAR\x1b[2J\x9b\n", std::vector<std::uint8_t>{1});
+  bus_.Publish("CLEAR\x1b[2J\x9b\n", Bytes(kData));
   node_->Tick(bus_.now_us += 1000);
   Stop();
   EXPECT_THAT(out_.str(), HasSubstr("CLEAR\\x1b[2J\\x9b\\x0a 1"));
