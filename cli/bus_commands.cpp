@@ -15,6 +15,7 @@
 #include "forereach/command_t.hpp"
 #include "lcmtypes/authentic.h"
 #include "lcmtypes/names.h"
+#include "lcmtypes/printable.h"
 
 namespace forereach {
 namespace {

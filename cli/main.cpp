@@ -1,8 +1,6 @@
 #include <optional>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 
 #include "certifier/task/process.h"
 #include "cli/commands.h"
@@ -27,6 +25,6 @@ int main(int argc, char** argv) {
   AddKeysCommand(app, action);
   AddBusCommands(app, action);
   if (const std::optional<int> code = ParseCommandLine(app, argc, argv)) return *code;
-  spdlog::set_default_logger(spdlog::stderr_color_mt("forereach"));
+  SetUpLog("forereach");
   return Guarded("forereach", action);
 }

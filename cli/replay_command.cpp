@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/replay.h"
+#include "lcmtypes/printable.h"
 #include "logger/json_text.h"
 #include "logger/log_tasks.h"
 
@@ -36,7 +37,7 @@ int RunReplay(const Options& options) {
                            {"differences", result.differences}})
               << std::endl;
   } else {
-    for (const std::string& difference : result.differences) std::cout << difference << "\n";
+    for (const std::string& difference : result.differences) std::cout << Printable(difference) << "\n";
     std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
               << result.differences.size() << " differ";
     if (result.circumstances > 0)

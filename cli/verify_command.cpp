@@ -12,6 +12,7 @@
 #include "cli/certificate_files.h"
 #include "cli/commands.h"
 #include "cli/progress.h"
+#include "lcmtypes/printable.h"
 #include "logger/json_text.h"
 
 namespace forereach {
@@ -67,7 +68,7 @@ Summary Count(const std::vector<Verdict>& verdicts) {
 
 std::string InWords(const RecordedCertificate& recorded, const Verdict& verdict) {
   std::ostringstream text;
-  text << (verdict.status == Status::kRefuted ? "refuted: " : "cannot verify: ") << recorded.name << "\n";
+  text << (verdict.status == Status::kRefuted ? "refuted: " : "cannot verify: ") << Printable(recorded.name) << "\n";
   for (const Mismatch& mismatch : recorded.mismatches)
     text << "  " << mismatch.what << "\n    expected " << mismatch.expected << "\n    found    " << mismatch.found
          << "\n";
@@ -128,7 +129,7 @@ std::string Extent(const CertificateFile& file) {
 void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& verdicts, const Summary& summary) {
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i].status == Status::kConfirmed) continue;
-    std::cout << InWords(file.certificates[i], verdicts[i]);
+    std::cout << PrintableLines(InWords(file.certificates[i], verdicts[i]));
     break;
   }
   std::cout << "verify: " << verdicts.size() << " certificates, " << summary.confirmed << " confirmed, "

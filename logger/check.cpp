@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "lcmtypes/printable.h"
 #include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/log_directory.h"
@@ -110,7 +111,7 @@ std::vector<LogCheck> CheckLogs(const std::string& path) {
 std::string ToText(const std::vector<LogCheck>& checks) {
   std::string text;
   for (const LogCheck& check : checks) {
-    text += fmt::format("{}: {}\n", check.log_file, InWords(check));
+    text += fmt::format("{}: {}\n", Printable(check.log_file), InWords(check));
     if (check.log != LogCheck::Log::kThere) continue;
     List(text, check.changed, "changed");
     List(text, check.missing, "missing");

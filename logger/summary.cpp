@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "forereach/robot_state_t.hpp"
+#include "lcmtypes/printable.h"
 
 namespace forereach {
 namespace {
@@ -25,7 +26,7 @@ std::int64_t Total(const std::map<std::string, std::int64_t>& counts) {
 
 std::string Listed(const std::map<std::string, std::int64_t>& counts) {
   std::string text;
-  for (const auto& [name, count] : counts) text += fmt::format("{}{} {}", text.empty() ? " (" : ", ", name, count);
+  for (const auto& [name, count] : counts) text += fmt::format("{}{} {}", text.empty() ? " (" : ", ", Printable(name), count);
   return text.empty() ? text : text + ")";
 }
 

@@ -6,12 +6,14 @@
 #include <utility>
 
 #include <CLI/CLI.hpp>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "certifier/task/key.h"
 #include "certifier/task/reloading.h"
 #include "lcmtypes/authentic_bus.h"
+#include "lcmtypes/printable.h"
 
 namespace forereach {
 namespace {
@@ -52,16 +54,32 @@ class DatagramWatch final : public Node {
   std::int64_t said_ = 0, next_us_ = 0;
 };
 
+class PrintableMessage final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
+    const std::string text = Printable({message.payload.data(), message.payload.size()});
+    out.append(text.data(), text.data() + text.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<PrintableMessage>(); }
+};
+
 }  // namespace
+
+void SetUpLog(const std::string& name) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<PrintableMessage>('*').set_pattern("%H:%M:%S.%e %n %^%l%$: %*");
+  spdlog::set_formatter(std::move(formatter));
+}
 
 int Guarded(const std::string& name, const std::function<int()>& body) {
   try {
     return body();
   } catch (const BadInput& error) {
-    std::cerr << name << ": " << error.what() << std::endl;
+    std::cerr << name << ": " << PrintableLines(error.what()) << std::endl;
     return kExitBadInput;
   } catch (const std::exception& error) {
-    std::cerr << name << ": " << error.what() << std::endl;
+    std::cerr << name << ": " << PrintableLines(error.what()) << std::endl;
     return 1;
   }
 }
@@ -93,8 +111,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   bus_arguments.AddTo(app);
   if (add_options) add_options(app);
   if (const std::optional<int> code = ParseCommandLine(app, argc, argv)) return *code;
-  spdlog::set_default_logger(spdlog::stderr_color_mt(description.name));
-  spdlog::set_pattern("%H:%M:%S.%e %n %^%l%$: %v");
+  SetUpLog(description.name);
   CatchStopSignals();
   const int code = Guarded(description.name, [&] {
     Config config = LoadConfig(config_path);

@@ -592,6 +592,7 @@ class Campaign final {
   }
 
   void Disks();
+  void Gone();
   void Routes() { NoNetwork(), LostRoute(); }
   void NoNetwork();
   void LostRoute();
@@ -616,6 +617,7 @@ const std::vector<Campaign::Kind> Campaign::kKinds{
     {"obstacles", &Campaign::Obstacles},
     {"forgeries", &Campaign::Forgeries},  {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
     {"disks", &Campaign::Disks},
+    {"gone", &Campaign::Gone},
     {"route", &Campaign::Routes},         {"reload", &Campaign::BadReload}};
 
 // A small file system of its own for the log, filled, made read-only, and given back.
@@ -719,6 +721,43 @@ void Campaign::StateDisks() {
     }, options_.others);
   }
   ::umount(directory.c_str());
+}
+
+// What the logger writes is deleted while it writes. It says so, counts what had been confirmed, and records again.
+void Campaign::Gone() {
+  const auto remove_files = [](const std::string& directory, const std::string& part) {
+    std::error_code error;
+    for (const auto& file : std::filesystem::directory_iterator(directory, error))
+      if (file.path().filename().string().find(part) != std::string::npos) std::filesystem::remove(file.path(), error);
+  };
+  const std::vector<std::pair<const char*, std::function<void(const std::string&)>>> kinds{
+      {"Log file deleted", [&](const std::string& directory) { remove_files(directory, ".lcmlog"); }},
+      {"Log directory deleted", [](const std::string& directory) { std::filesystem::remove_all(directory); }},
+      {"Database deleted", [&](const std::string& directory) { remove_files(directory, "decisions.sqlite"); }}};
+  for (const auto& [fault, take_away] : kinds) {
+    const bool is_database = &take_away == &kinds.back().second;
+    Rig rig(DemoTask(), {.takes_logs_away = true});
+    Row& row = Begin(fault, options_.others);
+    std::int64_t gone = 0;
+    const auto& logger = rig.witness().logger_status();
+    Tries(row, rig, [&](int) {
+      rig.Listen(kHeartbeat);
+      const logger_status_t before = *logger;
+      take_away(rig.directory());
+      const auto goes_on = [&] {
+        return logger->events_written > before.events_written + 50 && logger->state != logger_status_t::ERROR &&
+               (is_database ? logger->state == logger_status_t::STALE : logger->events_lost > before.events_lost);
+      };
+      Demand(row, rig.ListenUntil(goes_on, kSaysSoon), "it does not record again, or does not say what is lost: " +
+                                                           GetText(logger->message));
+      Demand(row, is_database || logger->events_lost - before.events_lost >= before.events_written - gone,
+             "it counts less as lost than it had confirmed");
+      gone += logger->events_lost - before.events_lost;
+      if (is_database) rig.End(Rig::kLogger), gone = 0;  // the next one makes the rows again
+    }, options_.others);
+    Remark(row, is_database ? "the next start makes the rows again" : "lost are the events that were deleted, and counted");
+    if (!is_database) row.lost_by_logger.reset();
+  }
 }
 
 // A network of its own for this thread and what it starts from now on: the machine's routes stay as they are.
@@ -899,7 +938,7 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "had to be refused or said was not, or at the end the logs were not what the database has of them.\n"
        << "*Lost*: events that the logger had confirmed and its log does not hold, looked at after each try,\n"
        << "those of a logger that ended once the next one has mended its logs;\n"
-       << "what a full disk keeps out is never confirmed; `-`: no logger ran. *Recovered*: within 20 s, after a reset\n"
+       << "what a full disk keeps out is never confirmed; `-`: no logger ran, or its logs were taken away. *Recovered*: within 20 s, after a reset\n"
        << "where a fault was latched, the certifier is OK, the robot executes a plan that was certified since, and the logger\n"
        << "records. Under raw datagrams it is forbidden too that a process grows by 48 MB. *Said why*: a process that cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";

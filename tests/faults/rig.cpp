@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -38,7 +39,9 @@ std::set<std::string> LogsIn(const std::string& directory) {
 
 std::int64_t EventsIn(const std::set<std::string>& logs) {
   std::int64_t events = 0;
-  ForEachEvent({logs.begin(), logs.end()}, [&events](const LogEvent&, const std::string&) { ++events; });
+  std::vector<std::string> there;
+  std::ranges::copy_if(logs, std::back_inserter(there), [](const std::string& log) { return std::filesystem::exists(log); });
+  ForEachEvent(there, [&events](const LogEvent&, const std::string&) { ++events; });
   return events;
 }
 
@@ -153,6 +156,7 @@ void Rig::LookAtEnd(Role role) {
   is_judged_[role] = true;
   const std::optional<int> status = processes_[role]->WaitForExit(std::chrono::milliseconds(0));
   const bool may_end_well = ended_by_[role] == SIGTERM || role == kPlanner || role == kRobot;
+  if (status == 1 && role == kLogger && options_.takes_logs_away && ended_by_[role] == SIGTERM) return;
   if (status ? *status == 0 && may_end_well : ended_by_[role] == SIGKILL) return;
   BadEnding(role, status ? "ended with exit status " + std::to_string(*status) : "ended by a signal");
 }
@@ -255,7 +259,9 @@ std::vector<std::string> Rig::CheckRecords() const {
   std::vector<std::string> amiss;
   for (const std::string& directory : directories_) try {
       std::vector<LogCheck> checks = CheckLogs(directory);
-      std::erase_if(checks, [](const LogCheck& check) { return check.whole_log() && check.ended; });
+      std::erase_if(checks, [this](const LogCheck& check) {
+        return (check.whole_log() && check.ended) || (options_.takes_logs_away && check.log == LogCheck::Log::kMissing);
+      });
       if (!checks.empty()) amiss.push_back(directory + ": " + ToText(checks));
     } catch (const BadInput& error) {
       amiss.push_back(error.what());

@@ -27,6 +27,7 @@ class Rig final {
     bool relayed = false;          ///< Certifier and logger are on a bus of their own: somebody has to relay.
     bool settable_clocks = false;  ///< SetClock may be called.
     std::vector<Obstacle> seen;    ///< Of a task whose gate.obstacles is bus: what is sent.
+    bool takes_logs_away = false;  ///< Logs are deleted: the logger may end with 1, and logs be missing.
   };
 
   /** @param task YAML of the task. */
@@ -87,6 +88,8 @@ class Rig final {
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] std::string url(Role role) const { return options_.relayed && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
+  /** Of the logger that is started next. */
+  [[nodiscard]] const std::string& directory() const { return next_directory_; }
   /** From the logger's next start on. */
   void SetDirectory(const std::string& directory) { next_directory_ = directory; }
   /** What the certifier keeps a fault in, from its next start on. */

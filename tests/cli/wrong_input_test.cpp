@@ -1,0 +1,254 @@
+// Which task a log was recorded with, and inputs that are no log or none of this task: a sentence and exit 2.
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "certifier/task/config.h"
+#include "forereach/decision_t.hpp"
+#include "logger/event_log.h"
+#include "logger/kept_tasks.h"
+#include "logger/log_directory.h"
+#include "tests/cli/program.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace fs = std::filesystem;
+
+const std::string kSource = FOREREACH_SOURCE_DIR;
+const std::string kCourse = kSource + "/tests/data/course.yaml", kCourseLog = kSource + "/tests/data/course.lcmlog";
+
+/** Two tasks of different digests, whose data lies outside the directory of the task files, and a run of each. */
+class KeptTaskTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scratch_ = new ScratchDirectory;
+    fs::create_directories(*scratch_ / "tasks_of_mine");
+    fs::create_directories(*scratch_ / "data");
+    fs::copy(kSource + "/config/data/demo_transitions.csv", *scratch_ / "data/demo.csv");
+    std::string text = Read(kSource + "/config/demo.yaml");
+    const auto replace = [&text](const std::string& old, const std::string& by) { text.replace(text.find(old), old.size(), by); };
+    replace("transitions: data/demo_transitions.csv", "transitions: ../data/demo.csv");
+    replace("time_limit_s: 45", "time_limit_s: 2");
+    text += "gate: {learn: none}\n";
+    for (const char* name : {"one", "two"}) {
+      scratch_->Write(std::string("tasks_of_mine/") + name + ".yaml", text + "# " + name + "\n");
+      const Output run =
+          Forereach("run --config " + TaskOf(name) + " --directory " + (*scratch_ / "log") + " 2>&1");
+      ASSERT_EQ(run.code, 0) << run.text;
+    }
+    logs_ = new std::vector<std::string>;
+    for (const std::string& log : LogDirectory(*scratch_ / "log").Logs()) logs_->push_back(*scratch_ / "log/" + log);
+    ASSERT_EQ(logs_->size(), 2u);
+  }
+  static void TearDownTestSuite() {
+    delete std::exchange(logs_, nullptr);
+    delete std::exchange(scratch_, nullptr);
+  }
+  static std::string TaskOf(const std::string& name) { return *scratch_ / "tasks_of_mine/" + name + ".yaml"; }
+
+  /** A copy of the directory, at a place where nothing else is. */
+  std::string Copied() {
+    const std::string copy = elsewhere_ / "copy";
+    fs::copy(*scratch_ / "log", copy, fs::copy_options::recursive);
+    return copy;
+  }
+  [[nodiscard]] static std::string In(const std::string& directory, const std::string& log) {
+    return directory + "/" + fs::path(log).filename().string();
+  }
+
+  static void ExpectRefused(const std::string& command, const std::vector<std::string>& sentences) {
+    const Output output = Forereach(command + " 2>&1");
+    EXPECT_EQ(output.code, 2) << command << "\n" << output.text;
+    for (const std::string& sentence : sentences) EXPECT_THAT(output.text, HasSubstr(sentence)) << command;
+    EXPECT_EQ(std::ranges::count(output.text, '\n'), 1) << command << "\n" << output.text;
+  }
+
+  static ScratchDirectory* scratch_;
+  static std::vector<std::string>* logs_;
+  const ScratchDirectory elsewhere_;
+};
+ScratchDirectory* KeptTaskTest::scratch_ = nullptr;
+std::vector<std::string>* KeptTaskTest::logs_ = nullptr;
+
+TEST_F(KeptTaskTest, ACopiedDirectoryNeedsNoTaskFile) {
+  const std::string copy = Copied();
+  fs::rename(*scratch_ / "data", *scratch_ / "data_away");
+  fs::rename(*scratch_ / "tasks_of_mine", *scratch_ / "tasks_away");
+  for (const std::string& log : *logs_) {
+    for (const char* command : {"replay ", "verify ", "report --picture picture.svg "}) {
+      std::string line = command + In(copy, log);
+      if (const auto at = line.find("picture.svg"); at != std::string::npos) line.replace(at, 11, elsewhere_ / "picture.svg");
+      const Output output = Forereach(line + " 2>&1");
+      EXPECT_EQ(output.code, 0) << line << "\n" << output.text;
+      EXPECT_THAT(output.text, Not(HasSubstr("tubes left out")));
+    }
+  }
+  fs::rename(*scratch_ / "tasks_away", *scratch_ / "tasks_of_mine");
+  fs::rename(*scratch_ / "data_away", *scratch_ / "data");
+}
+
+TEST_F(KeptTaskTest, ADirectoryWithSeveralTasksVerifiesWhole) {
+  const std::string copy = Copied();
+  for (const std::string& what : {copy, copy + "/decisions.sqlite"}) {
+    const Output output = Forereach("verify " + what + " 2>&1");
+    EXPECT_EQ(output.code, 0) << output.text;
+    EXPECT_THAT(output.text, AllOf(HasSubstr(" 0 refuted"), HasSubstr(" 0 cannot be verified")));
+  }
+  EXPECT_EQ(Forereach("verify " + copy + " --config " + TaskOf("one")).code, 0) << "the given one for its own, the kept for others";
+}
+
+TEST_F(KeptTaskTest, AnotherTaskIsRefusedAndItsOwnIsNamed) {
+  const std::string digest = ToHex(LoadConfig(TaskOf("one")).digest), log = logs_->front();
+  for (const char* command : {"replay ", "report ", "verify "}) {
+    ExpectRefused(command + log + " --config " + TaskOf("two"), {TaskOf("two"), digest, *scratch_ / "log/tasks/" + digest});
+    ExpectRefused(command + log + " --config " + kSource + "/config/point_mass.yaml", {digest});
+    ExpectRefused(command + kCourseLog + " --config " + TaskOf("two"), {"not kept beside the log"});
+    ExpectRefused(command + kCourseLog, {"--config"});
+  }
+  const Output other = Forereach("replay " + log + " --other-task --config " + TaskOf("two"));
+  EXPECT_EQ(other.code, 1);
+  EXPECT_THAT(other.text, HasSubstr("another config"));
+  EXPECT_EQ(Forereach("replay " + log + " --other-task 2>&1").code, 2);
+}
+
+TEST_F(KeptTaskTest, UnrelatedRunsAreRefused) {
+  const std::string both = logs_->at(0) + " " + logs_->at(1);
+  for (const char* command : {"replay ", "report ", "verify "}) {
+    ExpectRefused(command + both, {logs_->at(1), "does not follow", logs_->at(0)});
+    ExpectRefused(command + logs_->at(0) + " " + logs_->at(0), {"is named twice"});
+  }
+}
+
+TEST_F(KeptTaskTest, ADamagedTaskIsNotUsed) {
+  const Config task = LoadConfig(TaskOf("one"));
+  const std::string kept = "tasks/" + ToHex(task.digest);
+  std::string copy = Copied();
+  std::ofstream(copy + "/" + kept + "/task.yaml", std::ios::app) << "# more\n";
+  ExpectRefused("replay " + In(copy, logs_->front()), {"is damaged", kept});
+  fs::remove_all(copy);
+  copy = Copied();
+  const std::string transitions = copy + "/" + kept + "/transitions-" + ToHex(task.observations_digest) + ".csv";
+  std::string text = Read(transitions);
+  text.erase(text.rfind('\n', text.size() - 2) + 1);
+  std::ofstream(transitions) << text;
+  ExpectRefused("verify " + In(copy, logs_->front()), {"is damaged", transitions});
+  fs::remove(transitions);
+  ExpectRefused("report " + In(copy, logs_->front()), {"not kept beside it"});
+}
+
+TEST_F(KeptTaskTest, OfSeveralVersionsOfTheTransitionsTheLogNamesTheRightOne) {
+  const std::string copy = Copied();
+  TaskCopy other = CopyTask(LoadConfig(TaskOf("one")));
+  other.transitions.erase(other.transitions.rfind('\n', other.transitions.size() - 2) + 1);
+  const std::string csv = elsewhere_.Write("other.csv", other.transitions);
+  other.observations_digest = ObservationsDigest(*other.model, LoadTransitions(csv, *other.model));
+  KeptTasks(copy).Keep(other);
+  EXPECT_EQ(Forereach("replay " + In(copy, logs_->front())).code, 0);
+}
+
+TEST_F(KeptTaskTest, ATaskWithAKeyAsksForIt) {
+  const ScratchDirectory own;
+  Forereach("keygen " + (own / "robot.key"));
+  fs::copy(kSource + "/tests/data/course_transitions.csv", own / "course_transitions.csv");
+  const std::string task = own.Write("task.yaml", Read(kCourse) + "bus: {key: robot.key}\n");
+  ASSERT_EQ(Forereach("run --config " + task + " --directory " + (own / "log")).code, 0);
+  const std::string log = own / "log/" + LogDirectory(own / "log").Logs().front();
+  ExpectRefused("replay " + log, {"keys are not kept", "--key FILE", "--no-key"});
+  EXPECT_EQ(Forereach("replay " + log + " --key " + (own / "robot.key")).code, 0);
+  EXPECT_EQ(Forereach("replay " + log + " --config " + task).code, 0);
+  for (const auto& file : fs::recursive_directory_iterator(own / "log")) EXPECT_NE(file.path().filename(), "robot.key");
+}
+
+// Every command against every kind of input that is none for it.
+TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
+  const ScratchDirectory own;
+  const std::string empty = own.Write("empty.lcmlog", ""), text = own.Write("text.lcmlog", "hello\nworld\n");
+  const std::string json = own.Write("decision.lcmlog", "{\"outcome\": \"certified\"}");
+  const std::string noise = own.Write("noise.lcmlog", std::string(5000, '\x07'));
+  const std::string cut = own.Write("cut.lcmlog", "\xED\xA1\xDA\x01");
+  const std::string foreign = own / "foreign.sqlite", alien = own / "alien.lcmlog", none = own / "none.lcmlog";
+  {
+    sqlite3* handle = nullptr;
+    sqlite3_open(foreign.c_str(), &handle);
+    sqlite3_exec(handle, "CREATE TABLE t (a)", nullptr, nullptr, nullptr);
+    sqlite3_close(handle);
+    EventLogWriter writer(alien);
+    writer.Append(1, "SOMETHING_ELSE", std::vector<std::uint8_t>{1, 2, 3});
+    ASSERT_TRUE(writer.Flush());
+  }
+  const std::string database = *scratch_ / "log/decisions.sqlite", directory = *scratch_ / "log";
+  const std::vector<std::pair<std::string, std::string>> no_logs{
+      {empty, "is empty"},          {text, "no LCM event log"},          {json, ""},
+      {noise, "no LCM event log"},  {cut, "neither a candidate nor a decision"}, {alien, "neither a candidate nor a decision"},
+      {none, "No such file"},       {TaskOf("one"), "no LCM event log"}, {"/dev/null", "not a regular file"}};
+  for (const std::string& config : {std::string(), " --config " + TaskOf("one")}) {
+    for (const char* command : {"replay ", "report "}) {
+      for (const auto& [input, sentence] : no_logs) ExpectRefused(command + input + config, {sentence, input});
+      ExpectRefused(command + database + config, {"is an SQLite database"});
+      ExpectRefused(command + foreign + config, {"is an SQLite database"});
+      ExpectRefused(command + directory + config, {"is a directory"});
+      ExpectRefused(command + logs_->front() + " " + database + config, {"is an SQLite database"});
+      ExpectRefused(command + logs_->front() + " " + text + config, {"no LCM event log"});
+    }
+    for (const auto& [input, sentence] : no_logs) ExpectRefused("verify " + input + config, {input});
+    ExpectRefused("verify " + foreign + config, {"not a decision database"});
+    ExpectRefused("verify " + own.path() + config, {"no decision database"});
+    ExpectRefused("verify " + logs_->front() + " " + database + config, {"is an SQLite database"});
+    ExpectRefused("verify " + logs_->front() + " " + text + config, {"no LCM event log"});
+  }
+  for (const std::string& input : {empty, text, json, noise, alien, logs_->front(), database, foreign, TaskOf("one")})
+    ExpectRefused("check-log " + input, {input, "name the logger's directory"});
+  ExpectRefused("check-log " + none, {"no such directory"});
+  ExpectRefused("check-log " + own.path(), {"no decision database"});
+  for (const std::string& wrong : {text, json, database, logs_->front(), directory, none})
+    for (const char* command : {"replay ", "report ", "verify "})
+      ExpectRefused(command + logs_->front() + " --config " + wrong, {wrong});
+}
+
+// Whoever sends one invented decision does not keep the others from being judged.
+TEST_F(KeptTaskTest, ADecisionOfATaskThatNobodyKnowsSpoilsItselfOnly) {
+  const std::string copy = Copied(), log = In(copy, logs_->front());
+  {
+    EventLogWriter writer(log);
+    decision_t decision{};
+    decision.outcome = decision_t::CERTIFIED;
+    decision.sequence = 1 << 20;
+    decision.config_digest[0] = 1;
+    writer.Append(1, "PLAN_DECISION", Encode(decision));
+    ASSERT_TRUE(writer.Flush());
+  }
+  const Output replayed = Forereach("replay " + log), verified = Forereach("verify " + log);
+  EXPECT_EQ(replayed.code, 1);
+  EXPECT_THAT(replayed.text, HasSubstr(" 1 differ"));
+  EXPECT_EQ(verified.code, 1);
+  EXPECT_THAT(verified.text, AllOf(HasSubstr(" 0 refuted"), HasSubstr(" 1 cannot be verified")));
+}
+
+// A database from elsewhere names a log outside its directory.
+TEST_F(KeptTaskTest, ADatabaseDoesNotLeadOutOfItsDirectory) {
+  const std::string copy = Copied();
+  fs::copy(logs_->front(), elsewhere_ / "outside.lcmlog");
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open((copy + "/decisions.sqlite").c_str(), &handle), SQLITE_OK);
+  sqlite3_exec(handle, "UPDATE runs SET log_file = '../outside.lcmlog' WHERE continues = ''", nullptr, nullptr, nullptr);
+  sqlite3_exec(handle, "INSERT INTO runs (log_file, start_utime, schema) VALUES ('../outside.lcmlog', 0, 2)", nullptr, nullptr,
+               nullptr);
+  sqlite3_close(handle);
+  ExpectRefused("verify " + copy, {"not beside it", "../outside.lcmlog"});
+  ExpectRefused("check-log " + copy, {"not beside it"});
+}
+
+}  // namespace
+}  // namespace forereach
