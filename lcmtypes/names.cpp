@@ -26,6 +26,7 @@ std::string_view CauseName(std::int16_t cause) {
     case decision_t::CAUSE_DOMAIN_EXIT: return "domain_exit";
     case decision_t::CAUSE_NO_FINITE_ENCLOSURE: return "no_finite_enclosure";
     case decision_t::CAUSE_OBSTACLE: return "obstacle";
+    case decision_t::CAUSE_NO_STOP: return "no_stop";
     case decision_t::CAUSE_STALE: return "stale";
     case decision_t::CAUSE_FUTURE: return "future";
     case decision_t::CAUSE_DUPLICATE: return "duplicate";
@@ -45,6 +46,7 @@ std::string_view CauseName(std::int16_t cause) {
     case decision_t::CAUSE_SHADOW: return "shadow";
     case decision_t::CAUSE_NO_OBSTACLES: return "no_obstacles";
     case decision_t::CAUSE_SECOND_CERTIFIER: return "second_certifier";
+    case decision_t::CAUSE_LATCH_UNWRITABLE: return "latch_unwritable";
     default: return "unknown";
   }
 }
@@ -66,7 +68,9 @@ std::string_view EventName(std::int16_t kind) {
   }
 }
 
-bool StopsTheRobot(std::int16_t cause) { return cause == fault_t::SLICE_LEFT || cause == fault_t::DECLARATION_FALSIFIED; }
+bool StopsTheRobot(std::int16_t cause) {
+  return cause == fault_t::SLICE_LEFT || cause == fault_t::DECLARATION_FALSIFIED || cause == fault_t::UNCERTIFIED_PLAN;
+}
 
 std::string_view FaultName(std::int16_t cause) {
   switch (cause) {
@@ -74,6 +78,7 @@ std::string_view FaultName(std::int16_t cause) {
     case fault_t::CLOCK_JUMP: return "clock_jump";
     case fault_t::SLICE_LEFT: return "slice_left";
     case fault_t::DECLARATION_FALSIFIED: return "declaration_falsified";
+    case fault_t::UNCERTIFIED_PLAN: return "uncertified_plan";
     default: return "unknown";
   }
 }

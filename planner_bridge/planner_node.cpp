@@ -207,8 +207,12 @@ void PlannerNode::Learn(const decision_t& decision) {
   auto& counts = decision.outcome == decision_t::REJECTED ? rejected_ : abstained_;
   ++counts[std::string(CauseName(decision.cause))];
   // No candidate can pass before the world has changed.
-  if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_FAULT) return EndRound(false);
+  if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_FAULT ||
+      decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE)
+    return EndRound(false);
   if (decision.outcome == decision_t::ABSTAIN_FALSIFIED) return EndRound(false);
+  // A plan that does not stop is no nearer to the domain's bounds than one that does.
+  if (decision.cause == decision_t::CAUSE_NO_STOP) return;
   round_->lessons.Learn(static_cast<Outcome>(decision.outcome));
 }
 

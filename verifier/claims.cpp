@@ -52,6 +52,7 @@ class SliceCheck {
   [[nodiscard]] std::optional<Failure> Run() {
     for (int k = 0; k < slice_.dim() && !failure_; ++k) CheckHull(k);
     for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
+    if (!step_) CheckRest();
     if (!failure_) CheckSafety();
     return failure_;
   }
@@ -93,6 +94,25 @@ class SliceCheck {
       const Real half = Real(0.5) * (upper - lower);
       claims_.AtLeast(recorded_.remainder[k], half, half,
                       [&] { return "the recorded remainder covers that of " + name(k); });
+    }
+  }
+
+  // Of the last slice: what was derived stands, and so does what was recorded.
+  void CheckRest() {
+    for (const RestBound& bound : problem_.rest) {
+      if (failure_) return;
+      const int k = bound.coordinate;
+      const Real most(bound.tolerance), &c = slice_.center[Index(k)], r = slice_.HalfWidth(k);
+      const auto stands = [&](const char* which, const Real& lower, const Real& upper) {
+        const auto what = [&] { return "the plan ends standing: " + name(k) + " of " + which; };
+        claims_.AtMost(upper, most, most, what);
+        claims_.AtLeast(lower, -most, most, what);
+      };
+      stands("the last slice", c - r, c + r);
+      if (recorded_.lower.size() > 0) stands("the last recorded hull", recorded_.lower[k], recorded_.upper[k]);
+      if (recorded_.center.size() > 0)
+        stands("the last recorded slice", Real(recorded_.center[k]) - Real(recorded_.half_width[k]),
+               Real(recorded_.center[k]) + Real(recorded_.half_width[k]));
     }
   }
 

@@ -29,6 +29,10 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   RequireThat(problem->transitions.z.cols() == variables || problem->transitions.size() == 0,
               "transitions: " + std::to_string(problem->transitions.z.cols()) + " columns, must be " +
                   std::to_string(variables));
+  for (const RestBound& bound : problem->rest)
+    RequireThat(0 <= bound.coordinate && bound.coordinate < n && bound.tolerance >= 0 && bound.tolerance < kInfinity,
+                "rest: coordinate " + std::to_string(bound.coordinate) + " within " + std::to_string(bound.tolerance) +
+                    " is no state of the model, or negative or not finite");
   for (int i = 0; i < problem->transitions.size(); ++i) {
     const Eigen::VectorXd z = problem->transitions.z.row(i);
     RequireThat(problem->domain.Contains({z.data(), static_cast<std::size_t>(z.size())}),
@@ -153,8 +157,9 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   tube.slices_[0].Assign(initial_set);
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
   if (violation()) return Falsified(*violation());
-  const Decision stopped = Propagate(plan, tube);
-  Decision decision = stopped.outcome == Outcome::kNone ? JudgeSafety(obstacles, tube) : stopped;
+  Decision decision = Propagate(plan, tube);
+  if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
+  if (decision.outcome == Outcome::kNone) decision = JudgeSafety(obstacles, tube);
   for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;
   return decision;
 }
@@ -168,6 +173,23 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
     tube.length_ = t + 1;
   }
   return {};
+}
+
+Decision Certifier::JudgeRest(const Tube& tube) const noexcept {
+  Decision decision;
+  for (const RestBound& bound : problem_->rest) {
+    const Interval reached = tube.hull(tube.length(), bound.coordinate);
+    const bool is_below = reached.upper <= bound.tolerance;
+    if (is_below && -bound.tolerance <= reached.lower) continue;
+    decision.outcome = Outcome::kDomain;
+    decision.cause = Cause::kNoStop;
+    decision.step = tube.length();
+    decision.coordinate = bound.coordinate;
+    decision.margin = is_below ? reached.lower : reached.upper;
+    decision.threshold = is_below ? -bound.tolerance : bound.tolerance;
+    break;
+  }
+  return decision;
 }
 
 namespace {

@@ -63,7 +63,8 @@ class Certifier final {
   slice `tube.slice(t)` contains every reachable state and its projection is disjoint from every obstacle.
 
   Order of the tests: F; then for t < T the domain, the remainder, the envelope (D ends the run at its first step); after
-  the horizon S, at its first unsafe t in 0..T. X_T is not tested against the domain.
+  the horizon the bounds of `Problem::rest` on the hull of X_T, in their order (D, kNoStop, at step T); then S, at its
+  first unsafe t in 0..T. X_T is not tested against the domain.
   Cost O(T (N + n m)) plus a clearance a slice and obstacle that comes close. Any number of threads may call it, each
   with a tube of its own. @pre Require passes. */
   [[nodiscard]] Decision Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
@@ -74,6 +75,8 @@ class Certifier final {
   /** SeparateSlice, where what the hulls prove is known. */
   [[nodiscard]] Separation BetterOf(const Separation& by_hulls, const Tube& tube, int t,
                                     const Obstacle& obstacle) const noexcept;
+  /** Outcome kNone if the last slice provably stands. */
+  [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
   [[nodiscard]] Decision JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept;
 
   std::shared_ptr<const Problem> problem_;

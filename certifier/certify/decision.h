@@ -16,7 +16,7 @@ namespace forereach {
 
 /** Numbers as in lcmtypes/decision_t.lcm. Zero is not a certificate. */
 enum class Outcome { kNone = 0, kCertified = 1, kFalsified = 2, kDomain = 3, kSafety = 4 };
-enum class Cause { kNone = 0, kPairwise = 1, kDomainExit = 2, kNoFiniteEnclosure = 3, kObstacle = 4 };
+enum class Cause { kNone = 0, kPairwise = 1, kDomainExit = 2, kNoFiniteEnclosure = 3, kObstacle = 4, kNoStop = 5 };
 
 struct Decision {
   Outcome outcome = Outcome::kNone;
@@ -34,7 +34,7 @@ struct Decision {
   ///@}
 
   /** The value that decided and what it was held to. Certificate and S: proven distance from slice to the obstacle's
-  core, and its radius (m). D: what the hull reaches, and the domain's bound. F: difference, and what L allows. */
+  core, and its radius (m). D: what the hull reaches, and the bound of the domain or of standing. F: difference, and what L allows. */
   double margin = 0, threshold = 0;
 
   /** Whether a search for the tightest observation met its cap: the tube is as sound, and may be wider than it need be. */

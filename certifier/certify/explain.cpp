@@ -63,6 +63,9 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
     case Outcome::kDomain: {
       const std::string where = "abstain D: at step " + std::to_string(decision.step) + " ";
       if (decision.cause == Cause::kDomainExit) return where + ExplainExit(decision.exit, model);
+      if (decision.cause == Cause::kNoStop)
+        return where + "the plan ends, and " + VariableName(model, decision.coordinate) + " reaches " +
+               Short(decision.margin) + "; standing is up to " + Short(decision.threshold);
       return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
     }
     case Outcome::kSafety:

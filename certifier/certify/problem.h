@@ -3,6 +3,7 @@ holds, and which coordinates safety is judged in. */
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/model.h"
@@ -15,6 +16,12 @@ holds, and which coordinates safety is judged in. */
 
 namespace forereach {
 
+/** Part of what standing is: |x_coordinate| <= tolerance, in units of the state. */
+struct RestBound {
+  int coordinate = 0;
+  double tolerance = 0;  ///< Not negative.
+};
+
 struct Problem {
   std::shared_ptr<const NominalModel> model;  ///< f0
   Domain domain;                              ///< Z_cert
@@ -25,6 +32,7 @@ struct Problem {
   int max_leaf_visits = 512;                  ///< EnvelopeOptions: bounds the work of one search
   int max_observations = 10'000'000;          ///< Beyond it those that never attain the envelope are forgotten
   int zonotope_order = 5;                     ///< rho: at most rho * n generators after reduction
+  std::vector<RestBound> rest;                ///< A certified plan ends within all of these; empty: it may end moving
 };
 
 }  // namespace forereach

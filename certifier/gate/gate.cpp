@@ -16,7 +16,8 @@ namespace {
 
 // The bus contract fixes the numbers, so they are the same on both sides.
 static_assert(static_cast<int>(Outcome::kCertified) == 1 && static_cast<int>(Outcome::kSafety) == 4);
-static_assert(static_cast<int>(Cause::kPairwise) == 1 && static_cast<int>(Cause::kObstacle) == 4);
+static_assert(static_cast<int>(Cause::kPairwise) == 1 && static_cast<int>(Cause::kObstacle) == decision_t::CAUSE_OBSTACLE &&
+              static_cast<int>(Cause::kNoStop) == decision_t::CAUSE_NO_STOP);
 
 template <class Range>
 bool AllFinite(const Range& values) {
@@ -50,8 +51,9 @@ GateAnswer Gate::Decide(Bytes candidate, std::int64_t now_us) noexcept {
   return Answer(candidate, [now_us] { return now_us; }, std::nullopt);
 }
 
-GateAnswer Gate::Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why) noexcept {
-  return Answer(candidate, [now_us] { return now_us; }, Rejection{cause, why});
+GateAnswer Gate::Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why,
+                        std::int16_t outcome) noexcept {
+  return Answer(candidate, [now_us] { return now_us; }, Rejection{cause, why, outcome});
 }
 
 GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection> from_outside) noexcept {

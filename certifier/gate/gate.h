@@ -53,8 +53,9 @@ class Gate final {
   /** The same at a moment, microseconds since the Unix epoch, as if it took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** Rejects a candidate without certifying it, for a cause that lies outside it. What is wrong with itself goes before. */
-  [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why) noexcept;
+  /** Rejects a candidate, or abstains from it, without certifying it, for a cause that lies outside it. What is wrong with itself goes before. */
+  [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why,
+                                  std::int16_t outcome = decision_t::REJECTED) noexcept;
 
   /** Takes the obstacles of an obstacles_t, as gate.obstacles says (obstacles_in_force.h). Whole or not at all: returns what is
   wrong with the message, or an empty text. */

@@ -117,6 +117,19 @@ Eigen::MatrixXd ReadProjection(const Document& file, const NominalModel& model) 
   return projection;
 }
 
+std::vector<RestBound> ReadRest(const Document& file, const NominalModel& model) {
+  const std::string key = "task.rest", requires_stop = "gate.require_stop";
+  const bool says = file.Has(key), required = file.Has(requires_stop) ? file.Text(requires_stop) == "true" : says;
+  if (required && !says) file.Fail(requires_stop, "true, but task.rest does not say what standing is");
+  if (!says) return {};
+  std::vector<RestBound> rest;
+  for (const std::string& name : file.KeysOf(key))
+    rest.push_back({IndexOf(model.state_names(), name), file.Number(key + "." + name)});
+  if (rest.empty()) file.Fail(key, "names no state, so everything would be standing");
+  std::ranges::sort(rest, {}, &RestBound::coordinate);
+  return required ? rest : std::vector<RestBound>();
+}
+
 void RequireOrder(const Document& file, int order, int num_states) {
   const int largest = kMaxGenerators / num_states - 2;
   if (order > largest)
@@ -182,6 +195,7 @@ GateOptions ReadGate(const Document& file) {
     gate.obstacles = file.Text("gate.obstacles") == "bus" ? ObstaclesSource::kBus : ObstaclesSource::kTask;
   file.Read("gate.obstacles_timeout_ms", gate.obstacles_timeout_ms);
   read("gate.learn", "executed", gate.learns);
+  if (file.Has("gate.state")) gate.state = RelativeTo(file.path(), file.Text("gate.state"));
   return gate;
 }
 
@@ -402,6 +416,7 @@ std::shared_ptr<const Problem> ReadProblem(Document& file, TransitionsFile trans
   file.Read("certifier.max_observations", problem->max_observations);
   file.Read("certifier.zonotope_order", problem->zonotope_order);
   RequireOrder(file, problem->zonotope_order, model.num_states());
+  problem->rest = ReadRest(file, model);
   if (transitions == TransitionsFile::kIgnore) return problem;
   const std::string path = RelativeTo(file.path(), file.Text("transitions"));
   problem->transitions = ReadTransitions(path, model, file.Place("transitions"));
@@ -430,6 +445,7 @@ Config LoadConfig(const std::string& path, TransitionsFile transitions) {
   config.bus = ReadBus(file);
   config.planner = ReadPlanner(file);
   config.robot = ReadRobot(file, *problem.model);
+  config.gate.longest_step_ms = std::max(config.robot.step_period_ms, file.Number("model.dt") * 1e3);
   config.logger = ReadLogger(file);
   return config;
 }

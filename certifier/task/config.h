@@ -43,6 +43,8 @@ struct GateOptions {
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< Those heard on the bus are no longer known after this.
   bool learns = true;  ///< Executed transitions add to the observations.
+  std::string state = "state";   ///< Directory that keeps a latched fault over a restart.
+  double longest_step_ms = 150;  ///< No step of a plan takes longer. From a file: the model's dt or the robot's period.
 };
 
 /** What the operating system is asked for, so that nothing keeps the certifier waiting. */

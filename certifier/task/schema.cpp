@@ -200,6 +200,10 @@ std::vector<Key> TaskKeys() {
       Required(Map("task.initial_set", "X0, the states a plan may start from. A candidate on the bus brings its own.")),
       Required(Vector("task.initial_set.center", "of the state", kReal, Size::kStates, "Its middle.")),
       Required(Vector("task.initial_set.half_width", "of the state", kNotNegative, Size::kStates, "Half its width.")),
+      Map("task.rest", "What standing is: the absolute value of each state named here is at most its bound. A plan that may "
+                       "end otherwise is abstained from (D, no_stop), unless gate.require_stop is false."),
+      Number("task.rest.<state>", "of the state", kNotNegative,
+             "Its bound, on all of the last slice: small enough that the robot's hold mode takes up the rest."),
       Required(Names("task.projection", Between(1, kMaxSafetyDim), Size::kStates,
                      "P: the 1 to 3 states that obstacles are given in, in metres.")),
       Required(Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
@@ -274,6 +278,14 @@ std::vector<Key> CertifierKeys() {
                     "executed: transitions that the robot reports add to the observations while it drives; "
                     "declaration.noise_bound has to cover their errors. none: the file's transitions are all."),
                "executed"),
+      Optional(Word("gate.require_stop", {"true", "false"},
+                    "true: only plans that provably end standing, by task.rest, are certified. false: a plan may end moving."),
+               "true with task.rest, else false"),
+      Optional(Text("gate.state",
+                    "The directory, relative to this file, in which a latched fault and what contradicts a declaration "
+                    "outlive the certifier; `--state` takes precedence. Each robot needs one of its own, on a disk that "
+                    "outlives a restart of the machine."),
+               "`" + gate.state + "` in the working directory"),
       Optional(Map("realtime", "What the certifier asks of the operating system."), "all defaults"),
       Optional(Word("realtime.lock_memory", {"no", "try", "require"},
                     "Keep its memory from being swapped out. try: go on where it is not allowed, and say so."),
@@ -350,7 +362,8 @@ std::vector<Key> RobotKeys() {
       Optional(Vector("robot.start", "of the state", kReal, Size::kStates, "Its state when a run begins."),
                "the center of task.initial_set"),
       Number("robot.step_period_ms", "ms", Between(0.1, 60000), robot.step_period_ms,
-             "Wall-clock time of one step of the model."),
+             "Wall-clock time of one step of the model. The certifier expects that no step of a plan takes longer than this "
+             "or model.dt."),
       Number("robot.time_limit_s", "s", UpTo(1e6), robot.time_limit_s, "The run ends then, goal or not."),
       Optional(Word("robot.residual", {"none"}, "none: the robot is the nominal model."), "none"),
       Optional(Map("robot.residual", "How the real robot differs from the nominal model."), "none"),

@@ -50,6 +50,7 @@ TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
   EXPECT_EQ(config.gate.max_ahead_ms, 50);
   EXPECT_EQ(config.gate.certificate_lifetime_ms, 2000);
   EXPECT_EQ(config.gate.queue, 64);
+  EXPECT_EQ(config.gate.state, "state");
   EXPECT_EQ(config.bus.url, "udpm://239.255.76.67:7667?ttl=0");
   EXPECT_EQ(config.bus.candidate, "PLAN_CANDIDATE");
   EXPECT_EQ(config.bus.event, "EXECUTION_EVENT");
@@ -73,7 +74,7 @@ TEST(LoadConfig, ReadsEveryOption) {
       std::string(kTask) +
       "certifier: {method: paper, zonotope_order: 7}\n"
       "gate: {max_age_ms: 1, max_ahead_ms: 0, certificate_lifetime_ms: 3, queue: 4, obstacles: bus,\n"
-      "  obstacles_timeout_ms: 5}\n"
+      "  obstacles_timeout_ms: 5, state: kept}\n"
       "bus:\n"
       "  url: memq://\n"
       "  channels: {candidate: A, decision: B, certified: C, robot_state: D, obstacles: E, transition: F, status: G, "
@@ -90,6 +91,7 @@ TEST(LoadConfig, ReadsEveryOption) {
             std::make_tuple(1.0, 0.0, 3.0, 4));
   EXPECT_EQ(gate.obstacles, ObstaclesSource::kBus);
   EXPECT_EQ(gate.obstacles_timeout_ms, 5);
+  EXPECT_EQ(gate.state, files.directory() / "kept");
   const BusOptions& bus = config.bus;
   EXPECT_EQ(bus.url, "memq://");
   EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
@@ -133,6 +135,27 @@ TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
     EXPECT_EQ(config.gate.obstacles, source);
     EXPECT_NO_THROW(RequireObstaclesSource(config));
   }
+}
+
+TEST(LoadConfig, APlanHasToStopWhereTheTaskSaysWhatStandingIs) {
+  const TaskFiles files;
+  const std::string says = Replaced(kTask, "  projection:", "  rest: {vy: 0.25, vx: 0.5}\n  projection:");
+  EXPECT_TRUE(files.Load().problem->rest.empty());
+  for (const char* gate : {"", "gate: {require_stop: true}\n"}) {
+    const std::vector<RestBound> rest = files.Load(says + gate).problem->rest;
+    ASSERT_EQ(rest.size(), 2u) << gate;
+    EXPECT_EQ(rest[0].coordinate, 2);
+    EXPECT_EQ(rest[0].tolerance, 0.5);
+    EXPECT_EQ(rest[1].coordinate, 3);
+    EXPECT_EQ(rest[1].tolerance, 0.25);
+  }
+  EXPECT_TRUE(files.Load(says + "gate: {require_stop: false}\n").problem->rest.empty());
+}
+
+TEST(LoadConfig, TheLongestStepIsTheModelsOrTheRobots) {
+  const TaskFiles files;
+  EXPECT_EQ(files.Load().gate.longest_step_ms, 150);
+  EXPECT_EQ(files.Load(std::string(kTask) + "robot: {step_period_ms: 200}\n").gate.longest_step_ms, 200);
 }
 
 TEST(LoadConfig, ResidualsHaveTheModelsStepAndTheResidualsOwnDefaults) {

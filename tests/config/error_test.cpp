@@ -28,7 +28,7 @@ TEST_F(ErrorTest, UnknownKeys) {
       ErrorAfter("gate: {colour: 3}\n"),
       "task.yaml:19: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
             "decision_budget_ms, queue, mode, arming, robot_timeout_ms, max_clock_jump_ms, "
-            "obstacles, obstacles_timeout_ms, learn");
+            "obstacles, obstacles_timeout_ms, learn, require_stop, state");
   EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
             "task.yaml:9: declaration.lipschitz.theta: unknown key; known here: px, py, vx, vy");
   EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: 0.1, v_y"),
@@ -43,6 +43,19 @@ TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
             "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase");
   EXPECT_EQ(files_.ErrorWith("name: point_mass", "name: \"point\\nmass\""),
             "task.yaml:1: model.name: point?mass is not known; did you mean point_mass?");
+}
+
+TEST_F(ErrorTest, WhatStandingIs) {
+  const auto error = [&](const std::string& rest) { return files_.ErrorWith("  projection:", "  rest: " + rest + "\n  projection:"); };
+  EXPECT_EQ(error("{vx: 0.1, vy: 0}"), "");
+  EXPECT_EQ(error("{}"), "task.yaml:17: task.rest: names no state, so everything would be standing");
+  EXPECT_EQ(error("{vx: -0.1}"), "task.yaml:17: task.rest.vx: -0.1 is outside [0, inf)");
+  EXPECT_EQ(error("{vx: .nan}"), "task.yaml:17: task.rest.vx: .nan is not a finite number");
+  EXPECT_EQ(error("{ax: 0.1}"), "task.yaml:17: task.rest.ax: unknown key; did you mean px?");
+  EXPECT_EQ(ErrorAfter("gate: {require_stop: true}\n"),
+            "task.yaml:19: gate.require_stop: true, but task.rest does not say what standing is");
+  EXPECT_EQ(ErrorAfter("gate: {require_stop: false}\n"), "");
+  EXPECT_THAT(ErrorAfter("gate: {require_stop: yes}\n"), HasSubstr("gate.require_stop: yes is not known"));
 }
 
 TEST_F(ErrorTest, KeysOfAnotherModel) {

@@ -90,6 +90,21 @@ TEST(Shipped, EachPlanGetsTheAnswerItIsNamedAfter) {
   }
 }
 
+// What a robot on the bus drives has to end standing; coasting does not, standing still does.
+TEST(Shipped, ARobotsPlanHasToEndStanding) {
+  for (const std::string task : {"demo", "policy"}) {
+    const Config config = LoadConfig(kDirectory + task + ".yaml");
+    EXPECT_EQ(Decide(config, Eigen::MatrixXd::Zero(2, 6)).outcome, Outcome::kCertified) << task;
+    Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(2, 6);
+    controls(0, 0) = 10, controls(0, 2) = -10;  // jerk: 1 m/s^2 for a while, and then it coasts
+    const Decision decision = Decide(config, controls);
+    EXPECT_EQ(decision.outcome, Outcome::kDomain) << task;
+    EXPECT_EQ(decision.cause, Cause::kNoStop) << task;
+    EXPECT_EQ(decision.step, 6) << task;
+    EXPECT_EQ(config.problem->model->state_names()[static_cast<std::size_t>(decision.coordinate)], "v") << task;
+  }
+}
+
 // The first block of this kind in the README.
 std::string Block(const std::string& kind) {
   const std::string readme = Contents(kDirectory + "README.md"), fence = "```" + kind + "\n";

@@ -20,7 +20,8 @@ namespace {
 
 // Without a robot, and patient with a busy machine.
 constexpr const char* kGate =
-    "gate: {max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000, obstacles: task}\n";
+    "gate: {max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000,\n"
+    "  obstacles: task, require_stop: false}\n";
 
 struct Options {
   double seconds = 20, rate = 1000;
@@ -53,7 +54,8 @@ int MostSteps(const Config& config) {
 
 Row Measure(const Options& options, const std::string& name, Config config, int steps) {
   Row row{.name = name};
-  std::vector<std::string> command{FOREREACH_CERTIFIER, "--config", config.path, "--lcm-url", config.bus.url};
+  std::vector<std::string> command{FOREREACH_CERTIFIER, "--config", config.path, "--lcm-url", config.bus.url,
+                                   "--state", config.path + ".state"};
   if (!config.bus.key.empty()) command.insert(command.end(), {"--key", config.bus.key});
   ChildProcess certifier(command);
   if (!certifier.WaitForLog("ready on")) throw std::runtime_error(certifier.error());

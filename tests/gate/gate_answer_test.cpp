@@ -27,6 +27,26 @@ class GateAnswerTest : public testing::Test {
   Gate gate_{config_};
 };
 
+TEST(GateNoStop, APlanThatEndsMovingIsAbstainedFrom) {
+  Config config = SmallTask();
+  Problem problem = *config.problem;
+  problem.rest = {{2, 0.1}};
+  config.problem = std::make_shared<const Problem>(problem);
+  Gate gate(config);
+  const GateAnswer moving = gate.Decide(Encode(Candidate(1)), kNow);
+  EXPECT_EQ(moving.decision.outcome, decision_t::ABSTAIN_DOMAIN);
+  EXPECT_EQ(moving.decision.cause, decision_t::CAUSE_NO_STOP);
+  EXPECT_EQ(moving.decision.step, 10);
+  EXPECT_EQ(moving.decision.coordinate, 2);
+  EXPECT_NEAR(moving.decision.margin, 1.05, 1e-9);
+  EXPECT_EQ(moving.decision.threshold, 0.1);
+  EXPECT_THAT(GetText(moving.decision.message), HasSubstr("at step 10 the plan ends, and vx reaches 1.05"));
+  EXPECT_FALSE(moving.certified);
+  candidate_plan_t brakes = Candidate(2);
+  for (int t = 0; t < 10; ++t) brakes.control[t][0] = -1 / 1.5;
+  EXPECT_TRUE(gate.Decide(Encode(brakes), kNow).certified);
+}
+
 template <class Message>
 void ExpectDigestsOf(const Config& config, const Message& message) {
   EXPECT_EQ(GetDigest(message.config_digest), config.digest);

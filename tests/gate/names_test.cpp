@@ -129,6 +129,7 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                {"DOMAIN_EXIT", 2},
                                {"NO_FINITE_ENCLOSURE", 3},
                                {"OBSTACLE", 4},
+                               {"NO_STOP", 5},
                                {"STALE", 10},
                                {"FUTURE", 11},
                                {"DUPLICATE", 12},
@@ -147,7 +148,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                {"FAULT", 25},
                                {"SHADOW", 26},
                                {"NO_OBSTACLES", 27},
-                               {"SECOND_CERTIFIER", 28}}));
+                               {"SECOND_CERTIFIER", 28},
+                               {"LATCH_UNWRITABLE", 29}}));
   EXPECT_EQ(ConstantsOf("execution_event_t"), (Constants{{"ACCEPTED", 1},
                                                          {"REFUSED", 2},
                                                          {"STARTED", 3},
@@ -162,7 +164,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
   EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},
-                                               {"DECLARATION_FALSIFIED", 4}}));
+                                               {"DECLARATION_FALSIFIED", 4},
+                                               {"UNCERTIFIED_PLAN", 5}}));
   EXPECT_EQ(ConstantsOf("certifier_status_v3_t"),
             (Constants{{"OK", 1}, {"STALE", 2}, {"ERROR", 3}, {"DISARMED", 1}, {"ARMED", 2}, {"FAULT", 3},
                        {"LISTENING", 4}, {"STANDBY", 5}, {"NO_LATCH", 0}, {"LATCH_WRITTEN", 1}, {"LATCH_UNWRITABLE", 2},

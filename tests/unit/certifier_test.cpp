@@ -236,6 +236,54 @@ TEST(AbstainDomain, ThePoleOfTheSteeringHasItsOwnCause) {
   EXPECT_EQ(later.step, 2);
 }
 
+// A brake that ends at +-0.25 m/s, with the widths and the last bit of the residual around it.
+class NoStop : public testing::TestWithParam<double> {
+ protected:
+  Decision Brake(double tolerance, const std::vector<Obstacle>& obstacles = {}) {
+    Problem problem = PointMassProblem();
+    problem.rest = {{kVy, 1}, {kVx, tolerance}};
+    judge_.emplace(problem);
+    const double sign = GetParam();
+    const Zonotope start = Zonotope::FromBox(Vec({0, 0, 1.25 * sign, 0}), Vec({0, 0, 0.125, 0}));
+    return (*judge_)(start, Eigen::MatrixXd(Eigen::Vector2d(-2 * sign, 0)), obstacles);
+  }
+  // What the last slice reaches, away from zero.
+  double Reached() {
+    EXPECT_EQ(Brake(3).outcome, Outcome::kCertified);
+    const Interval hull = judge_->tube().hull(1, kVx);
+    EXPECT_NEAR(std::max(-hull.lower, hull.upper), 0.375, 1e-12);
+    return std::max(-hull.lower, hull.upper);
+  }
+
+  std::optional<Judge> judge_;
+};
+
+TEST_P(NoStop, TheBoundIsClosedToTheLastBit) {
+  const double reached = Reached();
+  EXPECT_EQ(Brake(reached).outcome, Outcome::kCertified);
+  const Decision d = Brake(NextDown(reached));
+  EXPECT_EQ(d.outcome, Outcome::kDomain);
+  EXPECT_EQ(d.cause, Cause::kNoStop);
+  EXPECT_EQ(d.step, 1) << "T";
+  EXPECT_EQ(d.coordinate, kVx);
+  EXPECT_EQ(d.margin, GetParam() * reached);
+  EXPECT_EQ(d.threshold, GetParam() * NextDown(reached));
+  ExpectNoWitness(d, true, false, false);
+  EXPECT_EQ(judge_->tube().length(), 1);
+  EXPECT_THAT(Explain(d, judge_->certifier().problem()), HasSubstr("abstain D: at step 1 the plan ends, and vx reaches "));
+  EXPECT_EQ(Brake(0).cause, Cause::kNoStop);
+}
+
+TEST_P(NoStop, ComesBeforeSafety) {
+  const std::vector<Obstacle> touched{Obstacle::Circle(Vec({0, 0}), 1)};
+  EXPECT_EQ(Brake(3, touched).outcome, Outcome::kSafety);
+  const Decision d = Brake(0.1, touched);
+  EXPECT_EQ(d.cause, Cause::kNoStop);
+  EXPECT_EQ(d.obstacle, -1);
+}
+
+INSTANTIATE_TEST_SUITE_P(BothDirections, NoStop, testing::Values(1.0, -1.0));
+
 TEST(AbstainFalsified, NamesThePairBeforeAnythingElse) {
   Problem problem = PointMassProblem();
   for (const double px : {1.0, 2.0}) AddNominalTransition(problem, Vec({px, 0, 0, 0, 0, 0}));
@@ -391,6 +439,9 @@ TEST(Certifier, NamesThePartThatDoesNotFit) {
   ExpectRefused([](Problem& p) { p.transitions.x_next(0, 0) = kInfinity; }, "transition 0: not finite");
   ExpectRefused([](Problem& p) { p.projection = Eigen::MatrixXd::Identity(2, 3); }, "projection");
   ExpectRefused([](Problem& p) { p.projection.setZero(); }, "projection");
+  ExpectRefused([](Problem& p) { p.rest = {{4, 1}}; }, "rest: coordinate 4");
+  ExpectRefused([](Problem& p) { p.rest = {{-1, 1}}; }, "rest: coordinate -1");
+  for (const double bad : {-1.0, kNan, kInfinity}) ExpectRefused([bad](Problem& p) { p.rest = {{0, bad}}; }, "rest: coordinate 0");
   ExpectRefused([](Problem& p) { p.zonotope_order = 0; }, "zonotope_order: 0");
   ExpectRefused([](Problem& p) { p.zonotope_order = 27; }, "zonotope_order: 27");
   Problem largest = PointMassProblem();

@@ -64,6 +64,27 @@ void ExpectRefuted(const Verdict& verdict, int step, const std::string& what) {
 
 TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), OneStep())); }
 
+TEST(HandMade, APlanThatDoesNotEndStandingIsRefuted) {
+  const auto within = [](int coordinate, double tolerance) {
+    const auto problem = Halves();
+    problem->rest = {{coordinate, tolerance}};
+    return problem;
+  };
+  ExpectConfirmed(Judge(within(2, Up(1.5)), OneStep()));
+  ExpectRefuted(Judge(within(2, 1.5), OneStep()), 1, "the plan ends standing: vx");
+  Certificate of_hulls_unknown = OneStep();
+  of_hulls_unknown.slices.clear();
+  ExpectConfirmed(Judge(within(2, Up(1.5)), of_hulls_unknown));
+  ExpectRefuted(Judge(within(2, 1.5), of_hulls_unknown), 1, "the plan ends standing: vx of the last slice");
+  Certificate wide = OneStep();
+  wide.slices[1].lower[3] = -2;  // true, but it does not show that the robot stands
+  ExpectConfirmed(Judge(Halves(), wide));
+  ExpectRefuted(Judge(within(3, 1.5), wide), 1, "vy of the last recorded hull");
+  wide = OneStep();
+  wide.slices[0].lower[3] = -2;  // at the start it may drive
+  ExpectConfirmed(Judge(within(3, 1.5), wide));
+}
+
 TEST(HandMade, ASliceWithoutItsLastBitIsRefuted) {
   for (int k = 0; k < 4; ++k) {
     Certificate certificate = OneStep();
