@@ -39,12 +39,15 @@ std::string Difference(const decision_t& recorded, const decision_t& replayed) {
 }
 
 // What no replay can give again.
-bool IsCircumstance(std::int16_t cause) {
-  switch (cause) {
+bool IsCircumstance(const decision_t& decision) {
+  switch (decision.cause) {
+    case decision_t::CAUSE_PAIRWISE:  // by what the certifier was told by its latch file: no pair of its own
+      return decision.step < 0 && decision.first_observation < 0;
     case decision_t::CAUSE_QUEUE_FULL:
     case decision_t::CAUSE_OVERRUN:
     case decision_t::CAUSE_NOT_ARMED:
     case decision_t::CAUSE_FAULT:
+    case decision_t::CAUSE_LATCH_UNWRITABLE:
       return true;
     default:
       return false;
@@ -122,7 +125,7 @@ class Replayer {
     const Candidate candidate = std::move(waiting.front());
     waiting.pop_front();
     CatchUp(*recorded);
-    if (IsCircumstance(recorded->cause)) {
+    if (IsCircumstance(*recorded)) {
       static_cast<void>(gate_->Refuse(candidate.bytes, recorded->utime, recorded->cause, ""));
       ++result_.circumstances;
       return;

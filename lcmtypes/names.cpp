@@ -95,6 +95,9 @@ std::string_view FaultAdvice(std::int16_t cause) {
     case fault_t::DECLARATION_FALSIFIED:
       return "a reset alone does not help, every candidate stays F: declare a larger bound in the task file, "
              "`forereach reload`, then `forereach reset`";
+    case fault_t::UNCERTIFIED_PLAN:
+      return "find what commands the robot without the guard, or which certifier certifies beside this one; then "
+             "`forereach reset`";
     default:
       return "find the reason, then `forereach reset`";
   }

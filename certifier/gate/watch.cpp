@@ -13,7 +13,8 @@ namespace forereach {
 namespace {
 
 constexpr std::array<std::int16_t, Watch::kNeeds> kCauses{
-    decision_t::CAUSE_SECOND_CERTIFIER, decision_t::CAUSE_NOT_ARMED, decision_t::CAUSE_NO_OBSTACLES};
+    decision_t::CAUSE_SECOND_CERTIFIER, decision_t::CAUSE_LATCH_UNWRITABLE, decision_t::CAUSE_NOT_ARMED,
+    decision_t::CAUSE_NO_OBSTACLES};
 
 }  // namespace
 

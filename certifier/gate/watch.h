@@ -29,8 +29,8 @@ class Watch final {
   };
   /** What has to hold before anything is certified. Of several that are lacking the first gives the cause. To add one: an
   entry here, its cause in watch.cpp. */
-  enum class Need { kCharge, kRobotState, kObstacles };
-  static constexpr std::size_t kNeeds = 3;
+  enum class Need { kCharge, kLatch, kRobotState, kObstacles };
+  static constexpr std::size_t kNeeds = 4;
   struct Refusal {
     std::int16_t cause;  ///< decision_t's
     std::string why;     ///< Names everything that is lacking.
@@ -44,6 +44,9 @@ class Watch final {
   /** @param why_not a clause that says why the need is not met; empty: it is met. Every need but the robot's state is met at
   first, and the robot's state is this class's own affair. */
   void Set(Need need, std::string why_not);
+
+  /** What Set has said of it. */
+  [[nodiscard]] const std::string& Lacks(Need need) const { return lacking_[static_cast<std::size_t>(need)]; }
 
   /** A usable state of the robot has been heard. */
   void SeeRobot(std::int64_t now_us);

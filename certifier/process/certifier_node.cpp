@@ -71,7 +71,8 @@ Charge::State ChargeOf(std::int16_t state) {
 
 }  // namespace
 
-CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std::int64_t listen_us)
+CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std::int64_t listen_us,
+                             std::unique_ptr<LatchFile> latch)
     : config_(Checked(config)),
       channels_(config.bus),
       realtime_(config.realtime),
@@ -82,7 +83,12 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       watch_(OptionsOf(config.gate)),
       charge_({clocks_.wall(), RandomInstance()}, listen_us),
       has_begun_(is_in_charge()),
-      reload_([path = config.path] { return Load(path); }) {
+      issued_(config.gate, clocks_.steady()),
+      reload_([path = config.path] { return Load(path); }),
+      latch_(std::move(latch)) {
+  if (latch_) OpenLatch();
+  if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
+    spdlog::warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
   if (const auto& violation = gate_->certifier().violation())
     spdlog::warn("observations {} and {} contradict the declaration: every candidate will be abstained from (F)",
                  violation->first, violation->second);
@@ -144,6 +150,7 @@ std::string CertifierNode::WhyNotInCharge() const {
 void CertifierNode::TakeCharge() {
   spdlog::info("in charge, as instance {:016x}", charge_.self().instance);
   has_begun_ = true;
+  issued_.TolerateFrom(clocks_.steady());
   if (!fault_of_other_) return;
   Fail(EmptyFault(fault_of_other_->cause), "latched by the certifier that was in charge before: " + fault_of_other_->why);
   fault_of_other_.reset();
@@ -213,6 +220,17 @@ void CertifierNode::OnRobotState(const Received& received) {
   if (state.mode == robot_state_t::FINISHED) return watch_.RobotHasFinished();
   watch_.SeeRobot(received.utime);
   FailIfLeft(conformance_.Check(state));
+  FailIfUncertified(state);
+}
+
+// A certifier in shadow mode does not decide what the robot executes.
+void CertifierNode::FailIfUncertified(const robot_state_t& state) {
+  const auto stranger = issued_.Judge(state, clocks_.steady());
+  if (!stranger || gate_->options().shadow) return;
+  fault_t fault = EmptyFault(fault_t::UNCERTIFIED_PLAN);
+  fault.plan_id = stranger->plan_id;
+  fault.step = static_cast<std::int16_t>(stranger->step);
+  Fail(fault, stranger->why);
 }
 
 void CertifierNode::FailIfLeft(const std::optional<Conformance::Departure>& departure) {
@@ -243,7 +261,8 @@ void CertifierNode::Learn(Bytes transition) {
   if (!error.empty()) return Refuse(channels_.transition, error);
   const auto& violation = gate_->certifier().violation();
   if (was_falsified || !violation) return;
-  falsified_.push_back({gate_->model_digest(), gate_->certifier().Contradiction()});
+  if (!is_contradicted_) contradictions_.push_back({gate_->model_digest(), gate_->certifier().Contradiction()});
+  is_contradicted_ = true;
   fault_t fault = EmptyFault(fault_t::DECLARATION_FALSIFIED);
   fault.coordinate = static_cast<std::int16_t>(violation->coordinate);
   fault.first_observation = violation->first;
@@ -254,6 +273,7 @@ void CertifierNode::Learn(Bytes transition) {
                           "differs by {}, the declaration allows {}",
                           violation->second, violation->first, violation->coordinate, violation->difference,
                           violation->bound));
+  Keep();  // also where another fault stays
 }
 
 void CertifierNode::OnCommand(const Received& received) {
@@ -269,6 +289,8 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
     case command_t::RESET:
       if (watch_.fault() && IsNotAfter(command.utime, watch_.fault()->utime, now_us, gate_->options()))
         return Refuse(channels_.command, "a reset from before the fault: nobody has seen it yet");
+      if (watch_.fault() && !ForgetFault())
+        return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_->why_not());
       if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));
       next_heartbeat_us_ = 0;
       return;
@@ -293,10 +315,82 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   fault.transition = last_transition_;
   SetText(fault.message, latched.why);
   announced_ = fault;
+  // From the kernel's hands it survives this process; the disk may take longer than a robot can wait.
+  const bool is_kept = latch_ && latch_->Put(Kept());
   SendFault();
+  if (is_kept) latch_->Flush();
+  LookForLatch();
   spdlog::error("fault {}: {}; nothing is certified. What to do: {}", FaultName(latched.cause), latched.why,
                 FaultAdvice(latched.cause));
   next_heartbeat_us_ = 0;
+}
+
+// ---- What outlives the process.
+
+LatchFile::Content CertifierNode::Kept() const {
+  LatchFile::Content content{std::nullopt, "", contradictions_};
+  if (watch_.fault()) content.fault = announced_, content.why = watch_.fault()->why;
+  return content;
+}
+
+void CertifierNode::OpenLatch() {
+  if (const auto stored = latch_->Read()) TakeOver(*stored);
+  Keep();
+}
+
+void CertifierNode::Keep() {
+  if (latch_ && latch_->Put(Kept())) latch_->Flush();
+  LookForLatch();
+}
+
+void CertifierNode::LookForLatch() {
+  if (!latch_) return;
+  const bool could = watch_.Lacks(Watch::Need::kLatch).empty();
+  watch_.Set(Watch::Need::kLatch, latch_->ready() ? "" : "no fault could be stored: " + latch_->why_not());
+  if (could && !latch_->ready()) spdlog::error("nothing is certified: no fault could be stored: {}", latch_->why_not());
+  if (!could && latch_->ready()) spdlog::info("{} can be written", latch_->path());
+}
+
+void CertifierNode::TakeOver(const LatchFile::Content& stored) {
+  for (const LatchFile::Contradiction& one : stored.contradictions) {
+    const bool is_known = std::ranges::any_of(contradictions_, [&](const LatchFile::Contradiction& known) {
+      return known.model == one.model && known.pair.z == one.pair.z && known.pair.lower == one.pair.lower &&
+             known.pair.upper == one.pair.upper;
+    });
+    if (!is_known) contradictions_.push_back(one);
+  }
+  is_contradicted_ = IsContradicted(gate_->model_digest(), gate_->certifier().problem().declaration);
+  if (is_contradicted_) spdlog::error("a transition from before this start contradicts the declaration: every candidate is F");
+  if (!stored.fault || !watch_.Latch({stored.fault->cause, stored.fault->utime, stored.why})) return;
+  announced_ = *stored.fault;
+  next_announcement_us_ = 0;
+  spdlog::error("fault {} from before this start: {}; nothing is certified. What to do: {}", FaultName(stored.fault->cause),
+                stored.why, FaultAdvice(stored.fault->cause));
+}
+
+void CertifierNode::CheckLatch() {
+  if (!latch_) return;
+  if (latch_->ready()) latch_->Look();
+  if (!latch_->ready()) OpenLatch();
+  LookForLatch();
+}
+
+bool CertifierNode::ForgetFault() {
+  if (!latch_) return true;
+  if (!latch_->ready()) OpenLatch();
+  LatchFile::Content content = Kept();
+  content.fault.reset();
+  content.why.clear();
+  const bool is_forgotten = latch_->ready() && latch_->Put(content) && latch_->Flush();
+  LookForLatch();
+  return is_forgotten;
+}
+
+bool CertifierNode::IsContradicted(const Digest& model, const Declaration& declaration) const {
+  return std::ranges::any_of(contradictions_, [&](const LatchFile::Contradiction& one) {
+    return one.model == model && one.pair.num_states() == declaration.lipschitz.rows() &&
+           one.pair.z.cols() == declaration.lipschitz.cols() && FindViolation(declaration, one.pair);
+  });
 }
 
 void CertifierNode::SendFault() {
@@ -313,7 +407,11 @@ void CertifierNode::Tick(std::int64_t now_us) {
   FollowCharge(before);
   LookForObstacles(now_us);
   if (heartbeats_ == 0 && is_in_charge()) Heartbeat(now_us);  // says that nothing has been decided or learned yet
-  if (const auto fault = watch_.Advance(now_us, clocks_.steady())) Announce(EmptyFault(fault->cause), *fault);
+  if (const auto fault = watch_.Advance(now_us, clocks_.steady())) {
+    // By a clock that was set back a plan may begin later than it could.
+    if (fault->cause == fault_t::CLOCK_JUMP) issued_.TolerateFrom(clocks_.steady());
+    Announce(EmptyFault(fault->cause), *fault);
+  }
   TakeReload();
   AnswerWaiting();
   CompactIfDue();
@@ -353,6 +451,10 @@ GateAnswer CertifierNode::Decide(Bytes candidate) {
   const std::int64_t now = clocks_.wall();
   LookForObstacles(now);
   if (const auto refusal = watch_.WhyNot()) return gate_->Refuse(candidate, now, refusal->cause, refusal->why);
+  if (is_contradicted_ && !gate_->certifier().violation())
+    return gate_->Refuse(candidate, now, decision_t::CAUSE_PAIRWISE,
+                         "a transition from before the start contradicts the declaration; another has to be declared",
+                         decision_t::ABSTAIN_FALSIFIED);
   const std::int64_t before = PageFaults();
   GateAnswer answer = gate_->Decide(candidate, clocks_.wall);
   if (decided_ > 0) page_faults_ += PageFaults() - before;
@@ -369,7 +471,10 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
 
   if (answer.certified) sender_.Send(channels_.certified, *answer.certified);
   sender_.Send(channels_.decision, answer.decision);
-  if (answer.certified) conformance_.Remember(*answer.certified);
+  if (answer.certified) {
+    conformance_.Remember(*answer.certified);
+    issued_.Add(*answer.certified, clocks_.steady());
+  }
   elapsed_us_[decided_++ % elapsed_us_.size()] = elapsed.count();
 }
 
@@ -401,14 +506,14 @@ std::string CertifierNode::WhyNotTaken(const Config& config) const {
            {bus != channels_, "bus.channels"},
            {config.realtime != realtime_, "realtime"},
            {config.gate.obstacles != config_.gate.obstacles, "gate.obstacles"},
+           {config.gate.state != config_.gate.state, "gate.state"},
            {after.model->num_states() != before.model->num_states(), "the number of states"},
            {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},
            {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
     if (changes) return config.path + ": " + what + " cannot change while the certifier runs";
   // What the robot has shown is not forgotten by reading a file.
-  for (const Falsified& falsified : falsified_)
-    if (falsified.model == config.model_digest && FindViolation(after.declaration, falsified.pair))
-      return config.path + ": a transition that was executed contradicts its declaration; another has to be declared";
+  if (IsContradicted(config.model_digest, after.declaration))
+    return config.path + ": a transition that was executed contradicts its declaration; another has to be declared";
   return "";
 }
 
@@ -426,6 +531,8 @@ void CertifierNode::TakeReload() {
   gate_ = std::move(loaded->gate);
   config_ = std::move(loaded->config);
   watch_.Follow(OptionsOf(gate_->options()));
+  issued_.Follow(gate_->options());
+  is_contradicted_ = false;  // WhyNotTaken has seen to that
   LookForObstacles(clocks_.wall());
   spdlog::info("version {} of {} is in force", ++version_, config_.path);
 }
@@ -434,8 +541,12 @@ void CertifierNode::TakeReload() {
 
 std::string CertifierNode::WhyNotOk() const {
   if (!is_in_charge()) return WhyNotInCharge();
-  if (watch_.fault()) return std::string(FaultName(watch_.fault()->cause)) + ": " + watch_.fault()->why;
-  if (gate_->certifier().violation()) return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a reset "
+  if (watch_.fault())
+    return std::string(FaultName(watch_.fault()->cause)) + ": " + (CanLatch() ? "" : "not stored, lost by a restart! ") +
+           watch_.fault()->why;
+  if (!CanLatch()) return watch_.WhyNot()->why;
+  if (gate_->certifier().violation() || is_contradicted_)
+    return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a reset "
            "does not help";
   if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
   if (const auto refusal = watch_.WhyNot()) return refusal->why;
@@ -446,10 +557,11 @@ std::string CertifierNode::WhyNotOk() const {
 }
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
+  CheckLatch();
   last_heartbeat_us_ = clocks_.steady();
   next_heartbeat_us_ = last_heartbeat_us_ + (charge_.state() == Charge::State::kListening ? kHeartbeatToOthersUs : kHeartbeatUs);
   certifier_status_v3_t status = gate_->Status(now_us);
-  const bool error = is_in_charge() && (watch_.fault() || gate_->certifier().violation());
+  const bool error = is_in_charge() && (watch_.fault() || gate_->certifier().violation() || is_contradicted_ || !CanLatch());
   status.sequence = is_in_charge() ? heartbeats_++ : heartbeats_aside_++;
   status.instance = charge_.self().instance;
   status.started_utime = charge_.self().started_utime;
@@ -460,6 +572,8 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.level = error ? certifier_status_v3_t::ERROR
                  : status.state == certifier_status_v3_t::ARMED ? certifier_status_v3_t::OK : certifier_status_v3_t::STALE;
   status.by_cause[decision_t::CAUSE_SECOND_CERTIFIER] += left_to_other_;
+  status.latch = !CanLatch()               ? certifier_status_v3_t::LATCH_UNWRITABLE
+                 : latch_ && watch_.fault() ? certifier_status_v3_t::LATCH_WRITTEN : certifier_status_v3_t::NO_LATCH;
   if (watch_.fault()) {
     status.fault = watch_.fault()->cause;
     status.fault_utime = watch_.fault()->utime;

@@ -12,6 +12,11 @@ the running work, and takes it whole or not at all; what cannot change while it 
 Of several certifiers on one bus one is in charge (charge.h). The others say nothing but their heartbeat. What they hear
 before they take charge they do not learn: one that takes charge knows as much as one that has just been started.
 
+With a latch file (latch_file.h) a fault is handed to the kernel before it is announced, and written to the disk right
+after. The next certifier begins with the same fault, and says it again. While no fault could be written, every candidate
+is rejected (CAUSE_LATCH_UNWRITABLE); a reset that cannot be written clears nothing. What has contradicted a declaration is
+kept there too, over resets: candidates under a declaration that it contradicts get F.
+
 First goes out the certified plan, which the robot waits for, then the decision: a planner that hears of a certificate
 knows that the plan was handed to the bus before. */
 #pragma once
@@ -27,7 +32,9 @@ knows that the plan was handed to the bus before. */
 #include "certifier/gate/charge.h"
 #include "certifier/gate/conformance.h"
 #include "certifier/gate/gate.h"
+#include "certifier/gate/issued_plans.h"
 #include "certifier/gate/watch.h"
+#include "certifier/process/latch_file.h"
 #include "certifier/task/reloading.h"
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -50,8 +57,10 @@ class CertifierNode final : public Node {
   static constexpr int kAtOnce = 8;  ///< Candidates decided on before the bus is looked at again.
 
   /** @param listen_us how long it listens for another certifier before it takes charge; Charge::kListenUs on a bus that others
-  can be on. @throws ConfigError if the task does not say gate.obstacles. */
-  CertifierNode(const Config& config, Bus& bus, Clocks clocks = {}, std::int64_t listen_us = 0);
+  can be on. @param latch may be null: then a restart forgets a fault. @throws ConfigError if the task does not say
+  gate.obstacles. */
+  CertifierNode(const Config& config, Bus& bus, Clocks clocks = {}, std::int64_t listen_us = 0,
+                std::unique_ptr<LatchFile> latch = nullptr);
   ~CertifierNode() override;
 
   void Tick(std::int64_t now_us) override;
@@ -103,6 +112,23 @@ class CertifierNode final : public Node {
   void SendFault();
   void Learn(Bytes transition);
   void FailIfLeft(const std::optional<Conformance::Departure>& departure);
+  void FailIfUncertified(const robot_state_t& state);
+
+  /** What the latch file has to hold now. */
+  [[nodiscard]] LatchFile::Content Kept() const;
+  /** Reads the latch file, takes over what it holds, and writes all of it back. */
+  void OpenLatch();
+  void TakeOver(const LatchFile::Content& stored);
+  void Keep();
+  void CheckLatch();
+  /** Arms or disarms by it. */
+  void LookForLatch();
+  /** Writes that there is no fault. True also without a latch file. */
+  [[nodiscard]] bool ForgetFault();
+  [[nodiscard]] bool CanLatch() const { return !latch_ || latch_->ready(); }
+  /** Whether something known contradicts this declaration of this model. */
+  [[nodiscard]] bool IsContradicted(const Digest& model, const Declaration& declaration) const;
+
   void Refuse(const std::string& channel, const std::string& why);
 
   void Heartbeat(std::int64_t now_us);
@@ -123,6 +149,7 @@ class CertifierNode final : public Node {
   std::int64_t left_to_other_ = 0;              // candidates
   bool obstacles_refused_ = false;              // since the last heartbeat, for gate.obstacles is task
   Conformance conformance_;
+  IssuedPlans issued_;
 
   struct Waiting {
     std::vector<std::uint8_t> candidate;
@@ -138,11 +165,9 @@ class CertifierNode final : public Node {
 
   Reloading<Loaded> reload_;
   std::future<void> compaction_;  // of *gate_
-  struct Falsified {
-    Digest model;
-    Observations pair;  // with an executed transition
-  };
-  std::vector<Falsified> falsified_;  // one at most for each version of the task
+  const std::unique_ptr<LatchFile> latch_;
+  std::vector<LatchFile::Contradiction> contradictions_;  // one at most for each version of the task
+  bool is_contradicted_ = false;  // the declaration in force, by one of them
   std::int64_t version_ = 1, failed_reloads_ = 0;
   std::string reload_error_;
 

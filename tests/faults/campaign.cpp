@@ -40,6 +40,7 @@ constexpr std::chrono::seconds kSaysSoon{3};       // some heartbeats
 constexpr milliseconds kHeartbeat{600};            // at least one
 constexpr std::size_t kMostHeard = 2000;           // messages that are kept to be sent again
 constexpr double kMayGrowBy = 48 << 20;            // a queue full of honest messages is in it
+constexpr std::chrono::seconds kStarts{10};        // a process that was started has spoken
 
 struct Row {
   std::string fault;
@@ -297,6 +298,73 @@ class Campaign final {
     }, options_.others);
   }
 
+  // Until the reset that Heal sends.
+  void DemandStillLatched(Row& row, Rig& rig, const fault_t& fault) {
+    const std::int64_t certificates = rig.witness().certificates();
+    rig.witness().Forget();
+    const auto says_it = [&] {
+      const auto &said = rig.witness().fault();
+      const auto &status = rig.witness().status();
+      return said && said->cause == fault.cause && said->utime == fault.utime && GetText(said->message) == GetText(fault.message) &&
+             status && status->state == certifier_status_v3_t::FAULT;
+    };
+    Demand(row, rig.ListenUntil(says_it, kStarts), "the next certifier does not say the fault again");
+    rig.Listen(milliseconds(1000));
+    Demand(row, rig.witness().certificates() == certificates, "the next certifier certified before the reset");
+  }
+
+  // A state outside its slice; FAULT is heard then.
+  std::optional<fault_t> Provoke(Row& row, Rig& rig, std::int64_t sequence) {
+    rig.witness().ForgetFault();
+    robot_state_t state = StateOutside(rig);
+    state.sequence = sequence;
+    rig.bus().Publish(rig.config().bus.robot_state, state);
+    static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
+    DemandLatched(row, rig, fault_t::SLICE_LEFT);
+    return rig.witness().fault();
+  }
+
+  void LatchedKills() {
+    Rig rig(DemoTask());
+    Row& row = Begin("SIGKILL of a certifier with a latched fault", options_.others);
+    std::int64_t sequence = 1 << 30;
+    Tries(row, rig, [&](int) {
+      const std::optional<fault_t> fault = Provoke(row, rig, sequence++);
+      rig.Listen(milliseconds(Below(30)));  // perhaps before it is on the disk
+      rig.End(Rig::kCertifier, SIGKILL);
+      rig.Start(Rig::kCertifier);
+      if (fault) DemandStillLatched(row, rig, *fault);
+    }, options_.others);
+  }
+
+  // What it says is a lie of this campaign, and no violation of the robot's.
+  void Strangers() {
+    Rig rig(DemoTask());
+    Row& row = Begin("A robot that executes what nobody certified (signed)", options_.others);
+    std::int64_t sequence = 1 << 30;
+    Tries(row, rig, [&](int i) {
+      // As long as a plan of the certifier before it may run: 2 s, twice the age of a message, and 128 steps.
+      if (i == 0) rig.Listen(std::chrono::seconds(17));
+      if (i == 0 && !rig.Heal().empty()) return Demand(row, false, "it is not well after a while");
+      rig.witness().ForgetFault();
+      robot_state_t state = State(rig);
+      state.mode = robot_state_t::EXECUTING;
+      state.sequence = sequence++;
+      const certified_plan_t& last = *rig.witness().last_certified();
+      state.executing_plan_id = i % 2 == 0 ? WallClockUs() : last.plan.plan_id;
+      state.executing_step = i % 2 == 0 ? 0 : last.plan.num_steps;
+      if (i % 2 != 0) std::copy_n(last.slice_lower[last.plan.num_steps], state.num_states, state.state);
+      rig.bus().Publish(rig.config().bus.robot_state, state);
+      static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
+      rig.Listen(kHeartbeat);
+      DemandLatched(row, rig, fault_t::UNCERTIFIED_PLAN);
+      for (const std::string& violation : rig.witness().TakeViolations())
+        Demand(row, violation.starts_with("plan " + std::to_string(state.executing_plan_id) + " is executing"), violation);
+    }, options_.others);
+  }
+
+  void StateDisks();
+
   void Nonsense() {
     Rig rig(DemoTask());
     Row& row = Begin("A planner that sends NaN, wrong sizes, garbage (signed)", options_.others);
@@ -449,6 +517,7 @@ class Campaign final {
 const std::vector<Campaign::Kind> Campaign::kKinds{
     {"kill", &Campaign::Kills},           {"clock", &Campaign::Clocks},        {"stop", &Campaign::Stops},
     {"network", &Campaign::BadNetwork},   {"lies", &Campaign::Lies},           {"nonsense", &Campaign::Nonsense},
+    {"latch", &Campaign::LatchedKills},   {"statedisk", &Campaign::StateDisks}, {"strangers", &Campaign::Strangers},
     {"forgeries", &Campaign::Forgeries},  {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
     {"disks", &Campaign::Disks},
     {"route", &Campaign::Routes},         {"reload", &Campaign::BadReload}};
@@ -491,6 +560,66 @@ void Campaign::Disks() {
                             logger.error().find(directory) != std::string::npos;
       Demand(read_only, says_why, "the logger did not end with the reason: " + logger.error());
       remount(0);
+    }, options_.others);
+  }
+  ::umount(directory.c_str());
+}
+
+// The same for the certifier's state.
+void Campaign::StateDisks() {
+  const ScratchDirectory scratch;
+  const std::string directory = scratch.path(), filler = directory + "/filler", latch = directory + "/latch.json";
+  constexpr const char* kSize = "size=1m";
+  if (::mount("tmpfs", directory.c_str(), "tmpfs", 0, kSize) != 0)
+    return NotTried("A full or read-only disk for the certifier's state", "mounting a small file system needs root");
+  {
+    Rig rig(DemoTask());
+    rig.End(Rig::kCertifier);
+    rig.SetState(directory);
+    const auto fill = [&] { std::ofstream(filler) << std::string(2 << 20, 'x'); };
+    const auto remount = [&](Row& row, unsigned long how) {
+      Demand(row, ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT | how, kSize) == 0, "no remount");
+    };
+    // Nothing is certified, and it is said why.
+    const auto demand_not_armed = [&](Row& row, const std::string& why) {
+      const std::int64_t certificates = rig.witness().certificates();
+      rig.witness().Forget();
+      rig.Start(Rig::kCertifier);
+      const auto says_so = [&] {
+        const auto& status = rig.witness().status();
+        return status && status->level == certifier_status_v3_t::ERROR && status->state == certifier_status_v3_t::DISARMED &&
+               GetText(status->message).starts_with("no fault could be stored");
+      };
+      Demand(row, rig.ListenUntil(says_so, kStarts), why + ", and the certifier does not say so");
+      rig.Listen(milliseconds(1000));
+      Demand(row, rig.witness().certificates() == certificates, why + ", and the certifier certified");
+    };
+    Row& at_start = Begin("The certifier's state on a disk that is full at its start", options_.others);
+    Tries(at_start, rig, [&](int) {
+      rig.End(Rig::kCertifier);
+      std::filesystem::remove(latch);
+      fill();
+      demand_not_armed(at_start, "no fault could be written");
+      std::filesystem::remove(filler);
+    }, options_.others);
+
+    Row& later = Begin("The certifier's state on a disk that is full when a fault is latched, then SIGKILL", options_.others);
+    std::int64_t sequence = 1 << 30;
+    Tries(later, rig, [&](int) {
+      fill();
+      const std::optional<fault_t> fault = Provoke(later, rig, sequence++);
+      rig.End(Rig::kCertifier, SIGKILL);
+      rig.Start(Rig::kCertifier);
+      if (fault) DemandStillLatched(later, rig, *fault);
+      std::filesystem::remove(filler);
+    }, options_.others);
+
+    Row& read_only = Begin("The certifier's state read-only at its start", options_.others);
+    Tries(read_only, rig, [&](int) {
+      rig.End(Rig::kCertifier);
+      remount(read_only, MS_RDONLY);
+      demand_not_armed(read_only, "the disk was read-only");
+      remount(read_only, 0);
     }, options_.others);
   }
   ::umount(directory.c_str());

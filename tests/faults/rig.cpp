@@ -50,7 +50,7 @@ std::string Tail(const std::string& text) {
 
 Rig::Rig(const std::string& task, const Options& options)
     : options_(options), task_path_(scratch_.Write("task.yaml", task)), key_path_(scratch_ / "key"),
-      next_directory_(scratch_ / "log") {
+      next_directory_(scratch_ / "log"), state_(scratch_ / "state") {
   static int rigs = 0;
   const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 40'000;
   far_url_ = "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
@@ -81,6 +81,7 @@ void Rig::Start(Role role) {
     records_.emplace_back();
     command.insert(command.end(), {"--directory", directory_});
   }
+  if (role == kCertifier) command.insert(command.end(), {"--state", state_});
   if (role == kRobot) drive_began_ = std::chrono::steady_clock::now();
   ended_by_[role] = 0;
   is_judged_[role] = false;

@@ -80,6 +80,8 @@ class Rig final {
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
   /** From the logger's next start on. */
   void SetDirectory(const std::string& directory) { next_directory_ = directory; }
+  /** What the certifier keeps a fault in, from its next start on. */
+  void SetState(const std::string& directory) { state_ = directory; }
 
  private:
   struct Record {  // of one logger
@@ -95,7 +97,7 @@ class Rig final {
 
   const Options options_;
   ScratchDirectory scratch_;
-  std::string task_path_, key_path_, near_url_, far_url_, next_directory_, directory_;
+  std::string task_path_, key_path_, near_url_, far_url_, next_directory_, directory_, state_;
   Config config_;
   std::unique_ptr<Bus> heard_, signed_;
   std::unique_ptr<Witness> witness_;

@@ -7,9 +7,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sched.h>
 #include <sqlite3.h>
-#include <sys/mount.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -17,6 +15,7 @@
 #include "logger/logger_node.h"
 #include "tests/logger/direct_bus.h"
 #include "tests/logger/logs.h"
+#include "tests/small_disk.h"
 
 namespace forereach {
 namespace {
@@ -454,26 +453,6 @@ TEST_F(DiskTest, AFailingFlushIsAnError) {
   Stop();
   EXPECT_EQ(std::ssize(Recorded()) + LostTo("disk"), fed_);
 }
-
-/** A small file system of this process's own on a directory; `mounted` is false where that is not allowed. */
-class SmallDisk final {
- public:
-  SmallDisk(const std::string& path, const std::string& options) : path_(path) {
-    std::filesystem::create_directories(path);
-    mounted = ::unshare(CLONE_NEWNS) == 0 && ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
-              ::mount("tmpfs", path.c_str(), "tmpfs", 0, options.c_str()) == 0;
-  }
-  ~SmallDisk() {
-    if (mounted) ::umount2(path_.c_str(), MNT_DETACH);
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
-  bool mounted = false;
-
- private:
-  std::string path_;
-};
 
 TEST_F(DiskTest, OnARealDiskThatFills) {
   const SmallDisk disk(config_.logger.directory, "size=6m");

@@ -828,6 +828,84 @@ TEST_F(ArmedNodeTest, ARobotThatLeavesItsSliceLatches) {
   EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED);
 }
 
+// The small task's certificates live 2 s; a message may be 0.5 s old, twice; 128 steps take 0.15 s each.
+constexpr std::int64_t kTolerated = 2'000'000 + 1'000'000 + 128 * 150'000;
+
+class StrangerTest : public ArmedNodeTest {
+ protected:
+  // Says twice a second that it stands, so that it is not lost.
+  void StandFor(std::int64_t us) {
+    for (const std::int64_t end = now_us_ + us; now_us_ < end;) {
+      Pass(std::min<std::int64_t>(500'000, end - now_us_));
+      SayState(State());
+    }
+  }
+};
+
+TEST_F(StrangerTest, APlanThatNobodyCertifiedLatchesOnceAnotherCertifiersAreOver) {
+  SayState(State());
+  StandFor(kTolerated);
+  SayState(State(7, 3));
+  EXPECT_TRUE(faults_.empty()) << "the certifier before this may have certified it";
+  Pass(1);
+  SayState(State(7, 3));
+  ASSERT_EQ(faults_.size(), 1u);
+  EXPECT_EQ(faults_[0].cause, fault_t::UNCERTIFIED_PLAN);
+  EXPECT_EQ(faults_[0].plan_id, 7);
+  EXPECT_EQ(faults_[0].step, 3);
+  EXPECT_EQ(GetText(faults_[0].message), "the robot executes plan 7, which was not certified, or should have ended");
+  EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
+  Reset();
+  SayState(State(7, 4));
+  EXPECT_EQ(faults_.back().sequence, 1) << "it still does";
+}
+
+TEST_F(StrangerTest, WhatThisCertifierCertifiedMayBeExecutedAndNoFurther) {
+  SayState(State());
+  StandFor(kTolerated + 1);
+  ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
+  const certified_plan_t plan = certified_.back();
+  const auto at = [&](int step) {
+    ++sequence_;  // each is judged by itself
+    robot_state_t state = State(plan.plan.plan_id, step);
+    const int slice = std::clamp(step, 0, 10);
+    for (int k = 0; k < 4; ++k) state.state[k] = plan.slice_upper[slice][k];
+    return state;
+  };
+  for (const int step : {0, 5, 9}) {
+    Pass(1000);
+    SayState(at(step));
+  }
+  EXPECT_TRUE(faults_.empty());
+  SayState(at(10));
+  ASSERT_EQ(faults_.size(), 1u) << "it has controls 0 to 9";
+  EXPECT_EQ(faults_[0].cause, fault_t::UNCERTIFIED_PLAN);
+  EXPECT_THAT(GetText(faults_[0].message), testing::HasSubstr("step 10 of 10"));
+  Reset();
+  SayState(at(-1));
+  EXPECT_EQ(faults_.back().sequence, 1);
+}
+
+TEST_F(StrangerTest, ARejectedCandidateIsNotCertified) {
+  SayState(State());
+  StandFor(kTolerated + 1);
+  ASSERT_EQ(Ask(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY);
+  SayState(State(decisions_.back().plan_id, 0));
+  ASSERT_EQ(faults_.size(), 1u);
+  EXPECT_EQ(faults_[0].cause, fault_t::UNCERTIFIED_PLAN);
+}
+
+// A certifier in shadow mode looks on while something else decides.
+TEST_F(StrangerTest, ShadowModeLatchesNothing) {
+  config_.gate.shadow = true;
+  Restart();
+  bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+  SayState(State());
+  StandFor(kTolerated + 1);
+  SayState(State(7, 3));
+  EXPECT_TRUE(faults_.empty());
+}
+
 transition_t Executed(const NominalModel& model, const Eigen::VectorXd& z, double error = 0) {
   transition_t transition{};
   transition.num_states = 4;
@@ -1022,6 +1100,7 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
   EXPECT_THAT(GetText(status_.message), testing::HasSubstr("nonsense"));
 
   for (const auto& [change, what] : {std::pair{"bus: {channels: {decision: ELSEWHERE}}", "bus.channels"},
+                                     std::pair{"gate: {state: elsewhere}", "gate.state"},
                                      std::pair{"realtime: {lock_memory: no}", "realtime"},
                                      std::pair{"realtime: {fifo_priority: 3}", "realtime"}}) {
     const std::int64_t failed = status_.failed_reloads;

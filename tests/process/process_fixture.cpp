@@ -41,7 +41,8 @@ task:
   projection: [px, py]
   obstacles:
     - circle: {center: [0, 2], radius: 0.8}
-gate: {max_age_ms: 20000, max_ahead_ms: 50, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000, obstacles: task}
+gate: {max_age_ms: 20000, max_ahead_ms: 50, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000,
+  obstacles: task, state: state}
 planner:
   goal: [6, 0]
   goal_radius: 0.5

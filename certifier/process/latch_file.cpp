@@ -1,0 +1,285 @@
+#include "certifier/process/latch_file.h"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <nlohmann/json.hpp>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include "certifier/numerics/limits.h"
+#include "certifier/task/json_file.h"
+#include "lcmtypes/bad_input.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* kFormat = "forereach latch";
+constexpr int kVersion = 1;
+constexpr const char* kNewName = "latch.json.new";
+
+bool IsAnswer(ssize_t result) { return result >= 0 || errno != EINTR; }
+
+// All of it, from the file's beginning.
+bool WriteAll(int file, const std::string& text) {
+  std::size_t written = 0;
+  while (written < text.size()) {
+    const ssize_t result = ::pwrite(file, text.data() + written, text.size() - written, static_cast<off_t>(written));
+    if (!IsAnswer(result)) continue;
+    if (result <= 0) {
+      if (result == 0) errno = EIO;
+      return false;
+    }
+    written += static_cast<std::size_t>(result);
+  }
+  return true;
+}
+
+bool IsSameFile(const struct stat& a, const struct stat& b) { return a.st_dev == b.st_dev && a.st_ino == b.st_ino; }
+
+// ---- The content as JSON. Strings may hold any bytes; numbers come back to the last bit.
+
+std::string Dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+Json ToJson(const Eigen::MatrixXd& rows) {
+  Json lists = Json::array();
+  for (const auto row : rows.rowwise()) lists.push_back(std::vector<double>(row.begin(), row.end()));
+  return lists;
+}
+
+Json ToJson(const LatchFile::Content& content) {
+  Json json{{"fault", nullptr}, {"contradictions", Json::array()}};
+  if (content.fault) json["fault"] = {{"message", content.why}, {"fault_t", Encode(*content.fault)}};
+  for (const LatchFile::Contradiction& found : content.contradictions)
+    json["contradictions"].push_back({{"model", found.model},
+                                      {"z", ToJson(found.pair.z)},
+                                      {"residual_lower", ToJson(found.pair.lower)},
+                                      {"residual_upper", ToJson(found.pair.upper)}});
+  return json;
+}
+
+Eigen::MatrixXd PairFrom(const Json& lists, std::size_t most) {
+  const auto rows = lists.get<std::array<std::vector<double>, 2>>();
+  if (rows[0].empty() || rows[0].size() > most || rows[0].size() != rows[1].size())
+    throw Json::other_error::create(501, "a pair of rows that do not fit", nullptr);
+  Eigen::MatrixXd matrix(2, static_cast<Eigen::Index>(rows[0].size()));
+  for (Eigen::Index i = 0; i < 2; ++i)
+    for (Eigen::Index k = 0; k < matrix.cols(); ++k)
+      matrix(i, k) = rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)];
+  return matrix;
+}
+
+LatchFile::Content ContentFrom(const Json& json) {
+  LatchFile::Content content;
+  if (const Json& fault = json.at("fault"); !fault.is_null()) {
+    content.fault = Decoded<fault_t>(fault.at("fault_t").get<std::vector<std::uint8_t>>());
+    if (!content.fault) throw Json::other_error::create(501, "fault_t cannot be decoded", nullptr);
+    content.why = fault.at("message").get<std::string>();
+  }
+  for (const Json& entry : json.at("contradictions")) {
+    LatchFile::Contradiction found{entry.at("model").get<Digest>(), {}};
+    found.pair.z = PairFrom(entry.at("z"), kMaxVariables);
+    found.pair.lower = PairFrom(entry.at("residual_lower"), kMaxStates);
+    found.pair.upper = PairFrom(entry.at("residual_upper"), kMaxStates);
+    if (found.pair.lower.cols() != found.pair.upper.cols())
+      throw Json::other_error::create(501, "a pair of rows that do not fit", nullptr);
+    content.contradictions.push_back(std::move(found));
+  }
+  return content;
+}
+
+// Of the file's size.
+std::string TextOf(const LatchFile::Content& content) {
+  const Json inner = ToJson(content);
+  std::string text = Dump({{"format", kFormat}, {"version", kVersion}, {"content", inner}, {"digest", ToHex(DigestOf(Dump(inner)))}});
+  if (text.size() < LatchFile::kBytes) text.resize(LatchFile::kBytes - 1, ' '), text += '\n';
+  return text;
+}
+
+// @throws Json::exception saying what is wrong.
+LatchFile::Content ContentOf(const std::string& text) {
+  std::istringstream stream(text);
+  const Json json = ParseJson<Json>(stream);
+  if (json.at("format") != kFormat) throw Json::other_error::create(501, "its format is another", nullptr);
+  if (json.at("version") != kVersion)
+    throw Json::other_error::create(501, "its version is " + Dump(json["version"]) + ", this certifier knows " + std::to_string(kVersion), nullptr);
+  if (json.at("digest") != ToHex(DigestOf(Dump(json.at("content")))))
+    throw Json::other_error::create(501, "its digest is not that of its content", nullptr);
+  return ContentFrom(json["content"]);
+}
+
+}  // namespace
+
+LatchFile::LatchFile(std::string directory) : directory_(std::move(directory)) { static_cast<void>(OpenDirectory()); }
+
+LatchFile::~LatchFile() {
+  CloseFile();
+  if (lock_ >= 0) ::close(lock_);
+}
+
+void LatchFile::CloseFile() {
+  if (file_ >= 0) ::close(std::exchange(file_, -1));
+}
+
+bool LatchFile::Fail(const std::string& why) {
+  ready_ = false;
+  why_ = why;
+  return false;
+}
+
+bool LatchFile::FailedTo(const std::string& what) {
+  return Fail(path() + ": cannot be " + what + ": " + std::generic_category().message(errno));
+}
+
+bool LatchFile::OpenDirectory() {
+  std::error_code error;
+  std::filesystem::create_directories(directory_, error);
+  const int directory = ::open(directory_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory < 0) {
+    if (error) errno = error.value();
+    return Fail(directory_ + ": cannot be made or opened: " + std::generic_category().message(errno));
+  }
+  if (::flock(directory, LOCK_EX | LOCK_NB) != 0) {
+    const int cause = errno;
+    ::close(directory);
+    if (cause == EWOULDBLOCK)
+      throw BadInput("gate.state: " + directory_ + ": another certifier keeps its state there; each robot and each certifier that stands by needs a directory of its own (--state)");
+    return Fail(directory_ + ": cannot be locked: " + std::generic_category().message(cause));
+  }
+  if (lock_ >= 0) ::close(lock_);
+  lock_ = directory;
+  struct stat its{};
+  if (::fstat(lock_, &its) != 0) return FailedTo("looked at");
+  if ((its.st_mode & S_IWOTH) != 0 && (its.st_mode & S_ISVTX) == 0)
+    return Fail(directory_ + ": anybody may write there: chmod o-w it");
+  return true;
+}
+
+std::optional<LatchFile::Content> LatchFile::Read() {
+  CloseFile();
+  may_write_ = ready_ = false;
+  struct stat locked{}, named{};
+  const bool is_locked = lock_ >= 0 && ::fstat(lock_, &locked) == 0 && ::stat(directory_.c_str(), &named) == 0 &&
+                         IsSameFile(locked, named);
+  try {
+    if (!is_locked && !OpenDirectory()) return std::nullopt;
+  } catch (const BadInput& error) {
+    return Fail(error.what()), std::nullopt;
+  }
+  // Reading does not wait for whoever is at the other end of a pipe, and follows no link.
+  const int file = ::openat(lock_, kName, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0 && errno == ENOENT) {
+    may_write_ = true;
+    return Content();
+  }
+  if (file < 0) return FailedTo(errno == ELOOP ? "read, it is a symbolic link" : "read"), std::nullopt;
+  std::optional<Content> content = ReadFrom(file);
+  struct stat read{}, written{};
+  static_cast<void>(::fstat(file, &read));
+  ::close(file);
+  if (!content) return std::nullopt;
+  holds_fault_ = content->fault.has_value();
+  file_ = ::openat(lock_, kName, O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (file_ < 0) {
+    FailedTo("written");
+  } else if (::fstat(file_, &written) != 0 || !IsSameFile(read, written)) {
+    CloseFile();
+    Fail(path() + ": was replaced while it was read");
+  } else {
+    may_write_ = true;
+  }
+  return content;
+}
+
+std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
+  const std::string advice = "; nobody knows whether a fault was latched. Once it is known why, delete the file";
+  struct stat its{};
+  if (::fstat(file, &its) != 0) return FailedTo("looked at"), std::nullopt;
+  if (emptied_ && its.st_size == 0) return Content();
+  if (!S_ISREG(its.st_mode)) return Fail(path() + ": is no regular file" + advice), std::nullopt;
+  if (its.st_uid != ::geteuid() && its.st_uid != 0)
+    return Fail(path() + ": belongs to user " + std::to_string(its.st_uid) + ", has to belong to user " +
+                std::to_string(::geteuid()) + " or 0" + advice), std::nullopt;
+  if ((its.st_mode & (S_IWGRP | S_IWOTH)) != 0)
+    return Fail(path() + ": others than its owner may write it" + advice), std::nullopt;
+  if (its.st_size != static_cast<off_t>(kBytes))
+    return Fail(path() + ": has " + std::to_string(its.st_size) + " bytes, has to have " + std::to_string(kBytes) + advice), std::nullopt;
+  std::string text(kBytes, '\0');
+  std::size_t taken = 0;
+  while (taken < text.size()) {
+    const ssize_t result = ::pread(file, text.data() + taken, text.size() - taken, static_cast<off_t>(taken));
+    if (!IsAnswer(result)) continue;
+    if (result < 0) return FailedTo("read"), std::nullopt;
+    if (result == 0) break;
+    taken += static_cast<std::size_t>(result);
+  }
+  text.resize(taken);
+  try {
+    return ContentOf(text);
+  } catch (const Json::exception& error) {
+    return Fail(path() + ": is damaged: " + error.what() + advice), std::nullopt;
+  }
+}
+
+bool LatchFile::Create(const std::string& text) {
+  ::unlinkat(lock_, kNewName, 0);
+  const int made = ::openat(lock_, kNewName, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (made < 0) return FailedTo("made");
+  file_ = made;
+  if (WriteAll(made, text) && ::fsync(made) == 0 && ::renameat(lock_, kNewName, lock_, kName) == 0 && ::fsync(lock_) == 0)
+    return true;
+  FailedTo("made");
+  CloseFile();
+  ::unlinkat(lock_, kNewName, 0);
+  return false;
+}
+
+bool LatchFile::Put(const Content& content) {
+  if (!may_write_) return false;
+  const std::string text = TextOf(content);
+  if (content.contradictions.size() > kMostContradictions || text.size() != kBytes)
+    return Fail(path() + ": holds at most " + std::to_string(kMostContradictions) +
+                " contradictions; once a declaration is true, delete the file");
+  if (file_ < 0 ? Create(text) : WriteAll(file_, text)) {
+    holds_fault_ = content.fault.has_value();
+    emptied_ = false;
+    return true;
+  }
+  if (file_ < 0) return false;
+  FailedTo("written");
+  if (content.fault && !holds_fault_) emptied_ = ::ftruncate(file_, 0) == 0;
+  return false;
+}
+
+bool LatchFile::Flush() {
+  if (file_ < 0) return false;
+  if (::fdatasync(file_) != 0) return FailedTo("written to the disk");
+  Look();
+  return ready_;
+}
+
+void LatchFile::Look() {
+  struct stat its{}, found{}, locked{}, named{};
+  struct statvfs disk{};
+  ready_ = false;
+  if (file_ < 0 || ::fstat(file_, &its) != 0 || ::fstat(lock_, &locked) != 0) return static_cast<void>(FailedTo("looked at"));
+  if (::stat(directory_.c_str(), &named) != 0 || !IsSameFile(locked, named) ||
+      ::fstatat(lock_, kName, &found, AT_SYMLINK_NOFOLLOW) != 0 || !IsSameFile(its, found))
+    return static_cast<void>(Fail(path() + ": was deleted or replaced"));
+  if (::fstatvfs(file_, &disk) != 0) return static_cast<void>(FailedTo("looked at"));
+  if ((disk.f_flag & ST_RDONLY) != 0) return static_cast<void>(Fail(path() + ": cannot be written: its disk is read-only"));
+  ready_ = true;
+  why_.clear();
+}
+
+}  // namespace forereach

@@ -1,0 +1,489 @@
+// What a certifier does not forget when it ends: faults and contradictions, on disks that work and on disks that do not.
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "certifier/process/certifier_node.h"
+#include "tests/gate/small_task.h"
+#include "tests/scratch.h"
+#include "tests/small_disk.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string Contents(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void WriteFile(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+// The next write to any file fails, as long as this lives.
+class NoWrites final {
+ public:
+  NoWrites() {
+    std::signal(SIGXFSZ, SIG_IGN);
+    EXPECT_EQ(getrlimit(RLIMIT_FSIZE, &before_), 0);
+    const rlimit none{0, before_.rlim_max};
+    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &none), 0);
+  }
+  ~NoWrites() { EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &before_), 0); }
+
+ private:
+  rlimit before_{};
+};
+
+class LatchTest : public testing::Test {
+ protected:
+  LatchTest() { config_.gate.needs_robot_state = true; }
+
+  // Ends a certifier without a word, as SIGKILL does, and begins the next.
+  void Begin() {
+    node_.reset();
+    faults_.clear();
+    certified_ = 0;
+    status_ = {};
+    bus_ = OpenBus("memq://", clock_);
+    bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
+    bus_->Subscribe("PLAN_DECISION", [this](const Received& r) { decision_ = Decoded<decision_t>(r.bytes).value(); });
+    bus_->Subscribe("PLAN_CERTIFIED", [this](const Received&) { ++certified_; });
+    bus_->Subscribe("CERTIFIER_STATUS",
+                    [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+    node_ = std::make_unique<CertifierNode>(config_, *bus_, Clocks{clock_, clock_}, 0, std::make_unique<LatchFile>(directory_));
+    Run();
+  }
+  void Run() {
+    bus_->Dispatch(0);
+    node_->Tick(now_us_);
+    bus_->Dispatch(0);
+  }
+  void Heartbeat() {
+    now_us_ += CertifierNode::kHeartbeatUs;
+    SayState();
+  }
+  void SayState() {
+    robot_state_t state{};
+    state.utime = now_us_;
+    state.sequence = sequence_++;
+    state.mode = robot_state_t::STANDING;
+    state.executing_plan_id = -1;
+    state.num_states = 4;
+    bus_->Publish("ROBOT_STATE", state);
+    Run();
+  }
+  const decision_t& Ask() {
+    bus_->Publish("PLAN_CANDIDATE", Candidate(next_plan_id_++, kAccelerationThatCertifies, now_us_));
+    Run();
+    return decision_;
+  }
+  // The robot's state is lost.
+  void Fault() {
+    SayState();
+    now_us_ += 1'000'001;
+    Run();
+  }
+  void Falsify() {
+    const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
+    transition_t transition{};
+    transition.num_states = 4;
+    transition.num_inputs = 2;
+    std::copy_n(z.data(), 4, transition.state);
+    config_.problem->model->Evaluate({z.data(), 6}, {transition.next_state, 4});
+    transition.next_state[2] += 0.01;
+    bus_->Publish("TRANSITION", transition);
+    Run();
+  }
+  void Reset(std::int64_t utime) {
+    command_t command{};
+    command.utime = utime;
+    command.kind = command_t::RESET;
+    bus_->Publish("COMMAND", command);
+    Run();
+  }
+  void Reset() {
+    now_us_ += 1;
+    Reset(now_us_);
+  }
+  void Declare(double noise_bound) {
+    Problem problem = *config_.problem;
+    problem.declaration.noise_bound.setConstant(noise_bound);
+    config_.problem = std::make_shared<const Problem>(problem);
+  }
+  void ExpectNotArmed(const std::string& why) {
+    SayState();
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_LATCH_UNWRITABLE);
+    EXPECT_EQ(decision_.outcome, decision_t::REJECTED);
+    EXPECT_THAT(GetText(decision_.message), StartsWith("rejected: no fault could be stored: "));
+    Heartbeat();
+    EXPECT_EQ(status_.state, certifier_status_v3_t::DISARMED);
+    EXPECT_EQ(status_.level, certifier_status_v3_t::ERROR);
+    EXPECT_THAT(node_->watch().Lacks(Watch::Need::kLatch), HasSubstr(why));
+    EXPECT_EQ(certified_, 0);
+  }
+  void ExpectArmed() {
+    Heartbeat();
+    EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << GetText(decision_.message);
+    Heartbeat();
+    EXPECT_EQ(status_.level, certifier_status_v3_t::OK) << GetText(status_.message);
+  }
+
+  std::int64_t now_us_ = kNow;
+  const Clock clock_ = [this] { return now_us_; };
+  const ScratchDirectory scratch_;
+  const std::string directory_ = scratch_ / "state", file_ = directory_ + "/latch.json";
+  Config config_ = SmallTask();
+  std::unique_ptr<Bus> bus_;
+  std::unique_ptr<CertifierNode> node_;
+  std::vector<fault_t> faults_;
+  decision_t decision_{};
+  certifier_status_v3_t status_{};
+  int certified_ = 0;
+  std::int64_t next_plan_id_ = 1, sequence_ = 0;
+};
+
+TEST_F(LatchTest, WithoutAFaultTheNextCertifierArmsByItself) {
+  for (int i = 0; i < 3; ++i) {
+    Begin();
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_NOT_ARMED);
+    ExpectArmed();
+    EXPECT_TRUE(faults_.empty());
+    EXPECT_EQ(std::filesystem::file_size(file_), LatchFile::kBytes);
+  }
+}
+
+TEST_F(LatchTest, AFaultOutlivesTheProcessUntilAReset) {
+  Begin();
+  Fault();
+  ASSERT_EQ(faults_.size(), 1u);
+  const fault_t fault = faults_[0];
+  const std::string sentence = GetText(Ask().message);
+  for (int i = 0; i < 3; ++i) {
+    now_us_ += 10'000;
+    Begin();
+    ASSERT_FALSE(faults_.empty()) << "said at once";
+    Heartbeat();
+    EXPECT_GE(faults_.size(), 2u) << "and again";
+    for (const fault_t& said : faults_) EXPECT_EQ(Encode(said), Encode(fault));
+    EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+    EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
+    EXPECT_EQ(status_.fault_utime, fault.utime);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
+    EXPECT_EQ(GetText(decision_.message), sentence);
+    EXPECT_EQ(certified_, 0);
+  }
+  Begin();
+  for (const std::int64_t utime : {fault.utime - 1, fault.utime}) {
+    now_us_ = fault.utime + 1000;
+    Reset(utime);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT) << "a reset from before it";
+  }
+  Reset();
+  ExpectArmed();
+  Begin();
+  EXPECT_TRUE(faults_.empty());
+  ExpectArmed();
+}
+
+TEST_F(LatchTest, AResetMayComeAfterTheClockWasSetBack) {
+  Begin();
+  Fault();
+  now_us_ -= 3'600'000'000;
+  Begin();
+  EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+  Reset();
+  Begin();
+  EXPECT_TRUE(faults_.empty());
+}
+
+TEST_F(LatchTest, OfTwoFaultsTheGraverIsKept) {
+  Begin();
+  Fault();
+  Falsify();
+  Begin();
+  ASSERT_FALSE(faults_.empty());
+  EXPECT_EQ(faults_.back().cause, fault_t::DECLARATION_FALSIFIED);
+}
+
+TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
+  Begin();
+  SayState();
+  Falsify();
+  for (int i = 0; i < 2; ++i) {
+    Begin();
+    EXPECT_EQ(status_.fault, i == 0 ? fault_t::DECLARATION_FALSIFIED : 0);
+    Reset();
+    SayState();
+    EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+    EXPECT_EQ(decision_.cause, decision_t::CAUSE_PAIRWISE);
+    Heartbeat();
+    EXPECT_EQ(status_.level, certifier_status_v3_t::ERROR);
+    EXPECT_THAT(GetText(status_.message), HasSubstr("contradict"));
+  }
+  Declare(0.004);  // 0.01 is the difference, twice this is allowed
+  Begin();
+  SayState();
+  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED);
+  Declare(0.006);
+  Begin();
+  ExpectArmed();
+  Declare(0);
+  Begin();
+  SayState();
+  EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED) << "nor is it forgotten after another";
+  config_.model_digest = DigestOf(std::string_view("another model"));
+  Begin();
+  ExpectArmed();
+}
+
+TEST_F(LatchTest, OneContradictionOfADeclarationIsEnough) {
+  Begin();
+  SayState();
+  for (int i = 0; i < 3; ++i) {
+    Falsify();
+    Begin();
+    Reset();
+    SayState();
+  }
+  node_.reset();
+  const auto held = LatchFile(directory_).Read();
+  ASSERT_TRUE(held);
+  EXPECT_EQ(held->contradictions.size(), 1u);
+}
+
+TEST_F(LatchTest, MoreContradictionsThanFitArmNobody) {
+  Begin();
+  SayState();
+  Falsify();
+  node_.reset();
+  LatchFile file(directory_);
+  LatchFile::Content content = file.Read().value();
+  content.contradictions.resize(LatchFile::kMostContradictions, content.contradictions[0]);
+  EXPECT_TRUE(file.Put(content) && file.Flush());
+  content.contradictions.push_back(content.contradictions[0]);
+  EXPECT_FALSE(file.Put(content));
+  EXPECT_FALSE(file.ready());
+  EXPECT_THAT(file.why_not(), HasSubstr("holds at most 16 contradictions"));
+}
+
+// The largest model there can be, with numbers of many digits.
+TEST_F(LatchTest, AsManyContradictionsFitAsAreAllowed) {
+  LatchFile file(directory_);
+  LatchFile::Content content = file.Read().value();
+  const double longest = -std::nextafter(1.2345678901234567e-301, 1.0);
+  content.why = std::string(400, '"');
+  content.fault.emplace();
+  std::ranges::fill(content.fault->message, 255);
+  const Observations pair{Eigen::MatrixXd::Constant(2, 24, longest), Eigen::MatrixXd::Constant(2, 16, longest),
+                          Eigen::MatrixXd::Constant(2, 16, longest)};
+  content.contradictions.resize(LatchFile::kMostContradictions, {Digest{255}, pair});
+  ASSERT_TRUE(file.Put(content) && file.Flush()) << file.why_not();
+  const auto read = file.Read();
+  ASSERT_TRUE(read) << file.why_not();
+  EXPECT_EQ(read->why, content.why);
+  EXPECT_EQ(read->contradictions.back().pair.z, pair.z);
+}
+
+TEST_F(LatchTest, OneDirectoryIsOneCertifiers) {
+  Begin();
+  try {
+    const LatchFile second(directory_);
+    FAIL();
+  } catch (const BadInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr(directory_ + ": another certifier keeps its state there"));
+  }
+  node_.reset();
+  EXPECT_NO_THROW(LatchFile{directory_});
+}
+
+// What cannot be trusted is not taken for "no fault", and no reset mends it.
+struct Damage {
+  const char* name;
+  std::function<void(const std::string& file)> harm;
+  const char* says;
+};
+class DamagedLatchTest : public LatchTest, public testing::WithParamInterface<Damage> {};
+
+TEST_P(DamagedLatchTest, IsNoFreedom) {
+  Begin();
+  Fault();
+  node_.reset();
+  GetParam().harm(file_);
+  Begin();
+  EXPECT_TRUE(faults_.empty());
+  ExpectNotArmed(GetParam().says);
+  Reset();
+  ExpectNotArmed(GetParam().says);
+  Begin();
+  ExpectNotArmed(file_);
+  std::filesystem::remove_all(file_);  // by a person
+  ExpectArmed();
+}
+
+std::function<void(const std::string&)> Edit(const std::string& from, const std::string& to) {
+  return [=](const std::string& file) {
+    std::string text = Contents(file);
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos);
+    text.replace(at, from.size(), to);
+    text.resize(LatchFile::kBytes, ' ');
+    WriteFile(file, text);
+  };
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Any, DamagedLatchTest,
+    testing::Values(
+        Damage{"Empty", [](const std::string& file) { WriteFile(file, ""); }, "has 0 bytes, has to have 65536"},
+        Damage{"Short", [](const std::string& file) { std::filesystem::resize_file(file, 65535); }, "65535 bytes"},
+        Damage{"Huge", [](const std::string& file) { std::filesystem::resize_file(file, std::uintmax_t{1} << 40); }, "bytes"},
+        Damage{"Zeros", [](const std::string& file) { WriteFile(file, std::string(65536, '\0')); }, "is damaged"},
+        Damage{"Spaces", [](const std::string& file) { WriteFile(file, std::string(65536, ' ')); }, "is damaged"},
+        Damage{"Deep", [](const std::string& file) { WriteFile(file, std::string(65536, '[')); }, "is damaged"},
+        Damage{"Half", [](const std::string& file) { std::string text = Contents(file); text.replace(400, 65136, 65136, '\0'); WriteFile(file, text); }, "is damaged"},
+        Damage{"NoFault", Edit("\"fault\":{", "\"fault\":null,\"no\":{"), "digest"},
+        Damage{"AnotherDigit", Edit("\"fault_t\":[", "\"fault_t\":[1"), "digest"},
+        Damage{"AnotherVersion", Edit("\"version\":1", "\"version\":2"), "its version is 2, this certifier knows 1"},
+        Damage{"AnotherFormat", Edit("forereach latch", "forereach match"), "its format is another"},
+        Damage{"Fifo", [](const std::string& file) { std::filesystem::remove(file); ASSERT_EQ(mkfifo(file.c_str(), 0600), 0); }, "is no regular file"},
+        Damage{"Directory", [](const std::string& file) { std::filesystem::remove(file); std::filesystem::create_directory(file); }, "is no regular file"},
+        Damage{"Link", [](const std::string& file) { std::filesystem::rename(file, file + "2"); std::filesystem::create_symlink(file + "2", file); }, "is a symbolic link"},
+        Damage{"OthersMayWrite", [](const std::string& file) { ASSERT_EQ(chmod(file.c_str(), 0622), 0); }, "others than its owner may write it"}),
+    [](const auto& of) { return of.param.name; });
+
+TEST_F(LatchTest, NoAlteredByteIsTakenForAnythingElse) {
+  Begin();
+  SayState();
+  Falsify();
+  node_.reset();
+  const std::string good = Contents(file_);
+  const std::size_t used = good.find_last_not_of(" \n") + 1;
+  const auto held = LatchFile(directory_).Read();
+  ASSERT_TRUE(held && held->fault && held->contradictions.size() == 1);
+  for (std::size_t at = 0; at < used + 3; at += at < 200 ? 1 : 17) {
+    for (const char bit : {char{1}, char{4}, char{32}}) {
+      std::string bad = good;
+      bad[at] = static_cast<char>(bad[at] ^ bit);
+      WriteFile(file_, bad);
+      const auto read = LatchFile(directory_).Read();
+      if (!read) continue;
+      EXPECT_EQ(Encode(*read->fault), Encode(*held->fault)) << at;  // white space
+    }
+  }
+}
+
+TEST_F(LatchTest, ADeletedFileIsMadeAgainWithWhatItHeld) {
+  Begin();
+  ExpectArmed();
+  std::filesystem::remove_all(directory_);
+  Fault();
+  Heartbeat();
+  Begin();
+  EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
+}
+
+TEST_F(LatchTest, AFaultThatCannotBeWrittenIsNotForgottenByARestart) {
+  Begin();
+  ExpectArmed();
+  {
+    const NoWrites no_writes;
+    Fault();
+    ASSERT_EQ(faults_.size(), 1u) << "it is said all the same";
+    Heartbeat();
+    EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+    EXPECT_THAT(GetText(status_.message), HasSubstr("not stored"));
+    Reset();
+    EXPECT_TRUE(node_->watch().fault()) << "nor can the reset be written";
+    node_.reset();
+  }
+  Begin();
+  ExpectNotArmed("has 0 bytes");
+}
+
+TEST_F(LatchTest, AFaultIsWrittenOnceTheDiskTakesIt) {
+  Begin();
+  ExpectArmed();
+  {
+    const NoWrites no_writes;
+    Fault();
+  }
+  Heartbeat();
+  EXPECT_THAT(GetText(status_.message), testing::Not(HasSubstr("not stored")));
+  Begin();
+  EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
+}
+
+TEST_F(LatchTest, AResetThatCannotBeWrittenClearsNothing) {
+  Begin();
+  Fault();
+  {
+    const NoWrites no_writes;
+    Reset();
+    EXPECT_TRUE(node_->watch().fault());
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
+    Heartbeat();
+    EXPECT_EQ(status_.messages_refused, 1);
+  }
+  Begin();
+  EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
+  Reset();
+  Begin();
+  ExpectArmed();
+}
+
+TEST_F(LatchTest, AFullDiskTakesAFaultOrArmsNobody) {
+  const SmallDisk disk(directory_, "size=256k");
+  if (!disk.mounted) GTEST_SKIP() << "no right to mount a small disk here";
+  const std::string filler = directory_ + "/filler";
+  const auto fill = [&] { WriteFile(filler, std::string(1 << 20, 'x')); };
+  fill();
+  Begin();
+  ExpectNotArmed("No space left on device");
+  std::filesystem::remove(filler);
+  ExpectArmed();
+  fill();
+  Fault();
+  Heartbeat();
+  EXPECT_THAT(GetText(status_.message), testing::Not(HasSubstr("not stored")));
+  Begin();
+  EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST) << "full from before it on";
+  Reset();
+  Begin();
+  ExpectArmed();
+}
+
+TEST_F(LatchTest, AReadOnlyDiskArmsNobodyAndItsFaultIsSaid) {
+  const SmallDisk disk(directory_, "size=256k");
+  if (!disk.mounted) GTEST_SKIP() << "no right to mount a small disk here";
+  ASSERT_TRUE(disk.Remount(MS_RDONLY));
+  Begin();
+  ExpectNotArmed("Read-only file system");
+  node_.reset();
+  ASSERT_TRUE(disk.Remount(0));
+  Begin();
+  Fault();
+  node_.reset();
+  ASSERT_TRUE(disk.Remount(MS_RDONLY));
+  Begin();
+  EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST) << "reading needs no right to write";
+  EXPECT_FALSE(faults_.empty());
+  Reset();
+  EXPECT_TRUE(node_->watch().fault()) << "it could not be written";
+  ASSERT_TRUE(disk.Remount(0));
+  Heartbeat();
+  Reset();
+  ExpectArmed();
+}
+
+}  // namespace
+}  // namespace forereach
