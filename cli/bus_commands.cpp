@@ -67,6 +67,14 @@ class Line final {
   std::vector<certifier_status_v3_t> heard_;
 };
 
+const char* LatchText(const certifier_status_v3_t& status) {
+  switch (status.latch) {
+    case certifier_status_v3_t::LATCH_WRITTEN: return "written";
+    case certifier_status_v3_t::LATCH_UNWRITABLE: return "unwritable";
+    default: return "none";
+  }
+}
+
 nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
   nlohmann::ordered_json by_outcome, by_cause;
   for (std::int16_t i = 0; i < 16; ++i)
@@ -76,6 +84,7 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
   return {{"level", LevelName(status.level)},
           {"state", StateName(status.state)},
           {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
+          {"latch", LatchText(status)},
           {"message", GetText(status.message)},
           {"advice", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultAdvice(status.fault))},
           {"shadow", status.shadow != 0},
@@ -118,6 +127,8 @@ void Print(const certifier_status_v3_t& status, bool json) {
   std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");
   if (const std::string message = GetText(status.message); !message.empty()) std::cout << ": " << message;
   if (status.fault != 0) std::cout << "\nwhat to do: " << FaultAdvice(status.fault);
+  if (status.latch == certifier_status_v3_t::LATCH_WRITTEN) std::cout << "\nthe fault is on disk: a restart does not clear it";
+  if (status.latch == certifier_status_v3_t::LATCH_UNWRITABLE) std::cout << "\ngate.state cannot be used: a fault is not on disk";
   std::cout << "\nversion " << status.version << ", " << status.observations << " observations, of these " << status.learned
             << " learned; " << status.candidates << " candidates:";
   for (std::int16_t i = 0; i < 16; ++i)

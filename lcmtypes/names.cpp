@@ -96,7 +96,7 @@ std::string_view FaultAdvice(std::int16_t cause) {
       return "a reset alone does not help, every candidate stays F: declare a larger bound in the task file, "
              "`forereach reload`, then `forereach reset`";
     case fault_t::UNCERTIFIED_PLAN:
-      return "find out what made the robot execute a plan that was not certified, before it moves again; then "
+      return "find what commands the robot without the guard, or which certifier certifies beside this one; then "
              "`forereach reset`";
     default:
       return "find the reason, then `forereach reset`";

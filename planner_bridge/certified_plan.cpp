@@ -52,7 +52,8 @@ class PlanSearch final {
       }
       if (before == 0) found_.decision = decision;
       if (decision.outcome == Outcome::kFalsified) return false;
-      lessons_.Learn(decision.outcome);
+      // A plan that does not stop is no nearer to the domain's bounds than one that does.
+      if (decision.cause != Cause::kNoStop) lessons_.Learn(decision.outcome);
     }
     return false;
   }

@@ -364,8 +364,8 @@ void CertifierNode::TakeOver(const LatchFile::Content& stored) {
   if (!stored.fault || !watch_.Latch({stored.fault->cause, stored.fault->utime, stored.why})) return;
   announced_ = *stored.fault;
   next_announcement_us_ = 0;
-  spdlog::error("fault {} from before this start: {}; nothing is certified until `forereach reset`",
-                FaultName(stored.fault->cause), stored.why);
+  spdlog::error("fault {} from before this start: {}; nothing is certified. What to do: {}", FaultName(stored.fault->cause),
+                stored.why, FaultAdvice(stored.fault->cause));
 }
 
 void CertifierNode::CheckLatch() {

@@ -128,6 +128,7 @@ class LatchTest : public testing::Test {
     Heartbeat();
     EXPECT_EQ(status_.state, certifier_status_v3_t::DISARMED);
     EXPECT_EQ(status_.level, certifier_status_v3_t::ERROR);
+    EXPECT_EQ(status_.latch, certifier_status_v3_t::LATCH_UNWRITABLE);
     EXPECT_THAT(node_->watch().Lacks(Watch::Need::kLatch), HasSubstr(why));
     EXPECT_EQ(certified_, 0);
   }
@@ -136,6 +137,7 @@ class LatchTest : public testing::Test {
     EXPECT_EQ(Ask().outcome, decision_t::CERTIFIED) << GetText(decision_.message);
     Heartbeat();
     EXPECT_EQ(status_.level, certifier_status_v3_t::OK) << GetText(status_.message);
+    EXPECT_EQ(status_.latch, certifier_status_v3_t::NO_LATCH);
   }
 
   std::int64_t now_us_ = kNow;
@@ -178,6 +180,7 @@ TEST_F(LatchTest, AFaultOutlivesTheProcessUntilAReset) {
     EXPECT_EQ(status_.state, certifier_status_v3_t::FAULT);
     EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
     EXPECT_EQ(status_.fault_utime, fault.utime);
+    EXPECT_EQ(status_.latch, certifier_status_v3_t::LATCH_WRITTEN);
     EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
     EXPECT_EQ(GetText(decision_.message), sentence);
     EXPECT_EQ(certified_, 0);
