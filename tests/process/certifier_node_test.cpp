@@ -437,7 +437,7 @@ class TwoCertifiersTest : public ObstaclesNodeTest {
     int Dispatch(int) override {
       const auto now = std::exchange(arrived, {});
       for (const auto& [channel, bytes] : now)
-        if (handlers.contains(channel)) handlers[channel](Received{channel, bytes, clock()});
+        if (handlers.contains(channel)) handlers[channel](Received{channel, bytes, clock(), bytes});
       return static_cast<int>(now.size());
     }
     [[nodiscard]] std::int64_t dropped() const override { return 0; }
