@@ -125,6 +125,42 @@ double Reduce(Slice& slice, int order, double remainder_rounding) {
   return std::max(close, tiny);
 }
 
+// As Reduce, by the choice that a record shows: the (order - 1) n columns nearest to its first. False if it has fewer. Any
+// choice gives a set that contains the slice.
+bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded) {
+  const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
+  if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return true;
+  if (recorded.cols() < static_cast<Eigen::Index>(kept)) return false;
+  std::vector<Eigen::VectorXd> rounded;
+  for (const auto& column : slice.columns) {
+    rounded.emplace_back(slice.dim());
+    for (int k = 0; k < slice.dim(); ++k) rounded.back()[k] = column[Index(k)].ToDouble();
+  }
+  std::vector<bool> taken(slice.columns.size());
+  Slice reduced{slice.center, {}};
+  for (std::size_t i = 0; i < kept; ++i) {
+    const auto generator = recorded.col(static_cast<Eigen::Index>(i));
+    std::size_t nearest = slice.columns.size();
+    double least = kNone;
+    for (std::size_t j = 0; j < slice.columns.size(); ++j) {
+      if (taken[j]) continue;
+      const double away = std::min((rounded[j] - generator).lpNorm<1>(), (rounded[j] + generator).lpNorm<1>());
+      if (away < least) least = away, nearest = j;
+    }
+    if (nearest == slice.columns.size()) return false;
+    taken[nearest] = true;
+    reduced.columns.push_back(slice.columns[nearest]);
+  }
+  for (int k = 0; k < slice.dim(); ++k) {
+    Real sum;
+    for (std::size_t j = 0; j < taken.size(); ++j)
+      if (!taken[j]) sum += abs(slice.columns[j][Index(k)]);
+    if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
+  }
+  slice = std::move(reduced);
+  return true;
+}
+
 // d_i d_l over the slice: at most r_i r_l in size, and within a quarter of the squares of the half-widths of
 // d_i / r_i + d_l / r_l and of their difference, times r_i r_l.
 Bounds MixedProduct(const Slice& slice, const std::vector<Real>& r, int i, int l, Method method) {
@@ -336,7 +372,9 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
     if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
   }
-  if (options.reduce)
+  const bool followed = options.follow && tube.slices.size() < options.follow->size() &&
+                        ReduceAs(next, problem_.zonotope_order, (*options.follow)[tube.slices.size()]);
+  if (options.reduce && !followed)
     tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
   tube.steps.push_back(std::move(step));
   tube.slices.push_back(std::move(next));

@@ -75,6 +75,8 @@ struct TubeOptions {
   bool reduce = true;            ///< Reduce the order as the certifier does, or never.
   bool split_remainder = false;  ///< Bound the Hessian over half the box too: the integral remainder in two parts.
   KnownRows known = {};
+  /** If not null, the generators recorded of each slice: the columns nearest to those that were kept are kept. */
+  const std::vector<Eigen::MatrixXd>* follow = nullptr;
 };
 
 /** A problem prepared for any number of plans, with as many bits as Precision said when it was made. Immutable. */

@@ -88,8 +88,8 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
 }
 
 // The certifier's own rules first. Where these leave a choice that its rounding may have taken otherwise, and the claim
-// fails by no more than that may matter, a tube that needs no choice confirms as well: never reduced, and with a
-// tighter remainder.
+// fails by no more than that may matter, other tubes confirm as well: one that chooses as the record shows, and those that
+// need no choice, never reduced, and with a tighter remainder.
 std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate& certificate) const {
   double ambiguity = 0;
   const auto attempt = [&](const TubeOptions& options) {
@@ -103,7 +103,12 @@ std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate
   // The centred remainder may shrink where its center moves; by a rounding error, that is no difference of rules.
   const double rounding = method_ == Method::kCentred ? kRounding : 0;
   if (!(failure->excess < std::max(kGrowth * ambiguity, rounding))) return failure;
-  for (const TubeOptions& options : {TubeOptions{false, false, known}, TubeOptions{false, true, known}})
+  std::vector<Eigen::MatrixXd> recorded;
+  for (const RecordedSlice& slice : certificate.slices)
+    if (slice.has_generators) recorded.push_back(slice.generators);
+  std::vector<TubeOptions> others{TubeOptions{false, false, known, nullptr}, TubeOptions{false, true, known, nullptr}};
+  if (!recorded.empty()) others.insert(others.begin(), TubeOptions{true, false, known, &recorded});
+  for (const TubeOptions& options : others)
     if (!attempt(options)) return std::nullopt;
   return failure;
 }
