@@ -7,10 +7,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include "certifier/task/config.h"
 #include "forereach/decision_t.hpp"
+#include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/kept_tasks.h"
 #include "logger/log_directory.h"
@@ -180,10 +180,9 @@ TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
   const std::string cut = own.Write("cut.lcmlog", "\xED\xA1\xDA\x01");
   const std::string foreign = own / "foreign.sqlite", alien = own / "alien.lcmlog", none = own / "none.lcmlog";
   {
-    sqlite3* handle = nullptr;
-    sqlite3_open(foreign.c_str(), &handle);
-    sqlite3_exec(handle, "CREATE TABLE t (a)", nullptr, nullptr, nullptr);
-    sqlite3_close(handle);
+    { const Database ours(foreign); }
+    std::fstream header(foreign, std::ios::in | std::ios::out | std::ios::binary);
+    header.seekp(68) << "else";  // the application's number
     EventLogWriter writer(alien);
     writer.Append(1, "SOMETHING_ELSE", std::vector<std::uint8_t>{1, 2, 3});
     ASSERT_TRUE(writer.Flush());
@@ -240,12 +239,7 @@ TEST_F(KeptTaskTest, ADecisionOfATaskThatNobodyKnowsSpoilsItselfOnly) {
 TEST_F(KeptTaskTest, ADatabaseDoesNotLeadOutOfItsDirectory) {
   const std::string copy = Copied();
   fs::copy(logs_->front(), elsewhere_ / "outside.lcmlog");
-  sqlite3* handle = nullptr;
-  ASSERT_EQ(sqlite3_open((copy + "/decisions.sqlite").c_str(), &handle), SQLITE_OK);
-  sqlite3_exec(handle, "UPDATE runs SET log_file = '../outside.lcmlog' WHERE continues = ''", nullptr, nullptr, nullptr);
-  sqlite3_exec(handle, "INSERT INTO runs (log_file, start_utime, schema) VALUES ('../outside.lcmlog', 0, 2)", nullptr, nullptr,
-               nullptr);
-  sqlite3_close(handle);
+  Database(copy + "/decisions.sqlite").BeginRun("../outside.lcmlog", 0);
   ExpectRefused("verify " + copy, {"not beside it", "../outside.lcmlog"});
   ExpectRefused("check-log " + copy, {"not beside it"});
 }

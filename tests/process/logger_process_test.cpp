@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "forereach/decision_t.hpp"
+#include "forereach/logger_status_t.hpp"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
@@ -36,6 +37,27 @@ TEST(LoggerProcessTest, RecordsAndEndsWithASummary) {
   for (const auto& file : std::filesystem::directory_iterator(directory))
     if (file.path().extension() == ".lcmlog") log_bytes += file.file_size();
   EXPECT_GE(log_bytes, kCandidates * EncodedSize<candidate_plan_t>());
+}
+
+// Exit status 1 tells whoever started it that something which it had confirmed is gone.
+TEST(LoggerProcessTest, EndsWithOneIfItsLogWasDeleted) {
+  const ScratchDirectory scratch;
+  const std::string path = scratch.Write("task.yaml", PatientTask()), directory = scratch / "recorded";
+  BusProbe probe(PrivateBusUrl(), {"LOGGER_STATUS"});
+  ChildProcess logger({FOREREACH_LOGGER, "--config", path, "--lcm-url", PrivateBusUrl(), "--directory", directory});
+  ASSERT_TRUE(logger.WaitForLog("ready on")) << logger.error();
+  const auto confirms = [&](std::int64_t events) {
+    return probe.WaitUntil([&] {
+      const auto heard = probe.Heard<logger_status_t>("LOGGER_STATUS");
+      return !heard.empty() && heard.back().events_written >= events;
+    });
+  };
+  ASSERT_TRUE(confirms(1));
+  for (const auto& file : std::filesystem::directory_iterator(directory))
+    if (file.path().extension() == ".lcmlog") std::filesystem::remove(file.path());
+  EXPECT_TRUE(probe.WaitUntil([&] { return probe.Heard<logger_status_t>("LOGGER_STATUS").back().events_lost > 0; }));
+  EXPECT_EQ(logger.Terminate(), 1) << logger.error();
+  EXPECT_NE(logger.output().find("confirmed events are gone"), std::string::npos) << logger.output();
 }
 
 }  // namespace
