@@ -227,7 +227,7 @@ class LogReading {
   // Adds what it finds to `file`; names the file of each certificate if `names` says so.
   LogReading(const std::vector<std::string>& logs, bool names, LearnedHistory& learned, CertificateFile& file)
       : config_(file.config),
-        authenticator_(config_.bus, KeyOf(config_.bus)),
+        authenticator_(config_.bus, PublicKeysOf(config_.bus)),
         obstacles_(config_),
         learned_(learned),
         certificates_(file.certificates),

@@ -53,7 +53,7 @@ bool IsCircumstance(std::int16_t cause) {
 
 class Replayer {
  public:
-  explicit Replayer(const Config& config) : config_(config), authenticator_(config.bus, KeyOf(config.bus)) {
+  explicit Replayer(const Config& config) : config_(config), authenticator_(config.bus, PublicKeysOf(config.bus)) {
     Restart();
   }
 

@@ -77,12 +77,12 @@ std::int64_t BytesOf(double megabytes) { return static_cast<std::int64_t>(megaby
 Recorder::Recorder(const Config& config, FreeSpace free_space)
     : channels_(config.bus),
       options_(config.logger),
-      key_(KeyOf(channels_)),
+      keys_(PublicKeysOf(channels_)),
       free_space_(std::move(free_space)),
       directory_(options_.directory),
       database_(directory_.PathOf(LogDirectory::kDatabase)),
       summary_(config),
-      interpreter_(channels_, "", key_),
+      interpreter_(channels_, "", keys_),
       flush_(options_.flush_ms * 1e3),
       age_(options_.rotate_minutes * 60e6),
       scan_(kScanUs),
@@ -156,7 +156,7 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
 
 // What it knew when the file began: it has seen the file before, if there is one.
 Interpreter Recorder::InterpreterFor(const RunRow& run) const {
-  Interpreter interpreter(channels_, run.continues, key_);
+  Interpreter interpreter(channels_, run.continues, keys_);
   if (!run.continues.empty() && directory_.Bytes(run.continues)) {
     EventLogReader before(directory_.PathOf(run.continues));
     Rows ignored;

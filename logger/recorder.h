@@ -128,7 +128,7 @@ class Recorder final {
 
   const BusOptions channels_;
   const LoggerOptions options_;
-  const std::optional<Key256> key_;
+  const std::optional<KeyRing> keys_;
   const FreeSpace free_space_;
   const LogDirectory directory_;
   Database database_;

@@ -13,6 +13,7 @@
 #include <sys/resource.h>
 
 #include "certifier/gate/stamp.h"
+#include "certifier/task/key.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -50,14 +51,14 @@ fault_t EmptyFault(std::int16_t cause) {
 
 CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks)
     : config_path_(config.path),
-      channels_(config.bus),
+      channels_(WithKeys(config.bus, Role::kCertifier)),
       realtime_(config.realtime),
       clocks_(std::move(clocks)),
       bus_(bus),
       sender_(bus),
       gate_(std::make_unique<Gate>(config)),
       watch_(OptionsOf(config.gate)),
-      reload_([path = config.path] { return Load(path); }) {
+      reload_([path = config.path, channels = channels_] { return Load(path, channels); }) {
   if (const auto& violation = gate_->certifier().violation())
     spdlog::warn("observations {} and {} contradict the declaration: every candidate will be abstained from (F)",
                  violation->first, violation->second);
@@ -270,9 +271,11 @@ void CertifierNode::CompactIfDue() {
 
 void CertifierNode::Reload() { reload_.Ask(); }
 
-CertifierNode::Loaded CertifierNode::Load(const std::string& path) try {
+CertifierNode::Loaded CertifierNode::Load(const std::string& path, const BusOptions& in_force) try {
   spdlog::info("reloading {}", path);
   Loaded loaded{LoadConfig(path), nullptr, ""};
+  loaded.error = WhyKeyCannotChange(in_force, loaded.config.bus, Role::kCertifier);
+  if (!loaded.error.empty()) loaded.error = path + ": " + loaded.error;
   loaded.gate = std::make_unique<Gate>(loaded.config);
   return loaded;
 } catch (const std::exception& error) {
@@ -282,8 +285,10 @@ CertifierNode::Loaded CertifierNode::Load(const std::string& path) try {
 std::string CertifierNode::WhyNotTaken(const Config& config) const {
   const Problem &before = gate_->certifier().problem(), &after = *config.problem;
   BusOptions bus = config.bus;
-  bus.url = channels_.url, bus.key = channels_.key;  // a command line may have given others
+  bus.url = channels_.url;  // a command line may have given another
+  bus.key = channels_.key, bus.keys = channels_.keys, bus.key_is_given = channels_.key_is_given;  // Load compares keys
   for (const auto& [changes, what] : std::initializer_list<std::pair<bool, const char*>>{
+           {bus.name != channels_.name, "bus.name"},
            {bus != channels_, "bus.channels"},
            {config.realtime != realtime_, "realtime"},
            {after.model->num_states() != before.model->num_states(), "the number of states"},
@@ -341,7 +346,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.bus_dropped = bus_.dropped();
   const Refusals refusals = bus_.refusals();
   status.refused_unsigned = refusals.unsigned_ones;
-  status.refused_forged = refusals.forged;
+  status.refused_forged = refusals.forged + refusals.foreign;
   status.refused_replayed = refusals.replayed;
   status.page_faults = page_faults_;
   status.queue_depth = static_cast<std::int32_t>(queue_.size());

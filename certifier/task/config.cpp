@@ -213,6 +213,7 @@ BusOptions ReadBus(const Document& file) {
   read("logger_status", bus.logger_status);
   read("fault", bus.fault);
   read("command", bus.command);
+  file.Read("bus.name", bus.name);
   if (file.Has("bus.key")) bus.key = RelativeTo(file.path(), file.Text("bus.key"));
   return bus;
 }

@@ -281,8 +281,12 @@ std::vector<Key> BusKeys() {
   return {
       Optional(Map("bus", "Where messages go."), "all defaults"),
       Optional(Text("bus.url", "LCM provider; `--lcm-url` takes precedence."), bus.url),
-      Optional(Text("bus.key", "Key file, relative to this file: what makes the robot move is then signed, and refused "
-                    "unsigned. `forereach keygen` makes one; `--key` takes precedence."),
+      Optional(Text("bus.name", "Name of the bus, which is part of every signature: what is signed for one bus is refused on "
+                    "another. All processes of a robot need the same."),
+               "address and port of the URL"),
+      Optional(Text("bus.key", "Directory of keys, or one role's key file, relative to this file: every message is then "
+                    "signed by the role that speaks on its channel, and refused otherwise. `forereach keygen` makes it; "
+                    "`--key` takes precedence."),
                "none, nothing is signed"),
       Optional(Map("bus.channels", "Names of the channels, all different."), "all defaults"),
       Channel("candidate", bus.candidate, "candidate_plan_t, from planners."),
