@@ -48,8 +48,8 @@ struct GapRow {
   std::int64_t lost = 0;
   std::int64_t utime = 0;
   /** "bus": never arrived; "queue": arrived while the logger's queue was full; "restart": the sender began anew;
-  "disk": could not be written, or too little was free; "quota": logger.quota_mb had no room for them; "backlog":
-  discarded by the bus before the logger took it, of any channel: those that count their messages show a gap "bus" too. */
+  "disk": could not be written, or too little was free; "quota": logger.quota_mb had no room for them; "unsigned": more than
+  logger.unsigned_kb_per_s, on channels that are not ForeReach's; "backlog": discarded by the bus before the logger took it, of any channel: those that count their messages show a gap "bus" too. */
   std::string reason;
 };
 

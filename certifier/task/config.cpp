@@ -330,6 +330,7 @@ LoggerOptions ReadLogger(const Document& file) {
       file.Fail("logger.quota_mb", ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
   }
   file.Read("logger.min_free_mb", logger.min_free_mb);
+  file.Read("logger.unsigned_kb_per_s", logger.unsigned_kb_per_s);
   return logger;
 }
 

@@ -112,6 +112,7 @@ struct LoggerOptions {
   double rotate_minutes = 60;      ///< Longest time in one log file.
   std::optional<double> quota_mb;  ///< Most of all log files together; nothing: none is ever deleted.
   double min_free_mb = 256;        ///< With less free on the disk recording pauses.
+  double unsigned_kb_per_s = 100;  ///< With keys, most of what nobody signed that is recorded; 10^3 bytes each.
 };
 
 struct Config {

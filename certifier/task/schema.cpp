@@ -394,6 +394,9 @@ std::vector<Key> LoggerKeys() {
                "none is deleted"),
       Number("logger.min_free_mb", "MB", UpTo(kMaxMegabytes), logger.min_free_mb,
              "With less free on the disk recording pauses; it resumes by itself once an eighth more is free."),
+      Number("logger.unsigned_kb_per_s", "kB/s", UpTo(1e6), logger.unsigned_kb_per_s,
+             "With keys: of messages that nobody signed (refused ones, as evidence, and those on channels that are not "
+             "ForeReach's) so much at most is recorded; the rest is counted. Each counts as 1 kB more than it has."),
   };
 }
 

@@ -317,7 +317,7 @@ class Campaign final {
     const BusOptions& channels = rig.config().bus;
     std::vector<std::pair<std::string, std::vector<std::uint8_t>>> heard;
     rig.open_bus().SubscribeUnchecked(".*", [&](const Received& r) {
-      if (channels.signed_channels().contains(r.channel) && heard.size() < 2000)
+      if (channels.speakers().contains(r.channel) && heard.size() < 2000)
         heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
     });
     Tries(row, rig, [&](int) {

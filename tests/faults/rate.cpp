@@ -13,6 +13,7 @@
 #include "tests/faults/demo_task.h"
 #include "tests/faults/load.h"
 #include "tests/faults/report.h"
+#include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
@@ -119,8 +120,7 @@ int Main(int argc, char** argv) {
   const ScratchDirectory scratch;
   Config config = LoadConfig(scratch.Write("task.yaml", DemoTask(kGate)));
   const int steps = MostSteps(config);
-  const std::string key = scratch / "key", url = PrivateBusUrl();
-  MakeKeyFile(key);
+  const std::string key = MakeTestKeys(scratch / "keys"), url = PrivateBusUrl();
   std::vector<Row> rows;
   for (const bool small : {false, true})
     for (const bool is_signed : {false, true}) {

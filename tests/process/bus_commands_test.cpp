@@ -23,14 +23,14 @@ using testing::HasSubstr;
 class BusCommands : public testing::Test {
  protected:
   BusCommands() {
-    EXPECT_EQ(Forereach("keygen '" + key_ + "'").code, 0);
+    EXPECT_EQ(Forereach("keygen --robot test '" + key_ + "'").code, 0);
     std::string task = PatientTask();
     task.replace(task.find("arming: none"), 12, "arming: robot_state, robot_timeout_ms: 2000");
     scratch_.Write("task.yaml", task);
     config_ = LoadConfig(path_);
     config_.bus.url = PrivateBusUrl();
     config_.bus.key = key_;
-    bus_ = OpenBus(config_.bus, "test");
+    bus_ = OpenBusOfAllRoles(config_.bus);
     certifier_ = std::make_unique<ChildProcess>(std::vector<std::string>{
         FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", config_.bus.url, "--key", key_});
     EXPECT_TRUE(certifier_->WaitForLog("ready on")) << certifier_->error();
@@ -52,7 +52,7 @@ class BusCommands : public testing::Test {
   }
 
   const ScratchDirectory scratch_;
-  const std::string path_ = scratch_ / "task.yaml", key_ = scratch_ / "key";
+  const std::string path_ = scratch_ / "task.yaml", key_ = scratch_ / "keys";
   Config config_;
   std::unique_ptr<Bus> bus_;
   std::unique_ptr<ChildProcess> certifier_;
