@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -14,6 +15,7 @@
 #include "cli/commands.h"
 #include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/command_t.hpp"
+#include "lcmtypes/authentic.h"
 #include "lcmtypes/keys.h"
 #include "lcmtypes/names.h"
 
@@ -37,7 +39,10 @@ class Line final {
     if (!channels_.keys) std::cerr << "forereach: warning: " << kUnsignedWarning << std::endl;
     bus_ = OpenBus(channels_, Role::kOperator);
     bus_->Subscribe(channels_.status, [this](const Received& received) {
-      if (const auto status = Decoded<certifier_status_v2_t>(received.bytes)) heard_.push_back(*status);
+      const Bytes message = channels_.keys ? received.bytes : WithoutSignature(received.raw);
+      if (!channels_.keys && message.size() < received.raw.size() && !std::exchange(warned_, true))
+        std::cerr << "forereach: warning: the heartbeat is signed; --key checks by whom" << std::endl;
+      if (const auto status = Decoded<certifier_status_v2_t>(message)) heard_.push_back(*status);
     });
   }
 
@@ -61,6 +66,7 @@ class Line final {
   BusOptions channels_;
   std::unique_ptr<Bus> bus_;
   std::vector<certifier_status_v2_t> heard_;
+  bool warned_ = false;
 };
 
 nlohmann::ordered_json ToJson(const certifier_status_v2_t& status, bool is_signed) {

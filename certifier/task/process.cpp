@@ -76,10 +76,10 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     config.bus = WithKeys(std::move(config.bus), description.role);
     const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.role);
     const std::unique_ptr<Node> node = make_node(config, *bus);
+    if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
     spdlog::info("ready on {} with {}{}", config.bus.url, config_path,
                  config.bus.keys ? ", signed as the " + std::string(RoleName(description.role)) + " of " + config.bus.keys->robot()
                                  : "");
-    if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
     RunNode(*node, *bus);
     return 0;
   });

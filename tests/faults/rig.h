@@ -72,8 +72,10 @@ class Rig final {
   void Command(std::int16_t kind);
   [[nodiscard]] Bus& bus() { return *signed_; }     ///< Signs as every role.
   [[nodiscard]] Bus& open_bus() { return *open_; }  ///< Neither signs nor looks at signatures.
+  /** Authentic messages. */
+  void Hear(const std::string& channel, Bus::Handler handler) { heard_->Subscribe(channel, std::move(handler)); }
   [[nodiscard]] KeyRing keys() const { return LoadAllKeys(key_path_); }
-  [[nodiscard]] Witness& witness() { return *witness_; }
+  [[nodiscard]] Witness& witness() const { return *witness_; }
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] std::string url(Role role) const { return options_.relayed && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }

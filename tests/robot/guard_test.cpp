@@ -471,8 +471,9 @@ TEST(GuardKey, TakesPlansThatTheCertifierSignedOnly) {
     return who.Sign(role, channel, plan, kNow);
   };
   for (const Role role : kAllRoles)
-    if (role != Role::kCertifier)
+    if (role != Role::kCertifier) {
       EXPECT_EQ(guard.Accept(by(signer, role), kNow).cause, GuardCause::kForged) << RoleName(role);
+    }
   EXPECT_EQ(guard.Accept(by(stranger, Role::kCertifier), kNow).cause, GuardCause::kForged);
   EXPECT_EQ(guard.Accept(by(signer, Role::kCertifier, "PLAN_DECISION"), kNow).cause, GuardCause::kForged);
   EXPECT_EQ(guard.Accept(by(elsewhere, Role::kCertifier), kNow).cause, GuardCause::kForeign);
