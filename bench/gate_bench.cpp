@@ -73,32 +73,60 @@ void RunCertificateDigest(State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(CertificateDigest(certified));
 }
 
-// What a key adds: a keyed digest of the message, on sending and again on receiving.
+// What keys add, on sending and again on receiving.
+const Speakers kSpeakers{{"PLAN", Role::kPlanner}};
+KeyRing BenchKeys() { return MakeKeyRing("benchmark", DigestOf("benchmark")); }
+
 template <class Message>
 void RunSign(State& state) {
-  Signer signer(Key256{}, "benchmark", kNow);
+  Signer signer(BenchKeys(), "bus");
   const std::vector<std::uint8_t> bytes = Encode(Message{});
-  for (auto _ : state) benchmark::DoNotOptimize(signer.Sign("PLAN", bytes, kNow));
+  for (auto _ : state) benchmark::DoNotOptimize(signer.Sign(Role::kPlanner, "PLAN", bytes, kNow));
 }
 
 // Each is taken once only, so a batch is signed beforehand.
 template <class Message>
 void RunCheck(State& state) {
-  Signer signer(Key256{}, "benchmark", kNow);
-  Authenticator authenticator(Key256{}, 0);
+  Signer signer(BenchKeys(), "bus");
+  Authenticator authenticator(BenchKeys(), "bus", kSpeakers, 0);
   const std::vector<std::uint8_t> bytes = Encode(Message{});
   std::vector<std::vector<std::uint8_t>> batch(256);
   std::size_t next = batch.size();
   for (auto _ : state) {
     if (next == batch.size()) {
       state.PauseTiming();
-      for (auto& message : batch) message = signer.Sign("PLAN", bytes, kNow);
+      for (auto& message : batch) message = signer.Sign(Role::kPlanner, "PLAN", bytes, kNow);
       next = 0;
       state.ResumeTiming();
     }
     if (authenticator.Check("PLAN", batch[next++]).first != Authenticity::kAuthentic)
       return state.SkipWithError("not authentic");
   }
+}
+
+// What a flood costs a receiver, a message: each kind is refused by what is cheapest to see of it.
+enum class Flood { kForgedTag, kReplayed, kForeign };
+
+template <class Message>
+void RunRefuse(State& state, Flood flood) {
+  Authenticator authenticator(BenchKeys(), "bus", kSpeakers, 0);
+  std::vector<std::uint8_t> bytes =
+      Signer(BenchKeys(), flood == Flood::kForeign ? "another bus" : "bus").Sign(Role::kPlanner, "PLAN", Encode(Message{}), kNow);
+  if (flood == Flood::kForgedTag) bytes[bytes.size() - 9] ^= 1;
+  if (flood == Flood::kReplayed) benchmark::DoNotOptimize(authenticator.Check("PLAN", bytes));
+  for (auto _ : state)
+    if (authenticator.Check("PLAN", bytes).first == Authenticity::kAuthentic) return state.SkipWithError("authentic");
+}
+
+// The straightforward check, to compare with: hash the whole message and verify, whatever it is.
+template <class Message>
+void RunFullCheck(State& state) {
+  const KeyRing keys = BenchKeys();
+  const std::vector<std::uint8_t> bytes = Encode(Message{});
+  const Digest digest = DigestOf(Bytes(bytes));
+  const Signature signature = keys.Sign(Role::kPlanner, digest);
+  for (auto _ : state)
+    if (!keys.IsSigned(Role::kPlanner, DigestOf(Bytes(bytes)), signature)) return state.SkipWithError("not authentic");
 }
 
 BENCHMARK_CAPTURE(RunDecide, certified, decision_t::CERTIFIED)->Name("gate/certified")->UseManualTime();
@@ -113,6 +141,12 @@ BENCHMARK_TEMPLATE(RunSign, candidate_plan_t)->Name("gate/sign_candidate");
 BENCHMARK_TEMPLATE(RunCheck, candidate_plan_t)->Name("gate/check_candidate");
 BENCHMARK_TEMPLATE(RunSign, certified_plan_t)->Name("gate/sign_certified");
 BENCHMARK_TEMPLATE(RunCheck, certified_plan_t)->Name("gate/check_certified");
+BENCHMARK_TEMPLATE(RunFullCheck, candidate_plan_t)->Name("gate/full_check_candidate");
+BENCHMARK_TEMPLATE(RunFullCheck, certified_plan_t)->Name("gate/full_check_certified");
+BENCHMARK_CAPTURE(RunRefuse<candidate_plan_t>, forged, Flood::kForgedTag)->Name("gate/check_forged_candidate");
+BENCHMARK_CAPTURE(RunRefuse<candidate_plan_t>, replayed, Flood::kReplayed)->Name("gate/check_replayed_candidate");
+BENCHMARK_CAPTURE(RunRefuse<candidate_plan_t>, foreign, Flood::kForeign)->Name("gate/check_foreign_candidate");
+BENCHMARK_CAPTURE(RunRefuse<certified_plan_t>, forged, Flood::kForgedTag)->Name("gate/check_forged_certified");
 
 }  // namespace
 }  // namespace forereach::bench

@@ -4,16 +4,19 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
 #include "lcmtypes/authentic.h"
+#include "lcmtypes/keys.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 
@@ -32,14 +35,19 @@ bool IsInCharge(const certifier_status_v3_t& status) {
   return status.state != certifier_status_v3_t::LISTENING && status.state != certifier_status_v3_t::STANDBY;
 }
 
-// A line to the certifier: commands to it, heartbeats from it.
+// A line to the certifier: commands to it, heartbeats from it. With a key only heartbeats that the certifier has signed.
 class Line final {
  public:
   explicit Line(const Options& options) : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
     options.bus.Override(channels_);
-    bus_ = OpenBus(channels_, "forereach");
+    channels_ = WithKeys(std::move(channels_), Role::kOperator);
+    if (!channels_.keys) std::cerr << "forereach: warning: " << kUnsignedWarning << std::endl;
+    bus_ = OpenBus(channels_, Role::kOperator);
     bus_->Subscribe(channels_.status, [this](const Received& received) {
-      if (const auto status = Decoded<certifier_status_v3_t>(received.bytes)) heard_.push_back(*status);
+      const Bytes message = channels_.keys ? received.bytes : WithoutSignature(received.raw);
+      if (!channels_.keys && message.size() < received.raw.size() && !std::exchange(warned_, true))
+        std::cerr << "forereach: warning: the heartbeat is signed; --key checks by whom" << std::endl;
+      if (const auto status = Decoded<certifier_status_v3_t>(message)) heard_.push_back(*status);
     });
   }
 
@@ -65,6 +73,7 @@ class Line final {
   BusOptions channels_;
   std::unique_ptr<Bus> bus_;
   std::vector<certifier_status_v3_t> heard_;
+  bool warned_ = false;
 };
 
 const char* LatchText(const certifier_status_v3_t& status) {
@@ -75,7 +84,7 @@ const char* LatchText(const certifier_status_v3_t& status) {
   }
 }
 
-nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
+nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signed) {
   nlohmann::ordered_json by_outcome, by_cause;
   for (std::int16_t i = 0; i < 16; ++i)
     if (status.by_outcome[i] > 0) by_outcome[std::string(OutcomeName(i))] = status.by_outcome[i];
@@ -87,6 +96,7 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
           {"latch", LatchText(status)},
           {"message", GetText(status.message)},
           {"advice", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultAdvice(status.fault))},
+          {"signed", is_signed},
           {"shadow", status.shadow != 0},
           {"version", status.version},
           {"failed_reloads", status.failed_reloads},
@@ -119,9 +129,9 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status) {
           {"elapsed_us", {{"p50", status.elapsed_p50_us}, {"p99", status.elapsed_p99_us}, {"max", status.elapsed_max_us}}}};
 }
 
-void Print(const certifier_status_v3_t& status, bool json) {
+void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
   if (json) {
-    std::cout << ToJson(status) << std::endl;
+    std::cout << ToJson(status, is_signed) << std::endl;
     return;
   }
   std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");
@@ -150,7 +160,7 @@ int ShowStatus(const Options& options) {
   Line line(options);
   const auto status = line.Await();
   if (!status) return NobodyAnswers(line.channels());
-  Print(*status, options.json);
+  Print(*status, options.json, line.channels().keys.has_value());
   return status->level == certifier_status_v3_t::OK ? 0 : 1;
 }
 
@@ -174,10 +184,10 @@ int Command(const Options& options, std::int16_t kind) {
                                     : status.version != before->version || status.failed_reloads != before->failed_reloads;
   });
   if (!after) return NobodyAnswers(line.channels());
-  Print(*after, options.json);
+  Print(*after, options.json, line.channels().keys.has_value());
   const bool done = kind == command_t::RESET ? after->state != certifier_status_v3_t::FAULT : after->version > before->version;
   if (!done && refused(*after) > refused(*before))
-    std::cerr << "forereach: the certifier refused the command; is it signed with its key (--key)?" << std::endl;
+    std::cerr << "forereach: the certifier refused the command; is it signed with the operator's key (--key)?" << std::endl;
   return done ? 0 : 1;
 }
 
@@ -192,6 +202,25 @@ void Add(CLI::App& app, Action& action, const std::string& name, const std::stri
   command->callback([options, run, &action] { action = [options, run] { return run(*options); }; });
 }
 
+void AddKeygenCommand(CLI::App& app, Action& action) {
+  auto robot = std::make_shared<std::string>(), directory = std::make_shared<std::string>();
+  CLI::App* keygen = app.add_subcommand("keygen", "Make the keys of one robot: a directory with one key file for each role");
+  keygen->add_option("--robot", *robot, "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature")
+      ->required()->type_name("NAME");
+  keygen->add_option("directory", *directory, "The new directory")->required()->type_name("DIR");
+  keygen->footer("Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or name it under "
+                 "bus.key in the task file. On another machine a process needs its own role's file alone, as in\n"
+                 "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub holds no secret: report, "
+                 "replay and verify judge logs by it.");
+  keygen->callback([robot, directory, &action] {
+    action = [robot, directory] {
+      MakeKeys(*robot, *directory);
+      std::cout << *directory << std::endl;
+      return 0;
+    };
+  });
+}
+
 }  // namespace
 
 void AddBusCommands(CLI::App& app, Action& action) {
@@ -201,18 +230,7 @@ void AddBusCommands(CLI::App& app, Action& action) {
   Add(app, action, "reload", "Have the certifier read its task file again, whole or not at all",
       [](const Options& options) { return Command(options, command_t::RELOAD); });
 
-  auto path = std::make_shared<std::string>();
-  CLI::App* keygen = app.add_subcommand("keygen", "Make a key file that only its owner can read, to sign messages with");
-  keygen->add_option("file", *path, "The new file")->required()->type_name("FILE");
-  keygen->footer("Example:\n  forereach keygen robot.key\nThen give --key robot.key to every process, or name it under "
-                 "bus.key in the task file.");
-  keygen->callback([path, &action] {
-    action = [path] {
-      MakeKeyFile(*path);
-      std::cout << *path << std::endl;
-      return 0;
-    };
-  });
+  AddKeygenCommand(app, action);
 }
 
 }  // namespace forereach

@@ -193,7 +193,7 @@ class LogReading {
              CertificateFile& file)
       : config_(file.config),
         share_(share),
-        authenticator_(config_.bus, KeyOf(config_.bus)),
+        authenticator_(config_.bus, PublicKeysOf(config_.bus)),
         obstacles_(config_),
         learned_(learned),
         certificates_(file.certificates),

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 #include <arpa/inet.h>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <cmath>
@@ -17,7 +18,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "certifier/task/config.h"
+#include "certifier/task/key.h"
+#include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "lcmtypes/bus.h"
 #include "lcmtypes/udp_receiver.h"
@@ -33,7 +35,8 @@ struct Check {
   std::string name;
   bool good;
   std::string found;
-  std::string advice;  // what to do if it is not good
+  std::string advice;    // what to do if it is not good
+  bool warning = false;  // it is not good, and the bus works all the same
 };
 
 class Socket {
@@ -120,23 +123,49 @@ Check CheckRoundTrip(const std::string& url) {
           "messages are lost: raise the receive buffer limit, see above"};
 }
 
-int Diagnose(const std::string& url, bool json) {
+// All files of a directory of keys that are there.
+std::string RolesIn(const std::string& path) {
+  std::string roles;
+  for (const Role role : kAllRoles) {
+    const std::string file = path + "/" + std::string(RoleName(role)) + ".key";
+    if (!std::filesystem::exists(file)) continue;
+    static_cast<void>(LoadKeys(file, role));
+    roles += (roles.empty() ? "" : ", ") + std::string(RoleName(role));
+  }
+  return roles.empty() ? "" : "; secrets of " + roles;
+}
+
+Check CheckKeys(const BusOptions& bus) {
+  if (bus.key.empty())
+    return {"keys", false, kUnsignedWarning,
+            "forereach keygen --robot NAME DIR, then --key DIR for every process, or bus.key in the task file", true};
+  try {
+    const KeyRing keys = LoadPublicKeys(bus.key);
+    return {"keys", true, bus.key + " of robot " + keys.robot() + ", for bus " + bus.bus_name() + RolesIn(bus.key), ""};
+  } catch (const KeyError& error) {
+    return {"keys", false, error.what(), "no process starts with it"};
+  }
+}
+
+int Diagnose(const BusOptions& bus, bool json) {
+  const std::string& url = bus.url;
   const std::map<std::string, std::string> versions{
       {"forereach", FOREREACH_VERSION}, {"lcm", BusVersion()}, {"compiler", __VERSION__},
       {"eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
                     std::to_string(EIGEN_MINOR_VERSION)}};
-  const std::vector<Check> checks{CheckLoopback(), CheckRoute(ParseMulticastUrl(url).group), CheckBuffer(), CheckRoundTrip(url)};
-  const bool good = std::ranges::all_of(checks, &Check::good);
+  const std::vector<Check> checks{CheckLoopback(), CheckRoute(ParseMulticastUrl(url).group), CheckBuffer(), CheckRoundTrip(url),
+                                  CheckKeys(bus)};
+  const bool good = std::ranges::all_of(checks, [](const Check& check) { return check.good || check.warning; });
   if (json) {
     nlohmann::json document{{"good", good}, {"versions", versions}, {"checks", nlohmann::json::array()}};
     for (const Check& check : checks)
-      document["checks"].push_back({{"name", check.name}, {"good", check.good}, {"found", check.found},
+      document["checks"].push_back({{"name", check.name}, {"good", check.good}, {"warning", check.warning}, {"found", check.found},
                                     {"advice", check.good ? nlohmann::json(nullptr) : nlohmann::json(check.advice)}});
     std::cout << document << std::endl;
   } else {
     for (const auto& [name, version] : versions) std::cout << "      " << name << " " << version << "\n";
     for (const Check& check : checks) {
-      std::cout << (check.good ? "good  " : "BAD   ") << check.name << ": " << check.found << "\n";
+      std::cout << (check.good ? "good  " : check.warning ? "WARN  " : "BAD   ") << check.name << ": " << check.found << "\n";
       if (!check.good) std::cout << "      -> " << check.advice << "\n";
     }
     std::cout << (good ? "The bus is ready." : "The bus is not ready: do what the arrows say.") << std::endl;
@@ -148,14 +177,22 @@ int Diagnose(const std::string& url, bool json) {
 
 void AddDoctorCommand(CLI::App& app, Action& action) {
   struct Options {
-    std::string url = BusOptions().url;
+    std::string config;
+    BusArguments bus;
     bool json = false;
   };
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("doctor", "Check the bus: route, buffers, a round trip; and say what to do");
-  command->add_option("--lcm-url", options->url, "The bus")->capture_default_str()->type_name("URL");
+  command->add_option("--config", options->config, "A task file: its bus and its keys")->type_name("FILE");
+  options->bus.AddTo(*command);
   command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->callback([options, &action] { action = [options] { return Diagnose(options->url, options->json); }; });
+  command->callback([options, &action] {
+    action = [options] {
+      BusOptions bus = options->config.empty() ? BusOptions() : LoadConfig(options->config, TransitionsFile::kIgnore).bus;
+      options->bus.Override(bus);
+      return Diagnose(bus, options->json);
+    };
+  });
 }
 
 }  // namespace forereach

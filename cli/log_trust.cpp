@@ -8,8 +8,9 @@ namespace forereach {
 
 void LogKey::AddTo(CLI::App& command) {
   CLI::Option* option = command.add_option(
-      "--key", file, "Key file: messages of a log that it did not sign are passed over; by default the task file's bus.key");
-  option->type_name("FILE");
+      "--key", file, "Directory of keys, verify.pub or any key file: messages of a log that its roles did not sign are passed over; "
+               "by default the task file's bus.key");
+  option->type_name("PATH");
   command.add_flag("--no-key", none, "Believe every message of a log, whoever sent it")->excludes(option);
 }
 
@@ -36,8 +37,9 @@ std::string InWords(const PassedOver& passed_over) {
 }
 
 nlohmann::json ToJson(const PassedOver& passed_over) {
-  const auto& [unsigned_ones, forged, replayed] = passed_over.not_authentic;
-  return {{"not_authentic", {{"unsigned", unsigned_ones}, {"forged", forged}, {"replayed", replayed}}},
+  const Refusals& refused = passed_over.not_authentic;
+  return {{"not_authentic", {{"unsigned", refused.unsigned_ones}, {"forged", refused.forged}, {"replayed", refused.replayed},
+                             {"of_another_bus", refused.foreign}}},
           {"undecodable", passed_over.undecodable}};
 }
 

@@ -59,7 +59,7 @@ bool IsCircumstance(const decision_t& decision) {
 class Replayer {
  public:
   explicit Replayer(const std::vector<Config>& tasks)
-      : tasks_(tasks), config_(tasks.front()), now_(&config_), authenticator_(config_.bus, KeyOf(config_.bus)), logged_obstacles_(config_) {
+      : tasks_(tasks), config_(tasks.front()), now_(&config_), authenticator_(config_.bus, PublicKeysOf(config_.bus)), logged_obstacles_(config_) {
     Restart();
   }
 

@@ -4,6 +4,7 @@
 
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
+#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "logger/logger_node.h"
@@ -30,10 +31,11 @@ int Run(const Options& options) {
   Config config = LoadConfig(options.config);
   if (!options.directory.empty()) config.logger.directory = options.directory;
   if (!options.key.empty()) config.bus.key = options.key;
+  config.bus.keys = AllKeysOf(config.bus);
   config.bus.url = "memq://";
   std::int64_t now = WallClockUs();
   const Clock clock = [&now] { return now; };
-  const auto bus = OpenBus(config.bus, "forereach", clock);
+  const auto bus = OpenBusOfAllRoles(config.bus, clock);
   LoggerNode logger(config, *bus, std::cout);
   CertifierNode certifier(config, *bus, {clock, clock});
   PlannerNode planner(config, *bus);
@@ -62,7 +64,7 @@ void AddRunCommand(CLI::App& app, Action& action) {
       "run", "Planner, certifier, robot and logger in this one process, on LCM's in-memory bus and a simulated clock");
   command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
   command->add_option("--directory", options->directory, "Where the logger writes")->type_name("DIR");
-  command->add_option("--key", options->key, "Key file; by default the task file's bus.key")->type_name("FILE");
+  command->add_option("--key", options->key, "Directory of keys; by default the task file's bus.key")->type_name("DIR");
   command->footer("Example:\n  forereach run --config config/demo.yaml --directory run/log");
   command->callback([options, &action] { action = [options] { return Run(*options); }; });
 }

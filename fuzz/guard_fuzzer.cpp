@@ -10,10 +10,20 @@ namespace forereach {
 namespace {
 
 constexpr std::int64_t kStart = kPlanStart, kStepUs = kPlanStepUs;
-constexpr Key256 kKey{1, 2, 3}, kOtherKey{4};
 
+const KeyRing& Keys(bool ours) {
+  static const KeyRing keys = MakeKeyRing("ours", DigestOf("ours")), other = MakeKeyRing("other", DigestOf("other"));
+  return ours ? keys : other;
+}
+
+// With the key it has a domain too, which the small plan reaches exactly.
 GuardOptions Options(bool with_key) {
-  return {2, 1, kStepUs, DigestOf("config"), DigestOf("model"), with_key ? std::optional(kKey) : std::nullopt};
+  GuardOptions options{2, 1, kStepUs, DigestOf("config"), DigestOf("model")};
+  if (!with_key) return options;
+  options.keys = Keys(true);
+  options.bus_name = "bus";
+  options.domain = GuardDomain{{-12, -5}, {12, 5}, {-3}, {3}};
+  return options;
 }
 
 // Makes something of it odd that a guard looks at.
@@ -86,8 +96,9 @@ class Session final {
     const int how = input.ConsumeIntegralInRange(0, 3);
     if (how == 3) return;
     message_ = {AnyPlan(input), with_key_ == (how == 0)};
-    if (how == 2) message_ = {forger_.Sign("PLAN_CERTIFIED", message_.bytes, kStart), false};
-    if (message_.is_signed) message_.bytes = signer_.Sign("PLAN_CERTIFIED", message_.bytes, kStart);
+    const auto sign = [&](Signer& signer, Role role) { return signer.Sign(role, "PLAN_CERTIFIED", message_.bytes, kStart); };
+    if (how == 2) message_ = {input.ConsumeBool() ? sign(forger_, Role::kCertifier) : sign(signer_, Role::kPlanner), false};
+    if (message_.is_signed) message_.bytes = sign(signer_, Role::kCertifier);
   }
 
   void Accept(FuzzedDataProvider& input) {
@@ -106,6 +117,15 @@ class Session final {
     last_id_ = plan.plan.plan_id;
     last_expiry_ = std::max(last_expiry_, plan.expires_utime);
     RequireSane(plan);
+    if (with_key_) RequireInDomain(plan);
+  }
+
+  static void RequireInDomain(const certified_plan_t& plan) {
+    for (int t = 0; t < plan.plan.num_steps; ++t) {
+      Require(std::abs(plan.plan.control[t][0]) <= 3);
+      Require(-12 <= plan.slice_lower[t][0] && plan.slice_upper[t][0] <= 12);
+      Require(-5 <= plan.slice_lower[t][1] && plan.slice_upper[t][1] <= 5);
+    }
   }
 
   static void RequireSane(const certified_plan_t& plan) {
@@ -155,7 +175,7 @@ class Session final {
 
   Guard guard_;
   const bool with_key_;
-  Signer signer_{kKey, "certifier", kStart}, forger_{kOtherKey, "certifier", kStart};
+  Signer signer_{Keys(true), "bus", 1}, forger_{Keys(false), "bus", 2};
   std::optional<std::int64_t> last_id_;
   std::int64_t last_expiry_ = INT64_MIN;
   Message message_;

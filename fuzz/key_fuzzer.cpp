@@ -1,14 +1,24 @@
-// Key files: a key is read out of what MakeKeyFile writes, and of nothing else.
+// Key files: public keys are read out of what MakeKeys writes, and of nothing else.
 #include "fuzz/fuzz.h"
-#include "lcmtypes/authentic.h"
+#include "lcmtypes/keys.h"
 
 bool forereach::Try(Bytes data) {
   static MemoryFile file;
   const std::string& path = file.Write(data);
   return IsTaken([&] {
-    const std::string text = "forereach-key-1 " + ToHex(LoadKey(path)) + "\n";
-    std::string given(data.begin(), data.end());
-    for (char& c : given) c = static_cast<char>('A' <= c && c <= 'F' ? c - 'A' + 'a' : c);
-    Require(given == text);
+    const KeyRing keys = LoadPublicKeys(path);
+    std::string text(data.begin(), data.end()), open = "robot " + keys.robot() + "\n", open_keys;
+    for (const Role role : kAllRoles)
+      open_keys += "public " + std::string(RoleName(role)) + " " + ToHex(keys.public_key(role)) + "\n";
+    if (text.starts_with("forereach-verify-2\n")) return Require(text == "forereach-verify-2\n" + open + open_keys);
+    Require(text.starts_with("forereach-key-2\n" + open + "role ") && text.ends_with("\n" + open_keys));
+    int roles = 0;
+    for (const Role role : kAllRoles) try {
+        const KeyRing own = LoadKeys(path, role);
+        ++roles;
+        Require(own.IsSigned(role, data, own.Sign(role, data)));
+      } catch (const KeyError&) {
+      }
+    Require(roles == 1);
   });
 }

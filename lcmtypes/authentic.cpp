@@ -1,113 +1,173 @@
 #include "lcmtypes/authentic.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
+#include <stdexcept>
+#include <string_view>
 
-#include <fcntl.h>
 #include <sodium.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 namespace forereach {
 namespace {
 
-constexpr std::string_view kMark = "FRSIGNED";
-constexpr std::string_view kKeyPrefix = "forereach-key-1 ";
-constexpr std::size_t kTagBytes = 32, kNumberBytes = 8;
-static_assert(kSignatureBytes == 2 * kNumberBytes + kTagBytes + kMark.size());
-constexpr std::size_t kKeyFileBytes = kKeyPrefix.size() + 2 * sizeof(Key256) + 1;
+constexpr std::string_view kMark = "FRSIGN02";
+constexpr std::string_view kSignatureContext = "ForeReach message 2", kTagContext = "ForeReach trailer 2";
+constexpr std::size_t kNumberBytes = 8, kMaxChannel = 255;
 
-// `covered`: the message, the sender and the counter.
-Digest TagOf(const Key256& key, const std::string& channel, Bytes covered) {
+// What is signed or tagged: it is put together on the stack, from parts of fixed length and a channel's name.
+class Covered final {
+ public:
+  void Append(Bytes part) {
+    std::memcpy(bytes_.data() + size_, part.data(), part.size());
+    size_ += part.size();
+  }
+  void Append(std::string_view part) { Append({reinterpret_cast<const std::uint8_t*>(part.data()), part.size()}); }
+  void AppendNumber(std::uint64_t number) { Append(BigEndian(number)); }
+  [[nodiscard]] Bytes bytes() const { return Bytes(bytes_).first(size_); }
+
+ private:
+  std::array<std::uint8_t, 512> bytes_;
+  std::size_t size_ = 0;
+};
+
+void AppendChannel(Covered& covered, const std::string& channel) {
+  covered.AppendNumber(channel.size());
+  covered.Append(channel);
+}
+
+Digest MessageDigest(const std::string& channel, Bytes message) {
   crypto_generichash_state state;
-  crypto_generichash_init(&state, key.data(), key.size(), kTagBytes);
+  crypto_generichash_init(&state, nullptr, 0, std::tuple_size_v<Digest>);
   const auto size = BigEndian<std::uint64_t>(channel.size());
   crypto_generichash_update(&state, size.data(), size.size());
   crypto_generichash_update(&state, reinterpret_cast<const std::uint8_t*>(channel.data()), channel.size());
-  crypto_generichash_update(&state, covered.data(), covered.size());
-  Digest tag;
-  crypto_generichash_final(&state, tag.data(), tag.size());
-  return tag;
+  crypto_generichash_update(&state, message.data(), message.size());
+  Digest digest;
+  crypto_generichash_final(&state, digest.data(), digest.size());
+  return digest;
 }
 
-bool IsSigned(Bytes bytes) {
-  return bytes.size() >= kSignatureBytes &&
+bool HasTrailer(Bytes bytes) {
+  return bytes.size() >= kTrailerBytes &&
          std::memcmp(bytes.data() + bytes.size() - kMark.size(), kMark.data(), kMark.size()) == 0;
 }
 
-// A file descriptor that closes itself.
-class File final {
- public:
-  explicit File(int descriptor) : descriptor_(descriptor) {}
-  ~File() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-  [[nodiscard]] int get() const { return descriptor_; }
+// bus, sender and counter as they stand in the trailer.
+using Numbers = std::array<std::uint8_t, 3 * kNumberBytes>;
 
- private:
-  int descriptor_;
-};
+Numbers NumbersOf(const BusId& bus, std::uint64_t sender, std::int64_t counter) {
+  Numbers numbers;
+  auto end = std::ranges::copy(bus, numbers.begin()).out;
+  end = std::ranges::copy(BigEndian(sender), end).out;
+  std::ranges::copy(BigEndian(counter), end);
+  return numbers;
+}
 
-[[noreturn]] void Fail(const std::string& path, const std::string& why) { throw KeyError("key " + path + ": " + why); }
+Covered ToSign(const std::string& robot, Role role, const Numbers& numbers, const std::string& channel, Bytes message) {
+  Covered covered;
+  covered.Append(kSignatureContext);
+  covered.Append(DigestOf(robot));
+  covered.Append(BigEndian(static_cast<std::uint8_t>(role)));
+  covered.Append(numbers);
+  covered.Append(MessageDigest(channel, message));
+  return covered;
+}
+
+Covered ToTag(const std::string& channel, std::size_t message_bytes, const Numbers& numbers, const Signature& signature) {
+  Covered covered;
+  covered.Append(kTagContext);
+  AppendChannel(covered, channel);
+  covered.AppendNumber(message_bytes);
+  covered.Append(numbers);
+  covered.Append(signature);
+  return covered;
+}
+
+void RequireChannel(const std::string& channel) {
+  if (channel.size() > kMaxChannel)
+    throw std::logic_error("a channel's name has " + std::to_string(channel.size()) + " bytes, at most " +
+                           std::to_string(kMaxChannel) + " can be signed");
+}
 
 }  // namespace
 
-void MakeKeyFile(const std::string& path) {
-  if (sodium_init() < 0) Fail(path, "the machine has no random numbers to make it of");
-  Key256 key;
-  randombytes_buf(key.data(), key.size());
-  const std::string text = std::string(kKeyPrefix) + ToHex(key) + "\n";
-  const File file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR));
-  if (file.get() < 0) Fail(path, std::string("cannot be made: ") + std::strerror(errno));
-  errno = ENOSPC;  // what a short write means
-  if (::write(file.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size()) && ::fsync(file.get()) == 0) return;
-  const std::string why = std::strerror(errno);
-  ::unlink(path.c_str());
-  Fail(path, "cannot be written: " + why);
+// The parts of a signed message.
+struct Authenticator::Trailer {
+  Bytes message;
+  Numbers numbers;
+  Signature signature;
+  GroupTag tag;
+
+  explicit Trailer(Bytes bytes) : message(bytes.first(bytes.size() - kTrailerBytes)) {
+    Bytes rest = bytes.subspan(message.size());
+    const auto take = [&rest](auto& part) {
+      std::memcpy(part.data(), rest.data(), part.size());
+      rest = rest.subspan(part.size());
+    };
+    take(numbers);
+    take(signature);
+    take(tag);
+  }
+  [[nodiscard]] BusId bus() const {
+    BusId bus;
+    std::copy_n(numbers.begin(), bus.size(), bus.begin());
+    return bus;
+  }
+  [[nodiscard]] std::uint64_t sender() const { return FromBigEndian<std::uint64_t>(Bytes(numbers).subspan(kNumberBytes)); }
+  [[nodiscard]] std::int64_t counter() const {
+    return FromBigEndian<std::int64_t>(Bytes(numbers).subspan(2 * kNumberBytes));
+  }
+};
+
+Bytes WithoutSignature(Bytes bytes) { return HasTrailer(bytes) ? bytes.first(bytes.size() - kTrailerBytes) : bytes; }
+
+BusId BusIdOf(const std::string& bus_name) {
+  const Digest digest = DigestOf(bus_name);
+  BusId bus;
+  std::copy_n(digest.begin(), bus.size(), bus.begin());
+  return bus;
 }
 
-Key256 LoadKey(const std::string& path) {
-  const File file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  struct stat status {};
-  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) Fail(path, std::string("cannot be read: ") + std::strerror(errno));
-  if (!S_ISREG(status.st_mode)) Fail(path, "is no regular file");
-  if (status.st_uid != ::geteuid() && status.st_uid != 0) Fail(path, "belongs to somebody else");
-  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) Fail(path, "others can read or write it; do: chmod 600 " + path);
-  std::array<char, kKeyFileBytes + 1> text;
-  const ssize_t size = ::read(file.get(), text.data(), text.size());
-  Key256 key;
-  std::size_t bytes = 0;
-  if (size != static_cast<ssize_t>(kKeyFileBytes) || text[kKeyFileBytes - 1] != '\n' ||
-      std::memcmp(text.data(), kKeyPrefix.data(), kKeyPrefix.size()) != 0 ||
-      sodium_hex2bin(key.data(), key.size(), text.data() + kKeyPrefix.size(), 2 * key.size(), nullptr, &bytes, nullptr) != 0 ||
-      bytes != key.size())
-    Fail(path, "holds no key; `forereach keygen " + path + "` makes one");
-  return key;
+// ---- Signing.
+
+Signer::Signer(KeyRing keys, const std::string& bus_name, std::uint64_t sender)
+    : keys_(std::move(keys)), bus_(BusIdOf(bus_name)), sender_(sender) {}
+
+std::uint64_t Signer::RandomSender() {
+  if (sodium_init() < 0) throw KeyError("key: libsodium cannot begin: the machine gives no random numbers");
+  std::uint64_t sender = 0;
+  randombytes_buf(&sender, sizeof sender);
+  return sender;
 }
 
-Bytes WithoutSignature(Bytes bytes) { return IsSigned(bytes) ? bytes.first(bytes.size() - kSignatureBytes) : bytes; }
-
-Signer::Signer(const Key256& key, const std::string& name, std::int64_t begun_us) : key_(key) {
-  const Digest digest = DigestOf(name + " " + std::to_string(begun_us) + " " + std::to_string(::getpid()));
-  sender_ = FromBigEndian<std::uint64_t>(digest);
-}
-
-std::vector<std::uint8_t> Signer::Sign(const std::string& channel, Bytes message, std::int64_t now_us) {
+std::vector<std::uint8_t> Signer::Sign(Role role, const std::string& channel, Bytes message, std::int64_t now_us) {
+  RequireChannel(channel);
   std::int64_t last = last_counter_, counter = 0;
   do counter = std::max(now_us, last + 1);
   while (!last_counter_.compare_exchange_weak(last, counter));
+  const Numbers numbers = NumbersOf(bus_, sender_, counter);
+  const Signature signature = keys_.Sign(role, ToSign(keys_.robot(), role, numbers, channel, message).bytes());
   std::vector<std::uint8_t> bytes;
-  bytes.reserve(message.size() + kSignatureBytes);
+  bytes.reserve(message.size() + kTrailerBytes);
   const auto append = [&](const auto& part) { bytes.insert(bytes.end(), part.begin(), part.end()); };
   append(message);
-  append(BigEndian(sender_));
-  append(BigEndian(counter));
-  append(TagOf(key_, channel, bytes));
+  append(numbers);
+  append(signature);
+  append(keys_.Tag(ToTag(channel, message.size(), numbers, signature).bytes()));
   append(kMark);
   return bytes;
+}
+
+// ---- Checking.
+
+Authenticator::Authenticator(KeyRing keys, const std::optional<std::string>& bus_name, Speakers speakers,
+                             std::int64_t begun_us)
+    : keys_(std::move(keys)) {
+  if (bus_name) bus_ = BusIdOf(*bus_name);
+  for (const auto& [channel, role] : speakers) {
+    RequireChannel(channel);
+    channels_.emplace(channel, Channel{role, begun_us, {}});
+  }
 }
 
 std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, Bytes bytes) {
@@ -117,35 +177,68 @@ std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, 
     case Authenticity::kUnsigned: ++refusals_.unsigned_ones; break;
     case Authenticity::kForged: ++refusals_.forged; break;
     case Authenticity::kReplayed: ++refusals_.replayed; break;
+    case Authenticity::kForeign: ++refusals_.foreign; break;
   }
   return {authenticity, {}};
 }
 
-Authenticity Authenticator::Judge(const std::string& channel, Bytes bytes) {
-  if (!IsSigned(bytes)) return Authenticity::kUnsigned;
-  const std::size_t covered = bytes.size() - kTagBytes - kMark.size();
-  const Digest tag = TagOf(key_, channel, bytes.first(covered));
-  if (sodium_memcmp(tag.data(), bytes.data() + covered, kTagBytes) != 0) return Authenticity::kForged;
-  const std::uint64_t sender = FromBigEndian<std::uint64_t>(bytes.subspan(covered - 2 * kNumberBytes));
-  const auto counter = FromBigEndian<std::int64_t>(bytes.subspan(covered - kNumberBytes));
-  return TakeCounter(channel, sender, counter) ? Authenticity::kAuthentic : Authenticity::kReplayed;
+// From cheap to dear: whoever is refused early costs little.
+Authenticity Authenticator::Judge(const std::string& name, Bytes bytes) {
+  if (!HasTrailer(bytes)) return Authenticity::kUnsigned;
+  const auto found = channels_.find(name);
+  if (found == channels_.end()) return Authenticity::kForged;
+  Channel& channel = found->second;
+  const Trailer trailer(bytes);
+  if (keys_.HoldsGroup()) {
+    const GroupTag tag = keys_.Tag(ToTag(name, trailer.message.size(), trailer.numbers, trailer.signature).bytes());
+    if (sodium_memcmp(tag.data(), trailer.tag.data(), tag.size()) != 0) return Authenticity::kForged;
+  }
+  if (bus_ && trailer.bus() != *bus_) return Authenticity::kForeign;
+  if (!IsFresh(channel, trailer)) return Authenticity::kReplayed;
+  if (keys_.HoldsGroup() && IsDoubted(trailer.tag)) return Authenticity::kForged;
+  const Covered covered = ToSign(keys_.robot(), channel.role, trailer.numbers, name, trailer.message);
+  if (!keys_.IsSigned(channel.role, covered.bytes(), trailer.signature)) {
+    CountTry(trailer.tag);
+    return Authenticity::kForged;
+  }
+  if (!Take(channel, trailer)) return Authenticity::kReplayed;
+  if (!bus_) bus_ = trailer.bus();
+  return Authenticity::kAuthentic;
 }
 
-bool Authenticator::TakeCounter(const std::string& channel, std::uint64_t sender, std::int64_t counter) {
-  const auto known = last_counter_.find({channel, sender});
-  if (counter <= (known == last_counter_.end() ? oldest_ : known->second)) return false;
-  if (known != last_counter_.end()) {
-    known->second = counter;
+bool Authenticator::IsFresh(const Channel& channel, const Trailer& trailer) {
+  const auto known = channel.last_counter.find(trailer.sender());
+  return trailer.counter() > (known == channel.last_counter.end() ? channel.oldest : known->second);
+}
+
+bool Authenticator::Take(Channel& channel, const Trailer& trailer) {
+  auto& last = channel.last_counter;
+  if (const auto known = last.find(trailer.sender()); known != last.end()) {
+    known->second = trailer.counter();
     return true;
   }
-  if (last_counter_.size() >= kMaxStreams) {  // what is forgotten must not be taken a second time
-    const auto silent = std::ranges::min_element(last_counter_, {}, [](const auto& stream) { return stream.second; });
-    oldest_ = std::max(oldest_, silent->second);
-    last_counter_.erase(silent);
-    if (counter <= oldest_) return false;
+  if (last.size() >= kMaxSenders) {  // what is forgotten must not be taken a second time
+    const auto lowest = std::ranges::min_element(last, {}, [](const auto& sender) { return sender.second; });
+    channel.oldest = std::max(channel.oldest, lowest->second);
+    last.erase(lowest);
+    if (trailer.counter() <= channel.oldest) return false;
   }
-  last_counter_.emplace(std::pair(channel, sender), counter);
+  last.emplace(trailer.sender(), trailer.counter());
   return true;
+}
+
+bool Authenticator::IsDoubted(const GroupTag& tag) const {
+  const auto doubt = std::ranges::find(doubts_, tag, &Doubt::tag);
+  return doubt != doubts_.end() && doubt->tries >= kMaxTries;
+}
+
+void Authenticator::CountTry(const GroupTag& tag) {
+  auto doubt = std::ranges::find(doubts_, tag, &Doubt::tag);
+  if (doubt == doubts_.end()) {
+    doubt = doubts_.begin() + static_cast<std::ptrdiff_t>(next_doubt_++ % doubts_.size());
+    *doubt = {tag, 0};
+  }
+  ++doubt->tries;
 }
 
 }  // namespace forereach

@@ -1,65 +1,74 @@
 #include "lcmtypes/authentic_bus.h"
 
-#include <deque>
+#include <mutex>
 #include <utility>
 
 namespace forereach {
 namespace {
 
-class AuthenticBus final : public Bus {
+// The receiving thread asks it; the thread that reads the counts is another.
+class KeyScreen final : public Screen {
  public:
-  AuthenticBus(std::unique_ptr<Bus> bus, const Key256& key, const std::string& name, std::set<std::string> channels,
-               Clock clock)
-      : bus_(std::move(bus)),
-        channels_(std::move(channels)),
-        clock_(std::move(clock)),
-        key_(key),
-        begun_us_(clock_()),
-        signer_(key, name, begun_us_) {}
+  explicit KeyScreen(Authenticator authenticator) : authenticator_(std::move(authenticator)) {}
 
-  void Subscribe(const std::string& channel, Handler handler) override {
-    if (!channels_.contains(channel)) return bus_->Subscribe(channel, std::move(handler));
-    // Of its own, since each handler is to get the message once.
-    Authenticator& authenticator = authenticators_.emplace_back(key_, begun_us_);
-    bus_->Subscribe(channel, [&authenticator, handler = std::move(handler)](const Received& received) {
-      const auto [authenticity, message] = authenticator.Check(received.channel, received.bytes);
-      if (authenticity == Authenticity::kAuthentic) handler({received.channel, message, received.utime, received.bytes});
-    });
+  std::optional<Bytes> Admit(const std::string& channel, Bytes raw) override {
+    const std::scoped_lock lock(mutex_);
+    if (!authenticator_.IsSpoken(channel)) return raw;
+    const auto [authenticity, message] = authenticator_.Check(channel, raw);
+    return authenticity == Authenticity::kAuthentic ? std::optional(message) : std::nullopt;
+  }
+  [[nodiscard]] Refusals refusals() const {
+    const std::scoped_lock lock(mutex_);
+    return authenticator_.refusals();
   }
 
+ private:
+  mutable std::mutex mutex_;
+  Authenticator authenticator_;
+};
+
+class SignedBus final : public Bus {
+ public:
+  SignedBus(const std::string& url, const KeyRing& keys, const std::string& bus_name, const Speakers& speakers, Clock clock)
+      : keys_(keys),
+        speakers_(speakers),
+        clock_(std::move(clock)),
+        signer_(keys, bus_name),
+        screen_(std::make_shared<KeyScreen>(Authenticator(keys, bus_name, speakers, clock_()))),
+        bus_(OpenBus(url, clock_, screen_)) {}
+
+  void Subscribe(const std::string& channel, Handler handler) override { bus_->Subscribe(channel, std::move(handler)); }
   void SubscribeUnchecked(const std::string& channel, Handler handler) override {
     bus_->SubscribeUnchecked(channel, std::move(handler));
   }
 
   bool Publish(const std::string& channel, Bytes bytes) override {
-    if (!channels_.contains(channel)) return bus_->Publish(channel, bytes);
-    return bus_->Publish(channel, Bytes(signer_.Sign(channel, bytes, clock_())));
+    const auto speaker = speakers_.find(channel);
+    if (speaker == speakers_.end()) return bus_->Publish(channel, bytes);
+    if (!keys_.Holds(speaker->second)) return false;
+    return bus_->Publish(channel, Bytes(signer_.Sign(speaker->second, channel, bytes, clock_())));
   }
 
   int Dispatch(int timeout_ms) override { return bus_->Dispatch(timeout_ms); }
   [[nodiscard]] std::int64_t dropped() const override { return bus_->dropped(); }
+  [[nodiscard]] std::int64_t refused_dropped() const override { return bus_->refused_dropped(); }
+  [[nodiscard]] Refusals refusals() const override { return screen_->refusals(); }
   [[nodiscard]] DatagramCounts datagrams() const override { return bus_->datagrams(); }
-  [[nodiscard]] Refusals refusals() const override {
-    Refusals sum;
-    for (const Authenticator& authenticator : authenticators_) sum += authenticator.refusals();
-    return sum;
-  }
 
  private:
-  const std::unique_ptr<Bus> bus_;
-  const std::set<std::string> channels_;
+  const KeyRing keys_;
+  const Speakers speakers_;
   const Clock clock_;
-  const Key256 key_;
-  const std::int64_t begun_us_;
   Signer signer_;
-  std::deque<Authenticator> authenticators_;  // one for each subscription
+  const std::shared_ptr<KeyScreen> screen_;
+  const std::unique_ptr<Bus> bus_;
 };
 
 }  // namespace
 
-std::unique_ptr<Bus> Authenticate(std::unique_ptr<Bus> bus, const Key256& key, const std::string& name,
-                                  std::set<std::string> protected_channels, Clock clock) {
-  return std::make_unique<AuthenticBus>(std::move(bus), key, name, std::move(protected_channels), std::move(clock));
+std::unique_ptr<Bus> OpenSignedBus(const std::string& url, const KeyRing& keys, const std::string& bus_name,
+                                   const Speakers& speakers, Clock clock) {
+  return std::make_unique<SignedBus>(url, keys, bus_name, speakers, std::move(clock));
 }
 
 }  // namespace forereach

@@ -1,8 +1,7 @@
-/** A bus that signs what it sends and refuses what is not signed, on the channels that make a robot move. */
+/** A bus that signs what it sends, and hands out what the right role has signed. */
 #pragma once
 
 #include <memory>
-#include <set>
 #include <string>
 
 #include "lcmtypes/authentic.h"
@@ -10,10 +9,11 @@
 
 namespace forereach {
 
-/** On every channel of `protected_channels`, Publish signs with `key`, and handlers get authentic messages only, without
-their signature; what is refused is counted (Bus::refusals). Other channels pass as they are.
-@param name says who speaks. @param clock of the counters. */
-[[nodiscard]] std::unique_ptr<Bus> Authenticate(std::unique_ptr<Bus> bus, const Key256& key, const std::string& name,
-                                                std::set<std::string> protected_channels, Clock clock = WallClockUs);
+/** Opens a bus (bus.h). On every channel of `speakers`, Publish signs as that role, and returns false where `keys` do not hold
+its secret; handlers get authentic messages only, without their trailer, and what is refused is counted (Bus::refusals).
+Other channels pass as they are.
+@param bus_name is part of every signature. @param clock of the counters, and of memq. @throws BusError. */
+[[nodiscard]] std::unique_ptr<Bus> OpenSignedBus(const std::string& url, const KeyRing& keys, const std::string& bus_name,
+                                                 const Speakers& speakers, Clock clock = WallClockUs);
 
 }  // namespace forereach

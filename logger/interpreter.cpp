@@ -71,8 +71,8 @@ EventRow MakeRow(const execution_event_t& event, LogReference reference) {
 
 }  // namespace
 
-Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optional<Key256> key)
-    : channels_(std::move(channels)), log_file_(std::move(log_file)), authenticator_(channels_, key) {}
+Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys)
+    : channels_(std::move(channels)), log_file_(std::move(log_file)), authenticator_(channels_, std::move(keys)) {}
 
 std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
   const Stream plain{channel, ""};

@@ -39,8 +39,8 @@ struct Position {
 
 class Interpreter final {
  public:
-  /** @param key as LogAuthenticator's. */
-  Interpreter(BusOptions channels, std::string log_file, std::optional<Key256> key = {});
+  /** @param keys as LogAuthenticator's. */
+  Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys = {});
 
   /** The stream of a message, and its place in it if it is one of a type that counts them. */
   [[nodiscard]] std::pair<Stream, std::optional<Position>> Identify(const std::string& channel, Bytes bytes) const;

@@ -3,8 +3,8 @@ believes what the robot's processes believed, and passes over the rest. */
 #pragma once
 
 #include <optional>
-#include <set>
 #include <string>
+#include <utility>
 
 #include "certifier/task/config.h"
 #include "lcmtypes/authentic.h"
@@ -14,9 +14,10 @@ namespace forereach {
 
 class LogAuthenticator final {
  public:
-  /** @param key that `channels.signed_channels()` are signed with; nothing: every message is taken for authentic. */
-  LogAuthenticator(const BusOptions& channels, std::optional<Key256> key)
-      : signed_channels_(channels.signed_channels()), key_(key) {}
+  /** @param keys public ones are enough; nothing: every message is taken for authentic. Messages count that were signed for
+  the bus `channels.name`, or without a name for the bus of the first authentic one. */
+  LogAuthenticator(const BusOptions& channels, std::optional<KeyRing> keys)
+      : channels_(channels), speakers_(channels.speakers()), keys_(std::move(keys)) {}
 
   /** Of the next event in the order of the log. On a signed channel neither unsigned and forged messages are authentic,
   nor those that came before or were signed more than a second before the first that was heard here. */
@@ -26,8 +27,9 @@ class LogAuthenticator final {
   [[nodiscard]] Refusals refusals() const { return authenticator_ ? authenticator_->refusals() : Refusals{}; }
 
  private:
-  std::set<std::string> signed_channels_;
-  std::optional<Key256> key_;
+  BusOptions channels_;
+  Speakers speakers_;
+  std::optional<KeyRing> keys_;
   std::optional<Authenticator> authenticator_;  // from the first message on a signed channel on
 };
 

@@ -5,15 +5,14 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string_view>
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
+#include "lcmtypes/heartbeat.h"
 
 namespace forereach {
 namespace {
@@ -77,7 +76,7 @@ class Surveyor final {
       Record(GetDigest(certified->config_digest), GetDigest(certified->observations_digest));
     } else if (Decoded<candidate_plan_t>(message)) {
       ++survey_.candidates;
-    } else if (const auto status = Decoded<certifier_status_v2_t>(message)) {
+    } else if (const auto status = ReadHeartbeat(message)) {
       certifier_.Take(status->sequence);
     } else if (const auto logger = Decoded<logger_status_t>(message)) {
       logger_.Take(logger->sequence);

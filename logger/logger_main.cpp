@@ -14,7 +14,8 @@ int main(int argc, char** argv) {
       "forereach-logger",
       "Records everything on the bus: an LCM event log (lcm-logplayer plays it) and a database of decisions, execution "
       "events and gaps. Ends on SIGTERM or Ctrl-C with a summary on standard output.",
-      "forereach-logger --config config/bicycle.yaml --directory /var/log/forereach"};
+      "forereach-logger --config config/bicycle.yaml --directory /var/log/forereach",
+      Role::kLogger};
   const auto make_node = [&directory](const Config& config, Bus& bus) -> std::unique_ptr<Node> {
     Config chosen = config;
     if (!directory.empty()) chosen.logger.directory = directory;

@@ -22,11 +22,23 @@ LoggerNode::LoggerNode(const Config& config, Bus& bus, std::ostream& out, FreeSp
       bus_(bus),
       out_(out),
       recorder_(config, std::move(free_space)),
-      bus_dropped_(bus.dropped()) {
+      bus_dropped_(bus.dropped()),
+      speakers_(recorder_.has_keys() ? channels_.speakers() : Speakers()),
+      unsigned_bytes_per_us_(config.logger.unsigned_kb_per_s * 1e-3) {
   bus.SubscribeUnchecked(".*", [this](const Received& received) { Receive(received); });
 }
 
 void LoggerNode::Receive(const Received& received) {
+  if (!speakers_.empty()) {
+    const bool is_ours = speakers_.contains(received.channel), is_refused = received.bytes.empty() && !received.raw.empty();
+    // A log is judged by the bus of its first authentic message, so nothing refused stands before that.
+    if (is_ours && !is_refused) authentic_heard_ = true;
+    if (is_refused && !authentic_heard_) return;
+    if ((!is_ours || is_refused) && !MayTakeUnsigned(received.raw.size())) {
+      if (!is_ours) ++unsigned_lost_;
+      return;
+    }
+  }
   if (received.channel != channels_.logger_status) last_heard_us_ = now_us_;
   if (queue_.size() < queue_size_) {
     queue_.push_back({-1, received.utime, received.channel, {received.raw.begin(), received.raw.end()}});
@@ -35,6 +47,24 @@ void LoggerNode::Receive(const Received& received) {
   Stream stream = recorder_.interpreter().Identify(received.channel, WithoutSignature(received.raw)).first;
   if (overflow_.size() >= kMaxStreamsInOverflow && !overflow_.contains(stream)) stream = {"*", ""};
   ++overflow_[stream];
+}
+
+// An allowance that grows with time, to that of one second at most. A clock set back stops it until the next message.
+bool LoggerNode::MayTakeUnsigned(std::size_t bytes) {
+  constexpr double kSecondUs = 1e6, kOverheadBytes = 1000;
+  const auto elapsed = static_cast<double>(now_us_ - std::exchange(allowance_us_, now_us_));
+  unsigned_allowance_ += std::clamp(elapsed, 0.0, kSecondUs) * unsigned_bytes_per_us_;
+  unsigned_allowance_ = std::min(unsigned_allowance_, kSecondUs * unsigned_bytes_per_us_);
+  const double cost = static_cast<double>(bytes) + kOverheadBytes;
+  if (unsigned_allowance_ < cost) return false;
+  unsigned_allowance_ -= cost;
+  return true;
+}
+
+// Of a bus that looks, those that it refused; else those that the log holds.
+Refusals LoggerNode::refusals() const {
+  const Refusals refused = bus_.refusals();
+  return refused.all() > 0 ? refused : recorder_.interpreter().refusals();
 }
 
 void LoggerNode::Tick(std::int64_t now_us) {
@@ -53,6 +83,7 @@ void LoggerNode::Tick(std::int64_t now_us) {
 void LoggerNode::Drain(std::int64_t now_us) {
   for (; !queue_.empty(); queue_.pop_front()) recorder_.Take(std::move(queue_.front()), now_us);
   for (const auto& [stream, lost] : std::exchange(overflow_, {})) recorder_.Lose(stream, lost, now_us, "queue");
+  if (unsigned_lost_ > 0) recorder_.Lose({"*", ""}, std::exchange(unsigned_lost_, 0), now_us, "unsigned");
   const std::int64_t dropped = bus_.dropped();
   if (dropped != bus_dropped_) recorder_.Lose({"*", ""}, dropped - bus_dropped_, now_us, "backlog");
   bus_dropped_ = dropped;
@@ -61,7 +92,7 @@ void LoggerNode::Drain(std::int64_t now_us) {
 void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
   heartbeat_.Start(now_us);
   const std::string trouble = recorder_.trouble(), silence = Silence(now_us);
-  const std::string refused = InWords(recorder_.interpreter().refusals());
+  const std::string refused = InWords(refusals());
   logger_status_t status{};
   status.utime = now_us;
   status.sequence = heartbeats_++;
@@ -99,8 +130,8 @@ void LoggerNode::Stop() {
   if (recorder_.files() > 1) out_ << ", the last of " << recorder_.files();
   out_ << "\ndatabase                  " << recorder_.database_path() << "\n" << ToText(recorder_.summary());
   if (!recorder_.gone().empty()) out_ << "gone                      " << recorder_.gone() << "\n";
-  const std::string refused = InWords(recorder_.interpreter().refusals());
-  if (!refused.empty()) out_ << "not authentic             " << refused << ", in the log and in no row\n";
+  const std::string refused = InWords(refusals());
+  if (!refused.empty()) out_ << "not authentic             " << refused << ", in no row\n";
   out_ << std::flush;
 }
 

@@ -9,7 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include "certifier/task/key.h"
-#include "forereach/certifier_status_v2_t.hpp"
+#include "lcmtypes/heartbeat.h"
 
 namespace forereach {
 namespace {
@@ -92,13 +92,13 @@ std::int64_t BytesOf(double megabytes) { return static_cast<std::int64_t>(megaby
 Recorder::Recorder(const Config& config, FreeSpace free_space)
     : channels_(config.bus),
       options_(config.logger),
-      key_(KeyOf(channels_)),
+      keys_(PublicKeysOf(channels_)),
       free_space_(std::move(free_space)),
       directory_(options_.directory),
       database_path_(directory_.PathOf(LogDirectory::kDatabase)),
       database_(std::make_unique<Database>(database_path_)),
       summary_(config),
-      interpreter_(channels_, "", key_),
+      interpreter_(channels_, "", keys_),
       task_path_(config.path),
       kept_tasks_(options_.directory),
       task_reading_(kRetryUs),
@@ -178,7 +178,7 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
 
 // What it knew when the file began: it has seen the file before, if there is one.
 Interpreter Recorder::InterpreterFor(const RunRow& run) const {
-  Interpreter interpreter(channels_, run.continues, key_);
+  Interpreter interpreter(channels_, run.continues, keys_);
   if (!run.continues.empty() && directory_.Bytes(run.continues)) {
     EventLogReader before(directory_.PathOf(run.continues));
     Rows ignored;
@@ -258,9 +258,9 @@ void Recorder::KeepTasks() const {
 // A reload may bring other transitions with the same task file, which only the version tells.
 void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
   if (task_path_.empty() || event.channel != channels_.status) return;
-  const auto status = Decoded<certifier_status_v2_t>(event.message());
+  const auto status = ReadHeartbeat(event.message());
   if (!status) return;
-  const std::pair heard{GetDigest(status->config_digest), status->version};
+  const std::pair heard{status->config_digest, status->version};
   if (heard == heard_task_) return;
   const bool is_first = !heard_task_ && !tasks_.empty() && tasks_.back().digest == heard.first;
   if (!is_first && !task_reading_.IsOver(now_us)) return;

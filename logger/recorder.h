@@ -80,6 +80,7 @@ class Recorder final {
   /** Opens the first log file, named after its time; the rest is to be called after it. @throws as the constructor. */
   void Begin(std::int64_t now_us);
   [[nodiscard]] bool begun() const { return log_ != nullptr; }
+  [[nodiscard]] bool has_keys() const { return keys_.has_value(); }
 
   /** The next message; its `number` is not read. */
   void Take(LogEvent event, std::int64_t now_us);
@@ -158,7 +159,7 @@ class Recorder final {
 
   const BusOptions channels_;
   const LoggerOptions options_;
-  const std::optional<Key256> key_;
+  const std::optional<KeyRing> keys_;
   const FreeSpace free_space_;
   const LogDirectory directory_;
   const std::string database_path_;

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
+#include <initializer_list>
 #include <stdexcept>
-#include <tuple>
 
 #include "lcmtypes/seal.h"
 
@@ -100,6 +100,19 @@ GuardVerdict CheckDigest(GuardCause cause, const char* name, const Digest& carri
   return RefuseDigest(cause, name, ToHex(carried), ToHex(expected));
 }
 
+GuardVerdict CheckDigestsAreThere(const certified_plan_t& certified) {
+  for (const auto& [name, digest] : std::initializer_list<std::pair<const char*, const std::uint8_t (&)[32]>>{
+           {"plan_digest", certified.plan_digest},
+           {"config_digest", certified.config_digest},
+           {"model_digest", certified.model_digest},
+           {"declaration_digest", certified.declaration_digest},
+           {"observations_digest", certified.observations_digest},
+           {"obstacles_digest", certified.obstacles_digest},
+           {"certificate_digest", certified.certificate_digest}})
+    if (GetDigest(digest) == Digest{}) return Refuse(GuardCause::kZeroDigest, Sentence("%s is zero", name));
+  return {};
+}
+
 GuardVerdict CheckSeal(const certified_plan_t& certified) {
   const std::vector<SealFault> faults = FindSealFaults(certified);
   if (faults.empty()) return {};
@@ -129,17 +142,20 @@ std::string_view GuardCauseName(GuardCause cause) {
     case GuardCause::kNone: return "none";
     case GuardCause::kUnsigned: return "unsigned";
     case GuardCause::kForged: return "forged";
+    case GuardCause::kForeign: return "foreign";
     case GuardCause::kSignatureReplayed: return "signature_replayed";
     case GuardCause::kWrongLength: return "wrong_length";
     case GuardCause::kTrailingBytes: return "trailing_bytes";
     case GuardCause::kUnknownFingerprint: return "unknown_fingerprint";
     case GuardCause::kWrongDimension: return "wrong_dimension";
     case GuardCause::kWrongStepPeriod: return "wrong_step_period";
+    case GuardCause::kZeroDigest: return "zero_digest";
     case GuardCause::kPlanDigest: return "plan_digest";
     case GuardCause::kCertificateDigest: return "certificate_digest";
     case GuardCause::kUnusedEntry: return "unused_entry";
     case GuardCause::kNonFinite: return "non_finite";
     case GuardCause::kEmptySlice: return "empty_slice";
+    case GuardCause::kOutsideDomain: return "outside_domain";
     case GuardCause::kExpired: return "expired";
     case GuardCause::kConfigDigest: return "config_digest";
     case GuardCause::kModelDigest: return "model_digest";
@@ -158,7 +174,24 @@ std::string_view GuardCauseName(GuardCause cause) {
   return "unknown";
 }
 
-Guard::Guard(GuardOptions options) : options_(options) {
+namespace {
+
+void RequireDomain(const std::optional<GuardDomain>& domain, const GuardOptions& options) {
+  if (!domain) return;
+  const auto require = [](const char* what, const std::vector<double>& lower, const std::vector<double>& upper, int size) {
+    bool good = lower.size() == static_cast<std::size_t>(size) && upper.size() == lower.size();
+    for (std::size_t k = 0; good && k < lower.size(); ++k) good = lower[k] <= upper[k];
+    if (!good)
+      throw std::invalid_argument(std::string("GuardOptions: domain: ") + what + " has to have " + std::to_string(size) +
+                                  " entries, and lower <= upper in each");
+  };
+  require("state", domain->state_lower, domain->state_upper, options.num_states);
+  require("input", domain->input_lower, domain->input_upper, options.num_inputs);
+}
+
+}  // namespace
+
+Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   const auto require = [](const char* name, std::int64_t value, std::int64_t most) {
     if (value < 1 || value > most)
       throw std::invalid_argument(std::string("GuardOptions: ") + name + " is " + std::to_string(value) +
@@ -167,8 +200,11 @@ Guard::Guard(GuardOptions options) : options_(options) {
   require("num_states", options_.num_states, kMaxPlanStates);
   require("num_inputs", options_.num_inputs, kMaxPlanInputs);
   require("step_us", options_.step_us, INT64_MAX);
+  RequireDomain(options_.domain, options_);
+  if (!options_.keys) return;
+  if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
   // A plan expires and its plan_id has to be new, so one from before the guard began does no more harm than a late one.
-  if (options_.key) authenticator_.emplace(*options_.key, 0);
+  authenticator_.emplace(*options_.keys, options_.bus_name, Speakers{{options_.channel, Role::kCertifier}}, 0);
 }
 
 void Guard::Halt() noexcept {
@@ -177,8 +213,9 @@ void Guard::Halt() noexcept {
   executing_.reset();
 }
 
-void Guard::Expect(const Digest& config_digest, const Digest& model_digest) {
-  expected_.emplace_back(config_digest, model_digest);
+void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain) {
+  RequireDomain(domain, options_);
+  expected_.push_back({config_digest, model_digest, std::move(domain)});
 }
 
 // Takes the signature off.
@@ -189,7 +226,8 @@ GuardVerdict Guard::Authenticated(Bytes& bytes) {
   switch (authenticity) {
     case Authenticity::kAuthentic: return {};
     case Authenticity::kUnsigned: return Refuse(GuardCause::kUnsigned, "the plan is not signed");
-    case Authenticity::kForged: return Refuse(GuardCause::kForged, "the plan is not signed with this robot's key");
+    case Authenticity::kForged: return Refuse(GuardCause::kForged, "the plan is not signed by this robot's certifier");
+    case Authenticity::kForeign: return Refuse(GuardCause::kForeign, "the plan was signed for another bus");
     case Authenticity::kReplayed: break;
   }
   return Refuse(GuardCause::kSignatureReplayed, "the plan's signature was used before");
@@ -210,7 +248,9 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     last_accepted_ = certified->plan.plan_id;
     last_expiry_ = std::max(last_expiry_, certified->expires_utime);
     if (const auto task = FindExpected(*certified); task != expected_.end()) {
-      std::tie(options_.config_digest, options_.model_digest) = *task;
+      options_.config_digest = task->config;
+      options_.model_digest = task->model;
+      if (task->domain) options_.domain = task->domain;
       expected_.erase(expected_.begin(), task + 1);
     }
     pending_ = std::move(certified);
@@ -238,14 +278,17 @@ GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
 }
 
 std::vector<Guard::Task>::const_iterator Guard::FindExpected(const certified_plan_t& certified) const {
-  return std::ranges::find(expected_, Task(GetDigest(certified.config_digest), GetDigest(certified.model_digest)));
+  const Digest config = GetDigest(certified.config_digest), model = GetDigest(certified.model_digest);
+  return std::ranges::find_if(expected_, [&](const Task& task) { return task.config == config && task.model == model; });
 }
 
 GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_us) const {
   const candidate_plan_t& plan = certified.plan;
   GuardVerdict verdict = ExamineSizes(plan);
+  if (verdict.ok()) verdict = CheckDigestsAreThere(certified);
   if (verdict.ok()) verdict = CheckSeal(certified);
   if (verdict.ok()) verdict = ExamineNumbers(certified);
+  if (verdict.ok()) verdict = ExamineDomain(certified);
   if (verdict.ok()) verdict = CheckExpiry(certified, now_us);
   const bool expected = FindExpected(certified) != expected_.end();
   if (verdict.ok() && options_.config_digest && !expected)
@@ -283,6 +326,35 @@ GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
       return RefuseAt(finite ? GuardCause::kEmptySlice : GuardCause::kNonFinite, t, k, lower, upper,
                       Sentence("slice %d in coordinate %d is [%.17g, %.17g]", t, k, lower, upper));
     }
+  return {};
+}
+
+// The last slice is what the plan leads to: the certifier does not hold it against the domain.
+GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
+  const auto task = FindExpected(certified);
+  const std::optional<GuardDomain>& domain = task != expected_.end() && task->domain ? task->domain : options_.domain;
+  if (!domain) return {};
+  const candidate_plan_t& plan = certified.plan;
+  const auto outside = [](const char* what, int t, int coordinate, double value, double bound) {
+    return RefuseAt(GuardCause::kOutsideDomain, t, coordinate, value, bound,
+                    Sentence("%s %d reaches %.17g in coordinate %d, the domain ends at %.17g", what, t, value, coordinate, bound));
+  };
+  for (int k = 0; k < options_.num_states; ++k) {
+    const double lower = domain->state_lower[static_cast<std::size_t>(k)], upper = domain->state_upper[static_cast<std::size_t>(k)];
+    const double center = plan.initial_center[k], half_width = plan.initial_half_width[k];
+    if (!AtMostSum(-upper, -center, -half_width)) return outside("X", 0, k, center + half_width, upper);
+    if (!AtMostSum(lower, center, -half_width)) return outside("X", 0, k, center - half_width, lower);
+    for (int t = 0; t < plan.num_steps; ++t) {
+      if (!(lower <= certified.slice_lower[t][k])) return outside("slice", t, k, certified.slice_lower[t][k], lower);
+      if (!(certified.slice_upper[t][k] <= upper)) return outside("slice", t, k, certified.slice_upper[t][k], upper);
+    }
+  }
+  for (int i = 0; i < options_.num_inputs; ++i) {
+    const double lower = domain->input_lower[static_cast<std::size_t>(i)], upper = domain->input_upper[static_cast<std::size_t>(i)];
+    for (int t = 0; t < plan.num_steps; ++t)
+      if (const double control = plan.control[t][i]; !(lower <= control && control <= upper))
+        return outside("control", t, options_.num_states + i, control, control < lower ? lower : upper);
+  }
   return {};
 }
 

@@ -101,7 +101,8 @@ int main(int argc, char** argv) {
        "line of JSON about the run.",
        "forereach-robot-sim --config config/demo.yaml\n"
        "  forereach-robot-sim --config config/demo.yaml --make-transitions made.csv --seed 1 --count 400 "
-       "--range v=7.25:15.75"},
+       "--range v=7.25:15.75",
+       Role::kRobot},
       [](const Config& config, Bus& bus) { return std::make_unique<RobotSimNode>(config, bus); },
       [&](CLI::App& app) { AddSampleOptions(app, for_help); });
 }

@@ -21,11 +21,21 @@ namespace {
 
 constexpr std::int64_t kProgressUs = 1'000'000;
 
-std::optional<Config> Load(const std::string& path) try {
-  return LoadConfig(path);
+std::optional<Config> Load(const std::string& path, const BusOptions& in_force) try {
+  Config config = LoadConfig(path);
+  const std::string why = WhyKeyCannotChange(in_force, config.bus, Role::kRobot);
+  if (!why.empty()) throw ConfigError(path + ": " + why);
+  return config;
 } catch (const std::exception& error) {
   spdlog::error("not reloaded: {}", error.what());
   return std::nullopt;
+}
+
+GuardDomain DomainOf(const Config& config) {
+  const auto entries = [](const Eigen::VectorXd& bounds) { return std::vector<double>(bounds.begin(), bounds.end()); };
+  const Domain& domain = config.problem->domain;
+  return {entries(domain.state.lower()), entries(domain.state.upper()), entries(domain.input.lower()),
+          entries(domain.input.upper())};
 }
 
 GuardOptions OptionsOf(const Config& config) {
@@ -35,8 +45,10 @@ GuardOptions OptionsOf(const Config& config) {
   options.step_us = Microseconds(config.robot.step_period_ms);
   options.config_digest = config.digest;
   options.model_digest = config.model_digest;
-  options.key = KeyOf(config.bus);
+  options.keys = KeysOf(config.bus, Role::kRobot);
+  options.bus_name = config.bus.bus_name();
   options.channel = config.bus.certified;
+  options.domain = DomainOf(config);
   return options;
 }
 
@@ -50,6 +62,11 @@ std::vector<int> RestCoordinates(const NominalModel& model) {
   return rest;
 }
 
+Config WithKeysOfRobot(Config config) {
+  config.bus = WithKeys(std::move(config.bus), Role::kRobot);
+  return config;
+}
+
 void RequireSize(const Config& config, const char* key, std::size_t size, std::int64_t expected) {
   if (static_cast<std::int64_t>(size) != expected)
     throw ConfigError(config.path + ": " + key + ": " + std::to_string(size) + " entries, it has to have " +
@@ -59,20 +76,19 @@ void RequireSize(const Config& config, const char* key, std::size_t size, std::i
 }  // namespace
 
 RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
-    : config_(config),
+    : config_(WithKeysOfRobot(config)),
       sender_(bus),
       out_(out),
       target_(MakeTarget(config)),
       period_us_(Microseconds(config.robot.step_period_ms)),
-      guard_(OptionsOf(config)),
+      guard_(OptionsOf(config_)),
       rest_coordinates_(RestCoordinates(*config.problem->model)),
-      reload_([path = config.path] { return Load(path); }),
+      reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
       state_(config.robot.start) {
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
     RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
-  // The guard checks the signature by itself.
-  bus.SubscribeUnchecked(config_.bus.certified, [this](const Received& received) { OnCertified(received); });
+  bus.Subscribe(config_.bus.certified, [this](const Received& received) { OnCertified(received); });
   bus.Subscribe(config_.bus.fault, [this](const Received& received) { OnFault(received); });
   bus.Subscribe(config_.bus.command, [this](const Received& received) { OnCommand(received); });
 }
@@ -128,7 +144,7 @@ void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
   if (reload_.TakeStall()) spdlog::error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
-  guard_.Expect(config->digest, config->model_digest);
+  guard_.Expect(config->digest, config->model_digest, DomainOf(*config));
   spdlog::info("plans certified under {} as it is now are accepted", config_.path);
 }
 

@@ -19,7 +19,7 @@ After it the robot stands until a reset on bus.channels.command.
 The run ends after the goal is reached or the time limit has passed: no further plan starts, the current one runs to
 its end, and once the robot stands it publishes FINISHED for kFinishedBoundaries boundaries and is done.
 
-With a key (bus.key) the guard takes signed plans only. Messages on PLAN_CERTIFIED, FAULT and COMMAND are all it obeys.
+With keys (bus.key) the guard checks once more, by itself, that the certifier has signed a plan. Messages on PLAN_CERTIFIED, FAULT and COMMAND are all it obeys.
 Obstacles and start are those of the task file. A reload makes it take plans certified under the file as it is now
 (Guard::Expect); the robot and its world stay. */
 #pragma once

@@ -57,9 +57,12 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
     case Outcome::kDomain: {
       const std::string where = "abstain D: at step " + std::to_string(decision.step) + " ";
       if (decision.cause == Cause::kDomainExit) return where + ExplainExit(decision.exit, model);
-      if (decision.cause == Cause::kNoStop)
+      if (decision.cause == Cause::kNoStop) {
+        const bool below = decision.margin < decision.threshold;
         return where + "the plan ends, and " + VariableName(model, decision.coordinate) + " reaches " +
-               Short(decision.margin) + "; standing is up to " + Short(decision.threshold);
+               (below ? RoundedDown(decision.margin) : RoundedUp(decision.margin)) + "; standing is up to " +
+               (below ? RoundedUp(decision.threshold) : RoundedDown(decision.threshold));
+      }
       return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
     }
     case Outcome::kSafety:

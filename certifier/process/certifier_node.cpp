@@ -14,6 +14,7 @@
 #include <sys/resource.h>
 
 #include "certifier/gate/stamp.h"
+#include "certifier/task/key.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -74,7 +75,7 @@ Charge::State ChargeOf(std::int16_t state) {
 CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std::int64_t listen_us,
                              std::unique_ptr<LatchFile> latch)
     : config_(Checked(config)),
-      channels_(config.bus),
+      channels_(WithKeys(config.bus, Role::kCertifier)),
       realtime_(config.realtime),
       clocks_(std::move(clocks)),
       bus_(bus),
@@ -84,7 +85,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       charge_({clocks_.wall(), RandomInstance()}, listen_us),
       has_begun_(is_in_charge()),
       issued_(config.gate, clocks_.steady()),
-      reload_([path = config.path] { return Load(path); }),
+      reload_([path = config.path, channels = channels_] { return Load(path, channels); }),
       latch_(std::move(latch)) {
   if (latch_) OpenLatch();
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
@@ -498,9 +499,11 @@ void CertifierNode::NotReloaded(const std::string& why) {
   spdlog::error("not reloaded, version {} stays in force: {}", version_, why);
 }
 
-CertifierNode::Loaded CertifierNode::Load(const std::string& path) try {
+CertifierNode::Loaded CertifierNode::Load(const std::string& path, const BusOptions& in_force) try {
   spdlog::info("reloading {}", path);
   Loaded loaded{Checked(LoadConfig(path)), nullptr, ""};
+  loaded.error = WhyKeyCannotChange(in_force, loaded.config.bus, Role::kCertifier);
+  if (!loaded.error.empty()) loaded.error = path + ": " + loaded.error;
   loaded.gate = std::make_unique<Gate>(loaded.config);
   return loaded;
 } catch (const std::exception& error) {
@@ -510,8 +513,10 @@ CertifierNode::Loaded CertifierNode::Load(const std::string& path) try {
 std::string CertifierNode::WhyNotTaken(const Config& config) const {
   const Problem &before = gate_->certifier().problem(), &after = *config.problem;
   BusOptions bus = config.bus;
-  bus.url = channels_.url, bus.key = channels_.key;  // a command line may have given others
+  bus.url = channels_.url;  // a command line may have given another
+  bus.key = channels_.key, bus.keys = channels_.keys, bus.key_is_given = channels_.key_is_given;  // Load compares keys
   for (const auto& [changes, what] : std::initializer_list<std::pair<bool, const char*>>{
+           {bus.name != channels_.name, "bus.name"},
            {bus != channels_, "bus.channels"},
            {config.realtime != realtime_, "realtime"},
            {config.gate.obstacles != config_.gate.obstacles, "gate.obstacles"},
@@ -596,6 +601,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   const Refusals refusals = bus_.refusals();
   status.refused_unsigned = refusals.unsigned_ones;
   status.refused_forged = refusals.forged;
+  status.refused_foreign = refusals.foreign;
   status.refused_replayed = refusals.replayed;
   status.page_faults = page_faults_;
   status.queue_depth = static_cast<std::int32_t>(queue_.size());

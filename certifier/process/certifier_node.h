@@ -101,7 +101,7 @@ class CertifierNode final : public Node {
   [[nodiscard]] GateAnswer Decide(Bytes candidate);
   void Answer(Bytes candidate, bool displaced);
   void CompactIfDue();
-  [[nodiscard]] static Loaded Load(const std::string& path);
+  [[nodiscard]] static Loaded Load(const std::string& path, const BusOptions& in_force);
   void TakeReload();
   void NotReloaded(const std::string& why);
   /** Why a task file, good in itself, cannot take the place of the one in force; empty if it can. */

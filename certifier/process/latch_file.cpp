@@ -4,7 +4,6 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -108,8 +107,7 @@ std::string TextOf(const LatchFile::Content& content) {
 
 // @throws Json::exception saying what is wrong.
 LatchFile::Content ContentOf(const std::string& text) {
-  std::istringstream stream(text);
-  const Json json = ParseJson<Json>(stream);
+  const Json json = ParseJson<Json>(text);
   if (json.at("format") != kFormat) throw Json::other_error::create(501, "its format is another", nullptr);
   if (json.at("version") != kVersion)
     throw Json::other_error::create(501, "its version is " + Dump(json["version"]) + ", this certifier knows " + std::to_string(kVersion), nullptr);

@@ -231,6 +231,7 @@ BusOptions ReadBus(const Document& file) {
   read("logger_status", bus.logger_status);
   read("fault", bus.fault);
   read("command", bus.command);
+  file.Read("bus.name", bus.name);
   if (file.Has("bus.key")) bus.key = RelativeTo(file.path(), file.Text("bus.key"));
   return bus;
 }
@@ -347,6 +348,7 @@ LoggerOptions ReadLogger(const Document& file) {
       file.Fail("logger.quota_mb", ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
   }
   file.Read("logger.min_free_mb", logger.min_free_mb);
+  file.Read("logger.unsigned_kb_per_s", logger.unsigned_kb_per_s);
   return logger;
 }
 

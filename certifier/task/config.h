@@ -5,7 +5,6 @@ and, made from it, in config/README.md. */
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@ and, made from it, in config/README.md. */
 #include "certifier/dynamics/parametric_residual.h"
 #include "certifier/task/canonical.h"
 #include "lcmtypes/bad_input.h"
+#include "lcmtypes/authentic.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -69,12 +69,21 @@ struct BusOptions {
   std::string logger_status = "LOGGER_STATUS";
   std::string fault = "FAULT";
   std::string command = "COMMAND";
-  std::string key;  ///< Path of a key file; empty: messages are not signed.
+  std::string name;           ///< Of the bus, in every signature; empty: default_name().
+  std::string key;            ///< Path of a directory of keys or of a key file; empty: messages are not signed.
+  bool key_is_given = false;  ///< On the command line, so the task file does not say which.
+  std::optional<KeyRing> keys;  ///< What `key` held when the process started; nothing: not read yet, or none.
 
-  /** The channels that are signed where there is a key: all that makes a certificate, or a robot move. */
-  [[nodiscard]] std::set<std::string> signed_channels() const {
-    return {candidate, certified, robot_state, obstacles, transition, fault, command};
+  /** Who speaks on which channel where there are keys. */
+  [[nodiscard]] Speakers speakers() const {
+    return {{decision, Role::kCertifier},    {certified, Role::kCertifier},   {status, Role::kCertifier},
+            {fault, Role::kCertifier},       {candidate, Role::kPlanner},     {obstacles, Role::kPerception},
+            {robot_state, Role::kRobot},     {transition, Role::kRobot},      {event, Role::kRobot},
+            {command, Role::kOperator},      {logger_status, Role::kLogger}};
   }
+
+  /** `name`, or address and port of `url`: "239.255.76.67:7667"; "memq" for memq. @throws BusError if `url` is none. */
+  [[nodiscard]] std::string bus_name() const;
 
   friend bool operator==(const BusOptions&, const BusOptions&) = default;
 };
@@ -114,6 +123,7 @@ struct LoggerOptions {
   double rotate_minutes = 60;      ///< Longest time in one log file.
   std::optional<double> quota_mb;  ///< Most of all log files together; nothing: none is ever deleted.
   double min_free_mb = 256;        ///< With less free on the disk recording pauses.
+  double unsigned_kb_per_s = 100;  ///< With keys, most of what nobody signed that is recorded; 10^3 bytes each.
 };
 
 struct Config {

@@ -84,21 +84,34 @@ int Guarded(const std::string& name, const std::function<int()>& body) {
   }
 }
 
-std::unique_ptr<Bus> OpenBus(const BusOptions& options, const std::string& name, Clock clock) {
-  std::unique_ptr<Bus> bus = OpenBus(options.url, clock);
-  const std::optional<Key256> key = KeyOf(options);
-  if (!key) return bus;
-  return Authenticate(std::move(bus), *key, name, options.signed_channels(), std::move(clock));
+namespace {
+
+std::unique_ptr<Bus> Open(const BusOptions& options, const std::optional<KeyRing>& keys, Clock clock) {
+  if (!keys) return OpenBus(options.url, std::move(clock));
+  return OpenSignedBus(options.url, *keys, options.bus_name(), options.speakers(), std::move(clock));
+}
+
+}  // namespace
+
+std::unique_ptr<Bus> OpenBus(const BusOptions& options, Role role, Clock clock) {
+  return Open(options, KeysOf(options, role), std::move(clock));
+}
+
+std::unique_ptr<Bus> OpenBusOfAllRoles(const BusOptions& options, Clock clock) {
+  return Open(options, AllKeysOf(options), std::move(clock));
 }
 
 void BusArguments::AddTo(CLI::App& app) {
   app.add_option("--lcm-url", url, "The bus; by default the task file's bus.url")->type_name("URL");
-  app.add_option("--key", key, "Key file that messages are signed with; by default the task file's bus.key")->type_name("FILE");
+  app.add_option("--key", key, "Directory of keys, or this role's key file; by default the task file's bus.key")
+      ->type_name("PATH");
 }
 
 void BusArguments::Override(BusOptions& options) const {
   if (!url.empty()) options.url = url;
-  if (!key.empty()) options.key = key;
+  if (key.empty()) return;
+  options.key = key;
+  options.key_is_given = true;
 }
 
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
@@ -116,9 +129,13 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   const int code = Guarded(description.name, [&] {
     Config config = LoadConfig(config_path);
     bus_arguments.Override(config.bus);
-    const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.name);
+    config.bus = WithKeys(std::move(config.bus), description.role);
+    const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.role);
     const std::unique_ptr<Node> node = make_node(config, *bus);
-    spdlog::info("ready on {} with {}{}", config.bus.url, config_path, config.bus.key.empty() ? "" : ", signed");
+    if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
+    spdlog::info("ready on {} with {}{}", config.bus.url, config_path,
+                 config.bus.keys ? ", signed as the " + std::string(RoleName(description.role)) + " of " + config.bus.keys->robot()
+                                 : "");
     DatagramWatch watched(*node, *bus);
     RunNode(watched, *bus);
     return node->failed() ? 1 : 0;

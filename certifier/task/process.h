@@ -7,6 +7,7 @@
 
 #include "certifier/task/command_line.h"
 #include "certifier/task/config.h"
+#include "lcmtypes/keys.h"
 #include "lcmtypes/node.h"
 
 namespace CLI {
@@ -19,22 +20,25 @@ struct ProcessDescription {
   std::string name;     ///< "forereach-certifier"
   std::string purpose;  ///< What it does, in a sentence or two.
   std::string example;  ///< A command line one can type.
+  Role role;            ///< That it speaks as.
 };
 
 using MakeNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& bus)>;
 
-/** The bus of a task: it signs what it has to if the task has a key. @param name says who speaks.
+/** The bus of a task. Where the task has a key, it signs what this role sends and hands out authentic messages only.
 @throws BusError, KeyError. */
-[[nodiscard]] std::unique_ptr<Bus> OpenBus(const BusOptions& options, const std::string& name, Clock clock = WallClockUs);
+[[nodiscard]] std::unique_ptr<Bus> OpenBus(const BusOptions& options, Role role, Clock clock = WallClockUs);
+/** The same for one program that speaks as every role. */
+[[nodiscard]] std::unique_ptr<Bus> OpenBusOfAllRoles(const BusOptions& options, Clock clock = WallClockUs);
 
-/** `--lcm-url URL` and `--key FILE`, which stand before what the task file says. */
+/** `--lcm-url URL` and `--key PATH`, which take precedence over the task file. */
 struct BusArguments {
   std::string url, key;
   void AddTo(CLI::App& app);
   void Override(BusOptions& options) const;
 };
 
-/** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key FILE` until it is done or gets SIGTERM or SIGINT.
+/** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key PATH` until it is done or gets SIGTERM or SIGINT.
 @param add_options adds a process's own options, if it has any.
 @return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other
 error. */

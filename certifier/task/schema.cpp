@@ -304,8 +304,12 @@ std::vector<Key> BusKeys() {
                     "Where the bus is, as LCM writes it: multicast group and port, options `ttl` and `recv_buf_size`. "
                     "`--lcm-url` takes precedence."),
                bus.url),
-      Optional(Text("bus.key", "Key file, relative to this file: what makes the robot move is then signed, and refused "
-                    "unsigned. `forereach keygen` makes one; `--key` takes precedence."),
+      Optional(Text("bus.name", "Name of the bus, which is part of every signature: what is signed for one bus is refused on "
+                    "another. All processes of a robot need the same."),
+               "address and port of the URL"),
+      Optional(Text("bus.key", "Directory of keys, or one role's key file, relative to this file: every message is then "
+                    "signed by the role that speaks on its channel, and refused otherwise. `forereach keygen` makes it; "
+                    "`--key` takes precedence."),
                "none, nothing is signed"),
       Optional(Map("bus.channels", "Names of the channels, all different."), "all defaults"),
       Channel("candidate", bus.candidate, "candidate_plan_t, from planners."),
@@ -414,6 +418,9 @@ std::vector<Key> LoggerKeys() {
                "none is deleted"),
       Number("logger.min_free_mb", "MB", UpTo(kMaxMegabytes), logger.min_free_mb,
              "With less free on the disk recording pauses; it resumes by itself once an eighth more is free."),
+      Number("logger.unsigned_kb_per_s", "kB/s", UpTo(1e6), logger.unsigned_kb_per_s,
+             "With keys: of messages that nobody signed (refused ones, as evidence, and those on channels that are not "
+             "ForeReach's) so much at most is recorded; the rest is counted. Each counts as 1 kB more than it has."),
   };
 }
 

@@ -397,7 +397,10 @@ TEST(Doctor, PrintsOneJsonDocument) {
   const Output output = Forereach("doctor --json");
   const Json document = Json::parse(output.text);
   EXPECT_EQ(output.code, document["good"] ? 0 : 1);
-  EXPECT_EQ(document["checks"].size(), 4u);
+  ASSERT_EQ(document["checks"].size(), 5u);
+  const Json& keys = document["checks"][4];
+  EXPECT_EQ(keys["found"], "UNSIGNED: anyone on this network can move this robot");
+  EXPECT_TRUE(keys["warning"]) << "the bus works all the same";
   for (const Json& check : document["checks"])
     EXPECT_TRUE(check["good"] || !check["advice"].get<std::string>().empty());
 }

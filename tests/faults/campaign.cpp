@@ -9,8 +9,10 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -24,11 +26,15 @@
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
 #include "forereach/command_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/obstacles_t.hpp"
 #include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/relay.h"
 #include "tests/faults/report.h"
 #include "tests/faults/rig.h"
+#include "tests/keys.h"
 #include "tests/process/raw_datagrams.h"
 
 namespace forereach {
@@ -386,41 +392,137 @@ class Campaign final {
     }, options_.others);
   }
 
-  // Whoever is on the network, without the key: new plans, certified plans, resets, and what was heard before.
+  using Sent = std::vector<std::uint8_t>;
+
+  // For each channel a message that would do harm if it were believed; what was heard last where that is harm enough.
+  std::map<std::string, Sent> HarmfulOf(const Rig& rig, const std::map<std::string, Sent>& heard) const {
+    const BusOptions& channels = rig.config().bus;
+    std::map<std::string, Sent> harmful;
+    for (const auto& [channel, raw] : heard) {
+      const Bytes message = WithoutSignature(raw);
+      harmful[channel].assign(message.begin(), message.end());
+    }
+    command_t command{};
+    command.utime = WallClockUs();
+    command.kind = command_t::RELOAD;
+    harmful[channels.command] = Encode(command);
+    fault_t fault{};
+    fault.utime = WallClockUs();
+    fault.cause = fault_t::SLICE_LEFT;
+    harmful[channels.fault] = Encode(fault);
+    obstacles_t nothing_there{};
+    nothing_there.utime = WallClockUs();
+    nothing_there.sequence = std::int64_t{1} << 40;
+    harmful[channels.obstacles] = Encode(nothing_there);
+    if (const certified_plan_t* certified = rig.witness().last_certified()) harmful[channels.certified] = Encode(Widened(*certified));
+    return harmful;
+  }
+
+  // What an attacker's certificate looks like: slices that nothing leaves, for a plan that starts soon.
+  static certified_plan_t Widened(certified_plan_t certified) {
+    certified.utime = WallClockUs();
+    certified.plan.plan_id += std::int64_t{1} << 32;
+    certified.plan.start_utime = certified.utime + 200'000;
+    certified.expires_utime = certified.utime + 1'000'000;
+    for (int t = 0; t <= certified.plan.num_steps; ++t)
+      for (int k = 0; k < certified.plan.num_states; ++k) certified.slice_lower[t][k] = -1e9, certified.slice_upper[t][k] = 1e9;
+    SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
+    SetDigest(certified.certificate_digest, CertificateDigest(certified));
+    return certified;
+  }
+
+  // A stranger without keys; somebody with all keys but the one that counts; another robot's keys; this robot on another bus.
   void Forgeries() {
     Rig rig(DemoTask());
-    Row& row = Begin("Forged and replayed messages (no key)", options_.others);
+    Row& row = Begin("On each signed channel: unsigned, forged, replayed, signed by each other role, by another robot, for another bus",
+                     options_.others);
     const BusOptions& channels = rig.config().bus;
-    Heard heard;
-    rig.open_bus().SubscribeUnchecked(".*", [&](const Received& r) {
-      if (channels.signed_channels().contains(r.channel) && heard.size() < kMostHeard)
-        heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
+    const Speakers speakers = channels.speakers();
+    std::map<std::string, Sent> heard;
+    rig.open_bus().Subscribe(Bus::kEveryChannel, [&](const Received& r) {
+      if (speakers.contains(r.channel)) heard[r.channel].assign(r.raw.begin(), r.raw.end());
     });
+    std::int64_t obeyed = 0;  // by the robot: plans that nobody certified, faults that nobody latched
+    rig.Hear(channels.event, [&](const Received& r) {
+      const auto event = Decoded<execution_event_t>(r.bytes);
+      obeyed += event && (event->kind == execution_event_t::HALTED || event->kind == execution_event_t::RESET ||
+                          (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31)));
+    });
+    Signer all(rig.keys(), channels.bus_name()), other_robot(TestKeys("another robot"), channels.bus_name()),
+        other_bus(rig.keys(), "another bus");
+    std::int64_t sent = 0;
+    std::set<std::string> tried;
     Tries(row, rig, [&](int) {
-      heard.clear();
-      rig.Listen(milliseconds(500));
-      const auto recorded = heard;
+      rig.Listen(milliseconds(700));
       const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
-      for (const auto& [channel, bytes] : recorded) {
-        rig.open_bus().Publish(channel, Bytes(bytes));                     // again
-        rig.open_bus().Publish(channel, WithoutSignature(Bytes(bytes)));  // unsigned
-        auto altered = bytes;
+      const std::int64_t obeyed_before = obeyed;
+      const auto recorded = heard;
+      for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
+        const Role speaker = speakers.at(channel);
+        tried.insert(channel);
+        const auto send = [&, channel = channel](const Sent& bytes) { rig.open_bus().Publish(channel, Bytes(bytes)), ++sent; };
+        send(message);
+        for (const Role role : kAllRoles)
+          if (role != speaker) send(all.Sign(role, channel, message, WallClockUs()));
+        send(other_robot.Sign(speaker, channel, message, WallClockUs()));
+        send(other_bus.Sign(speaker, channel, message, WallClockUs()));
+        if (!recorded.contains(channel)) continue;
+        Sent altered = recorded.at(channel);
+        send(altered);  // once more
         altered[altered.size() / 2] ^= 1;
-        rig.open_bus().Publish(channel, Bytes(altered));
+        send(altered);
       }
-      rig.Listen(milliseconds(100));
-      const auto refuses_all = [&] {  // whatever else it hears, the robot's states are among them
-        const auto& now = rig.witness().status();
+      rig.Listen(kHeartbeat);
+      const auto& now = rig.witness().status();
+      const auto refuses_all = [&] {
         return now && now->refused_unsigned > before.refused_unsigned && now->refused_forged > before.refused_forged &&
                now->refused_replayed > before.refused_replayed;
       };
       Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
+      Demand(row, !rig.witness().fault(), "a fault was believed or latched");
+      Demand(row, obeyed == obeyed_before, "the robot obeyed a fault, a reset or a certificate that nobody made");
+      Demand(row, now && now->version == before.version && now->failed_reloads == before.failed_reloads, "a reload was obeyed");
+      Demand(row, now && GetDigest(now->obstacles_digest) == GetDigest(before.obstacles_digest), "obstacles were believed");
+      Demand(row, now && now->messages_refused == before.messages_refused, "the certifier looked into a message that nobody may send");
     }, options_.others);
+    Demand(row, tried.size() == speakers.size(), "only " + std::to_string(tried.size()) + " channels were tried");
+    Remark(row, std::to_string(sent) + " sent on " + std::to_string(tried.size()) + " channels");
     if (rig.witness().status()) {
       const auto& s = *rig.witness().status();
       Remark(row, "refused by the certifier: " + std::to_string(s.refused_unsigned) + " unsigned, " +
-                      std::to_string(s.refused_forged) + " forged, " + std::to_string(s.refused_replayed) + " replayed");
+                      std::to_string(s.refused_forged) + " forged or of another bus, " + std::to_string(s.refused_replayed) + " replayed");
     }
+    StolenKeys();
+  }
+
+  // The adversary of the gate itself: a learned planner that has its key file, or another role's.
+  void StolenKeys() {
+    Rig rig(DemoTask());
+    Row& row = Begin("Certificates with slices of +-1e9, signed with a stolen key of planner, perception, robot, operator, logger",
+                     options_.others);
+    std::set<std::int64_t> forged, obeyed;
+    rig.Hear(rig.config().bus.event, [&](const Received& r) {
+      const auto event = Decoded<execution_event_t>(r.bytes);
+      if (event && event->kind != execution_event_t::REFUSED && forged.contains(event->plan_id)) obeyed.insert(event->plan_id);
+    });
+    Signer thief(rig.keys(), rig.config().bus.bus_name());
+    Tries(row, rig, [&](int i) {
+      const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
+      for (int j = 0; j < 20; ++j) {
+        certified_plan_t certified = Widened(*rig.witness().last_certified());
+        certified.plan.plan_id += j;
+        certified.plan.start_utime += 40'000 * j;
+        SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
+        SetDigest(certified.certificate_digest, CertificateDigest(certified));
+        forged.insert(certified.plan.plan_id);
+        const std::string& channel = rig.config().bus.certified;
+        rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));
+        rig.Listen(milliseconds(20));
+      }
+      rig.Listen(milliseconds(500));
+      Demand(row, obeyed.empty(), "the robot took a certificate that the certifier did not make");
+    }, options_.others);
+    Remark(row, std::to_string(forged.size()) + " forged, " + std::to_string(obeyed.size()) + " executed");
   }
 
   void Flood() {
@@ -903,7 +1005,7 @@ void Campaign::ReloadOfNoFile(Rig& rig) {
   Row& row = Begin("Reload of a pipe, /dev/zero, a directory, an unreadable file", options_.others);
   const std::string path = rig.task_path(), good = DemoTask();
   Tries(row, rig, [&](int i) {
-    const certifier_status_v2_t before = *rig.witness().status();
+    const certifier_status_v3_t before = *rig.witness().status();
     const auto& now = rig.witness().status();
     PutNoFile(path, i);
     rig.Signal(Rig::kRobot, SIGHUP);

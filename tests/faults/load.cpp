@@ -18,7 +18,7 @@ constexpr int kClosingAtMost = 50;
 Load::Load(const Config& config, Make make)
     : config_(config),
       make_(std::move(make)),
-      bus_(OpenBus(config.bus, "load")),
+      bus_(OpenBus(config.bus, Role::kPlanner)),
       base_id_(WallClockUs()) {
   bus_->Subscribe(config_.bus.decision, [this](const Received& r) { OnDecision(r); });
   bus_->Subscribe(config_.bus.status, [this](const Received& r) {

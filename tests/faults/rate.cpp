@@ -2,6 +2,7 @@
 // bus loses, how long an answer takes. Writes a table.
 #include <algorithm>
 #include <iostream>
+#include <optional>
 #include <sstream>
 
 #include <CLI/CLI.hpp>
@@ -10,9 +11,12 @@
 #include "certifier/gate/candidate_message.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
+#include "lcmtypes/authentic.h"
 #include "tests/faults/demo_task.h"
+#include "tests/faults/flood.h"
 #include "tests/faults/load.h"
 #include "tests/faults/report.h"
+#include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
@@ -24,12 +28,13 @@ constexpr const char* kGate =
     "  obstacles: task, require_stop: false}\n";
 
 struct Options {
-  double seconds = 20, rate = 1000;
+  double seconds = 20, rate = 1000, flood = 0;
   std::string report = "docs/reliability.md";
 };
 
 struct Row {
   std::string name;
+  double flood_per_s = 0;  // reached
   double asked = 0;
   std::int64_t sent = 0, answered = 0, again = 0, answers_lost = 0;
   double p50_us = 0, p99_us = 0, worst_us = 0;
@@ -52,7 +57,26 @@ int MostSteps(const Config& config) {
   throw std::runtime_error("nothing is certified");
 }
 
-Row Measure(const Options& options, const std::string& name, Config config, int steps) {
+using Payloads = std::vector<std::vector<std::uint8_t>>;
+
+// What a stranger can send: unsigned and random trailers, genuine messages once more, genuine trailers behind altered bodies.
+Payloads Forgeries(const Config& config, const Payloads& genuine, std::size_t body_bytes) {
+  constexpr int kEach = 32;
+  Payloads payloads;
+  Signer stranger(TestKeys("stranger"), config.bus.bus_name());
+  const std::vector<std::uint8_t> body(body_bytes);
+  for (int i = 0; i < kEach; ++i) {
+    payloads.push_back(stranger.Sign(Role::kPlanner, config.bus.candidate, body, WallClockUs()));
+    payloads.push_back(body);
+    if (genuine.empty() || body_bytes < genuine.front().size() / 2) continue;
+    payloads.push_back(genuine[static_cast<std::size_t>(i) % genuine.size()]);
+    payloads.push_back(payloads.back());
+    payloads.back()[100] ^= 1;
+  }
+  return payloads;
+}
+
+Row Measure(const Options& options, const std::string& name, Config config, int steps, std::size_t flood_bytes = 0) {
   Row row{.name = name};
   std::vector<std::string> command{FOREREACH_CERTIFIER, "--config", config.path, "--lcm-url", config.bus.url,
                                    "--state", config.path + ".state"};
@@ -60,11 +84,22 @@ Row Measure(const Options& options, const std::string& name, Config config, int 
   ChildProcess certifier(command);
   if (!certifier.WaitForLog("ready on")) throw std::runtime_error(certifier.error());
   Load load(config, [&](std::int64_t) { return Standing(config, steps); });
+  Payloads genuine;  // candidates as they are on the bus
+  auto ear = OpenBus(config.bus.url);
+  if (flood_bytes > 0)
+    ear->Subscribe(config.bus.candidate, [&](const Received& r) { genuine.emplace_back(r.raw.begin(), r.raw.end()); });
   load.Begin();
+  ear->Dispatch(50);
+  ear.reset();
+  std::optional<ForgedFlood> flood;
+  if (flood_bytes > 0)
+    flood.emplace(config.bus.url, config.bus.candidate, Forgeries(config, genuine, flood_bytes), options.flood);
   const std::int64_t begin = SteadyClockUs();
   load.Start(options.rate);
   load.ListenUntil(begin + static_cast<std::int64_t>(options.seconds * 1e6));
   row.asked = options.rate * static_cast<double>(SteadyClockUs() - begin) * 1e-6;
+  if (flood) row.flood_per_s = static_cast<double>(flood->sent()) / (static_cast<double>(SteadyClockUs() - begin) * 1e-6);
+  flood.reset();
   load.Finish();
   std::vector<double> latencies = load.TakeLatencies();
   row.p50_us = Percentile(latencies, 0.5), row.p99_us = Percentile(latencies, 0.99), row.worst_us = Percentile(latencies, 1);
@@ -103,6 +138,37 @@ std::string Table(const Options& options, int steps, const std::vector<Row>& row
   return text.str();
 }
 
+std::string FloodTable(const Options& options, const std::vector<Row>& rows) {
+  std::ostringstream text;
+  text << "Made by `scripts/faults rate --flood " << options.flood << " --rate " << options.rate << " --seconds "
+       << options.seconds << "`: signed candidates of 12 steps to the certifier's process\nwhile somebody without a key sends "
+       << "forged ones on the same channel: another robot's signatures, no signatures, and where they are as\nlong as a "
+       << "candidate also genuine ones once more and genuine trailers behind altered bodies. *Forged*: a second, as many as "
+       << "were reached.\n*Lost*: candidates, by the certifier's count of gaps, and decisions, by gaps heard.\n\n"
+       << "| flood | forged | refused | sent | certified | other answers | lost there | lost back | p50 us | p99 us | worst us |\n"
+       << "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  for (const Row& row : rows) {
+    const certifier_status_v3_t& status = row.status;
+    text << "| " << row.name << " | " << static_cast<std::int64_t>(row.flood_per_s) << " | "
+         << status.refused_unsigned + status.refused_forged + status.refused_replayed << " | " << row.sent << " | "
+         << status.by_outcome[decision_t::CERTIFIED] << " | " << OtherAnswers(status) << " | " << status.candidates_lost << " | "
+         << row.answers_lost << " | " << row.p50_us << " | " << row.p99_us << " | " << row.worst_us << " |\n";
+  }
+  return text.str();
+}
+
+int MeasureFlood(const Options& options, Config config) {
+  const ScratchDirectory scratch;
+  config.bus.url = PrivateBusUrl();
+  config.bus.key = MakeTestKeys(scratch / "keys");
+  constexpr int kSteps = 12;
+  std::vector<Row> rows{Measure(options, "none", config, kSteps)};
+  for (const std::size_t bytes : {std::size_t{64}, std::size_t{1000}, EncodedSize<candidate_plan_t>()})
+    rows.push_back(Measure(options, std::to_string(bytes) + " bytes", config, kSteps, bytes));
+  Publish(options.report, "forged flood", FloodTable(options, rows));
+  return std::ranges::all_of(rows, [](const Row& row) { return row.again == 0 && row.status.by_outcome[decision_t::CERTIFIED] > 0; }) ? 0 : 1;
+}
+
 // What is sent is answered once or counted as lost. In a short run a busy machine may have kept the load below what was asked.
 bool AddsUp(const Options& options, const Row& row) {
   const bool whole_load = options.seconds < 10 || static_cast<double>(row.sent) >= 0.99 * row.asked;
@@ -116,13 +182,15 @@ int Main(int argc, char** argv) {
                "forereach_rate_processes");
   app.add_option("--seconds", options.seconds, "How long, for each row")->capture_default_str();
   app.add_option("--rate", options.rate, "Candidates a second")->capture_default_str();
+  app.add_option("--flood", options.flood, "Forged messages a second beside them: says what becomes of the honest ones")
+      ->capture_default_str();
   AddReportOption(app, options.report);
   CLI11_PARSE(app, argc, argv);
   const ScratchDirectory scratch;
   Config config = LoadConfig(scratch.Write("task.yaml", DemoTask(kGate)));
+  if (options.flood > 0) return MeasureFlood(options, config);
   const int steps = MostSteps(config);
-  const std::string key = scratch / "key", url = PrivateBusUrl();
-  MakeKeyFile(key);
+  const std::string key = MakeTestKeys(scratch / "keys"), url = PrivateBusUrl();
   std::vector<Row> rows;
   for (const bool small : {false, true})
     for (const bool is_signed : {false, true}) {

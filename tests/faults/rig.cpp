@@ -9,8 +9,10 @@
 
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
+#include "lcmtypes/authentic_bus.h"
 #include "logger/check.h"
 #include "logger/event_log.h"
+#include "tests/keys.h"
 
 namespace forereach {
 namespace {
@@ -52,22 +54,25 @@ std::string Tail(const std::string& text) {
 }  // namespace
 
 Rig::Rig(const std::string& task, const Options& options)
-    : options_(options), task_path_(scratch_.Write("task.yaml", task)), key_path_(scratch_ / "key"),
-      next_directory_(scratch_ / "log"), state_(scratch_ / "state") {
+    : options_(options), task_path_(scratch_.Write("task.yaml", task + "bus: {name: campaign}\n")),
+      key_path_(MakeTestKeys(scratch_ / "keys", "campaign")),
+      next_directory_(scratch_ / "log"),
+      state_(scratch_ / "state") {
   static int rigs = 0;
   const int port = 20'000 + (static_cast<int>(::getpid()) * 16 + 2 * rigs++) % 40'000;
   far_url_ = "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
   near_url_ = options_.relayed ? "udpm://239.255.76.67:" + std::to_string(port + 1) + "?ttl=0" : far_url_;
-  MakeKeyFile(key_path_);
   config_ = LoadConfig(task_path_);
   config_.bus.url = near_url_;
   config_.bus.key = key_path_;
-  heard_ = OpenBus(near_url_);
-  signed_ = OpenBus(config_.bus, "campaign", [this] { return NowUs(); });
-  witness_ = std::make_unique<Witness>(*heard_, config_.bus, LoadKey(key_path_), options_.relayed);
+  open_ = OpenBus(near_url_);
+  signed_ = OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); });
+  // Clocks go back: it hears whatever is authentic, from whatever time.
+  heard_ = OpenSignedBus(near_url_, LoadPublicKeys(key_path_), config_.bus.bus_name(), config_.bus.speakers(), [] { return 0; });
+  witness_ = std::make_unique<Witness>(*heard_, config_.bus, options_.relayed);
   if (config_.gate.obstacles == ObstaclesSource::kBus)
-    perception_ = std::make_unique<Perception>(OpenBus(config_.bus, "perception"), config_.bus.obstacles, config_.gate,
-                                               options.seen);
+    perception_ = std::make_unique<Perception>(OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); }),
+                                               config_.bus.obstacles, config_.gate, options.seen);
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot}) Start(role);
 }
 
@@ -181,6 +186,7 @@ bool Rig::ListenUntil(const std::function<bool()>& done, std::chrono::millisecon
   while (!done()) {
     if (std::chrono::steady_clock::now() >= end) return false;
     heard_->Dispatch(5);
+    open_->Dispatch(0);
   }
   return true;
 }

@@ -81,9 +81,12 @@ class Rig final {
   [[nodiscard]] std::vector<std::string> CheckRecords() const;
 
   void Command(std::int16_t kind);
-  [[nodiscard]] Bus& bus() { return *signed_; }      ///< Signs.
-  [[nodiscard]] Bus& open_bus() { return *heard_; }  ///< Does not.
-  [[nodiscard]] Witness& witness() { return *witness_; }
+  [[nodiscard]] Bus& bus() { return *signed_; }     ///< Signs as every role.
+  [[nodiscard]] Bus& open_bus() { return *open_; }  ///< Neither signs nor looks at signatures.
+  /** Authentic messages. */
+  void Hear(const std::string& channel, Bus::Handler handler) { heard_->Subscribe(channel, std::move(handler)); }
+  [[nodiscard]] KeyRing keys() const { return LoadAllKeys(key_path_); }
+  [[nodiscard]] Witness& witness() const { return *witness_; }
   [[nodiscard]] Perception& perception() { return *perception_; }
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] std::string url(Role role) const { return options_.relayed && role >= kPlanner ? near_url_ : far_url_; }
@@ -111,7 +114,7 @@ class Rig final {
   ScratchDirectory scratch_;
   std::string task_path_, key_path_, near_url_, far_url_, next_directory_, directory_, state_;
   Config config_;
-  std::unique_ptr<Bus> heard_, signed_;
+  std::unique_ptr<Bus> heard_, signed_, open_;
   std::unique_ptr<Witness> witness_;
   std::array<std::unique_ptr<ChildProcess>, kRoles> processes_;
   std::unique_ptr<ChildProcess> second_;

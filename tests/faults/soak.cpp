@@ -10,10 +10,10 @@
 
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
-#include "lcmtypes/authentic.h"
 #include "logger/database.h"
 #include "tests/faults/load.h"
 #include "tests/faults/report.h"
+#include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
@@ -61,8 +61,7 @@ class Soak final {
     const std::string task = scratch_.Write("task.yaml", PatientTask() + "logger: {rotate_mb: 256, quota_mb: 2048}\n");
     config_ = LoadConfig(task);
     config_.bus.url = PrivateBusUrl();
-    config_.bus.key = scratch_ / "key";
-    MakeKeyFile(config_.bus.key);
+    config_.bus.key = MakeTestKeys(scratch_ / "keys");
     load_ = std::make_unique<Load>(config_, [this](std::int64_t number) {
       return CandidateFor(config_, 0, Eigen::Vector2d(0.2, number % 3 != 0 ? 0 : 2.5), 12, std::chrono::seconds(1));
     });

@@ -9,29 +9,23 @@
 
 namespace forereach {
 
-Witness::Witness(Bus& bus, const BusOptions& channels, const Key256& key, bool spoiled)
-    : channels_(channels), spoiled_(spoiled), authenticator_(key, 0) {
-  bus.SubscribeUnchecked(channels_.decision, [this](const Received& r) { OnDecision(r); });
-  bus.SubscribeUnchecked(channels_.certified, [this](const Received& r) { OnCertified(r); });
-  bus.SubscribeUnchecked(channels_.robot_state, [this](const Received& r) { OnState(r); });
-  bus.SubscribeUnchecked(channels_.transition, [this](const Received& r) { OnTransition(r); });
-  bus.SubscribeUnchecked(channels_.fault, [this](const Received& r) { OnFault(r); });
-  bus.SubscribeUnchecked(channels_.status, [this](const Received& r) { OnStatus(r); });
-  bus.SubscribeUnchecked(channels_.logger_status, [this](const Received& r) {
-    if (const auto status = Decoded<logger_status_t>(r.raw)) logger_status_ = status;
+Witness::Witness(Bus& bus, const BusOptions& channels, bool spoiled) : channels_(channels), spoiled_(spoiled) {
+  bus.Subscribe(channels_.decision, [this](const Received& r) { OnDecision(r); });
+  bus.Subscribe(channels_.certified, [this](const Received& r) { OnCertified(r); });
+  bus.Subscribe(channels_.robot_state, [this](const Received& r) { OnState(r); });
+  bus.Subscribe(channels_.transition, [this](const Received& r) { OnTransition(r); });
+  bus.Subscribe(channels_.fault, [this](const Received& r) { OnFault(r); });
+  bus.Subscribe(channels_.status, [this](const Received& r) { OnStatus(r); });
+  bus.Subscribe(channels_.logger_status, [this](const Received& r) {
+    if (const auto status = Decoded<logger_status_t>(r.bytes)) logger_status_ = status;
   });
 }
 
-Bytes Witness::Authentic(const Received& received) {
-  const auto [authenticity, message] = authenticator_.Check(received.channel, received.raw);
-  return authenticity == Authenticity::kAuthentic ? message : Bytes();
-}
-
 void Witness::OnDecision(const Received& received) {
-  const auto decision = Decoded<decision_t>(received.raw);
+  const auto decision = Decoded<decision_t>(received.bytes);
   if (!decision) return;
   ++decisions_;
-  const Digest digest = DigestOf(received.raw);
+  const Digest digest = DigestOf(received.bytes);
   const auto [known, is_new] = answers_.emplace(GetDigest(decision->plan_digest), Answer{digest, decision->cause});
   // The network may deliver one answer twice. The same bytes sent twice are two candidates; the second is a duplicate.
   if (!is_new && known->second.decision != digest && decision->cause != decision_t::CAUSE_DUPLICATE)
@@ -46,7 +40,7 @@ void Witness::OnDecision(const Received& received) {
 // One heartbeat is held against the last: what was counted then has been heard by now, what was heard then is counted
 // now. The certifier sends both from one thread, so a decision comes before the heartbeat that counts it.
 void Witness::OnStatus(const Received& received) {
-  const auto status = Decoded<certifier_status_v3_t>(received.raw);
+  const auto status = Decoded<certifier_status_v3_t>(received.bytes);
   // A certifier that is not in charge decides nothing.
   if (!status || status->state == certifier_status_v3_t::LISTENING || status->state == certifier_status_v3_t::STANDBY) return;
   status_ = status;
@@ -67,14 +61,14 @@ void Witness::OnStatus(const Received& received) {
 
 // While it is latched it is said again and again.
 void Witness::OnFault(const Received& received) {
-  const auto fault = Decoded<fault_t>(Authentic(received));
+  const auto fault = Decoded<fault_t>(received.bytes);
   if (!fault || (fault_ && fault->utime == fault_->utime && fault->sequence == fault_->sequence)) return;
   fault_ = fault;
   certificates_at_fault_ = certificates_;
 }
 
 void Witness::OnCertified(const Received& received) {
-  const auto plan = Decoded<certified_plan_t>(Authentic(received));
+  const auto plan = Decoded<certified_plan_t>(received.bytes);
   if (!plan || !FindSealFaults(*plan).empty()) return;
   if (world_ && GetDigest(plan->obstacles_digest) != *world_)
     Violate("plan " + std::to_string(plan->plan.plan_id) + " was certified under other obstacles than there are");
@@ -85,7 +79,7 @@ void Witness::OnCertified(const Received& received) {
 
 void Witness::OnState(const Received& received) {
   robot_heard_ = std::chrono::steady_clock::now();
-  const auto state = Decoded<robot_state_t>(Authentic(received));
+  const auto state = Decoded<robot_state_t>(received.bytes);
   if (!state || state->mode != robot_state_t::EXECUTING) return;
   applied_[state->utime] = {state->executing_plan_id, state->executing_step};
   const auto plan = plans_.find(state->executing_plan_id);
@@ -95,7 +89,7 @@ void Witness::OnState(const Received& received) {
 }
 
 void Witness::OnTransition(const Received& received) {
-  const auto transition = Decoded<transition_t>(Authentic(received));
+  const auto transition = Decoded<transition_t>(received.bytes);
   if (!transition) return;
   const auto applied = applied_.find(transition->utime);
   if (applied == applied_.end()) return;  // its state did not reach this listener

@@ -16,17 +16,16 @@
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
-#include "lcmtypes/authentic.h"
 #include "lcmtypes/bus.h"
 
 namespace forereach {
 
 class Witness final {
  public:
-  /** @param key of the system; a plan that is not signed with it is no certified plan.
+  /** @param bus hands out authentic messages only.
   @param spoiled if somebody between the certifier and this drops, repeats, delays or alters messages: the numbers of
   decisions are then not judged. */
-  Witness(Bus& bus, const BusOptions& channels, const Key256& key, bool spoiled);
+  Witness(Bus& bus, const BusOptions& channels, bool spoiled);
 
   /** One line for each thing that may not happen and did since the last call:
       - a robot executes a plan for which no certified plan, signed and sealed, was on the bus;
@@ -64,7 +63,6 @@ class Witness final {
 
  private:
   /** The message, if its sender has the key and it came once; else nothing, which no type decodes. */
-  [[nodiscard]] Bytes Authentic(const Received& received);
   void OnDecision(const Received& received);
   void OnStatus(const Received& received);
   void OnFault(const Received& received);
@@ -75,7 +73,6 @@ class Witness final {
 
   const BusOptions channels_;
   const bool spoiled_;
-  Authenticator authenticator_;
   struct Certified {
     certified_plan_t plan;
     std::int64_t number;  // counts certificates from 1

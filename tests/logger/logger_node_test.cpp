@@ -13,6 +13,7 @@
 
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "tests/keys.h"
 #include "tests/logger/direct_bus.h"
 #include "tests/logger/logs.h"
 
@@ -146,17 +147,16 @@ TEST_F(LoggerNodeTest, RecordsSequenceGapsAndRestarts) {
 class SignedLoggerTest : public LoggerNodeTest {
  protected:
   SignedLoggerTest() {
-    MakeKeyFile(scratch_ / "key");
-    config_.bus.key = scratch_ / "key";
-    planner_.emplace(LoadKey(config_.bus.key), "planner", kStart);
+    config_.bus.key = MakeTestKeys(scratch_ / "keys");
+    planner_.emplace(LoadAllKeys(config_.bus.key), "the bus");
   }
 
   [[nodiscard]] std::vector<std::uint8_t> Candidate(Signer& signer, std::int64_t sequence) const {
-    return signer.Sign("PLAN_CANDIDATE", Encode(MakeCandidate(sequence, sequence)), bus_.now_us);
+    return signer.Sign(Role::kPlanner, "PLAN_CANDIDATE", Encode(MakeCandidate(sequence, sequence)), bus_.now_us);
   }
   /** Candidates 0, 1 and 4, between them a repeated one and two of somebody without the key. */
   std::vector<std::vector<std::uint8_t>> Candidates() {
-    Signer other(Key256{1}, "other", kStart);
+    Signer other(TestKeys("other"), "the bus");
     const auto first = Candidate(*planner_, 0);
     return {first, Encode(MakeCandidate(std::int64_t{1} << 41, 1)), Candidate(other, std::int64_t{1} << 40), first,
             Candidate(*planner_, 1), Candidate(*planner_, 4)};
@@ -177,7 +177,8 @@ TEST_F(SignedLoggerTest, RecordsEverythingAndMakesRowsOfAuthenticMessagesOnly) {
   node.Tick(kStart);
   EXPECT_EQ(GetText(bus_.heartbeats.back().message), "recording");
   for (const auto& candidate : Candidates()) bus_.Publish("PLAN_CANDIDATE", Bytes(candidate));
-  bus_.Publish("PLAN_DECISION", MakeDecision(MakeCandidate(4, 4), 0, decision_t::CERTIFIED, 0));  // never signed
+  const decision_t decision = MakeDecision(MakeCandidate(4, 4), 0, decision_t::CERTIFIED, 0);
+  bus_.Publish("PLAN_DECISION", Bytes(planner_->Sign(Role::kCertifier, "PLAN_DECISION", Encode(decision), bus_.now_us)));
   node.Tick(bus_.now_us += 600'000);
   EXPECT_THAT(GetText(bus_.heartbeats.back().message), testing::HasSubstr("3 (unsigned 1, forged 1, replayed 1)"));
   EXPECT_EQ(bus_.heartbeats.back().state, logger_status_t::OK);

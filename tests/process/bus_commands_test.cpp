@@ -1,7 +1,9 @@
 // `forereach keygen`, `status`, `reset` and `reload` against a certifier that runs, signs and checks.
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <map>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -9,10 +11,12 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/task/process.h"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "tests/cli/program.h"
+#include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
@@ -23,14 +27,14 @@ using testing::HasSubstr;
 class BusCommands : public testing::Test {
  protected:
   BusCommands() {
-    EXPECT_EQ(Forereach("keygen '" + key_ + "'").code, 0);
+    EXPECT_EQ(Forereach("keygen --robot test '" + key_ + "'").code, 0);
     std::string task = PatientTask();
     task.replace(task.find("arming: none"), 12, "arming: robot_state, robot_timeout_ms: 2000");
     scratch_.Write("task.yaml", task);
     config_ = LoadConfig(path_);
     config_.bus.url = PrivateBusUrl();
     config_.bus.key = key_;
-    bus_ = OpenBus(config_.bus, "test");
+    bus_ = OpenBusOfAllRoles(config_.bus);
     certifier_ = std::make_unique<ChildProcess>(std::vector<std::string>{
         FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", config_.bus.url, "--key", key_});
     EXPECT_TRUE(certifier_->WaitForLog("ready on")) << certifier_->error();
@@ -52,7 +56,7 @@ class BusCommands : public testing::Test {
   }
 
   const ScratchDirectory scratch_;
-  const std::string path_ = scratch_ / "task.yaml", key_ = scratch_ / "key";
+  const std::string path_ = scratch_ / "task.yaml", key_ = scratch_ / "keys";
   Config config_;
   std::unique_ptr<Bus> bus_;
   std::unique_ptr<ChildProcess> certifier_;
@@ -105,6 +109,96 @@ TEST_F(BusCommands, UnsignedCandidatesAndStatesDoNothing) {
   EXPECT_EQ(status["state"], "disarmed");
   EXPECT_EQ(status["candidates"], 0);
   EXPECT_EQ(status["refused_unsigned"], 2);
+}
+
+// A stranger, or somebody with another role's key, says that all is well, once the certifier is dead.
+TEST_F(BusCommands, AForgedHeartbeatIsNoSignOfLife) {
+  SayState();
+  EXPECT_EQ(Say("status").code, 0);
+  EXPECT_EQ(certifier_->Terminate(), 0);
+  const auto open = OpenBus(config_.bus.url);
+  Signer forger(LoadAllKeys(key_), config_.bus.bus_name()), stranger(TestKeys("stranger"), config_.bus.bus_name());
+  std::atomic<bool> stop = false;
+  std::thread forging([&] {
+    for (std::int64_t i = 0; !stop; ++i, std::this_thread::sleep_for(std::chrono::milliseconds(20))) {
+      certifier_status_v3_t status{};
+      status.utime = WallClockUs();
+      status.sequence = i;
+      status.level = certifier_status_v3_t::OK;
+      status.state = certifier_status_v3_t::ARMED;
+      const auto bytes = Encode(status);
+      open->Publish("CERTIFIER_STATUS", Bytes(bytes));
+      open->Publish("CERTIFIER_STATUS", Bytes(stranger.Sign(Role::kCertifier, "CERTIFIER_STATUS", bytes, status.utime)));
+      for (const Role role : kAllRoles)
+        if (role != Role::kCertifier)
+          open->Publish("CERTIFIER_STATUS", Bytes(forger.Sign(role, "CERTIFIER_STATUS", bytes, status.utime)));
+    }
+  });
+  const Output status = Say("status"), reset = Say("reset"), reload = Say("reload");
+  const Output believed = Say("status", false);
+  stop = true;
+  forging.join();
+  for (const Output& output : {status, reset, reload}) {
+    EXPECT_EQ(output.code, 1) << output.text;
+    EXPECT_THAT(output.text, HasSubstr("no certifier answered"));
+  }
+  EXPECT_EQ(believed.code, 0) << "without a key everybody is believed";
+  EXPECT_THAT(believed.text, HasSubstr("UNSIGNED: anyone on this network can move this robot"));
+}
+
+TEST_F(BusCommands, AProcessWithAnotherRolesKeyDoesNotStart) {
+  ChildProcess process({FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", config_.bus.url, "--key", key_ + "/planner.key"});
+  EXPECT_EQ(process.WaitForExit(), 2);
+  EXPECT_THAT(process.error(), HasSubstr("planner.key: line 3: role: is planner, this program speaks as certifier"));
+}
+
+TEST_F(BusCommands, DoctorLooksAtTheKeys) {
+  EXPECT_THAT(Forereach("doctor --key '" + key_ + "' --lcm-url '" + config_.bus.url + "' 2>&1").text,
+              HasSubstr("of robot test, for bus " + config_.bus.bus_name() + "; secrets of certifier, planner"));
+  std::filesystem::permissions(key_ + "/planner.key", std::filesystem::perms::others_read, std::filesystem::perm_options::add);
+  const Output bad = Forereach("doctor --key '" + key_ + "' --lcm-url '" + config_.bus.url + "' 2>&1");
+  EXPECT_EQ(bad.code, 1);
+  EXPECT_THAT(bad.text, HasSubstr("others can read it"));
+}
+
+// Whatever is sent on each of our channels, only what its speaker signed for this robot and this bus is handed out.
+TEST_F(BusCommands, OnEachChannelOnlyItsSpeakerIsHeard) {
+  const auto open = OpenBus(config_.bus.url);
+  const KeyRing keys = LoadAllKeys(key_);
+  const std::string bus_name = config_.bus.bus_name();
+  Signer all(keys, bus_name), other_robot(TestKeys("other"), bus_name), other_bus(keys, "another bus");
+  std::map<std::string, int> heard, wanted;
+  const auto ear = OpenBus(config_.bus, Role::kLogger);
+  EXPECT_EQ(certifier_->Terminate(), 0);  // it speaks here too
+  for (const auto& [channel, speaker] : config_.bus.speakers())
+    ear->Subscribe(channel, [&heard](const Received& r) { heard[r.channel] += std::ranges::equal(r.bytes, Bytes(DigestOf("good"))); });
+  int forged = 0;
+  const Digest good = DigestOf("good");
+  for (const auto& [channel, speaker] : config_.bus.speakers()) {
+    const std::int64_t now = WallClockUs();
+    const auto send = [&](const std::vector<std::uint8_t>& bytes) { open->Publish(channel, Bytes(bytes)); };
+    open->Publish(channel, Bytes(good));
+    const auto genuine = all.Sign(speaker, channel, good, now);
+    auto altered = genuine;
+    altered[0] ^= 1;
+    send(altered), ++forged;
+    send(genuine), ++wanted[channel];
+    send(genuine);  // replayed
+    for (const Role role : kAllRoles)
+      if (role != speaker) send(all.Sign(role, channel, good, now)), ++forged;
+    send(other_robot.Sign(speaker, channel, good, now)), ++forged;
+    send(other_bus.Sign(speaker, channel, good, now));
+  }
+  const auto channels = static_cast<std::int64_t>(wanted.size());
+  for (int i = 0; i < 200 && ear->refusals().foreign < channels; ++i) ear->Dispatch(10);
+  ear->Dispatch(10);
+  EXPECT_EQ(channels, 11);
+  EXPECT_EQ(heard, wanted);
+  const Refusals refusals = ear->refusals();
+  EXPECT_EQ(refusals.unsigned_ones, channels);
+  EXPECT_EQ(refusals.forged, forged);
+  EXPECT_EQ(refusals.replayed, channels);
+  EXPECT_EQ(refusals.foreign, channels);
 }
 
 TEST(BusCommandsTest, NobodyThereIsSaid) {

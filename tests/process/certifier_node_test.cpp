@@ -2,6 +2,7 @@
 #include "certifier/process/certifier_node.h"
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -21,6 +22,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "robot/sim_node.h"
 #include "tests/gate/small_task.h"
+#include "tests/keys.h"
 #include "tests/scratch.h"
 
 namespace forereach {
@@ -1124,6 +1126,49 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
   EXPECT_EQ(status_.version, 2);
   EXPECT_EQ(GetDigest(status_.config_digest), LoadConfig(path_).digest);
   EXPECT_EQ(GetText(status_.message), "waits for the robot's state");
+}
+
+TEST_F(ReloadTest, TheKeyCannotChange) {
+  const std::string keys = MakeTestKeys(scratch_ / "keys"), others = MakeTestKeys(scratch_ / "others");
+  const auto with_key = [&](const std::string& key) {
+    Copy([&](const std::string& text) { return text + (key.empty() ? "" : "\nbus: {key: " + key + "}\n"); });
+  };
+  with_key(keys);
+  auto node = std::make_unique<CertifierNode>(LoadConfig(path_), *bus_, Clocks{clock_, clock_});
+  bus_->Subscribe("CERTIFIER_STATUS", [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+  node->Tick(kNow);
+  bus_->Dispatch(0);
+  const auto refused = [&](const char* why) {
+    const std::int64_t failed = status_.failed_reloads, version = status_.version;
+    Reload(*node);
+    EXPECT_EQ(status_.failed_reloads, failed + 1) << why;
+    EXPECT_EQ(status_.version, version) << why;
+    EXPECT_THAT(GetText(status_.message), testing::HasSubstr(why));
+  };
+  with_key("");
+  refused("bus.key is missing, it was");
+  with_key(others);
+  refused("bus.key is " );
+  with_key(keys);
+  Reload(*node);
+  EXPECT_EQ(status_.version, 2) << "the same key is taken";
+  std::filesystem::rename(keys, scratch_ / "old");
+  refused("cannot be read");
+  std::filesystem::rename(others, keys);
+  refused("holds other keys than at the start");
+}
+
+TEST_F(ReloadTest, AKeyThatTheCommandLineGaveStays) {
+  Copy([](const std::string& text) { return text; });
+  Config config = LoadConfig(path_);
+  config.bus.key = MakeTestKeys(scratch_ / "keys");
+  config.bus.key_is_given = true;
+  auto node = std::make_unique<CertifierNode>(config, *bus_, Clocks{clock_, clock_});
+  bus_->Subscribe("CERTIFIER_STATUS", [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+  node->Tick(kNow);
+  bus_->Dispatch(0);
+  Reload(*node);
+  EXPECT_EQ(status_.version, 2) << GetText(status_.message);
 }
 
 TEST_F(ReloadTest, ArmingAndQueueAreTheNewFilesToo) {

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {
@@ -39,6 +40,19 @@ TEST_P(UsageTest, HelpTeachesWithAnExample) {
   EXPECT_EQ(process.WaitForExit(), 0);
   EXPECT_THAT(process.output(),
               AllOf(HasSubstr("--config"), HasSubstr("--lcm-url"), HasSubstr("Example:\n  forereach-")));
+}
+
+TEST_P(UsageTest, WithoutAKeyItWarns) {
+  const std::string task = scratch_.Write("task.yaml", PatientTask()), url = PrivateBusUrl();
+  for (const bool with_key : {false, true}) {
+    std::vector<std::string> command{program(), "--config", task, "--lcm-url", url};
+    if (with_key) command.insert(command.end(), {"--key", MakeTestKeys(scratch_ / "keys")});
+    if (program() == FOREREACH_LOGGER) command.insert(command.end(), {"--directory", scratch_ / "log"});
+    ChildProcess process(command);
+    EXPECT_TRUE(process.WaitForLog("ready on")) << process.error();
+    EXPECT_EQ(process.error().find("UNSIGNED: anyone on this network can move this robot") == std::string::npos, with_key);
+    EXPECT_EQ(process.Terminate(), 0);
+  }
 }
 
 TEST_P(UsageTest, WithoutConfigItSaysSo) {

@@ -9,7 +9,9 @@
 #include <gmpxx.h>
 #include <gtest/gtest.h>
 
+#include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
+#include "tests/scratch.h"
 
 namespace forereach {
 namespace {
@@ -453,19 +455,130 @@ TEST(GuardHalt, AStateOutsideItsSliceHaltsUntilAReset) {
   EXPECT_TRUE(guard.Accept(next, kNow).ok());
 }
 
-TEST(GuardKey, TakesSignedPlansOnly) {
+GuardOptions WithKeys(const KeyRing& keys = TestKeys()) {
   GuardOptions options = TwoStates();
-  options.key = Key256{1};
-  Guard guard(options);
+  options.keys = keys;
+  options.bus_name = "the bus";
+  return options;
+}
+
+TEST(GuardKey, TakesPlansThatTheCertifierSignedOnly) {
+  Guard guard(WithKeys());
   const auto plan = Sealed(SmallPlan());
   EXPECT_EQ(guard.Accept(plan, kNow).cause, GuardCause::kUnsigned);
-  Signer signer({1}, "certifier", 0), stranger({2}, "certifier", 0);
-  EXPECT_EQ(guard.Accept(stranger.Sign("PLAN_CERTIFIED", plan, kNow), kNow).cause, GuardCause::kForged);
-  EXPECT_EQ(guard.Accept(signer.Sign("PLAN_CANDIDATE", plan, kNow), kNow).cause, GuardCause::kForged);
+  Signer signer(TestKeys(), "the bus"), stranger(TestKeys("stranger"), "the bus"), elsewhere(TestKeys(), "another bus");
+  const auto by = [&](Signer& who, Role role, const char* channel = "PLAN_CERTIFIED") {
+    return who.Sign(role, channel, plan, kNow);
+  };
+  for (const Role role : kAllRoles)
+    if (role != Role::kCertifier) {
+      EXPECT_EQ(guard.Accept(by(signer, role), kNow).cause, GuardCause::kForged) << RoleName(role);
+    }
+  EXPECT_EQ(guard.Accept(by(stranger, Role::kCertifier), kNow).cause, GuardCause::kForged);
+  EXPECT_EQ(guard.Accept(by(signer, Role::kCertifier, "PLAN_DECISION"), kNow).cause, GuardCause::kForged);
+  EXPECT_EQ(guard.Accept(by(elsewhere, Role::kCertifier), kNow).cause, GuardCause::kForeign);
   EXPECT_EQ(guard.pending(), nullptr);
-  const auto good = signer.Sign("PLAN_CERTIFIED", plan, kNow);
+  const auto good = by(signer, Role::kCertifier);
   EXPECT_TRUE(guard.Accept(good, kNow).ok());
   EXPECT_EQ(guard.Accept(good, kNow).cause, GuardCause::kSignatureReplayed);
+}
+
+TEST(GuardKey, TheKeyFileOfTheRobotIsEnough) {
+  const ScratchDirectory scratch;
+  const std::string keys = MakeTestKeys(scratch / "keys");
+  Guard guard(WithKeys(LoadKeys(keys + "/robot.key", Role::kRobot)));
+  Signer certifier(LoadKeys(keys, Role::kCertifier), "the bus");
+  EXPECT_TRUE(guard.Accept(certifier.Sign(Role::kCertifier, "PLAN_CERTIFIED", Sealed(SmallPlan()), kNow), kNow).ok());
+}
+
+TEST(GuardAccept, ADigestOfZeroIsRefused) {
+  const auto cause = [](auto zero) {
+    certified_plan_t certified = SmallPlan();
+    Seal(certified);
+    zero(certified);
+    Guard guard(TwoStates());
+    return guard.Accept(Encode(certified), kNow);
+  };
+  const auto zeroed = [&](std::uint8_t (certified_plan_t::*digest)[32], const char* name, bool reseal) {
+    const GuardVerdict verdict = cause([&](certified_plan_t& certified) {
+      SetDigest(certified.*digest, {});
+      if (reseal) SetDigest(certified.certificate_digest, CertificateDigest(certified));
+    });
+    EXPECT_EQ(verdict.cause, GuardCause::kZeroDigest) << name;
+    EXPECT_EQ(verdict.message, std::string(name) + " is zero");
+  };
+  zeroed(&certified_plan_t::plan_digest, "plan_digest", true);
+  zeroed(&certified_plan_t::config_digest, "config_digest", true);
+  zeroed(&certified_plan_t::model_digest, "model_digest", true);
+  zeroed(&certified_plan_t::declaration_digest, "declaration_digest", true);
+  zeroed(&certified_plan_t::observations_digest, "observations_digest", true);
+  zeroed(&certified_plan_t::obstacles_digest, "obstacles_digest", true);
+  zeroed(&certified_plan_t::certificate_digest, "certificate_digest", false);
+}
+
+// SmallPlan's slices 0..2 and its X_0 fit into it exactly; slice 3, the last, does not.
+GuardDomain Around() { return {{-12, -5}, {12, 5}, {0}, {0}}; }
+
+TEST(GuardDomainTest, APlanThatLeavesItIsRefusedWithTheWitness) {
+  GuardOptions options = TwoStates();
+  options.domain = Around();
+  const auto judge = [&](auto alter) {
+    certified_plan_t certified = SmallPlan();
+    alter(certified);
+    Guard guard(options);
+    return guard.Accept(Sealed(certified), kNow);
+  };
+  EXPECT_TRUE(judge([](auto&) {}).ok()) << "what it reaches exactly is inside, and its last slice is not looked at";
+  const auto refused = [&](auto alter, int step, int coordinate, double value, double bound) {
+    const GuardVerdict verdict = judge(alter);
+    EXPECT_EQ(verdict.cause, GuardCause::kOutsideDomain) << verdict.message;
+    EXPECT_EQ(verdict.step, step);
+    EXPECT_EQ(verdict.coordinate, coordinate);
+    EXPECT_EQ(verdict.value, value);
+    EXPECT_EQ(verdict.bound, bound);
+  };
+  refused([](auto& c) { c.slice_upper[2][0] = Above(12); }, 2, 0, Above(12), 12);
+  refused([](auto& c) { c.slice_lower[2][0] = Below(-12); }, 2, 0, Below(-12), -12);
+  refused([](auto& c) { c.slice_upper[0][1] = 1e9; }, 0, 1, 1e9, 5);
+  refused([](auto& c) { c.plan.control[1][0] = Above(0); }, 1, 2, Above(0), 0);
+  refused([](auto& c) { c.plan.control[0][0] = Below(0); }, 0, 2, Below(0), 0);
+  refused([](auto& c) { c.plan.initial_half_width[0] = 11.5; }, 0, 0, 12.5, 12);
+  EXPECT_TRUE(judge([](auto& c) { c.slice_upper[3][0] = 1e9; }).ok()) << "where the plan leads to is not in the domain";
+  certified_plan_t wide = SmallPlan();
+  for (int t = 0; t <= 3; ++t)
+    for (int k = 0; k < 2; ++k) wide.slice_lower[t][k] = -1e9, wide.slice_upper[t][k] = 1e9;
+  Guard guard(options);
+  EXPECT_EQ(guard.Accept(Sealed(wide), kNow).cause, GuardCause::kOutsideDomain);
+}
+
+// center + half_width above 12 by less than a rounding error of the sum.
+TEST(GuardDomainTest, TheInitialSetIsComparedExactly) {
+  GuardOptions options = TwoStates();
+  options.domain = Around();
+  certified_plan_t certified = SmallPlan();
+  certified.plan.initial_center[0] = 12;
+  certified.plan.initial_half_width[0] = 0;
+  EXPECT_TRUE(Guard(options).Accept(Sealed(certified), kNow).ok());
+  certified.plan.initial_half_width[0] = std::numeric_limits<double>::denorm_min();
+  EXPECT_EQ(Guard(options).Accept(Sealed(certified), kNow).cause, GuardCause::kOutsideDomain);
+}
+
+TEST(GuardDomainTest, ComesWithTheTaskThatIsReadAgain) {
+  GuardOptions options = TwoStates();
+  options.domain = Around();
+  Guard guard(options);
+  GuardDomain wider = Around();
+  wider.state_upper[0] = 100;
+  guard.Expect(DigestOf("another config"), DigestOf("another model"), wider);
+  certified_plan_t certified = SmallPlan(8);
+  certified.slice_upper[1][0] = 100;
+  EXPECT_EQ(guard.Accept(Sealed(certified), kNow).cause, GuardCause::kOutsideDomain) << "of the task before";
+  SetDigest(certified.config_digest, DigestOf("another config"));
+  SetDigest(certified.model_digest, DigestOf("another model"));
+  EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
+  certified.plan.plan_id = 9;
+  EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok()) << "from then on";
+  EXPECT_THROW(guard.Expect(DigestOf("c"), DigestOf("m"), GuardDomain{{1}, {0}, {}, {}}), std::invalid_argument);
 }
 
 TEST(GuardHalt, ForgetsWhatWaitsAndWhatExecutes) {
@@ -483,6 +596,15 @@ TEST(GuardOptionsTest, ImpossibleOptionsThrow) {
   EXPECT_THROW(Guard({1, 9, kStep, {}, {}}), std::invalid_argument);
   EXPECT_THROW(Guard({1, 1, 0, {}, {}}), std::invalid_argument);
   EXPECT_NO_THROW(Guard({16, 8, 1, {}, {}}));
+  GuardOptions nameless = WithKeys();
+  nameless.bus_name.clear();
+  EXPECT_THROW(Guard{nameless}, std::invalid_argument);
+  for (const GuardDomain& bad : {GuardDomain{{0}, {1}, {0}, {1}}, GuardDomain{{0, 0}, {1, -1}, {0}, {1}},
+                                 GuardDomain{{0, kNaN}, {1, 1}, {0}, {1}}, GuardDomain{{0, 0}, {1, 1}, {0, 0}, {1, 1}}}) {
+    GuardOptions options = TwoStates();
+    options.domain = bad;
+    EXPECT_THROW(Guard{options}, std::invalid_argument);
+  }
 }
 
 }  // namespace

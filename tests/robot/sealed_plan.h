@@ -41,6 +41,9 @@ inline certified_plan_t SmallPlan(std::int64_t plan_id = 7) {
   }
   SetDigest(certified.config_digest, DigestOf("config"));
   SetDigest(certified.model_digest, DigestOf("model"));
+  SetDigest(certified.declaration_digest, DigestOf("declaration"));
+  SetDigest(certified.observations_digest, DigestOf("observations"));
+  SetDigest(certified.obstacles_digest, DigestOf("obstacles"));
   return certified;
 }
 

@@ -13,6 +13,8 @@
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/authentic_bus.h"
+#include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach {
@@ -44,6 +46,8 @@ Config PointMassTask() {
   Problem problem;
   problem.model = MakePointMass(0.15);
   problem.projection = Eigen::MatrixXd::Identity(2, 4);
+  problem.domain.state = Box(Eigen::VectorXd::Constant(4, -1e3), Eigen::VectorXd::Constant(4, 1e3));
+  problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
   config.problem = std::make_shared<const Problem>(problem);
   config.digest = DigestOf("config");
   config.model_digest = DigestOf("model");
@@ -80,6 +84,8 @@ certified_plan_t Plan(const Config& config, std::int64_t id, int start, const st
   }
   SetDigest(certified.config_digest, config.digest);
   SetDigest(certified.model_digest, config.model_digest);
+  for (auto* digest : {&certified.declaration_digest, &certified.observations_digest, &certified.obstacles_digest})
+    SetDigest(*digest, DigestOf("something"));
   return certified;
 }
 
@@ -554,6 +560,8 @@ TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
   Problem problem;
   problem.model = MakeKinematicBicycle(0.1, 2.5);
   problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -1e3), Eigen::VectorXd::Constant(6, 1e3));
+  problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
   config.problem = std::make_shared<const Problem>(problem);
   config.robot.start = {0, 0, 0, 20, 1, 0.3};
   config.robot.residual = "heading_saturation";
@@ -569,6 +577,38 @@ TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
   EXPECT_EQ(std::vector<double>(standing.state, standing.state + 6), expected);
   expected[3] = expected[4] = 0;
   EXPECT_EQ(rig.StateAt(4), expected) << "at rest: v = a = 0, heading and steering kept";
+}
+
+TEST(RobotSim, APlanThatLeavesItsDomainIsRefused) {
+  const Config config = PointMassTask();
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t certified = Plan(config, 1, 1, kOrigin);
+  certified.slice_upper[1][0] = 1e9;
+  rig.Send(certified);
+  rig.RunTo(3);
+  EXPECT_EQ(rig.Summary()["plans_refused"]["outside_domain"], 1);
+  EXPECT_EQ(rig.Count(kStarted), 0);
+}
+
+// With keys, over the same bus as everybody: only the certifier's word counts.
+TEST(RobotSim, APlanThatAnotherRoleSignedIsNotExecuted) {
+  Config config = PointMassTask();
+  config.bus.url = "memq://";
+  config.bus.keys = TestKeys();
+  std::int64_t now = kT0;
+  const auto bus = OpenSignedBus("memq://", TestKeys(), config.bus.bus_name(),
+                                 {{config.bus.certified, Role::kPlanner}}, [&] { return now; });  // the thief's
+  std::ostringstream out;
+  RobotSimNode node(config, *bus, out);
+  for (int j = 0; j < 4; ++j, now += kPeriod) {
+    if (j == 1) bus->Publish(config.bus.certified, Bytes(Sealed(Plan(config, 1, 2, kOrigin))));
+    bus->Dispatch(0);
+    node.Tick(now);
+  }
+  const auto summary = nlohmann::json::parse(node.Summary());
+  EXPECT_EQ(summary["plans_refused"]["forged"], 1) << "the guard looks by itself";
+  EXPECT_EQ(summary["plans_started"], 0);
 }
 
 TEST(RobotSim, StopPrintsOneLineOfJson) {
