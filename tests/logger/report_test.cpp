@@ -147,6 +147,7 @@ TEST_F(LogPictureTest, WantsAPlane) {
 }
 
 TEST_F(LogPictureTest, TheReportSaysWhatIsWrong) {
+  Append("PLAN_CANDIDATE", Drive(0, true));
   std::ostringstream out;
   EXPECT_THAT([&] { Report({{scratch_ / "log"}, scratch_ / "missing.yaml", ""}, out); },
               testing::ThrowsMessage<BadInput>(testing::HasSubstr("missing.yaml")));
@@ -161,10 +162,11 @@ TEST_F(LogPictureTest, TheReportRefusesAPictureItCannotWriteBeforeItReadsAnythin
 
 // The name of a channel may be any bytes.
 TEST_F(LogPictureTest, TheReportIsJsonWhateverTheLogHolds) {
+  Append("PLAN_CANDIDATE", Drive(0, true));
   Append("CH\xff\xfe", MakeEvent(0, 0));
   std::ostringstream out;
   Report({{scratch_ / "log"}, FOREREACH_SOURCE_DIR "/tests/data/course.yaml", "", true}, out);
-  EXPECT_EQ(nlohmann::json::parse(out.str())["messages"].size(), 1u);
+  EXPECT_EQ(nlohmann::json::parse(out.str())["messages"].size(), 2u);
 }
 
 }  // namespace
