@@ -205,7 +205,7 @@ class LogReading {
     if (damage.places > 0 && share.is_first)
       certificates_.push_back({logs[0], {}, "the log is damaged in " + std::to_string(damage.places) + " places", {}});
     for (const decision_t& decision : decisions_)
-      if (const auto plan = of_plan_.find(GetDigest(decision.plan_digest)); plan != of_plan_.end())
+      for (auto [plan, end] = of_plan_.equal_range(GetDigest(decision.plan_digest)); plan != end; ++plan)
         CheckDecision(decision, plan->second);
     for (const auto& [digest, outcome] : outcomes_)
       if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
@@ -281,7 +281,7 @@ class LogReading {
     NoticeRestart(certified->sequence, last_certified_);
     certificate.name += ", plan " + std::to_string(certified->plan.plan_id) + " of " + GetText(certified->plan.source);
     CheckDigests(*certified, certificate);
-    of_plan_[DigestOf(Encode(certified->plan))] = {certificates_.size(), *certified};
+    of_plan_.insert({DigestOf(Encode(certified->plan)), {certificates_.size(), *certified}});
     certificates_.push_back(std::move(certificate));
   }
 
@@ -396,7 +396,7 @@ class LogReading {
   std::map<Digest, std::int16_t> outcomes_;
   std::set<Digest> plans_;
   std::vector<decision_t> decisions_;  // those that say CERTIFIED
-  std::map<Digest, Plan> of_plan_;
+  std::multimap<Digest, Plan> of_plan_;
   std::int64_t last_decision_ = -1, last_certified_ = -1;
 };
 

@@ -110,7 +110,7 @@ std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::s
     const bool same_row = i > 0 && bounds[i - 1].row == bounds[i].row;
     if (!same_row) text += (i > 0 ? "}, " : "") + names[static_cast<std::size_t>(bounds[i].row)] + ": {";
     text +=
-        (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " + RoundedUp(bounds[i].upper);
+        (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " + RoundedUp(bounds[i].upper, kDigits);
   }
   return text + (bounds.empty() ? "}" : "}}");
 }

@@ -115,10 +115,6 @@ TEST_F(DeclareTest, SaysWhereThereIsNoFiniteBound) {
   const std::string words = "no finite bound for the slope of theta by v";
   for (const char* options : {"", "--json", "--max-boxes 100000000", "--gap 1e-12", "--max-boxes 5"})
     expect(pole, {words.c_str(), "delta in [", "heading_saturation", "domain", task_.c_str()}, options);
-  expect(std::regex_replace(bicycle, std::regex("gate_temperature: 0.1"), "gate_temperature: [0, 1]"),
-         {"no finite bound", "gate_temperature in [0, "});
-  expect(std::regex_replace(bicycle, std::regex("\\[-40, -40(.*)0, -3, -0.48\\]"), "[-40, -40$010, -3, -1e308]"),
-         {"no finite bound"});
   EXPECT_FALSE(std::filesystem::exists(cover_));
   std::ofstream(task_) << pole;
   EXPECT_EQ(Declare("--cover " + cover_).code, 1);

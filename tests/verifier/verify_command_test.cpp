@@ -164,7 +164,7 @@ TEST_F(VerifyDecision, ChangedSigma) {
   Reseal(LoadConfig(scratch_ / "task.yaml"));
   const Output output = Verify();
   EXPECT_EQ(output.code, 1);
-  EXPECT_THAT(output.text, Not(HasSubstr("digest")));
+  EXPECT_THAT(output.text, Not(HasSubstr("digest of")));
 }
 
 TEST_F(VerifyDecision, MovedObstacle) {

@@ -230,6 +230,7 @@ class VerifyObstacles : public testing::Test {
     if (edit) edit(obstacles, certified);
     if (edit_decision_) edit_decision_(answer.decision);
     const std::string path = scratch_ / "log.lcmlog";
+    std::filesystem::remove(path);  // a writer goes on with a log that is there
     EventLogWriter writer(path);
     writer.Append(kStart + 1, config_.bus.obstacles, Encode(obstacles));
     writer.Append(kStart + 3, config_.bus.candidate, bytes);
