@@ -100,7 +100,8 @@ LatchFile::Content ContentFrom(const Json& json) {
 // Of the file's size.
 std::string TextOf(const LatchFile::Content& content) {
   const Json inner = ToJson(content);
-  std::string text = Dump({{"format", kFormat}, {"version", kVersion}, {"content", inner}, {"digest", ToHex(DigestOf(Dump(inner)))}});
+  std::string text = Dump(
+      {{"format", kFormat}, {"version", kVersion}, {"content", inner}, {"digest", ToHex(DigestOf(Dump(inner)))}});
   if (text.size() < LatchFile::kBytes) text.resize(LatchFile::kBytes - 1, ' '), text += '\n';
   return text;
 }
@@ -110,7 +111,8 @@ LatchFile::Content ContentOf(const std::string& text) {
   const Json json = ParseJson<Json>(text);
   if (json.at("format") != kFormat) throw Json::other_error::create(501, "its format is another", nullptr);
   if (json.at("version") != kVersion)
-    throw Json::other_error::create(501, "its version is " + Dump(json["version"]) + ", this certifier knows " + std::to_string(kVersion), nullptr);
+    throw Json::other_error::create(
+        501, "its version is " + Dump(json["version"]) + ", this certifier knows " + std::to_string(kVersion), nullptr);
   if (json.at("digest") != ToHex(DigestOf(Dump(json.at("content")))))
     throw Json::other_error::create(501, "its digest is not that of its content", nullptr);
   return ContentFrom(json["content"]);
@@ -151,7 +153,8 @@ bool LatchFile::OpenDirectory() {
     const int cause = errno;
     ::close(directory);
     if (cause == EWOULDBLOCK)
-      throw BadInput("gate.state: " + directory_ + ": another certifier keeps its state there; each robot and each certifier that stands by needs a directory of its own (--state)");
+      throw BadInput("gate.state: " + directory_ + ": another certifier keeps its state there; each robot and each "
+                       "certifier that stands by needs a directory of its own (--state)");
     return Fail(directory_ + ": cannot be locked: " + std::generic_category().message(cause));
   }
   if (lock_ >= 0) ::close(lock_);
@@ -211,7 +214,8 @@ std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
   if ((its.st_mode & (S_IWGRP | S_IWOTH)) != 0)
     return Fail(path() + ": others than its owner may write it" + advice), std::nullopt;
   if (its.st_size != static_cast<off_t>(kBytes))
-    return Fail(path() + ": has " + std::to_string(its.st_size) + " bytes, has to have " + std::to_string(kBytes) + advice), std::nullopt;
+    return Fail(path() + ": has " + std::to_string(its.st_size) + " bytes, has to have " + std::to_string(kBytes) +
+                advice), std::nullopt;
   std::string text(kBytes, '\0');
   std::size_t taken = 0;
   while (taken < text.size()) {
