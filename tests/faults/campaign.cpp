@@ -903,7 +903,7 @@ void Campaign::ReloadOfNoFile(Rig& rig) {
   Row& row = Begin("Reload of a pipe, /dev/zero, a directory, an unreadable file", options_.others);
   const std::string path = rig.task_path(), good = DemoTask();
   Tries(row, rig, [&](int i) {
-    const certifier_status_v2_t before = *rig.witness().status();
+    const certifier_status_v3_t before = *rig.witness().status();
     const auto& now = rig.witness().status();
     PutNoFile(path, i);
     rig.Signal(Rig::kRobot, SIGHUP);
