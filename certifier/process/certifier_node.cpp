@@ -602,6 +602,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.refused_unsigned = refusals.unsigned_ones;
   status.refused_forged = refusals.forged;
   status.refused_foreign = refusals.foreign;
+  status.is_unsigned = channels_.keys ? 0 : 1;
   status.refused_replayed = refusals.replayed;
   status.page_faults = page_faults_;
   status.queue_depth = static_cast<std::int32_t>(queue_.size());
