@@ -76,8 +76,8 @@ class Surveyor final {
       Record(GetDigest(certified->config_digest), GetDigest(certified->observations_digest));
     } else if (Decoded<candidate_plan_t>(message)) {
       ++survey_.candidates;
-    } else if (const auto status = ReadHeartbeat(message)) {
-      certifier_.Take(status->sequence);
+    } else if (const auto heartbeat = ReadHeartbeat(message)) {
+      if (heartbeat->in_charge) certifier_.Take(heartbeat->sequence);
     } else if (const auto logger = Decoded<logger_status_t>(message)) {
       logger_.Take(logger->sequence);
     }
