@@ -8,6 +8,7 @@
 #include <optional>
 #include <string_view>
 
+#include "certifier/task/files.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -76,8 +77,8 @@ class Surveyor final {
       Record(GetDigest(certified->config_digest), GetDigest(certified->observations_digest));
     } else if (Decoded<candidate_plan_t>(message)) {
       ++survey_.candidates;
-    } else if (const auto status = ReadHeartbeat(message)) {
-      certifier_.Take(status->sequence);
+    } else if (const auto heartbeat = ReadHeartbeat(message)) {
+      if (heartbeat->in_charge) certifier_.Take(heartbeat->sequence);
     } else if (const auto logger = Decoded<logger_status_t>(message)) {
       logger_.Take(logger->sequence);
     }

@@ -258,9 +258,9 @@ void Recorder::KeepTasks() const {
 // A reload may bring other transitions with the same task file, which only the version tells.
 void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
   if (task_path_.empty() || event.channel != channels_.status) return;
-  const auto status = ReadHeartbeat(event.message());
-  if (!status) return;
-  const std::pair heard{status->config_digest, status->version};
+  const auto heartbeat = ReadHeartbeat(event.message());
+  if (!heartbeat || !heartbeat->in_charge) return;
+  const std::pair heard{heartbeat->config_digest, heartbeat->version};
   if (heard == heard_task_) return;
   const bool is_first = !heard_task_ && !tasks_.empty() && tasks_.back().digest == heard.first;
   if (!is_first && !task_reading_.IsOver(now_us)) return;
