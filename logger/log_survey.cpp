@@ -8,6 +8,7 @@
 #include <optional>
 #include <string_view>
 
+#include "certifier/task/files.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"

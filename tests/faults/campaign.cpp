@@ -558,7 +558,7 @@ class Campaign final {
     const RawSender sender(rig.url(Rig::kCertifier));
     Heard heard;
     rig.open_bus().SubscribeUnchecked(Bus::kEveryChannel, [&](const Received& r) {
-      if (channels.signed_channels().contains(r.channel) && heard.size() < kMostHeard)
+      if (channels.speakers().contains(r.channel) && heard.size() < kMostHeard)
         heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
     });
     double most_grown = 0;
