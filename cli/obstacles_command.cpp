@@ -1,11 +1,13 @@
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
 
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
+#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 
@@ -24,7 +26,7 @@ struct Options {
 class ObstaclesNode final : public Node {
  public:
   ObstaclesNode(const Config& config, Bus& bus, std::int64_t period_us)
-      : path_(config.path), channel_(config.bus.obstacles), bus_(bus), sender_(period_us) {
+      : path_(config.path), channels_(config.bus), channel_(config.bus.obstacles), bus_(bus), sender_(period_us) {
     sender_.Set(config.obstacles);
   }
 
@@ -36,14 +38,19 @@ class ObstaclesNode final : public Node {
   }
 
   void Reload() override try {
-    sender_.Set(LoadConfig(path_, TransitionsFile::kIgnore).obstacles);
+    const Config config = LoadConfig(path_, TransitionsFile::kIgnore);
+    const std::string why = WhyKeyCannotChange(channels_, config.bus, Role::kPerception);
+    if (!why.empty()) throw ConfigError(path_ + ": " + why);
+    sender_.Set(config.obstacles);
     spdlog::info("the obstacles of {} from now on", path_);
   } catch (const std::exception& error) {
     spdlog::error("not reloaded, the obstacles of before are sent: {}", error.what());
   }
 
  private:
-  const std::string path_, channel_;
+  const std::string path_;
+  const BusOptions channels_;
+  const std::string channel_;
   Bus& bus_;
   ObstacleSender sender_;
   bool warned_ = false;
@@ -52,7 +59,9 @@ class ObstaclesNode final : public Node {
 int Send(const Options& options) {
   Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   options.bus.Override(config.bus);
-  const std::unique_ptr<Bus> bus = OpenBus(config.bus, "forereach-obstacles");
+  config.bus = WithKeys(std::move(config.bus), Role::kPerception);
+  if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
+  const std::unique_ptr<Bus> bus = OpenBus(config.bus, Role::kPerception);
   const std::int64_t period_us =
       options.period_ms > 0 ? Microseconds(options.period_ms) : ObstacleSender::PeriodUs(config.gate);
   if (3 * period_us > Microseconds(config.gate.obstacles_timeout_ms))

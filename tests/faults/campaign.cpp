@@ -448,7 +448,7 @@ class Campaign final {
       obeyed += event && (event->kind == execution_event_t::HALTED || event->kind == execution_event_t::RESET ||
                           (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31)));
     });
-    Signer all(rig.keys(), channels.bus_name()), other_robot(TestKeys("another robot"), channels.bus_name()),
+    Signer all(rig.keys(), channels.bus_name()), other_robot(TestKeys("another-robot"), channels.bus_name()),
         other_bus(rig.keys(), "another bus");
     std::int64_t sent = 0;
     std::set<std::string> tried;
@@ -558,7 +558,7 @@ class Campaign final {
     const RawSender sender(rig.url(Rig::kCertifier));
     Heard heard;
     rig.open_bus().SubscribeUnchecked(Bus::kEveryChannel, [&](const Received& r) {
-      if (channels.signed_channels().contains(r.channel) && heard.size() < kMostHeard)
+      if (channels.speakers().contains(r.channel) && heard.size() < kMostHeard)
         heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
     });
     double most_grown = 0;

@@ -18,17 +18,11 @@ namespace {
 
 constexpr std::size_t kBatch = 32;
 
-int Connected(const std::string& url) {
-  const MulticastUrl where = ParseMulticastUrl(url);
+int Opened() {
   const int handle = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(where.port);
-  inet_pton(AF_INET, where.group.c_str(), &address.sin_addr);
-  if (handle < 0 || ::connect(handle, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    throw std::runtime_error("no socket for " + url);
-  const unsigned char ttl = 0;
-  ::setsockopt(handle, IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof ttl);
+  const unsigned char ttl = 0;  // stays on this machine
+  if (handle < 0 || ::setsockopt(handle, IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof ttl) != 0)
+    throw std::runtime_error("no socket");
   return handle;
 }
 
@@ -36,7 +30,7 @@ int Connected(const std::string& url) {
 
 ForgedFlood::ForgedFlood(const std::string& url, const std::string& channel,
                          const std::vector<std::vector<std::uint8_t>>& payloads, double rate)
-    : socket_(Connected(url)) {
+    : socket_(Opened()), url_(url) {
   for (const auto& payload : payloads) {
     std::vector<std::uint8_t>& datagram = datagrams_.emplace_back();
     const auto append = [&](const auto& part) { datagram.insert(datagram.end(), part.begin(), part.end()); };
@@ -56,6 +50,11 @@ ForgedFlood::~ForgedFlood() {
 }
 
 void ForgedFlood::Run(double rate) {
+  const MulticastUrl where = ParseMulticastUrl(url_);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(where.port);
+  inet_pton(AF_INET, where.group.c_str(), &address.sin_addr);
   std::array<iovec, kBatch> parts{};
   std::array<mmsghdr, kBatch> messages{};
   std::size_t next = 0;
@@ -70,6 +69,8 @@ void ForgedFlood::Run(double rate) {
       std::vector<std::uint8_t>& datagram = datagrams_[next++ % datagrams_.size()];
       parts[i] = {datagram.data(), datagram.size()};
       messages[i] = {};
+      messages[i].msg_hdr.msg_name = &address;
+      messages[i].msg_hdr.msg_namelen = sizeof address;
       messages[i].msg_hdr.msg_iov = &parts[i];
       messages[i].msg_hdr.msg_iovlen = 1;
     }

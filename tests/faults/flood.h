@@ -25,6 +25,7 @@ class ForgedFlood final {
   void Run(double rate);
 
   const int socket_;
+  const std::string url_;
   std::vector<std::vector<std::uint8_t>> datagrams_;
   std::atomic<std::int64_t> sent_ = 0;
   std::atomic<bool> stop_ = false;

@@ -15,6 +15,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/authentic.h"
+#include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 
@@ -88,10 +89,7 @@ class HostileDatagramsTest : public testing::TestWithParam<Attack> {
     command.insert(command.end(), {"--directory", scratch_ / "log"});
     return command;
   }
-  std::string WriteKey() const {
-    MakeKeyFile(scratch_ / "key");
-    return scratch_ / "key";
-  }
+  std::string WriteKey() const { return MakeTestKeys(scratch_ / "keys"); }
   static std::string FarTask() {  // the drive lasts for longer than the attacks
     std::string task = PatientTask();
     const std::string goal = "goal: [6, 0]";

@@ -257,7 +257,7 @@ TEST_F(LcmInteroperationTest, OurProcessesTakeWhatLcmLogplayerPlays) {
 
 TEST_F(LcmInteroperationTest, OurLargestMessageFitsOneDatagramWithItsSignature) {
   EXPECT_GT(EncodedSize<certified_plan_t>(), EncodedSize<candidate_plan_t>());
-  EXPECT_TRUE(FitsOneDatagram(kMaxChannelBytes, EncodedSize<certified_plan_t>() + kSignatureBytes));
+  EXPECT_TRUE(FitsOneDatagram(kMaxChannelBytes, EncodedSize<certified_plan_t>() + kTrailerBytes));
 }
 
 }  // namespace
