@@ -34,7 +34,8 @@ class SignedBus final : public Bus {
         speakers_(speakers),
         clock_(std::move(clock)),
         signer_(keys, bus_name),
-        screen_(std::make_shared<KeyScreen>(Authenticator(keys, bus_name, speakers, clock_()))),
+        // Its own first message may be of the microsecond in which it begins.
+        screen_(std::make_shared<KeyScreen>(Authenticator(keys, bus_name, speakers, clock_() - 1))),
         bus_(OpenBus(url, clock_, screen_)) {}
 
   void Subscribe(const std::string& channel, Handler handler) override { bus_->Subscribe(channel, std::move(handler)); }
