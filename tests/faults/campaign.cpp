@@ -956,7 +956,7 @@ std::string Campaign::Spoilt(const std::string& task, int way) {
 void Campaign::BadReload() {
   Rig rig(DemoTask());
   Row& row = Begin("Reload of a bad task file", options_.others);
-  const std::string path = rig.task_path(), good = DemoTask();
+  const std::string path = rig.task_path(), good = rig.task();
   Tries(row, rig, [&](int i) {
     const certifier_status_v3_t before = *rig.witness().status();
     const auto& now = rig.witness().status();
@@ -1003,7 +1003,7 @@ void Campaign::PutNoFile(const std::string& path, int way) {
 
 void Campaign::ReloadOfNoFile(Rig& rig) {
   Row& row = Begin("Reload of a pipe, /dev/zero, a directory, an unreadable file", options_.others);
-  const std::string path = rig.task_path(), good = DemoTask();
+  const std::string path = rig.task_path(), good = rig.task();
   Tries(row, rig, [&](int i) {
     const certifier_status_v3_t before = *rig.witness().status();
     const auto& now = rig.witness().status();

@@ -17,13 +17,18 @@ inline std::string DemoTask(const std::string& more = "") {
   return task + "\n" + more;
 }
 
+/** The same with this gate instead. @param gate YAML of the value of `gate`. */
+inline std::string DemoTaskWithGate(const std::string& gate) {
+  std::string task = DemoTask();
+  const std::string demos = "{obstacles: task}";
+  return task.replace(task.find(demos), demos.size(), gate);
+}
+
 /** The same with its obstacles taken out: they are on the bus only. */
 inline std::string DemoTaskOnTheBus() {
-  std::string task = DemoTask();
+  std::string task = DemoTaskWithGate("{obstacles: bus}");
   const std::size_t begin = task.find("  obstacles:\n"), end = task.find("\n\n", begin);
-  task.replace(begin, end - begin, "  obstacles: []");
-  const std::string of_task = "{obstacles: task}";
-  return task.replace(task.find(of_task), of_task.size(), "{obstacles: bus}");
+  return task.replace(begin, end - begin, "  obstacles: []");
 }
 
 }  // namespace forereach

@@ -24,8 +24,8 @@ namespace {
 
 // Without a robot, and patient with a busy machine.
 constexpr const char* kGate =
-    "gate: {max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000,\n"
-    "  obstacles: task, require_stop: false}\n";
+    "{max_age_ms: 20000, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000,\n"
+    "  obstacles: task, require_stop: false}";
 
 struct Options {
   double seconds = 20, rate = 1000, flood = 0;
@@ -187,7 +187,7 @@ int Main(int argc, char** argv) {
   AddReportOption(app, options.report);
   CLI11_PARSE(app, argc, argv);
   const ScratchDirectory scratch;
-  Config config = LoadConfig(scratch.Write("task.yaml", DemoTask(kGate)));
+  Config config = LoadConfig(scratch.Write("task.yaml", DemoTaskWithGate(kGate)));
   if (options.flood > 0) return MeasureFlood(options, config);
   const int steps = MostSteps(config);
   const std::string key = MakeTestKeys(scratch / "keys"), url = PrivateBusUrl();

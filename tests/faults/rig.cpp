@@ -54,7 +54,7 @@ std::string Tail(const std::string& text) {
 }  // namespace
 
 Rig::Rig(const std::string& task, const Options& options)
-    : options_(options), task_path_(scratch_.Write("task.yaml", task + "bus: {name: campaign}\n")),
+    : options_(options), task_(task + "bus: {name: campaign}\n"), task_path_(scratch_.Write("task.yaml", task_)),
       key_path_(MakeTestKeys(scratch_ / "keys", "campaign")),
       next_directory_(scratch_ / "log"),
       state_(scratch_ / "state") {

@@ -91,6 +91,8 @@ class Rig final {
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] std::string url(Role role) const { return options_.relayed && role >= kPlanner ? near_url_ : far_url_; }
   [[nodiscard]] const std::string& task_path() const { return task_path_; }
+  /** YAML, as the processes were started with it. */
+  [[nodiscard]] const std::string& task() const { return task_; }
   /** Of the logger that is started next. */
   [[nodiscard]] const std::string& directory() const { return next_directory_; }
   /** From the logger's next start on. */
@@ -112,6 +114,7 @@ class Rig final {
 
   const Options options_;
   ScratchDirectory scratch_;
+  const std::string task_;
   std::string task_path_, key_path_, near_url_, far_url_, next_directory_, directory_, state_;
   Config config_;
   std::unique_ptr<Bus> heard_, signed_, open_;

@@ -156,7 +156,7 @@ class CertifierObstaclesTest : public testing::Test {
     EXPECT_NE(task.find(none), std::string::npos);
     world_ = scratch_.Write("world.yaml", task);
     task.replace(task.find(none), none.size(), "obstacles: []\n");
-    task.replace(task.find("obstacles: task}"), 16, "obstacles: bus}");
+    task.replace(task.find("obstacles: task,"), 16, "obstacles: bus,");
     path_ = scratch_.Write("task.yaml", task);
     config_ = LoadConfig(path_);
   }
@@ -246,7 +246,7 @@ TEST_F(CertifierObstaclesTest, ASecondCertifierStandsByAndTakesOver) {
 
 TEST_F(CertifierObstaclesTest, ATaskThatDoesNotSayWhereTheyComeFromIsRefused) {
   std::string task = PatientTask();
-  task.replace(task.find(", obstacles: task"), 17, "");
+  task.replace(task.find("obstacles: task, "), 17, "");
   const std::string path = scratch_.Write("unsaid.yaml", task);
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{FOREREACH_CERTIFIER, "--config", path, "--lcm-url", PrivateBusUrl()},

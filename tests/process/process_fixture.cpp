@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
+
+#include "lcmtypes/authentic.h"
 
 namespace forereach {
 
@@ -69,7 +72,8 @@ BusProbe::BusProbe(const std::string& url, const std::vector<std::string>& chann
   for (const std::string& channel : channels) {
     heard_[channel];
     bus_->Subscribe(channel, [this, channel](const Received& received) {
-      heard_[channel].emplace_back(received.bytes.begin(), received.bytes.end());
+      const Bytes message = WithoutSignature(received.raw);
+      heard_[channel].emplace_back(message.begin(), message.end());
     });
   }
 }
@@ -106,8 +110,8 @@ candidate_plan_t CandidateFor(const Config& config, std::int64_t plan_id, const 
   return candidate;
 }
 
-void AddFailureNotA(const char* type, const std::string& channel) {
-  ADD_FAILURE() << "what came on " << channel << " is not a " << type;
+void ThrowNotA(const char* type, const std::string& channel) {
+  throw std::runtime_error("what came on " + channel + " is not a " + type);
 }
 
 }  // namespace forereach

@@ -25,7 +25,8 @@ namespace forereach {
 with a slow machine and does without a robot: candidates may be 20 s old. Its state is kept beside the task file. The robot finishes after `time_limit_s`. */
 [[nodiscard]] std::string PatientTask(int time_limit_s = 60);
 
-/** Hears channels and keeps what comes. Fails with the advice of BusError if the bus cannot be opened. */
+/** Hears channels and keeps the messages that come, without their signatures, which it does not check. Fails with the
+advice of BusError if the bus cannot be opened. */
 class BusProbe final {
  public:
   BusProbe(const std::string& url, const std::vector<std::string>& channels);
@@ -39,7 +40,8 @@ class BusProbe final {
   [[nodiscard]] const std::vector<std::vector<std::uint8_t>>& heard(const std::string& channel) const {
     return heard_.at(channel);
   }
-  /** Everything heard on a channel so far; fails the test if something is not a Message. */
+  /** Everything heard on a channel so far. @throws std::runtime_error, which fails the test, if something is not a
+  Message. */
   template <class Message>
   [[nodiscard]] std::vector<Message> Heard(const std::string& channel) const;
 
@@ -52,13 +54,13 @@ class BusProbe final {
 [[nodiscard]] candidate_plan_t CandidateFor(const Config& config, std::int64_t plan_id, const Eigen::VectorXd& control,
                                             int steps = 6, std::chrono::milliseconds lead = std::chrono::seconds(20));
 
-void AddFailureNotA(const char* type, const std::string& channel);
+[[noreturn]] void ThrowNotA(const char* type, const std::string& channel);
 
 template <class Message>
 std::vector<Message> BusProbe::Heard(const std::string& channel) const {
   std::vector<Message> messages;
   for (const auto& bytes : heard(channel)) {
-    if (Decode(bytes, messages.emplace_back()) != DecodeStatus::kOk) AddFailureNotA(Message::getTypeName(), channel);
+    if (Decode(bytes, messages.emplace_back()) != DecodeStatus::kOk) ThrowNotA(Message::getTypeName(), channel);
   }
   return messages;
 }
