@@ -102,6 +102,8 @@ class SliceCheck {
       const auto what = [&] { return "the recorded envelope contains the residual of " + name(k); };
       claims_.AtMost(recorded_.envelope_lower[k], lower, scale, what);
       claims_.AtLeast(recorded_.envelope_upper[k], upper, scale, what);
+      claims_.AtMost(recorded_.envelope_lower[k], recorded_.envelope_upper[k], scale,
+                     [&] { return "the recorded envelope of " + name(k) + " is not empty"; });
     }
     if (recorded_.remainder.size() > 0) {
       const auto& [lower, upper] = step_->remainder[i];

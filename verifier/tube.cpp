@@ -11,6 +11,8 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::infinity();
 // Rows of L with more nonzero columns than this are bounded over the hull: that is part of the method.
 constexpr std::size_t kMaxExactColumns = 12;
+// Observations that contradict each other by less than this part of their operands may not do so in doubles.
+constexpr double kSeenInDoubles = 0x1p-40;
 
 std::size_t Index(int k) { return static_cast<std::size_t>(k); }
 
@@ -266,6 +268,12 @@ Real Slice::HalfWidth(int k) const {
   return sum;
 }
 
+// What data and declaration say of r_k over one Z_t.
+struct TubeMaker::Known {
+  Bounds bounds;
+  bool contradiction = false;  // one that doubles show too
+};
+
 // Z_t = X_t x {u_t}: the slice, and center, half-width and hull of every variable.
 struct TubeMaker::Query {
   int t;
@@ -303,6 +311,10 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
       const Real observed = Real(x_next) - nominal[static_cast<std::size_t>(k)];
       row.push_back({observed - allowed, observed + allowed});
     }
+    std::vector<Real>& sizes = sizes_.emplace_back();
+    for (const double x_next : data.x_next.row(i)) sizes.push_back(abs(Real(x_next)));
+    for (const auto& [output, variable, value] : equations.First(z))
+      sizes[Index(output)] += abs(value * z[Index(variable)]);
   }
 }
 
@@ -344,7 +356,13 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   Step step;
   step.remainder = Remainder(query, options.split_remainder);
   if (step.remainder.empty()) return no_bound("the nominal model's second derivative");
-  for (int k = 0; k < n; ++k) step.envelope.push_back(Envelope(query, k, options.known));
+  for (int k = 0; k < n; ++k) {
+    const auto& [bounds, contradiction] = Envelope(query, k, options.known);
+    if (contradiction)
+      return Failure{query.t, "some residual is consistent with data and declaration", bounds.lower.text(),
+                     "at most " + bounds.upper.text()};
+    step.envelope.push_back(bounds);
+  }
 
   Slice next;
   next.center = equations_.Value(query.center);
@@ -363,13 +381,10 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   }
   for (int k = 0; k < n; ++k) {  // diag(h)
     const auto& [lower, upper] = step.envelope[Index(k)];
-    // By less than a double's rounding the certifier cannot have seen it; then no system exists and all that follows
-    // holds.
-    if (CertainlyBelow(upper + Real(0x1p-40) * (abs(lower) + abs(upper)), lower))
-      return Failure{query.t, "some residual is consistent with data and declaration", lower.text(),
-                     "at most " + upper.text()};
+    // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
+    // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[Index(k)] += half * (lower + upper);
-    if (const Real h = half * max(Real(), upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
+    if (const Real h = half * abs(upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
     if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
   }
   const bool followed = options.follow && tube.slices.size() < options.follow->size() &&
@@ -546,7 +561,7 @@ struct TubeMaker::Row {
 };
 
 // Every observation gives a bound; doubles choose those that may give the tightest.
-Bounds TubeMaker::Envelope(const Query& query, int k, const KnownRows& known) const {
+TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows& known) const {
   const Row row(problem_.declaration, query, k);
   const Eigen::MatrixXd& z = problem_.transitions.z;
   std::vector<int> rows;
@@ -565,15 +580,20 @@ Bounds TubeMaker::Envelope(const Query& query, int k, const KnownRows& known) co
     highest = std::max(highest, lower.back() - slack.back());
     lowest = std::min(lowest, upper.back() + slack.back());
   }
-  std::optional<Bounds> bounds;
+  // The second time with doubts in their favour as large as rounding to doubles could give rise to.
+  std::optional<Bounds> bounds, doubtful;
+  const auto add = [](std::optional<Bounds>& all, const Bounds& one) {
+    all = all ? Bounds{max(all->lower, one.lower), min(all->upper, one.upper)} : one;
+  };
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (trusted && lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest) continue;
     const Real distance = row.Distance(z, rows[i]);
     const Bounds& residual = residuals_[Index(rows[i])][Index(k)];
-    const Bounds found{residual.lower - distance, residual.upper + distance};
-    bounds = bounds ? Bounds{max(bounds->lower, found.lower), min(bounds->upper, found.upper)} : found;
+    add(bounds, {residual.lower - distance, residual.upper + distance});
+    const Real doubt = Real(kSeenInDoubles) * (sizes_[Index(rows[i])][Index(k)] + Real(row.ScaleAt(z, rows[i])));
+    add(doubtful, {residual.lower - distance - doubt, residual.upper + distance + doubt});
   }
-  return *bounds;
+  return {*bounds, CertainlyBelow(doubtful->upper, doubtful->lower)};
 }
 
 }  // namespace forereach::verifier

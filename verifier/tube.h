@@ -96,7 +96,8 @@ class TubeMaker final {
   [[nodiscard]] double RemainderRounding() const;
   [[nodiscard]] std::optional<Failure> LeavesDomain(const Query& query) const;
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
-  [[nodiscard]] Bounds Envelope(const Query& query, int k, const KnownRows& known) const;
+  struct Known;
+  [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;
@@ -105,6 +106,8 @@ class TubeMaker final {
   /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included; [observation][state].
    */
   std::vector<std::vector<Bounds>> residuals_;
+  /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|: of what doubles rounded on the way to a residual; [observation][state]. */
+  std::vector<std::vector<Real>> sizes_;
   /** What rounding may have added to the certifier's columns by way of the remainder. */
   double remainder_rounding_;
 };

@@ -190,6 +190,24 @@ TEST(HandMade, ContradictingDataAreNoCertificate) {
   ExpectRefuted(Judge(problem, OneStep()), 0, "consistent");
 }
 
+// px + vx / 2 = 0 of terms 4 and -4, and a successor of 2^-51 beside one of 0: a certificate has to hold for both.
+TEST(HandMade, AContradictionOfRoundingSizeWidensTheSlice) {
+  const auto problem = Halves();
+  problem->transitions = {Eigen::MatrixXd::Zero(2, 6), Eigen::MatrixXd::Zero(2, 4)};
+  problem->transitions.z(1, 0) = 4;
+  problem->transitions.z(1, 2) = problem->transitions.x_next(1, 2) = -8;
+  problem->transitions.x_next(1, 0) = 0x1p-51;
+  Certificate certificate = OneStep();
+  certificate.slices[1].upper[0] = 1.625 + 0x1p-51;
+  ExpectConfirmed(Judge(problem, certificate));
+  certificate.slices[1].upper[0] = Up(1.625);
+  ExpectRefuted(Judge(problem, certificate), 1, "hull contains px");
+  certificate = OneStep();  // the observation of 0 still bounds from above, but for its last bit
+  certificate.slices[1].upper[0] = 1.625 + 0x1p-51;
+  certificate.slices[1].lower[0] = Up(Up(-1.375));
+  ExpectRefuted(Judge(problem, certificate), 1, "hull contains px");
+}
+
 TEST(HandMade, CentredRemainderKnowsTheSign) {
   auto problem = Halves();
   problem->model = MakeKinematicBicycle(0.5, 1);
