@@ -46,11 +46,13 @@ TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
 }
 
 TEST_F(ErrorTest, WhatStandingIs) {
-  const auto error = [&](const std::string& rest) { return files_.ErrorWith("  projection:", "  rest: " + rest + "\n  projection:"); };
+  const auto error = [&](const std::string& rest) {
+    return files_.ErrorWith("  projection:", "  rest: " + rest + "\n  projection:");
+  };
   EXPECT_EQ(error("{vx: 0.1, vy: 0}"), "");
   EXPECT_EQ(error("{}"), "task.yaml:17: task.rest: names no state, so everything would be standing");
   EXPECT_EQ(error("{vx: -0.1}"), "task.yaml:17: task.rest.vx: -0.1 is outside [0, inf)");
-  EXPECT_EQ(error("{vx: .nan}"), "task.yaml:17: task.rest.vx: .nan is not a finite number");
+  EXPECT_EQ(error("{vx: .nan}"), "task.yaml:17: task.rest.vx: .nan is not a finite number; write a number in [0, inf)");
   EXPECT_EQ(error("{ax: 0.1}"), "task.yaml:17: task.rest.ax: unknown key; did you mean px?");
   EXPECT_EQ(ErrorAfter("gate: {require_stop: true}\n"),
             "task.yaml:19: gate.require_stop: true, but task.rest does not say what standing is");

@@ -146,7 +146,8 @@ TEST(PolicyProposer, RefusesWhatDoesNotFit) {
   EXPECT_EQ(refusal(long_blocks, policy), "planner.policy: its blocks have 20 steps, planner.progress_steps is 21");
   Config no_goal = config;
   no_goal.planner.goal = {};
-  EXPECT_THAT(refusal(no_goal, policy), testing::StartsWith("planner.goal: 0 entries"));
+  EXPECT_EQ(refusal(no_goal, policy),
+            "planner.goal: missing: where to go, an entry for each of the 2 safety coordinates");
   Policy fewer = policy;
   fewer.input = {Eigen::VectorXd::Zero(4), Eigen::VectorXd::Ones(4)};
   EXPECT_EQ(refusal(config, fewer), "planner.policy: has 4 features, has to have 12");
