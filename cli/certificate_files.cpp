@@ -506,6 +506,7 @@ std::vector<CertificateFile> FromDatabase(const std::string& path, const std::st
       } else {
         const char* why = run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not beside the database";
         without_task.push_back({run.log_file, {}, why, {}});
+        why_none = path + ": " + run.log_file + ": " + why;
       }
     }
     const LogSurvey survey = SurveyChain(logs);

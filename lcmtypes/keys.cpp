@@ -14,6 +14,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "lcmtypes/printable.h"
+
 namespace forereach {
 namespace {
 
@@ -356,7 +358,7 @@ void SyncParent(const std::string& path) {
 
 void MakeKeys(const std::string& robot, const std::string& directory) {
   RequireSodium(directory);
-  RequireName(directory, "", robot);
+  RequireName(directory, "\"" + Printable(robot.substr(0, kMaxName + 1)) + "\": ", robot);
   if (::mkdir(directory.c_str(), S_IRWXU) != 0) FailSystem(directory, "cannot be made");
   try {
     if (::chmod(directory.c_str(), S_IRWXU) != 0) FailSystem(directory, "cannot be made");  // whatever the umask
