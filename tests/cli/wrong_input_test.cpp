@@ -1,6 +1,7 @@
 // Which task a log was recorded with, and inputs that are no log or none of this task: a sentence and exit 2.
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,10 +39,13 @@ class KeptTaskTest : public testing::Test {
     fs::create_directories(*scratch_ / "data");
     fs::copy(kSource + "/config/data/demo_transitions.csv", *scratch_ / "data/demo.csv");
     std::string text = Read(kSource + "/config/demo.yaml");
-    const auto replace = [&text](const std::string& old, const std::string& by) { text.replace(text.find(old), old.size(), by); };
+    const auto replace = [&text](const std::string& old, const std::string& by) {
+      ASSERT_NE(text.find(old), std::string::npos) << old;
+      text.replace(text.find(old), old.size(), by);
+    };
     replace("transitions: data/demo_transitions.csv", "transitions: ../data/demo.csv");
     replace("time_limit_s: 45", "time_limit_s: 2");
-    text += "gate: {learn: none}\n";
+    replace("gate: {obstacles: task}", "gate: {obstacles: task, learn: none}");
     for (const char* name : {"one", "two"}) {
       scratch_->Write(std::string("tasks_of_mine/") + name + ".yaml", text + "# " + name + "\n");
       const Output run =
@@ -160,15 +164,22 @@ TEST_F(KeptTaskTest, OfSeveralVersionsOfTheTransitionsTheLogNamesTheRightOne) {
 
 TEST_F(KeptTaskTest, ATaskWithAKeyAsksForIt) {
   const ScratchDirectory own;
-  Forereach("keygen " + (own / "robot.key"));
+  const std::string keys = own / "keys", gate = "gate: {obstacles: task}\n";
+  ASSERT_EQ(Forereach("keygen --robot alpha " + keys).code, 0);
   fs::copy(kSource + "/tests/data/course_transitions.csv", own / "course_transitions.csv");
-  const std::string task = own.Write("task.yaml", Read(kCourse) + "bus: {key: robot.key}\n");
-  ASSERT_EQ(Forereach("run --config " + task + " --directory " + (own / "log")).code, 0);
+  const std::string task = own.Write("task.yaml", Read(kCourse) + gate + "bus: {key: keys}\n");
+  const Output run = Forereach("run --config " + task + " --directory " + (own / "log") + " 2>&1");
+  ASSERT_EQ(run.code, 0) << run.text;
   const std::string log = own / "log/" + LogDirectory(own / "log").Logs().front();
   ExpectRefused("replay " + log, {"keys are not kept", "--key FILE", "--no-key"});
-  EXPECT_EQ(Forereach("replay " + log + " --key " + (own / "robot.key")).code, 0);
+  EXPECT_EQ(Forereach("replay " + log + " --key " + keys).code, 0);
+  EXPECT_EQ(Forereach("replay " + log + " --key " + keys + "/verify.pub").code, 0);
   EXPECT_EQ(Forereach("replay " + log + " --config " + task).code, 0);
-  for (const auto& file : fs::recursive_directory_iterator(own / "log")) EXPECT_NE(file.path().filename(), "robot.key");
+  std::set<std::string> secrets;
+  for (const auto& file : fs::directory_iterator(keys)) secrets.insert(Read(file.path()));
+  EXPECT_EQ(secrets.size(), 7u) << "a file for each of six roles, and the public keys";
+  for (const auto& file : fs::recursive_directory_iterator(own / "log"))
+    EXPECT_FALSE(file.is_regular_file() && secrets.contains(Read(file.path()))) << file.path();
 }
 
 // Every command against every kind of input that is none for it.
