@@ -106,7 +106,7 @@ class TubeMaker final {
   /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included; [observation][state].
    */
   std::vector<std::vector<Bounds>> residuals_;
-  /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|: of what doubles rounded on the way to a residual; [observation][state]. */
+  /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|, the size of the numbers a residual is made of; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
   /** What rounding may have added to the certifier's columns by way of the remainder. */
   double remainder_rounding_;

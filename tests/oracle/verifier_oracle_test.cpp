@@ -6,6 +6,7 @@
 #include "certifier/residual/consistency.h"
 #include "certifier/residual/observations.h"
 #include "tests/oracle/exact.h"
+#include "tests/oracle/random.h"
 #include "tests/verifier/record.h"
 
 namespace forereach {
@@ -49,11 +50,12 @@ struct Cancelling : testing::Test {
     return Rational(std::nextafter(size, kInfinity)) - Rational(size);
   }
 
-  void Certify() {
+  void Certify(double scale = 1) {
     const Certifier certifier(problem);
     Eigen::VectorXd center = Eigen::VectorXd::Zero(6), half(6);
     center[3] = 10;
     half << 0.05, 0.05, 0.01, 0.1, 0.01, 0.005;
+    half *= scale;
     const Zonotope initial_set = Zonotope::FromBox(center, half);
     const Eigen::MatrixXd controls = Eigen::Vector2d(0.5, 0.1).replicate(1, 10);
     const Plan plan{controls.data(), 2, 10, 2};
@@ -70,8 +72,7 @@ struct Cancelling : testing::Test {
   verifier::Certificate certificate;
 };
 
-// Neither side is wrong about the data: the rational envelope is empty, and the certifier's contains all of it that there
-// is, each end outward of the rational one.
+// The rational envelope is empty. Each end of the certifier's is outward of the rational one.
 TEST_F(Cancelling, DataContradictEachOtherAndDoublesDoNotShowIt) {
   const Rational lower = Residual(0) - Allowed(0), upper = Residual(1) + Allowed(1);
   ASSERT_GT(lower, upper);
@@ -88,6 +89,29 @@ TEST_F(Cancelling, TheCertificateIsConfirmedAllTheSame) {
   Certify();
   const verifier::Verdict verdict = Verify();
   EXPECT_EQ(verdict.status, verifier::Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
+}
+
+// Steps that cancel, off by up to 2^-62 of their terms; sets from points to wide ones.
+TEST_F(Cancelling, RandomCertificatesAreConfirmed) {
+  Random random(1);
+  SCOPED_TRACE(random.trace());
+  int contradicting = 0;
+  for (int i = 0; i < 300; ++i) {
+    const double before = random.Uniform(-0.09, 0.09), rate = -before / kDt;
+    const Rational exact = Rational(before) + Rational(kDt) * Rational(rate);
+    const double after = Rational(exact + Rational(random.Uniform(-1, 1) * 0x1p-62 * before)).get_d();
+    problem->transitions.z(0, kDelta) = before;
+    problem->transitions.z(0, kSteerRate) = rate;
+    problem->transitions.x_next(0, kDelta) = after;
+    problem->transitions.z(1, kDelta) = problem->transitions.x_next(1, kDelta) = after;
+    const Rational difference = abs(Residual(0) - Residual(1));
+    contradicting += difference > Allowed(0) + Allowed(1);
+    ASSERT_NO_FATAL_FAILURE(Certify(i % 3 == 0 ? 0 : i % 3 == 1 ? 0x1p-60 : 1));
+    const verifier::Verdict verdict = Verify();
+    ASSERT_EQ(verdict.status, verifier::Status::kConfirmed)
+        << i << ": " << verdict.failure.what << ": " << verdict.failure.found << ", " << verdict.failure.bound;
+  }
+  EXPECT_GT(contradicting, 200);
 }
 
 // And not because a contradiction admits every claim.
