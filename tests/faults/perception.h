@@ -42,7 +42,7 @@ class Perception final {
   template <class Spoil>
   void SayNow(Spoil spoil) {
     const std::lock_guard lock(mutex_);
-    auto message = *sender_.Due(INT64_MIN);  // as if the clock had been set back: due
+    auto message = sender_.Due(--set_back_us_).value();  // due: each time the clock was set back, once more
     message.utime = WallClockUs();
     if (spoil(message)) bus_->Publish(channel_, message);
   }
@@ -52,6 +52,7 @@ class Perception final {
   const std::string channel_;
   std::mutex mutex_;
   ObstacleSender sender_;
+  std::int64_t set_back_us_ = 0;
   bool silent_ = false;
   std::atomic<bool> stop_ = false;
   std::thread thread_;
