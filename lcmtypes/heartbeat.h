@@ -1,4 +1,4 @@
-/** What heartbeats of certifiers of all versions have in common: for readers of recorded logs. */
+/** What certifier_status_v3_t and certifier_status_v2_t have in common: for readers of recorded logs. */
 #pragma once
 
 #include <cstdint>

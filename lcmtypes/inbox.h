@@ -29,8 +29,8 @@ class Inbox final {
   /** As Bus::Dispatch, for what has been put. */
   int HandOut(int timeout_ms);
 
-  /** Gives the memory of a burst that has been handed out back to the system. That takes some milliseconds, so it is for who
-  has time. Of the thread that hands out. */
+  /** Gives the memory of a burst that has been handed out back to the system. That takes some milliseconds, so call it when
+  there is time, on the thread that hands out. */
   void GiveBack();
 
   [[nodiscard]] std::int64_t dropped() const { return admitted_.dropped; }

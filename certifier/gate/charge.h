@@ -1,14 +1,14 @@
 /** Which of several certifiers on one bus decides. One of them is in charge; the others decide nothing and answer nobody, so
 that each candidate gets one decision. A state machine over the heartbeats of others. No bus, no clock in it.
 
-    listening    --listened for so long, and heard of none that goes before--> in charge
+    listening    --has listened for listen_us, and heard none that goes before--> in charge
     listening    --hears one in charge, or an earlier one that listens--> standing by
     standing by  --none in charge is heard for kSilenceUs--> listening
     in charge    --hears an earlier one in charge--> standing by
     in charge    --was itself kept from running for kLapseUs--> listening
 
-The earlier one is that which was started before; of two started in the same microsecond, that with the smaller instance.
-kLapseUs is shorter than kSilenceUs: one that was paused knows that it may have been replaced before it says anything. */
+The earlier one was started first; of two started in the same microsecond it has the smaller instance.
+kLapseUs is shorter than kSilenceUs: one that was paused sends nothing before it knows that it may have been replaced. */
 #pragma once
 
 #include <compare>

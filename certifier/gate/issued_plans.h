@@ -2,8 +2,8 @@
 
 A guard executes certified plans only, and begins none after its certificate has expired. So a robot that reports
 executing another plan, or a step that its plan does not have, or a plan that began too late, has no such guard, or one
-that does not work. A plan that another certifier has issued, the one before this process was started for example, is
-not known here: for as long as such a plan might still be executing, plans that are not known are tolerated. */
+that does not work. Plans of another certifier, for example of the process before this one, are not known here. For as
+long as such a plan might still be executing, unknown plans are tolerated. */
 #pragma once
 
 #include <cstddef>

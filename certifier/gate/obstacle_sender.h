@@ -1,11 +1,11 @@
-/** For whoever sees obstacles: what to say on OBSTACLES, and when. The whole set, again and again, so that receivers know that
-somebody looks. No bus, no clock in it:
+/** For a program that sees obstacles: what to send on OBSTACLES, and when. It repeats the whole set, so that receivers know
+that somebody looks. No bus, no clock in it:
 
     ObstacleSender sender(ObstacleSender::PeriodUs(config.gate));
     sender.Set(obstacles);                                                  // whenever they have changed
     if (const auto message = sender.Due(now_us)) bus.Publish("OBSTACLES", *message);  // at least every period
 
-One sender for a bus. One that was started again begins at sequence 0, which receivers take with a later stamp. */
+One sender for a bus. A sender that restarts begins at sequence 0, which receivers accept with a later stamp. */
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@
                taken; one in order after it confirms it after a gap, two where a sequence came again. A sender that
                begins anew at 0 with a later stamp is in order.
     task   those of the task file. OBSTACLES is refused.
-    not said, in logs from before the key: those of the file until some are heard, then those heard last.
+    not said, in logs from before gate.obstacles: those of the file until some are heard, then those heard last.
 
 A reload does not forget what was heard. No bus, no clock in it. */
 #pragma once

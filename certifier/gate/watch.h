@@ -3,8 +3,8 @@
     disarmed --all needs are met--> armed --one is lacking--> disarmed
     any state --Latch, or what Advance notices--> fault --Reset--> disarmed
 
-Only a person clears a fault: what made it is looked at first. The first fault is kept, unless a later one stops the robot
-and it does not: then the later one takes its place. */
+Only a person clears a fault, after a look at what made it. The first fault is kept; a later one takes its place only if
+it stops the robot and the first does not. */
 #pragma once
 
 #include <array>

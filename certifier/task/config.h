@@ -25,7 +25,7 @@ class ConfigError : public BadInput {
 
 /** Where the obstacles of a task are known from. */
 enum class ObstaclesSource {
-  kUnsaid,  ///< Of tasks before the key: the file's, until some are heard on the bus. Read to replay old logs.
+  kUnsaid,  ///< Tasks from before gate.obstacles: the file's, until some are heard. Read to replay old logs.
   kBus,     ///< The file's and, besides, those that OBSTACLES says; nothing is certified while it says none.
   kTask,    ///< The file's alone.
 };
