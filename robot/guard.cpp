@@ -13,6 +13,7 @@
 namespace forereach {
 namespace {
 
+constexpr std::size_t kMostExpected = 8;  // tasks that were read and under which no plan has come
 constexpr int kMaxPlanStates = 16, kMaxPlanInputs = 8, kMaxPlanSteps = 128;
 
 [[gnu::format(printf, 1, 2)]] std::string Sentence(const char* format, ...) {
@@ -215,6 +216,8 @@ void Guard::Halt() noexcept {
 
 void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain) {
   RequireDomain(domain, options_);
+  std::erase_if(expected_, [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
+  if (expected_.size() >= kMostExpected) expected_.erase(expected_.begin());
   expected_.push_back({config_digest, model_digest, std::move(domain)});
 }
 

@@ -27,7 +27,7 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
   if (last && sequence <= last->sequence && IsNotAfter(message->utime, last->utime, now_us, options_))
     return "sequence " + std::to_string(sequence) + " does not exceed the last, " + std::to_string(last->sequence) +
            ", nor does its stamp the last one's";
-  NoteOrder(sequence);
+  NoteOrder(sequence, now_us);
   if (const std::string fault = Judge(message->utime, now_us, options_).fault; !fault.empty()) return Doubt(fault);
   try {
     state_.heard = Heard{sequence, message->utime, FromMessage(*message, dim_)};
@@ -40,12 +40,17 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
 }
 
 // Of a message that is newer than the last one taken.
-void ObstaclesInForce::NoteOrder(std::int64_t sequence) {
+void ObstaclesInForce::NoteOrder(std::int64_t sequence, std::int64_t now_us) {
   const std::int64_t next = state_.next.value_or(sequence);
   const bool follows_the_last_taken = !state_.heard || sequence - 1 == state_.heard->sequence;
   state_.next = sequence == INT64_MAX ? sequence : sequence + 1;
   if (sequence == 0) {
-    state_.unconfirmed = 0;
+    // While the last message is fresh this may be a second sender, which knows a part only.
+    // One from beyond now was stamped before a clock was set back.
+    const std::int64_t age_us = state_.heard ? now_us - state_.heard->utime : 0;
+    const bool is_beside_another = state_.heard && -Microseconds(options_.max_ahead_ms) <= age_us &&
+                                   age_us <= Microseconds(options_.obstacles_timeout_ms);
+    state_.unconfirmed = is_beside_another ? 1 : 0;
   } else if (sequence == next || follows_the_last_taken) {
     state_.unconfirmed = std::max(state_.unconfirmed - 1, 0);
   } else {

@@ -8,7 +8,8 @@
                good one ends this;
              - a message comes out of order. Messages were lost, or two senders speak in turn and each knows a part. It is
                taken; one in order after it confirms it after a gap, two where a sequence came again. A sender that
-               begins anew at 0 with a later stamp is in order.
+               begins anew at 0 with a later stamp is in order, but for one message more where the last one heard is
+               still fresh: it may be a second sender.
     task   those of the task file. OBSTACLES is refused.
     not said, in logs from before gate.obstacles: those of the file until some are heard, then those heard last.
 
@@ -63,7 +64,7 @@ class ObstaclesInForce final {
   };
 
   [[nodiscard]] std::string Doubt(const std::string& why);
-  void NoteOrder(std::int64_t sequence);
+  void NoteOrder(std::int64_t sequence, std::int64_t now_us);
   // The task's, if so asked, and those heard last.
   void Put(bool of_task);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <initializer_list>
 #include <iostream>
 #include <limits>
@@ -21,6 +22,7 @@ namespace forereach {
 namespace {
 
 constexpr int kUnindexedAtMost = 128;
+constexpr std::int64_t kClocksApartUs = 60'000'000;  // of two certifiers on one bus, at most
 // An index of so many is built in about a millisecond; of more it is built in a thread of its own.
 constexpr std::size_t kIndexedAtOnce = 4096;
 
@@ -97,6 +99,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
     spdlog::warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
                  LipschitzEnvelope::kMaxExactColumns);
   bus.Subscribe(channels_.status, [this](const Received& received) { OnStatus(received); });
+  bus.Subscribe(channels_.fault, [this](const Received& received) { OnFault(received); });
   bus.Subscribe(channels_.candidate, [this](const Received& received) { OnCandidate(received); });
   bus.Subscribe(channels_.obstacles, [this](const Received& received) { OnObstacles(received); });
   bus.Subscribe(channels_.robot_state, [this](const Received& received) { OnRobotState(received); });
@@ -113,17 +116,50 @@ CertifierNode::~CertifierNode() {
 void CertifierNode::OnStatus(const Received& received) {
   const auto status = Decoded<certifier_status_v3_t>(received.bytes);
   if (!status || status->instance == charge_.self().instance) return;
-  const std::string error = gate_->CheckFresh(status->utime, received.utime);
-  if (!error.empty()) return Refuse(channels_.status, error);
+  // Clocks that disagree must not hide two certifiers from each other; a log that somebody plays must not look like one.
+  if (std::abs(received.utime - status->utime) > kClocksApartUs)
+    return Refuse(channels_.status, "a heartbeat from another time");
+  LookAtCharge();
   const Charge::State before = charge_.state(), its_state = ChargeOf(status->state);
   charge_.Hear({status->started_utime, status->instance}, its_state);
-  if (its_state == Charge::State::kInCharge) {
-    fault_of_other_.reset();
-    if (status->fault != 0) fault_of_other_ = {status->fault, status->fault_utime, GetText(status->message)};
-  }
+  if (its_state == Charge::State::kInCharge) Heed(*status);
   FollowCharge(before);
   // It has to hear of this one before it takes charge.
   if (is_in_charge()) next_heartbeat_us_ = std::min(next_heartbeat_us_, last_heartbeat_us_ + kHeartbeatToOthersUs);
+}
+
+// What the one in charge says counts for this one if it takes over.
+void CertifierNode::Heed(const certifier_status_v3_t& status) {
+  fault_of_other_.reset();
+  if (status.fault != 0) fault_of_other_ = Watch::Fault{status.fault, status.fault_utime, GetText(status.message)};
+  // Without a fault it is in error where data contradict its declaration, or where it cannot store a fault.
+  const bool is_false = status.fault == fault_t::DECLARATION_FALSIFIED ||
+                        (status.fault == 0 && status.level == certifier_status_v3_t::ERROR &&
+                         status.latch != certifier_status_v3_t::LATCH_UNWRITABLE);
+  const std::pair declared{GetDigest(status.model_digest), GetDigest(status.declaration_digest)};
+  if (!is_false || std::ranges::find(known_false_, declared) != known_false_.end()) return;
+  if (known_false_.size() >= kMostKnownFalse) known_false_.erase(known_false_.begin());
+  known_false_.push_back(declared);
+  is_contradicted_ = is_contradicted_ || IsKnownFalse(config_);
+}
+
+bool CertifierNode::IsKnownFalse(const Config& config) const {
+  return std::ranges::find(known_false_, std::pair(config.model_digest, config.declaration_digest)) != known_false_.end();
+}
+
+// A datagram that says FAULT may be the last that the one in charge sends.
+void CertifierNode::OnFault(const Received& received) {
+  if (is_in_charge()) return;  // its own
+  const auto fault = Decoded<fault_t>(received.bytes);
+  if (!fault) return Refuse(channels_.fault, "not a fault_t");
+  fault_of_other_ = Watch::Fault{fault->cause, fault->utime, GetText(fault->message)};
+}
+
+// Before a message is acted on: a process that was paused may have been replaced since, and hears what piled up first.
+void CertifierNode::LookAtCharge() {
+  const Charge::State before = charge_.state();
+  charge_.Advance(clocks_.steady());
+  FollowCharge(before);
 }
 
 void CertifierNode::FollowCharge(Charge::State before) {
@@ -152,8 +188,10 @@ void CertifierNode::TakeCharge() {
   spdlog::info("in charge, as instance {:016x}", charge_.self().instance);
   has_begun_ = true;
   issued_.TolerateFrom(clocks_.steady());
-  if (!fault_of_other_) return;
-  Fail(EmptyFault(fault_of_other_->cause), "latched by the certifier that was in charge before: " + fault_of_other_->why);
+  if (fault_of_other_)
+    Fail(EmptyFault(fault_of_other_->cause), "latched by the certifier that was in charge before: " + fault_of_other_->why);
+  else if (IsKnownFalse(config_))
+    Fail(EmptyFault(fault_t::DECLARATION_FALSIFIED), "the certifier that was in charge before has seen it contradicted");
   fault_of_other_.reset();
 }
 
@@ -198,6 +236,7 @@ void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
 }
 
 void CertifierNode::OnObstacles(const Received& received) {
+  LookAtCharge();
   if (!has_begun_) return;
   const std::string error = gate_->UpdateObstacles(received.bytes, received.utime);
   LookForObstacles(received.utime);
@@ -212,6 +251,7 @@ void CertifierNode::LookForObstacles(std::int64_t now_us) {
 }
 
 void CertifierNode::OnRobotState(const Received& received) {
+  LookAtCharge();
   if (!has_begun_) return;
   robot_state_t state;
   if (Decode(received.bytes, state) != DecodeStatus::kOk) return Refuse(channels_.robot_state, "not a robot_state_t");
@@ -220,6 +260,7 @@ void CertifierNode::OnRobotState(const Received& received) {
   last_state_ = state;
   if (state.mode == robot_state_t::FINISHED) return watch_.RobotHasFinished();
   watch_.SeeRobot(received.utime);
+  if (!is_in_charge()) return;  // the robot may execute another's plans
   FailIfLeft(conformance_.Check(state));
   FailIfUncertified(state);
 }
@@ -249,11 +290,12 @@ void CertifierNode::FailIfLeft(const std::optional<Conformance::Departure>& depa
 }
 
 void CertifierNode::OnTransition(const Received& received) {
+  LookAtCharge();
   if (!has_begun_) return;
   const auto transition = Decoded<transition_t>(received.bytes);
   if (transition) last_transition_ = *transition;
   if (gate_->options().learns) Learn(received.bytes);  // first: a false declaration is why a slice is left
-  if (transition) FailIfLeft(conformance_.Check(*transition));
+  if (transition && is_in_charge()) FailIfLeft(conformance_.Check(*transition));
 }
 
 void CertifierNode::Learn(Bytes transition) {
@@ -278,6 +320,7 @@ void CertifierNode::Learn(Bytes transition) {
 }
 
 void CertifierNode::OnCommand(const Received& received) {
+  LookAtCharge();
   const auto command = Decoded<command_t>(received.bytes);
   if (!command) return Refuse(channels_.command, "not a command_t");
   const std::string error = gate_->CheckFresh(command->utime, received.utime);
@@ -360,7 +403,7 @@ void CertifierNode::TakeOver(const LatchFile::Content& stored) {
     });
     if (!is_known) contradictions_.push_back(one);
   }
-  is_contradicted_ = IsContradicted(gate_->model_digest(), gate_->certifier().problem().declaration);
+  is_contradicted_ = IsContradicted(gate_->model_digest(), gate_->certifier().problem().declaration) || IsKnownFalse(config_);
   if (is_contradicted_) spdlog::error("a transition from before this start contradicts the declaration: every candidate is F");
   if (!stored.fault || !watch_.Latch({stored.fault->cause, stored.fault->utime, stored.why})) return;
   announced_ = *stored.fault;
@@ -403,9 +446,7 @@ void CertifierNode::SendFault() {
 // ---- Candidates.
 
 void CertifierNode::Tick(std::int64_t now_us) {
-  const Charge::State before = charge_.state();
-  charge_.Advance(clocks_.steady());
-  FollowCharge(before);
+  LookAtCharge();
   LookForObstacles(now_us);
   if (heartbeats_ == 0 && is_in_charge()) Heartbeat(now_us);  // says that nothing has been decided or learned yet
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) {
@@ -454,7 +495,7 @@ GateAnswer CertifierNode::Decide(Bytes candidate) {
   if (const auto refusal = watch_.WhyNot()) return gate_->Refuse(candidate, now, refusal->cause, refusal->why);
   if (is_contradicted_ && !gate_->certifier().violation())
     return gate_->Refuse(candidate, now, decision_t::CAUSE_PAIRWISE,
-                         "a transition from before the start contradicts the declaration; another has to be declared",
+                         "a transition that was seen before contradicts the declaration; another has to be declared",
                          decision_t::ABSTAIN_FALSIFIED);
   const std::int64_t before = PageFaults();
   GateAnswer answer = gate_->Decide(candidate, clocks_.wall);
@@ -526,7 +567,7 @@ std::string CertifierNode::WhyNotTaken(const Config& config) const {
            {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
     if (changes) return config.path + ": " + what + " cannot change while the certifier runs";
   // What the robot has shown is not forgotten by reading a file.
-  if (IsContradicted(config.model_digest, after.declaration))
+  if (IsContradicted(config.model_digest, after.declaration) || IsKnownFalse(config))
     return config.path + ": a transition that was executed contradicts its declaration; another has to be declared";
   return "";
 }

@@ -27,6 +27,7 @@ knows that the plan was handed to the bus before. */
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "certifier/gate/charge.h"
@@ -36,6 +37,7 @@ knows that the plan was handed to the bus before. */
 #include "certifier/gate/watch.h"
 #include "certifier/process/latch_file.h"
 #include "certifier/task/reloading.h"
+#include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -83,6 +85,10 @@ class CertifierNode final : public Node {
   [[nodiscard]] bool is_in_charge() const { return charge_.state() == Charge::State::kInCharge; }
   void OnCandidate(const Received& received);
   void OnStatus(const Received& received);
+  void Heed(const certifier_status_v3_t& status);
+  [[nodiscard]] bool IsKnownFalse(const Config& config) const;
+  void OnFault(const Received& received);
+  void LookAtCharge();
   void FollowCharge(Charge::State before);
   void TakeCharge();
   void StandBy();
@@ -168,6 +174,9 @@ class CertifierNode final : public Node {
   std::future<void> compaction_;  // of *gate_
   const std::unique_ptr<LatchFile> latch_;
   std::vector<LatchFile::Contradiction> contradictions_;  // one at most for each version of the task
+  static constexpr std::size_t kMostKnownFalse = 16;
+  /** Model and declaration that the certifier in charge has seen contradicted, while this one stood by. */
+  std::vector<std::pair<Digest, Digest>> known_false_;
   bool is_contradicted_ = false;  // the declaration in force, by one of them
   std::int64_t version_ = 1, failed_reloads_ = 0;
   std::string reload_error_;

@@ -249,9 +249,12 @@ bool LatchFile::Create(const std::string& text) {
 bool LatchFile::Put(const Content& content) {
   if (!may_write_) return false;
   const std::string text = TextOf(content);
-  if (content.contradictions.size() > kMostContradictions || text.size() != kBytes)
+  if (content.contradictions.size() > kMostContradictions || text.size() != kBytes) {
+    // What cannot be stored must not look like "no fault" to the next start.
+    if (file_ >= 0 && !holds_fault_) emptied_ = ::ftruncate(file_, 0) == 0;
     return Fail(path() + ": holds at most " + std::to_string(kMostContradictions) +
                 " contradictions; once a declaration is true, delete the file");
+  }
   if (file_ < 0 ? Create(text) : WriteAll(file_, text)) {
     holds_fault_ = content.fault.has_value();
     emptied_ = false;

@@ -589,6 +589,43 @@ TEST_F(TwoCertifiersTest, AFaultThatTheFirstHadLatchedIsTakenOver) {
   EXPECT_EQ(Answers().at(0).cause, decision_t::CAUSE_FAULT);
 }
 
+// After a reset the heartbeat of the first shows no fault any more, and still that the declaration is false.
+TEST_F(TwoCertifiersTest, ADeclarationThatTheFirstHasSeenContradictedStaysFalse) {
+  FOREREACH_START_BOTH();
+  transition_t wrong{};
+  wrong.num_states = 4, wrong.num_inputs = 2;
+  wrong.utime = now_us_;
+  wrong.next_state[2] = 1;
+  listener_.Publish("TRANSITION", wrong);
+  Pass(700'000);
+  const auto reset = [this] {
+    command_t command{};
+    command.utime = now_us_;
+    command.kind = command_t::RESET;
+    listener_.Publish("COMMAND", command);
+    Pass(700'000);
+  };
+  reset();
+  ASSERT_EQ(Status(0).fault, 0);
+  nodes_[0].reset();
+  Pass(3'000'000);
+  EXPECT_EQ(Status(1).fault, fault_t::DECLARATION_FALSIFIED);
+  reset();
+  EXPECT_EQ(Status(1).fault, 0);
+  EXPECT_EQ(Answers().at(0).outcome, decision_t::ABSTAIN_FALSIFIED);
+}
+
+TEST_F(TwoCertifiersTest, AFaultThatNoHeartbeatHasShownIsTakenOver) {
+  FOREREACH_START_BOTH();
+  nodes_[0].reset();
+  fault_t last_word{};
+  last_word.utime = now_us_;
+  last_word.cause = fault_t::CLOCK_JUMP;
+  listener_.Publish("FAULT", last_word);
+  Pass(3'000'000);
+  EXPECT_EQ(Status(1).fault, fault_t::CLOCK_JUMP);
+}
+
 TEST_F(TwoCertifiersTest, AnOldHeartbeatIsNoCertifier) {
   for (SharedBus& bus : buses_) bus.clock = clock_;
   Start(0);
