@@ -116,9 +116,7 @@ std::vector<std::string> Rig::UnderClock(Role role) {
   const std::string path = scratch_ / (std::string("clock of the ") + kNames[role]);
   if (!clocks_[role]) clocks_[role].reset(MapClockFile(path.c_str()));
   if (!clocks_[role]) throw std::runtime_error(path + " cannot be mapped");
-  const char* others = std::getenv("ASAN_OPTIONS");  // a build with sanitizers wants to be the first library
-  return {"/usr/bin/env", "LD_PRELOAD=" FOREREACH_SETTABLE_CLOCK, "FOREREACH_CLOCK_FILE=" + path,
-          std::string("ASAN_OPTIONS=verify_asan_link_order=0:") + (others ? others : "")};
+  return {"/usr/bin/env", "LD_PRELOAD=" FOREREACH_SETTABLE_CLOCK, "FOREREACH_CLOCK_FILE=" + path, SanitizerAfterPreload()};
 }
 
 void Rig::SetClock(Role role, std::chrono::microseconds offset) {

@@ -1,5 +1,6 @@
 #include "tests/process/child_process.h"
 
+#include <cstdlib>
 #include <cerrno>
 #include <csignal>
 #include <fstream>
@@ -89,5 +90,10 @@ std::optional<int> ChildProcess::Terminate() {
 std::string ChildProcess::output() const { return TextOf(output_path_); }
 
 std::string ChildProcess::error() const { return TextOf(error_path_); }
+
+std::string SanitizerAfterPreload() {
+  const char* others = std::getenv("ASAN_OPTIONS");
+  return std::string("ASAN_OPTIONS=verify_asan_link_order=0:") + (others ? others : "");
+}
 
 }  // namespace forereach

@@ -28,7 +28,8 @@ class ReloadProcessTest : public testing::TestWithParam<const char*> {
   const ScratchDirectory scratch_;
   const std::string path_ = scratch_.Write("task.yaml", PatientTask()), marker_ = scratch_ / "stalled";
   ChildProcess process_{{"/usr/bin/env", std::string("LD_PRELOAD=") + FOREREACH_STALLED_MOUNT_LIBRARY,
-                         "FOREREACH_STALLED_MOUNT=" + marker_, GetParam(), "--config", path_, "--lcm-url", PrivateBusUrl()}};
+                         "FOREREACH_STALLED_MOUNT=" + marker_, SanitizerAfterPreload(), GetParam(), "--config", path_,
+                         "--lcm-url", PrivateBusUrl()}};
 };
 
 TEST_P(ReloadProcessTest, OfWhatIsNoRegularFileIsRefusedAndTheNextIsTaken) {
