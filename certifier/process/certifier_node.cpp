@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
 #include <initializer_list>
 #include <iostream>
 #include <limits>
@@ -117,7 +116,7 @@ void CertifierNode::OnStatus(const Received& received) {
   const auto status = Decoded<certifier_status_v3_t>(received.bytes);
   if (!status || status->instance == charge_.self().instance) return;
   // Clocks that disagree must not hide two certifiers from each other; a log that somebody plays must not look like one.
-  if (std::abs(received.utime - status->utime) > kClocksApartUs)
+  if (status->utime < received.utime - kClocksApartUs || status->utime > received.utime + kClocksApartUs)
     return Refuse(channels_.status, "a heartbeat from another time");
   LookAtCharge();
   const Charge::State before = charge_.state(), its_state = ChargeOf(status->state);
