@@ -115,7 +115,8 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
     if (!run.end_utime) Recover(run);
 }
 
-// Listed before the runs are read: another logger's file has its run by then, or is locked.
+// Listed before the runs are read: another logger's file has its run by then, or is locked. A file without a byte of an event
+// is what a logger leaves that is killed between making it and recording its run.
 void Recorder::AdoptLogs() {
   const std::vector<std::string> logs = directory_.Logs();
   const std::vector<RunRow> runs = database_->Runs();
@@ -123,7 +124,11 @@ void Recorder::AdoptLogs() {
     if (std::ranges::find(runs, log, &RunRow::log_file) != runs.end()) continue;
     try {
       const EventLogWriter locked(directory_.PathOf(log));
-      database_->BeginRun(log, locked.recovery().first_utime);
+      const LogRecovery& found = locked.recovery();
+      if (found.events == 0 && found.cut_bytes == 0 && found.corruptions == 0)
+        directory_.Remove(log);
+      else
+        database_->BeginRun(log, found.first_utime);
     } catch (const BadInput& error) {
       spdlog::warn("no run knows {}, and it is left alone: {}", log, error.what());
     }

@@ -548,6 +548,8 @@ class Campaign final {
       Remark(row, std::to_string(candidates) + " decisions heard; the certifier counts " +
                       std::to_string(rig.witness().status()->candidates) + " decided on and " +
                       std::to_string(rig.witness().status()->candidates_lost) + " that the bus lost");
+    if (rig.witness().unjudged() > 0)
+      Remark(row, std::to_string(rig.witness().unjudged()) + " executed plans not judged: the campaign lost messages itself");
   }
 
   // A stranger's, whatever their content: they do no more than any noise.

@@ -9,7 +9,8 @@
 
 namespace forereach {
 
-Witness::Witness(Bus& bus, const BusOptions& channels, bool spoiled) : channels_(channels), spoiled_(spoiled) {
+Witness::Witness(Bus& bus, const BusOptions& channels, bool spoiled)
+    : bus_(bus), channels_(channels), spoiled_(spoiled) {
   bus.Subscribe(channels_.decision, [this](const Received& r) { OnDecision(r); });
   bus.Subscribe(channels_.certified, [this](const Received& r) { OnCertified(r); });
   bus.Subscribe(channels_.robot_state, [this](const Received& r) { OnState(r); });
@@ -83,6 +84,10 @@ void Witness::OnState(const Received& received) {
   if (!state || state->mode != robot_state_t::EXECUTING) return;
   applied_[state->utime] = {state->executing_plan_id, state->executing_step};
   const auto plan = plans_.find(state->executing_plan_id);
+  if (plan == plans_.end() && bus_.dropped() > 0) {
+    unjudged_.insert(state->executing_plan_id);
+    return;
+  }
   if (plan == plans_.end())
     return Violate("plan " + std::to_string(state->executing_plan_id) + " is executing, and was never passed on");
   executed_ = std::max(executed_, plan->second.number);

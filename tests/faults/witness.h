@@ -2,8 +2,10 @@
 #pragma once
 
 #include <chrono>
+#include <iterator>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,7 +30,8 @@ class Witness final {
   Witness(Bus& bus, const BusOptions& channels, bool spoiled);
 
   /** One line for each thing that may not happen and did since the last call:
-      - a robot executes a plan for which no certified plan, signed and sealed, was on the bus;
+      - a robot executes a plan for which no certified plan, signed and sealed, was on the bus (a flood can make this
+        listener lose messages; after a loss such a plan is unjudged());
       - a control is applied that is not the one of that plan and step, or from a state outside that step's slice;
       - a candidate is answered twice by one certifier, or two of its decisions have one number;
       - a decision is not among the candidates that the certifier's heartbeat counts. */
@@ -46,6 +49,8 @@ class Witness final {
   /** Candidates that the certifiers had counted one heartbeat ago and whose decisions were not heard: never sent, or
   lost on the way. */
   [[nodiscard]] std::int64_t unheard() const { return earlier_unheard_ + unheard_; }
+  /** Plans that a robot executed and whose certificate was not heard, on a bus that lost messages to this listener. */
+  [[nodiscard]] std::int64_t unjudged() const { return std::ssize(unjudged_); }
   /** Certified plans, signed and sealed. */
   [[nodiscard]] std::int64_t certificates() const { return certificates_; }
   [[nodiscard]] const certified_plan_t* last_certified() const { return last_certified_; }
@@ -71,6 +76,7 @@ class Witness final {
   void OnTransition(const Received& received);
   void Violate(const std::string& what) { violations_.push_back(what); }
 
+  Bus& bus_;
   const BusOptions channels_;
   const bool spoiled_;
   struct Certified {
@@ -92,6 +98,7 @@ class Witness final {
     int step;
   };
   std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
+  std::set<std::int64_t> unjudged_;          // plan ids
   std::optional<Digest> world_;
   std::optional<certifier_status_v3_t> status_;
   std::optional<logger_status_t> logger_status_;

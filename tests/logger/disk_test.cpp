@@ -177,6 +177,22 @@ TEST_F(DiskTest, ALogThatNoRunKnowsIsTakenAndItsRowsAreMade) {
   EXPECT_EQ(std::filesystem::file_size(scratch_ / "log/stray.lcmlog"), 3u);
 }
 
+// As after a SIGKILL between making the file and recording its run.
+TEST_F(DiskTest, ALogThatNoRunKnowsAndThatHoldsNothingGoes) {
+  std::filesystem::create_directory(scratch_ / "log");
+  const std::string empty = scratch_ / "log/events-20231114-221319-000000.lcmlog";
+  { const EventLogWriter made(empty); }
+  const std::string cut = scratch_ / "log/events-20231114-221319-000001.lcmlog";
+  { const EventLogWriter made(cut); }
+  std::vector<std::uint8_t> bytes = ReadBytes(cut);
+  bytes.insert(bytes.end(), {0xED, 0xA1, 0xDA});
+  WriteBytes(cut, bytes);
+  { const LoggerNode recovery(config_, bus_, out_); }
+  EXPECT_FALSE(std::filesystem::exists(empty));
+  ASSERT_EQ(Runs().size(), 1u);
+  EXPECT_EQ(scratch_ / ("log/" + Runs()[0].log_file), cut);
+}
+
 TEST_F(DiskTest, ALogThatAnotherLoggerWritesIsNotTaken) {
   std::filesystem::create_directories(scratch_ / "log");
   const EventLogWriter other(scratch_ / "log/events-20231114-221319-000000.lcmlog");
