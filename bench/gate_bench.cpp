@@ -109,8 +109,8 @@ enum class Flood { kForgedTag, kReplayed, kForeign };
 
 void RunRefuse(State& state, Flood flood, std::size_t body_bytes) {
   Authenticator authenticator(BenchKeys(), "bus", kSpeakers, 0);
-  std::vector<std::uint8_t> bytes =
-      Signer(BenchKeys(), flood == Flood::kForeign ? "another bus" : "bus").Sign(Role::kPlanner, "PLAN", std::vector<std::uint8_t>(body_bytes), kNow);
+  std::vector<std::uint8_t> bytes = Signer(BenchKeys(), flood == Flood::kForeign ? "another bus" : "bus")
+                                        .Sign(Role::kPlanner, "PLAN", std::vector<std::uint8_t>(body_bytes), kNow);
   if (flood == Flood::kForgedTag) bytes[bytes.size() - 9] ^= 1;
   if (flood == Flood::kReplayed) benchmark::DoNotOptimize(authenticator.Check("PLAN", bytes));
   for (auto _ : state)
@@ -142,10 +142,14 @@ BENCHMARK_TEMPLATE(RunSign, certified_plan_t)->Name("gate/sign_certified");
 BENCHMARK_TEMPLATE(RunCheck, certified_plan_t)->Name("gate/check_certified");
 BENCHMARK_TEMPLATE(RunFullCheck, candidate_plan_t)->Name("gate/full_check_candidate");
 BENCHMARK_TEMPLATE(RunFullCheck, certified_plan_t)->Name("gate/full_check_certified");
-BENCHMARK_CAPTURE(RunRefuse, forged, Flood::kForgedTag, EncodedSize<candidate_plan_t>())->Name("gate/check_forged_candidate");
-BENCHMARK_CAPTURE(RunRefuse, replayed, Flood::kReplayed, EncodedSize<candidate_plan_t>())->Name("gate/check_replayed_candidate");
-BENCHMARK_CAPTURE(RunRefuse, foreign, Flood::kForeign, EncodedSize<candidate_plan_t>())->Name("gate/check_foreign_candidate");
-BENCHMARK_CAPTURE(RunRefuse, forged_large, Flood::kForgedTag, EncodedSize<certified_plan_t>())->Name("gate/check_forged_certified");
+BENCHMARK_CAPTURE(RunRefuse, forged, Flood::kForgedTag, EncodedSize<candidate_plan_t>())
+    ->Name("gate/check_forged_candidate");
+BENCHMARK_CAPTURE(RunRefuse, replayed, Flood::kReplayed, EncodedSize<candidate_plan_t>())
+    ->Name("gate/check_replayed_candidate");
+BENCHMARK_CAPTURE(RunRefuse, foreign, Flood::kForeign, EncodedSize<candidate_plan_t>())
+    ->Name("gate/check_foreign_candidate");
+BENCHMARK_CAPTURE(RunRefuse, forged_large, Flood::kForgedTag, EncodedSize<certified_plan_t>())
+    ->Name("gate/check_forged_certified");
 
 }  // namespace
 }  // namespace forereach::bench

@@ -145,27 +145,31 @@ void Register(const char* stage, Scenario scenario, int observations, Run run) {
 void RegisterInsertion(int observations) {
   const int tail = StoreOptions{}.tail_capacity, inserted = std::min(tail, observations / 2);
   const std::string name = std::string("stage/insertion/").append(NameOf(Scenario::kBicycle, observations));
-  benchmark::RegisterBenchmark(name.c_str(), [=](State& state) {
-    const Midway& midway = CachedMidway(Scenario::kBicycle, observations);
-    const Observations& all = midway.observations;
-    const int before = all.size() - inserted;
-    ObservationStore store(midway.task.problem->declaration,
-                           {all.z.topRows(before), all.lower.topRows(before), all.upper.topRows(before)},
-                           midway.Ends(&Box::lower), midway.Ends(&Box::upper));
-    // A column each, so that one observation's numbers lie together.
-    const Eigen::MatrixXd z = all.z.bottomRows(inserted).transpose(),
-                          lower = all.lower.bottomRows(inserted).transpose(),
-                          upper = all.upper.bottomRows(inserted).transpose();
-    const auto column = [](const Eigen::MatrixXd& matrix, Eigen::Index i) {
-      return std::span(matrix.col(i).data(), static_cast<std::size_t>(matrix.rows()));
-    };
-    Eigen::Index i = 0;
-    for (auto _ : state) {
-      const auto insertion = store.Insert(column(z, i), column(lower, i), column(upper, i));
-      if (insertion.id < 0 || insertion.violation) return state.SkipWithError("an observation was not taken");
-      ++i;
-    }
-  })->Iterations(inserted)->Unit(benchmark::kMicrosecond);
+  benchmark::RegisterBenchmark(
+      name.c_str(),
+      [=](State& state) {
+        const Midway& midway = CachedMidway(Scenario::kBicycle, observations);
+        const Observations& all = midway.observations;
+        const int before = all.size() - inserted;
+        ObservationStore store(midway.task.problem->declaration,
+                               {all.z.topRows(before), all.lower.topRows(before), all.upper.topRows(before)},
+                               midway.Ends(&Box::lower), midway.Ends(&Box::upper));
+        // A column each, so that one observation's numbers lie together.
+        const Eigen::MatrixXd z = all.z.bottomRows(inserted).transpose(),
+                              lower = all.lower.bottomRows(inserted).transpose(),
+                              upper = all.upper.bottomRows(inserted).transpose();
+        const auto column = [](const Eigen::MatrixXd& matrix, Eigen::Index i) {
+          return std::span(matrix.col(i).data(), static_cast<std::size_t>(matrix.rows()));
+        };
+        Eigen::Index i = 0;
+        for (auto _ : state) {
+          const auto insertion = store.Insert(column(z, i), column(lower, i), column(upper, i));
+          if (insertion.id < 0 || insertion.violation) return state.SkipWithError("an observation was not taken");
+          ++i;
+        }
+      })
+      ->Iterations(inserted)
+      ->Unit(benchmark::kMicrosecond);
 }
 
 }  // namespace

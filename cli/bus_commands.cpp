@@ -35,7 +35,8 @@ bool IsInCharge(const certifier_status_v3_t& status) {
   return status.state != certifier_status_v3_t::LISTENING && status.state != certifier_status_v3_t::STANDBY;
 }
 
-// A line to the certifier: commands to it, heartbeats from it. With a key only heartbeats that the certifier has signed.
+// A line to the certifier: commands to it, heartbeats from it. With a key only heartbeats that the certifier has
+// signed.
 class Line final {
  public:
   explicit Line(const Options& options) : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
@@ -90,43 +91,44 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signe
     if (status.by_outcome[i] > 0) by_outcome[std::string(OutcomeName(i))] = status.by_outcome[i];
   for (std::int16_t i = 1; i < 64; ++i)
     if (status.by_cause[i] > 0) by_cause[std::string(CauseName(i))] = status.by_cause[i];
-  return {{"level", LevelName(status.level)},
-          {"state", StateName(status.state)},
-          {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
-          {"latch", LatchText(status)},
-          {"message", GetText(status.message)},
-          {"advice", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultAdvice(status.fault))},
-          {"signed", is_signed},
-          {"shadow", status.shadow != 0},
-          {"version", status.version},
-          {"failed_reloads", status.failed_reloads},
-          {"candidates", status.candidates},
-          {"by_outcome", by_outcome},
-          {"by_cause", by_cause},
-          {"instance", status.instance},
-          {"started_utime", status.started_utime},
-          {"other_instance", status.other_instance == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.other_instance)},
-          {"obstacles",
-           {{"source", ObstaclesSourceName(status.obstacles_source)},
-            {"known", status.obstacles_known != 0},
-            {"in_force", status.obstacles_in_force},
-            {"utime", status.obstacles_utime == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_utime)},
-            {"age_us", status.obstacles_age_us < 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_age_us)},
-            {"lost", status.obstacles_lost}}},
-          {"latch", LatchName(status.latch)},
-          {"unsigned", status.is_unsigned != 0},
-          {"candidates_lost", status.candidates_lost},
-          {"messages_refused", status.messages_refused},
-          {"refused_unsigned", status.refused_unsigned},
-          {"refused_forged", status.refused_forged},
-          {"refused_replayed", status.refused_replayed},
-          {"refused_foreign", status.refused_foreign},
-          {"datagrams_refused", status.datagrams_refused},
-          {"bus_dropped", status.bus_dropped},
-          {"observations", status.observations},
-          {"learned", status.learned},
-          {"queue_depth", status.queue_depth},
-          {"elapsed_us", {{"p50", status.elapsed_p50_us}, {"p99", status.elapsed_p99_us}, {"max", status.elapsed_max_us}}}};
+  return {
+      {"level", LevelName(status.level)},
+      {"state", StateName(status.state)},
+      {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
+      {"latch", LatchText(status)},
+      {"message", GetText(status.message)},
+      {"advice", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultAdvice(status.fault))},
+      {"signed", is_signed},
+      {"shadow", status.shadow != 0},
+      {"version", status.version},
+      {"failed_reloads", status.failed_reloads},
+      {"candidates", status.candidates},
+      {"by_outcome", by_outcome},
+      {"by_cause", by_cause},
+      {"instance", status.instance},
+      {"started_utime", status.started_utime},
+      {"other_instance", status.other_instance == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.other_instance)},
+      {"obstacles",
+       {{"source", ObstaclesSourceName(status.obstacles_source)},
+        {"known", status.obstacles_known != 0},
+        {"in_force", status.obstacles_in_force},
+        {"utime", status.obstacles_utime == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_utime)},
+        {"age_us", status.obstacles_age_us < 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_age_us)},
+        {"lost", status.obstacles_lost}}},
+      {"latch", LatchName(status.latch)},
+      {"unsigned", status.is_unsigned != 0},
+      {"candidates_lost", status.candidates_lost},
+      {"messages_refused", status.messages_refused},
+      {"refused_unsigned", status.refused_unsigned},
+      {"refused_forged", status.refused_forged},
+      {"refused_replayed", status.refused_replayed},
+      {"refused_foreign", status.refused_foreign},
+      {"datagrams_refused", status.datagrams_refused},
+      {"bus_dropped", status.bus_dropped},
+      {"observations", status.observations},
+      {"learned", status.learned},
+      {"queue_depth", status.queue_depth},
+      {"elapsed_us", {{"p50", status.elapsed_p50_us}, {"p99", status.elapsed_p99_us}, {"max", status.elapsed_max_us}}}};
 }
 
 void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
@@ -137,15 +139,20 @@ void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
   std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");
   if (const std::string message = GetText(status.message); !message.empty()) std::cout << ": " << message;
   if (status.fault != 0) std::cout << "\nwhat to do: " << FaultAdvice(status.fault);
-  if (status.latch == certifier_status_v3_t::LATCH_WRITTEN) std::cout << "\nthe fault is on disk: a restart does not clear it";
-  if (status.latch == certifier_status_v3_t::LATCH_UNWRITABLE) std::cout << "\ngate.state cannot be used: a fault is not on disk";
-  std::cout << "\nversion " << status.version << ", " << status.observations << " observations, of these " << status.learned
-            << " learned; " << status.candidates << " candidates:";
+  if (status.latch == certifier_status_v3_t::LATCH_WRITTEN)
+    std::cout << "\nthe fault is on disk: a restart does not clear it";
+  if (status.latch == certifier_status_v3_t::LATCH_UNWRITABLE)
+    std::cout << "\ngate.state cannot be used: a fault is not on disk";
+  std::cout << "\nversion " << status.version << ", " << status.observations << " observations, of these "
+            << status.learned << " learned; " << status.candidates << " candidates:";
   for (std::int16_t i = 0; i < 16; ++i)
     if (status.by_outcome[i] > 0) std::cout << " " << status.by_outcome[i] << " " << OutcomeName(i);
-  std::cout << "\n" << status.obstacles_in_force << " obstacles in force, from the "
-            << (status.obstacles_source == certifier_status_v3_t::OBSTACLES_BUS ? "task file and the bus" : "task file");
-  if (status.obstacles_age_us >= 0) std::cout << "; the last message is " << status.obstacles_age_us / 1000 << " ms old";
+  std::cout << "\n"
+            << status.obstacles_in_force << " obstacles in force, from the "
+            << (status.obstacles_source == certifier_status_v3_t::OBSTACLES_BUS ? "task file and the bus"
+                                                                                : "task file");
+  if (status.obstacles_age_us >= 0)
+    std::cout << "; the last message is " << status.obstacles_age_us / 1000 << " ms old";
   if (!status.obstacles_known) std::cout << "; not all are known";
   std::cout << std::endl;
 }
@@ -180,14 +187,17 @@ int Command(const Options& options, std::int16_t kind) {
   const auto after = line.Await([&](const certifier_status_v3_t& status) {
     if (status.instance != before->instance) return false;
     if (refused(status) > refused(*before)) return true;
-    return kind == command_t::RESET ? status.utime >= command.utime
-                                    : status.version != before->version || status.failed_reloads != before->failed_reloads;
+    return kind == command_t::RESET
+               ? status.utime >= command.utime
+               : status.version != before->version || status.failed_reloads != before->failed_reloads;
   });
   if (!after) return NobodyAnswers(line.channels());
   Print(*after, options.json, line.channels().keys.has_value());
-  const bool done = kind == command_t::RESET ? after->state != certifier_status_v3_t::FAULT : after->version > before->version;
+  const bool done =
+      kind == command_t::RESET ? after->state != certifier_status_v3_t::FAULT : after->version > before->version;
   if (!done && refused(*after) > refused(*before))
-    std::cerr << "forereach: the certifier refused the command; is it signed with the operator's key (--key)?" << std::endl;
+    std::cerr << "forereach: the certifier refused the command; is it signed with the operator's key (--key)?"
+              << std::endl;
   return done ? 0 : 1;
 }
 
@@ -204,14 +214,18 @@ void Add(CLI::App& app, Action& action, const std::string& name, const std::stri
 
 void AddKeygenCommand(CLI::App& app, Action& action) {
   auto robot = std::make_shared<std::string>(), directory = std::make_shared<std::string>();
-  CLI::App* keygen = app.add_subcommand("keygen", "Make the keys of one robot: a directory with one key file for each role");
-  keygen->add_option("--robot", *robot, "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature")
-      ->required()->type_name("NAME");
+  CLI::App* keygen =
+      app.add_subcommand("keygen", "Make the keys of one robot: a directory with one key file for each role");
+  keygen
+      ->add_option("--robot", *robot, "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature")
+      ->required()
+      ->type_name("NAME");
   keygen->add_option("directory", *directory, "The new directory")->required()->type_name("DIR");
-  keygen->footer("Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or name it under "
-                 "bus.key in the task file. On another machine a process needs its own role's file alone, as in\n"
-                 "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub holds no secret: report, "
-                 "replay and verify judge logs by it.");
+  keygen->footer(
+      "Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or name it under "
+      "bus.key in the task file. On another machine a process needs its own role's file alone, as in\n"
+      "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub holds no secret: report, "
+      "replay and verify judge logs by it.");
   keygen->callback([robot, directory, &action] {
     action = [robot, directory] {
       MakeKeys(*robot, *directory);

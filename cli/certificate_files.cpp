@@ -177,7 +177,8 @@ verifier::Certificate CertificateOf(const certified_plan_t& certified, const std
   return certificate;
 }
 
-// Which decisions are judged under a task: those of its config digest, and under the first task those of digests without one.
+// Which decisions are judged under a task: those of its config digest, and under the first task those of digests
+// without one.
 struct Share {
   const Digest& digest;
   const std::set<Digest>& all;
@@ -320,8 +321,8 @@ class LogReading {
     certified_plan_t certified;
   };
 
-  // The decision that goes with a certified plan: it names the same inputs, and its numbers and its sentence follow from a
-  // clearance that the verifier then derives for every slice.
+  // The decision that goes with a certified plan: it names the same inputs, and its numbers and its sentence follow
+  // from a clearance that the verifier then derives for every slice.
   void CheckDecision(const decision_t& decision, const Plan& plan) {
     RecordedCertificate& certificate = certificates_[plan.certificate];
     const auto compare = [&](const std::string& field, const std::string& expected, const std::string& found) {
@@ -349,13 +350,15 @@ class LogReading {
     verifier::Certificate& derived = certificate.certificate;
     const int count = static_cast<int>(derived.obstacles.size());
     if (count == 0 ? decision.obstacle != -1 : decision.obstacle < 0 || decision.obstacle >= count)
-      return compare("obstacle", count == 0 ? "-1" : "0 to " + std::to_string(count - 1), std::to_string(decision.obstacle));
+      return compare("obstacle", count == 0 ? "-1" : "0 to " + std::to_string(count - 1),
+                     std::to_string(decision.obstacle));
     double clearance = kInfinity;
     if (count > 0) {
       const double radius = derived.obstacles[static_cast<std::size_t>(decision.obstacle)].radius();
       compare("threshold", ToText(radius), ToText(decision.threshold));
       clearance = SubDown(decision.margin, radius);
-      if (!(clearance > 0 && clearance < kInfinity)) compare("margin", "above " + ToText(radius), ToText(decision.margin));
+      if (!(clearance > 0 && clearance < kInfinity))
+        compare("margin", "above " + ToText(radius), ToText(decision.margin));
     } else {
       compare("margin", ToText(kInfinity), ToText(decision.margin));
       compare("threshold", "0", ToText(decision.threshold));
@@ -367,7 +370,8 @@ class LogReading {
   }
 
   // Only the message of a log says which slice is the closest. Older records have the clearance rounded to nearest.
-  static void CompareMessage(const decision_t& decision, int steps, double clearance, RecordedCertificate& certificate) {
+  static void CompareMessage(const decision_t& decision, int steps, double clearance,
+                             RecordedCertificate& certificate) {
     const std::string found = GetText(decision.message);
     char nearest[32];
     std::snprintf(nearest, sizeof nearest, "%.6g", clearance);
@@ -379,8 +383,9 @@ class LogReading {
       const std::size_t at = sentence.find(down);
       if (at != std::string::npos && is(sentence.replace(at, down.size(), " " + std::string(nearest) + " m "))) return;
     }
-    Compare(certificate, Altered("its decision's message"), ExplainCertificate(0, decision.obstacle, clearance) +
-                                                                (decision.obstacle < 0 ? "" : ", or another step"), found);
+    Compare(certificate, Altered("its decision's message"),
+            ExplainCertificate(0, decision.obstacle, clearance) + (decision.obstacle < 0 ? "" : ", or another step"),
+            found);
   }
 
   const Config& config_;
@@ -421,8 +426,9 @@ std::vector<CertificateFile> FromLogs(const std::vector<std::string>& logs, std:
 
 // ---- A decision database: its logs lie beside it, and its rows have to say what they say.
 
-void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const Share& share, const std::set<std::string>& tasks,
-               const LearnedHistory& learned, const Config& config, std::vector<RecordedCertificate>& certificates) {
+void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const Share& share,
+               const std::set<std::string>& tasks, const LearnedHistory& learned, const Config& config,
+               std::vector<RecordedCertificate>& certificates) {
   std::set<std::string> certified;
   for (const auto& [digest, outcome] : log.outcomes())
     if (outcome == decision_t::CERTIFIED) certified.insert(ToHex(digest));
@@ -466,7 +472,8 @@ LogSurvey SurveyChain(const std::vector<std::string>& logs) {
 std::vector<std::vector<RunRow>> Chains(Database& database) {
   std::vector<std::vector<RunRow>> chains;
   for (RunRow& run : database.Runs()) {
-    if (run.continues.empty() || chains.empty() || chains.back().back().log_file != run.continues) chains.emplace_back();
+    if (run.continues.empty() || chains.empty() || chains.back().back().log_file != run.continues)
+      chains.emplace_back();
     chains.back().push_back(std::move(run));
   }
   return chains;
@@ -487,7 +494,8 @@ std::vector<CertificateFile> FromDatabase(const std::string& path, const std::st
   std::string why_none = path + ": no run in it has a log with decisions";
   const auto group_of = [&](const Config& task) -> Group& {
     for (const auto& group : groups)
-      if (group->file.config.digest == task.digest && group->file.config.observations_digest == task.observations_digest)
+      if (group->file.config.digest == task.digest &&
+          group->file.config.observations_digest == task.observations_digest)
         return *group;
     Group& group = *groups.emplace_back(std::make_unique<Group>());
     group.file.config = task;
@@ -504,7 +512,8 @@ std::vector<CertificateFile> FromDatabase(const std::string& path, const std::st
         logs.push_back(log);
         std::ranges::move(database.Read(run.log_file).decisions, std::back_inserter(rows));
       } else {
-        const char* why = run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not beside the database";
+        const char* why =
+            run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not beside the database";
         without_task.push_back({run.log_file, {}, why, {}});
         why_none = path + ": " + run.log_file + ": " + why;
       }
@@ -549,7 +558,8 @@ std::vector<Config> TasksFor(const std::vector<std::string>& logs, const std::st
 
 }  // namespace
 
-std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const std::string& config_path, const LogKey& key) {
+std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const std::string& config_path,
+                                                 const LogKey& key) {
   std::string path = given;
   if (KindOf(path) == FileKind::kDirectory) {
     path = (std::filesystem::path(path) / LogDirectory::kDatabase).string();
@@ -557,15 +567,13 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const
   }
   try {
     switch (KindOf(path)) {
-      case FileKind::kDatabase:
-        return FromDatabase(path, config_path, key);
+      case FileKind::kDatabase: return FromDatabase(path, config_path, key);
       case FileKind::kJson:
         return {FromDecision(path, ParseJson<Json>(ReadWhole(path, kLargestJsonFile)), config_path)};
       case FileKind::kOther:
         if (Survey({path}).events == 0) break;
         [[fallthrough]];
-      default:
-        return FromLogs({path}, TasksFor({path}, config_path, key));
+      default: return FromLogs({path}, TasksFor({path}, config_path, key));
     }
   } catch (const Json::exception& error) {
     throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());

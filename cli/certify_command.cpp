@@ -60,12 +60,15 @@ int Certify(const Options& options) {
 
 void AddCertifyCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("certify", "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input");
+  CLI::App* command =
+      app.add_subcommand("certify", "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input");
   command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
   command->add_option("--plan", options->plan, "Controls, one row a step (CSV with a header)")
-      ->required()->type_name("FILE.csv");
+      ->required()
+      ->type_name("FILE.csv");
   command->add_flag("--json", options->json, "One JSON document on standard output, and nothing else there");
-  command->footer("Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv");
+  command->footer(
+      "Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv");
   command->callback([options, &action] { action = [options] { return Certify(*options); }; });
 }
 

@@ -26,9 +26,10 @@ int RunCheckLog(const Options& options) {
 void AddCheckLogCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
-      "check-log", "Hold a logger's directory against itself: exit 0 if every event that a row of the database comes from "
-                   "is in its log unchanged and no log is damaged or unknown to it, else 1; logs deleted for the quota "
-                   "are no fault");
+      "check-log",
+      "Hold a logger's directory against itself: exit 0 if every event that a row of the database comes from "
+      "is in its log unchanged and no log is damaged or unknown to it, else 1; logs deleted for the quota "
+      "are no fault");
   command->add_option("directory", options->directory, "The logger's directory")->required()->type_name("DIRECTORY");
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->footer("Example:\n  forereach check-log run/log");

@@ -80,10 +80,12 @@ Json InputsJson(const Eigen::MatrixXd& controls, const Config& config) {
   Json steps = Json::array();
   for (const auto column : controls.colwise()) steps.push_back(std::vector(column.begin(), column.end()));
   const Box& set = config.initial_set;
-  return {{"config", {{"given", config.path}, {"absolute", std::filesystem::absolute(config.path).lexically_normal().string()}}},
+  return {{"config",
+           {{"given", config.path}, {"absolute", std::filesystem::absolute(config.path).lexically_normal().string()}}},
           {"controls", steps},
-          {"initial_set", {{"lower", std::vector(set.lower().begin(), set.lower().end())},
-                           {"upper", std::vector(set.upper().begin(), set.upper().end())}}}};
+          {"initial_set",
+           {{"lower", std::vector(set.lower().begin(), set.lower().end())},
+            {"upper", std::vector(set.upper().begin(), set.upper().end())}}}};
 }
 
 void Append(CanonicalBytes& bytes, const Json& value) {
@@ -122,8 +124,7 @@ Digest TubeDigest(const nlohmann::json& tube) {
   return bytes.digest();
 }
 
-nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certifier& certifier,
-                      const Config& config) {
+nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certifier& certifier, const Config& config) {
   const Decision& decision = result.decision;
   const bool before_any_step = decision.outcome == Outcome::kFalsified && decision.step < 0;
   Json document;

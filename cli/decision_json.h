@@ -23,8 +23,8 @@ struct CertifyResult {
 /** Of every number in the document's `tube`, so that none can be altered unnoticed. What is infinite counts as null. */
 [[nodiscard]] Digest TubeDigest(const nlohmann::json& tube);
 
-/** docs/decision.md lists the keys. With `inputs` the document can be verified by itself. Numbers that are infinite, and
-keys that do not apply to the outcome, are null. */
+/** docs/decision.md lists the keys. With `inputs` the document can be verified by itself. Numbers that are infinite,
+and keys that do not apply to the outcome, are null. */
 [[nodiscard]] nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certifier& certifier,
                                     const Config& config);
 

@@ -111,8 +111,8 @@ class Reading {
   }
   void Compare(const Field& field, const Json& expected) {
     if (field.json() == expected) return;
-    record_.mismatches.push_back({kAltered + field.name(), expected.dump(),
-                                  field.json().dump(-1, ' ', false, Json::error_handler_t::replace)});
+    record_.mismatches.push_back(
+        {kAltered + field.name(), expected.dump(), field.json().dump(-1, ' ', false, Json::error_handler_t::replace)});
   }
 
   void ReadInputs() {
@@ -127,7 +127,8 @@ class Reading {
     set.lower = inputs["initial_set"]["lower"].Vector(model.num_states());
     set.upper = inputs["initial_set"]["upper"].Vector(model.num_states());
     if (set.lower != config_.initial_set.lower() || set.upper != config_.initial_set.upper())
-      record_.mismatches.push_back({kOtherInput + std::string("inputs.initial_set"), "that of " + config_.path, "another"});
+      record_.mismatches.push_back(
+          {kOtherInput + std::string("inputs.initial_set"), "that of " + config_.path, "another"});
     record_.certificate.obstacles = config_.obstacles;
   }
 
@@ -214,7 +215,8 @@ class Reading {
       Compare(document_["closest_step"], step);
       Compare(threshold, Json(radius));
       const double claimed = SubDown(margin.Number(), radius);
-      if (claimed != clearance) Compare(kAltered + margin.name() + " less the radius", Json(clearance).dump(), Json(claimed).dump());
+      if (claimed != clearance)
+        Compare(kAltered + margin.name() + " less the radius", Json(clearance).dump(), Json(claimed).dump());
     }
     const std::string sentence = ExplainCertificate(step, obstacle, clearance);
     Compare(document_["message"], sentence + (document_["capped"].Bool() ? kCapped : ""));

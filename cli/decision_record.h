@@ -1,4 +1,5 @@
-/** A decision's JSON document, read back. Strict: what docs/decision.md names has to be there, whole, and nothing else. */
+/** A decision's JSON document, read back. Strict: what docs/decision.md names has to be there, whole, and nothing else.
+ */
 #pragma once
 
 #include <string>
@@ -30,7 +31,8 @@ struct DecisionRecord {
 /** @throws ConfigError naming file and field unless the outcome is one there is. */
 [[nodiscard]] bool IsCertificate(const std::string& path, const nlohmann::json& document);
 
-/** @pre IsCertificate. @throws ConfigError naming file and field if one is missing, unknown, or not of its type or size. */
+/** @pre IsCertificate. @throws ConfigError naming file and field if one is missing, unknown, or not of its type or
+size. */
 [[nodiscard]] DecisionRecord ReadCertificate(const std::string& path, const nlohmann::json& document,
                                              const Config& config);
 

@@ -109,8 +109,8 @@ std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::s
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     const bool same_row = i > 0 && bounds[i - 1].row == bounds[i].row;
     if (!same_row) text += (i > 0 ? "}, " : "") + names[static_cast<std::size_t>(bounds[i].row)] + ": {";
-    text +=
-        (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " + RoundedUp(bounds[i].upper, kDigits);
+    text += (same_row ? ", " : "") + names[static_cast<std::size_t>(bounds[i].column)] + ": " +
+            RoundedUp(bounds[i].upper, kDigits);
   }
   return text + (bounds.empty() ? "}" : "}}");
 }
@@ -174,9 +174,9 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
   const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
   std::ostringstream text;
   text << std::left << "declare: " << config.residual->name << " over the domain, "
-       << (AllReached(bounds) ? "to a gap of " : "stopped at a gap of ") << RoundedUp(LargestGap(bounds), 2)
-       << "\n  " << std::setw(8) << "row" << std::setw(8) << "column" << std::setw(18) << "certified bound"
-       << std::setw(18) << "largest found" << std::setw(10) << "gap" << std::setw(9) << "boxes"
+       << (AllReached(bounds) ? "to a gap of " : "stopped at a gap of ") << RoundedUp(LargestGap(bounds), 2) << "\n  "
+       << std::setw(8) << "row" << std::setw(8) << "column" << std::setw(18) << "certified bound" << std::setw(18)
+       << "largest found" << std::setw(10) << "gap" << std::setw(9) << "boxes"
        << " at\n";
   for (const SlopeBound& bound : bounds) {
     text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)

@@ -1,18 +1,18 @@
+#include <arpa/inet.h>
+#include <net/if.h>
+#include <netinet/in.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
 #include <algorithm>
 #include <chrono>
-#include <arpa/inet.h>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <cmath>
 #include <map>
-#include <net/if.h>
-#include <netinet/in.h>
 #include <sstream>
-#include <sys/ioctl.h>
-#include <sys/socket.h>
 #include <thread>
-#include <unistd.h>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -59,8 +59,8 @@ Check CheckLoopback() {
   return {"loopback interface", up, up ? "up" : "down", std::string(kReadyCommand) + ", or: ip link set lo up"};
 }
 
-// The interface of the most specific route to `group`, empty if there is none. The kernel's table has addresses and masks
-// in hexadecimal, in network order as this machine reads it.
+// The interface of the most specific route to `group`, empty if there is none. The kernel's table has addresses and
+// masks in hexadecimal, in network order as this machine reads it.
 std::string InterfaceOfRoute(const std::string& group) {
   in_addr address{};
   inet_pton(AF_INET, group.c_str(), &address);
@@ -73,7 +73,8 @@ std::string InterfaceOfRoute(const std::string& group) {
     std::string name, gateway;
     std::uint32_t destination = 0, mask = 0;
     int flags = 0, references = 0, use = 0, metric = 0;
-    row >> name >> std::hex >> destination >> gateway >> flags >> std::dec >> references >> use >> metric >> std::hex >> mask;
+    row >> name >> std::hex >> destination >> gateway >> flags >> std::dec >> references >> use >> metric >> std::hex >>
+        mask;
     if (!row || (address.s_addr & mask) != destination || ntohl(mask) < longest_mask) continue;
     interface = name;
     longest_mask = ntohl(mask);
@@ -107,19 +108,20 @@ Check CheckRoundTrip(const std::string& url) {
       sender->Publish(channel, Bytes(bytes));
       for (int waits = 0; waits < 20 && !arrived; ++waits) receiver->Dispatch(5);
       if (arrived)
-        times_us.push_back(
-            std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
+        times_us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
     }
   } catch (const BusError& error) {
     return {"round trip on " + url, false, "no bus", error.what()};
   }
   std::ranges::sort(times_us);
   const auto at = [&](double fraction) {
-    return std::to_string(std::lround(times_us[static_cast<std::size_t>(fraction * static_cast<double>(times_us.size() - 1))]));
+    return std::to_string(
+        std::lround(times_us[static_cast<std::size_t>(fraction * static_cast<double>(times_us.size() - 1))]));
   };
   const std::string count = std::to_string(times_us.size()) + " of " + std::to_string(kRoundTrips) + " arrived";
   if (times_us.empty()) return {"round trip on " + url, false, count, "is multicast filtered by a firewall?"};
-  return {"round trip on " + url, times_us.size() == kRoundTrips, count + ", p50 " + at(0.5) + " us, p99 " + at(0.99) + " us",
+  return {"round trip on " + url, times_us.size() == kRoundTrips,
+          count + ", p50 " + at(0.5) + " us, p99 " + at(0.99) + " us",
           "messages are lost: raise the receive buffer limit, see above"};
 }
 
@@ -150,22 +152,30 @@ Check CheckKeys(const BusOptions& bus) {
 int Diagnose(const BusOptions& bus, bool json) {
   const std::string& url = bus.url;
   const std::map<std::string, std::string> versions{
-      {"forereach", FOREREACH_VERSION}, {"lcm", BusVersion()}, {"compiler", __VERSION__},
+      {"forereach", FOREREACH_VERSION},
+      {"lcm", BusVersion()},
+      {"compiler", __VERSION__},
       {"eigen", std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
                     std::to_string(EIGEN_MINOR_VERSION)}};
-  const std::vector<Check> checks{CheckLoopback(), CheckRoute(ParseMulticastUrl(url).group), CheckBuffer(), CheckRoundTrip(url),
-                                  CheckKeys(bus)};
+  const std::vector<Check> checks{CheckLoopback(), CheckRoute(ParseMulticastUrl(url).group), CheckBuffer(),
+                                  CheckRoundTrip(url), CheckKeys(bus)};
   const bool good = std::ranges::all_of(checks, [](const Check& check) { return check.good || check.warning; });
   if (json) {
     nlohmann::json document{{"good", good}, {"versions", versions}, {"checks", nlohmann::json::array()}};
     for (const Check& check : checks)
-      document["checks"].push_back({{"name", check.name}, {"good", check.good}, {"warning", check.warning}, {"found", check.found},
+      document["checks"].push_back({{"name", check.name},
+                                    {"good", check.good},
+                                    {"warning", check.warning},
+                                    {"found", check.found},
                                     {"advice", check.good ? nlohmann::json(nullptr) : nlohmann::json(check.advice)}});
     std::cout << document << std::endl;
   } else {
     for (const auto& [name, version] : versions) std::cout << "      " << name << " " << version << "\n";
     for (const Check& check : checks) {
-      std::cout << (check.good ? "good  " : check.warning ? "WARN  " : "BAD   ") << check.name << ": " << check.found << "\n";
+      std::cout << (check.good      ? "good  "
+                    : check.warning ? "WARN  "
+                                    : "BAD   ")
+                << check.name << ": " << check.found << "\n";
       if (!check.good) std::cout << "      -> " << check.advice << "\n";
     }
     std::cout << (good ? "The bus is ready." : "The bus is not ready: do what the arrows say.") << std::endl;
@@ -188,7 +198,8 @@ void AddDoctorCommand(CLI::App& app, Action& action) {
   command->add_flag("--json", options->json, "One JSON document on standard output");
   command->callback([options, &action] {
     action = [options] {
-      BusOptions bus = options->config.empty() ? BusOptions() : LoadConfig(options->config, TransitionsFile::kIgnore).bus;
+      BusOptions bus =
+          options->config.empty() ? BusOptions() : LoadConfig(options->config, TransitionsFile::kIgnore).bus;
       options->bus.Override(bus);
       return Diagnose(bus, options->json);
     };

@@ -8,8 +8,9 @@ namespace forereach {
 
 void LogKey::AddTo(CLI::App& command) {
   CLI::Option* option = command.add_option(
-      "--key", file, "Directory of keys, verify.pub or any key file: messages of a log that its roles did not sign are passed over; "
-               "by default the task file's bus.key");
+      "--key", file,
+      "Directory of keys, verify.pub or any key file: messages of a log that its roles did not sign are passed over; "
+      "by default the task file's bus.key");
   option->type_name("PATH");
   command.add_flag("--no-key", none, "Believe every message of a log, whoever sent it")->excludes(option);
 }
@@ -21,8 +22,9 @@ void LogKey::Override(BusOptions& options) const {
 void LogKey::Override(std::vector<Config>& tasks, const std::string& given) const {
   for (Config& task : tasks) {
     if (!task.bus.key.empty() && task.path != given && file.empty() && !none)
-      throw ConfigError(task.path + ": the task has a key, bus.key, and keys are not kept: name it with --key FILE, or believe "
-                                    "every message with --no-key");
+      throw ConfigError(task.path +
+                        ": the task has a key, bus.key, and keys are not kept: name it with --key FILE, or believe "
+                        "every message with --no-key");
     Override(task.bus);
   }
 }
@@ -38,8 +40,11 @@ std::string InWords(const PassedOver& passed_over) {
 
 nlohmann::json ToJson(const PassedOver& passed_over) {
   const Refusals& refused = passed_over.not_authentic;
-  return {{"not_authentic", {{"unsigned", refused.unsigned_ones}, {"forged", refused.forged}, {"replayed", refused.replayed},
-                             {"of_another_bus", refused.foreign}}},
+  return {{"not_authentic",
+           {{"unsigned", refused.unsigned_ones},
+            {"forged", refused.forged},
+            {"replayed", refused.replayed},
+            {"of_another_bus", refused.foreign}}},
           {"undecodable", passed_over.undecodable}};
 }
 

@@ -23,8 +23,8 @@ struct LogKey {
 
   void AddTo(CLI::App& command);
   void Override(BusOptions& options) const;
-  /** Of a task that the logger kept, beside which there is no key. @throws ConfigError if it has one and the command line
-  does not say which. */
+  /** Of a task that the logger kept, beside which there is no key. @throws ConfigError if it has one and the command
+  line does not say which. */
   void Override(std::vector<Config>& tasks, const std::string& given) const;
 };
 

@@ -8,8 +8,9 @@
 int main(int argc, char** argv) {
   using namespace forereach;
   CLI::App app("ForeReach certifies planned control sequences before a robot executes them.", "forereach");
-  app.footer("Try:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv\n"
-             "  forereach doctor\n  forereach certify --help");
+  app.footer(
+      "Try:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv\n"
+      "  forereach doctor\n  forereach certify --help");
   app.require_subcommand(1);
   Action action;
   AddCertifyCommand(app, action);

@@ -2,8 +2,8 @@
 #include <string>
 #include <utility>
 
-#include <CLI/CLI.hpp>
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
@@ -65,8 +65,9 @@ int Send(const Options& options) {
   const std::int64_t period_us =
       options.period_ms > 0 ? Microseconds(options.period_ms) : ObstacleSender::PeriodUs(config.gate);
   if (3 * period_us > Microseconds(config.gate.obstacles_timeout_ms))
-    spdlog::warn("every {} ms is less often than three times in gate.obstacles_timeout_ms: one lost message stops the robot",
-                 static_cast<double>(period_us) / 1e3);
+    spdlog::warn(
+        "every {} ms is less often than three times in gate.obstacles_timeout_ms: one lost message stops the robot",
+        static_cast<double>(period_us) / 1e3);
   ObstaclesNode node(config, *bus, period_us);
   spdlog::info("{} obstacles of {} on {} every {} ms", config.obstacles.size(), config.path, config.bus.url,
                static_cast<double>(period_us) / 1e3);
@@ -79,18 +80,22 @@ int Send(const Options& options) {
 void AddObstaclesCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
-      "obstacles", "Send a task file's obstacles on the bus, again and again, until SIGTERM: stands in for perception. "
-                   "SIGHUP reads the file again");
+      "obstacles",
+      "Send a task file's obstacles on the bus, again and again, until SIGTERM: stands in for perception. "
+      "SIGHUP reads the file again");
   command->add_option("--config", options->config, "Task file (YAML) that has the obstacles and names the bus")
       ->required()
       ->type_name("FILE");
   options->bus.AddTo(*command);
-  command->add_option("--period-ms", options->period_ms, "From one message to the next; by default a quarter of "
-                                                         "gate.obstacles_timeout_ms")
+  command
+      ->add_option("--period-ms", options->period_ms,
+                   "From one message to the next; by default a quarter of "
+                   "gate.obstacles_timeout_ms")
       ->check(CLI::Range(1.0, kMaxPeriodMs))
       ->type_name("MS");
-  command->footer("Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nA certifier whose task says "
-                  "gate.obstacles: bus certifies nothing before it has heard them, nor when they have fallen silent.");
+  command->footer(
+      "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nA certifier whose task says "
+      "gate.obstacles: bus certifies nothing before it has heard them, nor when they have fallen silent.");
   command->callback([options, &action] { action = [options] { return Send(*options); }; });
 }
 

@@ -48,7 +48,8 @@ std::string InWords(const Eigen::VectorXd& position) {
 int ReportFailure(const Options& options, const Config& config, const CertifiedPlan& plan) {
   std::cerr << "forereach plan: no certified plan from task.initial_set with seed " << options.seed << ": ";
   if (plan.candidates == 0)
-    std::cerr << "none of " << config.planner.candidates << " searches found a candidate; a smaller planner.clearance or "
+    std::cerr << "none of " << config.planner.candidates
+              << " searches found a candidate; a smaller planner.clearance or "
               << "a larger planner.time_limit_ms may help";
   else
     std::cerr << plan.candidates << (plan.candidates == 1 ? " candidate was" : " candidates were")
@@ -67,10 +68,11 @@ int MakePlan(const Options& options) {
   const auto& goal = config.planner.goal;
   const double away = (plan.end - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm();
   std::cout << options.out << ": " << plan.controls.cols() << " steps, the last "
-            << plan.controls.cols() - plan.progress_steps << " brake to a stand at about " << InWords(plan.end) << "\n  "
-            << Explain(plan.decision, *config.problem) << "\n";
+            << plan.controls.cols() - plan.progress_steps << " brake to a stand at about " << InWords(plan.end)
+            << "\n  " << Explain(plan.decision, *config.problem) << "\n";
   if (!plan.reaches_goal)
-    std::cout << "  The goal is " << away << " m further. This is as far as a single plan was certified; `forereach run "
+    std::cout << "  The goal is " << away
+              << " m further. This is as far as a single plan was certified; `forereach run "
               << "--config " << Quoted(options.config) << "` drives on with a new plan every few steps.\n";
   std::cout << "  now: forereach certify --config " << Quoted(options.config) << " --plan " << Quoted(options.out)
             << std::endl;
@@ -82,15 +84,17 @@ int MakePlan(const Options& options) {
 void AddPlanCommand(CLI::App& app, Action& action) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand(
-      "plan", "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a CSV file, 1 if none was "
-              "found, 2 bad input");
+      "plan",
+      "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a CSV file, 1 if none was "
+      "found, 2 bad input");
   command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
   command->add_option("--out", options->out, "Where to write the controls")->required()->type_name("FILE.csv");
   command->add_option("--seed", options->seed, "The same seed gives the same plan")
       ->check(CLI::Range(std::uint32_t{0}, std::numeric_limits<std::uint32_t>::max()))
       ->capture_default_str();
   command->footer(
-      "The task's planner proposes, the task's certifier decides on each candidate. The plan that is written is certified\n"
+      "The task's planner proposes, the task's certifier decides on each candidate. The plan that is written is "
+      "certified\n"
       "and ends in a stop. It goes as far towards the goal as a plan could be certified.\n\n"
       "Example:\n  forereach plan --config config/demo.yaml --out plan.csv");
   command->callback([options, &action] { action = [options] { return MakePlan(*options); }; });

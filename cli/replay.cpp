@@ -49,17 +49,19 @@ bool IsCircumstance(const decision_t& decision) {
     case decision_t::CAUSE_NOT_ARMED:
     case decision_t::CAUSE_FAULT:
     case decision_t::CAUSE_LATCH_UNWRITABLE:
-    case decision_t::CAUSE_NO_OBSTACLES:
-      return true;
-    default:
-      return false;
+    case decision_t::CAUSE_NO_OBSTACLES: return true;
+    default: return false;
   }
 }
 
 class Replayer {
  public:
   explicit Replayer(const std::vector<Config>& tasks)
-      : tasks_(tasks), config_(tasks.front()), now_(&config_), authenticator_(config_.bus, PublicKeysOf(config_.bus)), logged_obstacles_(config_) {
+      : tasks_(tasks),
+        config_(tasks.front()),
+        now_(&config_),
+        authenticator_(config_.bus, PublicKeysOf(config_.bus)),
+        logged_obstacles_(config_) {
     Restart();
   }
 
@@ -181,8 +183,10 @@ class Replayer {
 
   // What had changed before the decision was made, which is at most what is logged before it.
   void CatchUp(const decision_t& recorded) {
-    const Digest obstacles = GetDigest(recorded.obstacles_digest), observations = GetDigest(recorded.observations_digest);
-    while (!changes_.empty() && (gate_->obstacles_digest() != obstacles || gate_->observations_digest() != observations))
+    const Digest obstacles = GetDigest(recorded.obstacles_digest),
+                 observations = GetDigest(recorded.observations_digest);
+    while (!changes_.empty() &&
+           (gate_->obstacles_digest() != obstacles || gate_->observations_digest() != observations))
       TakeChange();
   }
 
@@ -211,12 +215,12 @@ class Replayer {
   }
 
   const std::vector<Config>& tasks_;
-  const Config& config_;  // of channels and key
-  const Config* now_;     // in force
+  const Config& config_;         // of channels and key
+  const Config* now_;            // in force
   bool reloaded_ahead_ = false;  // of the heartbeat that will tell of it
   LogAuthenticator authenticator_;
   std::unique_ptr<Gate> gate_;
-  ObstaclesInForce logged_obstacles_;  // by all that was logged so far
+  ObstaclesInForce logged_obstacles_;                   // by all that was logged so far
   std::map<Digest, std::deque<Candidate>> candidates_;  // not decided yet
   std::deque<Change> changes_;                          // logged, and perhaps not yet seen by the certifier
   Restarts restarts_;

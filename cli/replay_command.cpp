@@ -41,7 +41,8 @@ int RunReplay(const Options& options) {
     std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
               << result.differences.size() << " differ";
     if (result.circumstances > 0)
-      std::cout << ", " << result.circumstances << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";
+      std::cout << ", " << result.circumstances
+                << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";
     if (result.corruptions > 0) std::cout << "; the log is damaged in " << result.corruptions << " places";
     std::cout << InWords(result.passed_over) << std::endl;
   }

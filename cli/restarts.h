@@ -15,9 +15,9 @@ class Restarts final {
     kReload,  ///< The same with its task read again: the obstacles that it had heard it still knows.
   };
 
-  /** What has happened between the heartbeat before and this message of CERTIFIER_STATUS. A process counts heartbeats from
-  0, and versions up by each reload. A log may begin in the middle of its life, which is no beginning. Heartbeats of a
-  certifier that is not in charge mean nothing here: when it takes charge it counts from 0. */
+  /** What has happened between the heartbeat before and this message of CERTIFIER_STATUS. A process counts heartbeats
+  from 0, and versions up by each reload. A log may begin in the middle of its life, which is no beginning. Heartbeats
+  of a certifier that is not in charge mean nothing here: when it takes charge it counts from 0. */
   [[nodiscard]] Kind Notice(Bytes message) {
     const auto status = ReadHeartbeat(message);
     if (!status || !status->in_charge) return Kind::kNone;

@@ -118,11 +118,15 @@ void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts
 std::string Extent(const CertificateFile& file) {
   if (file.certificates.empty()) return "  checked: nothing, for there are no certificates";
   if (file.of_decision)
-    return "  checked: every field of the decision but elapsed_us and capped: digests against the task and its data; hull,\n"
-           "  generators, envelope, remainder, radius and clearance of each slice against a tube derived anew; the witness\n"
+    return "  checked: every field of the decision but elapsed_us and capped: digests against the task and its data; "
+           "hull,\n"
+           "  generators, envelope, remainder, radius and clearance of each slice against a tube derived anew; the "
+           "witness\n"
            "  and the sentence against the clearances";
-  return "  checked: of each certified plan its digests, its candidate, the obstacles in force, the hull of each slice against\n"
-         "  a tube derived anew, and that this keeps clear of every obstacle; of its decision, where the log has it, inputs,\n"
+  return "  checked: of each certified plan its digests, its candidate, the obstacles in force, the hull of each slice "
+         "against\n"
+         "  a tube derived anew, and that this keeps clear of every obstacle; of its decision, where the log has it, "
+         "inputs,\n"
          "  witness, margin and sentence. Not checked: times, sequence numbers, elapsed_us, which step is the closest";
 }
 
@@ -171,16 +175,18 @@ void AddVerifyCommand(CLI::App& app, Action& action) {
                          "there are any and all are "
                          "confirmed, 1 with the first that is not and the first step of it that fails, 2 bad input");
   command
-      ->add_option(
-          "files", options->files,
-          "What holds the certificates: a decision (the output of certify --json), an LCM event log (several if the run "
-          "was recorded in several, in their order), or a decision database with its logs beside it, or the directory of both")
+      ->add_option("files", options->files,
+                   "What holds the certificates: a decision (the output of certify --json), an LCM event log (several "
+                   "if the run "
+                   "was recorded in several, in their order), or a decision database with its logs beside it, or the "
+                   "directory of both")
       ->required()
       ->type_name("DECISION|LOG|DATABASE|DIRECTORY");
   command
-      ->add_option("--config", options->config,
-                   "The task file they were made with; by default the one that a decision names, or that the logger kept "
-                   "beside a log, in tasks/")
+      ->add_option(
+          "--config", options->config,
+          "The task file they were made with; by default the one that a decision names, or that the logger kept "
+          "beside a log, in tasks/")
       ->type_name("FILE");
   options->key.AddTo(*command);
   command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();

@@ -66,12 +66,10 @@ Estimate EstimatedPart(const Scope& scope, double lambda) {
   return EstimateOf(parts);
 }
 
-double TruePart(double lambda) {
-  return Escaping(lambda).deployed.maxCoeff() / PointMassSystem().deployed.maxCoeff();
-}
+double TruePart(double lambda) { return Escaping(lambda).deployed.maxCoeff() / PointMassSystem().deployed.maxCoeff(); }
 
-void AddOutcomes(const Scope& scope, const Results& results, const std::string& where, const Cell& cell,
-                 bool is_true, Table& table) {
+void AddOutcomes(const Scope& scope, const Results& results, const std::string& where, const Cell& cell, bool is_true,
+                 Table& table) {
   const auto row = [&](const char* what, Group group, Statistic statistic) {
     table.rows.push_back({where + what, {}, OverSeeds(scope, results, cell, group, statistic), 3, ""});
   };
@@ -87,7 +85,8 @@ void AddOutcomes(const Scope& scope, const Results& results, const std::string& 
 std::vector<Table> FamilyTables(const Scope& scope, const Results& results) {
   Table slopes{
       "Adversarial residual family: slopes",
-      "r_lambda = [1 + (lambda - 1) SmoothGate((s - 0.9) / 0.14)] r over the speed s, r the knee's: the family is ours, "
+      "r_lambda = [1 + (lambda - 1) SmoothGate((s - 0.9) / 0.14)] r over the speed s, r the knee's: the family is "
+      "ours, "
       "the paper prints no formula. Noiseless data from below the knee, N = 100, the same for every lambda. Largest "
       "velocity slope over the deployed matrix's: a proved bound on the true one, and LACKI's estimate from the data.",
       {}};
@@ -99,9 +98,9 @@ std::vector<Table> FamilyTables(const Scope& scope, const Results& results) {
   const double last = LambdasOf(scope).back();
   for (const double lambda : LambdasOf(scope)) {
     const std::string where = "lambda = " + std::to_string(static_cast<int>(lambda)) + ": ";
-    slopes.rows.push_back({where + "true",
-                           lambda == last ? std::optional(Paper("slopes.containment")) : std::nullopt,
-                           Exactly(TruePart(lambda)), 3, "which member the paper needs so much for is not in its text"});
+    slopes.rows.push_back({where + "true", lambda == last ? std::optional(Paper("slopes.containment")) : std::nullopt,
+                           Exactly(TruePart(lambda)), 3,
+                           "which member the paper needs so much for is not in its text"});
     slopes.rows.push_back({where + "estimate", Paper("slopes"), EstimatedPart(scope, lambda), 3,
                            "the paper's residual is flat at every sample, the softplus not quite"});
     AddOutcomes(scope, results, where + "true, ", TrueCell(lambda), true, outcomes);
@@ -117,9 +116,8 @@ Plot ProfilePlot() {
     const double speed = 0.02 * i;
     lines += DataLine({speed, EscapeAt(1, speed), EscapeAt(2, speed), EscapeAt(4, speed), EscapeAt(8, speed)});
   }
-  return {"adversarial-profiles", "Adversarial family: all members agree up to the knee, and so on data left of it.", 720,
-          400,
-          DataBlock("profile", lines) + R"(set xrange [0:3]; set yrange [0:8]
+  return {"adversarial-profiles", "Adversarial family: all members agree up to the knee, and so on data left of it.",
+          720, 400, DataBlock("profile", lines) + R"(set xrange [0:3]; set yrange [0:8]
 set arrow from 0.9, graph 0 to 0.9, graph 1 nohead dt 2 lc rgb grey
 set label 'knee' at 0.93, graph 0.95 textcolor rgb grey
 set object rectangle from 0, graph 0 to 0.283, graph 1 fc rgb sky fs solid 0.2 noborder behind
@@ -136,12 +134,11 @@ Plot SlopePlot(const Scope& scope) {
   const double deployed = PointMassSystem().deployed.maxCoeff();
   std::string lines;
   for (const double lambda : LambdasOf(scope))
-    lines += DataLine({lambda, deployed * TruePart(lambda), deployed * EstimatedPart(scope, lambda).mean.value_or(0),
-                       deployed});
+    lines += DataLine(
+        {lambda, deployed * TruePart(lambda), deployed * EstimatedPart(scope, lambda).mean.value_or(0), deployed});
   return {"adversarial-slopes",
-          "Adversarial family: the true slope passes every declared bound; the data and what is read off them stay.", 720,
-          400,
-          DataBlock("slope", lines) + R"(set logscale xy; set xrange [1:32]; set yrange [1e-4:10]
+          "Adversarial family: the true slope passes every declared bound; the data and what is read off them stay.",
+          720, 400, DataBlock("slope", lines) + R"(set logscale xy; set xrange [1:32]; set yrange [1e-4:10]
 set format y '10^{%T}'; set xtics (1, 2, 4, 8, 16, 32)
 set xlabel 'lambda'; set ylabel 'largest velocity slope'
 set key top left

@@ -59,10 +59,10 @@ struct Tally {
   int prefix_covered = 0;  ///< Of the tubes that D ended
   int undecided = 0;       ///< Tubes that count as not covered because membership could not be decided
   std::vector<int> domain_steps, safety_steps;  ///< By step, 0..T
-  std::vector<double> areas;  ///< Of P X_T of each plan in turn, m^2; -1 where the tube is not complete
+  std::vector<double> areas;      ///< Of P X_T of each plan in turn, m^2; -1 where the tube is not complete
   std::string answers;            ///< Of each plan in turn: C for a certificate, D, S, F, or V for a vacuous budget
   std::vector<double> distances;  ///< d of each plan in turn (chunks/support.h), where the system has a scale for it
-  PlanBudgets budgets;        ///< CP-SLS-MPC's
+  PlanBudgets budgets;            ///< CP-SLS-MPC's
 
   [[nodiscard]] int complete() const { return certified + safety + vacuous; }
   [[nodiscard]] int false_certificates() const { return certified - certified_safe; }

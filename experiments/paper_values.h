@@ -11,11 +11,10 @@ inline constexpr std::string_view kMain = "Table 1, ForeReach outcomes", kText =
                                   kSensitivity = "Certificate-budget and envelope sensitivity", kNorms = "Norm ratios",
                                   kBoxes = "Table, Parameter boxes", kIncorrect = "Incorrect Lipschitz declarations",
                                   kGrids = "Certified declarations", kProtocol = "Dynamic-bicycle protocol",
-                                  kChunks = "Table, Action-chunk certification",
-                                  kChunkText = "Action-chunk protocol",
+                                  kChunks = "Table, Action-chunk certification", kChunkText = "Action-chunk protocol",
                                   kDegradation = "Nominal-model degradation",
-                                  kLimits = "Short-horizon lower-bound scan",
-                                  kAssumptions = "Affine control example", kEstimators = "Slope-estimator declarations",
+                                  kLimits = "Short-horizon lower-bound scan", kAssumptions = "Affine control example",
+                                  kEstimators = "Slope-estimator declarations",
                                   kBudget = "Table, CP-SLS-MPC budget by N";
 
 inline constexpr PaperValue kPaperValues[] = {

@@ -81,13 +81,12 @@ Scenario MakeScenario(const System& system, Group group, int seed, int index) {
   if (&system == &ChunkSystem()) return MakeChunkScenario(group, seed, index);
   Random random{kForScenario, static_cast<std::uint64_t>(system.num_states()), static_cast<std::uint64_t>(group),
                 static_cast<std::uint64_t>(seed), static_cast<std::uint64_t>(index)};
-  const Start start = system.num_states() == BicycleSystem().num_states() ? BicycleStart(group, random)
-                                                                                : PointMassStart(group, random);
+  const Start start =
+      system.num_states() == BicycleSystem().num_states() ? BicycleStart(group, random) : PointMassStart(group, random);
   const Eigen::MatrixXd controls = start.control.replicate(1, system.horizon);
   const int k = random.Integer(system.horizon - 3, system.horizon);
-  const double aside = index % 2 == 0
-                           ? start.radius + random.Uniform(start.least_clearance, start.largest_clearance)
-                           : random.Uniform(0, 0.8) * start.radius;
+  const double aside = index % 2 == 0 ? start.radius + random.Uniform(start.least_clearance, start.largest_clearance)
+                                      : random.Uniform(0, 0.8) * start.radius;
   return {start.center, controls, PlaceBeside(system, start.center, controls, k, aside * start.side, start.radius)};
 }
 

@@ -1,5 +1,5 @@
-// Signatures: what a receiver takes is what the channel's role signed for this robot, bus and channel, whole, once, and not
-// from before.
+// Signatures: what a receiver takes is what the channel's role signed for this robot, bus and channel, whole, once, and
+// not from before.
 #include <map>
 #include <set>
 

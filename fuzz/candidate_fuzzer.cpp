@@ -1,5 +1,6 @@
-// Candidates through the gate, under any of four tasks: each gets one decision, and a certified plan comes only with the
-// outcome CERTIFIED, sealed, of a candidate that a certificate can be about, and with slices that its nominal run is in.
+// Candidates through the gate, under any of four tasks: each gets one decision, and a certified plan comes only with
+// the outcome CERTIFIED, sealed, of a candidate that a certificate can be about, and with slices that its nominal run
+// is in.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -23,8 +24,10 @@ constexpr std::size_t kNeverCertify[] = {1, 2};  // the data contradict the decl
 bool IsProper(const candidate_plan_t& plan) {
   bool proper = plan.num_states == 4 && plan.num_inputs == 2 && 1 <= plan.num_steps && plan.num_steps <= 128;
   for (int k = 0; proper && k < 4; ++k)
-    proper = std::isfinite(plan.initial_center[k]) && std::isfinite(plan.initial_half_width[k]) && plan.initial_half_width[k] >= 0;
-  for (int t = 0; proper && t < plan.num_steps; ++t) proper = std::abs(plan.control[t][0]) <= 3 && std::abs(plan.control[t][1]) <= 3;
+    proper = std::isfinite(plan.initial_center[k]) && std::isfinite(plan.initial_half_width[k]) &&
+             plan.initial_half_width[k] >= 0;
+  for (int t = 0; proper && t < plan.num_steps; ++t)
+    proper = std::abs(plan.control[t][0]) <= 3 && std::abs(plan.control[t][1]) <= 3;
   return proper;
 }
 
@@ -52,8 +55,8 @@ void RequireCertificate(const GateAnswer& answer, Bytes bytes, const NominalMode
   Require(certified.expires_utime >= answer.decision.utime && certified.plan.start_utime >= answer.decision.utime);
   for (int t = 0; t <= certified.plan.num_steps; ++t)
     for (int k = 0; k < 4; ++k)
-      Require(std::isfinite(certified.slice_lower[t][k]) && certified.slice_lower[t][k] <= certified.slice_upper[t][k] &&
-              std::isfinite(certified.slice_upper[t][k]));
+      Require(std::isfinite(certified.slice_lower[t][k]) &&
+              certified.slice_lower[t][k] <= certified.slice_upper[t][k] && std::isfinite(certified.slice_upper[t][k]));
   RequireNominalRunInside(certified, model);
 }
 

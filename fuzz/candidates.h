@@ -9,7 +9,9 @@ namespace forereach {
 /** Makes something of it odd that a gate looks at. */
 inline void Distort(FuzzedDataProvider& input, candidate_plan_t& plan) {
   switch (input.ConsumeIntegralInRange(0, 12)) {
-    case 0: plan.control[input.ConsumeIntegralInRange(0, 10)][input.ConsumeIntegralInRange(0, 2)] = AnyNumber(input); return;
+    case 0:
+      plan.control[input.ConsumeIntegralInRange(0, 10)][input.ConsumeIntegralInRange(0, 2)] = AnyNumber(input);
+      return;
     case 1: plan.initial_center[input.ConsumeIntegralInRange(0, 4)] = AnyNumber(input); return;
     case 2: plan.initial_half_width[input.ConsumeIntegralInRange(0, 4)] = AnyNumber(input); return;
     case 3: plan.start_utime = AnyInteger(input, plan.start_utime, 3'000'000); return;
@@ -28,8 +30,8 @@ inline void Distort(FuzzedDataProvider& input, candidate_plan_t& plan) {
 /** One that certifies, unless the input wants another. */
 inline candidate_plan_t AnyCandidate(FuzzedDataProvider& input, std::int64_t now_us) {
   const int plan_id = input.ConsumeIntegralInRange(1, 8);
-  const double acceleration =
-      input.PickValueInArray({kAccelerationThatCertifies, kAccelerationIntoTheCircle, kAccelerationOutsideDomain, -1.0});
+  const double acceleration = input.PickValueInArray(
+      {kAccelerationThatCertifies, kAccelerationIntoTheCircle, kAccelerationOutsideDomain, -1.0});
   candidate_plan_t plan = Candidate(plan_id, acceleration, now_us);
   for (int left = NumOdd(input); left > 0; --left) Distort(input, plan);
   return plan;

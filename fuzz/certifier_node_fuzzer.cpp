@@ -1,5 +1,5 @@
-// Every inbound type in any order through the certifier's node: each candidate is answered once, a certified plan goes out
-// right before its decision, and none while a fault is latched or the robot's state or the obstacles are not known.
+// Every inbound type in any order through the certifier's node: each candidate is answered once, a certified plan goes
+// out right before its decision, and none while a fault is latched or the robot's state or the obstacles are not known.
 #include <cstdlib>
 #include <map>
 #include <new>
@@ -14,8 +14,8 @@
 #include "fuzz/candidates.h"
 #include "lcmtypes/seal.h"
 
-// A node's tube is 2 MB; that fresh memory is given to each was half of the time. It gets the one before's, and who touches
-// that in between is found all the same. (Nothing else is both aligned and that large.)
+// A node's tube is 2 MB; that fresh memory is given to each was half of the time. It gets the one before's, and who
+// touches that in between is found all the same. (Nothing else is both aligned and that large.)
 namespace {
 void* kept = nullptr;
 std::size_t kept_size = 0;
@@ -39,7 +39,9 @@ void operator delete(void* block, std::align_val_t) noexcept {
   kept = block;
   kept_size = size;
 }
-void operator delete(void* block, std::size_t, std::align_val_t alignment) noexcept { operator delete(block, alignment); }
+void operator delete(void* block, std::size_t, std::align_val_t alignment) noexcept {
+  operator delete(block, alignment);
+}
 
 namespace forereach {
 namespace {

@@ -1,5 +1,5 @@
-// Transitions and plans: any bytes are finite numbers of the right shape, which come back to the last bit once written, or
-// refused with a ConfigError.
+// Transitions and plans: any bytes are finite numbers of the right shape, which come back to the last bit once written,
+// or refused with a ConfigError.
 #include "certifier/dynamics/models.h"
 #include "certifier/task/config.h"
 #include "fuzz/fuzz.h"
@@ -10,7 +10,8 @@ bool forereach::Try(Bytes data) {
   static const auto model = MakePointMass(0.15);
   const std::string& path = file.Write(data);
   if (Transitions read; IsTaken([&] { read = LoadTransitions(path, *model); })) {
-    Require(read.size() >= 1 && read.z.cols() == 6 && read.x_next.cols() == 4 && read.z.allFinite() && read.x_next.allFinite());
+    Require(read.size() >= 1 && read.z.cols() == 6 && read.x_next.cols() == 4 && read.z.allFinite() &&
+            read.x_next.allFinite());
     SaveTransitions(path, *model, read);
     const Transitions again = LoadTransitions(path, *model);
     Require(again.z == read.z && again.x_next == read.x_next);

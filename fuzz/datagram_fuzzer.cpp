@@ -1,7 +1,7 @@
-// A datagram of a stranger between two good ones, from the socket's buffer to the handlers. A datagram is a message exactly
-// if LCM's format says so, written down here once more; what it is split into are its own bytes, all of them. Handlers get
-// what the screen admits of messages on their channel, whole, once and in order, and the good messages whatever came
-// between them. At most one of the causes is counted for each datagram.
+// A datagram of a stranger between two good ones, from the socket's buffer to the handlers. A datagram is a message
+// exactly if LCM's format says so, written down here once more; what it is split into are its own bytes, all of them.
+// Handlers get what the screen admits of messages on their channel, whole, once and in order, and the good messages
+// whatever came between them. At most one of the causes is counted for each datagram.
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,8 +41,10 @@ std::optional<std::pair<std::string, std::string>> ByFormat(const std::string& d
 class Receiver final {
  public:
   Receiver() {
-    inbox_.Subscribe(kChannel, [this](const Received& r) { checked.push_back(TextOf(r.bytes)); }, false);
-    inbox_.Subscribe(Bus::kEveryChannel, [this](const Received& r) { unchecked.push_back(TextOf(r.raw)); }, true);
+    inbox_.Subscribe(
+        kChannel, [this](const Received& r) { checked.push_back(TextOf(r.bytes)); }, false);
+    inbox_.Subscribe(
+        Bus::kEveryChannel, [this](const Received& r) { unchecked.push_back(TextOf(r.raw)); }, true);
   }
 
   Datagram Take(Bytes bytes) {

@@ -27,8 +27,8 @@ inline void Require(bool holds) {
   if (!holds) std::abort();
 }
 
-/** What each target is: one execution. @return whether the input got past everything that refuses; how many do is printed
-when the process ends, for a fuzzer in which none does tries little. */
+/** What each target is: one execution. @return whether the input got past everything that refuses; how many do is
+printed when the process ends, for a fuzzer in which none does tries little. */
 bool Try(Bytes input);
 
 /** A file in memory, which each Write fills anew; its path opens it. Only its owner can read it. */
@@ -65,8 +65,20 @@ bool IsTaken(Read read) {
 /** Numbers that are likelier to break something than others. */
 inline double OddNumber(FuzzedDataProvider& input) {
   using Limits = std::numeric_limits<double>;
-  constexpr double kOdd[] = {0.0, -0.0, 1.0, -1.0, 0.05, 3.0, Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN(),
-                             Limits::max(), Limits::lowest(), Limits::min(), Limits::denorm_min(), Limits::epsilon()};
+  constexpr double kOdd[] = {0.0,
+                             -0.0,
+                             1.0,
+                             -1.0,
+                             0.05,
+                             3.0,
+                             Limits::infinity(),
+                             -Limits::infinity(),
+                             Limits::quiet_NaN(),
+                             Limits::max(),
+                             Limits::lowest(),
+                             Limits::min(),
+                             Limits::denorm_min(),
+                             Limits::epsilon()};
   return input.PickValueInArray(kOdd);
 }
 
@@ -79,8 +91,9 @@ inline double AnyNumber(FuzzedDataProvider& input) {
 inline std::int64_t AnyInteger(FuzzedDataProvider& input, std::int64_t middle, std::int64_t reach) {
   switch (input.ConsumeIntegralInRange(0, 4)) {
     case 0: return middle;
-    case 1: return static_cast<std::int64_t>(static_cast<std::uint64_t>(middle) +  // which may be at an end
-                                             static_cast<std::uint64_t>(input.ConsumeIntegralInRange(-reach, reach)));
+    case 1:
+      return static_cast<std::int64_t>(static_cast<std::uint64_t>(middle) +  // which may be at an end
+                                       static_cast<std::uint64_t>(input.ConsumeIntegralInRange(-reach, reach)));
     case 2: return std::numeric_limits<std::int64_t>::max() - input.ConsumeIntegralInRange(0, 2);
     case 3: return std::numeric_limits<std::int64_t>::min() + input.ConsumeIntegralInRange(0, 2);
     default: return input.ConsumeIntegral<std::int64_t>();
@@ -89,7 +102,8 @@ inline std::int64_t AnyInteger(FuzzedDataProvider& input, std::int64_t middle, s
 
 /** For sizes and kinds: one that is in use, or any. */
 inline std::int16_t AnySmall(FuzzedDataProvider& input, std::int16_t largest) {
-  return input.ConsumeBool() ? input.ConsumeIntegral<std::int16_t>() : input.ConsumeIntegralInRange<std::int16_t>(-1, largest);
+  return input.ConsumeBool() ? input.ConsumeIntegral<std::int16_t>()
+                             : input.ConsumeIntegralInRange<std::int16_t>(-1, largest);
 }
 
 /** How many things are odd: none half of the time, else up to seven. */
@@ -100,16 +114,19 @@ inline std::vector<std::uint8_t> AnyBytes(FuzzedDataProvider& input, std::size_t
   return input.ConsumeBytes<std::uint8_t>(input.ConsumeIntegralInRange<std::size_t>(0, at_most));
 }
 
-/** Replaces a few of the bytes: by a number of any kind, in the order of the bus, or by any bytes. Or changes the length. */
+/** Replaces a few of the bytes: by a number of any kind, in the order of the bus, or by any bytes. Or changes the
+length. */
 inline void Damage(FuzzedDataProvider& input, std::vector<std::uint8_t>& bytes) {
   for (int left = NumOdd(input); left > 0 && !bytes.empty(); --left) {
     const auto at = input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() - 1);
     const auto size = std::min<std::size_t>(bytes.size() - at, std::size_t{1} << input.ConsumeIntegralInRange(0, 3));
     const auto value = BigEndian(input.ConsumeBool() ? std::bit_cast<std::uint64_t>(OddNumber(input))
                                                      : input.ConsumeIntegral<std::uint64_t>());
-    std::copy(value.end() - static_cast<std::ptrdiff_t>(size), value.end(), bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    std::copy(value.end() - static_cast<std::ptrdiff_t>(size), value.end(),
+              bytes.begin() + static_cast<std::ptrdiff_t>(at));
   }
-  if (input.ConsumeIntegralInRange(0, 15) == 15) bytes.resize(input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));
+  if (input.ConsumeIntegralInRange(0, 15) == 15)
+    bytes.resize(input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));
 }
 
 /** A message of this type that was damaged on its way, or something else altogether. */

@@ -1,5 +1,5 @@
-// The guard under any plans, states and times: what it executes was sealed, signed where there is a key, finite, in time,
-// and newer than the last; each state it let pass lies in its slice; and nothing happens while it is halted.
+// The guard under any plans, states and times: what it executes was sealed, signed where there is a key, finite, in
+// time, and newer than the last; each state it let pass lies in its slice; and nothing happens while it is halted.
 #include <cmath>
 
 #include "fuzz/fuzz.h"
@@ -45,7 +45,9 @@ void Distort(FuzzedDataProvider& input, certified_plan_t& certified) {
     case 9: plan.plan_id = AnyInteger(input, plan.plan_id, 8); return;
     case 10: plan.initial_center[input.ConsumeIntegralInRange(0, 2)] = AnyNumber(input); return;
     case 11: plan.initial_half_width[input.ConsumeIntegralInRange(0, 2)] = AnyNumber(input); return;
-    case 12: plan.control[input.ConsumeIntegralInRange(0, 3)][input.ConsumeIntegralInRange(0, 1)] = AnyNumber(input); return;
+    case 12:
+      plan.control[input.ConsumeIntegralInRange(0, 3)][input.ConsumeIntegralInRange(0, 1)] = AnyNumber(input);
+      return;
     case 13: certified.config_digest[input.ConsumeIntegralInRange(0, 31)] ^= 1; return;
     case 14: certified.model_digest[input.ConsumeIntegralInRange(0, 31)] ^= 1; return;
   }
@@ -96,8 +98,11 @@ class Session final {
     const int how = input.ConsumeIntegralInRange(0, 3);
     if (how == 3) return;
     message_ = {AnyPlan(input), with_key_ == (how == 0)};
-    const auto sign = [&](Signer& signer, Role role) { return signer.Sign(role, "PLAN_CERTIFIED", message_.bytes, kStart); };
-    if (how == 2) message_ = {input.ConsumeBool() ? sign(forger_, Role::kCertifier) : sign(signer_, Role::kPlanner), false};
+    const auto sign = [&](Signer& signer, Role role) {
+      return signer.Sign(role, "PLAN_CERTIFIED", message_.bytes, kStart);
+    };
+    if (how == 2)
+      message_ = {input.ConsumeBool() ? sign(forger_, Role::kCertifier) : sign(signer_, Role::kPlanner), false};
     if (message_.is_signed) message_.bytes = sign(signer_, Role::kCertifier);
   }
 
@@ -129,10 +134,12 @@ class Session final {
   }
 
   static void RequireSane(const certified_plan_t& plan) {
-    Require(plan.plan.num_states == 2 && plan.plan.num_inputs == 1 && 1 <= plan.plan.num_steps && plan.plan.num_steps <= 128);
+    Require(plan.plan.num_states == 2 && plan.plan.num_inputs == 1 && 1 <= plan.plan.num_steps &&
+            plan.plan.num_steps <= 128);
     for (int t = 0; t < plan.plan.num_steps; ++t) Require(std::isfinite(plan.plan.control[t][0]));
     for (int t = 0; t <= plan.plan.num_steps; ++t)
-      for (int k = 0; k < 2; ++k) Require(std::isfinite(plan.slice_lower[t][k]) && plan.slice_lower[t][k] <= plan.slice_upper[t][k]);
+      for (int k = 0; k < 2; ++k)
+        Require(std::isfinite(plan.slice_lower[t][k]) && plan.slice_lower[t][k] <= plan.slice_upper[t][k]);
   }
 
   void TryStart(FuzzedDataProvider& input) {
@@ -141,7 +148,8 @@ class Session final {
     const std::int64_t now = AnyInteger(input, kStart, 2 * kStepUs);
     if (!guard_.TryStart(boundary, now, state).ok()) return;
     const certified_plan_t* plan = guard_.executing();
-    Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 && now <= plan->expires_utime);
+    Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 &&
+            now <= plan->expires_utime);
     RequireInSlice(*plan, 0, state);
     step_ = 0;
   }
@@ -159,7 +167,8 @@ class Session final {
 
   static void RequireInSlice(const certified_plan_t& plan, int step, const std::vector<double>& state) {
     Require(state.size() == 2 && step <= plan.plan.num_steps);
-    for (std::size_t k = 0; k < 2; ++k) Require(plan.slice_lower[step][k] <= state[k] && state[k] <= plan.slice_upper[step][k]);
+    for (std::size_t k = 0; k < 2; ++k)
+      Require(plan.slice_lower[step][k] <= state[k] && state[k] <= plan.slice_upper[step][k]);
   }
 
   static std::uint64_t Apart(std::int64_t a, std::int64_t b) {
@@ -169,7 +178,8 @@ class Session final {
   static std::vector<double> State(FuzzedDataProvider& input) {
     std::vector<double> state{1, -2};
     if (input.ConsumeBool()) state.resize(input.ConsumeIntegralInRange<std::size_t>(0, 20));
-    if (!state.empty() && input.ConsumeBool()) state[input.ConsumeIntegralInRange<std::size_t>(0, state.size() - 1)] = AnyNumber(input);
+    if (!state.empty() && input.ConsumeBool())
+      state[input.ConsumeIntegralInRange<std::size_t>(0, state.size() - 1)] = AnyNumber(input);
     return state;
   }
 

@@ -30,7 +30,9 @@ class JsonMutator final {
   }
 
  private:
-  Json::iterator AnyIn(Json& value) { return std::next(value.begin(), static_cast<Json::difference_type>(Below(value.size()))); }
+  Json::iterator AnyIn(Json& value) {
+    return std::next(value.begin(), static_cast<Json::difference_type>(Below(value.size())));
+  }
 
   // An entry of a list or map; the value itself if it has none.
   Json& AnyEntry(Json& value) {
@@ -49,18 +51,21 @@ class JsonMutator final {
   }
 
   void AddEntry(Json& value, Json entry) {
-    if (value.is_array()) value.insert(value.begin() + static_cast<Json::difference_type>(Below(value.size() + 1)), std::move(entry));
+    if (value.is_array())
+      value.insert(value.begin() + static_cast<Json::difference_type>(Below(value.size() + 1)), std::move(entry));
     if (value.is_object()) value["another"] = std::move(entry);
   }
 
   Json OtherValue(const Json& value) {
     if (value.is_number() && Below(2) > 0) return OtherNumber(value.get<double>());
-    const Json other[] = {nullptr, true, "", "\n", 0, -1, 1024, 9007199254740993, 1e308, -5e-324, Json::array(), Json::object()};
+    const Json other[] = {nullptr,       true,          "", "\n", 0, -1, 1024, 9007199254740993, 1e308, -5e-324,
+                          Json::array(), Json::object()};
     return other[Below(std::size(other))];
   }
 
   double OtherNumber(double number) {
-    const double other[] = {-number, 2 * number, 0.5 * number, number + 1, std::nextafter(number, 1e308), std::nextafter(number, -1e308)};
+    const double other[] = {
+        -number, 2 * number, 0.5 * number, number + 1, std::nextafter(number, 1e308), std::nextafter(number, -1e308)};
     return other[Below(std::size(other))];
   }
 
@@ -71,7 +76,8 @@ class JsonMutator final {
 
 }  // namespace forereach
 
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned seed) {
   using Json = forereach::JsonMutator::Json;
   return forereach::MutateText(data, size, max_size, seed, [](std::string_view text, std::minstd_rand& random) {
     Json document = Json::parse(text, nullptr, false);

@@ -15,8 +15,8 @@ namespace forereach {
 /** One of the last inputs that went deep; nothing if none did. */
 Bytes DeepInput(std::size_t which);
 
-/** For LLVMFuzzerCustomMutator. Half of the time an input that went deep is what is changed, for what is refused is refused
-again however it is changed; and a quarter of the changes is of bytes.
+/** For LLVMFuzzerCustomMutator. Half of the time an input that went deep is what is changed, for what is refused is
+refused again however it is changed; and a quarter of the changes is of bytes.
 @param change makes another text of one, with a source of random numbers; empty if it cannot. */
 template <class Change>
 std::size_t MutateText(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed, Change change) {

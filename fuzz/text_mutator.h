@@ -1,5 +1,6 @@
-/** Makes libFuzzer change a text of lines and numbers, YAML or CSV, by those as well as by bytes: hardly any change of a byte
-leaves a file that is not refused for a key or column of no name. To be included by the one source file of a target. */
+/** Makes libFuzzer change a text of lines and numbers, YAML or CSV, by those as well as by bytes: hardly any change of
+a byte leaves a file that is not refused for a key or column of no name. To be included by the one source file of a
+target. */
 #pragma once
 
 #include <algorithm>
@@ -46,8 +47,9 @@ class TextMutator final {
   }
 
   std::string_view AnyNumber() {
-    constexpr std::string_view kAny[] = {"0", "1", "-1", "2", "3", "0.5", "-2.5", "1e-3", "1e3", "16", "128", "1e300", "1e-320",
-                                         "1e999", ".nan", "-0.0", "0.1", "4", "1000", "65536", "2147483648"};
+    constexpr std::string_view kAny[] = {"0",    "1",    "-1",  "2",   "3",     "0.5",    "-2.5",
+                                         "1e-3", "1e3",  "16",  "128", "1e300", "1e-320", "1e999",
+                                         ".nan", "-0.0", "0.1", "4",   "1000",  "65536",  "2147483648"};
     return kAny[Below(std::size(kAny))];
   }
 
@@ -63,7 +65,8 @@ class TextMutator final {
 
 }  // namespace forereach
 
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned seed) {
   return forereach::MutateText(data, size, max_size, seed, [](std::string_view text, std::minstd_rand& random) {
     return forereach::TextMutator(text, random).Changed();
   });

@@ -73,7 +73,8 @@ Covered ToSign(const std::string& robot, Role role, const Numbers& numbers, cons
   return covered;
 }
 
-Covered ToTag(const std::string& channel, std::size_t message_bytes, const Numbers& numbers, const Signature& signature) {
+Covered ToTag(const std::string& channel, std::size_t message_bytes, const Numbers& numbers,
+              const Signature& signature) {
   Covered covered;
   covered.Append(kTagContext);
   AppendChannel(covered, channel);
@@ -113,7 +114,9 @@ struct Authenticator::Trailer {
     std::copy_n(numbers.begin(), bus.size(), bus.begin());
     return bus;
   }
-  [[nodiscard]] std::uint64_t sender() const { return FromBigEndian<std::uint64_t>(Bytes(numbers).subspan(kNumberBytes)); }
+  [[nodiscard]] std::uint64_t sender() const {
+    return FromBigEndian<std::uint64_t>(Bytes(numbers).subspan(kNumberBytes));
+  }
   [[nodiscard]] std::int64_t counter() const {
     return FromBigEndian<std::int64_t>(Bytes(numbers).subspan(2 * kNumberBytes));
   }

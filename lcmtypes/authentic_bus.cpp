@@ -29,7 +29,8 @@ class KeyScreen final : public Screen {
 
 class SignedBus final : public Bus {
  public:
-  SignedBus(const std::string& url, const KeyRing& keys, const std::string& bus_name, const Speakers& speakers, Clock clock)
+  SignedBus(const std::string& url, const KeyRing& keys, const std::string& bus_name, const Speakers& speakers,
+            Clock clock)
       : keys_(keys),
         speakers_(speakers),
         clock_(std::move(clock)),

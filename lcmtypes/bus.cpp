@@ -87,9 +87,8 @@ class MulticastBus final : public InboxBus {
  public:
   MulticastBus(const MulticastUrl& url, std::shared_ptr<Screen> screen)
       : InboxBus(std::move(screen)),
-        receiver_(url, [this](std::string_view channel, Bytes payload, std::int64_t utime) {
-          inbox_.Put(channel, payload, utime);
-        }),
+        receiver_(url, [this](std::string_view channel, Bytes payload,
+                              std::int64_t utime) { inbox_.Put(channel, payload, utime); }),
         sender_(url.ForSending()) {
     if (!sender_.good()) throw std::system_error(std::make_error_code(std::errc::network_unreachable), "LCM's sender");
   }

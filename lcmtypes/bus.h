@@ -29,9 +29,9 @@ class Screen {
  public:
   virtual ~Screen() = default;
 
-  /** Called once for each message that some subscription wants, in the order of arrival, before the message takes room in
-  the queue. On a udpm bus the receiving thread calls it, on memq the thread that calls Dispatch. A message for which it
-  throws is lost and counted as dropped.
+  /** Called once for each message that some subscription wants, in the order of arrival, before the message takes room
+  in the queue. On a udpm bus the receiving thread calls it, on memq the thread that calls Dispatch. A message for which
+  it throws is lost and counted as dropped.
   @return the message inside `raw`, a part of these very bytes; nothing if it is refused. */
   [[nodiscard]] virtual std::optional<Bytes> Admit(const std::string& channel, Bytes raw) = 0;
 };
@@ -48,10 +48,12 @@ class Bus {
 
   /** Calls `handler` for what is refused too, which then has `raw` alone: for who records, or checks by itself. Refused
   messages wait in a queue of their own, so that they displace no others. */
-  virtual void SubscribeUnchecked(const std::string& channel, Handler handler) { Subscribe(channel, std::move(handler)); }
+  virtual void SubscribeUnchecked(const std::string& channel, Handler handler) {
+    Subscribe(channel, std::move(handler));
+  }
 
-  /** Sends; returns false if the bus refused, also a message that does not fit one datagram (lcmtypes/datagram.h), which
-  nobody would receive. May be called from any thread. */
+  /** Sends; returns false if the bus refused, also a message that does not fit one datagram (lcmtypes/datagram.h),
+  which nobody would receive. May be called from any thread. */
   virtual bool Publish(const std::string& channel, Bytes bytes) = 0;
 
   /** Hands out what has arrived; waits up to `timeout_ms` for the first message. Returns how many handlers it called.
@@ -79,9 +81,9 @@ class Bus {
 
 /** Opens an LCM bus: `udpm://239.255.76.67:7667?ttl=0`, or `memq://`, which lives inside this object alone.
 
-A udpm bus sends by LCM and receives by itself, on a thread that only looks at headers, asks the screen and copies messages
-out (lcmtypes/udp_receiver.h); datagrams that are no whole message are counted and go no further. memq delivers within
-Dispatch, in order, stamped by `clock`, so that several nodes in one process can run on a simulated one.
+A udpm bus sends by LCM and receives by itself, on a thread that only looks at headers, asks the screen and copies
+messages out (lcmtypes/udp_receiver.h); datagrams that are no whole message are counted and go no further. memq delivers
+within Dispatch, in order, stamped by `clock`, so that several nodes in one process can run on a simulated one.
 @param screen null: every message is admitted.
 @throws BusError for any other kind of URL, or if the bus cannot be opened, for example without a multicast route; never
 falls back to another bus. */

@@ -18,7 +18,7 @@ class BusError : public BadInput {
 struct MulticastUrl {
   std::string group = "239.255.76.67";  ///< Dotted decimal, 224.0.0.0 to 239.255.255.255.
   std::uint16_t port = 7667;
-  int ttl = 0;                  ///< 0 stays on this machine, 1 on this network.
+  int ttl = 0;                    ///< 0 stays on this machine, 1 on this network.
   long receive_buffer_bytes = 0;  ///< recv_buf_size; 0: the URL does not say.
 
   /** What LCM is given: its own parser reads nothing that a person wrote. */

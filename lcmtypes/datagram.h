@@ -1,11 +1,11 @@
-/** LCM's datagrams, as anybody on the network can send them: bytes to a channel and a payload, or the reason for refusing
-them. One kind is read, LCM's short message:
+/** LCM's datagrams, as anybody on the network can send them: bytes to a channel and a payload, or the reason for
+refusing them. One kind is read, LCM's short message:
 
     "LC02" | sequence (4 bytes) | channel, 1 to 63 printable ASCII characters | zero byte | payload
 
 LCM splits a message that does not fit one datagram into fragments, "LC03". To put fragments together a receiver keeps
-memory for a message of which it knows the sender's claims only. Every message of ours fits one datagram, so fragments are
-refused. Nothing here allocates or throws. */
+memory for a message of which it knows the sender's claims only. Every message of ours fits one datagram, so fragments
+are refused. Nothing here allocates or throws. */
 #pragma once
 
 #include <cstddef>

@@ -15,9 +15,9 @@ Heartbeat Of(const Status& status, bool in_charge) {
 
 std::optional<Heartbeat> ReadHeartbeat(Bytes message) {
   if (const auto status = Decoded<certifier_status_v3_t>(message))
-    return Of(*status, status->state != certifier_status_v3_t::LISTENING && status->state != certifier_status_v3_t::STANDBY);
-  if (const auto status = Decoded<certifier_status_v2_t>(message))
-    return Of(*status, true);
+    return Of(*status,
+              status->state != certifier_status_v3_t::LISTENING && status->state != certifier_status_v3_t::STANDBY);
+  if (const auto status = Decoded<certifier_status_v2_t>(message)) return Of(*status, true);
   return std::nullopt;
 }
 

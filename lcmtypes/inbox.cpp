@@ -92,7 +92,8 @@ int Inbox::HandOut(int timeout_ms) {
     for (const Subscription* subscription : stored.for_whom) {
       ++calls;
       try {
-        subscription->handler({stored.channel, raw.subspan(stored.message_begin, stored.message_bytes), stored.utime, raw});
+        subscription->handler(
+            {stored.channel, raw.subspan(stored.message_begin, stored.message_bytes), stored.utime, raw});
       } catch (...) {
         failure = std::current_exception();
       }

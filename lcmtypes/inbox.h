@@ -29,8 +29,8 @@ class Inbox final {
   /** As Bus::Dispatch, for what has been put. */
   int HandOut(int timeout_ms);
 
-  /** Gives the memory of a burst that has been handed out back to the system. That takes some milliseconds, so call it when
-  there is time, on the thread that hands out. */
+  /** Gives the memory of a burst that has been handed out back to the system. That takes some milliseconds, so call it
+  when there is time, on the thread that hands out. */
   void GiveBack();
 
   [[nodiscard]] std::int64_t dropped() const { return admitted_.dropped; }
@@ -65,7 +65,7 @@ class Inbox final {
   const std::shared_ptr<Screen> screen_;
   std::mutex mutex_;  // guards subscriptions_, the queues and next_number_
   std::condition_variable arrived_;
-  std::deque<Subscription> subscriptions_;  // grows only: what points into it stays
+  std::deque<Subscription> subscriptions_;       // grows only: what points into it stays
   Queue admitted_{4096, std::size_t{32} << 20};  // 800 certified plans
   Queue refused_{256, std::size_t{4} << 20};
   std::uint64_t next_number_ = 0;

@@ -19,7 +19,8 @@
 namespace forereach {
 namespace {
 
-constexpr std::string_view kKeyFormat = "forereach-key-2", kVerifyFormat = "forereach-verify-2", kVerifyFile = "verify.pub";
+constexpr std::string_view kKeyFormat = "forereach-key-2", kVerifyFormat = "forereach-verify-2",
+                           kVerifyFile = "verify.pub";
 constexpr std::size_t kMaxName = 64, kMaxFileBytes = 2048;
 constexpr std::string_view kNameSigns = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-";
 
@@ -38,7 +39,9 @@ std::size_t At(Role role) { return static_cast<std::size_t>(role) - 1; }
 std::string FileOf(Role role) { return std::string(RoleName(role)) + ".key"; }
 
 [[noreturn]] void Fail(const std::string& path, const std::string& why) { throw KeyError("key " + path + ": " + why); }
-[[noreturn]] void FailSystem(const std::string& path, const std::string& what) { Fail(path, what + ": " + std::strerror(errno)); }
+[[noreturn]] void FailSystem(const std::string& path, const std::string& what) {
+  Fail(path, what + ": " + std::strerror(errno));
+}
 
 void RequireSodium(const std::string& path) {
   if (sodium_init() < 0) Fail(path, "libsodium cannot begin: the machine gives no random numbers");
@@ -46,7 +49,8 @@ void RequireSodium(const std::string& path) {
 
 void RequireName(const std::string& path, const std::string& where, std::string_view name) {
   if (name.empty() || name.size() > kMaxName || name.find_first_not_of(kNameSigns) != name.npos)
-    Fail(path, where + "a robot's name has to be 1 to " + std::to_string(kMaxName) + " letters, digits, '.', '_' or '-'");
+    Fail(path,
+         where + "a robot's name has to be 1 to " + std::to_string(kMaxName) + " letters, digits, '.', '_' or '-'");
 }
 
 // Text with secrets in it, which is wiped. It never grows, so no copy of it stays behind.
@@ -230,7 +234,9 @@ class LineReader final {
     if (!rest_.empty()) Complain("the file has to end before it");
   }
   // Never with the value: it may be a secret.
-  [[noreturn]] void Complain(const std::string& why) const { Fail(path_, "line " + std::to_string(line_) + ": " + why); }
+  [[noreturn]] void Complain(const std::string& why) const {
+    Fail(path_, "line " + std::to_string(line_) + ": " + why);
+  }
   [[nodiscard]] std::string where() const { return "line " + std::to_string(line_) + ": "; }
 
  private:
@@ -242,7 +248,8 @@ class LineReader final {
 Role ReadRole(LineReader& reader) {
   const std::string_view name = reader.Value("role");
   const auto role = std::ranges::find(kAllRoles, name, RoleName);
-  if (role == kAllRoles.end()) reader.Complain("role: has to be certifier, planner, perception, robot, operator or logger");
+  if (role == kAllRoles.end())
+    reader.Complain("role: has to be certifier, planner, perception, robot, operator or logger");
   return *role;
 }
 
@@ -250,7 +257,8 @@ void ReadPublicKeys(LineReader& reader, KeyRing::Content& content, std::optional
   for (const Role role : kAllRoles) {
     const std::string field = "public " + std::string(RoleName(role));
     const PublicKey key = reader.KeyOf(field);
-    if (own == role && key != content.public_keys[At(role)]) reader.Complain(field + ": is not that of the secret in line 4");
+    if (own == role && key != content.public_keys[At(role)])
+      reader.Complain(field + ": is not that of the secret in line 4");
     for (std::size_t other = 0; other < At(role); ++other)
       if (content.public_keys[other] == key) reader.Complain(field + ": is another role's key too");
     if (own && At(*own) > At(role) && key == content.public_keys[At(*own)])

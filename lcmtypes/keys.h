@@ -1,11 +1,12 @@
-/** The keys of one robot. Each role has a secret of its own, so a message says which role sent it, and the secret of one role
-makes nothing that counts as another's. `forereach keygen` makes a directory:
+/** The keys of one robot. Each role has a secret of its own, so a message says which role sent it, and the secret of
+one role makes nothing that counts as another's. `forereach keygen` makes a directory:
 
     certifier.key planner.key perception.key robot.key operator.key logger.key     mode 0600
     verify.pub                                                                     no secret in it
 
-A .key file holds what one role needs: its own secret, the group key, and the public keys of all roles. verify.pub holds the
-public keys alone: it is enough to judge a log. A file is text; every line is there once, in this order, and ends with '\n':
+A .key file holds what one role needs: its own secret, the group key, and the public keys of all roles. verify.pub holds
+the public keys alone: it is enough to judge a log. A file is text; every line is there once, in this order, and ends
+with '\n':
 
     forereach-key-2                      verify.pub: forereach-verify-2
     robot NAME                           1 to 64 letters, digits, '.', '_' or '-'
@@ -14,8 +15,8 @@ public keys alone: it is enough to judge a log. A file is text; every line is th
     group KEY                            not in verify.pub
     public certifier KEY                 and so on, one line a role, in the order above
 
-Keys are 32 bytes in lower-case hexadecimal. The group key keeps strangers out cheaply (authentic.h); whoever holds it alone
-can make nothing that counts. */
+Keys are 32 bytes in lower-case hexadecimal. The group key keeps strangers out cheaply (authentic.h); whoever holds it
+alone can make nothing that counts. */
 #pragma once
 
 #include <array>
@@ -36,7 +37,14 @@ class KeyError : public BadInput {
 };
 
 /** Numbers are part of every signature and never change. */
-enum class Role : std::uint8_t { kCertifier = 1, kPlanner = 2, kPerception = 3, kRobot = 4, kOperator = 5, kLogger = 6 };
+enum class Role : std::uint8_t {
+  kCertifier = 1,
+  kPlanner = 2,
+  kPerception = 3,
+  kRobot = 4,
+  kOperator = 5,
+  kLogger = 6
+};
 
 inline constexpr std::array kAllRoles{Role::kCertifier, Role::kPlanner,  Role::kPerception,
                                       Role::kRobot,     Role::kOperator, Role::kLogger};
@@ -83,8 +91,8 @@ class KeyRing final {
 void MakeKeys(const std::string& robot, const std::string& directory);
 
 /** The ring of one role. @param path a directory, of which ROLE.key is read, or one .key file.
-@throws KeyError if the file cannot be read, is no regular file, is neither this program's owner's nor root's, can be read or
-written by others, is not as described above, or is another role's. */
+@throws KeyError if the file cannot be read, is no regular file, is neither this program's owner's nor root's, can be
+read or written by others, is not as described above, or is another role's. */
 [[nodiscard]] KeyRing LoadKeys(const std::string& path, Role role);
 
 /** The ring of all roles, for one program that is all of them. @throws KeyError as LoadKeys; also if the files of the

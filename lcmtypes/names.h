@@ -8,7 +8,8 @@
 
 namespace forereach {
 
-/** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected", "abstain_deadline"; "unknown" for any other number. */
+/** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected", "abstain_deadline"; "unknown" for
+any other number. */
 [[nodiscard]] std::string_view OutcomeName(std::int16_t outcome);
 
 /** "none", "pairwise", "domain_exit", ... as decision_t's CAUSE_ constants; "unknown" for any other number. */
@@ -29,7 +30,8 @@ namespace forereach {
 /** "OK", "STALE", "ERROR": the level of certifier_status_v3_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view LevelName(std::int16_t level);
 
-/** "disarmed", "armed", "fault", "listening", "standby": the state of certifier_status_v3_t; "unknown" for any other number. */
+/** "disarmed", "armed", "fault", "listening", "standby": the state of certifier_status_v3_t; "unknown" for any other
+number. */
 [[nodiscard]] std::string_view StateName(std::int16_t state);
 
 /** "none", "written", "unwritable": the latch of certifier_status_v3_t; "unknown" for any other number. */

@@ -15,7 +15,8 @@ class Node {
  public:
   virtual ~Node() = default;
 
-  /** Called after each wait for messages, which lasts `kTickMs` milliseconds at most. `now_us`: microseconds since the Unix epoch, or a simulated clock. */
+  /** Called after each wait for messages, which lasts `kTickMs` milliseconds at most. `now_us`: microseconds since the
+  Unix epoch, or a simulated clock. */
   virtual void Tick(std::int64_t now_us) = 0;
 
   /** True while work waits: Tick is then called again at once. */
@@ -30,7 +31,8 @@ class Node {
   /** Called once before the process ends: flush, close, print a summary. */
   virtual void Stop() {}
 
-  /** Asked after Stop: whether its process ends with exit status 1, because something that it was there to keep is lost. */
+  /** Asked after Stop: whether its process ends with exit status 1, because something that it was there to keep is
+  lost. */
   [[nodiscard]] virtual bool failed() const { return false; }
 };
 
@@ -56,8 +58,8 @@ class Sender final {
 
 inline constexpr int kTickMs = 2;
 
-/** From here on SIGTERM and SIGINT end RunNode instead of the process, and SIGHUP reloads. RunNode does it too; a process
-that calls it first also ends cleanly if the signal comes while it starts. */
+/** From here on SIGTERM and SIGINT end RunNode instead of the process, and SIGHUP reloads. RunNode does it too; a
+process that calls it first also ends cleanly if the signal comes while it starts. */
 void CatchStopSignals();
 
 /** Runs `node` on `bus` until it is done or the process gets SIGTERM or SIGINT, then stops it. */

@@ -17,7 +17,8 @@ struct InUse {
 };
 
 InUse InUseBy(const candidate_plan_t& plan) {
-  if (!(1 <= plan.num_steps && plan.num_steps < kSlices && 1 <= plan.num_states && plan.num_states <= kStates)) return {};
+  if (!(1 <= plan.num_steps && plan.num_steps < kSlices && 1 <= plan.num_states && plan.num_states <= kStates))
+    return {};
   return {plan.num_steps + 1, plan.num_states};
 }
 

@@ -24,8 +24,8 @@ namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{64} << 10;
 static_assert(kBufferBytes > kMaxDatagramBytes);
-constexpr suseconds_t kReceivePollUs = 50'000;                   // how soon the thread sees that it has to stop
-constexpr std::chrono::milliseconds kPauseAfterError{10};        // an error that stays is no reason to spin
+constexpr suseconds_t kReceivePollUs = 50'000;             // how soon the thread sees that it has to stop
+constexpr std::chrono::milliseconds kPauseAfterError{10};  // an error that stays is no reason to spin
 
 void Require(bool done, const char* step) {
   if (!done) throw std::system_error(errno, std::generic_category(), step);
@@ -51,7 +51,9 @@ long GrantedReceiveBufferBytes() {
   return bytes;
 }
 
-UdpReceiver::Socket::Socket() : handle_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) { Require(handle_ >= 0, "socket"); }
+UdpReceiver::Socket::Socket() : handle_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+  Require(handle_ >= 0, "socket");
+}
 
 UdpReceiver::Socket::~Socket() { ::close(handle_); }
 
@@ -79,8 +81,8 @@ void UdpReceiver::Open(const MulticastUrl& url) {
   SetOption(socket, SOL_SOCKET, SO_TIMESTAMP, kOn, "time stamps");
   SetOption(socket, SOL_SOCKET, SO_RXQ_OVFL, kOn, "count of lost datagrams");
   SetOption(socket, SOL_SOCKET, SO_RCVTIMEO, timeval{0, kReceivePollUs}, "receive timeout");
-  // Of what comes to this port only the group's, from the interface by which it was joined: not what is sent to one of the
-  // machine's own addresses, nor the groups that others have joined here.
+  // Of what comes to this port only the group's, from the interface by which it was joined: not what is sent to one of
+  // the machine's own addresses, nor the groups that others have joined here.
   SetOption(socket, IPPROTO_IP, IP_MULTICAST_ALL, kOff, "own group alone");
   sockaddr_in place{};
   place.sin_family = AF_INET;

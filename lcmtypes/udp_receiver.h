@@ -1,5 +1,5 @@
-/** Receives the datagrams of one multicast group and port, on a thread of its own, and hands on the messages in them. LCM's
-own receiver is not used: what it does with a malformed header or a fragment is not under our control. */
+/** Receives the datagrams of one multicast group and port, on a thread of its own, and hands on the messages in them.
+LCM's own receiver is not used: what it does with a malformed header or a fragment is not under our control. */
 #pragma once
 
 #include <atomic>
@@ -16,12 +16,12 @@ namespace forereach {
 
 class UdpReceiver final {
  public:
-  /** Gets each message on the receiving thread, with the time in microseconds since the Unix epoch at which the kernel took
-  the datagram. Must not throw. */
+  /** Gets each message on the receiving thread, with the time in microseconds since the Unix epoch at which the kernel
+  took the datagram. Must not throw. */
   using Deliver = std::function<void(std::string_view channel, Bytes payload, std::int64_t utime)>;
 
-  /** Joins the group by the interface that the machine's routes say, and begins to receive. Unless the URL says how large the
-  receive buffer is to be, it asks for `kReceiveBufferBytes`, of which the kernel gives as much as it grants.
+  /** Joins the group by the interface that the machine's routes say, and begins to receive. Unless the URL says how
+  large the receive buffer is to be, it asks for `kReceiveBufferBytes`, of which the kernel gives as much as it grants.
   @throws std::system_error naming the step that failed. */
   UdpReceiver(const MulticastUrl& url, Deliver deliver);
   /** Takes up to 50 ms. */

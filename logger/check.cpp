@@ -74,7 +74,8 @@ std::string InWords(const LogCheck& check) {
 void List(std::string& text, const std::vector<std::int64_t>& events, const char* what) {
   if (events.empty()) return;
   const auto shown = std::min(events.size(), kMaxListed);
-  text += fmt::format("  {}: event {}{}\n", what, fmt::join(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+  text += fmt::format("  {}: event {}{}\n", what,
+                      fmt::join(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
                       events.size() > shown ? fmt::format(" and {} more", events.size() - shown) : "");
 }
 

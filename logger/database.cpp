@@ -4,8 +4,8 @@
 #include <cerrno>
 #include <string_view>
 
-#include <nlohmann/json.hpp>
 #include <sqlite3.h>
+#include <nlohmann/json.hpp>
 
 namespace forereach {
 namespace {
@@ -39,7 +39,7 @@ constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
     expected INTEGER, got INTEGER, lost INTEGER NOT NULL, utime INTEGER NOT NULL, reason TEXT NOT NULL,
     UNIQUE (log_file, event_number, reason));
 )sql",
-                                                                         R"sql(
+                                                                        R"sql(
   ALTER TABLE runs ADD COLUMN continues TEXT NOT NULL DEFAULT '';
   ALTER TABLE runs ADD COLUMN log_deleted_utime INTEGER;
   ALTER TABLE decisions ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
@@ -80,7 +80,8 @@ class Database::Statement final {
 
   /** Runs it to its end and returns how many rows it changed. */
   int Run() {
-    while (Step()) {}
+    while (Step()) {
+    }
     return sqlite3_changes(handle_);
   }
 
@@ -118,7 +119,8 @@ class Database::Statement final {
     std::string text;
     ReadNext(text);
     value.clear();
-    for (const auto& entry : nlohmann::json::parse(text)) value.push_back(entry.is_null() ? kUnknown : entry.get<double>());
+    for (const auto& entry : nlohmann::json::parse(text))
+      value.push_back(entry.is_null() ? kUnknown : entry.get<double>());
   }
   void ReadNext(std::optional<std::int64_t>& value) {
     value = IsNull() ? std::nullopt : std::optional(sqlite3_column_int64(statement_, column_));
@@ -199,7 +201,9 @@ std::optional<std::string> Database::FindDisplaced() {
   return std::nullopt;
 }
 
-void Database::Checkpoint() { sqlite3_wal_checkpoint_v2(handle_.get(), nullptr, SQLITE_CHECKPOINT_FULL, nullptr, nullptr); }
+void Database::Checkpoint() {
+  sqlite3_wal_checkpoint_v2(handle_.get(), nullptr, SQLITE_CHECKPOINT_FULL, nullptr, nullptr);
+}
 
 std::optional<int> Database::Write(const Rows& rows, const std::string& log_file, std::int64_t events) {
   int written = 0;
@@ -335,7 +339,8 @@ std::map<std::string, std::int64_t> Database::LossesWithoutEvents(const std::str
 
 Rows Database::Read(const std::string& log_file) {
   Rows rows;
-  Statement decisions(handle_.get(), "SELECT * FROM decisions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number");
+  Statement decisions(handle_.get(),
+                      "SELECT * FROM decisions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number");
   for (decisions.Bind(log_file); decisions.Step();) {
     DecisionRow& row = rows.decisions.emplace_back();
     decisions.Read(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime, row.sequence, row.source,

@@ -67,7 +67,8 @@ class Database final {
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
 
-  /** The events that rows of one log file come from, by number; twice if rows differ in the digest. @throws DatabaseError. */
+  /** The events that rows of one log file come from, by number; twice if rows differ in the digest. @throws
+  DatabaseError. */
   [[nodiscard]] std::vector<LogReference> References(const std::string& log_file);
 
   /** The config digests of a log file's decisions. @throws DatabaseError. */

@@ -31,7 +31,9 @@ void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t
   put(data);
 }
 
-std::string Reason(const std::string& what, const std::string& path) { return what + path + ": " + std::strerror(errno); }
+std::string Reason(const std::string& what, const std::string& path) {
+  return what + path + ": " + std::strerror(errno);
+}
 
 // Has the disk confirm that a file is in its directory. EINVAL: this file system knows no such thing.
 bool ConfirmEntry(const std::string& path) {
@@ -77,7 +79,8 @@ EventLogReader::Found EventLogReader::Examine(std::int64_t offset, Header& heade
   const std::int64_t left = std::min(size_ - offset, kHeaderBytes);
   std::array<std::uint8_t, kHeaderBytes> bytes;
   if (!ReadAt(offset, bytes.data(), left)) return Found::kNothing;
-  if (!std::equal(kSync.begin(), kSync.begin() + std::min<std::int64_t>(left, 4), bytes.begin())) return Found::kNothing;
+  if (!std::equal(kSync.begin(), kSync.begin() + std::min<std::int64_t>(left, 4), bytes.begin()))
+    return Found::kNothing;
   if (left < kHeaderBytes) return Found::kCut;
   header.number = FromBigEndian<std::int64_t>(Bytes(bytes).subspan(4));
   header.utime = FromBigEndian<std::int64_t>(Bytes(bytes).subspan(12));
@@ -152,14 +155,10 @@ void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEven
   LogEvent event;
   for (;;) {
     switch (reader.Next(event)) {
-      case LogStatus::kEvent:
-        visit(event);
-        break;
-      case LogStatus::kCorrupt:
-        break;
+      case LogStatus::kEvent: visit(event); break;
+      case LogStatus::kCorrupt: break;
       case LogStatus::kEnd:
-      case LogStatus::kCutTail:
-        return;
+      case LogStatus::kCutTail: return;
     }
   }
 }

@@ -89,8 +89,8 @@ class EventLogReader final {
   std::int64_t offset_ = 0, size_ = 0, corruptions_ = 0, skipped_bytes_ = 0;
 };
 
-/** Calls `visit` for each event from where the reader stands to the end of the log; passes over damage, which the reader
-counts. */
+/** Calls `visit` for each event from where the reader stands to the end of the log; passes over damage, which the
+reader counts. */
 void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEvent&)>& visit);
 
 /** Damaged places of logs, and the bytes in them. */
@@ -98,27 +98,29 @@ struct LogDamage {
   std::int64_t places = 0, bytes = 0;
 };
 
-/** Calls `visit` with each event of several logs that follow one another, as the files of one run do, and the log's path.
+/** Calls `visit` with each event of several logs that follow one another, as the files of one run do, and the log's
+path.
 @throws LogError if one cannot be read. */
 LogDamage ForEachEvent(const std::vector<std::string>& logs,
                        const std::function<void(const LogEvent&, const std::string&)>& visit);
 
 /** What a writer found in a file that existed already. */
 struct LogRecovery {
-  std::int64_t events = 0;           ///< Whole records kept.
-  std::int64_t cut_bytes = 0;        ///< Of a cut tail, removed.
-  std::int64_t corruptions = 0;      ///< Damaged places, left as they are.
-  std::int64_t skipped_bytes = 0;    ///< In them.
+  std::int64_t events = 0;                       ///< Whole records kept.
+  std::int64_t cut_bytes = 0;                    ///< Of a cut tail, removed.
+  std::int64_t corruptions = 0;                  ///< Damaged places, left as they are.
+  std::int64_t skipped_bytes = 0;                ///< In them.
   std::int64_t first_utime = 0, last_utime = 0;  ///< Of the first and last whole record, 0 without one.
 };
 
-/** What became of a file that is being written: it may be moved, deleted, replaced or cut while its descriptor still works. */
+/** What became of a file that is being written: it may be moved, deleted, replaced or cut while its descriptor still
+works. */
 enum class FilePlace {
-  kThere,     ///< Its path leads to it.
-  kDeleted,   ///< No name leads to it any more.
-  kElsewhere, ///< It has a name, but its path leads to nothing or to another file.
-  kCut,       ///< Its path leads to it, but some of what the disk has confirmed is gone from it.
-  kUnknown,   ///< Its path cannot be looked at, as without the permission to do so.
+  kThere,      ///< Its path leads to it.
+  kDeleted,    ///< No name leads to it any more.
+  kElsewhere,  ///< It has a name, but its path leads to nothing or to another file.
+  kCut,        ///< Its path leads to it, but some of what the disk has confirmed is gone from it.
+  kUnknown,    ///< Its path cannot be looked at, as without the permission to do so.
 };
 
 /** Which file a path leads to. */
@@ -132,8 +134,8 @@ struct FileIdentity {
 
 class EventLogWriter final {
  public:
-  /** Creates the file and has the disk confirm that it is in its directory, or recovers an existing one: keeps all whole
-  records, removes a cut tail and nothing else, and continues the event numbers. Holds a lock on the file while it
+  /** Creates the file and has the disk confirm that it is in its directory, or recovers an existing one: keeps all
+  whole records, removes a cut tail and nothing else, and continues the event numbers. Holds a lock on the file while it
   lives.
   @throws LogError if the file cannot be opened or another writer holds it. */
   explicit EventLogWriter(const std::string& path);
@@ -147,8 +149,8 @@ class EventLogWriter final {
 
   /** Writes everything appended so far and has the disk confirm it. On failure the file is put back to its last
   whole record, the events since are lost and false is returned; `problem` then says why. Where it cannot be put back,
-  the next Flush writes over what was left and confirms nothing before the file ends with its own last record. A file that
-  was cut by somebody else is left as it is. */
+  the next Flush writes over what was left and confirms nothing before the file ends with its own last record. A file
+  that was cut by somebody else is left as it is. */
   [[nodiscard]] bool Flush();
 
   /** Whether what Flush confirms can be read at the path. Cost: two looks at the file system and 28 bytes read. */

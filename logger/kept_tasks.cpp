@@ -73,14 +73,17 @@ class Part final {
 };
 
 // The digests in the names of the files that begin and end so; sorted.
-std::vector<std::string> DigestsOfNames(const std::string& directory, std::string_view beginning, std::string_view ending) {
+std::vector<std::string> DigestsOfNames(const std::string& directory, std::string_view beginning,
+                                        std::string_view ending) {
   std::vector<std::string> digests;
   std::error_code error;
   for (fs::directory_iterator file(directory, error), end; !error && file != end; file.increment(error)) {
     const std::string name = file->path().filename().string();
-    if (name.size() != beginning.size() + kHexDigits + ending.size() || !name.starts_with(beginning) || !name.ends_with(ending))
+    if (name.size() != beginning.size() + kHexDigits + ending.size() || !name.starts_with(beginning) ||
+        !name.ends_with(ending))
       continue;
-    if (const std::string digest = name.substr(beginning.size(), kHexDigits); IsDigest(digest)) digests.push_back(digest);
+    if (const std::string digest = name.substr(beginning.size(), kHexDigits); IsDigest(digest))
+      digests.push_back(digest);
   }
   std::ranges::sort(digests);
   return digests;
@@ -139,7 +142,8 @@ std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Diges
     });
   if (versions.size() != 1)
     throw ConfigError(task + ": of the versions of its transitions beside it the log names " +
-                      (versions.empty() ? "none" : "several") + "; copy the right one to where the task file has it, and "
+                      (versions.empty() ? "none" : "several") +
+                      "; copy the right one to where the task file has it, and "
                       "name the task with --config");
   const std::string transitions = TransitionsFileOf(directory, versions.front());
   NamedFiles instead{transitions, {}};
@@ -152,7 +156,8 @@ std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Diges
   if (config.digest != digest)
     throw ConfigError(task + ": is damaged: its digest is " + ToHex(config.digest) + ", not its directory's");
   if (ToHex(config.observations_digest) != versions.front())
-    throw ConfigError(transitions + ": is damaged: its digest is " + ToHex(config.observations_digest) + ", not its name's");
+    throw ConfigError(transitions + ": is damaged: its digest is " + ToHex(config.observations_digest) +
+                      ", not its name's");
   return config;
 }
 
@@ -163,7 +168,8 @@ void KeptTasks::Remove(const std::string& digest) const {
   fs::remove(directory + "/" + kTask, ignored);
   for (const std::string& version : DigestsOfNames(directory, kTransitions, kTransitionsEnding))
     fs::remove(TransitionsFileOf(directory, version), ignored);
-  for (const std::string& version : DigestsOfNames(directory, kPolicy, "")) fs::remove(PolicyFileOf(directory, version), ignored);
+  for (const std::string& version : DigestsOfNames(directory, kPolicy, ""))
+    fs::remove(PolicyFileOf(directory, version), ignored);
   fs::remove(directory, ignored);
 }
 

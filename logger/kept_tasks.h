@@ -4,9 +4,9 @@
     tasks/<config digest>/transitions-<observations digest>.csv the transitions that it names
     tasks/<config digest>/policy-<digest>                       the policy that it names, if it does
 
-All digests in hexadecimal. A task that was recorded with several versions of its transitions has one file for each. Names
-are made of digests alone, so that nothing in a log leads out of the directory, and what is read is held against its
-digest. Keys are not kept. */
+All digests in hexadecimal. A task that was recorded with several versions of its transitions has one file for each.
+Names are made of digests alone, so that nothing in a log leads out of the directory, and what is read is held against
+its digest. Keys are not kept. */
 #pragma once
 
 #include <memory>
@@ -41,8 +41,8 @@ class KeptTasks final {
   /** Where the task of this config digest is, or would be. */
   [[nodiscard]] std::string PathOf(const Digest& digest) const;
 
-  /** The task of this config digest, if it is kept. Of several versions of its transitions it is the one whose digest is
-  among `observations`. @throws ConfigError if what is kept is damaged, or cannot be told which version it was. */
+  /** The task of this config digest, if it is kept. Of several versions of its transitions it is the one whose digest
+  is among `observations`. @throws ConfigError if what is kept is damaged, or cannot be told which version it was. */
   [[nodiscard]] std::optional<Config> Find(const Digest& digest, const std::set<Digest>& observations) const;
 
   /** Deletes the task of this config digest, in hexadecimal; anything else is ignored. */

@@ -14,8 +14,8 @@ namespace forereach {
 
 class LogAuthenticator final {
  public:
-  /** @param keys public ones are enough; nothing: every message is taken for authentic. Messages count that were signed for
-  the bus `channels.name`, or without a name for the bus of the first authentic one. */
+  /** @param keys public ones are enough; nothing: every message is taken for authentic. Messages count that were signed
+  for the bus `channels.name`, or without a name for the bus of the first authentic one. */
   LogAuthenticator(const BusOptions& channels, std::optional<KeyRing> keys)
       : channels_(channels), speakers_(channels.speakers()), keys_(std::move(keys)) {}
 

@@ -29,7 +29,9 @@ void LogDirectory::Make() const {
   if (error) throw LogError("logger: cannot make the directory " + path_ + ": " + error.message());
 }
 
-std::string LogDirectory::PathOf(const std::string& file) const { return (std::filesystem::path(path_) / file).string(); }
+std::string LogDirectory::PathOf(const std::string& file) const {
+  return (std::filesystem::path(path_) / file).string();
+}
 
 std::string LogDirectory::FreeName(std::int64_t& time_us, const std::function<bool(const std::string&)>& taken) const {
   for (;; ++time_us) {

@@ -25,13 +25,14 @@ namespace fs = std::filesystem;
     case FileKind::kDirectory:
       throw LogError(path + ": is a directory; name the event logs in it, events-*.lcmlog of one run");
     case FileKind::kDatabase:
-      throw LogError(path + ": is an SQLite database, not an LCM event log; name the event logs beside it, events-*.lcmlog of "
-                            "one run");
+      throw LogError(path +
+                     ": is an SQLite database, not an LCM event log; name the event logs beside it, events-*.lcmlog of "
+                     "one run");
     case FileKind::kJson:
-      throw LogError(path + ": is a JSON document, not an LCM event log; a decision of `forereach certify --json` is for "
-                            "`forereach verify` alone");
-    default:
-      throw LogError(path + ": is no LCM event log: no event is in it; the logger's are named events-*.lcmlog");
+      throw LogError(path +
+                     ": is a JSON document, not an LCM event log; a decision of `forereach certify --json` is for "
+                     "`forereach verify` alone");
+    default: throw LogError(path + ": is no LCM event log: no event is in it; the logger's are named events-*.lcmlog");
   }
 }
 
@@ -95,9 +96,10 @@ class Surveyor final {
 
   void RequireSameRun(const std::string& log) const {
     if ((!certifier_.known() && !logger_.known()) || certifier_.go_on() || logger_.go_on()) return;
-    throw LogError(log + ": does not follow " + last_log_ +
-                   ": neither the certifier's nor the logger's heartbeats go on from one to the other; name the files of "
-                   "one run, in the order of their names, and other runs by themselves");
+    throw LogError(
+        log + ": does not follow " + last_log_ +
+        ": neither the certifier's nor the logger's heartbeats go on from one to the other; name the files of "
+        "one run, in the order of their names, and other runs by themselves");
   }
 
   LogSurvey survey_;
@@ -117,7 +119,8 @@ FileKind KindOf(const std::string& path) {
   if (bytes == std::string_view("SQLite format 3\0", 16)) return FileKind::kDatabase;
   if (bytes.starts_with("\xED\xA1\xDA\x01")) return FileKind::kEventLog;
   const auto begin = bytes.find_first_not_of(" \t\r\n");
-  return begin != std::string::npos && (bytes[begin] == '{' || bytes[begin] == '[') ? FileKind::kJson : FileKind::kOther;
+  return begin != std::string::npos && (bytes[begin] == '{' || bytes[begin] == '[') ? FileKind::kJson
+                                                                                    : FileKind::kOther;
 }
 
 LogSurvey Survey(const std::vector<std::string>& logs) {
@@ -133,10 +136,11 @@ LogSurvey Survey(const std::vector<std::string>& logs) {
 LogSurvey SurveyRun(const std::vector<std::string>& logs) {
   LogSurvey survey = Survey(logs);
   if (survey.candidates == 0 && survey.decisions == 0 && survey.configs.empty())
-    throw LogError(logs.front() + (logs.size() > 1 ? " and those behind it: " : ": ") +
-                   (survey.events == 0 ? "is empty" : "holds " + std::to_string(survey.events) + " events") +
-                   ", and neither a candidate nor a decision; nothing was proposed while it was recorded, or it is not of "
-                   "ForeReach");
+    throw LogError(
+        logs.front() + (logs.size() > 1 ? " and those behind it: " : ": ") +
+        (survey.events == 0 ? "is empty" : "holds " + std::to_string(survey.events) + " events") +
+        ", and neither a candidate nor a decision; nothing was proposed while it was recorded, or it is not of "
+        "ForeReach");
   return survey;
 }
 

@@ -14,7 +14,7 @@ namespace forereach {
 
 /** What logs hold, whatever their channels are called: messages are told by their types. */
 struct LogSurvey {
-  static constexpr std::size_t kMaxConfigs = 256;          ///< Who invents digests must not fill the memory.
+  static constexpr std::size_t kMaxConfigs = 256;  ///< Who invents digests must not fill the memory.
   static constexpr std::size_t kMaxObservations = 1 << 16;
 
   struct Recorded {
@@ -23,8 +23,9 @@ struct LogSurvey {
   };
 
   std::int64_t events = 0, candidates = 0, decisions = 0;
-  std::map<Digest, Recorded> configs;  ///< By the config digest of decisions and certified plans; the first kMaxConfigs.
-  std::vector<Digest> order;           ///< Of these, as they came first.
+  std::map<Digest, Recorded>
+      configs;                ///< By the config digest of decisions and certified plans; the first kMaxConfigs.
+  std::vector<Digest> order;  ///< Of these, as they came first.
 };
 
 /** Reads logs that follow one another, as the files of one run do.

@@ -32,7 +32,8 @@ std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, co
   std::optional<Config> task;
   if (!given.empty()) task = LoadConfig(given);
   if (survey.order.empty()) {  // candidates, and no decision
-    if (!task) throw ConfigError(logs + ": nothing in it was decided, so nothing names its task: name it with --config FILE");
+    if (!task)
+      throw ConfigError(logs + ": nothing in it was decided, so nothing names its task: name it with --config FILE");
     return {*task};
   }
   if (task && !survey.configs.contains(task->digest))

@@ -14,8 +14,7 @@ int main(int argc, char** argv) {
       "forereach-logger",
       "Records everything on the bus: an LCM event log (lcm-logplayer plays it) and a database of decisions, execution "
       "events and gaps. Ends on SIGTERM or Ctrl-C with a summary on standard output.",
-      "forereach-logger --config config/bicycle.yaml --directory /var/log/forereach",
-      Role::kLogger};
+      "forereach-logger --config config/bicycle.yaml --directory /var/log/forereach", Role::kLogger};
   const auto make_node = [&directory](const Config& config, Bus& bus) -> std::unique_ptr<Node> {
     Config chosen = config;
     if (!directory.empty()) chosen.logger.directory = directory;
@@ -26,6 +25,7 @@ int main(int argc, char** argv) {
     }
   };
   return RunProcess(argc, argv, description, make_node, [&directory](CLI::App& app) {
-    app.add_option("--directory", directory, "Where to write; by default the task file's logger.directory")->type_name("DIR");
+    app.add_option("--directory", directory, "Where to write; by default the task file's logger.directory")
+        ->type_name("DIR");
   });
 }

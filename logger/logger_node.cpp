@@ -30,7 +30,8 @@ LoggerNode::LoggerNode(const Config& config, Bus& bus, std::ostream& out, FreeSp
 
 void LoggerNode::Receive(const Received& received) {
   if (!speakers_.empty()) {
-    const bool is_ours = speakers_.contains(received.channel), is_refused = received.bytes.empty() && !received.raw.empty();
+    const bool is_ours = speakers_.contains(received.channel),
+               is_refused = received.bytes.empty() && !received.raw.empty();
     // A log is judged by the bus of its first authentic message, so nothing refused stands before that.
     if (is_ours && !is_refused) authentic_heard_ = true;
     if (is_refused && !authentic_heard_) return;
@@ -105,21 +106,22 @@ void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
   status.free_bytes = recorder_.free_bytes();
   status.flush_us = recorder_.flush_us();
   status.flush_worst_us = recorder_.TakeWorstFlushUs();
-  status.state = !recorder_.recording()                   ? logger_status_t::ERROR
+  status.state = !recorder_.recording()               ? logger_status_t::ERROR
                  : trouble.empty() && silence.empty() ? logger_status_t::OK
                                                       : logger_status_t::STALE;
   status.failed_flushes = static_cast<std::int16_t>(recorder_.failed_flushes());
-  SetText(status.message, !trouble.empty()   ? trouble
-                          : !silence.empty() ? silence
+  SetText(status.message, !trouble.empty()            ? trouble
+                          : !silence.empty()          ? silence
                           : !recorder_.gone().empty() ? "recording; " + recorder_.gone()
-                          : !refused.empty() ? "recording; not authentic and in no row: " + refused
-                                             : "recording");
+                          : !refused.empty()          ? "recording; not authentic and in no row: " + refused
+                                                      : "recording");
   bus_.Publish(channels_.logger_status, status);
 }
 
 std::string LoggerNode::Silence(std::int64_t now_us) const {
   if (now_us - last_heard_us_ < kSilenceUs) return "";
-  return fmt::format("recording, but nothing was heard for {:.1f} s", static_cast<double>(now_us - last_heard_us_) * 1e-6);
+  return fmt::format("recording, but nothing was heard for {:.1f} s",
+                     static_cast<double>(now_us - last_heard_us_) * 1e-6);
 }
 
 void LoggerNode::Stop() {

@@ -4,10 +4,10 @@ database (logger/recorder.h says how, and what can be lost), and sends a heartbe
 Handlers only copy into a bounded queue, and Tick takes from it, whatever the disk does: what does not fit the queue is
 dropped, counted and becomes a gap.
 
-With keys a stranger on the network can neither fill the disk nor displace honest logs: all authentic messages are recorded,
-with their trailer. Of what nobody signed (refused messages, and those on channels that are not ForeReach's) only
-logger.unsigned_kb_per_s are. Refused ones make no rows; how many there were is in the heartbeat's sentence and in what Stop
-prints. Those of other channels that are too much become gaps, "unsigned". */
+With keys a stranger on the network can neither fill the disk nor displace honest logs: all authentic messages are
+recorded, with their trailer. Of what nobody signed (refused messages, and those on channels that are not ForeReach's)
+only logger.unsigned_kb_per_s are. Refused ones make no rows; how many there were is in the heartbeat's sentence and in
+what Stop prints. Those of other channels that are too much become gaps, "unsigned". */
 #pragma once
 
 #include <cstdint>
@@ -61,10 +61,10 @@ class LoggerNode final : public Node {
   std::int64_t bus_dropped_;                 // as of the last Tick
   const Speakers speakers_;                  // empty without keys
   const double unsigned_bytes_per_us_;
-  double unsigned_allowance_ = 0;            // bytes
+  double unsigned_allowance_ = 0;  // bytes
   std::int64_t allowance_us_ = 0, unsigned_lost_ = 0;
   bool authentic_heard_ = false;
-  std::size_t high_water_ = 0;               // of the queue since the last heartbeat
+  std::size_t high_water_ = 0;  // of the queue since the last heartbeat
   std::int64_t now_us_ = 0, last_heard_us_ = 0, heartbeats_ = 0;
   Period heartbeat_{kHeartbeatUs};
 };

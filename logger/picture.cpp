@@ -75,7 +75,11 @@ double RoundLength(double length) {
 class Painter final {
  public:
   Painter(cairo_t* cairo, const Picture& picture, int width, int height)
-      : cairo_(cairo), picture_(picture), unit_(std::min(width / 1200.0, height / 800.0)), width_(width), height_(height) {
+      : cairo_(cairo),
+        picture_(picture),
+        unit_(std::min(width / 1200.0, height / 800.0)),
+        width_(width),
+        height_(height) {
     const Extent extent = ExtentOf(picture);
     const Vector2d size = extent.upper - extent.lower;
     left_ = kMargin * unit_;
@@ -224,7 +228,8 @@ class Painter final {
       const Vector2d normal = half_plane.normal.normalized(), along{-normal.y(), normal.x()};
       const Vector2d middle = lower_ + Vector2d(frame_width_, frame_height_) / (2 * scale_);
       const Vector2d foot = middle + (half_plane.offset / half_plane.normal.norm() - normal.dot(middle)) * normal;
-      TraceClosed({foot - far * along, foot + far * along, foot + far * along + far * normal, foot - far * along + far * normal});
+      TraceClosed({foot - far * along, foot + far * along, foot + far * along + far * normal,
+                   foot - far * along + far * normal});
     }
     SetColor(kObstacle, 0.88);
     cairo_fill_preserve(cairo_);
@@ -274,7 +279,6 @@ class Painter final {
     Stroke(kInk, 2);
   }
 
-
   // Only what the picture shows has an entry.
   void PaintLegend() {
     const double y = height_ - 24 * unit_;
@@ -321,7 +325,7 @@ class Painter final {
   const Picture& picture_;
   double unit_, width_, height_;
   double scale_ = 1, left_ = 0, top_ = 0, frame_width_ = 0, frame_height_ = 0;  // pixels, scale_ in pixels per metre
-  Vector2d lower_;                                                             // metres, the frame's lower left
+  Vector2d lower_;                                                              // metres, the frame's lower left
 };
 
 void Check(cairo_status_t status, const std::string& path) {
@@ -342,8 +346,7 @@ std::vector<std::string> PictureFiles(const std::string& name) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(directory, ignored))
     throw PictureError("picture: " + name + ": there is no directory " + directory.string());
-  const std::vector<std::string> files =
-      ending.empty() ? std::vector{name + ".svg", name + ".png"} : std::vector{name};
+  const std::vector<std::string> files = ending.empty() ? std::vector{name + ".svg", name + ".png"} : std::vector{name};
   for (const std::string& file : files)
     if (std::filesystem::is_directory(file, ignored))
       throw PictureError("picture: " + file + " is a directory, not a file");

@@ -34,17 +34,17 @@ struct Picture {
   std::string title;
   std::vector<std::string> key_numbers;  ///< Shown in one line below the title.
 
-  std::vector<Circle> circles;           ///< Obstacles.
-  std::vector<Polygon> polygons;         ///< Obstacles.
-  std::vector<HalfPlane> half_planes;    ///< Obstacles.
+  std::vector<Circle> circles;         ///< Obstacles.
+  std::vector<Polygon> polygons;       ///< Obstacles.
+  std::vector<HalfPlane> half_planes;  ///< Obstacles.
 
-  std::vector<Polygon> executed;         ///< Certified slices that the robot went through.
-  std::vector<Polygon> certified;        ///< Certified slices that newer plans replaced.
+  std::vector<Polygon> executed;                ///< Certified slices that the robot went through.
+  std::vector<Polygon> certified;               ///< Certified slices that newer plans replaced.
   std::vector<std::vector<Polygon>> abstained;  ///< Tubes refused for an obstacle (S), each up to
                                                 ///< the slice that may touch it.
 
-  std::vector<Eigen::Vector2d> path;     ///< Measured positions, from the start on.
-  std::vector<Eigen::Vector2d> stops;    ///< Where the robot stood on the way.
+  std::vector<Eigen::Vector2d> path;   ///< Measured positions, from the start on.
+  std::vector<Eigen::Vector2d> stops;  ///< Where the robot stood on the way.
   std::optional<Circle> goal;
 };
 

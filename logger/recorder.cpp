@@ -115,8 +115,8 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
     if (!run.end_utime) Recover(run);
 }
 
-// Listed before the runs are read: another logger's file has its run by then, or is locked. A file without a byte of an event
-// is what a logger leaves that is killed between making it and recording its run.
+// Listed before the runs are read: another logger's file has its run by then, or is locked. A file without a byte of an
+// event is what a logger leaves that is killed between making it and recording its run.
 void Recorder::AdoptLogs() {
   const std::vector<std::string> logs = directory_.Logs();
   const std::vector<RunRow> runs = database_->Runs();
@@ -177,8 +177,9 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
   if (unwritten > 0) write();
   const LogRecovery& found = mended.recovery();
   end_utime = std::max(end_utime, found.last_utime);
-  return fmt::format("{} events kept, a cut tail of {} bytes removed, {} damaged places of {} bytes left, {} rows written",
-                     found.events, found.cut_bytes, found.corruptions, found.skipped_bytes, new_rows);
+  return fmt::format(
+      "{} events kept, a cut tail of {} bytes removed, {} damaged places of {} bytes left, {} rows written",
+      found.events, found.cut_bytes, found.corruptions, found.skipped_bytes, new_rows);
 }
 
 // What it knew when the file began: it has seen the file before, if there is one.
@@ -280,7 +281,8 @@ void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
     AddTask(config);
     KeepTasks();
   } catch (const BadInput& error) {
-    spdlog::warn("the certifier's task, config digest {}, is not kept beside the log: {}", ToHex(heard.first), error.what());
+    spdlog::warn("the certifier's task, config digest {}, is not kept beside the log: {}", ToHex(heard.first),
+                 error.what());
   }
 }
 
@@ -391,7 +393,8 @@ void Recorder::GiveUpLog(FilePlace place, std::int64_t now_us) {
   Counts left;
   if (place == FilePlace::kCut) try {
       EventLogReader reader(log_path_);
-      ForEachEvent(reader, [&](const LogEvent& event) { ++left[confirmed_.contains(event.channel) ? event.channel : "*"]; });
+      ForEachEvent(reader,
+                   [&](const LogEvent& event) { ++left[confirmed_.contains(event.channel) ? event.channel : "*"]; });
     } catch (const LogError& error) {
       spdlog::error("{}: what is left of it cannot be read: {}", log_file_, error.what());
     }
@@ -415,7 +418,8 @@ std::int64_t Recorder::CountEarlierFilesGone(std::int64_t now_us) {
     gone += events;
     return true;
   });
-  if (gone > 0) gone_ = fmt::format("earlier logs of this run were deleted or moved, {} confirmed events are gone", gone);
+  if (gone > 0)
+    gone_ = fmt::format("earlier logs of this run were deleted or moved, {} confirmed events are gone", gone);
   return gone;
 }
 
@@ -438,7 +442,8 @@ void Recorder::StartAnew(std::int64_t now_us) {
       return;
     }
     log_->Abandon();
-    for (const auto& [channel, events] : std::exchange(unflushed_, {})) CountLoss({channel, ""}, events, now_us, "gone");
+    for (const auto& [channel, events] : std::exchange(unflushed_, {}))
+      CountLoss({channel, ""}, events, now_us, "gone");
     rows_.decisions.clear();
     rows_.events.clear();
     WithoutEvents(rows_.gaps);

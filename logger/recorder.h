@@ -18,19 +18,19 @@ ended before it has.
 **Files that go while they are written.** At each flush the log and the database are looked at. A log that was deleted,
 moved, replaced or cut short is given up: what the disk had confirmed of it and cannot be read at its place any more is
 counted as gaps "gone", and a new file goes on with the events that wait in memory, under the numbers that they have
-already. The directory is made again if need be; where no new file can be made recording pauses and it is tried every second.
-A database that is no longer in its place is opened or made anew. What it lacks of logs that are there is made again
-by the next start; gaps without an event that it alone held are lost.
+already. The directory is made again if need be; where no new file can be made recording pauses and it is tried every
+second. A database that is no longer in its place is opened or made anew. What it lacks of logs that are there is made
+again by the next start; gaps without an event that it alone held are lost.
 
-**Tasks.** The task file and the files that it names are kept beside the logs (logger/kept_tasks.h), so that a log can be read
-without them. When the certifier's heartbeats tell of a reload the task file is read again, and kept too if it is the one that
-they name. A kept task is deleted with the last log whose decisions name it.
+**Tasks.** The task file and the files that it names are kept beside the logs (logger/kept_tasks.h), so that a log can
+be read without them. When the certifier's heartbeats tell of a reload the task file is read again, and kept too if it
+is the one that they name. A kept task is deleted with the last log whose decisions name it.
 
-**Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes is
-counted by channel, and the counts become gaps. With a flush that fails it is the same for the events of that flush. Gaps
-of this kind are written when recording goes on, and until then every ten seconds. For the quota the logs of ended runs are
-deleted, oldest first, each marked in the database before; the file being written and runs that were not ended are never
-deleted, nor is any if that would not make room. */
+**Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes
+is counted by channel, and the counts become gaps. With a flush that fails it is the same for the events of that flush.
+Gaps of this kind are written when recording goes on, and until then every ten seconds. For the quota the logs of ended
+runs are deleted, oldest first, each marked in the database before; the file being written and runs that were not ended
+are never deleted, nor is any if that would not make room. */
 #pragma once
 
 #include <cstdint>
@@ -56,12 +56,15 @@ namespace forereach {
 /** Free bytes of a directory's disk. */
 using FreeSpace = std::function<std::int64_t(const std::string& directory)>;
 
-/** A period on a clock that may jump: over once it has passed since the start, and if the clock went back behind that. */
+/** A period on a clock that may jump: over once it has passed since the start, and if the clock went back behind that.
+ */
 class Period final {
  public:
   explicit Period(double us) : us_(static_cast<std::int64_t>(us)) {}
   void Start(std::int64_t now_us) { start_ = now_us; }
-  [[nodiscard]] bool IsOver(std::int64_t now_us) const { return !start_ || now_us < *start_ || now_us - *start_ >= us_; }
+  [[nodiscard]] bool IsOver(std::int64_t now_us) const {
+    return !start_ || now_us < *start_ || now_us - *start_ >= us_;
+  }
 
  private:
   std::int64_t us_;
@@ -84,7 +87,8 @@ class Recorder final {
 
   /** The next message; its `number` is not read. */
   void Take(LogEvent event, std::int64_t now_us);
-  /** `lost` messages of the stream, the next ones of its count, reached this process and not Take: they make one gap. */
+  /** `lost` messages of the stream, the next ones of its count, reached this process and not Take: they make one gap.
+   */
   void Lose(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason);
   /** Flushes and rotates where it is time. */
   void Tick(std::int64_t now_us);
@@ -105,8 +109,8 @@ class Recorder final {
   [[nodiscard]] std::string trouble() const;
   /** Flushes in a row that failed or found recording paused. */
   [[nodiscard]] int failed_flushes() const { return failed_flushes_; }
-  /** What was on the disk and is no more, of the files that this run has written; the last such event in words, empty if
-  there was none. */
+  /** What was on the disk and is no more, of the files that this run has written; the last such event in words, empty
+  if there was none. */
   [[nodiscard]] const std::string& gone() const { return gone_; }
   /** Events that the disk confirmed, and messages that are in no log: gone from it, or never written. */
   [[nodiscard]] std::int64_t written() const { return written_; }
@@ -170,9 +174,9 @@ class Recorder final {
 
   const std::string task_path_;
   const KeptTasks kept_tasks_;
-  std::vector<TaskCopy> tasks_;                                  // of this run, the last kMaxTasks
-  std::optional<std::pair<Digest, std::int64_t>> heard_task_;    // config digest and version of the last heartbeat
-  std::set<std::string> tasks_in_use_;                           // config digests of this run, in hexadecimal
+  std::vector<TaskCopy> tasks_;                                // of this run, the last kMaxTasks
+  std::optional<std::pair<Digest, std::int64_t>> heard_task_;  // config digest and version of the last heartbeat
+  std::set<std::string> tasks_in_use_;                         // config digests of this run, in hexadecimal
   Period task_reading_;
 
   std::string log_path_, log_file_;
@@ -183,19 +187,19 @@ class Recorder final {
   std::int64_t begun_us_ = 0;
   Period flush_, age_, scan_, gaps_, retry_, anew_, database_anew_;
 
-  Counts unflushed_;                                            // events in the log's buffer
-  Counts confirmed_;                                            // events that the disk has confirmed of this file
-  std::map<std::string, std::int64_t> earlier_files_;           // of this run, with their events
-  bool is_log_lost_ = false;                                    // and no new one could be made
-  bool is_log_hidden_ = false;                                  // whether it is in its place cannot be seen
+  Counts unflushed_;                                   // events in the log's buffer
+  Counts confirmed_;                                   // events that the disk has confirmed of this file
+  std::map<std::string, std::int64_t> earlier_files_;  // of this run, with their events
+  bool is_log_lost_ = false;                           // and no new one could be made
+  bool is_log_hidden_ = false;                         // whether it is in its place cannot be seen
   std::string gone_;
-  Rows flushed_rows_, rows_;                                    // of events on disk; of events in the log's buffer
-  bool rows_lost_ = false;                                      // some of this file, to be made again by the next start
-  std::map<std::pair<std::string, Stream>, Loss> losses_;       // by reason; no gaps yet
-  std::string pause_;                                           // the reason of the gaps it makes; empty while recording
-  std::int64_t told_events_ = 0;                                // of this file, to the database
-  bool needs_new_file_ = false;                                 // the database has not all rows of this one
-  bool are_rows_behind_ = false;                                // of earlier files, to be made again by the next start
+  Rows flushed_rows_, rows_;                               // of events on disk; of events in the log's buffer
+  bool rows_lost_ = false;                                 // some of this file, to be made again by the next start
+  std::map<std::pair<std::string, Stream>, Loss> losses_;  // by reason; no gaps yet
+  std::string pause_;                                      // the reason of the gaps it makes; empty while recording
+  std::int64_t told_events_ = 0;                           // of this file, to the database
+  bool needs_new_file_ = false;                            // the database has not all rows of this one
+  bool are_rows_behind_ = false;                           // of earlier files, to be made again by the next start
   std::string rotation_problem_, anew_problem_, database_problem_, displaced_, reported_;
   int failed_flushes_ = 0;
   std::int64_t written_ = 0, lost_ = 0, other_bytes_ = 0, free_bytes_ = 0;

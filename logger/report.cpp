@@ -35,8 +35,8 @@ constexpr std::size_t kBatch = 256;
 
 class PictureMaker final {
  public:
-  /** @param tasks nothing: every decision is of this config. Else those that other makers draw, and the digests of others
-  still are this one's if it `counts_unknown`. */
+  /** @param tasks nothing: every decision is of this config. Else those that other makers draw, and the digests of
+  others still are this one's if it `counts_unknown`. */
   explicit PictureMaker(const Config& config, const std::vector<Config>* tasks = nullptr, bool counts_unknown = true)
       : digest_(config.digest),
         tasks_(tasks),
@@ -182,25 +182,20 @@ class PictureMaker final {
     Picture& picture = result_.picture;
     const auto& points = obstacle.points();
     switch (obstacle.kind()) {
-      case Obstacle::Kind::kCircle:
-        picture.circles.push_back({points[0], obstacle.radius()});
-        break;
+      case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
       case Obstacle::Kind::kBox:
         picture.polygons.push_back(
             {points[0], {points[1].x(), points[0].y()}, points[1], {points[0].x(), points[1].y()}});
         break;
-      case Obstacle::Kind::kPolygon:
-        picture.polygons.push_back(InOrder({points.begin(), points.end()}));
-        break;
-      case Obstacle::Kind::kHalfSpace:
-        picture.half_planes.push_back({points[0], obstacle.offset()});
-        break;
+      case Obstacle::Kind::kPolygon: picture.polygons.push_back(InOrder({points.begin(), points.end()})); break;
+      case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
     }
   }
 
   // The hull's corners counter-clockwise (Andrew's chain): a polygon obstacle may list its points in any order.
   static Picture::Polygon InOrder(Picture::Polygon points) {
-    std::ranges::sort(points, [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
+    std::ranges::sort(points,
+                      [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
     Picture::Polygon hull;
     for (int pass = 0; pass < 2; ++pass) {
       const std::size_t base = hull.size();
@@ -241,7 +236,8 @@ std::string TitleOf(const Config& config) {
 }
 
 std::string InWords(double microseconds) {
-  return microseconds < 1000 ? fmt::format("{:.0f} \u00b5s", microseconds) : fmt::format("{:.1f} ms", microseconds / 1000);
+  return microseconds < 1000 ? fmt::format("{:.0f} \u00b5s", microseconds)
+                             : fmt::format("{:.1f} ms", microseconds / 1000);
 }
 
 std::vector<std::string> KeyNumbers(const Summary& summary) {
@@ -258,8 +254,10 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
   add(abstained("obstacle"), "abstained S");
   if (summary.latency_us.WasMeasured())
-    numbers.push_back(fmt::format("decided in {} (p50), {} (p99)", InWords(summary.latency_us.p50), InWords(summary.latency_us.p99)));
-  numbers.push_back(fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
+    numbers.push_back(
+        fmt::format("decided in {} (p50), {} (p99)", InWords(summary.latency_us.p50), InWords(summary.latency_us.p99)));
+  numbers.push_back(
+      fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
   numbers.push_back(fmt::format("{} contacts", summary.contacts));
   return numbers;
 }
@@ -315,7 +313,8 @@ void Report(const ReportOptions& options, std::ostream& out) {
   out << ToText(summary);
   for (const std::string& file : files) out << fmt::format("{:<26}{}\n", "picture", file);
   if (drawn.disagreements > 0)
-    out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out", drawn.disagreements);
+    out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out",
+                       drawn.disagreements);
 }
 
 }  // namespace forereach

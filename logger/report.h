@@ -18,9 +18,9 @@ struct LogPicture {
   int disagreements = 0;
 };
 
-/** Certifies the candidates of logs that follow one another again, under the obstacles in force when each was decided, and collects what there
-is to draw: the tubes of certified plans and of abstentions S, the measured path, stops, goal, obstacles at the end.
-Without title and key numbers. Cost: one certify call a plan.
+/** Certifies the candidates of logs that follow one another again, under the obstacles in force when each was decided,
+and collects what there is to draw: the tubes of certified plans and of abstentions S, the measured path, stops, goal,
+obstacles at the end. Without title and key numbers. Cost: one certify call a plan.
 @throws LogError if a log cannot be read, PictureError if the task's safety coordinates are not planar. */
 [[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config);
 /** The same, each plan under the task of its decision's config digest; plans of other digests are left out and counted.
@@ -30,7 +30,7 @@ Without title and key numbers. Cost: one certify call a plan.
 struct ReportOptions {
   std::vector<std::string> logs;  ///< Files of one run, in their order.
   std::string config;             ///< Task file; empty: the tasks that were kept beside the logs.
-  std::string picture;  ///< As PictureFiles takes it; none if empty.
+  std::string picture;            ///< As PictureFiles takes it; none if empty.
   bool json = false;
   int width = 1200, height = 800;  ///< Pixels.
 };

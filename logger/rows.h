@@ -51,7 +51,8 @@ struct GapRow {
   "disk": could not be written, or too little was free; "quota": logger.quota_mb had no room for them;
   "gone": were in a log that was deleted, moved, replaced or cut short while it was written; "unsigned": more than
   logger.unsigned_kb_per_s, on channels that are not ForeReach's; "backlog":
-  discarded by the bus before the logger took it, of any channel: those that count their messages show a gap "bus" too. */
+  discarded by the bus before the logger took it, of any channel: those that count their messages show a gap "bus" too.
+*/
   std::string reason;
 };
 

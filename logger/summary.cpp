@@ -26,7 +26,8 @@ std::int64_t Total(const std::map<std::string, std::int64_t>& counts) {
 
 std::string Listed(const std::map<std::string, std::int64_t>& counts) {
   std::string text;
-  for (const auto& [name, count] : counts) text += fmt::format("{}{} {}", text.empty() ? " (" : ", ", Printable(name), count);
+  for (const auto& [name, count] : counts)
+    text += fmt::format("{}{} {}", text.empty() ? " (" : ", ", Printable(name), count);
   return text.empty() ? text : text + ")";
 }
 
@@ -40,7 +41,8 @@ std::string DistanceToGoal(const Summary& summary) {
   const double distance = *summary.distance_to_goal_m;
   if (!summary.goal_reached) return fmt::format("{:.2f} m (goal not reached)", distance);
   if (distance <= summary.goal_radius_m) return fmt::format("{:.2f} m (goal reached)", distance);
-  return fmt::format("{:.2f} m at the end (the goal was reached before, within {:g} m)", distance, summary.goal_radius_m);
+  return fmt::format("{:.2f} m at the end (the goal was reached before, within {:g} m)", distance,
+                     summary.goal_radius_m);
 }
 
 nlohmann::json ToJson(const Quantiles& quantiles) {

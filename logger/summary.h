@@ -21,7 +21,8 @@ namespace forereach {
 struct Quantiles {
   double p50 = kUnknown, p99 = kUnknown;
 
-  /** False also if all of them are zero: the simulated clock of `forereach run` stands still while something is computed. */
+  /** False also if all of them are zero: the simulated clock of `forereach run` stands still while something is
+  computed. */
   [[nodiscard]] bool WasMeasured() const { return p99 > 0; }
 };
 
@@ -30,23 +31,23 @@ struct Summary {
 
   /** By channel; those beyond kMaxChannels as "*". Empty if made from a database. */
   std::map<std::string, std::int64_t> messages;
-  double duration_s = 0;                         ///< From the first message to the last.
-  std::int64_t proposed = 0;                     ///< Candidates; from a database, decisions.
+  double duration_s = 0;      ///< From the first message to the last.
+  std::int64_t proposed = 0;  ///< Candidates; from a database, decisions.
   std::int64_t decided = 0, certified = 0;
   std::map<std::string, std::int64_t> abstained, rejected;  ///< By cause.
-  Quantiles latency_us;                          ///< From a candidate's receipt to its decision's, both at the logger.
-  Quantiles certify_us;                          ///< The certify step alone.
-  std::optional<double> distance_to_goal_m;      ///< Of the last known state; nothing without goal or state.
-  double goal_radius_m = 0;                      ///< The goal counts as reached within this.
-  bool goal_reached = false;                     ///< At some time; the robot may have driven on since.
+  Quantiles latency_us;                      ///< From a candidate's receipt to its decision's, both at the logger.
+  Quantiles certify_us;                      ///< The certify step alone.
+  std::optional<double> distance_to_goal_m;  ///< Of the last known state; nothing without goal or state.
+  double goal_radius_m = 0;                  ///< The goal counts as reached within this.
+  bool goal_reached = false;                 ///< At some time; the robot may have driven on since.
   std::int64_t contacts = 0;
   std::int64_t steps_inside = 0, steps_outside = 0;  ///< Of the slice certified for that step.
   /** Before the goal: braking tails begun, and times the robot came to stand, by a plan's end or a step outside. */
   std::int64_t tails = 0, stops = 0;
-  std::int64_t refused = 0;                      ///< Certified plans that the guard refused.
-  std::map<std::string, std::int64_t> lost;      ///< Messages missing, by reason.
-  std::int64_t backlog = 0;                      ///< Discarded by the bus before the logger took them, see rows.h.
-  std::int64_t restarts = 0;                     ///< Senders that began to count anew.
+  std::int64_t refused = 0;                         ///< Certified plans that the guard refused.
+  std::map<std::string, std::int64_t> lost;         ///< Messages missing, by reason.
+  std::int64_t backlog = 0;                         ///< Discarded by the bus before the logger took them, see rows.h.
+  std::int64_t restarts = 0;                        ///< Senders that began to count anew.
   std::int64_t corruptions = 0, skipped_bytes = 0;  ///< Damaged places of the log, and the bytes in them.
 };
 
@@ -54,7 +55,8 @@ struct Summary {
 [[nodiscard]] std::string ToText(const Summary& summary);
 [[nodiscard]] nlohmann::json ToJson(const Summary& summary);
 
-/** Collects a summary piece by piece, in memory that does not grow: quantiles are those of the last kMaxSamples durations. */
+/** Collects a summary piece by piece, in memory that does not grow: quantiles are those of the last kMaxSamples
+durations. */
 class SummaryBuilder final {
  public:
   static constexpr std::size_t kMaxSamples = 1 << 16;
@@ -93,8 +95,8 @@ class SummaryBuilder final {
   std::vector<double> state_;
 };
 
-/** Of logs that follow one another, as the files of one run do. @throws LogError if one cannot be read. Damage is passed
-over and counted. Cost: linear in the logs. */
+/** Of logs that follow one another, as the files of one run do. @throws LogError if one cannot be read. Damage is
+passed over and counted. Cost: linear in the logs. */
 [[nodiscard]] Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config);
 /** Of one log file's rows, or of all for an empty name. @throws DatabaseError. */
 [[nodiscard]] Summary SummarizeDatabase(Database& database, const std::string& log_file, const Config& config);

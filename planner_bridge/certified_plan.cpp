@@ -31,8 +31,9 @@ class PlanSearch final {
   }
 
  private:
-  // Adds one progress part from `start`, with a braking tail in place of the old one. False if no such plan is certified;
-  // then found_ is as before. The tube only widens on its way, so what one part has learned holds for the next.
+  // Adds one progress part from `start`, with a braking tail in place of the old one. False if no such plan is
+  // certified; then found_ is as before. The tube only widens on its way, so what one part has learned holds for the
+  // next.
   bool Extend(const Eigen::VectorXd& start) {
     for (int attempt = 0; attempt < config_.planner.candidates; ++attempt) {
       const PlanRequest request{start, lessons_.clearance(),

@@ -23,7 +23,8 @@ class Lessons final {
   half-width of X_0, by which the tube is certain to reach beyond its center, or planner.clearance_step for a state that
   the projection reads.
   @param half_width  of X_0, n entries. @param projection  P, p-by-n. */
-  [[nodiscard]] Eigen::VectorXd DomainMargin(const Eigen::VectorXd& half_width, const Eigen::MatrixXd& projection) const;
+  [[nodiscard]] Eigen::VectorXd DomainMargin(const Eigen::VectorXd& half_width,
+                                             const Eigen::MatrixXd& projection) const;
 
  private:
   double clearance_, step_;

@@ -34,9 +34,9 @@ class NavigationField final {
 
   Eigen::VectorXd goal_;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
-  double cell_ = 0;                // metres
-  int columns_ = 0, rows_ = 0;     // 0 if not in the plane
-  std::vector<double> distance_;   // at the nodes
+  double cell_ = 0;               // metres
+  int columns_ = 0, rows_ = 0;    // 0 if not in the plane
+  std::vector<double> distance_;  // at the nodes
 };
 
 }  // namespace forereach

@@ -68,7 +68,8 @@ void PlannerNode::OnRobotState(const Received& received) {
   if (finished_) return;
   last_state_utime_ = state.utime;
   Follow(state);
-  if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() && NextPlanIsDue(state))
+  if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() &&
+      NextPlanIsDue(state))
     BeginRound(state);
 }
 
@@ -161,8 +162,7 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
 
 PlanRequest PlannerNode::RequestOf(const Round& round) const {
   constexpr std::uint32_t kSpread = 1'000'003;
-  return {round.center, round.lessons.clearance(),
-          round.lessons.DomainMargin(half_width_, config_.problem->projection),
+  return {round.center, round.lessons.clearance(), round.lessons.DomainMargin(half_width_, config_.problem->projection),
           static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1};
 }

@@ -14,8 +14,8 @@ candidate at a time and waits for its decision:
     abstained, no time -> the next candidate
 It ends without a certificate after `candidates` searches, or when too little time is left until its start; the next
 state begins another. Where gate.obstacles is bus, no round begins before the obstacles are known, and a round ends when
-they are not known any more (obstacles_in_force.h). All planning is done in Tick, one search at a time. Once the robot has been at the goal, or has
-said FINISHED, no round begins any more.
+they are not known any more (obstacles_in_force.h). All planning is done in Tick, one search at a time. Once the robot
+has been at the goal, or has said FINISHED, no round begins any more.
 
 Messages that do not decode, contain what is not finite, are stamped ahead of the clock by more than gate.max_ahead_ms,
 are obstacles that the gate would not take (obstacles_in_force.h), or concern somebody else's candidates are counted
@@ -96,7 +96,7 @@ class PlannerNode final : public Node {
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
   std::optional<std::int64_t> waiting_start_;       // of a certified plan that is still to begin
   std::int64_t last_state_utime_ = 0;
-  std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
+  std::int64_t next_plan_id_ = 0;  // 0 before the first tick
   ObstaclesInForce obstacles_;
   bool arrived_ = false, finished_ = false;
 

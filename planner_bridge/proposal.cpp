@@ -77,9 +77,11 @@ std::shared_ptr<ob::Planner> Make(const oc::SpaceInformationPtr& space) {
 using MakeAlgorithm = std::shared_ptr<ob::Planner> (*)(const oc::SpaceInformationPtr&);
 
 MakeAlgorithm AlgorithmNamed(const std::string& name) {
-  static const std::map<std::string, MakeAlgorithm> algorithms{
-      {"kpiece", Make<oc::KPIECE1>}, {"est", Make<oc::EST>}, {"pdst", Make<oc::PDST>}, {"rrt", Make<oc::RRT>},
-      {"sst", Make<oc::SST>}};
+  static const std::map<std::string, MakeAlgorithm> algorithms{{"kpiece", Make<oc::KPIECE1>},
+                                                               {"est", Make<oc::EST>},
+                                                               {"pdst", Make<oc::PDST>},
+                                                               {"rrt", Make<oc::RRT>},
+                                                               {"sst", Make<oc::SST>}};
   const auto found = algorithms.find(name);
   if (found == algorithms.end())
     throw std::invalid_argument("planner.algorithm: " + name + " is not kpiece, est, pdst, rrt or sst");
@@ -410,8 +412,7 @@ std::unique_ptr<oc::SimpleSetup> Planner::Search::SetUp(const Ambition& ambition
   bounds.setHigh(static_cast<unsigned>(n_ + 1), start_distance_);
   states->setBounds(bounds);
   const double cell = std::max(gain_ / planner_.options_.progress_steps, 0.1);
-  states->registerDefaultProjection(
-      std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
+  states->registerDefaultProjection(std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
 
   auto controls = std::make_shared<oc::RealVectorControlSpace>(states, static_cast<unsigned>(m_));
   const Box& input = planner_.problem_->domain.input;
@@ -459,8 +460,7 @@ std::optional<Proposal> Planner::Search::Assemble(oc::PathControl& path, const A
   const auto progress = static_cast<Eigen::Index>(path.getControlCount());
   Eigen::MatrixXd tail;
   if (!FindTail(StateOf(Values(path.getStates().back())), ambition, tail)) return std::nullopt;
-  Proposal proposal{Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()),
-                    static_cast<int>(progress),
+  Proposal proposal{Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()), static_cast<int>(progress),
                     Eigen::MatrixXd(start_.size(), progress + tail.cols() + 1)};
   for (Eigen::Index t = 0; t < progress; ++t)
     std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, proposal.controls.col(t).data());

@@ -87,9 +87,8 @@ GuardVerdict CheckSlice(const certified_plan_t& certified, int step, std::span<c
 
 GuardVerdict CheckExpiry(const certified_plan_t& certified, std::int64_t now_us) {
   if (now_us <= certified.expires_utime) return {};
-  return Refuse(GuardCause::kExpired,
-                Sentence("plan %" PRId64 " expired at %" PRId64 " us, now it is %" PRId64 " us", certified.plan.plan_id,
-                         certified.expires_utime, now_us));
+  return Refuse(GuardCause::kExpired, Sentence("plan %" PRId64 " expired at %" PRId64 " us, now it is %" PRId64 " us",
+                                               certified.plan.plan_id, certified.expires_utime, now_us));
 }
 
 GuardVerdict RefuseDigest(GuardCause cause, const char* name, const std::string& carried, const std::string& expected) {
@@ -102,7 +101,7 @@ GuardVerdict CheckDigest(GuardCause cause, const char* name, const Digest& carri
 }
 
 GuardVerdict CheckDigestsAreThere(const certified_plan_t& certified) {
-  for (const auto& [name, digest] : std::initializer_list<std::pair<const char*, const std::uint8_t (&)[32]>>{
+  for (const auto& [name, digest] : std::initializer_list<std::pair<const char*, const std::uint8_t(&)[32]>>{
            {"plan_digest", certified.plan_digest},
            {"config_digest", certified.config_digest},
            {"model_digest", certified.model_digest},
@@ -120,12 +119,10 @@ GuardVerdict CheckSeal(const certified_plan_t& certified) {
   const SealFault& fault = faults.front();
   const char* field = fault.field.c_str();
   switch (fault.kind) {
-    case SealFault::Kind::kPlanDigest:
-      return RefuseDigest(GuardCause::kPlanDigest, field, fault.found, fault.expected);
+    case SealFault::Kind::kPlanDigest: return RefuseDigest(GuardCause::kPlanDigest, field, fault.found, fault.expected);
     case SealFault::Kind::kCertificateDigest:
       return RefuseDigest(GuardCause::kCertificateDigest, field, fault.found, fault.expected);
-    case SealFault::Kind::kUnusedEntry:
-      break;
+    case SealFault::Kind::kUnusedEntry: break;
   }
   return RefuseAt(GuardCause::kUnusedEntry, fault.step, fault.coordinate, fault.value, 0,
                   Sentence("%s is %s, it has to be %s", field, fault.found.c_str(), fault.expected.c_str()));
@@ -179,12 +176,13 @@ namespace {
 
 void RequireDomain(const std::optional<GuardDomain>& domain, const GuardOptions& options) {
   if (!domain) return;
-  const auto require = [](const char* what, const std::vector<double>& lower, const std::vector<double>& upper, int size) {
+  const auto require = [](const char* what, const std::vector<double>& lower, const std::vector<double>& upper,
+                          int size) {
     bool good = lower.size() == static_cast<std::size_t>(size) && upper.size() == lower.size();
     for (std::size_t k = 0; good && k < lower.size(); ++k) good = lower[k] <= upper[k];
     if (!good)
-      throw std::invalid_argument(std::string("GuardOptions: domain: ") + what + " has to have " + std::to_string(size) +
-                                  " entries, and lower <= upper in each");
+      throw std::invalid_argument(std::string("GuardOptions: domain: ") + what + " has to have " +
+                                  std::to_string(size) + " entries, and lower <= upper in each");
   };
   require("state", domain->state_lower, domain->state_upper, options.num_states);
   require("input", domain->input_lower, domain->input_upper, options.num_inputs);
@@ -216,7 +214,8 @@ void Guard::Halt() noexcept {
 
 void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain) {
   RequireDomain(domain, options_);
-  std::erase_if(expected_, [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
+  std::erase_if(expected_,
+                [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
   if (expected_.size() >= kMostExpected) expected_.erase(expected_.begin());
   expected_.push_back({config_digest, model_digest, std::move(domain)});
 }
@@ -282,7 +281,8 @@ GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
 
 std::vector<Guard::Task>::const_iterator Guard::FindExpected(const certified_plan_t& certified) const {
   const Digest config = GetDigest(certified.config_digest), model = GetDigest(certified.model_digest);
-  return std::ranges::find_if(expected_, [&](const Task& task) { return task.config == config && task.model == model; });
+  return std::ranges::find_if(expected_,
+                              [&](const Task& task) { return task.config == config && task.model == model; });
 }
 
 GuardVerdict Guard::Examine(const certified_plan_t& certified, std::int64_t now_us) const {
@@ -339,11 +339,13 @@ GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
   if (!domain) return {};
   const candidate_plan_t& plan = certified.plan;
   const auto outside = [](const char* what, int t, int coordinate, double value, double bound) {
-    return RefuseAt(GuardCause::kOutsideDomain, t, coordinate, value, bound,
-                    Sentence("%s %d reaches %.17g in coordinate %d, the domain ends at %.17g", what, t, value, coordinate, bound));
+    return RefuseAt(
+        GuardCause::kOutsideDomain, t, coordinate, value, bound,
+        Sentence("%s %d reaches %.17g in coordinate %d, the domain ends at %.17g", what, t, value, coordinate, bound));
   };
   for (int k = 0; k < options_.num_states; ++k) {
-    const double lower = domain->state_lower[static_cast<std::size_t>(k)], upper = domain->state_upper[static_cast<std::size_t>(k)];
+    const double lower = domain->state_lower[static_cast<std::size_t>(k)],
+                 upper = domain->state_upper[static_cast<std::size_t>(k)];
     const double center = plan.initial_center[k], half_width = plan.initial_half_width[k];
     if (!AtMostSum(-upper, -center, -half_width)) return outside("X", 0, k, center + half_width, upper);
     if (!AtMostSum(lower, center, -half_width)) return outside("X", 0, k, center - half_width, lower);
@@ -353,7 +355,8 @@ GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
     }
   }
   for (int i = 0; i < options_.num_inputs; ++i) {
-    const double lower = domain->input_lower[static_cast<std::size_t>(i)], upper = domain->input_upper[static_cast<std::size_t>(i)];
+    const double lower = domain->input_lower[static_cast<std::size_t>(i)],
+                 upper = domain->input_upper[static_cast<std::size_t>(i)];
     for (int t = 0; t < plan.num_steps; ++t)
       if (const double control = plan.control[t][i]; !(lower <= control && control <= upper))
         return outside("control", t, options_.num_states + i, control, control < lower ? lower : upper);

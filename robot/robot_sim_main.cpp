@@ -32,10 +32,13 @@ void AddSampleOptions(CLI::App& app, SampleOptions& options) {
                    ->type_name("FILE");
   app.add_option("--seed", options.seed, "Seed of the samples")->needs(make)->capture_default_str();
   app.add_option("--count", options.count, "How many transitions")
-      ->needs(make)->check(CLI::Range(1, 10'000'000))->capture_default_str();
+      ->needs(make)
+      ->check(CLI::Range(1, 10'000'000))
+      ->capture_default_str();
   app.add_option("--range", options.ranges,
                  "Narrows one coordinate of the domain, as in v=7.25:15.75; once for each coordinate")
-      ->needs(make)->type_name("NAME=LOWER:UPPER");
+      ->needs(make)
+      ->type_name("NAME=LOWER:UPPER");
 }
 
 // All of `text` as a number.

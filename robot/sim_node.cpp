@@ -4,8 +4,8 @@
 #include <array>
 #include <limits>
 
-#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
 
 #include "certifier/gate/stamp.h"
 #include "certifier/numerics/text.h"
@@ -118,7 +118,8 @@ void RobotSimNode::OnFault(const Received& received) {
   const int step = executing_step();
   if (executing()) Stand();
   guard_.Halt();
-  PublishEvent(received.utime, execution_event_t::HALTED, plan_id, step, 0, "emergency stop: " + GetText(fault->message));
+  PublishEvent(received.utime, execution_event_t::HALTED, plan_id, step, 0,
+               "emergency stop: " + GetText(fault->message));
 }
 
 void RobotSimNode::OnCommand(const Received& received) {

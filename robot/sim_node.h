@@ -12,16 +12,16 @@ So without a newer certificate the robot runs the tail it has already certified,
 
 Standing is a hold mode of the simulated robot: the speed and acceleration that a finished tail leaves are set to
 zero at once (v and a of the bicycle, vx and vy of the point mass), every other coordinate keeps its value, and no
-control and no residual act until the next plan starts. An emergency stop (STEP_OUTSIDE, or HALTED when the certifier says
-SLICE_LEFT or DECLARATION_FALSIFIED) enters the same mode, whatever the speed was: nothing certified is left to execute.
-After it the robot stands until a reset on bus.channels.command.
+control and no residual act until the next plan starts. An emergency stop (STEP_OUTSIDE, or HALTED when the certifier
+says SLICE_LEFT or DECLARATION_FALSIFIED) enters the same mode, whatever the speed was: nothing certified is left to
+execute. After it the robot stands until a reset on bus.channels.command.
 
 The run ends after the goal is reached or the time limit has passed: no further plan starts, the current one runs to
 its end, and once the robot stands it publishes FINISHED for kFinishedBoundaries boundaries and is done.
 
-With keys (bus.key) the guard checks once more, by itself, that the certifier has signed a plan. Messages on PLAN_CERTIFIED, FAULT and COMMAND are all it obeys.
-Obstacles and start are those of the task file. A reload makes it take plans certified under the file as it is now
-(Guard::Expect); the robot and its world stay. */
+With keys (bus.key) the guard checks once more, by itself, that the certifier has signed a plan. Messages on
+PLAN_CERTIFIED, FAULT and COMMAND are all it obeys. Obstacles and start are those of the task file. A reload makes it
+take plans certified under the file as it is now (Guard::Expect); the robot and its world stay. */
 #pragma once
 
 #include <iostream>

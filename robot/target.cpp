@@ -9,9 +9,9 @@
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/residuals.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/text.h"
-#include "certifier/dynamics/residuals.h"
 
 namespace forereach {
 namespace {

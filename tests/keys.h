@@ -8,7 +8,9 @@
 namespace forereach {
 
 /** All roles of a robot. */
-inline KeyRing TestKeys(const std::string& robot = "test") { return MakeKeyRing(robot, DigestOf("entropy of " + robot)); }
+inline KeyRing TestKeys(const std::string& robot = "test") {
+  return MakeKeyRing(robot, DigestOf("entropy of " + robot));
+}
 
 /** Makes a directory of keys, and returns its path. */
 inline std::string MakeTestKeys(const std::string& directory, const std::string& robot = "test") {

@@ -66,8 +66,8 @@ class Search {
     return true;
   }
 
-  // First those that are the same up to rounding, so that of nearly parallel ones each takes its own, at last any of which a
-  // part helps. A column along an axis here may have got a tiny second entry there.
+  // First those that are the same up to rounding, so that of nearly parallel ones each takes its own, at last any of
+  // which a part helps. A column along an axis here may have got a tiny second entry there.
   void PairByNearness() {
     std::ranges::fill(pairs_, std::nullopt);
     const auto take = [&](bool whole, double worst, double worst_of_axis) {
@@ -147,7 +147,8 @@ class Search {
     return Containment{Answer::kUnknown, k, need, room};
   }
 
-  // Along e_i / r_i +- e_k / r_k, with r the half-widths there: where two coordinates are tied together that are not here.
+  // Along e_i / r_i +- e_k / r_k, with r the half-widths there: where two coordinates are tied together that are not
+  // here.
   [[nodiscard]] std::optional<Containment> Refuted() const {
     const Eigen::VectorXd half_width = generators_.cwiseAbs().rowwise().sum();
     for (int i = 0; i < inner_.dim(); ++i)
@@ -159,7 +160,8 @@ class Search {
           const Real away = along_i * (inner_.center[Index(i)] - Real(center_[i])) +
                             along_k * (inner_.center[Index(k)] - Real(center_[k]));
           Real reach = abs(away), bound;
-          for (const auto& column : inner_.columns) reach += abs(along_i * column[Index(i)] + along_k * column[Index(k)]);
+          for (const auto& column : inner_.columns)
+            reach += abs(along_i * column[Index(i)] + along_k * column[Index(k)]);
           for (const auto g : generators_.colwise()) bound += abs(along_i * Real(g[i]) + along_k * Real(g[k]));
           if (CertainlyBelow(bound, reach)) return Containment{Answer::kNo, -1, reach, bound};
         }
@@ -169,9 +171,9 @@ class Search {
   const Slice& inner_;
   const Eigen::VectorXd& center_;
   const Eigen::MatrixXd& generators_;
-  std::vector<Eigen::VectorXd> rounded_;  // inner's columns
-  std::vector<int> axis_;                 // of each generator
-  std::vector<bool> taken_;               // each generator
+  std::vector<Eigen::VectorXd> rounded_;    // inner's columns
+  std::vector<int> axis_;                   // of each generator
+  std::vector<bool> taken_;                 // each generator
   std::vector<std::optional<Pair>> pairs_;  // of each column of inner
 };
 

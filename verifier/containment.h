@@ -18,10 +18,11 @@ struct Containment {
 
 /** Whether inner lies in <center, generators>.
 
-Sufficient: inner's columns d_j are written as gamma_j g_i(j) + delta_j, |gamma_j| <= 1, no g_i taken twice, and for each
-coordinate k the generators along that axis which were not taken make up for the rest:
-|c'_k - c_k| + sum_j |delta_jk| <= sum of their |g_k|. Any choice of pairs and gammas is sound; doubles choose.
-Cost O(m^2 n) in doubles, O(m n) in Reals. */
-[[nodiscard]] Containment IsInside(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators);
+Sufficient: inner's columns d_j are written as gamma_j g_i(j) + delta_j, |gamma_j| <= 1, no g_i taken twice, and for
+each coordinate k the generators along that axis which were not taken make up for the rest: |c'_k - c_k| + sum_j
+|delta_jk| <= sum of their |g_k|. Any choice of pairs and gammas is sound; doubles choose. Cost O(m^2 n) in doubles, O(m
+n) in Reals. */
+[[nodiscard]] Containment IsInside(const Slice& inner, const Eigen::VectorXd& center,
+                                   const Eigen::MatrixXd& generators);
 
 }  // namespace forereach::verifier

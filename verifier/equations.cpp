@@ -1,5 +1,5 @@
-#include <map>
 #include "verifier/equations.h"
+#include <map>
 
 namespace forereach::verifier {
 namespace {
@@ -84,7 +84,8 @@ class BicycleEquations final : public Equations {
 
 std::unique_ptr<Equations> EquationsOf(const NominalModel& model) {
   std::map<std::string, double> parameters;
-  for (std::size_t p = 0; p < model.parameters().size(); ++p) parameters[model.parameter_names()[p]] = model.parameters()[p];
+  for (std::size_t p = 0; p < model.parameters().size(); ++p)
+    parameters[model.parameter_names()[p]] = model.parameters()[p];
   const auto has = [&](const char* name) { return parameters.count(name) == 1; };
   if (model.name() == "point_mass" && has("dt") && parameters.size() == 1)
     return std::make_unique<PointMassEquations>(parameters.at("dt"));

@@ -127,8 +127,8 @@ double Reduce(Slice& slice, int order, double remainder_rounding) {
   return std::max(close, tiny);
 }
 
-// As Reduce, by the choice that a record shows: the (order - 1) n columns nearest to its first. False if it has fewer. Any
-// choice gives a set that contains the slice.
+// As Reduce, by the choice that a record shows: the (order - 1) n columns nearest to its first. False if it has fewer.
+// Any choice gives a set that contains the slice.
 bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded) {
   const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
   if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return true;
@@ -220,7 +220,8 @@ Bounds DiagonalRange(const Real& h, const Real& r) {
   return {half_square * min(Real(), h.lower()), half_square * max(Real(), h.upper())};
 }
 
-// Of a term of the centred method: the sum of its parts' ranges, or the range of their sum over the box, if that is less.
+// Of a term of the centred method: the sum of its parts' ranges, or the range of their sum over the box, if that is
+// less.
 Bounds CentredRange(const RemainderTerm& term, const Slice& slice, const std::vector<Real>& r) {
   const SecondDerivative& entry = *term.entry;
   if (entry.row == entry.column) return DiagonalRange(entry.value, r[Index(entry.row)]);
@@ -318,8 +319,9 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
   }
 }
 
-// The certifier rounds each remainder by what its expansion may be off anywhere in the domain, some 2^-44 of the largest
-// remainder there, and several meet in a column; where that is not negligible it takes intervals, as tight as the slice.
+// The certifier rounds each remainder by what its expansion may be off anywhere in the domain, some 2^-44 of the
+// largest remainder there, and several meet in a column; where that is not negligible it takes intervals, as tight as
+// the slice.
 double TubeMaker::RemainderRounding() const {
   const auto [lower, upper] = problem_.domain.Corners();
   std::vector<Real> box, half_width;

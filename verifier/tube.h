@@ -4,8 +4,8 @@ the residual envelope, plainly. Shares the problem's data types with the certifi
 For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h)] >. */
 #pragma once
 
-#include <memory>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <vector>
 

@@ -88,8 +88,8 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
 }
 
 // The certifier's own rules first. Where these leave a choice that its rounding may have taken otherwise, and the claim
-// fails by no more than that may matter, other tubes confirm as well: one that chooses as the record shows, and those that
-// need no choice, never reduced, and with a tighter remainder.
+// fails by no more than that may matter, other tubes confirm as well: one that chooses as the record shows, and those
+// that need no choice, never reduced, and with a tighter remainder.
 std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate& certificate) const {
   double ambiguity = 0;
   const auto attempt = [&](const TubeOptions& options) {

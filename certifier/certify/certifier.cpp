@@ -138,13 +138,12 @@ void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span
     for (std::size_t k = 0; k < plan.input(t).size(); ++k)
       RequireThat(std::isfinite(plan.input(t)[k]), "plan: step " + number(t) + ": " + model.input_names()[k] + " is " +
                                                        number(plan.input(t)[k]) + ", must be finite");
-  RequireThat(initial_set.dim() == model.num_states(),
-              "initial set: dimension " + number(initial_set.dim()) + ", the model has " + number(model.num_states()) +
-                  " states");
+  RequireThat(initial_set.dim() == model.num_states(), "initial set: dimension " + number(initial_set.dim()) +
+                                                           ", the model has " + number(model.num_states()) + " states");
   const int most = problem_->zonotope_order * model.num_states();
-  RequireThat(initial_set.num_generators() <= most,
-              "initial set: " + number(initial_set.num_generators()) + " generators, must be at most " + number(most) +
-                  ", the zonotope order times the states");
+  RequireThat(initial_set.num_generators() <= most, "initial set: " + number(initial_set.num_generators()) +
+                                                        " generators, must be at most " + number(most) +
+                                                        ", the zonotope order times the states");
   for (std::size_t o = 0; o < obstacles.size(); ++o)
     RequireThat(obstacles[o].dim() == projection_.dim(),
                 "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +
@@ -168,7 +167,8 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
   for (int t = 0; t < plan.num_steps; ++t) {
     const auto i = static_cast<std::size_t>(t);
     StepRecord& record = tube.steps_[i];
-    const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1], tube.steps_[i + 1].half_width.data());
+    const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1],
+                                               tube.steps_[i + 1].half_width.data());
     if (result.status != StepResult::Status::kDone) return Stopped(result, t, record);
     tube.length_ = t + 1;
   }
@@ -223,7 +223,8 @@ Decision Judged(Outcome outcome, const Closest& closest) {
 }  // namespace
 
 Separation Certifier::SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept {
-  return BetterOf(SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacle), tube, t, obstacle);
+  return BetterOf(SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacle), tube, t,
+                  obstacle);
 }
 
 Separation Certifier::BetterOf(const Separation& by_hulls, const Tube& tube, int t,

@@ -37,7 +37,7 @@ class Certifier final {
   [[nodiscard]] bool uses_hull_distance() const { return known_.uses_hull_distance(); }
 
   enum class Learned {
-    kAdded,          ///< From now on every certificate rests on it; violation() says whether it falsifies the declaration.
+    kAdded,  ///< From now on every certificate rests on it; violation() says whether it falsifies the declaration.
     kOutsideDomain,  ///< Not proven to lie in the domain: it says nothing about the residual there.
     kUnusable,       ///< Not finite, or the nominal map has no finite enclosure there.
   };
@@ -55,18 +55,18 @@ class Certifier final {
   [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept;
 
   /** Throws std::invalid_argument, naming value and bound, unless Certify may be called with these: sizes as the
-  problem's, 1..kMaxSteps steps, finite controls, obstacles in the safety dimension, X_0 with at most order * n generators. */
+  problem's, 1..kMaxSteps steps, finite controls, obstacles in the safety dimension, X_0 with at most order * n
+  generators. */
   void Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
 
   /** Decides whether every admissible residual keeps the robot clear of the obstacles, from every state in
   `initial_set`, under `plan`. The outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, the
   slice `tube.slice(t)` contains every reachable state and its projection is disjoint from every obstacle.
 
-  Order of the tests: F; then for t < T the domain, the remainder, the envelope (D ends the run at its first step); after
-  the horizon the bounds of `Problem::rest` on the hull of X_T, in their order (D, kNoStop, at step T); then S, at its
-  first unsafe t in 0..T. X_T is not tested against the domain.
-  Cost O(T (N + n m)) plus a clearance a slice and obstacle that comes close. Any number of threads may call it, each
-  with a tube of its own. @pre Require passes. */
+  Order of the tests: F; then for t < T the domain, the remainder, the envelope (D ends the run at its first step);
+  after the horizon the bounds of `Problem::rest` on the hull of X_T, in their order (D, kNoStop, at step T); then S, at
+  its first unsafe t in 0..T. X_T is not tested against the domain. Cost O(T (N + n m)) plus a clearance a slice and
+  obstacle that comes close. Any number of threads may call it, each with a tube of its own. @pre Require passes. */
   [[nodiscard]] Decision Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
                                  Tube& tube) const noexcept;
 

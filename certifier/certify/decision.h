@@ -26,18 +26,20 @@ struct Decision {
 
   /** @name Witness: what the outcome rests on; -1 or kNone where it does not apply. */
   ///@{
-  DomainExit exit{};       ///< D by domain exit.
-  int coordinate = -1;     ///< F: residual coordinate. D: coordinate of z, or state without a finite enclosure.
+  DomainExit exit{};    ///< D by domain exit.
+  int coordinate = -1;  ///< F: residual coordinate. D: coordinate of z, or state without a finite enclosure.
   int first_observation = -1, second_observation = -1;  ///< F: the violating pair.
-  int obstacle = -1;       ///< S: the obstacle. Certificate: the one that the tube comes closest to.
-  int closest_step = -1;   ///< Certificate: where it does.
+  int obstacle = -1;      ///< S: the obstacle. Certificate: the one that the tube comes closest to.
+  int closest_step = -1;  ///< Certificate: where it does.
   ///@}
 
   /** The value that decided and what it was held to. Certificate and S: proven distance from slice to the obstacle's
-  core, and its radius (m). D: what the hull reaches, and the bound of the domain or of standing. F: difference, and what L allows. */
+  core, and its radius (m). D: what the hull reaches, and the bound of the domain or of standing. F: difference, and
+  what L allows. */
   double margin = 0, threshold = 0;
 
-  /** Whether a search for the tightest observation met its cap: the tube is as sound, and may be wider than it need be. */
+  /** Whether a search for the tightest observation met its cap: the tube is as sound, and may be wider than it need be.
+   */
   bool capped = false;
 };
 
@@ -62,7 +64,8 @@ class Tube final {
   [[nodiscard]] std::span<const double> half_width(int t) const {
     return {step(t).half_width.data(), static_cast<std::size_t>(slice(t).dim())};
   }
-  /** An interval that contains coordinate k of X_t, rounded outward. Cost O(1): the half-widths are those of the step. */
+  /** An interval that contains coordinate k of X_t, rounded outward. Cost O(1): the half-widths are those of the step.
+   */
   [[nodiscard]] Interval hull(int t, int k) const {
     const double center = slice(t).center(k), r = half_width(t)[static_cast<std::size_t>(k)];
     return {SubDown(center, r), AddUp(center, r)};

@@ -19,10 +19,8 @@ std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
   const std::string value = below ? RoundedDown(exit.value) : RoundedUp(exit.value);
   const std::string bound = below ? RoundedUp(exit.bound) : RoundedDown(exit.bound);
   switch (exit.kind) {
-    case Kind::kLower:
-      return VariableName(model, exit.index) + " reaches " + value + ", below its bound " + bound;
-    case Kind::kUpper:
-      return VariableName(model, exit.index) + " reaches " + value + ", above its bound " + bound;
+    case Kind::kLower: return VariableName(model, exit.index) + " reaches " + value + ", below its bound " + bound;
+    case Kind::kUpper: return VariableName(model, exit.index) + " reaches " + value + ", above its bound " + bound;
     case Kind::kInequality:
       return "inequality " + std::to_string(exit.index) + " reaches " + value + ", above its bound " + bound;
     default:
@@ -36,8 +34,8 @@ std::string ExplainFalsified(const Decision& decision, const NominalModel& model
     return "abstain F: at step " + std::to_string(decision.step) + " no residual in " + coordinate +
            " agrees with all observations and the declaration";
   return "abstain F: observations " + std::to_string(decision.first_observation) + " and " +
-         std::to_string(decision.second_observation) + " differ in " + coordinate + " by " + RoundedDown(decision.margin) +
-         ", the declaration allows " + RoundedUp(decision.threshold);
+         std::to_string(decision.second_observation) + " differ in " + coordinate + " by " +
+         RoundedDown(decision.margin) + ", the declaration allows " + RoundedUp(decision.threshold);
 }
 
 std::string ExplainSafety(const Decision& decision) {
@@ -52,8 +50,7 @@ std::string ExplainSafety(const Decision& decision) {
 std::string Sentence(const Decision& decision, const Problem& problem) {
   const NominalModel& model = *problem.model;
   switch (decision.outcome) {
-    case Outcome::kFalsified:
-      return ExplainFalsified(decision, model);
+    case Outcome::kFalsified: return ExplainFalsified(decision, model);
     case Outcome::kDomain: {
       const std::string where = "abstain D: at step " + std::to_string(decision.step) + " ";
       if (decision.cause == Cause::kDomainExit) return where + ExplainExit(decision.exit, model);
@@ -66,10 +63,8 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
       return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
     }
     case Outcome::kSafety:
-    case Outcome::kCertified:
-      return ExplainSafety(decision);
-    case Outcome::kNone:
-      break;
+    case Outcome::kCertified: return ExplainSafety(decision);
+    case Outcome::kNone: break;
   }
   return "no decision";
 }

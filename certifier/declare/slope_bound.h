@@ -35,7 +35,7 @@ struct SlopeBound {
   /** Where `upper` is infinite: a box w without a finite bound, cut until it could not be cut further or `max_boxes`
   came. Empty where `upper` is finite. */
   std::vector<Interval> unbounded;
-  Cover cover;                ///< Of the domain's box and the parameters' together.
+  Cover cover;  ///< Of the domain's box and the parameters' together.
 
   /** (upper - lower) / lower, rounded up; infinite where lower is zero and upper is not. */
   [[nodiscard]] double gap() const;

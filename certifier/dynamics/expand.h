@@ -28,7 +28,9 @@ inline PlainInterval operator*(PlainInterval a, PlainInterval b) {
   const double p = a.lower * b.lower, q = a.lower * b.upper, r = a.upper * b.lower, s = a.upper * b.upper;
   return {std::min(std::min(p, q), std::min(r, s)), std::max(std::max(p, q), std::max(r, s))};
 }
-inline PlainInterval Divide(PlainInterval a, PlainInterval b) { return a * PlainInterval{1 / b.upper, 1 / b.lower}; }  // b does not contain 0
+inline PlainInterval Divide(PlainInterval a, PlainInterval b) {
+  return a * PlainInterval{1 / b.upper, 1 / b.lower};
+}  // b does not contain 0
 inline PlainInterval Square(PlainInterval a) {
   const double p = a.lower * a.lower, q = a.upper * a.upper;
   const bool has_zero = a.lower <= 0 && a.upper >= 0;
@@ -43,8 +45,8 @@ using Ends [[gnu::vector_size(16)]] = double;
 
 FOREREACH_INLINE Ends Both(double x) { return Ends{x, x}; }
 
-/** The turns from a center c to the ends of an interval around it: their sines, the first negative, and cosines. The first
-term that Taylor's polynomials leave out is below 2^-52 up to 1/4. */
+/** The turns from a center c to the ends of an interval around it: their sines, the first negative, and cosines. The
+first term that Taylor's polynomials leave out is below 2^-52 up to 1/4. */
 struct Turns {
   Ends sine, cosine;
   bool wide;  // too wide to tell by the slopes at its ends whether a sine is monotone on it
@@ -60,7 +62,8 @@ struct Turns {
   }
 };
 
-/** Sine and cosine at both ends by the addition theorems. Where the slope changes its sign an extremum may lie inside. */
+/** Sine and cosine at both ends by the addition theorems. Where the slope changes its sign an extremum may lie inside.
+ */
 struct Wave {
   Ends sines, cosines;
   bool wide;
@@ -150,7 +153,8 @@ template <std::size_t N, class Visit>
 FOREREACH_INLINE void ForEachConstant(Visit visit) {
   [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
     (visit(std::integral_constant<std::size_t, I>()), ...);
-  }(std::make_index_sequence<N>());
+  }
+  (std::make_index_sequence<N>());
 }
 
 template <const Program& kProgram>
@@ -158,11 +162,18 @@ FOREREACH_INLINE void Expand(const double* parameters, const double* z, const Pl
   constexpr auto kSize = static_cast<std::size_t>(kProgram.size);
   std::array<double, kSize> v;
   std::array<PlainInterval, kSize> w;
-  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) { EvaluateAtPoint<kProgram, i>(parameters, z, v.data()); });
-  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) { EvaluateOverBox<kProgram, i>(parameters, box, v.data(), w.data()); });
+  ForEachConstant<kSize>([&](auto i)
+                             __attribute__((always_inline)) { EvaluateAtPoint<kProgram, i>(parameters, z, v.data()); });
+  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) {
+    EvaluateOverBox<kProgram, i>(parameters, box, v.data(), w.data());
+  });
   ForEachConstant<kProgram.states>([&](auto k) __attribute__((always_inline)) { out.value[k] = v[kProgram.value[k]]; });
-  ForEachConstant<kProgram.num_first>([&](auto e) __attribute__((always_inline)) { out.jacobian[e] = v[kProgram.jacobian[e].node]; });
-  ForEachConstant<kProgram.num_second>([&](auto e) __attribute__((always_inline)) { out.hessian[e] = w[kProgram.hessian[e].node]; });
+  ForEachConstant<kProgram.num_first>([&](auto e) __attribute__((always_inline)) {
+    out.jacobian[e] = v[kProgram.jacobian[e].node];
+  });
+  ForEachConstant<kProgram.num_second>([&](auto e) __attribute__((always_inline)) {
+    out.hessian[e] = w[kProgram.hessian[e].node];
+  });
 }
 
 template <const Program& kProgram>
@@ -170,7 +181,8 @@ FOREREACH_AVX2 void ExpandAvx2(const double* parameters, const double* z, const 
   Expand<kProgram>(parameters, z, box, out);
 }
 template <const Program& kProgram>
-FOREREACH_FLATTEN void ExpandBaseline(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
+FOREREACH_FLATTEN void ExpandBaseline(const double* parameters, const double* z, const PlainInterval* box,
+                                      Expansion& out) {
   Expand<kProgram>(parameters, z, box, out);
 }
 

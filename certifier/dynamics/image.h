@@ -52,7 +52,8 @@ FOREREACH_INLINE Lanes RowImage(const Lanes* columns, const Lanes* factors) {
     Lanes sum = Weighted<kProgram, kFirst>(columns, factors);
     [&]<std::size_t... E>(std::index_sequence<E...>) __attribute__((always_inline)) {
       ((sum += Weighted<kProgram, kFirst + 1 + E>(columns, factors)), ...);
-    }(std::make_index_sequence<static_cast<std::size_t>(kRow.count - 1)>());
+    }
+    (std::make_index_sequence<static_cast<std::size_t>(kRow.count - 1)>());
     return sum;
   }
 }
@@ -68,7 +69,8 @@ template <const Program& kProgram, std::size_t... K>
 FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice, Zonotope& next, ImageSums& sums,
                               std::index_sequence<K...>) {
   std::array<Lanes, Program::kMaxFirst> factors;
-  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e) factors[e] = AllLanes(expansion.jacobian[e]);
+  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e)
+    factors[e] = AllLanes(expansion.jacobian[e]);
   Lanes row_sums[sizeof...(K)] = {(static_cast<void>(K), AllLanes(0))...};
   ColumnScores::Writer scores(sums.scores);
   const std::size_t size = slice.padded_size();
@@ -106,21 +108,22 @@ FOREREACH_INLINE double RowSlack(const Expansion& expansion, const StepError& er
   };
   [&]<std::size_t... E>(std::index_sequence<E...>) __attribute__((always_inline)) {
     (add(std::integral_constant<std::size_t, E>()), ...);
-  }(std::make_index_sequence<static_cast<std::size_t>(kRow.count)>());
+  }
+  (std::make_index_sequence<static_cast<std::size_t>(kRow.count)>());
   return slack;
 }
 
 template <const Program& kProgram, std::size_t... K>
-FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice,
-                          Zonotope& next, ImageSums& sums, std::index_sequence<K...> rows) {
+FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
+                          ImageSums& sums, std::index_sequence<K...> rows) {
   next.Reset(slice.dim(), slice.num_generators());
   MapRows<kProgram>(expansion, slice, next, sums, rows);
   StoreAll({RowSlack<kProgram, K>(expansion, error, slice)...}, next.mutable_slacks());
 }
 
 template <const Program& kProgram>
-FOREREACH_AVX2 void MapAvx2(const Expansion& expansion, const StepError& error, const Zonotope& slice,
-                            Zonotope& next, ImageSums& sums) noexcept {
+FOREREACH_AVX2 void MapAvx2(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
+                            ImageSums& sums) noexcept {
   Map<kProgram>(expansion, error, slice, next, sums,
                 std::make_index_sequence<static_cast<std::size_t>(kProgram.states)>());
 }
@@ -133,13 +136,12 @@ FOREREACH_FLATTEN void MapBaseline(const Expansion& expansion, const StepError& 
 
 }  // namespace internal
 
-/** Sets the generators of `next` to fl(J G), J = expansion.jacobian, and its slack to |J| s + error.image, s the slice's
-slack: a bound, but for a relative 2^-44, on what this leaves out, for every slice and matrix J' that `error` is for:
-    |J' (G b + diag(s) b') - fl(J G) b| <= slack,   |b|_inf <= 1, |b'|_inf <= 1.
-The center of `next` is left alone. */
+/** Sets the generators of `next` to fl(J G), J = expansion.jacobian, and its slack to |J| s + error.image, s the
+slice's slack: a bound, but for a relative 2^-44, on what this leaves out, for every slice and matrix J' that `error` is
+for: |J' (G b + diag(s) b') - fl(J G) b| <= slack,   |b|_inf <= 1, |b'|_inf <= 1. The center of `next` is left alone. */
 template <const Program& kProgram>
-void MapGenerators(const Expansion& expansion, const StepError& error, const Zonotope& slice,
-                   Zonotope& next, ImageSums& sums) noexcept {
+void MapGenerators(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
+                   ImageSums& sums) noexcept {
   if (active_instruction_set == InstructionSet::kAvx2)
     internal::MapAvx2<kProgram>(expansion, error, slice, next, sums);
   else

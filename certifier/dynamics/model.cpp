@@ -7,7 +7,8 @@ namespace forereach {
 
 std::string NominalModel::description() const {
   std::string text = names_.name;
-  for (std::size_t p = 0; p < parameters_.size(); ++p) text += " " + names_.parameters[p] + "=" + ToText(parameters_[p]);
+  for (std::size_t p = 0; p < parameters_.size(); ++p)
+    text += " " + names_.parameters[p] + "=" + ToText(parameters_[p]);
   return text;
 }
 

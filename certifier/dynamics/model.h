@@ -24,7 +24,9 @@ struct Linearization {
   std::array<MatrixEntry, Program::kMaxFirst> entries;
   int count = 0;
 
-  [[nodiscard]] std::span<const MatrixEntry> jacobian() const { return {entries.data(), static_cast<std::size_t>(count)}; }
+  [[nodiscard]] std::span<const MatrixEntry> jacobian() const {
+    return {entries.data(), static_cast<std::size_t>(count)};
+  }
 };
 
 /** Encloses the Hessians of all f0_k over a box. Entries with row <= column that are not listed are exactly zero;
@@ -71,7 +73,8 @@ class NominalModel {
   void Linearize(std::span<const double> z, Linearization& out) const noexcept;
 
   /** Encloses every second derivative of f0 over the box of d_z intervals, Eq. (qt-formula), by interval arithmetic. An
-  entry may be infinite where no finite enclosure exists, for example where a steering interval meets the tangent's pole. */
+  entry may be infinite where no finite enclosure exists, for example where a steering interval meets the tangent's
+  pole. */
   void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept;
 
   /** All of these at once in plain arithmetic, fast, for the certify step; rounding.h has the error.

@@ -15,19 +15,19 @@ program of a model that comes with the library is a constant, and evaluating it 
 namespace forereach {
 
 enum class Op : unsigned char {
-  kVariable,      ///< z_a
-  kParameter,     ///< parameter a, a double that is exactly what it is
-  kConstant,      ///< `constant`
-  kAdd,           ///< a + b
-  kSubtract,      ///< a - b
-  kMultiply,      ///< a b
-  kDivide,        ///< a / b
-  kNegate,        ///< -a
-  kSquare,        ///< a^2
-  kSin,           ///< sin a; its cosine is the next node
-  kCos,           ///< cos a; its sine is the node before
-  kTan,           ///< tan a; b is the sine of a
-  kTanCurvature   ///< 2 a (1 + a^2): the second derivative of the tangent whose value is a
+  kVariable,     ///< z_a
+  kParameter,    ///< parameter a, a double that is exactly what it is
+  kConstant,     ///< `constant`
+  kAdd,          ///< a + b
+  kSubtract,     ///< a - b
+  kMultiply,     ///< a b
+  kDivide,       ///< a / b
+  kNegate,       ///< -a
+  kSquare,       ///< a^2
+  kSin,          ///< sin a; its cosine is the next node
+  kCos,          ///< cos a; its sine is the node before
+  kTan,          ///< tan a; b is the sine of a
+  kTanCurvature  ///< 2 a (1 + a^2): the second derivative of the tangent whose value is a
 };
 
 /** One operation on nodes before it. */
@@ -134,33 +134,23 @@ class Differentiation {
   constexpr short Of(short i, short variable) {
     const Operation n = program_.node(i);
     switch (n.op) {
-      case Op::kVariable:
-        return n.a == variable ? program_.Constant(1) : kZero;
+      case Op::kVariable: return n.a == variable ? program_.Constant(1) : kZero;
       case Op::kParameter:
-      case Op::kConstant:
-        return kZero;
-      case Op::kAdd:
-        return Sum(Of(n.a, variable), Of(n.b, variable));
-      case Op::kSubtract:
-        return Sum(Of(n.a, variable), Negated(Of(n.b, variable)));
-      case Op::kMultiply:
-        return Sum(Product(n.a, Of(n.b, variable)), Product(Of(n.a, variable), n.b));
+      case Op::kConstant: return kZero;
+      case Op::kAdd: return Sum(Of(n.a, variable), Of(n.b, variable));
+      case Op::kSubtract: return Sum(Of(n.a, variable), Negated(Of(n.b, variable)));
+      case Op::kMultiply: return Sum(Product(n.a, Of(n.b, variable)), Product(Of(n.a, variable), n.b));
       case Op::kDivide: {  // (a' - (a / b) b') / b
         const short rest = Sum(Of(n.a, variable), Negated(Product(i, Of(n.b, variable))));
         return rest == kZero ? kZero : program_.Add({Op::kDivide, rest, n.b});
       }
-      case Op::kNegate:
-        return Negated(Of(n.a, variable));
+      case Op::kNegate: return Negated(Of(n.a, variable));
       case Op::kSquare:  // only ever of a tangent, in 1 + t^2: half of its derivative is t t'
         return Product(program_.Constant(2), Product(n.a, Of(n.a, variable)));
-      case Op::kSin:
-        return Product(static_cast<short>(i + 1), Of(n.a, variable));
-      case Op::kCos:
-        return Product(Negated(static_cast<short>(i - 1)), Of(n.a, variable));
-      case Op::kTan:
-        return Product(TanSlope(i), Of(n.a, variable));
-      case Op::kTanCurvature:
-        break;
+      case Op::kSin: return Product(static_cast<short>(i + 1), Of(n.a, variable));
+      case Op::kCos: return Product(Negated(static_cast<short>(i - 1)), Of(n.a, variable));
+      case Op::kTan: return Product(TanSlope(i), Of(n.a, variable));
+      case Op::kTanCurvature: break;
     }
     throw std::logic_error("program: a third derivative");
   }
@@ -186,9 +176,7 @@ class Differentiation {
     const short square = program_.Add({Op::kSquare, t, -1});
     return program_.Add({Op::kAdd, program_.Constant(1), square});
   }
-  constexpr short Sum(short a, short b) {
-    return a == kZero ? b : b == kZero ? a : program_.Add({Op::kAdd, a, b});
-  }
+  constexpr short Sum(short a, short b) { return a == kZero ? b : b == kZero ? a : program_.Add({Op::kAdd, a, b}); }
   constexpr short Negated(short a) { return a == kZero ? kZero : program_.Add({Op::kNegate, a, -1}); }
   constexpr short Product(short a, short b) {
     if (a == kZero || b == kZero) return kZero;

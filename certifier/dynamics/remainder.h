@@ -1,5 +1,5 @@
-/** The nonlinear Taylor remainder of one step: rho_k(d) = 1/2 d^T H_k d with d = z - c_Z, for all z in the query and all H
-in the interval Hessian over its hull. As straight-line code for a program that is known at compile time. */
+/** The nonlinear Taylor remainder of one step: rho_k(d) = 1/2 d^T H_k d with d = z - c_Z, for all z in the query and
+all H in the interval Hessian over its hull. As straight-line code for a program that is known at compile time. */
 #pragma once
 
 #include <algorithm>
@@ -80,8 +80,9 @@ struct RemainderTerms {
 template <const Program& kProgram>
 inline constexpr RemainderTerms kRemainderTerms{kProgram};
 
-// Above all relative rounding of the few operations below, whose results are compared with the sum of their terms' sizes;
-// and above what underflow leaves out, yet a normal number times any but a tiny derivative: others are slow to multiply.
+// Above all relative rounding of the few operations below, whose results are compared with the sum of their terms'
+// sizes; and above what underflow leaves out, yet a normal number times any but a tiny derivative: others are slow to
+// multiply.
 inline constexpr double kRemainderRelative = 0x1p-44, kRemainderTiny = 0x1p-1000;
 
 inline double CountedError(double error) { return kCountsRounding ? error : 0; }
@@ -98,8 +99,9 @@ FOREREACH_INLINE void EncloseSizes(const double* half_width, const PlainInterval
     constexpr double kWeight = kTerm.first == kTerm.second ? 0.5 : 1;
     const double r = half_width[kTerm.first], other = half_width[kTerm.second];
     if (r == 0 || other == 0) return;  // exactly zero
-    sums[kTerm.output] += kWeight * Size(hessian[kTerm.entry]) * (r * other + kRemainderTiny) * (1 + kRemainderRelative) +
-                          CountedError(error[kTerm.entry]);
+    sums[kTerm.output] +=
+        kWeight * Size(hessian[kTerm.entry]) * (r * other + kRemainderTiny) * (1 + kRemainderRelative) +
+        CountedError(error[kTerm.entry]);
   });
   constexpr double kZeros[kStates] = {};
   StoreAll(kZeros, out.center.data());
@@ -134,7 +136,8 @@ FOREREACH_INLINE ProductEnds<kProgram> EncloseProducts(const Zonotope& slice, co
     const Lanes s_l{s[kOne.second], s[kOne.second], s[kTwo.second], s[kTwo.second]};
     const Lanes product = r_i * r_l, quarter = AllLanes(0.25) / product;
     const Lanes sum = SumEach(sums[4 * g], sums[4 * g + 1], sums[4 * g + 2], sums[4 * g + 3]) + (s_i * r_l + s_l * r_i);
-    const LaneMask fits = (product > AllLanes(0x1p-400)) & (product < AllLanes(0x1p400));  // else a factor could underflow
+    const LaneMask fits =
+        (product > AllLanes(0x1p-400)) & (product < AllLanes(0x1p400));  // else a factor could underflow
     StoreLanes(fits ? Min(product, sum * sum * quarter) : product, &ends[4 * g]);
   });
   return ends;

@@ -114,7 +114,7 @@ struct VelocityKnee {
 
   template <class T>
   void operator()(std::span<const T> z, std::span<T> residual) const {
-    const std::array<T, 7> exact{T(dt),          T(damping),     T(cross), T(knee), T(softplus_temperature),
+    const std::array<T, 7> exact{T(dt),          T(damping),  T(cross), T(knee), T(softplus_temperature),
                                  T(regularizer), T(smoothing)};
     Evaluate<T>(exact, z, residual);
   }

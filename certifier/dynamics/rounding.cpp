@@ -44,10 +44,8 @@ class Analysis {
       case Op::kVariable:  // the ends of a hull, center +- half-width, are rounded
         return {0, Rounding(range_[static_cast<std::size_t>(n.a)].Magnitude())};
       case Op::kParameter:
-      case Op::kConstant:
-        return {};
-      case Op::kNegate:
-        return error(n.a);
+      case Op::kConstant: return {};
+      case Op::kNegate: return error(n.a);
       case Op::kAdd:
       case Op::kSubtract: {
         const double size = AddUp(Size(n.a), Size(n.b));
@@ -57,9 +55,11 @@ class Analysis {
         });
       }
       case Op::kMultiply:
-        return Error::Both(error(n.a), error(n.b), [&](double a, double b) { return Product(Size(n.a), a, Size(n.b), b); });
+        return Error::Both(error(n.a), error(n.b),
+                           [&](double a, double b) { return Product(Size(n.a), a, Size(n.b), b); });
       case Op::kSquare:
-        return Error::Both(error(n.a), error(n.a), [&](double a, double b) { return Product(Size(n.a), a, Size(n.a), b); });
+        return Error::Both(error(n.a), error(n.a),
+                           [&](double a, double b) { return Product(Size(n.a), a, Size(n.a), b); });
       case Op::kDivide:
         return Error::Both(error(n.a), error(n.b), [&](double a, double b) { return Quotient(n.a, a, n.b, b); });
       case Op::kSin:
@@ -147,11 +147,13 @@ StepError BoundStepError(const Program& program, const ExpansionError& error,
     if (!is_state(entry) || copies[k]) continue;
     const double gamma = (2.0 * entries[k] + 2) * kUnitRoundoff;
     const double off = AddUp(error.jacobian[e], MulUp(gamma, error.jacobian_size[e]));
-    step.image[k] = AddUp(AddUp(step.image[k], MulUp(off, half_width[static_cast<std::size_t>(entry.column)])), kUnderflow);
+    step.image[k] =
+        AddUp(AddUp(step.image[k], MulUp(off, half_width[static_cast<std::size_t>(entry.column)])), kUnderflow);
   }
   for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e) {
     const Program::Second& entry = program.hessian[e];
-    const double product = MulUp(half_width[static_cast<std::size_t>(entry.row)], half_width[static_cast<std::size_t>(entry.column)]);
+    const double product =
+        MulUp(half_width[static_cast<std::size_t>(entry.row)], half_width[static_cast<std::size_t>(entry.column)]);
     step.remainder[e] = MulUp(1 + 0x1p-44, AddUp(MulUp(error.hessian[e], product), kUnderflow));
   }
   return step;

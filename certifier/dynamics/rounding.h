@@ -11,7 +11,8 @@ namespace forereach {
 
 /** For every z in the domain and every box inside it:
     |Expansion.value_k - f0_k(z)| <= value_k,   |Expansion.jacobian_e - D f0(z)_e| <= jacobian_e,
-and each end of Expansion.hessian_e lies at most hessian_e inside of the true range. Infinite where there is no bound. */
+and each end of Expansion.hessian_e lies at most hessian_e inside of the true range. Infinite where there is no bound.
+*/
 struct ExpansionError {
   std::array<double, kMaxStates> value{};
   std::array<double, Program::kMaxFirst> jacobian{};

@@ -12,7 +12,8 @@ Plan PlanOf(const candidate_plan_t& candidate) {
 Zonotope InitialSetOf(const candidate_plan_t& candidate) {
   const int n = candidate.num_states;
   if (!(1 <= n && n <= kMaxStates))
-    throw std::invalid_argument("candidate: " + std::to_string(n) + " states, must be 1 to " + std::to_string(kMaxStates));
+    throw std::invalid_argument("candidate: " + std::to_string(n) + " states, must be 1 to " +
+                                std::to_string(kMaxStates));
   return Zonotope::FromBox(Eigen::Map<const Eigen::VectorXd>(candidate.initial_center, n),
                            Eigen::Map<const Eigen::VectorXd>(candidate.initial_half_width, n));
 }

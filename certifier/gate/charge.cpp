@@ -12,15 +12,16 @@ void Charge::Hear(const Identity& other, State its_state) {
   other_ = other;
   other_silent_us_ = 0;
   const bool is_earlier = other < self_, decides = its_state == State::kInCharge;
-  const bool goes_before = state_ == State::kInCharge ? decides && is_earlier
-                                                      : decides || (its_state == State::kListening && is_earlier);
+  const bool goes_before =
+      state_ == State::kInCharge ? decides && is_earlier : decides || (its_state == State::kListening && is_earlier);
   if (!goes_before) return;
   state_ = State::kStandingBy;
   leaderless_us_ = 0;
 }
 
 void Charge::Advance(std::int64_t steady_us) {
-  const std::int64_t passed = steady_us - last_us_.value_or(steady_us), counted = std::clamp<std::int64_t>(passed, 0, kStepUs);
+  const std::int64_t passed = steady_us - last_us_.value_or(steady_us),
+                     counted = std::clamp<std::int64_t>(passed, 0, kStepUs);
   last_us_ = steady_us;
   other_silent_us_ += counted;
   if (other_silent_us_ >= kSilenceUs) other_.reset();

@@ -1,5 +1,5 @@
-/** Which of several certifiers on one bus decides. One of them is in charge; the others decide nothing and answer nobody, so
-that each candidate gets one decision. A state machine over the heartbeats of others. No bus, no clock in it.
+/** Which of several certifiers on one bus decides. One of them is in charge; the others decide nothing and answer
+nobody, so that each candidate gets one decision. A state machine over the heartbeats of others. No bus, no clock in it.
 
     listening    --has listened for listen_us, and heard none that goes before--> in charge
     listening    --hears one in charge, or an earlier one that listens--> standing by
@@ -8,7 +8,8 @@ that each candidate gets one decision. A state machine over the heartbeats of ot
     in charge    --was itself kept from running for kLapseUs--> listening
 
 The earlier one was started first; of two started in the same microsecond it has the smaller instance.
-kLapseUs is shorter than kSilenceUs: one that was paused sends nothing before it knows that it may have been replaced. */
+kLapseUs is shorter than kSilenceUs: one that was paused sends nothing before it knows that it may have been replaced.
+*/
 #pragma once
 
 #include <compare>

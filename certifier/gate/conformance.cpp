@@ -23,7 +23,8 @@ void Conformance::Remember(const certified_plan_t& certified) {
 std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state) {
   const std::span<const double> measured(state.state, static_cast<std::size_t>(state.num_states));
   const bool executing = state.mode == robot_state_t::EXECUTING;
-  const bool follows = state.sequence > last_.sequence && state.sequence - 1 == last_.sequence;  // any numbers: no overflow
+  const bool follows =
+      state.sequence > last_.sequence && state.sequence - 1 == last_.sequence;  // any numbers: no overflow
   std::optional<Departure> departure;
   if (executing && follows && last_.plan_id >= 0) departure = Compare(last_.plan_id, last_.step + 1, measured);
   if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured);

@@ -1,8 +1,8 @@
 /** Runtime conformance: is the robot where its certificate says?
 
-A state measured outside its certified slice refutes what the certificate rests on: the model, the declaration, its noise
-bound, or the measurement. The robot's guard looks for it too; the certifier does so that nothing more is certified on
-grounds that are known to be false. */
+A state measured outside its certified slice refutes what the certificate rests on: the model, the declaration, its
+noise bound, or the measurement. The robot's guard looks for it too; the certifier does so that nothing more is
+certified on grounds that are known to be false. */
 #pragma once
 
 #include <cstddef>
@@ -30,17 +30,18 @@ class Conformance final {
 
   Conformance() { plans_.reserve(kPlans); }
 
-  /** In the place of one of the same plan_id, unless that is executed: a guard does not take the plan_id it executes. */
+  /** In the place of one of the same plan_id, unless that is executed: a guard does not take the plan_id it executes.
+   */
   void Remember(const certified_plan_t& certified);
 
-  /** Holds a usable state of the robot against the slice of the step that it says it is at, and, if it has gone on by one
-  boundary while executing, against that of the plan it was executing before. Nothing if it lies in them, or no certificate
-  for its plan is remembered. Cost O(n). */
+  /** Holds a usable state of the robot against the slice of the step that it says it is at, and, if it has gone on by
+  one boundary while executing, against that of the plan it was executing before. Nothing if it lies in them, or no
+  certificate for its plan is remembered. Cost O(n). */
   [[nodiscard]] std::optional<Departure> Check(const robot_state_t& state);
 
-  /** Holds the end of a step that began with one of the last two states heard against the slice after it. A robot that ends
-  its plan there, or whose guard stops it, stands from then on, and its states say nothing of slices; that it stands may be
-  heard first. */
+  /** Holds the end of a step that began with one of the last two states heard against the slice after it. A robot that
+  ends its plan there, or whose guard stops it, stands from then on, and its states say nothing of slices; that it
+  stands may be heard first. */
   [[nodiscard]] std::optional<Departure> Check(const transition_t& transition) const;
 
  private:

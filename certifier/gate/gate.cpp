@@ -16,7 +16,8 @@ namespace {
 
 // The bus contract fixes the numbers, so they are the same on both sides.
 static_assert(static_cast<int>(Outcome::kCertified) == 1 && static_cast<int>(Outcome::kSafety) == 4);
-static_assert(static_cast<int>(Cause::kPairwise) == 1 && static_cast<int>(Cause::kObstacle) == decision_t::CAUSE_OBSTACLE &&
+static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
+              static_cast<int>(Cause::kObstacle) == decision_t::CAUSE_OBSTACLE &&
               static_cast<int>(Cause::kNoStop) == decision_t::CAUSE_NO_STOP);
 
 template <class Range>
@@ -48,12 +49,14 @@ void Gate::Inherit(const Gate& before) {
 GateAnswer Gate::Decide(Bytes candidate, const Clock& clock) noexcept { return Answer(candidate, clock, std::nullopt); }
 
 GateAnswer Gate::Decide(Bytes candidate, std::int64_t now_us) noexcept {
-  return Answer(candidate, [now_us] { return now_us; }, std::nullopt);
+  return Answer(
+      candidate, [now_us] { return now_us; }, std::nullopt);
 }
 
 GateAnswer Gate::Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why,
                         std::int16_t outcome) noexcept {
-  return Answer(candidate, [now_us] { return now_us; }, Rejection{cause, why, outcome});
+  return Answer(
+      candidate, [now_us] { return now_us; }, Rejection{cause, why, outcome});
 }
 
 GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection> from_outside) noexcept {
@@ -79,7 +82,8 @@ GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection
     if (rejection) {
       decision.outcome = rejection->outcome;
       decision.cause = rejection->cause;
-      SetText(decision.message, (rejection->outcome == decision_t::REJECTED ? "rejected: " : "abstained: ") + rejection->why);
+      SetText(decision.message,
+              (rejection->outcome == decision_t::REJECTED ? "rejected: " : "abstained: ") + rejection->why);
     } else {
       Certify(candidate, answer);
       WithdrawIfLate(answer, clock());
@@ -106,8 +110,7 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
     case DecodeStatus::kTrailingBytes:
       return Rejection{decision_t::CAUSE_TRAILING_BYTES,
                        size + ", must be " + std::to_string(EncodedSize<candidate_plan_t>())};
-    case DecodeStatus::kOk:
-      break;
+    case DecodeStatus::kOk: break;
   }
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate)) return rejection;
@@ -126,7 +129,8 @@ std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candid
                          " steps; the task has " + std::to_string(model.num_states()) + " and " +
                          std::to_string(model.num_inputs()) + ", at most " + std::to_string(kMaxSteps) + " steps"};
   const auto first = [](const auto& field, int count) { return std::span(field, static_cast<std::size_t>(count)); };
-  bool finite = AllFinite(first(candidate.initial_center, states)) && AllFinite(first(candidate.initial_half_width, states));
+  bool finite =
+      AllFinite(first(candidate.initial_center, states)) && AllFinite(first(candidate.initial_half_width, states));
   for (int t = 0; t < steps; ++t) finite &= AllFinite(first(candidate.control[t], inputs));
   if (!finite) return Rejection{decision_t::CAUSE_NON_FINITE, "NaN or infinity in its initial set or controls"};
   for (const double half_width : first(candidate.initial_half_width, states))
@@ -134,36 +138,37 @@ std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candid
   return std::nullopt;
 }
 
-std::string Gate::CheckFresh(std::int64_t utime, std::int64_t now_us) const { return Judge(utime, now_us, options_).fault; }
+std::string Gate::CheckFresh(std::int64_t utime, std::int64_t now_us) const {
+  return Judge(utime, now_us, options_).fault;
+}
 
 std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const {
   const std::int64_t lifetime = Microseconds(options_.certificate_lifetime_ms);
   const Stamp stamp = Judge(candidate.utime, now_us, options_);
   if (stamp.freshness != Freshness::kFresh)
-    return Rejection{stamp.freshness == Freshness::kStale ? decision_t::CAUSE_STALE : decision_t::CAUSE_FUTURE, stamp.fault};
+    return Rejection{stamp.freshness == Freshness::kStale ? decision_t::CAUSE_STALE : decision_t::CAUSE_FUTURE,
+                     stamp.fault};
   switch (FreshnessOf(candidate.start_utime, now_us, 0, lifetime)) {
     case Freshness::kStale:
-      return Rejection{decision_t::CAUSE_TOO_LATE, "its start was " + Milliseconds(now_us, candidate.start_utime) + " ago"};
+      return Rejection{decision_t::CAUSE_TOO_LATE,
+                       "its start was " + Milliseconds(now_us, candidate.start_utime) + " ago"};
     case Freshness::kFuture:
       return Rejection{decision_t::CAUSE_FUTURE, "starts in " + Milliseconds(candidate.start_utime, now_us) +
                                                      ", a certificate lives " +
                                                      ToText(options_.certificate_lifetime_ms) + " ms"};
-    case Freshness::kFresh:
-      return std::nullopt;
+    case Freshness::kFresh: return std::nullopt;
   }
   return std::nullopt;
 }
 
 std::optional<Gate::Rejection> Gate::CheckSource(const candidate_plan_t& candidate, std::int64_t now_us) {
   switch (sources_.Admit(candidate, now_us)) {
-    case Sources::Admission::kNew:
-      return std::nullopt;
+    case Sources::Admission::kNew: return std::nullopt;
     case Sources::Admission::kUsed:
-      return Rejection{decision_t::CAUSE_DUPLICATE,
-                       "plan_id " + std::to_string(candidate.plan_id) + " was used by this source, or is too far below its highest, " +
-                           std::to_string(sources_.HighestPlanId(candidate))};
-    case Sources::Admission::kTooManySources:
-      break;
+      return Rejection{decision_t::CAUSE_DUPLICATE, "plan_id " + std::to_string(candidate.plan_id) +
+                                                        " was used by this source, or is too far below its highest, " +
+                                                        std::to_string(sources_.HighestPlanId(candidate))};
+    case Sources::Admission::kTooManySources: break;
   }
   return Rejection{decision_t::CAUSE_TOO_MANY_SOURCES,
                    "more than " + std::to_string(Sources::kMaxSources) + " sources send candidates"};
@@ -233,8 +238,7 @@ std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) { return obs
 
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
   const int n = certifier_.problem().model->num_states();
-  if (state.num_states != n)
-    return std::to_string(state.num_states) + " states, the task has " + std::to_string(n);
+  if (state.num_states != n) return std::to_string(state.num_states) + " states, the task has " + std::to_string(n);
   if (!AllFinite(std::span(state.state, static_cast<std::size_t>(n)))) return "NaN or infinity in it";
   if (state.mode < robot_state_t::STANDING || state.mode > robot_state_t::FINISHED)
     return "unknown mode " + std::to_string(state.mode);

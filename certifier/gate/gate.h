@@ -1,8 +1,8 @@
 /** The gate: a candidate's bytes and a clock in, exactly one decision out. No bus, no wall clock, no thread in it.
 
-Whatever is not a proof is an abstention or a rejection: bytes that are no candidate, one that is stale, stamped ahead of
-the clock, too late for its own start or to be decided on before it, a repetition, of wrong size or not finite, and any
-error inside. Whether the world is fit for certificates at all is for others to say (watch.h): they call Refuse. */
+Whatever is not a proof is an abstention or a rejection: bytes that are no candidate, one that is stale, stamped ahead
+of the clock, too late for its own start or to be decided on before it, a repetition, of wrong size or not finite, and
+any error inside. Whether the world is fit for certificates at all is for others to say (watch.h): they call Refuse. */
 #pragma once
 
 #include <cstdint>
@@ -53,20 +53,22 @@ class Gate final {
   /** The same at a moment, microseconds since the Unix epoch, as if it took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** Rejects a candidate, or abstains from it, without certifying it, for a cause that lies outside it. What is wrong with itself goes before. */
+  /** Rejects a candidate, or abstains from it, without certifying it, for a cause that lies outside it. What is wrong
+  with itself goes before. */
   [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why,
                                   std::int16_t outcome = decision_t::REJECTED) noexcept;
 
-  /** Takes the obstacles of an obstacles_t, as gate.obstacles says (obstacles_in_force.h). Whole or not at all: returns what is
-  wrong with the message, or an empty text. */
+  /** Takes the obstacles of an obstacles_t, as gate.obstacles says (obstacles_in_force.h). Whole or not at all: returns
+  what is wrong with the message, or an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
   /** Adds an executed transition to the observations, if the task has it learn, and chains observations_digest:
-  BLAKE2b-256 of the digest before and the message's bytes. Returns what is wrong with it, and nothing has changed, or an
-  empty text. Whether it falsifies the declaration, certifier().violation() says. */
+  BLAKE2b-256 of the digest before and the message's bytes. Returns what is wrong with it, and nothing has changed, or
+  an empty text. Whether it falsifies the declaration, certifier().violation() says. */
   [[nodiscard]] std::string Learn(Bytes transition);
 
-  /** What keeps a robot's state from being believed: sizes, numbers, a stamp that is stale or ahead; empty if nothing. */
+  /** What keeps a robot's state from being believed: sizes, numbers, a stamp that is stale or ahead; empty if nothing.
+   */
   [[nodiscard]] std::string CheckRobotState(const robot_state_t& state, std::int64_t now_us) const;
   /** What is wrong with a stamp at this time (stamp.h), or empty. */
   [[nodiscard]] std::string CheckFresh(std::int64_t utime, std::int64_t now_us) const;

@@ -24,7 +24,9 @@ void IssuedPlans::TolerateFrom(std::int64_t steady_us) {
 
 // It begins before it expires, by a clock that may be behind by the age of a fresh message; then it runs all its steps;
 // and the last of its states may be as late again.
-std::int64_t IssuedPlans::LongestLife(int num_steps) const { return lifetime_us_ + 2 * delay_us_ + num_steps * step_us_; }
+std::int64_t IssuedPlans::LongestLife(int num_steps) const {
+  return lifetime_us_ + 2 * delay_us_ + num_steps * step_us_;
+}
 
 void IssuedPlans::Add(const certified_plan_t& certified, std::int64_t steady_us) {
   while (!issued_.empty() && issued_.front().may_run_until_us < steady_us) issued_.pop_front();

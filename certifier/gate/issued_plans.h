@@ -33,7 +33,8 @@ class IssuedPlans final {
 
   /** From here on by these. */
   void Follow(const GateOptions& gate);
-  /** Another certifier may have issued plans until now: tolerates unknown ones for as long as these may be executing. */
+  /** Another certifier may have issued plans until now: tolerates unknown ones for as long as these may be executing.
+   */
   void TolerateFrom(std::int64_t steady_us);
 
   /** A plan was certified and sent. Cost O(1) on average. */

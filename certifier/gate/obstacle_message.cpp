@@ -21,12 +21,8 @@ Obstacle FromMessage(const obstacle_t& message) {
     throw std::invalid_argument(std::to_string(message.num_points) + " points of dimension " +
                                 std::to_string(message.dimension));
   switch (message.kind) {
-    case obstacle_t::CIRCLE:
-      RequirePoints(message, 1);
-      return Obstacle::Circle(Point(message, 0), message.value);
-    case obstacle_t::BOX:
-      RequirePoints(message, 2);
-      return Obstacle::AxisBox(Point(message, 0), Point(message, 1));
+    case obstacle_t::CIRCLE: RequirePoints(message, 1); return Obstacle::Circle(Point(message, 0), message.value);
+    case obstacle_t::BOX: RequirePoints(message, 2); return Obstacle::AxisBox(Point(message, 0), Point(message, 1));
     case obstacle_t::POLYGON: {
       std::vector<Eigen::VectorXd> vertices;
       for (int i = 0; i < message.num_points; ++i) vertices.push_back(Point(message, i));
@@ -35,8 +31,7 @@ Obstacle FromMessage(const obstacle_t& message) {
     case obstacle_t::HALF_SPACE:
       RequirePoints(message, 1);
       return Obstacle::HalfSpace(Point(message, 0), message.value);
-    default:
-      throw std::invalid_argument("unknown kind " + std::to_string(message.kind));
+    default: throw std::invalid_argument("unknown kind " + std::to_string(message.kind));
   }
 }
 

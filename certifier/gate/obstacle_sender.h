@@ -1,5 +1,5 @@
-/** For a program that sees obstacles: what to send on OBSTACLES, and when. It repeats the whole set, so that receivers know
-that somebody looks. No bus, no clock in it:
+/** For a program that sees obstacles: what to send on OBSTACLES, and when. It repeats the whole set, so that receivers
+know that somebody looks. No bus, no clock in it:
 
     ObstacleSender sender(ObstacleSender::PeriodUs(config.gate));
     sender.Set(obstacles);                                                  // whenever they have changed
@@ -31,13 +31,13 @@ class ObstacleSender final {
   @throws std::invalid_argument for more than kMaxObstacles. */
   void Set(const std::vector<Obstacle>& obstacles);
 
-  /** The next message if it is time for it, stamped `now_us`: microseconds since the Unix epoch. Nothing before the first Set.
-  A clock that was set back delays none. */
+  /** The next message if it is time for it, stamped `now_us`: microseconds since the Unix epoch. Nothing before the
+  first Set. A clock that was set back delays none. */
   [[nodiscard]] std::optional<obstacles_t> Due(std::int64_t now_us);
 
  private:
   const std::int64_t period_us_;
-  std::optional<obstacles_t> message_;  // the next
+  std::optional<obstacles_t> message_;   // the next
   std::optional<std::int64_t> last_us_;  // nothing: due at once
 };
 

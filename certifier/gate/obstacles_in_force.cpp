@@ -18,7 +18,8 @@ ObstaclesInForce::ObstaclesInForce(const Config& config)
 }
 
 std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
-  if (options_.obstacles == ObstaclesSource::kTask) return "gate.obstacles is task: those of the task file are all there are";
+  if (options_.obstacles == ObstaclesSource::kTask)
+    return "gate.obstacles is task: those of the task file are all there are";
   const auto message = Decoded<obstacles_t>(bytes);
   if (!message) return Doubt("not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) + " bytes");
   const std::int64_t sequence = message->sequence;
@@ -69,16 +70,17 @@ std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
   if (!state_.doubt.empty()) return "the last message was refused: " + state_.doubt;
   if (!state_.heard) return "none has been heard yet";
   if (state_.unconfirmed > 0)
-    return "sequence " + std::to_string(state_.heard->sequence) + " came out of order: messages were lost, or there are two senders";
+    return "sequence " + std::to_string(state_.heard->sequence) +
+           " came out of order: messages were lost, or there are two senders";
   const std::int64_t stamp = state_.heard->utime;
-  switch (FreshnessOf(stamp, now_us, Microseconds(options_.obstacles_timeout_ms), Microseconds(options_.max_ahead_ms))) {
+  switch (
+      FreshnessOf(stamp, now_us, Microseconds(options_.obstacles_timeout_ms), Microseconds(options_.max_ahead_ms))) {
     case Freshness::kStale:
       return "the last message is " + Milliseconds(now_us, stamp) + " old, at most " +
              ToText(options_.obstacles_timeout_ms) + " ms are allowed";
     case Freshness::kFuture:
       return "the last message is stamped " + Milliseconds(stamp, now_us) + " ahead: the clock was set back";
-    case Freshness::kFresh:
-      break;
+    case Freshness::kFresh: break;
   }
   return {};
 }

@@ -1,17 +1,16 @@
 /** Which obstacles count, and whether they are all there are. By gate.obstacles of the task:
 
-    bus    those of the task file and, besides, those of the last OBSTACLES message. What the file says stands whatever is
-           heard: walls do not go away because nobody sees them. All obstacles are known from the first usable message on,
-           until one of these happens:
+    bus    those of the task file and, besides, those of the last OBSTACLES message. What the file says stands whatever
+is heard: walls do not go away because nobody sees them. All obstacles are known from the first usable message on, until
+one of these happens:
              - the last message's stamp is older than gate.obstacles_timeout_ms;
-             - a message is refused, and not because it came late or twice: nobody knows what it would have said. The next
-               good one ends this;
-             - a message comes out of order. Messages were lost, or two senders speak in turn and each knows a part. It is
-               taken; one in order after it confirms it after a gap, two where a sequence came again. A sender that
-               begins anew at 0 with a later stamp is in order, but for one message more where the last one heard is
-               still fresh: it may be a second sender.
-    task   those of the task file. OBSTACLES is refused.
-    not said, in logs from before gate.obstacles: those of the file until some are heard, then those heard last.
+             - a message is refused, and not because it came late or twice: nobody knows what it would have said. The
+next good one ends this;
+             - a message comes out of order. Messages were lost, or two senders speak in turn and each knows a part. It
+is taken; one in order after it confirms it after a gap, two where a sequence came again. A sender that begins anew at 0
+with a later stamp is in order, but for one message more where the last one heard is still fresh: it may be a second
+sender. task   those of the task file. OBSTACLES is refused. not said, in logs from before gate.obstacles: those of the
+file until some are heard, then those heard last.
 
 A reload does not forget what was heard. No bus, no clock in it. */
 #pragma once
@@ -32,8 +31,9 @@ class ObstaclesInForce final {
   /** The task's. */
   explicit ObstaclesInForce(const Config& config);
 
-  /** Takes the bytes of an obstacles_t that came at `now_us`: whole, or not at all. Its stamp has to be fresh (stamp.h), and
-  it newer than the one before: of a larger sequence or of a later stamp. Returns what is wrong, or an empty text. */
+  /** Takes the bytes of an obstacles_t that came at `now_us`: whole, or not at all. Its stamp has to be fresh
+  (stamp.h), and it newer than the one before: of a larger sequence or of a later stamp. Returns what is wrong, or an
+  empty text. */
   [[nodiscard]] std::string Update(Bytes message, std::int64_t now_us);
 
   /** Why all() may not be all obstacles there are at this time; empty if they are, as far as is known. Cost O(1). */
@@ -56,10 +56,10 @@ class ObstaclesInForce final {
     std::vector<Obstacle> obstacles;
   };
   struct State {
-    std::optional<Heard> heard;       // last
+    std::optional<Heard> heard;        // last
     std::optional<std::int64_t> next;  // the sequence after the last one seen, refused ones too
-    std::string doubt;                // the last message was refused: why
-    int unconfirmed = 0;              // messages in order that are still needed
+    std::string doubt;                 // the last message was refused: why
+    int unconfirmed = 0;               // messages in order that are still needed
     std::int64_t lost = 0;
   };
 

@@ -1,9 +1,9 @@
 /** Who has sent which candidates: none is decided on twice, and what never arrived is counted.
 
-A plan_id may be used once. Candidates need not be taken up in their order: of each source the last kWindow plan_ids below
-the highest are told apart, older ones count as used. What a source has used is forgotten when it has been silent for so long
-that whatever it sent before would be stale now, and it makes room for another, so neither invented sources nor a huge
-plan_id lock anybody out for long. */
+A plan_id may be used once. Candidates need not be taken up in their order: of each source the last kWindow plan_ids
+below the highest are told apart, older ones count as used. What a source has used is forgotten when it has been silent
+for so long that whatever it sent before would be stale now, and it makes room for another, so neither invented sources
+nor a huge plan_id lock anybody out for long. */
 #pragma once
 
 #include <algorithm>
@@ -23,15 +23,15 @@ class Sources final {
 
   enum class Admission { kNew, kUsed, kTooManySources };
 
-  /** @param forget_after_us a source is forgotten when none of its candidates was new for so long: at least as long as a
-  candidate stays fresh. */
+  /** @param forget_after_us a source is forgotten when none of its candidates was new for so long: at least as long as
+  a candidate stays fresh. */
   explicit Sources(std::int64_t forget_after_us) : forget_after_us_(forget_after_us) {}
 
   /** Goes on where others' counting stops. How long a source is remembered stays as given to these. */
   void Inherit(const Sources& before);
 
-  /** Every candidate that decodes, once, before anything else is asked of it. In whatever order they are taken up: a source
-  has begun to count anew if a later stamp has a smaller sequence. */
+  /** Every candidate that decodes, once, before anything else is asked of it. In whatever order they are taken up: a
+  source has begun to count anew if a later stamp has a smaller sequence. */
   void Hear(const candidate_plan_t& candidate, std::int64_t now_us);
 
   /** If it is new, its plan_id is used from now on. */

@@ -16,8 +16,7 @@ Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options)
     case Freshness::kFuture:
       return {freshness, "stamped " + Milliseconds(utime, now_us) + " ahead, at most " + ToText(options.max_ahead_ms) +
                              " ms allowed"};
-    case Freshness::kFresh:
-      break;
+    case Freshness::kFresh: break;
   }
   return {freshness, ""};
 }

@@ -17,9 +17,10 @@ struct Stamp {
 /** Of a message stamped `utime` that came at `now_us`, both microseconds since the Unix epoch. */
 [[nodiscard]] Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options);
 
-/** True if a fresh message stamped `utime` is no later than what happened at `then_us`. Where the clock has been set back
-since, so that `then_us` lies ahead, nothing is known of their order: false. */
-[[nodiscard]] bool IsNotAfter(std::int64_t utime, std::int64_t then_us, std::int64_t now_us, const GateOptions& options);
+/** True if a fresh message stamped `utime` is no later than what happened at `then_us`. Where the clock has been set
+back since, so that `then_us` lies ahead, nothing is known of their order: false. */
+[[nodiscard]] bool IsNotAfter(std::int64_t utime, std::int64_t then_us, std::int64_t now_us,
+                              const GateOptions& options);
 
 /** To the nearest microsecond. */
 [[nodiscard]] std::int64_t Microseconds(double milliseconds);

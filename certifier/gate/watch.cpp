@@ -12,9 +12,9 @@
 namespace forereach {
 namespace {
 
-constexpr std::array<std::int16_t, Watch::kNeeds> kCauses{
-    decision_t::CAUSE_SECOND_CERTIFIER, decision_t::CAUSE_LATCH_UNWRITABLE, decision_t::CAUSE_NOT_ARMED,
-    decision_t::CAUSE_NO_OBSTACLES};
+constexpr std::array<std::int16_t, Watch::kNeeds> kCauses{decision_t::CAUSE_SECOND_CERTIFIER,
+                                                          decision_t::CAUSE_LATCH_UNWRITABLE,
+                                                          decision_t::CAUSE_NOT_ARMED, decision_t::CAUSE_NO_OBSTACLES};
 
 }  // namespace
 
@@ -47,8 +47,8 @@ std::optional<Watch::Fault> Watch::Advance(std::int64_t now_us, std::int64_t ste
   std::optional<Fault> found;
   if (std::abs(moved) > options_.max_clock_jump_us) {
     found = {fault_t::CLOCK_JUMP, now_us,
-             "the wall clock moved by " + Milliseconds(moved, 0) + ", at most " + Milliseconds(options_.max_clock_jump_us, 0) +
-                 " are allowed"};
+             "the wall clock moved by " + Milliseconds(moved, 0) + ", at most " +
+                 Milliseconds(options_.max_clock_jump_us, 0) + " are allowed"};
   } else if (options_.needs_robot_state && robot_seen_us_ && now_us - *robot_seen_us_ > options_.robot_timeout_us) {
     found = {fault_t::ROBOT_STATE_LOST, now_us,
              "the robot's state was last heard " + Milliseconds(now_us, *robot_seen_us_) + " ago, at most " +

@@ -27,8 +27,8 @@ class Watch final {
     std::int64_t utime;
     std::string why;
   };
-  /** What has to hold before anything is certified. Of several that are lacking the first gives the cause. To add one: an
-  entry here, its cause in watch.cpp. */
+  /** What has to hold before anything is certified. Of several that are lacking the first gives the cause. To add one:
+  an entry here, its cause in watch.cpp. */
   enum class Need { kCharge, kLatch, kRobotState, kObstacles };
   static constexpr std::size_t kNeeds = 4;
   struct Refusal {
@@ -41,8 +41,8 @@ class Watch final {
   /** From here on by these. What was seen, and a fault, stay. */
   void Follow(const WatchOptions& options);
 
-  /** @param why_not a clause that says why the need is not met; empty: it is met. Every need but the robot's state is met at
-  first, and the robot's state is this class's own affair. */
+  /** @param why_not a clause that says why the need is not met; empty: it is met. Every need but the robot's state is
+  met at first, and the robot's state is this class's own affair. */
   void Set(Need need, std::string why_not);
 
   /** What Set has said of it. */

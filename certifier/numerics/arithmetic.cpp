@@ -31,7 +31,8 @@ void RequireExactArithmetic() {
     throw std::runtime_error("this thread does not round to nearest, which bounds need: see fesetround");
   if (!HasSubnormals())
     throw std::runtime_error(
-        "this thread takes subnormal numbers for zero, and bounds need them: link without -ffast-math and -Ofast, and do "
+        "this thread takes subnormal numbers for zero, and bounds need them: link without -ffast-math and -Ofast, and "
+        "do "
         "not set FTZ or DAZ");
 }
 

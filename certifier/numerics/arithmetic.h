@@ -1,8 +1,8 @@
 /** Whether a program computes as bounds need it, where the preprocessor cannot tell (compilation.h).
 
 Every file that includes this tests itself when the program starts: a file whose compiler was told to fuse or to reorder
-operations says so to the library, and no Certifier can be made. So does a thread that makes a Certifier: flags at linking
-time, or other libraries, may have switched off subnormal numbers or changed the rounding. */
+operations says so to the library, and no Certifier can be made. So does a thread that makes a Certifier: flags at
+linking time, or other libraries, may have switched off subnormal numbers or changed the rounding. */
 #pragma once
 
 #include <bit>
@@ -13,8 +13,8 @@ time, or other libraries, may have switched off subnormal numbers or changed the
 
 namespace forereach {
 
-/** Throws std::runtime_error, saying what to change, unless all files that include this compute as they are written, and
-this thread rounds to nearest and has subnormal numbers. */
+/** Throws std::runtime_error, saying what to change, unless all files that include this compute as they are written,
+and this thread rounds to nearest and has subnormal numbers. */
 void RequireExactArithmetic();
 
 }  // namespace forereach
@@ -35,7 +35,8 @@ struct ForeReachArithmetic {
   [[gnu::noinline]] static bool IsAsWritten() {
     // Not known to the compiler.
     volatile double above = 1 + 0x1p-30, below = 1 - 0x1p-30, one = 1, tiny = 0x1p-60, three = 3, five = 5, nothing = 0,
-                    no_number = std::numeric_limits<double>::quiet_NaN(), endless = std::numeric_limits<double>::infinity();
+                    no_number = std::numeric_limits<double>::quiet_NaN(),
+                    endless = std::numeric_limits<double>::infinity();
     const double a = above, b = below, u = one, t = tiny, d = three, n = five, z = nothing, nan = no_number;
     // 1 - 2^-60 is rounded to 1. Each product is read anew: one that is used twice need not be fused.
     const double difference = a * b - u, negated = u - above * below, product = above * below, later = product - one;

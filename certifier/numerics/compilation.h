@@ -1,9 +1,9 @@
 /** What a program that includes ForeReach's headers has to be compiled with. Every installed header includes this one.
 
-A certificate is a theorem about rounded numbers, and parts of the library are compiled in the user's program: models are
-templates. So some flags change what is proven, and others change the layout of what crosses the library's boundary. Such a
-flag is refused here, by a sentence. All other flags give the same bits: optimisation levels, instruction sets, sanitizers,
-assertions, debug symbols.
+A certificate is a theorem about rounded numbers, and parts of the library are compiled in the user's program: models
+are templates. So some flags change what is proven, and others change the layout of what crosses the library's boundary.
+Such a flag is refused here, by a sentence. All other flags give the same bits: optimisation levels, instruction sets,
+sanitizers, assertions, debug symbols.
 
 What the preprocessor cannot see is tested when the program starts (arithmetic.h), or does not link (sets/eigen.h). */
 #pragma once
@@ -27,7 +27,8 @@ What the preprocessor cannot see is tested when the program starts (arithmetic.h
 #error "ForeReach is built with libstdc++, and its containers cross the interface: compile without -stdlib=libc++"
 #endif
 #ifdef _GLIBCXX_DEBUG
-#error "_GLIBCXX_DEBUG changes the layout of containers that cross ForeReach's interface: use _GLIBCXX_ASSERTIONS instead"
+#error \
+    "_GLIBCXX_DEBUG changes the layout of containers that cross ForeReach's interface: use _GLIBCXX_ASSERTIONS instead"
 #endif
 #if !_GLIBCXX_USE_CXX11_ABI
 #error "ForeReach is built with libstdc++'s strings of C++11: compile without _GLIBCXX_USE_CXX11_ABI=0"
@@ -53,20 +54,21 @@ struct CharAndDouble {
   char c;
   double d;
 };
-static_assert(sizeof(CharAndDouble) == 16, "ForeReach's classes have their natural layout: compile without -fpack-struct");
+static_assert(sizeof(CharAndDouble) == 16,
+              "ForeReach's classes have their natural layout: compile without -fpack-struct");
 
 }  // namespace forereach::internal
 
-/** Between these two, every operation is rounded by itself: a * b + c is not fused, though compilers do that by default where
-the machine can. Headers whose arithmetic is compiled in the user's program stand between them. Where the build passes
--ffp-contract=off for all, as the CMake targets do, they do nothing.
+/** Between these two, every operation is rounded by itself: a * b + c is not fused, though compilers do that by default
+where the machine can. Headers whose arithmetic is compiled in the user's program stand between them. Where the build
+passes -ffp-contract=off for all, as the CMake targets do, they do nothing.
 
 clang warns of functions that pass wide vectors; here all of them are inlined. */
 #if defined(__clang__)
-#define FOREREACH_ARITHMETIC_BEGIN                                                    \
-  _Pragma("clang diagnostic push") _Pragma("clang diagnostic ignored \"-Wpsabi\"")    \
-  _Pragma("clang diagnostic ignored \"-Wignored-pragmas\"") _Pragma("float_control(precise, on, push)")  \
-  _Pragma("clang fp contract(off)")
+#define FOREREACH_ARITHMETIC_BEGIN                                                                          \
+  _Pragma("clang diagnostic push") _Pragma("clang diagnostic ignored \"-Wpsabi\"")                          \
+      _Pragma("clang diagnostic ignored \"-Wignored-pragmas\"") _Pragma("float_control(precise, on, push)") \
+          _Pragma("clang fp contract(off)")
 #define FOREREACH_ARITHMETIC_END _Pragma("float_control(pop)") _Pragma("clang diagnostic pop")
 #elif defined(FOREREACH_ROUNDS_EACH_OPERATION)
 #define FOREREACH_ARITHMETIC_BEGIN

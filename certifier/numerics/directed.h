@@ -21,8 +21,8 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kMaxDouble = std::numeric_limits<double>::max();
 inline constexpr double kUnitRoundoff = 0x1p-53;
 
-/** Whether the certify step counts its rounding errors. It does; bench/ compiles the library a second time, under another
-name, to measure what that costs. */
+/** Whether the certify step counts its rounding errors. It does; bench/ compiles the library a second time, under
+another name, to measure what that costs. */
 #ifdef FOREREACH_WITHOUT_ROUNDING
 inline constexpr bool kCountsRounding = false;
 #else

@@ -48,7 +48,8 @@ struct Interval {
   friend Interval operator*(const Interval& a, const Interval& b) {
     if (!a.IsFinite() || !b.IsFinite()) return Entire();
     if (a.lower >= 0) {
-      return Checked(MulDown(b.lower >= 0 ? a.lower : a.upper, b.lower), MulUp(b.upper >= 0 ? a.upper : a.lower, b.upper));
+      return Checked(MulDown(b.lower >= 0 ? a.lower : a.upper, b.lower),
+                     MulUp(b.upper >= 0 ? a.upper : a.lower, b.upper));
     }
     if (a.upper <= 0) return -(-a * b);
     if (b.lower >= 0 || b.upper <= 0) return b * a;
@@ -59,7 +60,8 @@ struct Interval {
   friend Interval operator/(const Interval& a, const Interval& b) {
     if (!a.IsFinite() || !b.IsFinite() || b.Contains(0)) return Entire();
     if (b.upper < 0) return -(a / -b);
-    return Checked(DivDown(a.lower, a.lower >= 0 ? b.upper : b.lower), DivUp(a.upper, a.upper >= 0 ? b.lower : b.upper));
+    return Checked(DivDown(a.lower, a.lower >= 0 ? b.upper : b.lower),
+                   DivUp(a.upper, a.upper >= 0 ? b.lower : b.upper));
   }
 
   friend bool operator==(const Interval&, const Interval&) = default;

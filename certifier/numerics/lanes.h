@@ -2,9 +2,9 @@
 max, abs and comparisons are used and sums are always taken in the same order.
 
 How a vector is passed by value depends on the instruction set of the two functions. A hot function is compiled for AVX2
-beside its baseline (simd.h), so a vector never enters or leaves a function that may not be inlined: functions and lambdas
-that take or return one are marked FOREREACH_INLINE, which also holds without optimisation, and one vector is seen as another
-by Bits and FromBits, where std::bit_cast would be a call. */
+beside its baseline (simd.h), so a vector never enters or leaves a function that may not be inlined: functions and
+lambdas that take or return one are marked FOREREACH_INLINE, which also holds without optimisation, and one vector is
+seen as another by Bits and FromBits, where std::bit_cast would be a call. */
 #pragma once
 
 #include <array>

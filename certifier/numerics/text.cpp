@@ -20,7 +20,8 @@ struct Decimal {
 Decimal Exact(double x) {
   std::array<char, kAllDigits + 16> text;
   const char* end =
-      std::to_chars(text.data(), text.data() + text.size(), std::abs(x), std::chars_format::scientific, kAllDigits - 1).ptr;
+      std::to_chars(text.data(), text.data() + text.size(), std::abs(x), std::chars_format::scientific, kAllDigits - 1)
+          .ptr;
   const char* exponent = std::find(text.data(), text.data() + text.size(), 'e') + 1;
   Decimal decimal{text[0] + std::string(text.data() + 2, static_cast<std::size_t>(exponent - text.data()) - 3), 0};
   std::from_chars(exponent + (*exponent == '+'), end, decimal.point);

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
+#include <nlohmann/json.hpp>
 
 #include "certifier/gate/stamp.h"
 #include "certifier/task/key.h"
@@ -62,12 +62,9 @@ std::int64_t RandomInstance() {
 
 Charge::State ChargeOf(std::int16_t state) {
   switch (state) {
-    case certifier_status_v3_t::LISTENING:
-      return Charge::State::kListening;
-    case certifier_status_v3_t::STANDBY:
-      return Charge::State::kStandingBy;
-    default:
-      return Charge::State::kInCharge;
+    case certifier_status_v3_t::LISTENING: return Charge::State::kListening;
+    case certifier_status_v3_t::STANDBY: return Charge::State::kStandingBy;
+    default: return Charge::State::kInCharge;
   }
 }
 
@@ -115,7 +112,8 @@ CertifierNode::~CertifierNode() {
 void CertifierNode::OnStatus(const Received& received) {
   const auto status = Decoded<certifier_status_v3_t>(received.bytes);
   if (!status || status->instance == charge_.self().instance) return;
-  // Clocks that disagree must not hide two certifiers from each other; a log that somebody plays must not look like one.
+  // Clocks that disagree must not hide two certifiers from each other; a log that somebody plays must not look like
+  // one.
   if (status->utime < received.utime - kClocksApartUs || status->utime > received.utime + kClocksApartUs)
     return Refuse(channels_.status, "a heartbeat from another time");
   LookAtCharge();
@@ -143,7 +141,8 @@ void CertifierNode::Heed(const certifier_status_v3_t& status) {
 }
 
 bool CertifierNode::IsKnownFalse(const Config& config) const {
-  return std::ranges::find(known_false_, std::pair(config.model_digest, config.declaration_digest)) != known_false_.end();
+  return std::ranges::find(known_false_, std::pair(config.model_digest, config.declaration_digest)) !=
+         known_false_.end();
 }
 
 // A datagram that says FAULT may be the last that the one in charge sends.
@@ -171,14 +170,12 @@ void CertifierNode::FollowCharge(Charge::State before) {
 
 std::string CertifierNode::WhyNotInCharge() const {
   switch (charge_.state()) {
-    case Charge::State::kListening:
-      return "listens whether another certifier is on this bus";
+    case Charge::State::kListening: return "listens whether another certifier is on this bus";
     case Charge::State::kStandingBy:
       if (!charge_.other()) return "another certifier was in charge on this bus, and has fallen silent";
       return fmt::format("another certifier, instance {:016x}, is in charge on this bus: this one decides nothing",
                          charge_.other()->instance);
-    case Charge::State::kInCharge:
-      break;
+    case Charge::State::kInCharge: break;
   }
   return "";
 }
@@ -188,9 +185,11 @@ void CertifierNode::TakeCharge() {
   has_begun_ = true;
   issued_.TolerateFrom(clocks_.steady());
   if (fault_of_other_)
-    Fail(EmptyFault(fault_of_other_->cause), "latched by the certifier that was in charge before: " + fault_of_other_->why);
+    Fail(EmptyFault(fault_of_other_->cause),
+         "latched by the certifier that was in charge before: " + fault_of_other_->why);
   else if (IsKnownFalse(config_))
-    Fail(EmptyFault(fault_t::DECLARATION_FALSIFIED), "the certifier that was in charge before has seen it contradicted");
+    Fail(EmptyFault(fault_t::DECLARATION_FALSIFIED),
+         "the certifier that was in charge before has seen it contradicted");
   fault_of_other_.reset();
 }
 
@@ -283,9 +282,9 @@ void CertifierNode::FailIfLeft(const std::optional<Conformance::Departure>& depa
   fault.value = departure->value;
   fault.lower = departure->lower;
   fault.upper = departure->upper;
-  Fail(fault, fmt::format("plan {}: state coordinate {} is {} at step {}, its certified slice is [{}, {}]",
-                          departure->plan_id, departure->coordinate, departure->value, departure->step,
-                          departure->lower, departure->upper));
+  Fail(fault,
+       fmt::format("plan {}: state coordinate {} is {} at step {}, its certified slice is [{}, {}]", departure->plan_id,
+                   departure->coordinate, departure->value, departure->step, departure->lower, departure->upper));
 }
 
 void CertifierNode::OnTransition(const Received& received) {
@@ -337,10 +336,8 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
       if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));
       next_heartbeat_us_ = 0;
       return;
-    case command_t::RELOAD:
-      return Reload();
-    default:
-      return Refuse(channels_.command, "unknown kind " + std::to_string(command.kind));
+    case command_t::RELOAD: return Reload();
+    default: return Refuse(channels_.command, "unknown kind " + std::to_string(command.kind));
   }
 }
 
@@ -402,13 +399,15 @@ void CertifierNode::TakeOver(const LatchFile::Content& stored) {
     });
     if (!is_known) contradictions_.push_back(one);
   }
-  is_contradicted_ = IsContradicted(gate_->model_digest(), gate_->certifier().problem().declaration) || IsKnownFalse(config_);
-  if (is_contradicted_) spdlog::error("a transition from before this start contradicts the declaration: every candidate is F");
+  is_contradicted_ =
+      IsContradicted(gate_->model_digest(), gate_->certifier().problem().declaration) || IsKnownFalse(config_);
+  if (is_contradicted_)
+    spdlog::error("a transition from before this start contradicts the declaration: every candidate is F");
   if (!stored.fault || !watch_.Latch({stored.fault->cause, stored.fault->utime, stored.why})) return;
   announced_ = *stored.fault;
   next_announcement_us_ = 0;
-  spdlog::error("fault {} from before this start: {}; nothing is certified. What to do: {}", FaultName(stored.fault->cause),
-                stored.why, FaultAdvice(stored.fault->cause));
+  spdlog::error("fault {} from before this start: {}; nothing is certified. What to do: {}",
+                FaultName(stored.fault->cause), stored.why, FaultAdvice(stored.fault->cause));
 }
 
 void CertifierNode::CheckLatch() {
@@ -595,16 +594,18 @@ void CertifierNode::TakeReload() {
 std::string CertifierNode::WhyNotOk() const {
   if (!is_in_charge()) return WhyNotInCharge();
   if (watch_.fault())
-    return std::string(FaultName(watch_.fault()->cause)) + ": " + (CanLatch() ? "" : "not stored, lost by a restart! ") +
-           watch_.fault()->why;
+    return std::string(FaultName(watch_.fault()->cause)) + ": " +
+           (CanLatch() ? "" : "not stored, lost by a restart! ") + watch_.fault()->why;
   if (!CanLatch()) return watch_.WhyNot()->why;
   if (gate_->certifier().violation() || is_contradicted_)
-    return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a reset "
+    return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a "
+           "reset "
            "does not help";
   if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
   if (const auto refusal = watch_.WhyNot()) return refusal->why;
   if (charge_.other())
-    return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing", charge_.other()->instance);
+    return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing",
+                       charge_.other()->instance);
   if (gate_->options().obstacles == ObstaclesSource::kBus) return "";
   return fmt::format("gate.obstacles is task: the {} of the task file are all there are{}", gate_->obstacles().size(),
                      obstacles_refused_ ? "; " + channels_.obstacles + " is refused" : "");
@@ -613,9 +614,11 @@ std::string CertifierNode::WhyNotOk() const {
 void CertifierNode::Heartbeat(std::int64_t now_us) {
   CheckLatch();
   last_heartbeat_us_ = clocks_.steady();
-  next_heartbeat_us_ = last_heartbeat_us_ + (charge_.state() == Charge::State::kListening ? kHeartbeatToOthersUs : kHeartbeatUs);
+  next_heartbeat_us_ =
+      last_heartbeat_us_ + (charge_.state() == Charge::State::kListening ? kHeartbeatToOthersUs : kHeartbeatUs);
   certifier_status_v3_t status = gate_->Status(now_us);
-  const bool error = is_in_charge() && (watch_.fault() || gate_->certifier().violation() || is_contradicted_ || !CanLatch());
+  const bool error =
+      is_in_charge() && (watch_.fault() || gate_->certifier().violation() || is_contradicted_ || !CanLatch());
   status.sequence = is_in_charge() ? heartbeats_++ : heartbeats_aside_++;
   status.instance = charge_.self().instance;
   status.started_utime = charge_.self().started_utime;
@@ -623,11 +626,13 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.state = static_cast<std::int16_t>(watch_.state());
   if (charge_.state() == Charge::State::kListening) status.state = certifier_status_v3_t::LISTENING;
   if (charge_.state() == Charge::State::kStandingBy) status.state = certifier_status_v3_t::STANDBY;
-  status.level = error ? certifier_status_v3_t::ERROR
-                 : status.state == certifier_status_v3_t::ARMED ? certifier_status_v3_t::OK : certifier_status_v3_t::STALE;
+  status.level = error                                          ? certifier_status_v3_t::ERROR
+                 : status.state == certifier_status_v3_t::ARMED ? certifier_status_v3_t::OK
+                                                                : certifier_status_v3_t::STALE;
   status.by_cause[decision_t::CAUSE_SECOND_CERTIFIER] += left_to_other_;
-  status.latch = !CanLatch()               ? certifier_status_v3_t::LATCH_UNWRITABLE
-                 : latch_ && watch_.fault() ? certifier_status_v3_t::LATCH_WRITTEN : certifier_status_v3_t::NO_LATCH;
+  status.latch = !CanLatch()                ? certifier_status_v3_t::LATCH_UNWRITABLE
+                 : latch_ && watch_.fault() ? certifier_status_v3_t::LATCH_WRITTEN
+                                            : certifier_status_v3_t::NO_LATCH;
   if (watch_.fault()) {
     status.fault = watch_.fault()->cause;
     status.fault_utime = watch_.fault()->utime;
@@ -673,10 +678,11 @@ void CertifierNode::Stop() {
   const auto count = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
   std::cout << nlohmann::json{{"candidates", status.candidates},
                               {"certified", count(decision_t::CERTIFIED)},
-                              {"abstained", {{"falsified", count(decision_t::ABSTAIN_FALSIFIED)},
-                                             {"domain", count(decision_t::ABSTAIN_DOMAIN)},
-                                             {"safety", count(decision_t::ABSTAIN_SAFETY)},
-                                             {"deadline", count(decision_t::ABSTAIN_DEADLINE)}}},
+                              {"abstained",
+                               {{"falsified", count(decision_t::ABSTAIN_FALSIFIED)},
+                                {"domain", count(decision_t::ABSTAIN_DOMAIN)},
+                                {"safety", count(decision_t::ABSTAIN_SAFETY)},
+                                {"deadline", count(decision_t::ABSTAIN_DEADLINE)}}},
                               {"rejected", count(decision_t::REJECTED)},
                               {"observations", status.observations},
                               {"learned", status.learned},

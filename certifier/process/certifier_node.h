@@ -13,9 +13,9 @@ Of several certifiers on one bus one is in charge (charge.h). The others say not
 before they take charge they do not learn: one that takes charge knows as much as one that has just been started.
 
 With a latch file (latch_file.h) a fault is handed to the kernel before it is announced, and written to the disk right
-after. The next certifier begins with the same fault, and says it again. While no fault could be written, every candidate
-is rejected (CAUSE_LATCH_UNWRITABLE); a reset that cannot be written clears nothing. What has contradicted a declaration is
-kept there too, over resets: candidates under a declaration that it contradicts get F.
+after. The next certifier begins with the same fault, and says it again. While no fault could be written, every
+candidate is rejected (CAUSE_LATCH_UNWRITABLE); a reset that cannot be written clears nothing. What has contradicted a
+declaration is kept there too, over resets: candidates under a declaration that it contradicts get F.
 
 First goes out the certified plan, which the robot waits for, then the decision: a planner that hears of a certificate
 knows that the plan was handed to the bus before. */
@@ -55,12 +55,12 @@ class CertifierNode final : public Node {
  public:
   static constexpr std::int64_t kHeartbeatUs = 500'000;
   static constexpr std::int64_t kHeartbeatToOthersUs = 100'000;  ///< While it listens for others, and to one that does.
-  static constexpr std::size_t kHeldAtMost = 4096;  ///< Candidates that wait while it listens for others.
+  static constexpr std::size_t kHeldAtMost = 4096;               ///< Candidates that wait while it listens for others.
   static constexpr int kAtOnce = 8;  ///< Candidates decided on before the bus is looked at again.
 
-  /** @param listen_us how long it listens for another certifier before it takes charge; Charge::kListenUs on a bus that others
-  can be on. @param latch may be null: then a restart forgets a fault. @throws ConfigError if the task does not say
-  gate.obstacles. */
+  /** @param listen_us how long it listens for another certifier before it takes charge; Charge::kListenUs on a bus that
+  others can be on. @param latch may be null: then a restart forgets a fault. @throws ConfigError if the task does not
+  say gate.obstacles. */
   CertifierNode(const Config& config, Bus& bus, Clocks clocks = {}, std::int64_t listen_us = 0,
                 std::unique_ptr<LatchFile> latch = nullptr);
   ~CertifierNode() override;
@@ -151,7 +151,7 @@ class CertifierNode final : public Node {
   std::unique_ptr<Gate> gate_;
   Watch watch_;
   Charge charge_;
-  bool has_begun_ = false;  // has been in charge, and no other since
+  bool has_begun_ = false;                      // has been in charge, and no other since
   std::optional<Watch::Fault> fault_of_other_;  // of the one in charge, by its last heartbeat
   std::int64_t left_to_other_ = 0;              // candidates
   bool obstacles_refused_ = false;              // since the last heartbeat, for gate.obstacles is task
@@ -167,7 +167,7 @@ class CertifierNode final : public Node {
   robot_state_t last_state_{};
   transition_t last_transition_{};
 
-  fault_t announced_{};                // the last fault, sent again while it is latched: a datagram may be lost
+  fault_t announced_{};                    // the last fault, sent again while it is latched: a datagram may be lost
   std::int64_t next_announcement_us_ = 0;  // by the steady clock
 
   Reloading<Loaded> reload_;

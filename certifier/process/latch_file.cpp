@@ -8,11 +8,11 @@
 #include <utility>
 
 #include <fcntl.h>
-#include <nlohmann/json.hpp>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include "certifier/numerics/limits.h"
 #include "certifier/task/json_file.h"
@@ -100,8 +100,8 @@ LatchFile::Content ContentFrom(const Json& json) {
 // Of the file's size.
 std::string TextOf(const LatchFile::Content& content) {
   const Json inner = ToJson(content);
-  std::string text = Dump(
-      {{"format", kFormat}, {"version", kVersion}, {"content", inner}, {"digest", ToHex(DigestOf(Dump(inner)))}});
+  std::string text =
+      Dump({{"format", kFormat}, {"version", kVersion}, {"content", inner}, {"digest", ToHex(DigestOf(Dump(inner)))}});
   if (text.size() < LatchFile::kBytes) text.resize(LatchFile::kBytes - 1, ' '), text += '\n';
   return text;
 }
@@ -153,13 +153,14 @@ bool LatchFile::OpenDirectory() {
     const int cause = errno;
     ::close(directory);
     if (cause == EWOULDBLOCK)
-      throw BadInput("gate.state: " + directory_ + ": another certifier keeps its state there; each robot and each "
-                       "certifier that stands by needs a directory of its own (--state)");
+      throw BadInput("gate.state: " + directory_ +
+                     ": another certifier keeps its state there; each robot and each "
+                     "certifier that stands by needs a directory of its own (--state)");
     return Fail(directory_ + ": cannot be locked: " + std::generic_category().message(cause));
   }
   if (lock_ >= 0) ::close(lock_);
   lock_ = directory;
-  struct stat its{};
+  struct stat its {};
   if (::fstat(lock_, &its) != 0) return FailedTo("looked at");
   if ((its.st_mode & S_IWOTH) != 0 && (its.st_mode & S_ISVTX) == 0)
     return Fail(directory_ + ": anybody may write there: chmod o-w it");
@@ -169,7 +170,8 @@ bool LatchFile::OpenDirectory() {
 std::optional<LatchFile::Content> LatchFile::Read() {
   CloseFile();
   may_write_ = ready_ = false;
-  struct stat locked{}, named{};
+  struct stat locked {
+  }, named{};
   const bool is_locked = lock_ >= 0 && ::fstat(lock_, &locked) == 0 && ::stat(directory_.c_str(), &named) == 0 &&
                          IsSameFile(locked, named);
   try {
@@ -185,7 +187,8 @@ std::optional<LatchFile::Content> LatchFile::Read() {
   }
   if (file < 0) return FailedTo(errno == ELOOP ? "read, it is a symbolic link" : "read"), std::nullopt;
   std::optional<Content> content = ReadFrom(file);
-  struct stat read{}, written{};
+  struct stat read {
+  }, written{};
   static_cast<void>(::fstat(file, &read));
   ::close(file);
   if (!content) return std::nullopt;
@@ -204,18 +207,20 @@ std::optional<LatchFile::Content> LatchFile::Read() {
 
 std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
   const std::string advice = "; nobody knows whether a fault was latched. Once it is known why, delete the file";
-  struct stat its{};
+  struct stat its {};
   if (::fstat(file, &its) != 0) return FailedTo("looked at"), std::nullopt;
   if (emptied_ && its.st_size == 0) return Content();
   if (!S_ISREG(its.st_mode)) return Fail(path() + ": is no regular file" + advice), std::nullopt;
   if (its.st_uid != ::geteuid() && its.st_uid != 0)
     return Fail(path() + ": belongs to user " + std::to_string(its.st_uid) + ", has to belong to user " +
-                std::to_string(::geteuid()) + " or 0" + advice), std::nullopt;
+                std::to_string(::geteuid()) + " or 0" + advice),
+           std::nullopt;
   if ((its.st_mode & (S_IWGRP | S_IWOTH)) != 0)
     return Fail(path() + ": others than its owner may write it" + advice), std::nullopt;
   if (its.st_size != static_cast<off_t>(kBytes))
     return Fail(path() + ": has " + std::to_string(its.st_size) + " bytes, has to have " + std::to_string(kBytes) +
-                advice), std::nullopt;
+                advice),
+           std::nullopt;
   std::string text(kBytes, '\0');
   std::size_t taken = 0;
   while (taken < text.size()) {
@@ -238,7 +243,8 @@ bool LatchFile::Create(const std::string& text) {
   const int made = ::openat(lock_, kNewName, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (made < 0) return FailedTo("made");
   file_ = made;
-  if (WriteAll(made, text) && ::fsync(made) == 0 && ::renameat(lock_, kNewName, lock_, kName) == 0 && ::fsync(lock_) == 0)
+  if (WriteAll(made, text) && ::fsync(made) == 0 && ::renameat(lock_, kNewName, lock_, kName) == 0 &&
+      ::fsync(lock_) == 0)
     return true;
   FailedTo("made");
   CloseFile();
@@ -274,15 +280,18 @@ bool LatchFile::Flush() {
 }
 
 void LatchFile::Look() {
-  struct stat its{}, found{}, locked{}, named{};
-  struct statvfs disk{};
+  struct stat its {
+  }, found{}, locked{}, named{};
+  struct statvfs disk {};
   ready_ = false;
-  if (file_ < 0 || ::fstat(file_, &its) != 0 || ::fstat(lock_, &locked) != 0) return static_cast<void>(FailedTo("looked at"));
+  if (file_ < 0 || ::fstat(file_, &its) != 0 || ::fstat(lock_, &locked) != 0)
+    return static_cast<void>(FailedTo("looked at"));
   if (::stat(directory_.c_str(), &named) != 0 || !IsSameFile(locked, named) ||
       ::fstatat(lock_, kName, &found, AT_SYMLINK_NOFOLLOW) != 0 || !IsSameFile(its, found))
     return static_cast<void>(Fail(path() + ": was deleted or replaced"));
   if (::fstatvfs(file_, &disk) != 0) return static_cast<void>(FailedTo("looked at"));
-  if ((disk.f_flag & ST_RDONLY) != 0) return static_cast<void>(Fail(path() + ": cannot be written: its disk is read-only"));
+  if ((disk.f_flag & ST_RDONLY) != 0)
+    return static_cast<void>(Fail(path() + ": cannot be written: its disk is read-only"));
   ready_ = true;
   why_.clear();
 }

@@ -43,13 +43,14 @@ class LatchFile final {
   LatchFile(const LatchFile&) = delete;
   LatchFile& operator=(const LatchFile&) = delete;
 
-  /** Opens and reads the file. Nothing, and why_not() says why, if it exists and cannot be trusted. What was read counts
-  even if it cannot be written. Not ready until Put and Flush have succeeded after it. */
+  /** Opens and reads the file. Nothing, and why_not() says why, if it exists and cannot be trusted. What was read
+  counts even if it cannot be written. Not ready until Put and Flush have succeeded after it. */
   [[nodiscard]] std::optional<Content> Read();
 
-  /** Hands the content to the kernel, from where it survives the end of the process; makes the file where there is none.
-  Flush waits until it is on the disk. False, and why_not() says why, if that failed or Read has not succeeded. If a fault
-  cannot be written over "no fault", the file is emptied, where that is possible: an empty file counts as damaged. */
+  /** Hands the content to the kernel, from where it survives the end of the process; makes the file where there is
+  none. Flush waits until it is on the disk. False, and why_not() says why, if that failed or Read has not succeeded. If
+  a fault cannot be written over "no fault", the file is emptied, where that is possible: an empty file counts as
+  damaged. */
   bool Put(const Content& content);
   bool Flush();
 
@@ -75,8 +76,8 @@ class LatchFile final {
   int lock_ = -1, file_ = -1;  // the directory, and the file in it
   bool may_write_ = false;     // Read has found nothing that has to be kept
   bool ready_ = false;
-  bool holds_fault_ = false;   // as far as is known
-  bool emptied_ = false;       // by Put
+  bool holds_fault_ = false;  // as far as is known
+  bool emptied_ = false;      // by Put
   std::string why_;
 };
 

@@ -61,8 +61,9 @@ void Domain::Validate(int num_states, int num_inputs) const {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const auto& [coordinates, center, radius] = balls[i];
     const std::string which = "ball " + std::to_string(i);
-    require(!coordinates.empty() && static_cast<Eigen::Index>(coordinates.size()) == center.size() && center.allFinite(),
-            which + " needs as many finite center entries as coordinates");
+    require(
+        !coordinates.empty() && static_cast<Eigen::Index>(coordinates.size()) == center.size() && center.allFinite(),
+        which + " needs as many finite center entries as coordinates");
     for (const int l : coordinates)
       require(0 <= l && l < variables, which + ": coordinate " + std::to_string(l) + " does not exist");
     require(radius >= 0 && radius < kInfinity, which + ": radius " + ToText(radius) + " is negative or not finite");
@@ -119,7 +120,8 @@ bool DomainTest::MeetsConstraintsWell(const double* center, const double* half_w
     for (std::size_t i = 0; i < coordinates.size(); ++i) {
       const auto l = static_cast<std::size_t>(coordinates[i]);
       const double middle = ball_center[static_cast<Eigen::Index>(i)];
-      const double reach = std::abs(center[l] - middle) + half_width[l] + RoundingError(kMargin, std::abs(center[l]) + std::abs(middle));
+      const double reach =
+          std::abs(center[l] - middle) + half_width[l] + RoundingError(kMargin, std::abs(center[l]) + std::abs(middle));
       square += reach * reach;
     }
     inside &= radius > 0x1p-400 && square * (1 + kMargin) < radius * radius * (1 - kMargin);

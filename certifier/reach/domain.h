@@ -79,10 +79,11 @@ class DomainTest final {
 
   FOREREACH_INLINE bool StateLiesWellInside(const double* center, const double* half_width) const noexcept {
     const Lanes margin = AllLanes(RoundingError(kMargin, 1));
-    return HoldsForFirst(num_states_, [&](std::size_t k) __attribute__((always_inline)) {
-      const Lanes c = LoadLanes(center + k), r = LoadLanes(half_width + k), reach = r + margin * (Abs(c) + r);
-      return (LoadLanes(&state_lower_[k]) < c - reach) & (c + reach < LoadLanes(&state_upper_[k]));
-    });
+    return HoldsForFirst(
+        num_states_, [&](std::size_t k) __attribute__((always_inline)) {
+          const Lanes c = LoadLanes(center + k), r = LoadLanes(half_width + k), reach = r + margin * (Abs(c) + r);
+          return (LoadLanes(&state_lower_[k]) < c - reach) & (c + reach < LoadLanes(&state_upper_[k]));
+        });
   }
   FOREREACH_INLINE bool InputLiesWellInside(std::span<const double> input) const noexcept {
     bool inside = true;

@@ -13,7 +13,9 @@ constexpr double kRelative = 0x1p-43, kTiny = 0x1p-1050;
 constexpr double kLargestError = 1e-6;
 
 bool IsNegligible(const StepError& error) {
-  const auto all_small = [](const auto& errors) { return std::ranges::all_of(errors, [](double e) { return e <= kLargestError; }); };
+  const auto all_small = [](const auto& errors) {
+    return std::ranges::all_of(errors, [](double e) { return e <= kLargestError; });
+  };
   return all_small(error.value) && all_small(error.image) && all_small(error.remainder);
 }
 
@@ -41,8 +43,8 @@ void Propagator::HalfWidths(const Zonotope& slice, double* half_width) noexcept 
   }
 }
 
-void Propagator::ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull, Expansion& expansion,
-                                   ExpansionError& error) const noexcept {
+void Propagator::ExpandByIntervals(std::span<const double> center, std::span<const PlainInterval> hull,
+                                   Expansion& expansion, ExpansionError& error) const noexcept {
   Linearization nominal;
   model_.Linearize(center, nominal);
   for (std::size_t k = 0; k < static_cast<std::size_t>(model_.num_states()); ++k) {
@@ -99,27 +101,31 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
                            const ImageSums& sums, Zonotope& next, double* residual_half_width,
                            double* next_half_width) noexcept {
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
-  return HoldsForFirst(static_cast<std::size_t>(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
-    const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
-    const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
-    const Lanes half = (upper - lower) * AllLanes(0.5);
-    const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
-    const Lanes added = Abs(lower) + Abs(upper) + Abs(moved);
-    const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kTiny);
-    Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
-                   (added > AllLanes(0) ? rounding : AllLanes(0))) * AllLanes(1 + kRelative);
-    if constexpr (!kCountsRounding) slack = AllLanes(0);
-    const Lanes hull = (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
-    StoreLanes(half, residual_half_width + k);
-    StoreLanes(center, next.mutable_centers() + k);
-    StoreLanes(slack, next.mutable_slacks() + k);
-    StoreLanes(hull, next_half_width + k);
-    return (Abs(center) + hull < AllLanes(kInfinity)) & (lower <= upper);
-  });
+  return HoldsForFirst(
+      static_cast<std::size_t>(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
+        const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
+        const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
+        const Lanes half = (upper - lower) * AllLanes(0.5);
+        const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
+        const Lanes added = Abs(lower) + Abs(upper) + Abs(moved);
+        const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kTiny);
+        Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
+                       (added > AllLanes(0) ? rounding : AllLanes(0))) *
+                      AllLanes(1 + kRelative);
+        if constexpr (!kCountsRounding) slack = AllLanes(0);
+        const Lanes hull =
+            (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
+        StoreLanes(half, residual_half_width + k);
+        StoreLanes(center, next.mutable_centers() + k);
+        StoreLanes(slack, next.mutable_slacks() + k);
+        StoreLanes(hull, next_half_width + k);
+        return (Abs(center) + hull < AllLanes(kInfinity)) & (lower <= upper);
+      });
 }
 
 // Why the successor could not be joined.
-[[gnu::noinline]] StepResult Failed(const StepRecord& record, const Zonotope& next, const double* next_half_width) noexcept {
+[[gnu::noinline]] StepResult Failed(const StepRecord& record, const Zonotope& next,
+                                    const double* next_half_width) noexcept {
   using Status = StepResult::Status;
   for (int k = 0; k < next.dim(); ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -150,7 +156,8 @@ FOREREACH_FLATTEN StepResult Propagator::StepBaseline(const Zonotope& slice, std
 StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
                                   Zonotope& next, double* next_half_width) const noexcept {
   const double* half_width = record.half_width.data();
-  if (const DomainExit exit = domain_.FindExit(slice.centers(), half_width, input); exit.kind != DomainExit::Kind::kNone)
+  if (const DomainExit exit = domain_.FindExit(slice.centers(), half_width, input);
+      exit.kind != DomainExit::Kind::kNone)
     return {StepResult::Status::kDomainExit, exit, -1};
   const Surroundings around(slice, half_width, input);
   const std::size_t variables = static_cast<std::size_t>(slice.dim()) + input.size();
@@ -170,7 +177,8 @@ StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const do
   ExpandByIntervals(center, hull, expansion, error);
   std::array<double, kMaxVariables> half_width{};
   std::copy_n(record.half_width.begin(), slice.dim(), half_width.begin());
-  return Advance(slice, input, expansion, BoundStepError(model_.program(), error, half_width), record, next, next_half_width);
+  return Advance(slice, input, expansion, BoundStepError(model_.program(), error, half_width), record, next,
+                 next_half_width);
 }
 
 StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
@@ -178,7 +186,8 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
                                double* next_half_width) const noexcept {
   const auto n = static_cast<std::size_t>(slice.dim());
   const double* half_width = record.half_width.data();
-  model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(), record.remainder);
+  model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(),
+                          record.remainder);
   const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
     return Abs(LoadLanes(&record.remainder.half_width[k])) < AllLanes(kInfinity);
   };

@@ -28,9 +28,9 @@ struct StepRecord {
 struct StepResult {
   enum class Status {
     kDone,
-    kDomainExit,          ///< Box(Z_t) is not proven to lie in Z_cert; `exit` says where.
-    kNoFiniteEnclosure,   ///< The nominal map or the residual has no finite bound; `coordinate` says which.
-    kInconsistent         ///< No admissible residual exists over Z_t: lower > upper in `coordinate`.
+    kDomainExit,         ///< Box(Z_t) is not proven to lie in Z_cert; `exit` says where.
+    kNoFiniteEnclosure,  ///< The nominal map or the residual has no finite bound; `coordinate` says which.
+    kInconsistent        ///< No admissible residual exists over Z_t: lower > upper in `coordinate`.
   };
   Status status = Status::kDone;
   DomainExit exit{};
@@ -47,8 +47,8 @@ class Propagator final {
   nothing. @pre order * n + 2 n <= kMaxGenerators, and slice has at most order * n generators.
   @param record its half_width is given (HalfWidths), the rest is set. @param next_half_width n entries: the same of
   `next`, for the step after. */
-  [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
-                                double* next_half_width) const noexcept;
+  [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, StepRecord& record,
+                                Zonotope& next, double* next_half_width) const noexcept;
 
   /** Upper bounds on the half-widths of the slice's hull, n of them. */
   static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
@@ -68,9 +68,10 @@ class Propagator final {
                                     Zonotope& next, double* next_half_width) const noexcept;
   [[nodiscard]] StepResult StepBaseline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
                                         Zonotope& next, double* next_half_width) const noexcept;
-  [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
-                                   const StepError& error, StepRecord& record, Zonotope& next,
-                                   double* next_half_width) const noexcept;
+  [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input,
+                                                    const Expansion& expansion, const StepError& error,
+                                                    StepRecord& record, Zonotope& next,
+                                                    double* next_half_width) const noexcept;
   const NominalModel& model_;
   DomainTest domain_;
   const ResidualEnclosure& residual_;

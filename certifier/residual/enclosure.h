@@ -29,7 +29,7 @@ class ResidualEnclosure {
   virtual ~ResidualEnclosure() = default;
 
   /** @pre the hull of the query lies in the certification domain. A coordinate whose lower bound exceeds its upper
-   * bound proves that no admissible residual exists. */
+  bound proves that no admissible residual exists. */
   virtual void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept = 0;
 };
 

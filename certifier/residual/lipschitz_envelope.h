@@ -94,7 +94,7 @@ class LipschitzEnvelope final : public ResidualEnclosure {
 
   EnvelopeOptions options_;
   std::vector<Row> rows_;
-  std::vector<int> active_;  // the rows that are not constant
+  std::vector<int> active_;    // the rows that are not constant
   ResidualBounds constant_{};  // the bounds of the others
   bool uses_hull_distance_ = false;
 };

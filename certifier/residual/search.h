@@ -25,7 +25,7 @@ struct Sides {
 };
 
 /** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry
- * on. */
+on. */
 template <class Metric>
 double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best,
                    Budget& budget) {

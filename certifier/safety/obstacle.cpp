@@ -84,9 +84,9 @@ Obstacle Obstacle::AxisBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& 
 }
 
 Obstacle Obstacle::Polygon(const std::vector<Eigen::VectorXd>& vertices) {
-  Require(3 <= vertices.size() && vertices.size() <= kMaxObstaclePoints,
-          "polygon: " + std::to_string(vertices.size()) + " vertices, must be 3 to " +
-              std::to_string(kMaxObstaclePoints));
+  Require(
+      3 <= vertices.size() && vertices.size() <= kMaxObstaclePoints,
+      "polygon: " + std::to_string(vertices.size()) + " vertices, must be 3 to " + std::to_string(kMaxObstaclePoints));
   Obstacle polygon(Kind::kPolygon, 2);
   polygon.points_ = vertices;
   std::vector<Eigen::Vector3d> hull;
@@ -109,8 +109,7 @@ Obstacle Obstacle::HalfSpace(const Eigen::VectorXd& normal, double offset) {
 
 double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
   switch (obstacle.kind()) {
-    case Obstacle::Kind::kCircle:
-      return (y - obstacle.points()[0]).norm() - obstacle.radius();
+    case Obstacle::Kind::kCircle: return (y - obstacle.points()[0]).norm() - obstacle.radius();
     case Obstacle::Kind::kHalfSpace: {
       const Eigen::VectorXd& normal = obstacle.points()[0];
       return (obstacle.offset() - normal.dot(y)) / normal.norm();
@@ -120,8 +119,7 @@ double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
       const double inside = outside.maxCoeff();
       return inside < 0 ? inside : outside.max(0).matrix().norm();
     }
-    case Obstacle::Kind::kPolygon:
-      break;
+    case Obstacle::Kind::kPolygon: break;
   }
   std::vector<Eigen::Vector2d> offsets;
   for (const Eigen::VectorXd& vertex : obstacle.points()) offsets.emplace_back(vertex - y);

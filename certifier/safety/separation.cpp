@@ -31,7 +31,9 @@ double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const
     }
     center += d[i] * slice.center(i);
     spread += std::abs(d[i]) * slice.slack(i);
-    size += std::abs(d[i]) * (std::abs(slice.center(i)) + std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i])) + Sum(sum);
+    size +=
+        std::abs(d[i]) * (std::abs(slice.center(i)) + std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i])) +
+        Sum(sum);
   }
   Lanes sum = AllLanes(0);
   for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) sum += Abs(LoadLanes(&along[j]));
@@ -165,8 +167,9 @@ Vector NearestOnSegment(const Vector& a, const Vector& b) {
   return a + edge * std::clamp(-a.dot(edge) / length_square, 0.0, 1.0);
 }
 
-// Gilbert, Johnson and Keerthi's search for the point of {core - slice} next to the origin: from one point found towards
-// it, the lowest point in that direction, and the nearest point of the segments between those kept. A few steps do.
+// Gilbert, Johnson and Keerthi's search for the point of {core - slice} next to the origin: from one point found
+// towards it, the lowest point in that direction, and the nearest point of the segments between those kept. A few steps
+// do.
 void Descend(Search& search, Vector nearest) noexcept {
   constexpr int kMaxSteps = 12;
   Vector kept[2] = {nearest, nearest};
@@ -225,10 +228,8 @@ Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
       search.Consider(Vector::UnitX());
       return search.best();
     }
-    case 2:
-      return BestPlanar(slice, obstacle);
-    default:
-      return BestSpatial(slice, obstacle);
+    case 2: return BestPlanar(slice, obstacle);
+    default: return BestSpatial(slice, obstacle);
   }
 }
 
@@ -253,7 +254,8 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
   for (std::size_t k = 0; k < p; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const double below = obstacle.lower()[i] - slice.center[k], above = slice.center[k] - obstacle.upper()[i];
-    const double size = std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i]) + std::abs(slice.center[k]) + slice.half_width[k];
+    const double size =
+        std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i]) + std::abs(slice.center[k]) + slice.half_width[k];
     const double gap = std::max(below, above) - slice.half_width[k] - RoundingError(kMargin, size);
     square += gap > 0 ? gap * gap : 0;
   }
@@ -266,7 +268,8 @@ namespace {
 FOREREACH_INLINE Separation SeparateInline(const Zonotope& slice, const Obstacle& obstacle) noexcept {
   const Vector direction = BestDirection(slice, obstacle);
   if (obstacle.kind() != Obstacle::Kind::kHalfSpace && std::abs(direction.squaredNorm() - 1) < 0x1p-46)
-    if (const Separation plain{PlainDistanceLower(slice, obstacle, direction), obstacle.radius()}; plain.IsProven()) return plain;
+    if (const Separation plain{PlainDistanceLower(slice, obstacle, direction), obstacle.radius()}; plain.IsProven())
+      return plain;
   return {DistanceLower(slice, obstacle, direction), obstacle.radius()};
 }
 

@@ -14,9 +14,9 @@ namespace {
 void RequireShape(Eigen::Index center, Eigen::Index rows, Eigen::Index columns) {
   if (center != rows || center > kMaxStates || columns > kMaxGenerators)
     throw std::invalid_argument("zonotope: a center of " + std::to_string(center) + " entries and " +
-                                std::to_string(rows) + "-by-" + std::to_string(columns) +
-                                " generators; at most " + std::to_string(kMaxStates) + " rows and " +
-                                std::to_string(kMaxGenerators) + " columns");
+                                std::to_string(rows) + "-by-" + std::to_string(columns) + " generators; at most " +
+                                std::to_string(kMaxStates) + " rows and " + std::to_string(kMaxGenerators) +
+                                " columns");
 }
 
 // An upper bound on start + sum |g| of a padded row. Zeros add no rounding error, so a single entry is summed exactly.
@@ -235,7 +235,8 @@ FOREREACH_INLINE void DropFromRows(Zonotope& set, std::size_t k, const double* s
 }
 
 // Moves all columns but the `drop` of smallest score to the front and adds the absolute values of those to `boxed`.
-FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const double* scores, const Lanes& inflation, Lengths& boxed) {
+FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const double* scores, const Lanes& inflation,
+                           Lengths& boxed) {
   constexpr std::size_t kMaxRows = 8;
   const auto count = static_cast<std::size_t>(set.num_generators()), n = static_cast<std::size_t>(set.dim());
   const Lanes largest = AllLanes(drop <= 8 ? Smallest(scores, count, drop) : SmallestOfMany(scores, count, drop));
@@ -243,7 +244,8 @@ FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const double* scores
   for (; k + kMaxRows < n; k += kMaxRows) DropFromRows<kMaxRows>(set, k, scores, largest, inflation, boxed);
   [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
     ((n - k == I + 1 ? DropFromRows<I + 1>(set, k, scores, largest, inflation, boxed) : void()), ...);
-  }(std::make_index_sequence<kMaxRows>());
+  }
+  (std::make_index_sequence<kMaxRows>());
 }
 
 // Axis-aligned generators lengths_k e_k, those whose bit k is set.

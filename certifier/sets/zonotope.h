@@ -133,7 +133,8 @@ class ColumnScores {
       double* scores = scores_.scores_.data();
       const std::size_t rest = count % kLaneCount;
       if (rest > 0) StoreLanes(FirstLanes(LoadLanes(scores + count - rest), rest, kInfinity), scores + count - rest);
-      for (std::size_t j = PaddedToLanes(count); j % kBlock != 0; j += kLaneCount) StoreLanes(AllLanes(kInfinity), scores + j);
+      for (std::size_t j = PaddedToLanes(count); j % kBlock != 0; j += kLaneCount)
+        StoreLanes(AllLanes(kInfinity), scores + j);
     }
 
    private:
@@ -150,8 +151,8 @@ class ColumnScores {
   alignas(32) std::array<double, (kMaxGenerators + kBlock - 1) / kBlock * kBlock> scores_;
 };
 
-/** Appends the axis-aligned generators first_k e_k, then second_k e_k, those that are not zero, and reduces the order as
-Girard does, Eq. (order-reduction): a set with more than order * n generators keeps the (order - 1) * n columns of
+/** Appends the axis-aligned generators first_k e_k, then second_k e_k, those that are not zero, and reduces the order
+as Girard does, Eq. (order-reduction): a set with more than order * n generators keeps the (order - 1) * n columns of
 largest |g|_1 - |g|_inf (ties, to 45 bits: the earlier) and encloses the rest in a box, rounded outward; zero columns
 are dropped. The slack stays. The result contains the set with all generators. Cost O(n m + m^2), m generators.
 @param scores of the set's columns. @param first, second n lengths each, of kMaxStates that can be read. */

@@ -27,7 +27,8 @@ std::vector<std::string> CommandNames(const CLI::App& app) {
 
 // An argument may hold any bytes; those that would drive a terminal are not printed.
 std::string Shown(std::string text) {
-  std::ranges::replace_if(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   return text;
 }
 

@@ -345,7 +345,8 @@ LoggerOptions ReadLogger(const Document& file) {
   if (file.Has("logger.quota_mb")) {
     logger.quota_mb = file.Number("logger.quota_mb");
     if (*logger.quota_mb < logger.rotate_mb)
-      file.Fail("logger.quota_mb", ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
+      file.Fail("logger.quota_mb",
+                ToText(*logger.quota_mb) + " is less than logger.rotate_mb, " + ToText(logger.rotate_mb));
   }
   file.Read("logger.min_free_mb", logger.min_free_mb);
   file.Read("logger.unsigned_kb_per_s", logger.unsigned_kb_per_s);
@@ -471,10 +472,11 @@ NamedFiles FilesNamedBy(const std::string& path) {
 
 void RequireObstaclesSource(const Config& config) {
   if (config.gate.obstacles != ObstaclesSource::kUnsaid) return;
-  throw ConfigError(config.path +
-                    ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those that OBSTACLES says on "
-                    "the bus; nothing is certified before they are heard, nor while they are silent. `task`: the obstacles "
-                    "of this file are all there are");
+  throw ConfigError(
+      config.path +
+      ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those that OBSTACLES says on "
+      "the bus; nothing is certified before they are heard, nor while they are silent. `task`: the obstacles "
+      "of this file are all there are");
 }
 
 Transitions LoadTransitions(const std::string& path, const NominalModel& model) {

@@ -11,8 +11,8 @@ and, made from it, in config/README.md. */
 #include "certifier/certify/problem.h"
 #include "certifier/dynamics/parametric_residual.h"
 #include "certifier/task/canonical.h"
-#include "lcmtypes/bad_input.h"
 #include "lcmtypes/authentic.h"
+#include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -42,8 +42,8 @@ struct GateOptions {
   double max_clock_jump_ms = 200;
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< Those heard on the bus are no longer known after this.
-  bool learns = true;  ///< Executed transitions add to the observations.
-  std::string state = "state";   ///< Directory that keeps a latched fault over a restart.
+  bool learns = true;                  ///< Executed transitions add to the observations.
+  std::string state = "state";         ///< Directory that keeps a latched fault over a restart.
   double longest_step_ms = 150;  ///< No step of a plan takes longer. From a file: the model's dt or the robot's period.
 };
 
@@ -69,17 +69,17 @@ struct BusOptions {
   std::string logger_status = "LOGGER_STATUS";
   std::string fault = "FAULT";
   std::string command = "COMMAND";
-  std::string name;           ///< Of the bus, in every signature; empty: default_name().
-  std::string key;            ///< Path of a directory of keys or of a key file; empty: messages are not signed.
-  bool key_is_given = false;  ///< On the command line, so the task file does not say which.
+  std::string name;             ///< Of the bus, in every signature; empty: default_name().
+  std::string key;              ///< Path of a directory of keys or of a key file; empty: messages are not signed.
+  bool key_is_given = false;    ///< On the command line, so the task file does not say which.
   std::optional<KeyRing> keys;  ///< What `key` held when the process started; nothing: not read yet, or none.
 
   /** Who speaks on which channel where there are keys. */
   [[nodiscard]] Speakers speakers() const {
-    return {{decision, Role::kCertifier},    {certified, Role::kCertifier},   {status, Role::kCertifier},
-            {fault, Role::kCertifier},       {candidate, Role::kPlanner},     {obstacles, Role::kPerception},
-            {robot_state, Role::kRobot},     {transition, Role::kRobot},      {event, Role::kRobot},
-            {command, Role::kOperator},      {logger_status, Role::kLogger}};
+    return {{decision, Role::kCertifier}, {certified, Role::kCertifier}, {status, Role::kCertifier},
+            {fault, Role::kCertifier},    {candidate, Role::kPlanner},   {obstacles, Role::kPerception},
+            {robot_state, Role::kRobot},  {transition, Role::kRobot},    {event, Role::kRobot},
+            {command, Role::kOperator},   {logger_status, Role::kLogger}};
   }
 
   /** `name`, or address and port of `url`: "239.255.76.67:7667"; "memq" for memq. @throws BusError if `url` is none. */
@@ -117,8 +117,8 @@ struct RobotOptions {
 
 struct LoggerOptions {
   std::string directory = "log";
-  int queue = 4096;       ///< Messages held for writing at most.
-  double flush_ms = 200;  ///< A killed logger loses at most this much.
+  int queue = 4096;                ///< Messages held for writing at most.
+  double flush_ms = 200;           ///< A killed logger loses at most this much.
   double rotate_mb = 1024;         ///< Most of one log file; 10^6 bytes each.
   double rotate_minutes = 60;      ///< Longest time in one log file.
   std::optional<double> quota_mb;  ///< Most of all log files together; nothing: none is ever deleted.
@@ -133,7 +133,7 @@ struct Config {
   std::shared_ptr<const Problem> problem;
   std::vector<Obstacle> obstacles;
   Digest obstacles_digest{};
-  Box initial_set;  ///< X0, rounded outward.
+  Box initial_set;                             ///< X0, rounded outward.
   std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds; dt and wheelbase are the model's.
   GateOptions gate;
   RealtimeOptions realtime;
@@ -150,8 +150,8 @@ enum class TransitionsFile { kRead, kIgnore };
 @throws ConfigError for a missing file, an unknown or missing key, a wrong size, a non-finite or out-of-range number. */
 [[nodiscard]] Config LoadConfig(const std::string& path, TransitionsFile transitions = TransitionsFile::kRead);
 
-/** @throws ConfigError, which says what to write, where the task does not say gate.obstacles: whoever certifies on a bus needs
-to know where its obstacles come from. */
+/** @throws ConfigError, which says what to write, where the task does not say gate.obstacles: whoever certifies on a
+bus needs to know where its obstacles come from. */
 void RequireObstaclesSource(const Config& config);
 
 /** Reads transitions: CSV with a column for each state, each input and each state's successor `<state>_next`, in any

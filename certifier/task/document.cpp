@@ -109,9 +109,7 @@ std::string UnitOf(const Key& row) {
 }
 
 // What a number has to be: "write a number in (0, 60], its unit is s".
-std::string Wanted(const Key& row) {
-  return "write " + NumberName(row.type) + " in " + row.range.text() + UnitOf(row);
-}
+std::string Wanted(const Key& row) { return "write " + NumberName(row.type) + " in " + row.range.text() + UnitOf(row); }
 
 bool Reads(const std::string& token, Type type) {
   return type == Type::kInteger ? ParseInteger(token).problem.empty() : ParseNumber(token).problem.empty();
@@ -137,14 +135,16 @@ std::string WithoutLeadingZeros(std::string token) {
 std::string AsInteger(const std::string& token) {
   constexpr double kLargest = 1e15;  // exact in a double
   const Parsed<double> whole = ParseNumber(token);
-  const bool is_one = whole.problem.empty() && std::abs(whole.value) < kLargest && std::trunc(whole.value) == whole.value;
+  const bool is_one =
+      whole.problem.empty() && std::abs(whole.value) < kLargest && std::trunc(whole.value) == whole.value;
   return is_one ? std::to_string(static_cast<long long>(whole.value)) : token;
 }
 
 // What to write instead of a token that is not the number it should be.
 std::string Correction(const std::string& token, const Key& row) {
   const std::string digits = Without(token, "+-");
-  if (digits.size() > 1 && digits[0] == '0' && std::isalpha(static_cast<unsigned char>(digits[1])) != 0 && digits[1] != 'e')
+  if (digits.size() > 1 && digits[0] == '0' && std::isalpha(static_cast<unsigned char>(digits[1])) != 0 &&
+      digits[1] != 'e')
     return "write it in decimal";
   std::string with_point = token;
   std::ranges::replace(with_point, ',', '.');
@@ -221,7 +221,8 @@ class Checker {
       const Key& row = ChildRow(entry.first, pattern, key);
       const auto [first, is_new] = seen.emplace(word, LineOf(entry.first.Mark()));
       if (!is_new)
-        Fail(entry.first, child, "stands twice, first in line " + std::to_string(first->second) + "; delete one of them");
+        Fail(entry.first, child,
+             "stands twice, first in line " + std::to_string(first->second) + "; delete one of them");
       if (!row.only.empty() && row.only != kind) Fail(entry.first, child, "is for " + row.only + ", not for " + kind);
       Check(entry.second, row.path, child);
     }
@@ -247,8 +248,8 @@ class Checker {
       }
     }
     if (const std::size_t colon = word.find(':'); colon != std::string::npos && Contains(known, word.substr(0, colon)))
-      Fail(entry, Below(key, word), "unknown key; write a space after the colon: " + word.substr(0, colon) + ": " +
-                                        word.substr(colon + 1));
+      Fail(entry, Below(key, word),
+           "unknown key; write a space after the colon: " + word.substr(0, colon) + ": " + word.substr(colon + 1));
     Fail(entry, Below(key, word), "unknown key; " + Suggestion(word, known));
   }
 
@@ -258,10 +259,11 @@ class Checker {
     if (!node.IsScalar()) Fail(node, key, Shown(node) + not_one + "; " + Wanted(row));
     const std::string& token = node.Scalar();
     if (!HasForm(node, Type::kNumber))
-      Fail(node, key, "\"" + Shown(node) + "\" is " + (node.Tag() == "!" ? "quoted text" : "tagged " + node.Tag()) +
-                          ", not " + NumberName(row.type) + "; " +
-                          (Reads(token, row.type) ? "write " + token + (node.Tag() == "!" ? " without quotes" : " alone")
-                                                  : Wanted(row)));
+      Fail(node, key,
+           "\"" + Shown(node) + "\" is " + (node.Tag() == "!" ? "quoted text" : "tagged " + node.Tag()) + ", not " +
+               NumberName(row.type) + "; " +
+               (Reads(token, row.type) ? "write " + token + (node.Tag() == "!" ? " without quotes" : " alone")
+                                       : Wanted(row)));
     values_.insert_or_assign(key, node);
     const Parsed<double> number = ParseNumber(token);
     const std::string_view problem = row.type == Type::kInteger ? ParseInteger(token).problem : number.problem;
@@ -361,7 +363,8 @@ YAML::Node Parse(const std::string& path, const std::string& text) {
     YAML::Parser parser(in);
     Nobody nobody;
     if (!parser.HandleNextDocument(nobody)) throw ConfigError(At(path, 1) + "has no YAML document, has to have one");
-    if (parser.HandleNextDocument(nobody)) throw ConfigError(At(path, 1) + "has several YAML documents, has to have one");
+    if (parser.HandleNextDocument(nobody))
+      throw ConfigError(At(path, 1) + "has several YAML documents, has to have one");
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw ConfigError(At(path, LineOf(error.mark)) + "not valid YAML: " + error.msg + TabAdvice(text, error.mark.line));
@@ -398,7 +401,9 @@ std::vector<std::string> SchemaScope::variables() const {
 }
 
 Document::Document(const std::string& path)
-    : path_(path), text_(ReadWhole(path, kLargestTaskFile)), tree_(std::make_unique<Tree>(Tree{Parse(path, text_), {}})) {}
+    : path_(path),
+      text_(ReadWhole(path, kLargestTaskFile)),
+      tree_(std::make_unique<Tree>(Tree{Parse(path, text_), {}})) {}
 
 Document::~Document() = default;
 

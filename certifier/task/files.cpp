@@ -55,7 +55,8 @@ std::size_t InputFile::Read(char* to, std::size_t most) {
   ssize_t count;
   do count = ::read(descriptor_, to, most);
   while (count < 0 && errno == EINTR);
-  if (count < 0) Fail("reading failed after " + std::to_string(read_) + " bytes: " + std::generic_category().message(errno));
+  if (count < 0)
+    Fail("reading failed after " + std::to_string(read_) + " bytes: " + std::generic_category().message(errno));
   RequireAtMost(read_ += count);
   return static_cast<std::size_t>(count);
 }

@@ -1,7 +1,7 @@
 /** Reading files that people name, so that no file can hang the process or fill its memory.
 
-Only regular files are read: a pipe, a socket, a device or a directory is an error, and opening one does not wait. A read
-from a mount that stalls still waits; whoever may not wait reads in a thread of its own (reloading.h). */
+Only regular files are read: a pipe, a socket, a device or a directory is an error, and opening one does not wait. A
+read from a mount that stalls still waits; whoever may not wait reads in a thread of its own (reloading.h). */
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,8 @@ class InputFile final {
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
 
-  /** The next bytes, at most so many; 0 at the end. @throws ConfigError if reading fails or the file has grown larger. */
+  /** The next bytes, at most so many; 0 at the end. @throws ConfigError if reading fails or the file has grown larger.
+   */
   [[nodiscard]] std::size_t Read(char* to, std::size_t most);
 
  private:

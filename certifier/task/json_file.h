@@ -10,8 +10,9 @@
 
 namespace forereach {
 
-/** The document, if it nests at most 32 levels and no object has a key twice: what walks over a deeper one by recursion,
-as nlohmann's own copying and writing do, could end the program; and of two values another reader may take the other.
+/** The document, if it nests at most 32 levels and no object has a key twice: what walks over a deeper one by
+recursion, as nlohmann's own copying and writing do, could end the program; and of two values another reader may take
+the other.
 @throws Json::exception, also for what is no JSON. */
 template <class Json>
 [[nodiscard]] Json ParseJson(std::string_view text) {

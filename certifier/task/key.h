@@ -23,8 +23,9 @@ inline constexpr const char* kUnsignedWarning = "UNSIGNED: anyone on this networ
 /** The options with these keys in them. */
 [[nodiscard]] BusOptions WithKeys(BusOptions options, Role role);
 
-/** Why a task file that was read again cannot take the place of the one that a process began with: another key, none, or
-other content of the same. Empty if it can. Reads the keys of `read_again`. @param role that the process speaks as. */
+/** Why a task file that was read again cannot take the place of the one that a process began with: another key, none,
+or other content of the same. Empty if it can. Reads the keys of `read_again`. @param role that the process speaks as.
+*/
 [[nodiscard]] std::string WhyKeyCannotChange(const BusOptions& in_force, const BusOptions& read_again, Role role);
 
 }  // namespace forereach

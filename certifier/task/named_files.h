@@ -15,8 +15,8 @@ struct NamedFiles {
 /** What a task file names, relative to its own place. @throws ConfigError if it is no task file. */
 [[nodiscard]] NamedFiles FilesNamedBy(const std::string& path);
 
-/** As the other LoadConfig, but reads the files of `instead` where the task file names one; those that are empty it takes
-from where the task file says. @throws ConfigError likewise. */
+/** As the other LoadConfig, but reads the files of `instead` where the task file names one; those that are empty it
+takes from where the task file says. @throws ConfigError likewise. */
 [[nodiscard]] Config LoadConfig(const std::string& path, const NamedFiles& instead);
 
 }  // namespace forereach

@@ -5,10 +5,10 @@
 #include <optional>
 #include <utility>
 
-#include <CLI/CLI.hpp>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 
 #include "certifier/task/key.h"
 #include "certifier/task/reloading.h"
@@ -20,8 +20,8 @@ namespace {
 
 constexpr std::int64_t kSaysAgainAfterUs = 10'000'000;
 
-// Runs a node, and warns of what comes from the network that is no message: when it begins, and at most every ten seconds
-// while it goes on, since anybody on the network can send as much of it as he likes.
+// Runs a node, and warns of what comes from the network that is no message: when it begins, and at most every ten
+// seconds while it goes on, since anybody on the network can send as much of it as he likes.
 class DatagramWatch final : public Node {
  public:
   DatagramWatch(Node& node, const Bus& bus) : node_(node), bus_(bus) {}
@@ -43,9 +43,10 @@ class DatagramWatch final : public Node {
     const DatagramCounts counts = bus_.datagrams();
     const std::int64_t amiss = counts.refused() + counts.lost_by_kernel + counts.receive_errors;
     if (amiss == std::exchange(said_, amiss)) return false;
-    spdlog::warn("from the network, since the start: {} datagrams refused{}{}; {} lost to a full receive buffer; {} errors",
-                 counts.refused(), counts.refused() > 0 ? ": " : "", RefusedInWords(counts), counts.lost_by_kernel,
-                 counts.receive_errors);
+    spdlog::warn(
+        "from the network, since the start: {} datagrams refused{}{}; {} lost to a full receive buffer; {} errors",
+        counts.refused(), counts.refused() > 0 ? ": " : "", RefusedInWords(counts), counts.lost_by_kernel,
+        counts.receive_errors);
     return true;
   }
 
@@ -60,7 +61,9 @@ class PrintableMessage final : public spdlog::custom_flag_formatter {
     const std::string text = Printable({message.payload.data(), message.payload.size()});
     out.append(text.data(), text.data() + text.size());
   }
-  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<PrintableMessage>(); }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableMessage>();
+  }
 };
 
 }  // namespace
@@ -134,8 +137,9 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     const std::unique_ptr<Node> node = make_node(config, *bus);
     if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
     spdlog::info("ready on {} with {}{}", config.bus.url, config_path,
-                 config.bus.keys ? ", signed as the " + std::string(RoleName(description.role)) + " of " + config.bus.keys->robot()
-                                 : "");
+                 config.bus.keys
+                     ? ", signed as the " + std::string(RoleName(description.role)) + " of " + config.bus.keys->robot()
+                     : "");
     DatagramWatch watched(*node, *bus);
     RunNode(watched, *bus);
     return node->failed() ? 1 : 0;

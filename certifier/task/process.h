@@ -38,15 +38,16 @@ struct BusArguments {
   void Override(BusOptions& options) const;
 };
 
-/** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key PATH` until it is done or gets SIGTERM or SIGINT.
+/** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key PATH` until it is done or gets SIGTERM or
+SIGINT.
 @param add_options adds a process's own options, if it has any.
 @return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other
 error. */
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
                const std::function<void(CLI::App&)>& add_options = {});
 
-/** Logs go to standard error, under this name, from here on. Control characters in a line are escaped: it may name what others
-chose. */
+/** Logs go to standard error, under this name, from here on. Control characters in a line are escaped: it may name what
+others chose. */
 void SetUpLog(const std::string& name);
 
 /** Runs `body` and turns its exceptions into exit codes, after one line: 2 for BadInput, 1 for others. */

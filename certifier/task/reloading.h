@@ -36,21 +36,21 @@ the process then ends by std::_Exit. */
 inline std::atomic<int> reloads_under_way = 0;
 
 /** Reads in a thread of its own that nobody waits for: one that reads from a mount that stalls may never end. One reads
-at a time; where it has not ended after `patience` it is stalled, and another may begin beside it, of at most kMost. Where
-a newer result was taken an older one is dropped. */
+at a time; where it has not ended after `patience` it is stalled, and another may begin beside it, of at most kMost.
+Where a newer result was taken an older one is dropped. */
 template <class Result>
 class Reloading final {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMost = 2;
 
-  /** @param read runs in a thread of its own, up to kMost times at once; it owns whatever it uses, since this object and
-  its owner may be gone before it ends. */
+  /** @param read runs in a thread of its own, up to kMost times at once; it owns whatever it uses, since this object
+  and its owner may be gone before it ends. */
   explicit Reloading(std::function<Result()> read, Clock::duration patience = std::chrono::seconds(10))
       : read_(std::move(read)), patience_(patience) {}
 
-  /** Reads, or reads once more after what is under way: that may have read before what it is asked for was written. False
-  where kMost are stalled: it is read once one of them has ended. */
+  /** Reads, or reads once more after what is under way: that may have read before what it is asked for was written.
+  False where kMost are stalled: it is read once one of them has ended. */
   [[nodiscard]] bool Ask() {
     again_ = true;
     BeginIfDue();
@@ -88,7 +88,8 @@ class Reloading final {
     std::exception_ptr error;
     std::atomic<bool> ended = false;
     const Clock::time_point begun = Clock::now();
-    bool dropped = false, told = false;  // a newer one was taken; it was told that this one is stalled. Of the node alone
+    bool dropped = false,
+         told = false;  // a newer one was taken; it was told that this one is stalled. Of the node alone
 
     void Run(const std::function<Result()>& read) noexcept {
       try {

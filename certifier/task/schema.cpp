@@ -200,16 +200,18 @@ std::vector<Key> TaskKeys() {
       Required(Map("task.initial_set", "X0, the states a plan may start from. A candidate on the bus brings its own.")),
       Required(Vector("task.initial_set.center", "of the state", kReal, Size::kStates, "Its middle.")),
       Required(Vector("task.initial_set.half_width", "of the state", kNotNegative, Size::kStates, "Half its width.")),
-      Map("task.rest", "What standing is: the absolute value of each state named here is at most its bound. A plan that may "
-                       "end otherwise is abstained from (D, no_stop), unless gate.require_stop is false."),
+      Map("task.rest",
+          "What standing is: the absolute value of each state named here is at most its bound. A plan that may "
+          "end otherwise is abstained from (D, no_stop), unless gate.require_stop is false."),
       Number("task.rest.<state>", "of the state", kNotNegative,
              "Its bound, on all of the last slice: small enough that the robot's hold mode takes up the rest."),
       Required(Names("task.projection", Between(1, kMaxSafetyDim), Size::kStates,
                      "P: the 1 to 3 states that obstacles are given in, in metres.")),
       Required(Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
                        "P as a matrix: 1 to 3 rows, one entry for each state.")),
-      Required(List("task.obstacles", Between(0, kMaxObstacles),
-                    "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those on the bus count besides.")),
+      Required(
+          List("task.obstacles", Between(0, kMaxObstacles),
+               "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those on the bus count besides.")),
       Map("task.obstacles[]", "One of circle, box, polygon and half_plane."),
       Map("task.obstacles[].circle", "A disc; the projection has to have 2 rows."),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
@@ -231,16 +233,18 @@ std::vector<Key> CertifierKeys() {
   const GateOptions gate;
   return {
       Optional(Map("certifier", "How it certifies."), "all defaults"),
-      Optional(Word("certifier.method", {"centred", "paper"},
-                    "paper: Algorithm 1 of the paper, with this project's conventions, unchanged for good. centred: the "
-                    "same with a tighter bound on the nominal model's remainder."),
-               "centred"),
+      Optional(
+          Word("certifier.method", {"centred", "paper"},
+               "paper: Algorithm 1 of the paper, with this project's conventions, unchanged for good. centred: the "
+               "same with a tighter bound on the nominal model's remainder."),
+          "centred"),
       Integer("certifier.zonotope_order", Between(1, kMaxGenerators), Problem{}.zonotope_order,
               "rho: a slice has at most rho generators a state. (rho + 2) times the number of states may not exceed " +
                   std::to_string(kMaxGenerators) + "."),
-      Integer("certifier.max_leaf_visits", Between(1, 1 << 20), Problem{}.max_leaf_visits,
-              "Groups of 32 observations that one search for the tightest may look at. Any of them give a sound bound; a "
-              "decision whose search met this cap says so."),
+      Integer(
+          "certifier.max_leaf_visits", Between(1, 1 << 20), Problem{}.max_leaf_visits,
+          "Groups of 32 observations that one search for the tightest may look at. Any of them give a sound bound; a "
+          "decision whose search met this cap says so."),
       Integer("certifier.max_observations", Between(1, 100'000'000), Problem{}.max_observations,
               "Observations kept at most: beyond it those go that never attain the envelope."),
       Optional(Map("gate", "What the certifier accepts from the bus."), "all defaults"),
@@ -255,44 +259,51 @@ std::vector<Key> CertifierKeys() {
              "from unread."),
       Integer("gate.queue", Between(1, 65536), gate.queue,
               "Candidates that wait at most; beyond it the oldest is rejected."),
-      Optional(Word("gate.mode", {"enforce", "shadow"},
-                    "shadow: decide and count as ever, but certify nothing: what would be certified is rejected as shadow."),
-               "enforce"),
-      Optional(Word("gate.arming", {"robot_state", "none"},
-                    "robot_state: certify only once the robot's state is heard, and latch a fault when it is lost. none: "
-                    "for a certifier without a robot."),
-               "robot_state"),
+      Optional(
+          Word("gate.mode", {"enforce", "shadow"},
+               "shadow: decide and count as ever, but certify nothing: what would be certified is rejected as shadow."),
+          "enforce"),
+      Optional(
+          Word("gate.arming", {"robot_state", "none"},
+               "robot_state: certify only once the robot's state is heard, and latch a fault when it is lost. none: "
+               "for a certifier without a robot."),
+          "robot_state"),
       Number("gate.robot_timeout_ms", "ms", UpTo(kHourMs), gate.robot_timeout_ms,
              "The robot's state counts as lost after this time without one."),
       Number("gate.max_clock_jump_ms", "ms", UpTo(kHourMs), gate.max_clock_jump_ms,
              "A wall clock that moves by more than this against the time that has passed latches a fault."),
-      Optional(Word("gate.obstacles", {"bus", "task"},
-                    "bus: the obstacles are task.obstacles and, besides, those that OBSTACLES says; nothing is certified "
-                    "before it is heard, nor while it is silent. task: task.obstacles are all, OBSTACLES is refused. "
-                    "forereach-certifier and `forereach run` do not start without this key."),
-               "not said"),
-      Number("gate.obstacles_timeout_ms", "ms", UpTo(kHourMs), gate.obstacles_timeout_ms,
-             "With `obstacles: bus`: the obstacles heard are no longer known this long after their stamp. Send the whole "
-             "set at least every third of it."),
+      Optional(
+          Word("gate.obstacles", {"bus", "task"},
+               "bus: the obstacles are task.obstacles and, besides, those that OBSTACLES says; nothing is certified "
+               "before it is heard, nor while it is silent. task: task.obstacles are all, OBSTACLES is refused. "
+               "forereach-certifier and `forereach run` do not start without this key."),
+          "not said"),
+      Number(
+          "gate.obstacles_timeout_ms", "ms", UpTo(kHourMs), gate.obstacles_timeout_ms,
+          "With `obstacles: bus`: the obstacles heard are no longer known this long after their stamp. Send the whole "
+          "set at least every third of it."),
       Optional(Word("gate.learn", {"executed", "none"},
                     "executed: transitions that the robot reports add to the observations while it drives; "
                     "declaration.noise_bound has to cover their errors. none: the file's transitions are all."),
                "executed"),
       Optional(Word("gate.require_stop", {"true", "false"},
-                    "true: only plans that provably end standing, by task.rest, are certified. false: a plan may end moving."),
+                    "true: only plans that provably end standing, by task.rest, are certified. false: a plan may end "
+                    "moving."),
                "true with task.rest, else false"),
-      Optional(Text("gate.state",
-                    "The directory, relative to this file, in which a latched fault and what contradicts a declaration "
-                    "outlive the certifier; `--state` takes precedence. Each robot needs one of its own, on a disk that "
-                    "outlives a restart of the machine."),
-               "`" + gate.state + "` in the working directory"),
+      Optional(
+          Text("gate.state",
+               "The directory, relative to this file, in which a latched fault and what contradicts a declaration "
+               "outlive the certifier; `--state` takes precedence. Each robot needs one of its own, on a disk that "
+               "outlives a restart of the machine."),
+          "`" + gate.state + "` in the working directory"),
       Optional(Map("realtime", "What the certifier asks of the operating system."), "all defaults"),
       Optional(Word("realtime.lock_memory", {"no", "try", "require"},
                     "Keep its memory from being swapped out. try: go on where it is not allowed, and say so."),
                "try"),
-      Integer("realtime.fifo_priority", Between(0, 99), RealtimeOptions{}.fifo_priority,
-              "Priority under SCHED_FIFO; 0 leaves the scheduler as it is. Where it is not allowed the certifier does not "
-              "start."),
+      Integer(
+          "realtime.fifo_priority", Between(0, 99), RealtimeOptions{}.fifo_priority,
+          "Priority under SCHED_FIFO; 0 leaves the scheduler as it is. Where it is not allowed the certifier does not "
+          "start."),
   };
 }
 
@@ -304,13 +315,16 @@ std::vector<Key> BusKeys() {
                     "Where the bus is, as LCM writes it: multicast group and port, options `ttl` and `recv_buf_size`. "
                     "`--lcm-url` takes precedence."),
                bus.url),
-      Optional(Text("bus.name", "Name of the bus, which is part of every signature: what is signed for one bus is refused on "
+      Optional(Text("bus.name",
+                    "Name of the bus, which is part of every signature: what is signed for one bus is refused on "
                     "another. All processes of a robot need the same."),
                "address and port of the URL"),
-      Optional(Text("bus.key", "Directory of keys, or one role's key file, relative to this file: every message is then "
-                    "signed by the role that speaks on its channel, and refused otherwise. `forereach keygen` makes it; "
-                    "`--key` takes precedence."),
-               "none, nothing is signed"),
+      Optional(
+          Text("bus.key",
+               "Directory of keys, or one role's key file, relative to this file: every message is then "
+               "signed by the role that speaks on its channel, and refused otherwise. `forereach keygen` makes it; "
+               "`--key` takes precedence."),
+          "none, nothing is signed"),
       Optional(Map("bus.channels", "Names of the channels, all different."), "all defaults"),
       Channel("candidate", bus.candidate, "candidate_plan_t, from planners."),
       Channel("decision", bus.decision, "decision_t, one for each candidate."),
@@ -330,11 +344,12 @@ std::vector<Key> PlannerKeys() {
   const PlannerOptions planner;
   return {
       Optional(Map("planner", "How candidates are made."), "all defaults"),
-      Optional(Word("planner.source", {"ompl", "policy"},
-                    "ompl: searched for, clear of the obstacles. policy: blocks of a learned policy of the bicycle, which "
-                    "knows of no obstacles; algorithm, clearances and seed do not concern it, progress_steps may not be "
-                    "more than a block has, and it drives at most 10 m/s."),
-               planner.source),
+      Optional(
+          Word("planner.source", {"ompl", "policy"},
+               "ompl: searched for, clear of the obstacles. policy: blocks of a learned policy of the bicycle, which "
+               "knows of no obstacles; algorithm, clearances and seed do not concern it, progress_steps may not be "
+               "more than a block has, and it drives at most 10 m/s."),
+          planner.source),
       Text("planner.policy", "The policy's file, relative to this one; required for `source: policy`."),
       Optional(Word("planner.algorithm", {"kpiece", "est", "pdst", "rrt", "sst"}, "The OMPL control planner."),
                planner.algorithm),
@@ -369,7 +384,8 @@ std::vector<Key> RobotKeys() {
       Optional(Vector("robot.start", "of the state", kReal, Size::kStates, "Its state when a run begins."),
                "the center of task.initial_set"),
       Number("robot.step_period_ms", "ms", Between(0.1, 60000), robot.step_period_ms,
-             "Wall-clock time of one step of the model. The certifier expects that no step of a plan takes longer than this "
+             "Wall-clock time of one step of the model. The certifier expects that no step of a plan takes longer than "
+             "this "
              "or model.dt."),
       Number("robot.time_limit_s", "s", UpTo(1e6), robot.time_limit_s, "The run ends then, goal or not."),
       Optional(Word("robot.residual", {"none"}, "none: the robot is the nominal model."), "none"),
@@ -384,8 +400,9 @@ std::vector<Key> RobotKeys() {
 // What is assumed of the residual, each parameter a number or an interval.
 std::vector<Key> ResidualKeys() {
   std::vector<Key> keys{
-      Map("residual", "Equations of the residual with parameters known within intervals: `forereach declare` makes the "
-                      "declaration from them. The certifier does not read it."),
+      Map("residual",
+          "Equations of the residual with parameters known within intervals: `forereach declare` makes the "
+          "declaration from them. The certifier does not read it."),
       Required(Word("residual.name", {"heading_saturation", "velocity_knee"},
                     "heading_saturation is for kinematic_bicycle, velocity_knee for point_mass.")),
   };
@@ -412,10 +429,11 @@ std::vector<Key> LoggerKeys() {
              "A log file that would grow beyond this is ended and a new one begun."),
       Number("logger.rotate_minutes", "min", UpTo(1e6), logger.rotate_minutes,
              "So is one that has been written to for this long."),
-      Optional(Number("logger.quota_mb", "MB", UpTo(kMaxMegabytes),
-                      "All log files of the directory together, at least rotate_mb: beyond it the oldest ended ones are "
-                      "deleted, and where that does not help recording pauses."),
-               "none is deleted"),
+      Optional(
+          Number("logger.quota_mb", "MB", UpTo(kMaxMegabytes),
+                 "All log files of the directory together, at least rotate_mb: beyond it the oldest ended ones are "
+                 "deleted, and where that does not help recording pauses."),
+          "none is deleted"),
       Number("logger.min_free_mb", "MB", UpTo(kMaxMegabytes), logger.min_free_mb,
              "With less free on the disk recording pauses; it resumes by itself once an eighth more is free."),
       Number("logger.unsigned_kb_per_s", "kB/s", UpTo(1e6), logger.unsigned_kb_per_s,
@@ -426,8 +444,8 @@ std::vector<Key> LoggerKeys() {
 
 std::vector<Key> MakeSchema() {
   std::vector<Key> keys{Map("", "The task file.")};
-  for (const auto part :
-       {ModelKeys, DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys, BusKeys, PlannerKeys, RobotKeys, LoggerKeys})
+  for (const auto part : {ModelKeys, DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys, BusKeys,
+                          PlannerKeys, RobotKeys, LoggerKeys})
     std::ranges::move(part(), std::back_inserter(keys));
   return keys;
 }

@@ -22,14 +22,14 @@ namespace forereach::experiments {
 struct Setting {
   const NominalModel& model;
   const Domain& domain;
-  const Declaration& declaration;   // L and sigma
+  const Declaration& declaration;  // L and sigma
   const Transitions& data;
-  std::uint64_t seed;               // for methods that draw
+  std::uint64_t seed;  // for methods that draw
 };
 
 /** A peer of the envelope: residual bounds over a query set in, tube out (by the same Propagator). */
 struct Method {
-  std::string name;                 // as in the paper's tables
+  std::string name;  // as in the paper's tables
   std::unique_ptr<ResidualEnclosure> (*make)(const Setting&);
 };
 

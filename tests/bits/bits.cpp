@@ -1,5 +1,5 @@
-// Prints every bit of the decisions and tubes of some plans, for two models of the library and for one of the user's own.
-// Whatever it is compiled with, by whatever compiler and for whatever machine, it prints the same.
+// Prints every bit of the decisions and tubes of some plans, for two models of the library and for one of the user's
+// own. Whatever it is compiled with, by whatever compiler and for whatever machine, it prints the same.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -112,11 +112,17 @@ void Certify(const Task& task, Method method, int plans, Random& random) {
 
 int main() try {
   Random random;
-  const Task bicycle{MakeKinematicBicycle(0.1, 2.5), {40, 40, 3, 25, 3, 0.48}, {8, 0.4},
-                     {0, 0, 0.25, 6, 0.1, 0.05}, {0.03, 0.03, 0.01, 0.05, 0.01, 0.004}};
+  const Task bicycle{MakeKinematicBicycle(0.1, 2.5),
+                     {40, 40, 3, 25, 3, 0.48},
+                     {8, 0.4},
+                     {0, 0, 0.25, 6, 0.1, 0.05},
+                     {0.03, 0.03, 0.01, 0.05, 0.01, 0.004}};
   const Task point_mass{MakePointMass(0.15), {20, 20, 6, 6}, {3, 3}, {0, 0, 2, 0.1}, {0.05, 0.05, 0.03, 0.03}};
-  const Task own{std::make_shared<EquationsModel<Unicycle>>(Unicycle{0.1, 0.05, 1.5}), {40, 40, 3, 9, 0.5}, {2, 0.8},
-                 {0, 0, 0.5, 4, 0.05}, {0.04, 0.04, 0.01, 0.03, 0.01}};
+  const Task own{std::make_shared<EquationsModel<Unicycle>>(Unicycle{0.1, 0.05, 1.5}),
+                 {40, 40, 3, 9, 0.5},
+                 {2, 0.8},
+                 {0, 0, 0.5, 4, 0.05},
+                 {0.04, 0.04, 0.01, 0.03, 0.01}};
   for (const Method method : {Method::kCentred, Method::kPaper}) {
     Certify(bicycle, method, 7, random);
     Certify(point_mass, method, 4, random);

@@ -9,8 +9,8 @@ struct Unicycle {
   static constexpr int kStates = 5, kInputs = 2;
   static constexpr const char* kName = "unicycle_with_drag";
   static constexpr std::array<const char*, kStates> kStateNames{"x", "y", "theta", "v", "lean"};  // m, m, rad, m/s, rad
-  static constexpr std::array<const char*, kInputs> kInputNames{"acceleration", "turn"};         // m/s^2, rad/s
-  static constexpr std::array<const char*, 3> kParameterNames{"dt", "drag", "length"};          // s, 1/s, m
+  static constexpr std::array<const char*, kInputs> kInputNames{"acceleration", "turn"};          // m/s^2, rad/s
+  static constexpr std::array<const char*, 3> kParameterNames{"dt", "drag", "length"};            // s, 1/s, m
 
   double dt, drag, length;
 

@@ -25,7 +25,8 @@ using testing::HasSubstr;
 using Json = nlohmann::json;
 
 Json CertifyJson(const std::string& config, const std::string& plan) {
-  return Json::parse(Forereach("certify --json --config config/" + config + ".yaml --plan config/plans/" + plan + ".csv").text);
+  return Json::parse(
+      Forereach("certify --json --config config/" + config + ".yaml --plan config/plans/" + plan + ".csv").text);
 }
 
 std::set<std::string> KeysOf(const Json& object) {
@@ -126,7 +127,8 @@ TEST(CertifyJsonTest, AnAbstentionDNamesCoordinateValueAndBound) {
 
 TEST(CertifyJsonTest, AnAbstentionFNamesThePairAndWhatTheDeclarationAllows) {
   const Json decision = CertifyJson("bicycle_falsified", "bicycle_certified");
-  EXPECT_EQ(WitnessOf(decision), (Keys{"coordinate", "first_observation", "second_observation", "margin", "threshold"}));
+  EXPECT_EQ(WitnessOf(decision),
+            (Keys{"coordinate", "first_observation", "second_observation", "margin", "threshold"}));
   EXPECT_EQ(decision["first_observation"], 0);
   EXPECT_EQ(decision["second_observation"], 6);
   EXPECT_EQ(decision["coordinate"], 2);
@@ -139,7 +141,8 @@ TEST(CertifyJsonTest, WithoutObstaclesThereIsNoClosestOne) {
   text = std::regex_replace(text, std::regex("obstacles:\n *- circle.*"), "obstacles: []");
   text = std::regex_replace(text, std::regex("transitions: data"), "transitions: " FOREREACH_SOURCE_DIR "/config/data");
   const Json decision = Json::parse(Forereach("certify --json --config " + scratch.Write("task.yaml", text) +
-                                              " --plan config/plans/bicycle_certified.csv").text);
+                                              " --plan config/plans/bicycle_certified.csv")
+                                        .text);
   EXPECT_EQ(decision["outcome"], "certified");
   EXPECT_EQ(WitnessOf(decision), Keys{});
 }
@@ -218,7 +221,8 @@ TEST(BadInput, NamesWhatCannotBeUsed) {
   } cases[] = {
       {"certify --config config --plan x.csv", "config: is a directory, not a file"},
       {"certify --config config/bicycle.yaml --plan config", "config: is a directory, not a file"},
-      {"certify --config config/bicycle.yaml --plan " + empty, "empty:1: the file is empty; it has to begin with the header"},
+      {"certify --config config/bicycle.yaml --plan " + empty,
+       "empty:1: the file is empty; it has to begin with the header"},
       {"certify --config " + empty + " --plan x.csv", "empty:1: has no YAML document"},
       {"certify --config '' --plan x.csv", "--config: the value is empty; write a FILE"},
       {certify + " --plan x.csv", "--plan"},
@@ -271,15 +275,19 @@ std::vector<std::string> ExamplesOf(const std::string& help) {
   std::istringstream lines(help);
   bool inside = false;
   for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with("Example") || line.starts_with("Try:")) inside = true;
-    else if (!line.starts_with("  ")) inside = false;
-    else if (inside) examples.push_back(line.substr(2));
+    if (line.starts_with("Example") || line.starts_with("Try:"))
+      inside = true;
+    else if (!line.starts_with("  "))
+      inside = false;
+    else if (inside)
+      examples.push_back(line.substr(2));
   }
   return examples;
 }
 
 // Each example is run as it stands, in a directory that has the repository's config/ and a recorded log under the name
-// that the examples use, too. Not run: what needs a bus, and declare's covers, which take long and have tests of their own.
+// that the examples use, too. Not run: what needs a bus, and declare's covers, which take long and have tests of their
+// own.
 TEST(Help, EveryExampleRuns) {
   const forereach::ScratchDirectory scratch;
   std::filesystem::create_directory_symlink(FOREREACH_SOURCE_DIR "/config", scratch / "config");
@@ -296,7 +304,7 @@ TEST(Help, EveryExampleRuns) {
     for (const std::string& example : ExamplesOf(Forereach(command + " --help").text))
       if (example.find("doctor") == std::string::npos && example.find("cover.json") == std::string::npos) run(example);
   };
-  run_all_of("run");        // records run/log
+  run_all_of("run");  // records run/log
   run_all_of("check-log");
   for (const auto& entry : std::filesystem::directory_iterator(scratch / "run/log"))
     if (entry.path().extension() == ".lcmlog")
@@ -377,14 +385,14 @@ TEST(Plan, SaysWhyWhenThereIsNone) {
     Replacements task;
     int code;
     const char* sentence;
-  } cases[] = {
-      {{{first, "{center: [0, 0], radius: 2.5}"}}, 1, "searches found a candidate"},
-      {{{first, "{center: [4.5, 0], radius: 2}"}, {"half_width: [0.05, 0.05", "half_width: [3, 3"}}, 1,
-       "not certified, the last: abstain S"},
-      {{{speed_noise, "noise_bound: [0, 0, 0, 1"}}, 1, "not certified, the last: abstain D"},
-      {{{"delta: 0.609638820", "delta: 0.0001"}}, 1, "1 candidate was not certified, the last: abstain F"},
-      {{{"  goal: [120, 0]\n", ""}}, 2, "planner.goal: missing"},
-      {{{"algorithm: kpiece", "algorithm: magic"}}, 2, "planner.algorithm: magic"}};
+  } cases[] = {{{{first, "{center: [0, 0], radius: 2.5}"}}, 1, "searches found a candidate"},
+               {{{first, "{center: [4.5, 0], radius: 2}"}, {"half_width: [0.05, 0.05", "half_width: [3, 3"}},
+                1,
+                "not certified, the last: abstain S"},
+               {{{speed_noise, "noise_bound: [0, 0, 0, 1"}}, 1, "not certified, the last: abstain D"},
+               {{{"delta: 0.609638820", "delta: 0.0001"}}, 1, "1 candidate was not certified, the last: abstain F"},
+               {{{"  goal: [120, 0]\n", ""}}, 2, "planner.goal: missing"},
+               {{{"algorithm: kpiece", "algorithm: magic"}}, 2, "planner.algorithm: magic"}};
   for (const auto& c : cases) {
     const forereach::ScratchDirectory scratch;
     const std::string out = scratch / "plan.csv";

@@ -9,10 +9,10 @@
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
 #include "cli/replay.h"
+#include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
-#include "forereach/candidate_plan_t.hpp"
 #include "logger/event_log.h"
 #include "tests/cli/program.h"
 #include "tests/cli/signed_log.h"
@@ -92,7 +92,8 @@ TEST_F(ReplayTest, ChangedOutcomeIsListed) {
   const std::string path = Edited([&](LogEvent& event) {
     if (auto decision = Decoded<decision_t>(event.data); decision && !changed) {
       changed = true;
-      decision->outcome = decision->outcome == decision_t::CERTIFIED ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED;
+      decision->outcome =
+          decision->outcome == decision_t::CERTIFIED ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED;
       event.data = Encode(*decision);
     }
     return true;
@@ -156,8 +157,8 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
   EXPECT_THAT(Replay({logs[1]}, config).differences, testing::Not(testing::IsEmpty()));
 }
 
-// A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if the
-// certifier itself began after them.
+// A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if
+// the certifier itself began after them.
 TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
   Config config = SmallTask();
   config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
@@ -175,8 +176,8 @@ TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganW
       EventLogWriter writer(path);
       writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
       writer.Append(kNow, config.bus.status, Encode(status));
-      DecideAndLog(gate, Encode(Candidate(1)), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED, config,
-                   writer);
+      DecideAndLog(gate, Encode(Candidate(1)), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED,
+                   config, writer);
       EXPECT_TRUE(writer.Flush());
     }
     ExpectAgreed(path, config, 1);
@@ -208,8 +209,8 @@ TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
   ExpectAgreed(path, config, 2);
 }
 
-// The whole set comes again and again; a second certifier's heartbeats are none of the one that decides; where the obstacles
-// were not known nothing is compared.
+// The whole set comes again and again; a second certifier's heartbeats are none of the one that decides; where the
+// obstacles were not known nothing is compared.
 TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
   const Config config = SmallTaskOnTheBus();
   const std::string path = NewLog();
@@ -226,7 +227,8 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
       writer.Append(kNow, config.bus.status, Encode(mine));
       const auto unknown = Encode(Candidate(id++));
       writer.Append(kNow, config.bus.candidate, unknown);
-      writer.Append(kNow, config.bus.decision, Encode(gate.Refuse(unknown, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
+      writer.Append(kNow, config.bus.decision,
+                    Encode(gate.Refuse(unknown, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
       for (int i = 0; i < 12; ++i) {
         obstacles_t message = ToMessage(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
                                                    : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
@@ -236,8 +238,8 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
         EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
         others.sequence = 3 + i % 5;
         writer.Append(kNow, config.bus.status, Encode(others));
-        DecideAndLog(gate, Encode(Candidate(id++)), i / 4 == 1 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED, config,
-                     writer);
+        DecideAndLog(gate, Encode(Candidate(id++)), i / 4 == 1 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED,
+                     config, writer);
         ++decided;
         ++mine.sequence;
         writer.Append(kNow, config.bus.status, Encode(mine));

@@ -54,8 +54,7 @@ class KeptTaskTest : public testing::Test {
     replace("gate: {obstacles: task}", "gate: {obstacles: task, learn: none}");
     for (const char* name : {"one", "two"}) {
       scratch_->Write(std::string("tasks_of_mine/") + name + ".yaml", text + "# " + name + "\n");
-      const Output run =
-          Forereach("run --config " + TaskOf(name) + " --directory " + (*scratch_ / "log") + " 2>&1");
+      const Output run = Forereach("run --config " + TaskOf(name) + " --directory " + (*scratch_ / "log") + " 2>&1");
       ASSERT_EQ(run.code, 0) << run.text;
     }
     logs_ = new std::vector<std::string>;
@@ -98,7 +97,8 @@ TEST_F(KeptTaskTest, ACopiedDirectoryNeedsNoTaskFile) {
   for (const std::string& log : *logs_) {
     for (const char* command : {"replay ", "verify ", "report --picture picture.svg "}) {
       std::string line = command + In(copy, log);
-      if (const auto at = line.find("picture.svg"); at != std::string::npos) line.replace(at, 11, elsewhere_ / "picture.svg");
+      if (const auto at = line.find("picture.svg"); at != std::string::npos)
+        line.replace(at, 11, elsewhere_ / "picture.svg");
       const Output output = Forereach(line + " 2>&1");
       EXPECT_EQ(output.code, 0) << line << "\n" << output.text;
       EXPECT_THAT(output.text, Not(HasSubstr("tubes left out")));
@@ -115,13 +115,15 @@ TEST_F(KeptTaskTest, ADirectoryWithSeveralTasksVerifiesWhole) {
     EXPECT_EQ(output.code, 0) << output.text;
     EXPECT_THAT(output.text, AllOf(HasSubstr(" 0 refuted"), HasSubstr(" 0 cannot be verified")));
   }
-  EXPECT_EQ(Forereach("verify " + copy + " --config " + TaskOf("one")).code, 0) << "the given one for its own, the kept for others";
+  EXPECT_EQ(Forereach("verify " + copy + " --config " + TaskOf("one")).code, 0)
+      << "the given one for its own, the kept for others";
 }
 
 TEST_F(KeptTaskTest, AnotherTaskIsRefusedAndItsOwnIsNamed) {
   const std::string digest = ToHex(LoadConfig(TaskOf("one")).digest), log = logs_->front();
   for (const char* command : {"replay ", "report ", "verify "}) {
-    ExpectRefused(command + log + " --config " + TaskOf("two"), {TaskOf("two"), digest, *scratch_ / "log/tasks/" + digest});
+    ExpectRefused(command + log + " --config " + TaskOf("two"),
+                  {TaskOf("two"), digest, *scratch_ / "log/tasks/" + digest});
     ExpectRefused(command + log + " --config " + kSource + "/config/point_mass.yaml", {digest});
     ExpectRefused(command + kCourseLog + " --config " + TaskOf("two"), {"not kept beside the log"});
     ExpectRefused(command + kCourseLog, {"--config"});
@@ -204,10 +206,15 @@ TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
     ASSERT_TRUE(writer.Flush());
   }
   const std::string database = *scratch_ / "log/decisions.sqlite", directory = *scratch_ / "log";
-  const std::vector<std::pair<std::string, std::string>> no_logs{
-      {empty, "is empty"},          {text, "no LCM event log"},          {json, ""},
-      {noise, "no LCM event log"},  {cut, "neither a candidate nor a decision"}, {alien, "neither a candidate nor a decision"},
-      {none, "No such file"},       {TaskOf("one"), "no LCM event log"}, {"/dev/null", "not a regular file"}};
+  const std::vector<std::pair<std::string, std::string>> no_logs{{empty, "is empty"},
+                                                                 {text, "no LCM event log"},
+                                                                 {json, ""},
+                                                                 {noise, "no LCM event log"},
+                                                                 {cut, "neither a candidate nor a decision"},
+                                                                 {alien, "neither a candidate nor a decision"},
+                                                                 {none, "No such file"},
+                                                                 {TaskOf("one"), "no LCM event log"},
+                                                                 {"/dev/null", "not a regular file"}};
   for (const std::string& config : {std::string(), " --config " + TaskOf("one")}) {
     for (const char* command : {"replay ", "report "}) {
       for (const auto& [input, sentence] : no_logs) ExpectRefused(command + input + config, {sentence, input});

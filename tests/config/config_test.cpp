@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/task/schema.h"
 #include "certifier/dynamics/residuals.h"
+#include "certifier/task/schema.h"
 #include "tests/config/task_files.h"
 
 namespace forereach {
@@ -84,7 +84,8 @@ TEST(LoadConfig, ReadsEveryOption) {
       "  tail_steps: 7, lead_steps: 8, candidates: 9, cruise_speed: 10, braking: 11, time_limit_ms: 12, seed: 13,\n"
       "  initial_half_width: [1, 2, 3, 4]}\n"
       "robot: {start: [4, 3, 2, 1], step_period_ms: 14, time_limit_s: 15, residual: {name: velocity_knee, knee: 2}}\n"
-      "logger: {directory: here, queue: 16, flush_ms: 17, rotate_mb: 18, rotate_minutes: 19, quota_mb: 20, min_free_mb: 21}\n");
+      "logger: {directory: here, queue: 16, flush_ms: 17, rotate_mb: 18, rotate_minutes: 19, quota_mb: 20, "
+      "min_free_mb: 21}\n");
   EXPECT_EQ(config.problem->zonotope_order, 7);
   const GateOptions& gate = config.gate;
   EXPECT_EQ(std::tie(gate.max_age_ms, gate.max_ahead_ms, gate.certificate_lifetime_ms, gate.queue),

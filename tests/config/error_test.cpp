@@ -24,9 +24,8 @@ TEST_F(ErrorTest, UnknownKeys) {
   EXPECT_EQ(files_.ErrorWith("  noise_bound:", "  noise_bounds:"),
             "task.yaml:11: declaration.noise_bounds: unknown key; did you mean noise_bound?");
   EXPECT_EQ(ErrorAfter("planer: {}\n"), "task.yaml:19: planer: unknown key; did you mean planner?");
-  EXPECT_EQ(
-      ErrorAfter("gate: {colour: 3}\n"),
-      "task.yaml:19: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
+  EXPECT_EQ(ErrorAfter("gate: {colour: 3}\n"),
+            "task.yaml:19: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
             "decision_budget_ms, queue, mode, arming, robot_timeout_ms, max_clock_jump_ms, "
             "obstacles, obstacles_timeout_ms, learn, require_stop, state");
   EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
@@ -84,8 +83,10 @@ TEST_F(ErrorTest, MissingKeys) {
 }
 
 TEST_F(ErrorTest, DoubleKeys) {
-  EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"), "task.yaml:9: declaration.lipschitz.vx.vx: stands twice, first in line 9; delete one of them");
-  EXPECT_EQ(ErrorAfter("transitions: other.csv\n"), "task.yaml:19: transitions: stands twice, first in line 12; delete one of them");
+  EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"),
+            "task.yaml:9: declaration.lipschitz.vx.vx: stands twice, first in line 9; delete one of them");
+  EXPECT_EQ(ErrorAfter("transitions: other.csv\n"),
+            "task.yaml:19: transitions: stands twice, first in line 12; delete one of them");
 }
 
 TEST_F(ErrorTest, SizesThatDoNotFit) {
@@ -121,8 +122,9 @@ TEST_F(ErrorTest, MatricesThatDoNotFit) {
 TEST_F(ErrorTest, NumbersThatAreNotFinite) {
   EXPECT_THAT(files_.ErrorWith("upper: [20, 20, 5.4, 5.4]", "upper: [20, .inf, 5.4, 5.4]"),
               StartsWith("task.yaml:5: domain.state.upper[1]: .inf is not a finite number; write a number in "));
-  EXPECT_THAT(files_.ErrorWith("{vx: 0.1, vy", "{vx: NaN, vy"),
-              StartsWith("task.yaml:9: declaration.lipschitz.vx.vx: NaN is not a finite number; write a number in [0, inf)"));
+  EXPECT_THAT(
+      files_.ErrorWith("{vx: 0.1, vy", "{vx: NaN, vy"),
+      StartsWith("task.yaml:9: declaration.lipschitz.vx.vx: NaN is not a finite number; write a number in [0, inf)"));
 }
 
 TEST_F(ErrorTest, NumbersOutsideTheirRange) {
@@ -152,37 +154,38 @@ TEST_F(ErrorTest, TheLargestOrderIsAccepted) { EXPECT_EQ(ErrorAfter("certifier: 
 TEST_F(ErrorTest, NumbersThatAreWrittenOtherwise) {
   const struct {
     const char *written, *error;
-  } of_dt[] = {
-      {"'0.15'", "\"0.15\" is quoted text, not a number; write 0.15 without quotes"},
-      {"\"0.1\"", "\"0.1\" is quoted text, not a number; write 0.1 without quotes"},
-      {"!!str 0.1", "\"0.1\" is tagged tag:yaml.org,2002:str, not a number; write 0.1 alone"},
-      {"'fast'", "\"fast\" is quoted text, not a number; write a number in (0, 60], its unit is s"},
-      {"fast", "fast is not a number; write a number in (0, 60], its unit is s"},
-      {"yes", "yes is not a number; write a number in (0, 60], its unit is s"},
-      {"true", "true is not a number; write a number in (0, 60], its unit is s"},
-      {"", "has no value; write a number in (0, 60], its unit is s"},
-      {"~", "has no value; write a number in (0, 60], its unit is s"},
-      {"[0.15]", "a list is not a number; write a number in (0, 60], its unit is s"},
-      {"{a: 1}", "a map is not a number; write a number in (0, 60], its unit is s"},
-      {"0x10", "0x10 is not a number; write it in decimal"},
-      {"0o17", "0o17 is not a number; write it in decimal"},
-      {"0b11", "0b11 is not a number; write it in decimal"},
-      {"010", "010 has a leading zero; write 10, or its decimal value if octal was meant"},
-      {"00.5", "00.5 has a leading zero; write 0.5, or its decimal value if octal was meant"},
-      {"0.15s", "0.15s is not a number; write 0.15 alone, its unit is s"},
-      {"150 ms", "150 ms is not a number; write 150 alone, its unit is s"},
-      {"1_000", "1_000 is not a number; write 1000"},
-      {".nan", ".nan is not a finite number; write a number in (0, 60], its unit is s"},
-      {"inf", "inf is not a finite number; write a number in (0, 60], its unit is s"},
-      {"-.inf", "-.inf is not a finite number; write a number in (0, 60], its unit is s"},
-      {"1e999", "1e999 is too large or too small to represent; write a number in (0, 60], its unit is s"},
-      {"--1", "--1 is not a number; write a number in (0, 60], its unit is s"},
-      {"1e5", "1e5 is outside (0, 60]"},
-      {"-0.1", "-0.1 is outside (0, 60]"}};
+  } of_dt[] = {{"'0.15'", "\"0.15\" is quoted text, not a number; write 0.15 without quotes"},
+               {"\"0.1\"", "\"0.1\" is quoted text, not a number; write 0.1 without quotes"},
+               {"!!str 0.1", "\"0.1\" is tagged tag:yaml.org,2002:str, not a number; write 0.1 alone"},
+               {"'fast'", "\"fast\" is quoted text, not a number; write a number in (0, 60], its unit is s"},
+               {"fast", "fast is not a number; write a number in (0, 60], its unit is s"},
+               {"yes", "yes is not a number; write a number in (0, 60], its unit is s"},
+               {"true", "true is not a number; write a number in (0, 60], its unit is s"},
+               {"", "has no value; write a number in (0, 60], its unit is s"},
+               {"~", "has no value; write a number in (0, 60], its unit is s"},
+               {"[0.15]", "a list is not a number; write a number in (0, 60], its unit is s"},
+               {"{a: 1}", "a map is not a number; write a number in (0, 60], its unit is s"},
+               {"0x10", "0x10 is not a number; write it in decimal"},
+               {"0o17", "0o17 is not a number; write it in decimal"},
+               {"0b11", "0b11 is not a number; write it in decimal"},
+               {"010", "010 has a leading zero; write 10, or its decimal value if octal was meant"},
+               {"00.5", "00.5 has a leading zero; write 0.5, or its decimal value if octal was meant"},
+               {"0.15s", "0.15s is not a number; write 0.15 alone, its unit is s"},
+               {"150 ms", "150 ms is not a number; write 150 alone, its unit is s"},
+               {"1_000", "1_000 is not a number; write 1000"},
+               {".nan", ".nan is not a finite number; write a number in (0, 60], its unit is s"},
+               {"inf", "inf is not a finite number; write a number in (0, 60], its unit is s"},
+               {"-.inf", "-.inf is not a finite number; write a number in (0, 60], its unit is s"},
+               {"1e999", "1e999 is too large or too small to represent; write a number in (0, 60], its unit is s"},
+               {"--1", "--1 is not a number; write a number in (0, 60], its unit is s"},
+               {"1e5", "1e5 is outside (0, 60]"},
+               {"-0.1", "-0.1 is outside (0, 60]"}};
   for (const auto& [written, error] : of_dt)
-    EXPECT_EQ(files_.ErrorWith("dt: 0.15", std::string("dt: ") + written), std::string("task.yaml:1: model.dt: ") + error);
+    EXPECT_EQ(files_.ErrorWith("dt: 0.15", std::string("dt: ") + written),
+              std::string("task.yaml:1: model.dt: ") + error);
   for (const char* written : {".15", "+0.15", "15e-2", "1.", "5e-1", "0"})
-    EXPECT_EQ(files_.ErrorWith("dt: 0.15", std::string("dt: ") + written).empty(), std::string(written) != "0") << written;
+    EXPECT_EQ(files_.ErrorWith("dt: 0.15", std::string("dt: ") + written).empty(), std::string(written) != "0")
+        << written;
   const struct {
     const char *written, *error;
   } of_queue[] = {{"1.5", "1.5 is not an integer; write an integer in [1, 65536]"},
@@ -193,10 +196,12 @@ TEST_F(ErrorTest, NumbersThatAreWrittenOtherwise) {
                   {"64k", "64k is not an integer; write 64 alone"},
                   {"0064", "0064 has a leading zero; write 64, or its decimal value if octal was meant"},
                   {"{a: 1}", "a map is not an integer; write an integer in [1, 65536]"},
-                  {"99999999999999999999", "99999999999999999999 is too large or too small to represent; write an "
-                                           "integer in [1, 65536]"}};
+                  {"99999999999999999999",
+                   "99999999999999999999 is too large or too small to represent; write an "
+                   "integer in [1, 65536]"}};
   for (const auto& [written, error] : of_queue)
-    EXPECT_EQ(ErrorAfter(std::string("gate: {queue: ") + written + "}\n"), std::string("task.yaml:19: gate.queue: ") + error);
+    EXPECT_EQ(ErrorAfter(std::string("gate: {queue: ") + written + "}\n"),
+              std::string("task.yaml:19: gate.queue: ") + error);
   EXPECT_EQ(files_.ErrorWith("    upper: [20, 20, 5.4, 5.4]", "    upper: [20, '20', 5.4, 5.4]"),
             "task.yaml:5: domain.state.upper[1]: \"20\" is quoted text, not a number; write 20 without quotes");
 }
@@ -288,7 +293,8 @@ TEST_F(ErrorTest, FilesThatAreNotTasks) {
   EXPECT_THAT(files_.Error("model: [\n"), StartsWith("task.yaml:2: not valid YAML: "));
   EXPECT_THAT(files_.Error("a: &x 1\nb: *y\n"), StartsWith("task.yaml:2: not valid YAML: "));
   EXPECT_EQ(files_.Error(""), "task.yaml:1: has no YAML document, has to have one");
-  EXPECT_EQ(files_.Error(std::string(kTask) + "---\nmore: 1\n"), "task.yaml:1: has several YAML documents, has to have one");
+  EXPECT_EQ(files_.Error(std::string(kTask) + "---\nmore: 1\n"),
+            "task.yaml:1: has several YAML documents, has to have one");
   EXPECT_EQ(files_.Error("   ,"), "task.yaml:1: has several YAML documents, has to have one");
   EXPECT_EQ(files_.Error("just words\n"), "task.yaml:1: just words is not a map");
   EXPECT_EQ(files_.Error("? [a, b]\n: 1\n"), "task.yaml:1: a list is not a key");
@@ -297,9 +303,9 @@ TEST_F(ErrorTest, FilesThatAreNotTasks) {
 }
 
 TEST_F(ErrorTest, FilesThatAreNotThere) {
-  EXPECT_THAT([&] { (void)LoadConfig(files_.directory() / "none.yaml"); },
-              testing::ThrowsMessage<ConfigError>(
-                  files_.directory() / "none.yaml: cannot be read: No such file or directory"));
+  EXPECT_THAT(
+      [&] { (void)LoadConfig(files_.directory() / "none.yaml"); },
+      testing::ThrowsMessage<ConfigError>(files_.directory() / "none.yaml: cannot be read: No such file or directory"));
   EXPECT_THAT([&] { (void)LoadConfig(files_.directory() / ""); },
               testing::ThrowsMessage<ConfigError>(HasSubstr("is a directory, not a file")));
 }

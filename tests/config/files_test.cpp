@@ -26,9 +26,9 @@
 namespace forereach {
 namespace {
 
+using std::chrono::milliseconds;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-using std::chrono::milliseconds;
 
 class FilesTest : public testing::Test {
  protected:
@@ -63,7 +63,8 @@ TEST_F(FilesTest, AreReadWholeUpToTheBound) {
   EXPECT_EQ(ReadWhole(path, 4), text);
   EXPECT_EQ(ReadWhole(Write("empty", ""), 4), "");
   EXPECT_THAT([&] { (void)ReadWhole(path, 3); }, ThrowsMessage<ConfigError>(HasSubstr("file: is larger than 3 bytes")));
-  EXPECT_THAT([&] { (void)ReadWhole(path, 3, "x.yaml:2: "); }, ThrowsMessage<ConfigError>(testing::StartsWith("x.yaml:2: ")));
+  EXPECT_THAT([&] { (void)ReadWhole(path, 3, "x.yaml:2: "); },
+              ThrowsMessage<ConfigError>(testing::StartsWith("x.yaml:2: ")));
   EXPECT_EQ(ReadBeginning(path, 2), "a" + std::string(1, '\0'));
   EXPECT_EQ(ReadBeginning(path, 9), text);
   const std::string large(200'000, 'x');
@@ -92,7 +93,8 @@ TEST_F(FilesTest, AsTransitionsAreRefusedWithTheLineThatNamesThem) {
 TEST_F(FilesTest, ALineOfCsvIsBounded) {
   const std::string path = Write("t.csv", "a\n1\n");
   std::filesystem::resize_file(path, std::uintmax_t{1} << 33);  // zeros, which take no place on the disk
-  EXPECT_THAT([&] { (void)ReadCsv(path, {"a"}); }, ThrowsMessage<ConfigError>(HasSubstr("t.csv:3: longer than 1048576 bytes")));
+  EXPECT_THAT([&] { (void)ReadCsv(path, {"a"}); },
+              ThrowsMessage<ConfigError>(HasSubstr("t.csv:3: longer than 1048576 bytes")));
   std::filesystem::resize_file(path, std::uintmax_t{1} << 35);
   EXPECT_THAT([&] { (void)ReadCsv(path, {"a"}); }, ThrowsMessage<ConfigError>(HasSubstr("is larger than 16384 MiB")));
 }

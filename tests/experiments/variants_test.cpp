@@ -88,8 +88,7 @@ TEST(Escaping, IsDeclaredWithinAPercent) {
     ExpectDeclared(system, 4);
     for (const int k : {0, 1, 2, 3})
       for (const int l : {2, 3}) {
-        const double steepest =
-            SteepestBeyondTheKnee(system, static_cast<std::size_t>(k), static_cast<std::size_t>(l));
+        const double steepest = SteepestBeyondTheKnee(system, static_cast<std::size_t>(k), static_cast<std::size_t>(l));
         EXPECT_NEAR(steepest / system.deployed(k, l), 1, 0.01) << lambda << " " << k << " " << l;
       }
   }
@@ -97,7 +96,9 @@ TEST(Escaping, IsDeclaredWithinAPercent) {
 }
 
 TEST(Escaping, MembersAgreeBelowTheKneeAndTheFirstIsTheKnee) {
-  const auto successors = [](const System& system, Layout layout) { return MakeData(system, layout, 0, 100, 0).x_next; };
+  const auto successors = [](const System& system, Layout layout) {
+    return MakeData(system, layout, 0, 100, 0).x_next;
+  };
   for (const Layout layout : {Layout::kBelowKnee, Layout::kCorridor})
     EXPECT_EQ(successors(Escaping(1), layout), successors(PointMassSystem(), layout));
   EXPECT_EQ(successors(Escaping(32), Layout::kBelowKnee), successors(Escaping(1), Layout::kBelowKnee));

@@ -1,5 +1,5 @@
-// The fault campaign: real processes on a real loopback bus are killed, stopped, lied to, flooded and cut off, and after each
-// try a witness says whether anything happened that may never happen. Writes a table.
+// The fault campaign: real processes on a real loopback bus are killed, stopped, lied to, flooded and cut off, and
+// after each try a witness says whether anything happened that may never happen. Writes a table.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -16,12 +16,12 @@
 #include <sstream>
 #include <thread>
 
-#include <CLI/CLI.hpp>
 #include <fcntl.h>
 #include <sched.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
@@ -52,7 +52,7 @@ constexpr std::chrono::seconds kStarts{10};        // a process that was started
 
 struct Row {
   std::string fault;
-  int tries = 0;  // 0: it cannot be tried here, the remark says why
+  int tries = 0;                               // 0: it cannot be tried here, the remark says why
   std::size_t forbidden = 0;                   // what may never happen, and did
   std::optional<std::int64_t> lost_by_logger;  // Rig::TakeLost; nothing: no logger ran
   int recovered = 0, said_why = 0;             // of the tries
@@ -106,7 +106,9 @@ class Campaign final {
   // So many of them, with a system that is healthy at first.
   void Tries(Row& row, Rig& rig, const std::function<void(int)>& hurt, int tries, bool bus_loses = false) {
     if (HealAtFirst(row, rig))
-      for (int i = 0; i < tries; ++i) Try(row, rig, [&] { hurt(i); }, bus_loses);
+      for (int i = 0; i < tries; ++i)
+        Try(
+            row, rig, [&] { hurt(i); }, bus_loses);
     rig.EndAll();
     CountLost(row, rig);
     DemandNothingForbidden(row, rig);
@@ -155,14 +157,17 @@ class Campaign final {
   void Signals(const std::string& fault, int signal, int tries) {
     Rig rig(DemoTask());
     Row& row = Begin(fault, tries);
-    Tries(row, rig, [&](int i) {
-      const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
-      rig.Listen(milliseconds(Below(120)));
-      if (signal == SIGKILL) return rig.End(role, SIGKILL);
-      rig.Signal(role, signal);
-      rig.Listen(milliseconds(Below(2000)));
-      rig.Signal(role, SIGCONT);
-    }, tries);
+    Tries(
+        row, rig,
+        [&](int i) {
+          const auto role = static_cast<Rig::Role>(i % Rig::kRoles);
+          rig.Listen(milliseconds(Below(120)));
+          if (signal == SIGKILL) return rig.End(role, SIGKILL);
+          rig.Signal(role, signal);
+          rig.Listen(milliseconds(Below(2000)));
+          rig.Signal(role, SIGCONT);
+        },
+        tries);
   }
 
   void Kills() { Signals("SIGKILL at a random moment", SIGKILL, options_.kills); }
@@ -191,29 +196,35 @@ class Campaign final {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin(std::string("The clock of the ") + Rig::kNames[role] + " jumps by 0.3 s to an hour, and back",
                      options_.others);
-    Tries(row, rig, [&](int) {
-      rig.SetClock(role, Jump());
-      rig.Listen(milliseconds(1000));
-      rig.SetClock(role, microseconds(0));
-      rig.Listen(milliseconds(200));
-      if (role == Rig::kCertifier) DemandLatched(row, rig, fault_t::CLOCK_JUMP);
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int) {
+          rig.SetClock(role, Jump());
+          rig.Listen(milliseconds(1000));
+          rig.SetClock(role, microseconds(0));
+          rig.Listen(milliseconds(200));
+          if (role == Rig::kCertifier) DemandLatched(row, rig, fault_t::CLOCK_JUMP);
+        },
+        options_.others);
   }
 
-  // As when the machine's clock is set. Whoever begins after it went back signs with times that were used before it did, so
-  // all begin anew.
+  // As when the machine's clock is set. Whoever begins after it went back signs with times that were used before it
+  // did, so all begin anew.
   void AllClocks() {
     Rig rig(DemoTask(), {.settable_clocks = true});
     Row& row = Begin("All clocks jump by 0.3 s to an hour, and stay", options_.others);
     microseconds offset(0);
     int anew = 0;
-    Tries(row, rig, [&](int) {
-      const microseconds jump = Jump();
-      rig.SetClocks(offset += jump);
-      rig.Listen(milliseconds(1000));
-      DemandLatched(row, rig, fault_t::CLOCK_JUMP);
-      if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int) {
+          const microseconds jump = Jump();
+          rig.SetClocks(offset += jump);
+          rig.Listen(milliseconds(1000));
+          DemandLatched(row, rig, fault_t::CLOCK_JUMP);
+          if (jump < kAnewIfBackBy) rig.EndAll(), ++anew;
+        },
+        options_.others);
     Remark(row, std::to_string(anew) + " times back by more than 5 s: all started again");
   }
 
@@ -246,12 +257,16 @@ class Campaign final {
         relay.SetWeather(now);
       };
       Row& row = Begin("Datagrams: " + name, options_.others);
-      Tries(row, rig, [&](int) {
-        set(weather);
-        rig.Listen(milliseconds(1000));
-        set({});
-        rig.Listen(milliseconds(100));  // no altered message is still on its way when the heartbeats are believed again
-      }, options_.others, true);
+      Tries(
+          row, rig,
+          [&](int) {
+            set(weather);
+            rig.Listen(milliseconds(1000));
+            set({});
+            rig.Listen(
+                milliseconds(100));  // no altered message is still on its way when the heartbeats are believed again
+          },
+          options_.others, true);
       stop = true;
       passing.join();
       Remark(row, std::to_string(relay.spoiled()) + " messages spoiled");
@@ -288,22 +303,25 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("A robot that lies about its state (signed)", options_.others);
     std::int64_t sequence = 1 << 30;
-    Tries(row, rig, [&](int) {
-      for (int j = 0; j < 20; ++j) {
-        robot_state_t state = State(rig);
-        state.sequence = sequence++;
-        state.executing_plan_id = j % 2 == 0 ? WallClockUs() : -1;
-        for (int k = 0; k < state.num_states; ++k) state.state[k] = j % 5 == 4 ? 1e300 : Below(100) - 50;
-        rig.bus().Publish(rig.config().bus.robot_state, state);
-        rig.Listen(milliseconds(5));
-      }
-      robot_state_t state = StateOutside(rig);
-      state.sequence = sequence++;
-      rig.bus().Publish(rig.config().bus.robot_state, state);
-      static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
-      rig.Listen(kHeartbeat);
-      DemandLatched(row, rig, fault_t::SLICE_LEFT);
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int) {
+          for (int j = 0; j < 20; ++j) {
+            robot_state_t state = State(rig);
+            state.sequence = sequence++;
+            state.executing_plan_id = j % 2 == 0 ? WallClockUs() : -1;
+            for (int k = 0; k < state.num_states; ++k) state.state[k] = j % 5 == 4 ? 1e300 : Below(100) - 50;
+            rig.bus().Publish(rig.config().bus.robot_state, state);
+            rig.Listen(milliseconds(5));
+          }
+          robot_state_t state = StateOutside(rig);
+          state.sequence = sequence++;
+          rig.bus().Publish(rig.config().bus.robot_state, state);
+          static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
+          rig.Listen(kHeartbeat);
+          DemandLatched(row, rig, fault_t::SLICE_LEFT);
+        },
+        options_.others);
   }
 
   // Until the reset that Heal sends.
@@ -311,10 +329,11 @@ class Campaign final {
     const std::int64_t certificates = rig.witness().certificates();
     rig.witness().Forget();
     const auto says_it = [&] {
-      const auto &said = rig.witness().fault();
-      const auto &status = rig.witness().status();
-      return said && said->cause == fault.cause && said->utime == fault.utime && GetText(said->message) == GetText(fault.message) &&
-             status && status->state == certifier_status_v3_t::FAULT;
+      const auto& said = rig.witness().fault();
+      const auto& status = rig.witness().status();
+      return said && said->cause == fault.cause && said->utime == fault.utime &&
+             GetText(said->message) == GetText(fault.message) && status &&
+             status->state == certifier_status_v3_t::FAULT;
     };
     Demand(row, rig.ListenUntil(says_it, kStarts), "the next certifier does not say the fault again");
     rig.Listen(milliseconds(1000));
@@ -336,13 +355,16 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("SIGKILL of a certifier with a latched fault", options_.others);
     std::int64_t sequence = 1 << 30;
-    Tries(row, rig, [&](int) {
-      const std::optional<fault_t> fault = Provoke(row, rig, sequence++);
-      rig.Listen(milliseconds(Below(30)));  // perhaps before it is on the disk
-      rig.End(Rig::kCertifier, SIGKILL);
-      rig.Start(Rig::kCertifier);
-      if (fault) DemandStillLatched(row, rig, *fault);
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int) {
+          const std::optional<fault_t> fault = Provoke(row, rig, sequence++);
+          rig.Listen(milliseconds(Below(30)));  // perhaps before it is on the disk
+          rig.End(Rig::kCertifier, SIGKILL);
+          rig.Start(Rig::kCertifier);
+          if (fault) DemandStillLatched(row, rig, *fault);
+        },
+        options_.others);
   }
 
   // What it says is a lie of this campaign, and no violation of the robot's.
@@ -350,25 +372,29 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("A robot that executes what nobody certified (signed)", options_.others);
     std::int64_t sequence = 1 << 30;
-    Tries(row, rig, [&](int i) {
-      // As long as a plan of the certifier before it may run: 2 s, twice the age of a message, and 128 steps.
-      if (i == 0) rig.Listen(std::chrono::seconds(17));
-      if (i == 0 && !rig.Heal().empty()) return Demand(row, false, "it is not well after a while");
-      rig.witness().ForgetFault();
-      robot_state_t state = State(rig);
-      state.mode = robot_state_t::EXECUTING;
-      state.sequence = sequence++;
-      const certified_plan_t& last = *rig.witness().last_certified();
-      state.executing_plan_id = i % 2 == 0 ? WallClockUs() : last.plan.plan_id;
-      state.executing_step = i % 2 == 0 ? 0 : last.plan.num_steps;
-      if (i % 2 != 0) std::copy_n(last.slice_lower[last.plan.num_steps], state.num_states, state.state);
-      rig.bus().Publish(rig.config().bus.robot_state, state);
-      static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
-      rig.Listen(kHeartbeat);
-      DemandLatched(row, rig, fault_t::UNCERTIFIED_PLAN);
-      for (const std::string& violation : rig.witness().TakeViolations())
-        Demand(row, violation.starts_with("plan " + std::to_string(state.executing_plan_id) + " is executing"), violation);
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int i) {
+          // As long as a plan of the certifier before it may run: 2 s, twice the age of a message, and 128 steps.
+          if (i == 0) rig.Listen(std::chrono::seconds(17));
+          if (i == 0 && !rig.Heal().empty()) return Demand(row, false, "it is not well after a while");
+          rig.witness().ForgetFault();
+          robot_state_t state = State(rig);
+          state.mode = robot_state_t::EXECUTING;
+          state.sequence = sequence++;
+          const certified_plan_t& last = *rig.witness().last_certified();
+          state.executing_plan_id = i % 2 == 0 ? WallClockUs() : last.plan.plan_id;
+          state.executing_step = i % 2 == 0 ? 0 : last.plan.num_steps;
+          if (i % 2 != 0) std::copy_n(last.slice_lower[last.plan.num_steps], state.num_states, state.state);
+          rig.bus().Publish(rig.config().bus.robot_state, state);
+          static_cast<void>(rig.ListenUntil([&] { return rig.witness().fault().has_value(); }, kSaysSoon));
+          rig.Listen(kHeartbeat);
+          DemandLatched(row, rig, fault_t::UNCERTIFIED_PLAN);
+          for (const std::string& violation : rig.witness().TakeViolations())
+            Demand(row, violation.starts_with("plan " + std::to_string(state.executing_plan_id) + " is executing"),
+                   violation);
+        },
+        options_.others);
   }
 
   void StateDisks();
@@ -377,19 +403,22 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("A planner that sends NaN, wrong sizes, garbage (signed)", options_.others);
     std::int64_t id = 1;
-    Tries(row, rig, [&](int) {
-      for (int j = 0; j < 50; ++j) {
-        candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
-        SetText(candidate.source, "nonsense");
-        if (j % 3 == 0) candidate.control[Below(6)][Below(2)] = std::numeric_limits<double>::quiet_NaN();
-        if (j % 3 == 1) candidate.num_steps = static_cast<std::int16_t>(random_());
-        if (j % 3 == 2) candidate.initial_half_width[Below(6)] = -1;
-        std::vector<std::uint8_t> bytes = Encode(candidate);
-        if (j % 7 == 0) bytes.resize(static_cast<std::size_t>(Below(20'000)));
-        rig.bus().Publish(rig.config().bus.candidate, Bytes(bytes));
-        if (j % 10 == 0) rig.Listen(milliseconds(5));
-      }
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int) {
+          for (int j = 0; j < 50; ++j) {
+            candidate_plan_t candidate = CandidateFor(rig.config(), id++, Eigen::Vector2d(0, 0), 6, milliseconds(100));
+            SetText(candidate.source, "nonsense");
+            if (j % 3 == 0) candidate.control[Below(6)][Below(2)] = std::numeric_limits<double>::quiet_NaN();
+            if (j % 3 == 1) candidate.num_steps = static_cast<std::int16_t>(random_());
+            if (j % 3 == 2) candidate.initial_half_width[Below(6)] = -1;
+            std::vector<std::uint8_t> bytes = Encode(candidate);
+            if (j % 7 == 0) bytes.resize(static_cast<std::size_t>(Below(20'000)));
+            rig.bus().Publish(rig.config().bus.candidate, Bytes(bytes));
+            if (j % 10 == 0) rig.Listen(milliseconds(5));
+          }
+        },
+        options_.others);
   }
 
   using Sent = std::vector<std::uint8_t>;
@@ -414,7 +443,8 @@ class Campaign final {
     nothing_there.utime = WallClockUs();
     nothing_there.sequence = std::int64_t{1} << 40;
     harmful[channels.obstacles] = Encode(nothing_there);
-    if (const certified_plan_t* certified = rig.witness().last_certified()) harmful[channels.certified] = Encode(Widened(*certified));
+    if (const certified_plan_t* certified = rig.witness().last_certified())
+      harmful[channels.certified] = Encode(Widened(*certified));
     return harmful;
   }
 
@@ -425,17 +455,21 @@ class Campaign final {
     certified.plan.start_utime = certified.utime + 200'000;
     certified.expires_utime = certified.utime + 1'000'000;
     for (int t = 0; t <= certified.plan.num_steps; ++t)
-      for (int k = 0; k < certified.plan.num_states; ++k) certified.slice_lower[t][k] = -1e9, certified.slice_upper[t][k] = 1e9;
+      for (int k = 0; k < certified.plan.num_states; ++k)
+        certified.slice_lower[t][k] = -1e9, certified.slice_upper[t][k] = 1e9;
     SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
     SetDigest(certified.certificate_digest, CertificateDigest(certified));
     return certified;
   }
 
-  // A stranger without keys; somebody with all keys but the one that counts; another robot's keys; this robot on another bus.
+  // A stranger without keys; somebody with all keys but the one that counts; another robot's keys; this robot on
+  // another bus.
   void Forgeries() {
     Rig rig(DemoTask());
-    Row& row = Begin("On each signed channel: unsigned, forged, replayed, signed by each other role, by another robot, for another bus",
-                     options_.others);
+    Row& row = Begin(
+        "On each signed channel: unsigned, forged, replayed, signed by each other role, by another robot, for another "
+        "bus",
+        options_.others);
     const BusOptions& channels = rig.config().bus;
     const Speakers speakers = channels.speakers();
     std::map<std::string, Sent> heard;
@@ -445,52 +479,63 @@ class Campaign final {
     std::int64_t obeyed = 0;  // by the robot: plans that nobody certified, faults that nobody latched
     rig.Hear(channels.event, [&](const Received& r) {
       const auto event = Decoded<execution_event_t>(r.bytes);
-      obeyed += event && (event->kind == execution_event_t::HALTED || event->kind == execution_event_t::RESET ||
-                          (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31)));
+      obeyed +=
+          event &&
+          (event->kind == execution_event_t::HALTED || event->kind == execution_event_t::RESET ||
+           (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31)));
     });
     Signer all(rig.keys(), channels.bus_name()), other_robot(TestKeys("another-robot"), channels.bus_name()),
         other_bus(rig.keys(), "another bus");
     std::int64_t sent = 0;
     std::set<std::string> tried;
-    Tries(row, rig, [&](int) {
-      rig.Listen(milliseconds(700));
-      const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
-      const std::int64_t obeyed_before = obeyed;
-      const auto recorded = heard;
-      for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
-        const Role speaker = speakers.at(channel);
-        tried.insert(channel);
-        const auto send = [&, channel = channel](const Sent& bytes) { rig.open_bus().Publish(channel, Bytes(bytes)), ++sent; };
-        send(message);
-        for (const Role role : kAllRoles)
-          if (role != speaker) send(all.Sign(role, channel, message, WallClockUs()));
-        send(other_robot.Sign(speaker, channel, message, WallClockUs()));
-        send(other_bus.Sign(speaker, channel, message, WallClockUs()));
-        if (!recorded.contains(channel)) continue;
-        Sent altered = recorded.at(channel);
-        send(altered);  // once more
-        altered[altered.size() / 2] ^= 1;
-        send(altered);
-      }
-      rig.Listen(kHeartbeat);
-      const auto& now = rig.witness().status();
-      const auto refuses_all = [&] {
-        return now && now->refused_unsigned > before.refused_unsigned && now->refused_forged > before.refused_forged &&
-               now->refused_replayed > before.refused_replayed;
-      };
-      Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
-      Demand(row, !rig.witness().fault(), "a fault was believed or latched");
-      Demand(row, obeyed == obeyed_before, "the robot obeyed a fault, a reset or a certificate that nobody made");
-      Demand(row, now && now->version == before.version && now->failed_reloads == before.failed_reloads, "a reload was obeyed");
-      Demand(row, now && GetDigest(now->obstacles_digest) == GetDigest(before.obstacles_digest), "obstacles were believed");
-      Demand(row, now && now->messages_refused == before.messages_refused, "the certifier looked into a message that nobody may send");
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int) {
+          rig.Listen(milliseconds(700));
+          const auto before = rig.witness().status().value_or(certifier_status_v3_t{});
+          const std::int64_t obeyed_before = obeyed;
+          const auto recorded = heard;
+          for (const auto& [channel, message] : HarmfulOf(rig, recorded)) {
+            const Role speaker = speakers.at(channel);
+            tried.insert(channel);
+            const auto send = [&, channel = channel](const Sent& bytes) {
+              rig.open_bus().Publish(channel, Bytes(bytes)), ++sent;
+            };
+            send(message);
+            for (const Role role : kAllRoles)
+              if (role != speaker) send(all.Sign(role, channel, message, WallClockUs()));
+            send(other_robot.Sign(speaker, channel, message, WallClockUs()));
+            send(other_bus.Sign(speaker, channel, message, WallClockUs()));
+            if (!recorded.contains(channel)) continue;
+            Sent altered = recorded.at(channel);
+            send(altered);  // once more
+            altered[altered.size() / 2] ^= 1;
+            send(altered);
+          }
+          rig.Listen(kHeartbeat);
+          const auto& now = rig.witness().status();
+          const auto refuses_all = [&] {
+            return now && now->refused_unsigned > before.refused_unsigned &&
+                   now->refused_forged > before.refused_forged && now->refused_replayed > before.refused_replayed;
+          };
+          Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
+          Demand(row, !rig.witness().fault(), "a fault was believed or latched");
+          Demand(row, obeyed == obeyed_before, "the robot obeyed a fault, a reset or a certificate that nobody made");
+          Demand(row, now && now->version == before.version && now->failed_reloads == before.failed_reloads,
+                 "a reload was obeyed");
+          Demand(row, now && GetDigest(now->obstacles_digest) == GetDigest(before.obstacles_digest),
+                 "obstacles were believed");
+          Demand(row, now && now->messages_refused == before.messages_refused,
+                 "the certifier looked into a message that nobody may send");
+        },
+        options_.others);
     Demand(row, tried.size() == speakers.size(), "only " + std::to_string(tried.size()) + " channels were tried");
     Remark(row, std::to_string(sent) + " sent on " + std::to_string(tried.size()) + " channels");
     if (rig.witness().status()) {
       const auto& s = *rig.witness().status();
       Remark(row, "refused by the certifier: " + std::to_string(s.refused_unsigned) + " unsigned, " +
-                      std::to_string(s.refused_forged) + " forged or of another bus, " + std::to_string(s.refused_replayed) + " replayed");
+                      std::to_string(s.refused_forged) + " forged or of another bus, " +
+                      std::to_string(s.refused_replayed) + " replayed");
     }
     StolenKeys();
   }
@@ -498,30 +543,35 @@ class Campaign final {
   // The adversary of the gate itself: a learned planner that has its key file, or another role's.
   void StolenKeys() {
     Rig rig(DemoTask());
-    Row& row = Begin("Certificates with slices of +-1e9, signed with a stolen key of planner, perception, robot, operator, logger",
-                     options_.others);
+    Row& row = Begin(
+        "Certificates with slices of +-1e9, signed with a stolen key of planner, perception, robot, operator, logger",
+        options_.others);
     std::set<std::int64_t> forged, obeyed;
     rig.Hear(rig.config().bus.event, [&](const Received& r) {
       const auto event = Decoded<execution_event_t>(r.bytes);
-      if (event && event->kind != execution_event_t::REFUSED && forged.contains(event->plan_id)) obeyed.insert(event->plan_id);
+      if (event && event->kind != execution_event_t::REFUSED && forged.contains(event->plan_id))
+        obeyed.insert(event->plan_id);
     });
     Signer thief(rig.keys(), rig.config().bus.bus_name());
-    Tries(row, rig, [&](int i) {
-      const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
-      for (int j = 0; j < 20; ++j) {
-        certified_plan_t certified = Widened(*rig.witness().last_certified());
-        certified.plan.plan_id += j;
-        certified.plan.start_utime += 40'000 * j;
-        SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
-        SetDigest(certified.certificate_digest, CertificateDigest(certified));
-        forged.insert(certified.plan.plan_id);
-        const std::string& channel = rig.config().bus.certified;
-        rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));
-        rig.Listen(milliseconds(20));
-      }
-      rig.Listen(milliseconds(500));
-      Demand(row, obeyed.empty(), "the robot took a certificate that the certifier did not make");
-    }, options_.others);
+    Tries(
+        row, rig,
+        [&](int i) {
+          const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
+          for (int j = 0; j < 20; ++j) {
+            certified_plan_t certified = Widened(*rig.witness().last_certified());
+            certified.plan.plan_id += j;
+            certified.plan.start_utime += 40'000 * j;
+            SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
+            SetDigest(certified.certificate_digest, CertificateDigest(certified));
+            forged.insert(certified.plan.plan_id);
+            const std::string& channel = rig.config().bus.certified;
+            rig.open_bus().Publish(channel, Bytes(thief.Sign(stolen, channel, Encode(certified), WallClockUs())));
+            rig.Listen(milliseconds(20));
+          }
+          rig.Listen(milliseconds(500));
+          Demand(row, obeyed.empty(), "the robot took a certificate that the certifier did not make");
+        },
+        options_.others);
     Remark(row, std::to_string(forged.size()) + " forged, " + std::to_string(obeyed.size()) + " executed");
   }
 
@@ -529,27 +579,31 @@ class Campaign final {
     Rig rig(DemoTask());
     Row& row = Begin("A flood of " + std::to_string(options_.floods) + " candidates (signed)", 1);
     std::int64_t candidates = 0;
-    Tries(row, rig, [&](int) {
-      candidate_plan_t candidate = CandidateFor(rig.config(), 1, Eigen::Vector2d(0, 0), 12, milliseconds(500));
-      SetText(candidate.source, "flood");
-      const std::int64_t before = rig.witness().decisions();
-      for (int i = 0; i < options_.floods; ++i) {
-        candidate.plan_id = i + 1;
-        candidate.sequence = i;
-        candidate.utime = WallClockUs();
-        candidate.start_utime = candidate.utime + 500'000;
-        rig.bus().Publish(rig.config().bus.candidate, candidate);
-        if (i % 16 == 0) rig.Listen(milliseconds(0)), rig.open_bus().Dispatch(0);
-      }
-      rig.Listen(milliseconds(1500));
-      candidates = rig.witness().decisions() - before;
-    }, 1, true);
+    Tries(
+        row, rig,
+        [&](int) {
+          candidate_plan_t candidate = CandidateFor(rig.config(), 1, Eigen::Vector2d(0, 0), 12, milliseconds(500));
+          SetText(candidate.source, "flood");
+          const std::int64_t before = rig.witness().decisions();
+          for (int i = 0; i < options_.floods; ++i) {
+            candidate.plan_id = i + 1;
+            candidate.sequence = i;
+            candidate.utime = WallClockUs();
+            candidate.start_utime = candidate.utime + 500'000;
+            rig.bus().Publish(rig.config().bus.candidate, candidate);
+            if (i % 16 == 0) rig.Listen(milliseconds(0)), rig.open_bus().Dispatch(0);
+          }
+          rig.Listen(milliseconds(1500));
+          candidates = rig.witness().decisions() - before;
+        },
+        1, true);
     if (rig.witness().status())
       Remark(row, std::to_string(candidates) + " decisions heard; the certifier counts " +
                       std::to_string(rig.witness().status()->candidates) + " decided on and " +
                       std::to_string(rig.witness().status()->candidates_lost) + " that the bus lost");
     if (rig.witness().unjudged() > 0)
-      Remark(row, std::to_string(rig.witness().unjudged()) + " executed plans not judged: the campaign lost messages itself");
+      Remark(row, std::to_string(rig.witness().unjudged()) +
+                      " executed plans not judged: the campaign lost messages itself");
   }
 
   // A stranger's, whatever their content: they do no more than any noise.
@@ -564,26 +618,33 @@ class Campaign final {
         heard.push_back({r.channel, {r.raw.begin(), r.raw.end()}});
     });
     double most_grown = 0;
-    Tries(row, rig, [&](int) {
-      heard.clear();
-      rig.Listen(milliseconds(300));
-      std::array<double, Rig::kRoles> before{};
-      for (int role = 0; role < Rig::kRoles; ++role) before[static_cast<std::size_t>(role)] = rig.Resident(Rig::Role(role));
-      send(rig, sender, Heard(heard));
-      rig.Listen(kHeartbeat);
-      for (int role = 0; role < Rig::kRoles; ++role) {
-        const double grown = rig.Resident(Rig::Role(role)) - before[static_cast<std::size_t>(role)];
-        most_grown = std::max(most_grown, grown);
-        Demand(row, grown < kMayGrowBy, std::string("the ") + Rig::kNames[static_cast<std::size_t>(role)] + " grew by " +
-                                            std::to_string(std::lround(grown / (1 << 20))) + " MB");
-      }
-    }, options_.others, true);
-    Remark(row, "no process grew by more than " + std::to_string(std::lround(std::ceil(most_grown / (1 << 20)))) + " MB in a try");
+    Tries(
+        row, rig,
+        [&](int) {
+          heard.clear();
+          rig.Listen(milliseconds(300));
+          std::array<double, Rig::kRoles> before{};
+          for (int role = 0; role < Rig::kRoles; ++role)
+            before[static_cast<std::size_t>(role)] = rig.Resident(Rig::Role(role));
+          send(rig, sender, Heard(heard));
+          rig.Listen(kHeartbeat);
+          for (int role = 0; role < Rig::kRoles; ++role) {
+            const double grown = rig.Resident(Rig::Role(role)) - before[static_cast<std::size_t>(role)];
+            most_grown = std::max(most_grown, grown);
+            Demand(row, grown < kMayGrowBy,
+                   std::string("the ") + Rig::kNames[static_cast<std::size_t>(role)] + " grew by " +
+                       std::to_string(std::lround(grown / (1 << 20))) + " MB");
+          }
+        },
+        options_.others, true);
+    Remark(row, "no process grew by more than " + std::to_string(std::lround(std::ceil(most_grown / (1 << 20)))) +
+                    " MB in a try");
   }
 
   // Each of the first three ended LCM's own receiver, or took it memory by the gigabyte.
   void Datagrams() {
-    const std::vector<std::string> channels{"ROBOT_STATE", "PLAN_CERTIFIED", "PLAN_CANDIDATE"};  // each process hears one
+    const std::vector<std::string> channels{"ROBOT_STATE", "PLAN_CERTIFIED",
+                                            "PLAN_CANDIDATE"};  // each process hears one
     const auto on_each = [&](auto make) {
       return [&channels, make](Rig&, const RawSender& sender, const Heard&) {
         for (const std::string& channel : channels) sender.Send(make(channel));
@@ -609,7 +670,8 @@ class Campaign final {
 
   // What a candidate is answered that would be certified from rest at the start; nothing if it is not answered.
   std::optional<std::int16_t> CauseOfACandidate(Rig& rig) {
-    candidate_plan_t candidate = CandidateFor(rig.config(), next_own_id_++, Eigen::Vector2d(0, 0), 6, milliseconds(400));
+    candidate_plan_t candidate =
+        CandidateFor(rig.config(), next_own_id_++, Eigen::Vector2d(0, 0), 6, milliseconds(400));
     SetText(candidate.source, "campaign");
     rig.bus().Publish(rig.config().bus.candidate, candidate);
     const Digest digest = DigestOf(Encode(candidate));
@@ -622,7 +684,8 @@ class Campaign final {
     const auto cause = CauseOfACandidate(rig);
     const bool rejected = cause == decision_t::CAUSE_NO_OBSTACLES || cause == decision_t::CAUSE_NOT_ARMED ||
                           cause == decision_t::CAUSE_FAULT;
-    Demand(row, rejected, "a candidate was answered " + std::string(cause ? CauseName(*cause) : "nothing") + " " + when);
+    Demand(row, rejected,
+           "a candidate was answered " + std::string(cause ? CauseName(*cause) : "nothing") + " " + when);
     if (cause == decision_t::CAUSE_NO_OBSTACLES) ++told_unknown_;
   }
 
@@ -633,7 +696,8 @@ class Campaign final {
     rig.witness().SetWorld(world.obstacles_digest);
     Row& row = Begin(fault, options_.others);
     told_unknown_ = 0;
-    Tries(row, rig, [&](int i) { hurt(row, rig, i); }, options_.others);
+    Tries(
+        row, rig, [&](int i) { hurt(row, rig, i); }, options_.others);
     if (told_unknown_ > 0) Remark(row, std::to_string(told_unknown_) + " candidates rejected as no_obstacles");
   }
 
@@ -680,12 +744,8 @@ class Campaign final {
       if (!rig.SecondCertifierIsAlive()) rig.StartSecondCertifier();
       rig.Listen(milliseconds(1000 + Below(500)));
       switch (i % 3) {
-        case 0:
-          rig.End(Rig::kCertifier, SIGKILL);
-          break;
-        case 1:
-          rig.EndSecondCertifier();
-          break;
+        case 0: rig.End(Rig::kCertifier, SIGKILL); break;
+        case 1: rig.EndSecondCertifier(); break;
         default:
           rig.Signal(Rig::kCertifier, SIGSTOP);
           rig.Listen(milliseconds(3000));
@@ -715,14 +775,15 @@ class Campaign final {
 };
 
 const std::vector<Campaign::Kind> Campaign::kKinds{
-    {"kill", &Campaign::Kills},           {"clock", &Campaign::Clocks},        {"stop", &Campaign::Stops},
-    {"network", &Campaign::BadNetwork},   {"lies", &Campaign::Lies},           {"nonsense", &Campaign::Nonsense},
-    {"latch", &Campaign::LatchedKills},   {"statedisk", &Campaign::StateDisks}, {"strangers", &Campaign::Strangers},
-    {"obstacles", &Campaign::Obstacles},
-    {"forgeries", &Campaign::Forgeries},  {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
-    {"disks", &Campaign::Disks},
-    {"gone", &Campaign::Gone},
-    {"route", &Campaign::Routes},         {"reload", &Campaign::BadReload}};
+    {"kill", &Campaign::Kills},          {"clock", &Campaign::Clocks},
+    {"stop", &Campaign::Stops},          {"network", &Campaign::BadNetwork},
+    {"lies", &Campaign::Lies},           {"nonsense", &Campaign::Nonsense},
+    {"latch", &Campaign::LatchedKills},  {"statedisk", &Campaign::StateDisks},
+    {"strangers", &Campaign::Strangers}, {"obstacles", &Campaign::Obstacles},
+    {"forgeries", &Campaign::Forgeries}, {"flood", &Campaign::Flood},
+    {"datagrams", &Campaign::Datagrams}, {"disks", &Campaign::Disks},
+    {"gone", &Campaign::Gone},           {"route", &Campaign::Routes},
+    {"reload", &Campaign::BadReload}};
 
 // A small file system of its own for the log, filled, made read-only, and given back.
 void Campaign::Disks() {
@@ -736,33 +797,39 @@ void Campaign::Disks() {
     rig.SetDirectory(directory);
     rig.End(Rig::kLogger);  // it is started again there
     Row& full = Begin("Full disk", options_.others);
-    Tries(full, rig, [&](int) {
-      const std::string filler = directory + "/filler";  // as much as there is room for
-      std::ofstream(filler) << std::string(32 << 20, 'x');
-      rig.Listen(milliseconds(700));
-      const auto says_so = [&] {
-        const auto& logger = rig.witness().logger_status();
-        return logger && logger->state == logger_status_t::ERROR;
-      };
-      Demand(full, rig.ListenUntil(says_so, kSaysSoon), "the disk was full, and the logger's state was not ERROR");
-      std::filesystem::remove(filler);
-    }, options_.others);
+    Tries(
+        full, rig,
+        [&](int) {
+          const std::string filler = directory + "/filler";  // as much as there is room for
+          std::ofstream(filler) << std::string(32 << 20, 'x');
+          rig.Listen(milliseconds(700));
+          const auto says_so = [&] {
+            const auto& logger = rig.witness().logger_status();
+            return logger && logger->state == logger_status_t::ERROR;
+          };
+          Demand(full, rig.ListenUntil(says_so, kSaysSoon), "the disk was full, and the logger's state was not ERROR");
+          std::filesystem::remove(filler);
+        },
+        options_.others);
 
     // While a file is open to be written the kernel refuses it, so it is done before the logger starts.
     Row& read_only = Begin("Log directory read-only at the logger's start", options_.others);
     const auto remount = [&](unsigned long how) {
       Demand(read_only, ::mount("tmpfs", directory.c_str(), "tmpfs", MS_REMOUNT | how, kSize) == 0, "no remount");
     };
-    Tries(read_only, rig, [&](int) {
-      rig.End(Rig::kLogger);
-      remount(MS_RDONLY);
-      ChildProcess logger({FOREREACH_LOGGER, "--config", rig.task_path(), "--lcm-url", rig.url(Rig::kLogger),
-                           "--directory", directory});
-      const bool says_why = logger.WaitForExit(std::chrono::seconds(10)) == 2 &&
-                            logger.error().find(directory) != std::string::npos;
-      Demand(read_only, says_why, "the logger did not end with the reason: " + logger.error());
-      remount(0);
-    }, options_.others);
+    Tries(
+        read_only, rig,
+        [&](int) {
+          rig.End(Rig::kLogger);
+          remount(MS_RDONLY);
+          ChildProcess logger({FOREREACH_LOGGER, "--config", rig.task_path(), "--lcm-url", rig.url(Rig::kLogger),
+                               "--directory", directory});
+          const bool says_why =
+              logger.WaitForExit(std::chrono::seconds(10)) == 2 && logger.error().find(directory) != std::string::npos;
+          Demand(read_only, says_why, "the logger did not end with the reason: " + logger.error());
+          remount(0);
+        },
+        options_.others);
   }
   ::umount(directory.c_str());
 }
@@ -789,7 +856,8 @@ void Campaign::StateDisks() {
       rig.Start(Rig::kCertifier);
       const auto says_so = [&] {
         const auto& status = rig.witness().status();
-        return status && status->level == certifier_status_v3_t::ERROR && status->state == certifier_status_v3_t::DISARMED &&
+        return status && status->level == certifier_status_v3_t::ERROR &&
+               status->state == certifier_status_v3_t::DISARMED &&
                GetText(status->message).starts_with("no fault could be stored");
       };
       Demand(row, rig.ListenUntil(says_so, kStarts), why + ", and the certifier does not say so");
@@ -797,32 +865,42 @@ void Campaign::StateDisks() {
       Demand(row, rig.witness().certificates() == certificates, why + ", and the certifier certified");
     };
     Row& at_start = Begin("The certifier's state on a disk that is full at its start", options_.others);
-    Tries(at_start, rig, [&](int) {
-      rig.End(Rig::kCertifier);
-      std::filesystem::remove(latch);
-      fill();
-      demand_not_armed(at_start, "no fault could be written");
-      std::filesystem::remove(filler);
-    }, options_.others);
+    Tries(
+        at_start, rig,
+        [&](int) {
+          rig.End(Rig::kCertifier);
+          std::filesystem::remove(latch);
+          fill();
+          demand_not_armed(at_start, "no fault could be written");
+          std::filesystem::remove(filler);
+        },
+        options_.others);
 
-    Row& later = Begin("The certifier's state on a disk that is full when a fault is latched, then SIGKILL", options_.others);
+    Row& later =
+        Begin("The certifier's state on a disk that is full when a fault is latched, then SIGKILL", options_.others);
     std::int64_t sequence = 1 << 30;
-    Tries(later, rig, [&](int) {
-      fill();
-      const std::optional<fault_t> fault = Provoke(later, rig, sequence++);
-      rig.End(Rig::kCertifier, SIGKILL);
-      rig.Start(Rig::kCertifier);
-      if (fault) DemandStillLatched(later, rig, *fault);
-      std::filesystem::remove(filler);
-    }, options_.others);
+    Tries(
+        later, rig,
+        [&](int) {
+          fill();
+          const std::optional<fault_t> fault = Provoke(later, rig, sequence++);
+          rig.End(Rig::kCertifier, SIGKILL);
+          rig.Start(Rig::kCertifier);
+          if (fault) DemandStillLatched(later, rig, *fault);
+          std::filesystem::remove(filler);
+        },
+        options_.others);
 
     Row& read_only = Begin("The certifier's state read-only at its start", options_.others);
-    Tries(read_only, rig, [&](int) {
-      rig.End(Rig::kCertifier);
-      remount(read_only, MS_RDONLY);
-      demand_not_armed(read_only, "the disk was read-only");
-      remount(read_only, 0);
-    }, options_.others);
+    Tries(
+        read_only, rig,
+        [&](int) {
+          rig.End(Rig::kCertifier);
+          remount(read_only, MS_RDONLY);
+          demand_not_armed(read_only, "the disk was read-only");
+          remount(read_only, 0);
+        },
+        options_.others);
   }
   ::umount(directory.c_str());
 }
@@ -844,22 +922,26 @@ void Campaign::Gone() {
     Row& row = Begin(fault, options_.others);
     std::int64_t gone = 0;
     const auto& logger = rig.witness().logger_status();
-    Tries(row, rig, [&](int) {
-      rig.Listen(kHeartbeat);
-      const logger_status_t before = *logger;
-      take_away(rig.directory());
-      const auto goes_on = [&] {
-        return logger->events_written > before.events_written + 50 && logger->state != logger_status_t::ERROR &&
-               (is_database ? logger->state == logger_status_t::STALE : logger->events_lost > before.events_lost);
-      };
-      Demand(row, rig.ListenUntil(goes_on, kSaysSoon), "it does not record again, or does not say what is lost: " +
-                                                           GetText(logger->message));
-      Demand(row, is_database || logger->events_lost - before.events_lost >= before.events_written - gone,
-             "it counts less as lost than it had confirmed");
-      gone += logger->events_lost - before.events_lost;
-      if (is_database) rig.End(Rig::kLogger), gone = 0;  // the next one makes the rows again
-    }, options_.others);
-    Remark(row, is_database ? "the next start makes the rows again" : "lost are the events that were deleted, and counted");
+    Tries(
+        row, rig,
+        [&](int) {
+          rig.Listen(kHeartbeat);
+          const logger_status_t before = *logger;
+          take_away(rig.directory());
+          const auto goes_on = [&] {
+            return logger->events_written > before.events_written + 50 && logger->state != logger_status_t::ERROR &&
+                   (is_database ? logger->state == logger_status_t::STALE : logger->events_lost > before.events_lost);
+          };
+          Demand(row, rig.ListenUntil(goes_on, kSaysSoon),
+                 "it does not record again, or does not say what is lost: " + GetText(logger->message));
+          Demand(row, is_database || logger->events_lost - before.events_lost >= before.events_written - gone,
+                 "it counts less as lost than it had confirmed");
+          gone += logger->events_lost - before.events_lost;
+          if (is_database) rig.End(Rig::kLogger), gone = 0;  // the next one makes the rows again
+        },
+        options_.others);
+    Remark(row,
+           is_database ? "the next start makes the rows again" : "lost are the events that were deleted, and counted");
     if (!is_database) row.lost_by_logger.reset();
   }
 }
@@ -927,14 +1009,17 @@ void Campaign::LostRoute() {
   Rig rig(DemoTask());
   Row& row = Begin(fault, options_.others);
   const auto not_sent = [&] { return rig.witness().status() ? rig.witness().status()->messages_not_sent : 0; };
-  Tries(row, rig, [&](int) {
-    const std::int64_t before = not_sent();
-    Demand(row, network.SetRoute(false), "the route stays");
-    rig.Listen(milliseconds(1000));
-    Demand(row, network.SetRoute(true), "the route does not come back");
-    const bool counted = rig.ListenUntil([&] { return not_sent() > before; }, kSaysSoon);
-    Demand(row, counted, "the certifier counts no message that the bus refused");
-  }, options_.others, true);
+  Tries(
+      row, rig,
+      [&](int) {
+        const std::int64_t before = not_sent();
+        Demand(row, network.SetRoute(false), "the route stays");
+        rig.Listen(milliseconds(1000));
+        Demand(row, network.SetRoute(true), "the route does not come back");
+        const bool counted = rig.ListenUntil([&] { return not_sent() > before; }, kSaysSoon);
+        Demand(row, counted, "the certifier counts no message that the bus refused");
+      },
+      options_.others, true);
 }
 
 // Certainly bad, each way in turn.
@@ -944,14 +1029,10 @@ std::string Campaign::Spoilt(const std::string& task, int way) {
     return std::string(task).replace(task.find(good), good.size(), bad);
   };
   switch (way % 4) {
-    case 0:
-      return cut_before(task.find("\ntask:"));  // which is required
-    case 1:
-      return cut_before(task.size()) + "\nno_such_key: 1\n";
-    case 2:
-      return with("dt: 0.1", "dt: .nan");
-    default:
-      return with("\ntransitions: ", "\ntransitions: /there_is_none");
+    case 0: return cut_before(task.find("\ntask:"));  // which is required
+    case 1: return cut_before(task.size()) + "\nno_such_key: 1\n";
+    case 2: return with("dt: 0.1", "dt: .nan");
+    default: return with("\ntransitions: ", "\ntransitions: /there_is_none");
   }
 }
 
@@ -959,31 +1040,34 @@ void Campaign::BadReload() {
   Rig rig(DemoTask());
   Row& row = Begin("Reload of a bad task file", options_.others);
   const std::string path = rig.task_path(), good = rig.task();
-  Tries(row, rig, [&](int i) {
-    const certifier_status_v3_t before = *rig.witness().status();
-    const auto& now = rig.witness().status();
-    std::ofstream(path) << Spoilt(good, i / 2);
-    if (i % 2 == 0)
-      rig.Signal(Rig::kCertifier, SIGHUP);
-    else
-      rig.Command(command_t::RELOAD);
-    const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
-    Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
-    const std::int64_t certificates = rig.witness().certificates();
-    const auto certifies = [&] { return rig.witness().certificates() > certificates; };
-    Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
-    rig.Listen(kHeartbeat);
-    Demand(row, now->failed_reloads == before.failed_reloads + 1, "it was not refused once");
-    Demand(row, GetText(now->message).starts_with("the last reload failed"), "the heartbeat does not say so");
-    Demand(row, now->version == before.version, "it raised the version");
-    const Digest digest = GetDigest(rig.witness().last_certified()->config_digest);
-    Demand(row, digest == GetDigest(before.config_digest), "plans were certified under another task");
+  Tries(
+      row, rig,
+      [&](int i) {
+        const certifier_status_v3_t before = *rig.witness().status();
+        const auto& now = rig.witness().status();
+        std::ofstream(path) << Spoilt(good, i / 2);
+        if (i % 2 == 0)
+          rig.Signal(Rig::kCertifier, SIGHUP);
+        else
+          rig.Command(command_t::RELOAD);
+        const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
+        Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
+        const std::int64_t certificates = rig.witness().certificates();
+        const auto certifies = [&] { return rig.witness().certificates() > certificates; };
+        Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
+        rig.Listen(kHeartbeat);
+        Demand(row, now->failed_reloads == before.failed_reloads + 1, "it was not refused once");
+        Demand(row, GetText(now->message).starts_with("the last reload failed"), "the heartbeat does not say so");
+        Demand(row, now->version == before.version, "it raised the version");
+        const Digest digest = GetDigest(rig.witness().last_certified()->config_digest);
+        Demand(row, digest == GetDigest(before.config_digest), "plans were certified under another task");
 
-    std::ofstream(path) << good;
-    rig.Command(command_t::RELOAD);
-    const auto taken = [&] { return now->version > before.version; };
-    Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
-  }, options_.others);
+        std::ofstream(path) << good;
+        rig.Command(command_t::RELOAD);
+        const auto taken = [&] { return now->version > before.version; };
+        Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
+      },
+      options_.others);
   ReloadOfNoFile(rig);
 }
 
@@ -994,39 +1078,39 @@ void Campaign::PutNoFile(const std::string& path, int way) {
     case 0:
       if (::mkfifo(path.c_str(), 0600) != 0) throw std::runtime_error(path + ": no pipe can be made");
       return;
-    case 1:
-      return std::filesystem::create_symlink("/dev/zero", path);
-    case 2:
-      return (void)std::filesystem::create_directory(path);
-    default:
-      return std::filesystem::create_symlink(path, path);  // cannot be read, not even by root
+    case 1: return std::filesystem::create_symlink("/dev/zero", path);
+    case 2: return (void)std::filesystem::create_directory(path);
+    default: return std::filesystem::create_symlink(path, path);  // cannot be read, not even by root
   }
 }
 
 void Campaign::ReloadOfNoFile(Rig& rig) {
   Row& row = Begin("Reload of a pipe, /dev/zero, a directory, an unreadable file", options_.others);
   const std::string path = rig.task_path(), good = rig.task();
-  Tries(row, rig, [&](int i) {
-    const certifier_status_v3_t before = *rig.witness().status();
-    const auto& now = rig.witness().status();
-    PutNoFile(path, i);
-    rig.Signal(Rig::kRobot, SIGHUP);
-    rig.Command(command_t::RELOAD);
-    const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
-    Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
-    Demand(row, now->version == before.version, "it raised the version");
-    const std::int64_t certificates = rig.witness().certificates();
-    const auto certifies = [&] { return rig.witness().certificates() > certificates; };
-    Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
-    const bool ends = i / 4 % 2 == 1;
-    if (ends) rig.End(Rig::kCertifier);  // that it ends in time is looked at after each try
-    std::filesystem::remove_all(path);
-    std::ofstream(path) << good;
-    if (ends) return;
-    rig.Command(command_t::RELOAD);
-    const auto taken = [&] { return now->version > before.version; };
-    Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
-  }, options_.others);
+  Tries(
+      row, rig,
+      [&](int i) {
+        const certifier_status_v3_t before = *rig.witness().status();
+        const auto& now = rig.witness().status();
+        PutNoFile(path, i);
+        rig.Signal(Rig::kRobot, SIGHUP);
+        rig.Command(command_t::RELOAD);
+        const auto refused = [&] { return now->failed_reloads > before.failed_reloads; };
+        Demand(row, rig.ListenUntil(refused, kSaysSoon), "it was not refused");
+        Demand(row, now->version == before.version, "it raised the version");
+        const std::int64_t certificates = rig.witness().certificates();
+        const auto certifies = [&] { return rig.witness().certificates() > certificates; };
+        Demand(row, rig.ListenUntil(certifies, kSaysSoon), "nothing was certified after it");
+        const bool ends = i / 4 % 2 == 1;
+        if (ends) rig.End(Rig::kCertifier);  // that it ends in time is looked at after each try
+        std::filesystem::remove_all(path);
+        std::ofstream(path) << good;
+        if (ends) return;
+        rig.Command(command_t::RELOAD);
+        const auto taken = [&] { return now->version > before.version; };
+        Demand(row, rig.ListenUntil(taken, kSaysSoon), "the good file was not taken after it");
+      },
+      options_.others);
 }
 
 std::string Table(const std::vector<Row>& rows, const Options& options) {
@@ -1043,9 +1127,12 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
        << "had to be refused or said was not, or at the end the logs were not what the database has of them.\n"
        << "*Lost*: events that the logger had confirmed and its log does not hold, looked at after each try,\n"
        << "those of a logger that ended once the next one has mended its logs;\n"
-       << "what a full disk keeps out is never confirmed; `-`: no logger ran, or its logs were taken away. *Recovered*: within 20 s, after a reset\n"
-       << "where a fault was latched, the certifier is OK, the robot executes a plan that was certified since, and the logger\n"
-       << "records. Under raw datagrams it is forbidden too that a process grows by 48 MB. *Said why*: a process that cannot start exits with the reason.\n\n"
+       << "what a full disk keeps out is never confirmed; `-`: no logger ran, or its logs were taken away. "
+          "*Recovered*: within 20 s, after a reset\n"
+       << "where a fault was latched, the certifier is OK, the robot executes a plan that was certified since, and the "
+          "logger\n"
+       << "records. Under raw datagrams it is forbidden too that a process grows by 48 MB. *Said why*: a process that "
+          "cannot start exits with the reason.\n\n"
        << "| fault | tries | forbidden | lost | recovered | said why | |\n|---|---|---|---|---|---|---|\n";
   for (const Row& row : rows)
     text << "| " << row.fault << " | " << row.tries << " | " << row.forbidden << " | "

@@ -1,5 +1,5 @@
-/** The wall clock of a process that runs with the library made of settable_clock.cpp: a file that the process and whoever
-sets its clock both map. */
+/** The wall clock of a process that runs with the library made of settable_clock.cpp: a file that the process and
+whoever sets its clock both map. */
 #pragma once
 
 #include <atomic>

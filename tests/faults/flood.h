@@ -15,8 +15,8 @@ class ForgedFlood final {
  public:
   /** Sends LCM datagrams that have `payloads` in turn to the bus, `rate` a second, until it is destroyed.
   @throws std::runtime_error if there is no socket. */
-  ForgedFlood(const std::string& url, const std::string& channel, const std::vector<std::vector<std::uint8_t>>& payloads,
-              double rate);
+  ForgedFlood(const std::string& url, const std::string& channel,
+              const std::vector<std::vector<std::uint8_t>>& payloads, double rate);
   ~ForgedFlood();
 
   [[nodiscard]] std::int64_t sent() const { return sent_; }

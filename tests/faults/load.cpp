@@ -16,10 +16,7 @@ constexpr int kClosingAtMost = 50;
 }  // namespace
 
 Load::Load(const Config& config, Make make)
-    : config_(config),
-      make_(std::move(make)),
-      bus_(OpenBus(config.bus, Role::kPlanner)),
-      base_id_(WallClockUs()) {
+    : config_(config), make_(std::move(make)), bus_(OpenBus(config.bus, Role::kPlanner)), base_id_(WallClockUs()) {
   bus_->Subscribe(config_.bus.decision, [this](const Received& r) { OnDecision(r); });
   bus_->Subscribe(config_.bus.status, [this](const Received& r) {
     if (const auto status = Decoded<certifier_status_v3_t>(r.bytes)) status_ = *status;
@@ -117,7 +114,8 @@ void Load::Finish() {
     listen_until_quiet();
   }
   const std::int64_t heard = status_.sequence;
-  while (status_.sequence < heard + 2 && SteadyClockUs() < end + kPatienceUs) ListenUntil(SteadyClockUs() + kQuietUs / 10);
+  while (status_.sequence < heard + 2 && SteadyClockUs() < end + kPatienceUs)
+    ListenUntil(SteadyClockUs() + kQuietUs / 10);
 }
 
 double Percentile(std::vector<double>& values, double fraction) {

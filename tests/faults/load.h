@@ -1,5 +1,5 @@
-/** A steady load for a certifier: signed candidates, one at each of its times, and what becomes of each. They are sent by a
-thread of its own, so nothing that is done with the answers delays the next. */
+/** A steady load for a certifier: signed candidates, one at each of its times, and what becomes of each. They are sent
+by a thread of its own, so nothing that is done with the answers delays the next. */
 #pragma once
 
 #include <atomic>
@@ -32,7 +32,8 @@ class Load final {
 
   /** Sends until an answer comes: all losses from here on are seen as gaps. @throws std::runtime_error after 30 s. */
   void Begin();
-  /** Sends `rate` candidates a second from now on. Where it is kept from sending for more than 50 ms, those are left out. */
+  /** Sends `rate` candidates a second from now on. Where it is kept from sending for more than 50 ms, those are left
+  out. */
   void Start(double rate);
   void ListenUntil(std::int64_t steady_us);
   /** Sends no more; waits for what is still to come, and for a heartbeat of the certifier from after it. */
@@ -44,11 +45,11 @@ class Load final {
   [[nodiscard]] std::int64_t answered_again() const { return answered_again_; }
   /** Decisions that were sent and not heard here, by gaps in their sequence. */
   [[nodiscard]] std::int64_t answers_lost() const { return last_decision_ - first_decision_ + 1 - decisions_; }
-  /** Microseconds from each candidate's stamp, before it is encoded and signed, to the kernel's of its answer; since the last
-  call. */
+  /** Microseconds from each candidate's stamp, before it is encoded and signed, to the kernel's of its answer; since
+  the last call. */
   [[nodiscard]] std::vector<double> TakeLatencies() { return std::exchange(latencies_, {}); }
-  /** By how many microseconds the sender's thread woke up too late, each time since the last call: what the machine does to a
-  thread that only sleeps. */
+  /** By how many microseconds the sender's thread woke up too late, each time since the last call: what the machine
+  does to a thread that only sleeps. */
   [[nodiscard]] std::vector<double> TakeLateness();
   [[nodiscard]] const certifier_status_v3_t& status() const { return status_; }
 

@@ -1,4 +1,5 @@
-/** Somebody who sees obstacles: sends them by a thread of its own, and can fall silent, lose messages and talk nonsense. */
+/** Somebody who sees obstacles: sends them by a thread of its own, and can fall silent, lose messages and talk
+nonsense. */
 #pragma once
 
 #include <atomic>
@@ -16,7 +17,8 @@ namespace forereach {
 
 class Perception final {
  public:
-  Perception(std::unique_ptr<Bus> bus, std::string channel, const GateOptions& options, const std::vector<Obstacle>& obstacles)
+  Perception(std::unique_ptr<Bus> bus, std::string channel, const GateOptions& options,
+             const std::vector<Obstacle>& obstacles)
       : bus_(std::move(bus)), channel_(std::move(channel)), sender_(ObstacleSender::PeriodUs(options)) {
     sender_.Set(obstacles);
     thread_ = std::thread([this] {

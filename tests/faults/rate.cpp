@@ -1,5 +1,5 @@
-// A thousand full-size candidates a second through the certifier's process on a real loopback bus: what is answered, what the
-// bus loses, how long an answer takes. Writes a table.
+// A thousand full-size candidates a second through the certifier's process on a real loopback bus: what is answered,
+// what the bus loses, how long an answer takes. Writes a table.
 #include <algorithm>
 #include <iostream>
 #include <optional>
@@ -10,8 +10,8 @@
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
 #include "forereach/decision_t.hpp"
-#include "lcmtypes/names.h"
 #include "lcmtypes/authentic.h"
+#include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/flood.h"
 #include "tests/faults/load.h"
@@ -51,7 +51,8 @@ int MostSteps(const Config& config) {
   for (int steps = kMaxSteps; steps > 0; --steps) {
     const candidate_plan_t candidate = Standing(config, steps);
     Tube tube;
-    if (certifier.Certify(PlanOf(candidate), InitialSetOf(candidate), config.obstacles, tube).outcome == Outcome::kCertified)
+    if (certifier.Certify(PlanOf(candidate), InitialSetOf(candidate), config.obstacles, tube).outcome ==
+        Outcome::kCertified)
       return steps;
   }
   throw std::runtime_error("nothing is certified");
@@ -59,7 +60,8 @@ int MostSteps(const Config& config) {
 
 using Payloads = std::vector<std::vector<std::uint8_t>>;
 
-// What a stranger can send: unsigned and random trailers, genuine messages once more, genuine trailers behind altered bodies.
+// What a stranger can send: unsigned and random trailers, genuine messages once more, genuine trailers behind altered
+// bodies.
 Payloads Forgeries(const Config& config, const Payloads& genuine, std::size_t body_bytes) {
   constexpr int kEach = 32;
   Payloads payloads;
@@ -78,8 +80,8 @@ Payloads Forgeries(const Config& config, const Payloads& genuine, std::size_t bo
 
 Row Measure(const Options& options, const std::string& name, Config config, int steps, std::size_t flood_bytes = 0) {
   Row row{.name = name};
-  std::vector<std::string> command{FOREREACH_CERTIFIER, "--config", config.path, "--lcm-url", config.bus.url,
-                                   "--state", config.path + ".state"};
+  std::vector<std::string> command{FOREREACH_CERTIFIER, "--config", config.path,           "--lcm-url",
+                                   config.bus.url,      "--state",  config.path + ".state"};
   if (!config.bus.key.empty()) command.insert(command.end(), {"--key", config.bus.key});
   ChildProcess certifier(command);
   if (!certifier.WaitForLog("ready on")) throw std::runtime_error(certifier.error());
@@ -98,11 +100,13 @@ Row Measure(const Options& options, const std::string& name, Config config, int 
   load.Start(options.rate);
   load.ListenUntil(begin + static_cast<std::int64_t>(options.seconds * 1e6));
   row.asked = options.rate * static_cast<double>(SteadyClockUs() - begin) * 1e-6;
-  if (flood) row.flood_per_s = static_cast<double>(flood->sent()) / (static_cast<double>(SteadyClockUs() - begin) * 1e-6);
+  if (flood)
+    row.flood_per_s = static_cast<double>(flood->sent()) / (static_cast<double>(SteadyClockUs() - begin) * 1e-6);
   flood.reset();
   load.Finish();
   std::vector<double> latencies = load.TakeLatencies();
-  row.p50_us = Percentile(latencies, 0.5), row.p99_us = Percentile(latencies, 0.99), row.worst_us = Percentile(latencies, 1);
+  row.p50_us = Percentile(latencies, 0.5), row.p99_us = Percentile(latencies, 0.99),
+  row.worst_us = Percentile(latencies, 1);
   row.sent = load.sent(), row.answered = load.answered(), row.again = load.answered_again();
   row.answers_lost = load.answers_lost();
   row.status = load.status();
@@ -121,38 +125,46 @@ std::string OtherAnswers(const certifier_status_v3_t& status) {
 
 std::string Table(const Options& options, int steps, const std::vector<Row>& rows) {
   std::ostringstream text;
-  text << "Made by `scripts/faults rate --seconds " << options.seconds << " --rate " << options.rate << "`: candidates of "
-       << steps << " steps, all to be certified, from one process to the\n"
-       << "certifier's. *Lost there*: candidates, by the certifier's count of gaps. *Lost back*: decisions, by gaps heard.\n"
-       << "Latency from a candidate's stamp to the arrival of its answer; *gate*: of this the certifier's work on the last 1024.\n\n"
-       << "| | sent | certified | other answers | answered twice | lost there | lost back | unaccounted | p50 us | p99 us "
-       << "| worst us | gate p50 us | gate p99 us |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  text << "Made by `scripts/faults rate --seconds " << options.seconds << " --rate " << options.rate
+       << "`: candidates of " << steps << " steps, all to be certified, from one process to the\n"
+       << "certifier's. *Lost there*: candidates, by the certifier's count of gaps. *Lost back*: decisions, by gaps "
+          "heard.\n"
+       << "Latency from a candidate's stamp to the arrival of its answer; *gate*: of this the certifier's work on the "
+          "last 1024.\n\n"
+       << "| | sent | certified | other answers | answered twice | lost there | lost back | unaccounted | p50 us | p99 "
+          "us "
+       << "| worst us | gate p50 us | gate p99 us "
+          "|\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Row& row : rows) {
     const certifier_status_v3_t& status = row.status;
     const std::int64_t unaccounted = row.sent - row.answered - status.candidates_lost - row.answers_lost;
     text << "| " << row.name << " | " << row.sent << " | " << status.by_outcome[decision_t::CERTIFIED] << " | "
          << OtherAnswers(status) << " | " << row.again << " | " << status.candidates_lost << " | " << row.answers_lost
-         << " | " << unaccounted << " | " << row.p50_us << " | " << row.p99_us << " | " << row.worst_us << " | " << status.elapsed_p50_us << " | "
-         << status.elapsed_p99_us << " |\n";
+         << " | " << unaccounted << " | " << row.p50_us << " | " << row.p99_us << " | " << row.worst_us << " | "
+         << status.elapsed_p50_us << " | " << status.elapsed_p99_us << " |\n";
   }
   return text.str();
 }
 
 std::string FloodTable(const Options& options, const std::vector<Row>& rows) {
   std::ostringstream text;
-  text << "Made by `scripts/faults rate --flood " << options.flood << " --rate " << options.rate << " --seconds "
-       << options.seconds << "`: signed candidates of 12 steps to the certifier's process\nwhile somebody without a key sends "
-       << "forged ones on the same channel: another robot's signatures, no signatures, and where they are as\nlong as a "
-       << "candidate also genuine ones once more and genuine trailers behind altered bodies. *Forged*: a second, as many as "
-       << "were reached.\n*Lost*: candidates, by the certifier's count of gaps, and decisions, by gaps heard.\n\n"
-       << "| flood | forged | refused | sent | certified | other answers | lost there | lost back | p50 us | p99 us | worst us |\n"
-       << "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  text
+      << "Made by `scripts/faults rate --flood " << options.flood << " --rate " << options.rate << " --seconds "
+      << options.seconds
+      << "`: signed candidates of 12 steps to the certifier's process\nwhile somebody without a key sends "
+      << "forged ones on the same channel: another robot's signatures, no signatures, and where they are as\nlong as a "
+      << "candidate also genuine ones once more and genuine trailers behind altered bodies. *Forged*: a second, as "
+         "many as "
+      << "were reached.\n*Lost*: candidates, by the certifier's count of gaps, and decisions, by gaps heard.\n\n"
+      << "| flood | forged | refused | sent | certified | other answers | lost there | lost back | p50 us | p99 us | "
+         "worst us |\n"
+      << "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Row& row : rows) {
     const certifier_status_v3_t& status = row.status;
     text << "| " << row.name << " | " << static_cast<std::int64_t>(row.flood_per_s) << " | "
          << status.refused_unsigned + status.refused_forged + status.refused_replayed << " | " << row.sent << " | "
-         << status.by_outcome[decision_t::CERTIFIED] << " | " << OtherAnswers(status) << " | " << status.candidates_lost << " | "
-         << row.answers_lost << " | " << row.p50_us << " | " << row.p99_us << " | " << row.worst_us << " |\n";
+         << status.by_outcome[decision_t::CERTIFIED] << " | " << OtherAnswers(status) << " | " << status.candidates_lost
+         << " | " << row.answers_lost << " | " << row.p50_us << " | " << row.p99_us << " | " << row.worst_us << " |\n";
   }
   return text.str();
 }
@@ -166,10 +178,14 @@ int MeasureFlood(const Options& options, Config config) {
   for (const std::size_t bytes : {std::size_t{64}, std::size_t{1000}, EncodedSize<candidate_plan_t>()})
     rows.push_back(Measure(options, std::to_string(bytes) + " bytes", config, kSteps, bytes));
   Publish(options.report, "forged flood", FloodTable(options, rows));
-  return std::ranges::all_of(rows, [](const Row& row) { return row.again == 0 && row.status.by_outcome[decision_t::CERTIFIED] > 0; }) ? 0 : 1;
+  return std::ranges::all_of(
+             rows, [](const Row& row) { return row.again == 0 && row.status.by_outcome[decision_t::CERTIFIED] > 0; })
+             ? 0
+             : 1;
 }
 
-// What is sent is answered once or counted as lost. In a short run a busy machine may have kept the load below what was asked.
+// What is sent is answered once or counted as lost. In a short run a busy machine may have kept the load below what was
+// asked.
 bool AddsUp(const Options& options, const Row& row) {
   const bool whole_load = options.seconds < 10 || static_cast<double>(row.sent) >= 0.99 * row.asked;
   return row.again == 0 && row.answered + row.answers_lost == row.status.candidates &&
@@ -178,8 +194,9 @@ bool AddsUp(const Options& options, const Row& row) {
 
 int Main(int argc, char** argv) {
   Options options;
-  CLI::App app("Full-size candidates at a steady rate through the certifier; says what is answered and what the bus loses.",
-               "forereach_rate_processes");
+  CLI::App app(
+      "Full-size candidates at a steady rate through the certifier; says what is answered and what the bus loses.",
+      "forereach_rate_processes");
   app.add_option("--seconds", options.seconds, "How long, for each row")->capture_default_str();
   app.add_option("--rate", options.rate, "Candidates a second")->capture_default_str();
   app.add_option("--flood", options.flood, "Forged messages a second beside them: says what becomes of the honest ones")
@@ -196,7 +213,8 @@ int Main(int argc, char** argv) {
     for (const bool is_signed : {false, true}) {
       config.bus.url = url + (small ? "&recv_buf_size=212992" : "");
       config.bus.key = is_signed ? key : "";
-      const std::string name = std::string(is_signed ? "signed" : "unsigned") + (small ? ", receive buffers of 208 kB" : "");
+      const std::string name =
+          std::string(is_signed ? "signed" : "unsigned") + (small ? ", receive buffers of 208 kB" : "");
       rows.push_back(Measure(options, name, config, steps));
     }
   Publish(options.report, "rate", Table(options, steps, rows));

@@ -10,7 +10,8 @@
 
 namespace forereach {
 
-/** Replaces what stands between `<!-- NAME -->` and `<!-- end of NAME -->` in a file; appends both where they are missing. */
+/** Replaces what stands between `<!-- NAME -->` and `<!-- end of NAME -->` in a file; appends both where they are
+missing. */
 inline void ReplaceBetween(const std::string& path, const std::string& name, const std::string& text) {
   const std::string begin = "<!-- " + name + " -->\n", end = "<!-- end of " + name + " -->";
   std::ostringstream old;

@@ -20,7 +20,7 @@ namespace {
 constexpr std::chrono::seconds kRecovers{20};
 constexpr std::chrono::milliseconds kLastWords{50};  // what a process sent before it ended has been heard then
 constexpr std::chrono::seconds kDriveAtMost{6};      // at the next Heal; it takes ten, and a try and a Heal two each
-constexpr std::chrono::seconds kSilent{5};  // a robot whose clock went back waits until it is where it was
+constexpr std::chrono::seconds kSilent{5};           // a robot whose clock went back waits until it is where it was
 constexpr std::size_t kTailBytes = 1000;
 
 const std::array<std::string, Rig::kRoles> kPrograms{FOREREACH_LOGGER, FOREREACH_CERTIFIER, FOREREACH_PLANNER,
@@ -42,7 +42,8 @@ std::set<std::string> LogsIn(const std::string& directory) {
 std::int64_t EventsIn(const std::set<std::string>& logs) {
   std::int64_t events = 0;
   std::vector<std::string> there;
-  std::ranges::copy_if(logs, std::back_inserter(there), [](const std::string& log) { return std::filesystem::exists(log); });
+  std::ranges::copy_if(logs, std::back_inserter(there),
+                       [](const std::string& log) { return std::filesystem::exists(log); });
   ForEachEvent(there, [&events](const LogEvent&, const std::string&) { ++events; });
   return events;
 }
@@ -54,7 +55,9 @@ std::string Tail(const std::string& text) {
 }  // namespace
 
 Rig::Rig(const std::string& task, const Options& options)
-    : options_(options), task_(task + "bus: {name: campaign}\n"), task_path_(scratch_.Write("task.yaml", task_)),
+    : options_(options),
+      task_(task + "bus: {name: campaign}\n"),
+      task_path_(scratch_.Write("task.yaml", task_)),
       key_path_(MakeTestKeys(scratch_ / "keys", "campaign")),
       next_directory_(scratch_ / "log"),
       state_(scratch_ / "state") {
@@ -68,7 +71,8 @@ Rig::Rig(const std::string& task, const Options& options)
   open_ = OpenBus(near_url_);
   signed_ = OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); });
   // Clocks go back: it hears whatever is authentic, from whatever time.
-  heard_ = OpenSignedBus(near_url_, LoadPublicKeys(key_path_), config_.bus.bus_name(), config_.bus.speakers(), [] { return 0; });
+  heard_ = OpenSignedBus(near_url_, LoadPublicKeys(key_path_), config_.bus.bus_name(), config_.bus.speakers(),
+                         [] { return 0; });
   witness_ = std::make_unique<Witness>(*heard_, config_.bus, options_.relayed);
   if (config_.gate.obstacles == ObstaclesSource::kBus)
     perception_ = std::make_unique<Perception>(OpenBusOfAllRoles(config_.bus, [this] { return NowUs(); }),
@@ -77,9 +81,9 @@ Rig::Rig(const std::string& task, const Options& options)
 }
 
 void Rig::StartSecondCertifier() {
-  second_ = std::make_unique<ChildProcess>(std::vector<std::string>{
-      FOREREACH_CERTIFIER, "--config", task_path_, "--lcm-url", url(kCertifier), "--key", key_path_, "--state",
-      state_ + " of the second"});
+  second_ = std::make_unique<ChildProcess>(std::vector<std::string>{FOREREACH_CERTIFIER, "--config", task_path_,
+                                                                    "--lcm-url", url(kCertifier), "--key", key_path_,
+                                                                    "--state", state_ + " of the second"});
 }
 
 void Rig::EndSecondCertifier() {
@@ -116,7 +120,8 @@ std::vector<std::string> Rig::UnderClock(Role role) {
   const std::string path = scratch_ / (std::string("clock of the ") + kNames[role]);
   if (!clocks_[role]) clocks_[role].reset(MapClockFile(path.c_str()));
   if (!clocks_[role]) throw std::runtime_error(path + " cannot be mapped");
-  return {"/usr/bin/env", "LD_PRELOAD=" FOREREACH_SETTABLE_CLOCK, "FOREREACH_CLOCK_FILE=" + path, SanitizerAfterPreload()};
+  return {"/usr/bin/env", "LD_PRELOAD=" FOREREACH_SETTABLE_CLOCK, "FOREREACH_CLOCK_FILE=" + path,
+          SanitizerAfterPreload()};
 }
 
 void Rig::SetClock(Role role, std::chrono::microseconds offset) {
@@ -173,7 +178,9 @@ std::vector<std::string> Rig::TakeBadEndings() {
   return std::exchange(bad_endings_, {});
 }
 
-bool Rig::IsAlive(Role role) const { return processes_[role] && !processes_[role]->WaitForEnd(std::chrono::milliseconds(0)); }
+bool Rig::IsAlive(Role role) const {
+  return processes_[role] && !processes_[role]->WaitForEnd(std::chrono::milliseconds(0));
+}
 
 void Rig::Listen(std::chrono::milliseconds time) {
   static_cast<void>(ListenUntil([] { return false; }, time));
@@ -219,10 +226,10 @@ std::string Rig::Heal() {
           Command(command_t::RESET);
           next_reset = std::chrono::steady_clock::now() + std::chrono::milliseconds(200);
         }
-        const bool silent = std::chrono::steady_clock::now() - std::max(witness_->robot_heard(), drive_began_) > kSilent;
+        const bool silent =
+            std::chrono::steady_clock::now() - std::max(witness_->robot_heard(), drive_began_) > kSilent;
         if (silent || !IsAlive(kRobot) || !IsAlive(kPlanner)) DriveAnew();
-        return status && status->level == certifier_status_v3_t::OK &&
-               witness_->executed() > certificates_before &&
+        return status && status->level == certifier_status_v3_t::OK && witness_->executed() > certificates_before &&
                witness_->logger_status() && witness_->logger_status()->state == logger_status_t::OK;
       },
       kRecovers);
@@ -232,7 +239,8 @@ std::string Rig::Heal() {
   }
   const auto& status = witness_->status();
   std::string why = status ? "certifier: " + GetText(status->message) : "no certifier is heard";
-  why += witness_->logger_status() ? "; logger: " + GetText(witness_->logger_status()->message) : "; no logger is heard";
+  why +=
+      witness_->logger_status() ? "; logger: " + GetText(witness_->logger_status()->message) : "; no logger is heard";
   for (const Role role : {kLogger, kCertifier, kPlanner, kRobot})
     why += std::string("; ") + kNames[role] + (IsAlive(role) ? ": " + LastLine(processes_[role]->error()) : " ended");
   return why + "; decisions " + std::to_string(witness_->decisions() - before) + ", certificates " +

@@ -54,7 +54,9 @@ class Rig final {
   [[nodiscard]] std::vector<std::string> TakeBadEndings();
   [[nodiscard]] bool IsAlive(Role role) const;
   /** Bytes of memory that it holds; 0 if it is not there. */
-  [[nodiscard]] double Resident(Role role) const { return processes_[role] ? ResidentBytes(processes_[role]->pid()) : 0; }
+  [[nodiscard]] double Resident(Role role) const {
+    return processes_[role] ? ResidentBytes(processes_[role]->pid()) : 0;
+  }
 
   /** From now on the wall clock of a process is the machine's plus `offset`. @throws std::runtime_error if the process
   does not look at it. */
@@ -73,8 +75,8 @@ class Rig final {
   void DriveAnew();
 
   /** Events that logs lack, found since the last call: of the present logger's those that it has confirmed, as far as
-  was heard; of one before it also those that stood in them when the next was started, once more after that one has mended
-  them. What a logger cannot write it does not confirm. */
+  was heard; of one before it also those that stood in them when the next was started, once more after that one has
+  mended them. What a logger cannot write it does not confirm. */
   [[nodiscard]] std::int64_t TakeLost();
   /** Holds all logs against the databases of their directories (logger/check.h). No logger may run.
   @return one entry for each directory in which something is amiss. */

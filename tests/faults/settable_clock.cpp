@@ -1,6 +1,6 @@
-// Preloaded into a process (LD_PRELOAD), moves its wall clock by what the file FOREREACH_CLOCK_FILE says, from one reading to
-// the next: what std::chrono and GLib read, and the kernel's stamps of datagrams, which are the times messages
-// came. The steady clock stays as it is.
+// Preloaded into a process (LD_PRELOAD), moves its wall clock by what the file FOREREACH_CLOCK_FILE says, from one
+// reading to the next: what std::chrono and GLib read, and the kernel's stamps of datagrams, which are the times
+// messages came. The steady clock stays as it is.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -47,7 +47,8 @@ extern "C" {
 int clock_gettime(clockid_t clock, timespec* time) noexcept {
   static auto* const next = Next<int(clockid_t, timespec*)>("clock_gettime");
   const int result = next(clock, time);
-  if (result == 0 && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE)) Move(time->tv_sec, time->tv_nsec, 1000);
+  if (result == 0 && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE))
+    Move(time->tv_sec, time->tv_nsec, 1000);
   return result;
 }
 

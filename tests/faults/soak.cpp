@@ -1,12 +1,12 @@
-// The soak: certifier and logger under a steady load of signed candidates, interval by interval. Memory has to stay flat,
-// latency not to drift, and all counters to add up. Writes a table; what does not hold is an error.
+// The soak: certifier and logger under a steady load of signed candidates, interval by interval. Memory has to stay
+// flat, latency not to drift, and all counters to add up. Writes a table; what does not hold is an error.
 #include <algorithm>
 #include <csignal>
 #include <iostream>
 #include <sstream>
 
-#include <CLI/CLI.hpp>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
@@ -24,8 +24,8 @@ constexpr double kJudgedFromMinutes = 10;  // shorter runs are all warming up
 // The last fifth of the run against the second, by medians.
 constexpr double kCertifierMayGrowKb = 2048, kLoggerMayGrowKb = 8192;
 constexpr double kLatencyMayGrowBy = 1.5, kAndByUs = 100;
-// Between a candidate's stamp and its answer's two threads of the certifier wake up, and the kernel's own between them: the
-// 99th percentile may grow by three times what a thread that only sleeps is woken later.
+// Between a candidate's stamp and its answer's two threads of the certifier wake up, and the kernel's own between them:
+// the 99th percentile may grow by three times what a thread that only sleeps is woken later.
 constexpr double kWakings = 3;
 
 struct Options {
@@ -71,8 +71,10 @@ class Soak final {
   }
 
   void Run() {
-    const std::vector<std::string> common{"--config", config_.path, "--lcm-url", config_.bus.url, "--key", config_.bus.key};
-    std::vector<std::string> of_logger{FOREREACH_LOGGER, "--directory", log().string()}, of_certifier{FOREREACH_CERTIFIER};
+    const std::vector<std::string> common{"--config",      config_.path, "--lcm-url",
+                                          config_.bus.url, "--key",      config_.bus.key};
+    std::vector<std::string> of_logger{FOREREACH_LOGGER, "--directory", log().string()},
+        of_certifier{FOREREACH_CERTIFIER};
     of_logger.insert(of_logger.end(), common.begin(), common.end());
     of_certifier.insert(of_certifier.end(), common.begin(), common.end());
     ChildProcess logger(of_logger), certifier(of_certifier);
@@ -103,12 +105,18 @@ class Soak final {
 
   void EndInterval(double minutes, pid_t certifier, pid_t logger) {
     std::vector<double> latencies = load_->TakeLatencies(), lateness = load_->TakeLateness();
-    const Interval now{minutes, Percentile(latencies, 0.5), Percentile(latencies, 0.99), Percentile(latencies, 1),
-                       Percentile(lateness, 0.99), ResidentBytes(certifier) / 1024, ResidentBytes(logger) / 1024};
+    const Interval now{minutes,
+                       Percentile(latencies, 0.5),
+                       Percentile(latencies, 0.99),
+                       Percentile(latencies, 1),
+                       Percentile(lateness, 0.99),
+                       ResidentBytes(certifier) / 1024,
+                       ResidentBytes(logger) / 1024};
     intervals_.push_back(now);
     if (intervals_.size() % (kIntervals / 12) == 0)
-      std::cerr << "minute " << minutes << ": p50 " << now.p50_us << " us, p99 " << now.p99_us << " us, a sleeper's " << now.late_p99_us << " us, certifier "
-                << now.certifier_kb << " kB, logger " << now.logger_kb << " kB\n";
+      std::cerr << "minute " << minutes << ": p50 " << now.p50_us << " us, p99 " << now.p99_us << " us, a sleeper's "
+                << now.late_p99_us << " us, certifier " << now.certifier_kb << " kB, logger " << now.logger_kb
+                << " kB\n";
   }
 
   // Medians over the second and the last fifth of the run.
@@ -136,21 +144,23 @@ std::string Soak::Table(const std::vector<std::string>& faults) const {
   std::ostringstream text;
   text << "Made by `scripts/faults soak --minutes " << options_.minutes << " --rate " << options_.rate
        << "`: signed candidates of 12 steps, two of three certified, while the\n"
-       << "logger records. Microseconds from a candidate's stamp to the arrival of its answer; by how much a thread that only\n"
+       << "logger records. Microseconds from a candidate's stamp to the arrival of its answer; by how much a thread "
+          "that only\n"
        << "sleeps wakes up too late on the same machine meanwhile; resident memory.\n\n"
        << "| minute | p50 us | p99 us | worst us | sleeper p99 us | certifier kB | logger kB |\n"
        << "|---:|---:|---:|---:|---:|---:|---:|\n";
   for (std::size_t i = 0; i < intervals_.size(); ++i)
     if (i == 0 || (i + 1) % (kIntervals / 6) == 0)
       text << "| " << intervals_[i].ended_min << " | " << intervals_[i].p50_us << " | " << intervals_[i].p99_us << " | "
-           << intervals_[i].worst_us << " | " << intervals_[i].late_p99_us << " | " << intervals_[i].certifier_kb << " | " << intervals_[i].logger_kb << " |\n";
+           << intervals_[i].worst_us << " | " << intervals_[i].late_p99_us << " | " << intervals_[i].certifier_kb
+           << " | " << intervals_[i].logger_kb << " |\n";
   const certifier_status_v3_t& certifier = load_->status();
-  text << "\nSent " << load_->sent() << ", answered " << load_->answered() << ", of these twice " << load_->answered_again()
-       << "; answers lost on the way " << load_->answers_lost() << ".\nThe certifier counts " << certifier.candidates
-       << " decided on, " << certifier.candidates_lost << " lost on the way and " << certifier.page_faults
-       << " page faults while deciding;\nthe logger " << logger_.events_written << " events written and "
-       << logger_.events_lost << " lost; its database holds " << recorded_.decisions << " decisions and "
-       << recorded_.decisions_lost << " as gaps.\n";
+  text << "\nSent " << load_->sent() << ", answered " << load_->answered() << ", of these twice "
+       << load_->answered_again() << "; answers lost on the way " << load_->answers_lost() << ".\nThe certifier counts "
+       << certifier.candidates << " decided on, " << certifier.candidates_lost << " lost on the way and "
+       << certifier.page_faults << " page faults while deciding;\nthe logger " << logger_.events_written
+       << " events written and " << logger_.events_lost << " lost; its database holds " << recorded_.decisions
+       << " decisions and " << recorded_.decisions_lost << " as gaps.\n";
   text << "Judgement: " << (faults.empty() ? "all holds" : "does not hold");
   if (options_.minutes < kJudgedFromMinutes) text << "; too short to look at load, growth and drift";
   for (const std::string& fault : faults) text << "\n- " << fault;
@@ -175,7 +185,8 @@ std::vector<std::string> Soak::Judge() const {
   equal(certifier.candidates, load_->answered() + load_->answers_lost(), "decided on, and answers heard or missing");
   equal(load_->answered_again(), 0, "answered twice, at most");
   equal(logger_.events_lost, 0, "events lost by the logger, at most");
-  equal(certifier.candidates, recorded_.decisions + recorded_.decisions_lost, "decided on, and decisions recorded or a gap");
+  equal(certifier.candidates, recorded_.decisions + recorded_.decisions_lost,
+        "decided on, and decisions recorded or a gap");
   if (options_.minutes < kJudgedFromMinutes) return faults;
   const auto sent = static_cast<double>(load_->sent());
   demand(sent >= 0.99 * wanted_, "the load was less than asked for: the machine is too busy");

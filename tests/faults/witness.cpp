@@ -43,7 +43,8 @@ void Witness::OnDecision(const Received& received) {
 void Witness::OnStatus(const Received& received) {
   const auto status = Decoded<certifier_status_v3_t>(received.bytes);
   // A certifier that is not in charge decides nothing.
-  if (!status || status->state == certifier_status_v3_t::LISTENING || status->state == certifier_status_v3_t::STANDBY) return;
+  if (!status || status->state == certifier_status_v3_t::LISTENING || status->state == certifier_status_v3_t::STANDBY)
+    return;
   status_ = status;
   if (spoiled_) return;
   if (status->sequence == 0) {  // a certifier's first sign of life

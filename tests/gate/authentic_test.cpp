@@ -58,7 +58,9 @@ TEST(Authentic, TheTrailerIsAsItIsWrittenDown) {
   EXPECT_EQ(FromBigEndian<std::int64_t>(trailer.subspan(16)), kBegun + 1);
   EXPECT_EQ(std::string(trailer.end() - 8, trailer.end()), "FRSIGN02");
   std::vector<std::uint8_t> covered, text;
-  const auto append = [](std::vector<std::uint8_t>& to, const auto& part) { to.insert(to.end(), part.begin(), part.end()); };
+  const auto append = [](std::vector<std::uint8_t>& to, const auto& part) {
+    to.insert(to.end(), part.begin(), part.end());
+  };
   append(text, BigEndian<std::uint64_t>(9));
   append(text, std::string("certifier"));
   append(text, kMessage);
@@ -91,7 +93,8 @@ TEST(Authentic, EveryBitCounts) {
 TEST(Authentic, EveryOtherLengthIsRefused) {
   const std::vector<std::uint8_t> bytes = Signed();
   for (std::size_t size = 0; size < bytes.size(); ++size)
-    EXPECT_EQ(Judge({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)}), Authenticity::kUnsigned) << size;
+    EXPECT_EQ(Judge({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)}), Authenticity::kUnsigned)
+        << size;
   std::vector<std::uint8_t> longer = bytes;
   longer.insert(longer.begin(), 0);
   EXPECT_EQ(Judge(longer), Authenticity::kForged);
@@ -113,7 +116,8 @@ TEST(Authentic, HoldsForItsChannelItsRobotAndItsBus) {
   EXPECT_EQ(Judge(Signed(kBegun + 1, TestKeys("other"))), Authenticity::kForged);
   EXPECT_EQ(Judge(Signed(kBegun + 1, MakeKeyRing("test", DigestOf("other entropy")))), Authenticity::kForged);
   EXPECT_EQ(Judge(kMessage), Authenticity::kUnsigned);
-  const auto of_other_bus = Signer(TestKeys(), "other bus", 1).Sign(Role::kCertifier, "certifier", kMessage, kBegun + 1);
+  const auto of_other_bus =
+      Signer(TestKeys(), "other bus", 1).Sign(Role::kCertifier, "certifier", kMessage, kBegun + 1);
   EXPECT_EQ(Judge(of_other_bus), Authenticity::kForeign);
   Authenticator authenticator = Receiver();
   EXPECT_EQ(authenticator.Check("certifier", of_other_bus).first, Authenticity::kForeign);
@@ -132,7 +136,9 @@ TEST(Authentic, ACounterIsTakenOnce) {
   const auto sign = [](Signer& by, std::int64_t now) { return by.Sign(Role::kCertifier, "certifier", kMessage, now); };
   const auto first = sign(signer, kBegun + 1), second = sign(signer, kBegun + 1);
   Authenticator authenticator = Receiver();
-  const auto judge = [&](const std::vector<std::uint8_t>& bytes) { return authenticator.Check("certifier", bytes).first; };
+  const auto judge = [&](const std::vector<std::uint8_t>& bytes) {
+    return authenticator.Check("certifier", bytes).first;
+  };
   EXPECT_EQ(judge(second), Authenticity::kAuthentic);
   EXPECT_EQ(judge(second), Authenticity::kReplayed);
   EXPECT_EQ(judge(first), Authenticity::kReplayed) << "older ones are not fresh any more";
@@ -191,14 +197,23 @@ TEST(Authentic, AStolenKeyCannotUseUpCountersOfAnotherRole) {
   };
   EXPECT_EQ(certified(), Authenticity::kAuthentic);
   for (std::uint64_t sender = 0; sender < 4 * Authenticator::kMaxSenders; ++sender) {
-    EXPECT_EQ(authenticator.Check("planner", Signer(stolen, kBus, sender).Sign(Role::kPlanner, "planner", kMessage, kFar + static_cast<std::int64_t>(sender))).first,
-              Authenticity::kAuthentic);
-    EXPECT_EQ(authenticator.Check("certifier", Signer(stolen, kBus, sender).Sign(Role::kPlanner, "certifier", kMessage, kFar)).first,
-              Authenticity::kForged);
+    EXPECT_EQ(
+        authenticator
+            .Check("planner", Signer(stolen, kBus, sender)
+                                  .Sign(Role::kPlanner, "planner", kMessage, kFar + static_cast<std::int64_t>(sender)))
+            .first,
+        Authenticity::kAuthentic);
+    EXPECT_EQ(
+        authenticator.Check("certifier", Signer(stolen, kBus, sender).Sign(Role::kPlanner, "certifier", kMessage, kFar))
+            .first,
+        Authenticity::kForged);
   }
   EXPECT_EQ(certified(), Authenticity::kAuthentic) << "its own sender number was among those";
-  EXPECT_EQ(authenticator.Check("certifier", Signer(TestKeys(), kBus, 999).Sign(Role::kCertifier, "certifier", kMessage, kBegun + 2)).first,
-            Authenticity::kAuthentic)
+  EXPECT_EQ(
+      authenticator
+          .Check("certifier", Signer(TestKeys(), kBus, 999).Sign(Role::kCertifier, "certifier", kMessage, kBegun + 2))
+          .first,
+      Authenticity::kAuthentic)
       << "one that has just started";
 }
 

@@ -12,7 +12,8 @@ namespace {
 
 using State = Charge::State;
 
-constexpr Charge::Identity kSelf{100, 5}, kEarlier{99, 9}, kLater{101, 1}, kSameTimeSmaller{100, 4}, kSameTimeLarger{100, 6};
+constexpr Charge::Identity kSelf{100, 5}, kEarlier{99, 9}, kLater{101, 1}, kSameTimeSmaller{100, 4},
+    kSameTimeLarger{100, 6};
 
 // Runs for so long, in steps of a process that is not paused.
 void Pass(Charge& charge, std::int64_t& now, std::int64_t us) {
@@ -38,7 +39,8 @@ TEST(ChargeTest, EveryHeartbeatInEveryState) {
         std::int64_t now = 0;
         Charge charge = InState(state, now);
         charge.Hear(other, its);
-        const bool yields = state == State::kListening  ? its == State::kInCharge || (its == State::kListening && is_earlier)
+        const bool yields = state == State::kListening
+                                ? its == State::kInCharge || (its == State::kListening && is_earlier)
                             : state == State::kInCharge ? its == State::kInCharge && is_earlier
                                                         : true;
         EXPECT_EQ(charge.state(), yields ? State::kStandingBy : state)
@@ -120,21 +122,25 @@ TEST(ChargeTest, OneInChargeThatWasPausedListensAnewBeforeItDecides) {
   }
 }
 
-// Three certifiers on a bus that loses heartbeats; they are paused, killed and started again at random. Whenever nothing has
-// happened for a while exactly one is in charge, and two at once only where heartbeats were lost.
+// Three certifiers on a bus that loses heartbeats; they are paused, killed and started again at random. Whenever
+// nothing has happened for a while exactly one is in charge, and two at once only where heartbeats were lost.
 TEST(ChargeTest, OneIsInChargeWhateverHappens) {
   for (const double loss : {0.0, 0.2}) {
     const unsigned seed = std::random_device{}();
     SCOPED_TRACE("seed " + std::to_string(seed) + ", loss " + std::to_string(loss));
     std::mt19937 random(seed);
-    const auto below = [&](std::int64_t bound) { return static_cast<std::int64_t>(random() % static_cast<unsigned>(bound)); };
+    const auto below = [&](std::int64_t bound) {
+      return static_cast<std::int64_t>(random() % static_cast<unsigned>(bound));
+    };
     struct Certifier {
       Charge charge;
       std::int64_t paused_until = 0, next_beat = 0;
       State last = State::kListening;
     };
     std::int64_t now = 1'000'000, instances = 1;
-    const auto start = [&] { return Certifier{Charge({now, instances++}, Charge::kListenUs), 0, 0, State::kListening}; };
+    const auto start = [&] {
+      return Certifier{Charge({now, instances++}, Charge::kListenUs), 0, 0, State::kListening};
+    };
     std::vector<Certifier> all{start(), start(), start()};
     std::int64_t together = 0;
     for (int round = 0; round < 60; ++round) {

@@ -32,13 +32,20 @@ struct Contract {
   std::size_t bytes;
 };
 const std::map<std::string, Contract> kContracts = {
-    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}},  {"certified_plan_t", {0x7bf4494f969b9eeb, 41808}},
-    {"certifier_status_t", {0x553e2b8fcb2c6ae3, 248}}, {"decision_t", {0x6c785a9e0911c4e6, 466}},
-    {"execution_event_t", {0x4742c25e0eefd377, 336}},  {"obstacle_t", {0x29158dc0270b76d4, 406}},
-    {"obstacles_t", {0x9c72b610dc35fea7, 25498}},      {"robot_state_t", {0xe3677d78a66b57da, 166}},
-    {"transition_t", {0xa599cda800864690, 348}},       {"logger_status_t", {0x2a2438623a759ef0, 260}},
-    {"certifier_status_v2_t", {0xc45b41cd96d85653, 1144}}, {"command_t", {0x1b315e627593a95f, 58}},
-    {"fault_t", {0xdcbd63f7ef2c91dd, 728}},         {"certifier_status_v3_t", {0xf224554c7bae02b5, 1220}},
+    {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}},
+    {"certified_plan_t", {0x7bf4494f969b9eeb, 41808}},
+    {"certifier_status_t", {0x553e2b8fcb2c6ae3, 248}},
+    {"decision_t", {0x6c785a9e0911c4e6, 466}},
+    {"execution_event_t", {0x4742c25e0eefd377, 336}},
+    {"obstacle_t", {0x29158dc0270b76d4, 406}},
+    {"obstacles_t", {0x9c72b610dc35fea7, 25498}},
+    {"robot_state_t", {0xe3677d78a66b57da, 166}},
+    {"transition_t", {0xa599cda800864690, 348}},
+    {"logger_status_t", {0x2a2438623a759ef0, 260}},
+    {"certifier_status_v2_t", {0xc45b41cd96d85653, 1144}},
+    {"command_t", {0x1b315e627593a95f, 58}},
+    {"fault_t", {0xdcbd63f7ef2c91dd, 728}},
+    {"certifier_status_v3_t", {0xf224554c7bae02b5, 1220}},
 };
 
 template <class Message>
@@ -57,8 +64,8 @@ class MessageTest : public testing::Test {
 };
 
 using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_t, certifier_status_v2_t,
-                                certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t, obstacle_t, obstacles_t,
-                                robot_state_t, transition_t>;
+                                certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t,
+                                logger_status_t, obstacle_t, obstacles_t, robot_state_t, transition_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {

@@ -133,7 +133,8 @@ TEST(ConformanceTest, TheEndOfAStepIsJudgedThoughTheNextStateOvertookIt) {
   hear(1, 7, 30);
   EXPECT_FALSE(conformance.Check(Step(30, 100, 100))) << "late";
   hear(0, 7, 30);
-  EXPECT_TRUE(conformance.Check(Step(30, 100, 100))) << "that far behind it has begun anew, though its clock was set back";
+  EXPECT_TRUE(conformance.Check(Step(30, 100, 100)))
+      << "that far behind it has begun anew, though its clock was set back";
 }
 
 TEST(ConformanceTest, ANewCertificateOfTheSameIdCountsUnlessTheOldOneIsExecuted) {

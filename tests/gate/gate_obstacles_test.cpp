@@ -85,7 +85,8 @@ TEST_F(GateObstaclesTest, ThoseHeardCountBesideTheTasksAndDecisionsAreBoundToThe
   EXPECT_EQ(GetDigest(blocked.obstacles_digest), ObstaclesDigest(Both(of_task_, kOnTheWay)));
 
   EXPECT_EQ(Update(Message(kFarAway, 1)), "");
-  EXPECT_EQ(Decide(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY) << "the circle of the config stands";
+  EXPECT_EQ(Decide(kAccelerationIntoTheCircle).outcome, decision_t::ABSTAIN_SAFETY)
+      << "the circle of the config stands";
   const GateAnswer clear = gate_.Decide(Encode(Candidate(next_plan_id_++)), kNow);
   EXPECT_EQ(clear.decision.outcome, decision_t::CERTIFIED);
   EXPECT_EQ(GetDigest(clear.decision.obstacles_digest), ObstaclesDigest(Both(of_task_, kFarAway)));
@@ -174,7 +175,8 @@ TEST_F(GateObstaclesTest, AGapMakesThemUnknownUntilTheNextInOrder) {
 TEST_F(GateObstaclesTest, AMessageThatComesLateOrTwiceChangesNothing) {
   Say(0);
   Say(1);
-  for (const std::int64_t sequence : {0, 1}) ExpectRefused(Encode(Message(kOnTheWay, sequence)), "does not exceed the last");
+  for (const std::int64_t sequence : {0, 1})
+    ExpectRefused(Encode(Message(kOnTheWay, sequence)), "does not exceed the last");
   EXPECT_EQ(Why(), "");
   obstacles_t old = Message(kOnTheWay, 1);
   old.utime = kNow - 3'000'000;
@@ -194,8 +196,13 @@ TEST_F(GateObstaclesTest, ASenderThatBeginsAnewAtZeroIsConfirmedByItsNextMessage
 }
 
 TEST_F(GateObstaclesTest, TwoSendersAreNeverKnownTogether) {
-  struct { std::int64_t first, second; const char* what; } const starts[] = {
-      {100, 0, "the second has just begun"}, {100, 7, "it was there before"}, {50, 50, "in step"}, {50, 49, "one behind"}};
+  struct {
+    std::int64_t first, second;
+    const char* what;
+  } const starts[] = {{100, 0, "the second has just begun"},
+                      {100, 7, "it was there before"},
+                      {50, 50, "in step"},
+                      {50, 49, "one behind"}};
   for (const auto& [first, second, what] : starts) {
     Gate gate(SmallTaskOnTheBus());
     for (int i = 0; i < 20; ++i) {

@@ -245,7 +245,8 @@ TEST_F(GateRefusalTest, WhatCouldBeDecodedIsNamedInTheDecision) {
 
 TEST_F(GateRefusalTest, ADisplacedCandidateIsRejectedHoweverGood) {
   for (const auto& bytes : {Encode(Candidate(1)), std::vector<std::uint8_t>{}}) {
-    const GateAnswer answer = gate_.Refuse(bytes, kNow, decision_t::CAUSE_QUEUE_FULL, "newer candidates displaced it from the queue");
+    const GateAnswer answer =
+        gate_.Refuse(bytes, kNow, decision_t::CAUSE_QUEUE_FULL, "newer candidates displaced it from the queue");
     EXPECT_EQ(answer.decision.outcome, decision_t::REJECTED);
     EXPECT_EQ(answer.decision.cause, bytes.empty() ? decision_t::CAUSE_WRONG_LENGTH : decision_t::CAUSE_QUEUE_FULL);
     EXPECT_FALSE(answer.certified);

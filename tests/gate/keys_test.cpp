@@ -121,7 +121,8 @@ TEST_F(KeyFiles, AWriteThatFailsLeavesNothingBehind) {
 }
 
 TEST_F(KeyFiles, ANameIsBounded) {
-  for (const std::string& bad : {std::string(), std::string("a b"), std::string("a\nb"), std::string("../a/b"), std::string(65, 'a')})
+  for (const std::string& bad :
+       {std::string(), std::string("a b"), std::string("a\nb"), std::string("../a/b"), std::string(65, 'a')})
     EXPECT_THAT(ProblemOf([&] { MakeKeys(bad, scratch_ / "new"); }), HasSubstr("robot's name has to be")) << bad;
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "new"));
   EXPECT_EQ(ProblemOf([&] { MakeKeys(std::string(64, 'a'), scratch_ / "new"); }), "");
@@ -136,7 +137,8 @@ TEST_F(KeyFiles, OfAnotherRoleAreRefused) {
 
 TEST_F(KeyFiles, OfTwoRobotsInOneDirectoryAreRefused) {
   const std::string others = MakeTestKeys(scratch_ / "others");
-  std::filesystem::copy_file(others + "/robot.key", File("robot.key"), std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::copy_file(others + "/robot.key", File("robot.key"),
+                             std::filesystem::copy_options::overwrite_existing);
   EXPECT_THAT(ProblemOf([&] { (void)LoadAllKeys(keys_); }), HasSubstr("robot.key: belongs to other keys"));
 }
 
@@ -194,7 +196,8 @@ TEST_F(KeyFiles, AreReadLineByLine) {
     if (i < 3) continue;
     upper[i].back() = 'G';
     EXPECT_THAT(problem(upper), HasSubstr("64 lower-case hexadecimal digits")) << i;
-    EXPECT_THAT(problem(upper), testing::Not(HasSubstr(lines[i].substr(lines[i].rfind(' ') + 1, 20)))) << "a secret is not shown";
+    EXPECT_THAT(problem(upper), testing::Not(HasSubstr(lines[i].substr(lines[i].rfind(' ') + 1, 20))))
+        << "a secret is not shown";
   }
   auto other = lines;
   std::swap(other[3], other[4]);

@@ -112,18 +112,20 @@ TEST(NamesTest, EveryLevelAndStateOfTheHeartbeatHasItsName) {
   ExpectNamed(take("the latch", "LATCH"), LatchName);
   ExpectNamed(take("the source of obstacles", "OBSTACLES"), ObstaclesSourceName);
   ExpectNamed(states, StateName);
-  for (const std::int16_t other : {std::int16_t{0}, std::int16_t{4}, std::int16_t{-1}}) EXPECT_EQ(LevelName(other), "unknown");
+  for (const std::int16_t other : {std::int16_t{0}, std::int16_t{4}, std::int16_t{-1}})
+    EXPECT_EQ(LevelName(other), "unknown");
 }
 
 // Recorded logs carry the numbers, and the fingerprint does not cover them: a new constant gets a new line, no line
 // ever changes.
 TEST(NamesTest, NumbersAreNeverReused) {
   const auto [outcomes, causes] = OutcomesAndCauses();
-  EXPECT_EQ(
-      outcomes,
-      (Constants{
-          {"CERTIFIED", 1}, {"ABSTAIN_FALSIFIED", 2}, {"ABSTAIN_DOMAIN", 3}, {"ABSTAIN_SAFETY", 4}, {"REJECTED", 5},
-          {"ABSTAIN_DEADLINE", 6}}));
+  EXPECT_EQ(outcomes, (Constants{{"CERTIFIED", 1},
+                                 {"ABSTAIN_FALSIFIED", 2},
+                                 {"ABSTAIN_DOMAIN", 3},
+                                 {"ABSTAIN_SAFETY", 4},
+                                 {"REJECTED", 5},
+                                 {"ABSTAIN_DEADLINE", 6}}));
   EXPECT_EQ(causes, (Constants{{"NONE", 0},
                                {"PAIRWISE", 1},
                                {"DOMAIN_EXIT", 2},
@@ -166,10 +168,19 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                {"SLICE_LEFT", 3},
                                                {"DECLARATION_FALSIFIED", 4},
                                                {"UNCERTIFIED_PLAN", 5}}));
-  EXPECT_EQ(ConstantsOf("certifier_status_v3_t"),
-            (Constants{{"OK", 1}, {"STALE", 2}, {"ERROR", 3}, {"DISARMED", 1}, {"ARMED", 2}, {"FAULT", 3},
-                       {"LISTENING", 4}, {"STANDBY", 5}, {"NO_LATCH", 0}, {"LATCH_WRITTEN", 1}, {"LATCH_UNWRITABLE", 2},
-                       {"OBSTACLES_TASK", 1}, {"OBSTACLES_BUS", 2}}));
+  EXPECT_EQ(ConstantsOf("certifier_status_v3_t"), (Constants{{"OK", 1},
+                                                             {"STALE", 2},
+                                                             {"ERROR", 3},
+                                                             {"DISARMED", 1},
+                                                             {"ARMED", 2},
+                                                             {"FAULT", 3},
+                                                             {"LISTENING", 4},
+                                                             {"STANDBY", 5},
+                                                             {"NO_LATCH", 0},
+                                                             {"LATCH_WRITTEN", 1},
+                                                             {"LATCH_UNWRITABLE", 2},
+                                                             {"OBSTACLES_TASK", 1},
+                                                             {"OBSTACLES_BUS", 2}}));
   EXPECT_EQ(ConstantsOf("certifier_status_v2_t"),
             (Constants{{"OK", 1}, {"STALE", 2}, {"ERROR", 3}, {"DISARMED", 1}, {"ARMED", 2}, {"FAULT", 3}}));
   EXPECT_EQ(ConstantsOf("command_t"), (Constants{{"RESET", 1}, {"RELOAD", 2}}));

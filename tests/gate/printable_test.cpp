@@ -17,13 +17,22 @@ TEST(PrintableTest, TextStays) {
 TEST(PrintableTest, WhatCommandsATerminalIsEscaped) {
   EXPECT_EQ(Printable("\x1b[2J"), "\\x1b[2J");
   EXPECT_EQ(Printable(std::string_view("\0\a\b\t\n\r\x7f", 7)), "\\x00\\x07\\x08\\x09\\x0a\\x0d\\x7f");
-  EXPECT_EQ(Printable("\xc2\x9b" "31m"), "\\xc2\\x9b31m") << "the same introducer in one character";
-  EXPECT_EQ(Printable("\xe2\x80\xae" "abc"), "\\xe2\\x80\\xae" "abc") << "right to left";
+  EXPECT_EQ(Printable("\xc2\x9b"
+                      "31m"),
+            "\\xc2\\x9b31m")
+      << "the same introducer in one character";
+  EXPECT_EQ(Printable("\xe2\x80\xae"
+                      "abc"),
+            "\\xe2\\x80\\xae"
+            "abc")
+      << "right to left";
   EXPECT_EQ(PrintableLines("a\nb\x1b\r\n"), "a\nb\\x1b\\x0d\n");
 }
 
 TEST(PrintableTest, WhatIsNoUtf8IsEscaped) {
-  EXPECT_EQ(Printable("\x9b" "31m"), "\\x9b31m");
+  EXPECT_EQ(Printable("\x9b"
+                      "31m"),
+            "\\x9b31m");
   EXPECT_EQ(Printable("\xc1\xbf\xe0\x80\x80\xed\xa0\x80\xf5\x80\x80\x80"),
             "\\xc1\\xbf\\xe0\\x80\\x80\\xed\\xa0\\x80\\xf5\\x80\\x80\\x80");
   EXPECT_EQ(Printable("\xe2\x82"), "\\xe2\\x82") << "cut";

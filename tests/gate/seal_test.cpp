@@ -109,11 +109,12 @@ TEST(Seal, OneUlpOfASliceInUse) {
 }
 
 TEST(Seal, AnEntryBeyondThoseInUse) {
-  for (const double stray : {1.0, -0.0, std::numeric_limits<double>::denorm_min(),
-                             std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double stray :
+       {1.0, -0.0, std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_lower[12][6] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
     EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_upper[13][0] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
-    EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_upper[128][15] = stray; }), ElementsAre(Kind::kUnusedEntry)) << stray;
+    EXPECT_THAT(FaultsAfter([&](auto& c) { c.slice_upper[128][15] = stray; }), ElementsAre(Kind::kUnusedEntry))
+        << stray;
   }
 }
 

@@ -46,7 +46,8 @@ TEST(SourcesTest, TheWindowEndsWhereItSays) {
 }
 
 TEST(SourcesTest, ExtremeIdsAreIdsLikeOthers) {
-  constexpr std::int64_t kLowest = std::numeric_limits<std::int64_t>::min(), kHighest = std::numeric_limits<std::int64_t>::max();
+  constexpr std::int64_t kLowest = std::numeric_limits<std::int64_t>::min(),
+                         kHighest = std::numeric_limits<std::int64_t>::max();
   Sources sources(kForget);
   EXPECT_EQ(sources.Admit(From("a", kLowest), 0), Admission::kNew);
   EXPECT_EQ(sources.Admit(From("a", kHighest), 0), Admission::kNew);
@@ -76,7 +77,8 @@ TEST(SourcesTest, SilentSourcesMakeRoomAndAHugeIdLocksNobodyOutForLong) {
   EXPECT_EQ(sources.Admit(From("17", 1), kForget + 1), Admission::kNew);
   EXPECT_EQ(sources.Admit(From("17", INT64_MAX), kForget + 1), Admission::kNew);
   EXPECT_EQ(sources.Admit(From("17", 2), kForget + 2), Admission::kUsed);
-  EXPECT_EQ(sources.Admit(From("17", 2), 2 * kForget + 2), Admission::kNew) << "what it sent then would be stale by now";
+  EXPECT_EQ(sources.Admit(From("17", 2), 2 * kForget + 2), Admission::kNew)
+      << "what it sent then would be stale by now";
 }
 
 TEST(SourcesTest, AClockThatWasSetBackLocksNobodyOut) {

@@ -13,8 +13,8 @@ using testing::HasSubstr;
 
 constexpr WatchOptions kOptions{true, 1000, 200};
 
-// Every combination of what may be lacking, with a fault and without, in a task that needs the robot's state and in one that
-// does not.
+// Every combination of what may be lacking, with a fault and without, in a task that needs the robot's state and in one
+// that does not.
 TEST(WatchTest, IsArmedIfNothingIsLackingAndSaysAllThatIs) {
   for (unsigned bits = 0; bits < 32; ++bits) {
     const bool second = bits & 1, unseen = bits & 2, unknown = bits & 4, fault = bits & 8, needs_robot = bits & 16;
@@ -29,9 +29,7 @@ TEST(WatchTest, IsArmedIfNothingIsLackingAndSaysAllThatIs) {
     const auto refusal = watch.WhyNot();
     SCOPED_TRACE(bits);
     EXPECT_EQ(refusal.has_value(), second || robot_lacks || unknown || fault);
-    EXPECT_EQ(watch.state(), fault     ? Watch::State::kFault
-                             : refusal ? Watch::State::kDisarmed
-                                       : Watch::State::kArmed);
+    EXPECT_EQ(watch.state(), fault ? Watch::State::kFault : refusal ? Watch::State::kDisarmed : Watch::State::kArmed);
     if (!refusal) continue;
     EXPECT_EQ(refusal->cause, fault         ? decision_t::CAUSE_FAULT
                               : second      ? decision_t::CAUSE_SECOND_CERTIFIER

@@ -18,7 +18,8 @@ class CheckTest : public testing::Test {
   // A log of five execution events, every one with its row.
   CheckTest() : database_(scratch_ / "decisions.sqlite") {
     EventLogWriter writer(log_);
-    for (std::int64_t i = 0; i < 5; ++i) writer.Append(i, "EXECUTION_EVENT", Encode(MakeEvent(i, execution_event_t::STARTED)));
+    for (std::int64_t i = 0; i < 5; ++i)
+      writer.Append(i, "EXECUTION_EVENT", Encode(MakeEvent(i, execution_event_t::STARTED)));
     EXPECT_TRUE(writer.Flush());
     Interpreter interpreter({}, "a.lcmlog");
     Rows rows;

@@ -17,7 +17,9 @@ class DirectBus final : public Bus {
   explicit DirectBus(std::int64_t start = kStart) : now_us(start) {}
 
   using Bus::Publish;
-  void Subscribe(const std::string& channel, Handler handler) override { handlers_.emplace_back(channel, std::move(handler)); }
+  void Subscribe(const std::string& channel, Handler handler) override {
+    handlers_.emplace_back(channel, std::move(handler));
+  }
   bool Publish(const std::string& channel, Bytes bytes) override {
     if (const auto status = Decoded<logger_status_t>(bytes)) {
       heartbeats.push_back(*status);

@@ -123,7 +123,8 @@ std::vector<std::string> InWords(const Rows& rows) {
   return words;
 }
 
-// Rows made again from the files of a run are those made while it ran, also where a file knows only with the one before.
+// Rows made again from the files of a run are those made while it ran, also where a file knows only with the one
+// before.
 TEST_F(DiskTest, RowsMadeAgainAreTheSame) {
   config_.logger.rotate_mb = 0.02;
   Start();

@@ -6,10 +6,10 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <lcm/lcm-cpp.hpp>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <lcm/lcm-cpp.hpp>
 
 #include "tests/logger/logs.h"
 
@@ -35,7 +35,8 @@ std::size_t RecordOffset(int index) {
 }
 
 void PutLength(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t value) {
-  for (int i = 0; i < 4; ++i) bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
+  for (int i = 0; i < 4; ++i)
+    bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
 }
 
 TEST(EventLog, RoundTrip) {
@@ -161,7 +162,8 @@ TEST_P(CorruptLength, LosesThatRecordOnly) {
 
 // Implausible ones, plausible ones that point behind the end, and one (60) that swallows the record behind it.
 INSTANTIATE_TEST_SUITE_P(HugeNegativeAndSwallowing, CorruptLength,
-                         testing::Values(0x7fffffffu, 0x80000000u, 0xffffffffu, 1u << 24, (1u << 24) + 1, 1u << 20, 60u));
+                         testing::Values(0x7fffffffu, 0x80000000u, 0xffffffffu, 1u << 24, (1u << 24) + 1, 1u << 20,
+                                         60u));
 
 TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
   const ScratchDirectory scratch;
@@ -329,7 +331,9 @@ TEST(EventLog, SurvivesMutation) {
   const unsigned seed = std::random_device{}();
   RecordProperty("seed", std::to_string(seed));
   std::mt19937 random(seed);
-  const auto below = [&random](std::size_t bound) { return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random); };
+  const auto below = [&random](std::size_t bound) {
+    return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random);
+  };
   for (int round = 0; round < 1000; ++round) {
     SCOPED_TRACE(testing::Message() << "seed " << seed << " round " << round);
     std::vector<std::uint8_t> bytes = whole;
@@ -337,7 +341,9 @@ TEST(EventLog, SurvivesMutation) {
       const auto at = static_cast<std::ptrdiff_t>(below(bytes.size()));
       switch (below(4)) {
         case 0: bytes[static_cast<std::size_t>(at)] ^= static_cast<std::uint8_t>(1u << below(8)); break;
-        case 1: bytes.erase(bytes.begin() + at, bytes.begin() + std::min<std::ptrdiff_t>(at + 9, std::ssize(bytes))); break;
+        case 1:
+          bytes.erase(bytes.begin() + at, bytes.begin() + std::min<std::ptrdiff_t>(at + 9, std::ssize(bytes)));
+          break;
         case 2: bytes.insert(bytes.begin() + at, {0xED, 0xA1, 0xDA, 0x01, 0, 0, 0}); break;
         default: bytes.resize(static_cast<std::size_t>(at));
       }

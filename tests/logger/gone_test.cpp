@@ -162,7 +162,8 @@ class DatabaseGoneTest : public GoneTest {
     for (const LogCheck& check : CheckLogs(directory())) EXPECT_TRUE(check.whole_log() && check.ended);
   }
   void RemoveDatabase() const {
-    for (const char* ending : {"", "-wal", "-shm"}) fs::remove(scratch_ / (std::string("log/decisions.sqlite") + ending));
+    for (const char* ending : {"", "-wal", "-shm"})
+      fs::remove(scratch_ / (std::string("log/decisions.sqlite") + ending));
   }
 };
 
@@ -188,7 +189,8 @@ TEST_F(DatabaseGoneTest, ADatabaseThatIsReplacedByAnOldOne) {
 
 TEST_F(DatabaseGoneTest, ADatabaseThatIsReplacedBySomethingElseWaitsUntilThatIsGone) {
   RemoveDatabase();
-  scratch_.Write("log/decisions.sqlite", "no database, but something of more than a few bytes " + std::string(500, 'x'));
+  scratch_.Write("log/decisions.sqlite",
+                 "no database, but something of more than a few bytes " + std::string(500, 'x'));
   Feed(600);
   EXPECT_EQ(last().state, logger_status_t::STALE);
   EXPECT_THAT(Message(), HasSubstr("not a database"));

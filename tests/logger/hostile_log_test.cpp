@@ -41,7 +41,8 @@ struct Damaged {
   std::vector<std::int64_t> origin;
 
   void Erase(std::size_t at, std::size_t count) {
-    const auto begin = static_cast<std::ptrdiff_t>(at), end = static_cast<std::ptrdiff_t>(std::min(at + count, bytes.size()));
+    const auto begin = static_cast<std::ptrdiff_t>(at),
+               end = static_cast<std::ptrdiff_t>(std::min(at + count, bytes.size()));
     bytes.erase(bytes.begin() + begin, bytes.begin() + end);
     origin.erase(origin.begin() + begin, origin.begin() + end);
   }
@@ -78,7 +79,8 @@ class HostileLog : public testing::Test {
 
   std::size_t Below(std::size_t bound) { return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random_); }
 
-  /** The records of `path` from the `first` on, `count` at most, as one log; `ends_` gets where each ends, by its start. */
+  /** The records of `path` from the `first` on, `count` at most, as one log; `ends_` gets where each ends, by its
+  start. */
   Damaged Window(const std::string& path, std::size_t first, std::size_t count) {
     const std::vector<std::uint8_t> whole = ReadBytes(path);
     EventLogReader reader(path);
@@ -99,10 +101,8 @@ class HostileLog : public testing::Test {
   void Harm(Damaged& log) {
     const std::size_t at = Below(log.bytes.size());
     switch (Below(7)) {
-      case 0:
-        return log.Set(at, static_cast<std::uint8_t>(log.bytes[at] ^ 1u << Below(8)));
-      case 1:
-        return log.Erase(at, 1 + Below(Below(2) ? 8 : 6000));
+      case 0: return log.Set(at, static_cast<std::uint8_t>(log.bytes[at] ^ 1u << Below(8)));
+      case 1: return log.Erase(at, 1 + Below(Below(2) ? 8 : 6000));
       case 2: {  // splice: a part of the log again
         const std::size_t from = Below(log.bytes.size()), count = std::min(1 + Below(20000), log.bytes.size() - from);
         const auto begin = static_cast<std::ptrdiff_t>(from), end = static_cast<std::ptrdiff_t>(from + count);
@@ -111,7 +111,8 @@ class HostileLog : public testing::Test {
       }
       case 3: {  // a length field, huge, negative or anything
         const std::size_t field = StartNear(at) + (Below(2) ? 20 : 24);
-        const std::uint32_t values[] = {0x7fffffff, 0xffffffff, 1u << 24, (1u << 24) + 1, static_cast<std::uint32_t>(random_())};
+        const std::uint32_t values[] = {0x7fffffff, 0xffffffff, 1u << 24, (1u << 24) + 1,
+                                        static_cast<std::uint32_t>(random_())};
         const std::uint32_t value = values[Below(std::size(values))];
         for (std::size_t i = 0; i < 4 && field + i < log.bytes.size(); ++i)
           log.Set(field + i, static_cast<std::uint8_t>(value >> (24 - 8 * i)));
@@ -204,7 +205,8 @@ TEST_F(HostileLog, EveryUndamagedRecordIsRecovered) {
 TEST_F(HostileLog, LengthsDoNotFillTheMemory) {
   {
     EventLogWriter writer(scratch_ / "log");
-    for (const std::size_t bytes : {std::size_t{100}, std::size_t{10} << 20, std::size_t{kMaxLogDataBytes}, std::size_t{5}})
+    for (const std::size_t bytes :
+         {std::size_t{100}, std::size_t{10} << 20, std::size_t{kMaxLogDataBytes}, std::size_t{5}})
       writer.Append(1, "LARGE", std::vector<std::uint8_t>(bytes, 7));
     ASSERT_TRUE(writer.Flush());
   }
@@ -247,15 +249,16 @@ TEST_F(HostileLog, ClaimsThatAreNotBelievedTakeNoMemory) {
   EXPECT_LE(peak_bytes - before, std::size_t{1} << 16);
 }
 
-// Headers that each claim what follows them make the reader look again and again; that may not cost more than the bytes.
+// Headers that each claim what follows them make the reader look again and again; that may not cost more than the
+// bytes.
 TEST_F(HostileLog, NestedClaimsTakeNoLongerThanTheirBytes) {
   std::vector<std::uint8_t> header{0xED, 0xA1, 0xDA, 0x01};
   header.resize(28);
-  header[23] = 1;                                   // one byte of channel
-  header[25] = 1;                                   // 65536 of data
+  header[23] = 1;  // one byte of channel
+  header[25] = 1;  // 65536 of data
   std::vector<std::uint8_t> bytes;
   for (int i = 0; i < 50'000; ++i) bytes.insert(bytes.end(), header.begin(), header.end());
-  bytes.push_back(0);                               // no claim ends at a sync word
+  bytes.push_back(0);  // no claim ends at a sync word
   WriteBytes(scratch_ / "nested", bytes);
   EventLogReader reader(scratch_ / "nested");
   ForEachEvent(reader, [](const LogEvent&) {});

@@ -47,7 +47,9 @@ class KeptTest : public DiskTest {
     bus_.Publish("PLAN_DECISION", decision);
     node_->Tick(bus_.now_us += 20'000);
   }
-  [[nodiscard]] bool IsKept(const Digest& digest) const { return KeptTasks(scratch_ / "log").Find(digest, {}).has_value(); }
+  [[nodiscard]] bool IsKept(const Digest& digest) const {
+    return KeptTasks(scratch_ / "log").Find(digest, {}).has_value();
+  }
 
   std::string text_;
   std::int64_t heartbeats_ = 0;

@@ -74,9 +74,9 @@ TEST_F(LoggerNodeTest, RecordsEverythingAndSummarises) {
   EXPECT_EQ(rows.events[0].kind, "step_inside");
   EXPECT_TRUE(rows.gaps.empty());
   EXPECT_EQ(Runs()[0].end_utime, bus_.now_us);
-  EXPECT_THAT(out_.str(), testing::AllOf(testing::HasSubstr(log_path), testing::HasSubstr("domain_exit 1"),
-                                         testing::HasSubstr("PLAN_CANDIDATE 2"),
-                                         testing::HasSubstr("p50 150.0 us, p99 350.0 us")));
+  EXPECT_THAT(out_.str(),
+              testing::AllOf(testing::HasSubstr(log_path), testing::HasSubstr("domain_exit 1"),
+                             testing::HasSubstr("PLAN_CANDIDATE 2"), testing::HasSubstr("p50 150.0 us, p99 350.0 us")));
 }
 
 TEST_F(LoggerNodeTest, FlushesOnTimeOnly) {
@@ -158,8 +158,12 @@ class SignedLoggerTest : public LoggerNodeTest {
   std::vector<std::vector<std::uint8_t>> Candidates() {
     Signer other(TestKeys("other"), "the bus");
     const auto first = Candidate(*planner_, 0);
-    return {first, Encode(MakeCandidate(std::int64_t{1} << 41, 1)), Candidate(other, std::int64_t{1} << 40), first,
-            Candidate(*planner_, 1), Candidate(*planner_, 4)};
+    return {first,
+            Encode(MakeCandidate(std::int64_t{1} << 41, 1)),
+            Candidate(other, std::int64_t{1} << 40),
+            first,
+            Candidate(*planner_, 1),
+            Candidate(*planner_, 4)};
   }
   static void ExpectOneGap(const Rows& rows) {
     ASSERT_EQ(rows.gaps.size(), 1u);
@@ -178,7 +182,8 @@ TEST_F(SignedLoggerTest, RecordsEverythingAndMakesRowsOfAuthenticMessagesOnly) {
   EXPECT_EQ(GetText(bus_.heartbeats.back().message), "recording");
   for (const auto& candidate : Candidates()) bus_.Publish("PLAN_CANDIDATE", Bytes(candidate));
   const decision_t decision = MakeDecision(MakeCandidate(4, 4), 0, decision_t::CERTIFIED, 0);
-  bus_.Publish("PLAN_DECISION", Bytes(planner_->Sign(Role::kCertifier, "PLAN_DECISION", Encode(decision), bus_.now_us)));
+  bus_.Publish("PLAN_DECISION",
+               Bytes(planner_->Sign(Role::kCertifier, "PLAN_DECISION", Encode(decision), bus_.now_us)));
   node.Tick(bus_.now_us += 600'000);
   EXPECT_THAT(GetText(bus_.heartbeats.back().message), testing::HasSubstr("3 (unsigned 1, forged 1, replayed 1)"));
   EXPECT_EQ(bus_.heartbeats.back().state, logger_status_t::OK);
@@ -302,8 +307,9 @@ TEST_F(LoggerNodeTest, MakesMissingRowsAgainFromTheLog) {
     const LoggerNode node(config_, bus, out_);
     ASSERT_EQ(node.recorder().recovered().size(), start == 0 ? 2u : 0u) << "a mended run is mended once";
     if (start > 0) break;
-    EXPECT_THAT(node.recorder().recovered()[0], testing::AllOf(testing::HasSubstr("3 events kept"), testing::HasSubstr("50 bytes"),
-                                                    testing::HasSubstr("3 rows written")));
+    EXPECT_THAT(node.recorder().recovered()[0],
+                testing::AllOf(testing::HasSubstr("3 events kept"), testing::HasSubstr("50 bytes"),
+                               testing::HasSubstr("3 rows written")));
     EXPECT_THAT(node.recorder().recovered()[1], testing::HasSubstr("no log file was written"));
   }
   EXPECT_EQ(std::filesystem::file_size(log), size);
@@ -369,7 +375,8 @@ TEST_F(LoggerNodeTest, SurvivesAKill) {
     usleep(std::uniform_int_distribution<useconds_t>(0, 3000)(random));
     ASSERT_EQ(kill(child, SIGKILL), 0);
     ASSERT_EQ(waitpid(child, nullptr, 0), child);
-    while (read(ends[0], &safe, sizeof safe) == static_cast<ssize_t>(sizeof safe)) {}
+    while (read(ends[0], &safe, sizeof safe) == static_cast<ssize_t>(sizeof safe)) {
+    }
     close(ends[0]);
     reported.push_back(safe);
   }

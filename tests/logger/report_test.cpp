@@ -121,8 +121,8 @@ TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
   EXPECT_TRUE(drawn.picture.circles.empty());
   ASSERT_EQ(drawn.picture.polygons.size(), 2u);
   EXPECT_EQ(drawn.picture.polygons[0].size(), 4u);
-  EXPECT_THAT(drawn.picture.polygons[1],
-              testing::ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5), Eigen::Vector2d(6, 6), Eigen::Vector2d(5, 6)));
+  EXPECT_THAT(drawn.picture.polygons[1], testing::ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5),
+                                                              Eigen::Vector2d(6, 6), Eigen::Vector2d(5, 6)));
   EXPECT_EQ(drawn.picture.half_planes.size(), 1u);
 }
 
@@ -149,15 +149,21 @@ TEST_F(LogPictureTest, WantsAPlane) {
 TEST_F(LogPictureTest, TheReportSaysWhatIsWrong) {
   Append("PLAN_CANDIDATE", Drive(0, true));
   std::ostringstream out;
-  EXPECT_THAT([&] { Report({{scratch_ / "log"}, scratch_ / "missing.yaml", ""}, out); },
-              testing::ThrowsMessage<BadInput>(testing::HasSubstr("missing.yaml")));
+  EXPECT_THAT(
+      [&] {
+        Report({{scratch_ / "log"}, scratch_ / "missing.yaml", ""}, out);
+      },
+      testing::ThrowsMessage<BadInput>(testing::HasSubstr("missing.yaml")));
   EXPECT_EQ(out.str(), "");
 }
 
 TEST_F(LogPictureTest, TheReportRefusesAPictureItCannotWriteBeforeItReadsAnything) {
   std::ostringstream out;
-  EXPECT_THAT([&] { Report({{"none.lcmlog"}, "none.yaml", scratch_ / "x.gif"}, out); },
-              testing::ThrowsMessage<BadInput>(testing::HasSubstr("x.gif ends in .gif")));
+  EXPECT_THAT(
+      [&] {
+        Report({{"none.lcmlog"}, "none.yaml", scratch_ / "x.gif"}, out);
+      },
+      testing::ThrowsMessage<BadInput>(testing::HasSubstr("x.gif ends in .gif")));
 }
 
 // The name of a channel may be any bytes.

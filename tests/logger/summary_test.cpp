@@ -35,8 +35,9 @@ void WriteRun(const std::string& path) {
   }
   int sequence = 0;
   using E = execution_event_t;
-  for (const std::int16_t kind : {E::ACCEPTED, E::REFUSED, E::STARTED, E::STEP_INSIDE, E::STEP_INSIDE, E::STEP_INSIDE,
-                                  E::TAIL_BEGUN, E::STANDING, E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::GOAL_REACHED})
+  for (const std::int16_t kind :
+       {E::ACCEPTED, E::REFUSED, E::STARTED, E::STEP_INSIDE, E::STEP_INSIDE, E::STEP_INSIDE, E::TAIL_BEGUN, E::STANDING,
+        E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::GOAL_REACHED})
     writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence++, kind)));
   writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence + 4, E::STANDING)));
   robot_state_t state{};

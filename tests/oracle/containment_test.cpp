@@ -1,5 +1,5 @@
-// What a certificate claims, tried: rollouts of many residuals that satisfy data and declaration, in 256 bits, never leave
-// a slice of the tube, and under a certified plan never meet an obstacle.
+// What a certificate claims, tried: rollouts of many residuals that satisfy data and declaration, in 256 bits, never
+// leave a slice of the tube, and under a certified plan never meet an obstacle.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -39,7 +39,8 @@ class AdmissibleResidual {
       for (std::size_t k = 0; k < nominal.size(); ++k) {
         const auto coordinate = static_cast<Eigen::Index>(k);
         const double next = problem.transitions.x_next(i, coordinate);
-        const Real slack = Real(NextUp(std::abs(next))) - Real(std::abs(next)) + Real(declaration_.noise_bound[coordinate]);
+        const Real slack =
+            Real(NextUp(std::abs(next))) - Real(std::abs(next)) + Real(declaration_.noise_bound[coordinate]);
         lower.push_back(Real(next) - nominal[k] - slack);
         upper.push_back(Real(next) - nominal[k] + slack);
       }
@@ -56,7 +57,8 @@ class AdmissibleResidual {
       Real distance = 0;
       for (Eigen::Index l = 0; l < z_.cols(); ++l)
         if (declaration_.lipschitz(k, l) != 0)
-          distance += Real(declaration_.lipschitz(k, l)) * abs(z[static_cast<std::size_t>(l)] - z_(static_cast<Eigen::Index>(i), l));
+          distance += Real(declaration_.lipschitz(k, l)) *
+                      abs(z[static_cast<std::size_t>(l)] - z_(static_cast<Eigen::Index>(i), l));
       const auto row = static_cast<std::size_t>(k);
       const Real low = lower_[i][row] - distance, high = upper_[i][row] + distance;
       if (i == 0 || low > from_below) from_below = low;
@@ -124,10 +126,12 @@ class Membership {
     for (int k = 0; k < slice.dim(); ++k) middle += static_cast<Quad>(normal[k]) * static_cast<Quad>(slice.center(k));
     for (int j = 0; j < slice.num_generators(); ++j) {
       Quad along = 0;
-      for (int k = 0; k < slice.dim(); ++k) along += static_cast<Quad>(normal[k]) * static_cast<Quad>(slice.generator(k, j));
+      for (int k = 0; k < slice.dim(); ++k)
+        along += static_cast<Quad>(normal[k]) * static_cast<Quad>(slice.generator(k, j));
       spread += along < 0 ? -along : along;
     }
-    for (int k = 0; k < slice.dim(); ++k) spread += static_cast<Quad>(std::abs(normal[k])) * static_cast<Quad>(slice.slack(k));
+    for (int k = 0; k < slice.dim(); ++k)
+      spread += static_cast<Quad>(std::abs(normal[k])) * static_cast<Quad>(slice.slack(k));
     half_spaces_.push_back({normal, middle + spread});
     half_spaces_.push_back({-normal, spread - middle});
   }
@@ -160,11 +164,11 @@ bool Collides(const Obstacle& obstacle, const Eigen::MatrixXd& projection, const
       return dx * dx + dy * dy <= Real(obstacle.radius()) * Real(obstacle.radius());
     }
     case Obstacle::Kind::kBox:
-      return Real(points[0][0]) <= y[0] && y[0] <= Real(points[1][0]) && Real(points[0][1]) <= y[1] && y[1] <= Real(points[1][1]);
+      return Real(points[0][0]) <= y[0] && y[0] <= Real(points[1][0]) && Real(points[0][1]) <= y[1] &&
+             y[1] <= Real(points[1][1]);
     case Obstacle::Kind::kHalfSpace:
       return Real(points[0][0]) * y[0] + Real(points[0][1]) * y[1] >= Real(obstacle.offset());
-    case Obstacle::Kind::kPolygon:
-      break;
+    case Obstacle::Kind::kPolygon: break;
   }
   bool left = true, right = true;  // of every side of the triangle
   for (std::size_t i = 0; i < 3; ++i) {
@@ -207,7 +211,8 @@ TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
           ASSERT_TRUE(t == 0 || members[static_cast<std::size_t>(t)].Contains(x)) << "slice " << t;
           ++slices;
           for (const Obstacle& obstacle : query.obstacles) {
-            ASSERT_FALSE(decision.outcome == Outcome::kCertified && Collides(obstacle, problem->projection, x)) << "step " << t;
+            ASSERT_FALSE(decision.outcome == Outcome::kCertified && Collides(obstacle, problem->projection, x))
+                << "step " << t;
           }
           if (t == tube.length()) break;
           std::vector<Real> z = x;
@@ -243,7 +248,9 @@ TEST(ContainmentJudge, NoticesAStateJustOutside) {
     }
     std::vector<Real> inside = x, outside = x;
     inside[static_cast<std::size_t>(k)] = inside[static_cast<std::size_t>(k)] - Real(1e-25);
-    for (std::size_t l = 0; l < 6; ++l) inside[l] = Real(slice.center(static_cast<int>(l))) + (inside[l] - slice.center(static_cast<int>(l))) * Real(1 - 1e-10);
+    for (std::size_t l = 0; l < 6; ++l)
+      inside[l] =
+          Real(slice.center(static_cast<int>(l))) + (inside[l] - slice.center(static_cast<int>(l))) * Real(1 - 1e-10);
     outside[static_cast<std::size_t>(k)] += Real(1e-25);
     EXPECT_TRUE(member.Contains(inside));
     EXPECT_FALSE(member.Contains(outside));

@@ -272,7 +272,8 @@ int main(int argc, char** argv) {
     while (called < count) {
       const long number = next++;
       if (only >= 0 && number > only) break;
-      const Counts counts = RunProblem(seed, number, method == "paper" ? Method::kPaper : Method::kCentred, tube, mutex);
+      const Counts counts =
+          RunProblem(seed, number, method == "paper" ? Method::kPaper : Method::kCentred, tube, mutex);
       called += counts.calls;
       const std::lock_guard lock(mutex);
       total.Add(counts);

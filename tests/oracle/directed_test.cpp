@@ -190,8 +190,9 @@ std::vector<double> Terms(Random& random, int count) {
   const int kind = random.Below(3);
   std::vector<double> terms;
   for (int i = 0; i < count; ++i)
-    terms.push_back(std::ldexp(random.Uniform(0, 2), kind == 0 ? 0 : kind == 1 ? random.Integer(-60, 60)
-                                                                               : random.Integer(-1074, -1060)));
+    terms.push_back(std::ldexp(random.Uniform(0, 2), kind == 0   ? 0
+                                                     : kind == 1 ? random.Integer(-60, 60)
+                                                                 : random.Integer(-1074, -1060)));
   return terms;
 }
 

@@ -116,14 +116,16 @@ class Real {
 /** max {d . z : z in Z}. */
 [[nodiscard]] inline Rational Support(const Zonotope& set, std::span<const double> direction) {
   Rational value = 0;
-  for (int k = 0; k < set.dim(); ++k) value += Rational(direction[static_cast<std::size_t>(k)]) * Rational(set.center(k));
+  for (int k = 0; k < set.dim(); ++k)
+    value += Rational(direction[static_cast<std::size_t>(k)]) * Rational(set.center(k));
   for (int j = 0; j < set.num_generators(); ++j) {
     Rational along = 0;
     for (int k = 0; k < set.dim(); ++k)
       along += Rational(direction[static_cast<std::size_t>(k)]) * Rational(set.generator(k, j));
     value += abs(along);
   }
-  for (int k = 0; k < set.dim(); ++k) value += abs(Rational(direction[static_cast<std::size_t>(k)])) * Rational(set.slack(k));
+  for (int k = 0; k < set.dim(); ++k)
+    value += abs(Rational(direction[static_cast<std::size_t>(k)])) * Rational(set.slack(k));
   return value;
 }
 

@@ -35,7 +35,8 @@ TEST(Exponential, RangesContainTheExactValues) {
     const double x = std::copysign(size, sign(random)), y = x + width(random) * size / 4;
     ASSERT_TRUE(Contains(exp(Interval(x, y)), mpfr_exp, x) && Contains(exp(Interval(x, y)), mpfr_exp, y)) << x;
     if (x > -1) {
-      ASSERT_TRUE(Contains(log1p(Interval(x, y)), mpfr_log1p, x) && Contains(log1p(Interval(x, y)), mpfr_log1p, y)) << x;
+      ASSERT_TRUE(Contains(log1p(Interval(x, y)), mpfr_log1p, x) && Contains(log1p(Interval(x, y)), mpfr_log1p, y))
+          << x;
     }
     if (x > 0) {
       ASSERT_TRUE(Contains(sqrt(Interval(x, y)), mpfr_sqrt, x) && Contains(sqrt(Interval(x, y)), mpfr_sqrt, y)) << x;

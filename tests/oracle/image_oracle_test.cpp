@@ -1,5 +1,5 @@
-// The image of a slice's generators against exact rationals: for no matrix within the Jacobian's error does what the plain
-// image leaves out exceed the slack.
+// The image of a slice's generators against exact rationals: for no matrix within the Jacobian's error does what the
+// plain image leaves out exceed the slack.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -49,13 +49,15 @@ Rational LeftOut(Random& random, const Program& program, const Case& c, const Zo
     const Program::First& entry = program.jacobian[e];
     if (entry.row != k || entry.column >= program.states) continue;
     const double part = random.Coin(0.7) ? random.Sign() : random.Uniform(-1, 1);
-    row[static_cast<std::size_t>(entry.column)] = Rational(c.expansion.jacobian[e]) + Rational(part) * Rational(c.off.jacobian[e]);
+    row[static_cast<std::size_t>(entry.column)] =
+        Rational(c.expansion.jacobian[e]) + Rational(part) * Rational(c.off.jacobian[e]);
   }
   Rational sum = 0;
   for (int l = 0; l < program.states; ++l) sum += abs(row[static_cast<std::size_t>(l)]) * Rational(c.slice.slack(l));
   for (int j = 0; j < c.slice.num_generators(); ++j) {
     Rational difference = -Rational(image.generator(k, j));
-    for (int l = 0; l < program.states; ++l) difference += row[static_cast<std::size_t>(l)] * Rational(c.slice.generator(l, j));
+    for (int l = 0; l < program.states; ++l)
+      difference += row[static_cast<std::size_t>(l)] * Rational(c.slice.generator(l, j));
     sum += abs(difference);
   }
   return sum;

@@ -75,8 +75,8 @@ TEST_P(IntervalOperation, IsTheRangeUpToTwoDoubles) {
     std::vector<Rational> ends;
     for (const double x : {a.lower, a.upper})
       for (const double y : {b.lower, b.upper}) ends.push_back(Result(Rational(x), Rational(y), GetParam()));
-    SCOPED_TRACE(testing::Message() << "[" << a.lower << ", " << a.upper << "] " << GetParam() << " [" << b.lower << ", "
-                                    << b.upper << "]");
+    SCOPED_TRACE(testing::Message() << "[" << a.lower << ", " << a.upper << "] " << GetParam() << " [" << b.lower
+                                    << ", " << b.upper << "]");
     ExpectRange(Result(a, b, GetParam()), *std::min_element(ends.begin(), ends.end()),
                 *std::max_element(ends.begin(), ends.end()));
     if (HasFatalFailure()) return;
@@ -111,7 +111,8 @@ TEST(Interval, HalfWidthAndMiddleHoldAtEveryScale) {
     ASSERT_LE(x.HalfWidthUpper(), Up(Ceiling(half), 2));
     ASSERT_TRUE(x.Contains(x.Middle()));
     for (const double y : {x.Middle(), x.lower, x.upper}) {
-      const Rational reach = std::max(Rational(Rational(x.upper) - Rational(y)), Rational(Rational(y) - Rational(x.lower)));
+      const Rational reach =
+          std::max(Rational(Rational(x.upper) - Rational(y)), Rational(Rational(y) - Rational(x.lower)));
       ASSERT_TRUE(AtMost(reach, x.DistanceUpper(y))) << x.DistanceUpper(y);
     }
   }
@@ -147,7 +148,8 @@ TEST(Interval, SquareIsTheRangeUpToTwoDoubles) {
 }
 
 TEST(Interval, DivisionByAnIntervalThatTouchesZeroIsEntire) {
-  for (const Interval& b : {Interval(0), Interval(-0.0), Interval(0, 1), Interval(-1, 0), Interval(-1, 1), Interval(-0.0, 1)})
+  for (const Interval& b :
+       {Interval(0), Interval(-0.0), Interval(0, 1), Interval(-1, 0), Interval(-1, 1), Interval(-0.0, 1)})
     EXPECT_EQ(Interval(1, 2) / b, Interval::Entire());
   EXPECT_NE(Interval(1, 2) / Interval(0x1p-1074, 1), Interval::Entire());
 }
@@ -202,7 +204,12 @@ std::optional<std::pair<Real, Real>> Range(Function f, const Interval& x) {
     return std::pair(a, b);
   }
   const double maximum_at = f == Function::kSin ? 1 : 0;
-  return std::pair(Holds(x, maximum_at + 2, 4) ? Real(-1) : a < b ? a : b, Holds(x, maximum_at, 4) ? Real(1) : a < b ? b : a);
+  return std::pair(Holds(x, maximum_at + 2, 4) ? Real(-1)
+                   : a < b                     ? a
+                                               : b,
+                   Holds(x, maximum_at, 4) ? Real(1)
+                   : a < b                 ? b
+                                           : a);
 }
 
 // A double x >= 0 with the unit in the last place of the function's value there.
@@ -211,7 +218,8 @@ double Ulp(double x) { return NextUp(std::abs(x)) - std::abs(x); }
 void ExpectFunctionRange(Function f, const Interval& x) {
   const Interval range = Enclose(f, x);
   const auto exact_range = Range(f, x);
-  SCOPED_TRACE(testing::Message() << "function " << static_cast<int>(f) << " on [" << x.lower << ", " << x.upper << "]");
+  SCOPED_TRACE(testing::Message() << "function " << static_cast<int>(f) << " on [" << x.lower << ", " << x.upper
+                                  << "]");
   if (!exact_range) {
     ASSERT_EQ(range, Interval::Entire());
     return;
@@ -266,7 +274,8 @@ TEST_P(Trigonometric, HoldsAtEveryMultipleOfHalfPi) {
 }
 
 TEST_P(Trigonometric, OfTinyArgumentsIsTight) {
-  for (const double x : {0.0, -0.0, 0x1p-1074, -0x1p-1074, 0x1p-1022, 1e-300, 1e-20, -1e-8}) ExpectFunctionRange(GetParam(), x);
+  for (const double x : {0.0, -0.0, 0x1p-1074, -0x1p-1074, 0x1p-1022, 1e-300, 1e-20, -1e-8})
+    ExpectFunctionRange(GetParam(), x);
 }
 
 TEST_P(Trigonometric, OfArgumentsTooLargeToReduceIsEverything) {
@@ -284,7 +293,9 @@ TEST_P(Trigonometric, LibraryErrorIsBelowOneUnit) {
   double worst = 0, worst_at = 0;
   for (int trial = 0; trial < 60000; ++trial) {
     const double x = Angle(random).lower;
-    const double value = GetParam() == Function::kSin ? std::sin(x) : GetParam() == Function::kCos ? std::cos(x) : std::tan(x);
+    const double value = GetParam() == Function::kSin   ? std::sin(x)
+                         : GetParam() == Function::kCos ? std::cos(x)
+                                                        : std::tan(x);
     const Real true_value = Value(GetParam(), x);
     const double error = std::abs((Real(value) - true_value).ToDouble()) / Ulp(true_value.ToDouble());
     if (error > worst) worst = error, worst_at = x;

@@ -35,19 +35,34 @@ Formulas Bicycle(const std::vector<Real>& z) {
   const Real s = sin(z[kTheta]), c = cos(z[kTheta]), t = tan(z[kDelta]), secant = Real(1) + t * t, &v = z[kV];
   return {{z[kX] + dt * (v * c), z[kY] + dt * (v * s), z[kTheta] + per_wheelbase * (v * t), v + dt * z[kA],
            z[kA] + dt * z[kJerk], z[kDelta] + dt * z[kSteerRate]},
-          {{{0, kX}, 1}, {{0, kTheta}, -dt * v * s}, {{0, kV}, dt * c},
-           {{1, kY}, 1}, {{1, kTheta}, dt * v * c}, {{1, kV}, dt * s},
-           {{2, kTheta}, 1}, {{2, kV}, per_wheelbase * t}, {{2, kDelta}, per_wheelbase * v * secant},
-           {{3, kV}, 1}, {{3, kA}, dt}, {{4, kA}, 1}, {{4, kJerk}, dt}, {{5, kDelta}, 1}, {{5, kSteerRate}, dt}},
-          {{{0, kTheta, kTheta}, -dt * v * c}, {{0, kTheta, kV}, -dt * s},
-           {{1, kTheta, kTheta}, -dt * v * s}, {{1, kTheta, kV}, dt * c},
-           {{2, kV, kDelta}, per_wheelbase * secant}, {{2, kDelta, kDelta}, per_wheelbase * v * Real(2) * t * secant}}};
+          {{{0, kX}, 1},
+           {{0, kTheta}, -dt * v * s},
+           {{0, kV}, dt * c},
+           {{1, kY}, 1},
+           {{1, kTheta}, dt * v * c},
+           {{1, kV}, dt * s},
+           {{2, kTheta}, 1},
+           {{2, kV}, per_wheelbase * t},
+           {{2, kDelta}, per_wheelbase * v * secant},
+           {{3, kV}, 1},
+           {{3, kA}, dt},
+           {{4, kA}, 1},
+           {{4, kJerk}, dt},
+           {{5, kDelta}, 1},
+           {{5, kSteerRate}, dt}},
+          {{{0, kTheta, kTheta}, -dt * v * c},
+           {{0, kTheta, kV}, -dt * s},
+           {{1, kTheta, kTheta}, -dt * v * s},
+           {{1, kTheta, kV}, dt * c},
+           {{2, kV, kDelta}, per_wheelbase * secant},
+           {{2, kDelta, kDelta}, per_wheelbase * v * Real(2) * t * secant}}};
 }
 
 Formulas PointMassFormulas(const std::vector<Real>& z) {
   const Real dt(kPointMassDt), half_square = dt * dt / Real(2);
   Formulas f{{}, {}, {}};
-  for (std::size_t axis = 0; axis < 2; ++axis) f.value.push_back(z[axis] + dt * z[axis + 2] + half_square * z[axis + 4]);
+  for (std::size_t axis = 0; axis < 2; ++axis)
+    f.value.push_back(z[axis] + dt * z[axis + 2] + half_square * z[axis + 4]);
   for (std::size_t axis = 0; axis < 2; ++axis) f.value.push_back(z[axis + 2] + dt * z[axis + 4]);
   for (int axis = 0; axis < 2; ++axis) {
     f.jacobian[{axis, axis}] = 1;
@@ -100,7 +115,8 @@ TEST_P(Model, LinearizationContainsValueAndJacobian) {
     Linearization linearization;
     model().Linearize(View(z), linearization);
     for (std::size_t k = 0; k < f.value.size(); ++k) {
-      ASSERT_TRUE(Inside(f.value[k], linearization.value[k]) || linearization.value[k] == Interval::Entire()) << "value " << k;
+      ASSERT_TRUE(Inside(f.value[k], linearization.value[k]) || linearization.value[k] == Interval::Entire())
+          << "value " << k;
     }
     ExpectJacobian(linearization, f);
     if (HasFatalFailure()) return;
@@ -178,17 +194,18 @@ TEST_P(Model, HessianContainsAllSecondDerivativesOverTheBox) {
       const Formulas f = GetParam().formulas(PointIn(random, box));
       for (const auto& [place, value] : f.hessian) {
         ASSERT_TRUE(listed.count(place));
-        ASSERT_TRUE(Inside(value, listed[place])) << std::get<0>(place) << ": " << std::get<1>(place) << ", " << std::get<2>(place);
+        ASSERT_TRUE(Inside(value, listed[place]))
+            << std::get<0>(place) << ": " << std::get<1>(place) << ", " << std::get<2>(place);
       }
-      for (const auto& [place, value] : listed)
-        ASSERT_TRUE(f.hessian.count(place) || value.Contains(0));
+      for (const auto& [place, value] : listed) ASSERT_TRUE(f.hessian.count(place) || value.Contains(0));
     }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Model,
                          testing::Values(ModelCase{"point_mass", MakePointMass(kPointMassDt), PointMassFormulas},
-                                         ModelCase{"kinematic_bicycle", MakeKinematicBicycle(kDt, kWheelbase), Bicycle}));
+                                         ModelCase{"kinematic_bicycle", MakeKinematicBicycle(kDt, kWheelbase),
+                                                   Bicycle}));
 
 TEST(PointMassModel, HasNoSecondDerivativesAtAll) {
   Random random(505);
@@ -222,14 +239,18 @@ TEST(BicycleModel, HessianIsTheTrueRange) {
           const double steer = box[kDelta].lower + (box[kDelta].upper - box[kDelta].lower) * i / samples;
           const double t = std::tan(steer), per_wheelbase = kDt / kWheelbase;
           const std::map<std::tuple<int, int, int>, double> values{
-              {{0, kTheta, kTheta}, -kDt * speed * std::cos(angle)}, {{0, kTheta, kV}, -kDt * std::sin(angle)},
-              {{1, kTheta, kTheta}, -kDt * speed * std::sin(angle)}, {{1, kTheta, kV}, kDt * std::cos(angle)},
-              {{2, kV, kDelta}, per_wheelbase * (1 + t * t)}, {{2, kDelta, kDelta}, per_wheelbase * speed * 2 * t * (1 + t * t)}};
+              {{0, kTheta, kTheta}, -kDt * speed * std::cos(angle)},
+              {{0, kTheta, kV}, -kDt * std::sin(angle)},
+              {{1, kTheta, kTheta}, -kDt * speed * std::sin(angle)},
+              {{1, kTheta, kV}, kDt * std::cos(angle)},
+              {{2, kV, kDelta}, per_wheelbase * (1 + t * t)},
+              {{2, kDelta, kDelta}, per_wheelbase * speed * 2 * t * (1 + t * t)}};
           const double at = values.at({output, row, column});
           lowest = std::min(lowest, at);
           highest = std::max(highest, at);
         }
-      EXPECT_LE(value.upper - value.lower, (highest - lowest) * 1.0001 + 1e-14) << output << ": " << row << ", " << column;
+      EXPECT_LE(value.upper - value.lower, (highest - lowest) * 1.0001 + 1e-14)
+          << output << ": " << row << ", " << column;
     }
   }
 }
@@ -290,8 +311,10 @@ struct Derivatives {
 Derivatives ByHand(std::size_t expression, double x, double y, double w) {
   const double sx = std::sin(x), cx = std::cos(x), sy = std::sin(y), cy = std::cos(y);
   switch (expression) {
-    case 0: return {{y / w, x / w, -x * y / (w * w)},
-                    {{0, 1 / w, -y / (w * w)}, {1 / w, 0, -x / (w * w)}, {-y / (w * w), -x / (w * w), 2 * x * y / (w * w * w)}}};
+    case 0:
+      return {
+          {y / w, x / w, -x * y / (w * w)},
+          {{0, 1 / w, -y / (w * w)}, {1 / w, 0, -x / (w * w)}, {-y / (w * w), -x / (w * w), 2 * x * y / (w * w * w)}}};
     case 1: return {{cx * cy, -sx * sy, 0}, {{-sx * cy, -cx * sy, 0}, {-cx * sy, -sx * cy, 0}, {0, 0, 0}}};
     case 2: {
       const double t = std::tan(x * y), d = 1 + t * t, dd = 2 * t * d;
@@ -299,11 +322,13 @@ Derivatives ByHand(std::size_t expression, double x, double y, double w) {
     }
     case 3: return {{w - y, -x, x}, {{0, -1, 1}, {-1, 0, 0}, {1, 0, 0}}};
     case 4: return {{3 * x * x, 0, 0}, {{6 * x, 0, 0}, {0, 0, 0}, {0, 0, 0}}};
-    case 5: return {{-1 / ((x + 2) * (x + 2)), 0, 0}, {{2 / ((x + 2) * (x + 2) * (x + 2)), 0, 0}, {0, 0, 0}, {0, 0, 0}}};
+    case 5:
+      return {{-1 / ((x + 2) * (x + 2)), 0, 0}, {{2 / ((x + 2) * (x + 2) * (x + 2)), 0, 0}, {0, 0, 0}, {0, 0, 0}}};
     default: {
       const double s = std::sin(sx * y), c = std::cos(sx * y);
       return {{-s * cx * y, -s * sx, 0},
-              {{-c * cx * cx * y * y + s * sx * y, -c * sx * cx * y - s * cx, 0}, {-c * sx * cx * y - s * cx, -c * sx * sx, 0},
+              {{-c * cx * cx * y * y + s * sx * y, -c * sx * cx * y - s * cx, 0},
+               {-c * sx * cx * y - s * cx, -c * sx * sx, 0},
                {0, 0, 0}}};
     }
   }
@@ -342,7 +367,8 @@ TEST(Program, DerivativesAgreeWithThoseMadeByHand) {
         }
         for (int j = i; j < 3; ++j) {
           const auto place = second.find({output, i, j});
-          ASSERT_NEAR(place == second.end() ? 0 : plain.hessian[place->second].lower, expected.hessian[i][j], 1e-12) << i << j;
+          ASSERT_NEAR(place == second.end() ? 0 : plain.hessian[place->second].lower, expected.hessian[i][j], 1e-12)
+              << i << j;
           if (place == second.end()) continue;
           ASSERT_NEAR(plain.hessian[place->second].upper, expected.hessian[i][j], 1e-12);
           ASSERT_NEAR(hessian.entries[place->second].second_derivative.Middle(), expected.hessian[i][j], 1e-12);
@@ -368,7 +394,8 @@ struct DomainCase {
       if (random.Coin(0.1)) b = a;
       const double half = std::abs(b - a) / 2;
       center[l] = std::clamp((a + b) / 2, middle - reach, middle + reach);
-      const double lower = std::max(center[l] - half, middle - reach), upper = std::min(center[l] + half, middle + reach);
+      const double lower = std::max(center[l] - half, middle - reach),
+                   upper = std::min(center[l] + half, middle + reach);
       box.emplace_back(lower, upper);
       ranges.push_back({lower, upper});
     }
@@ -397,7 +424,8 @@ TEST_P(Model, ExpansionErrorBoundsThePlainEvaluation) {
     for (int sample = 0; sample < 4; ++sample) {
       const Formulas inside = GetParam().formulas(PointIn(random, c.box));
       for (int e = 0; e < program.num_second; ++e) {
-        const auto entry = inside.hessian.find({program.hessian[e].output, program.hessian[e].row, program.hessian[e].column});
+        const auto entry =
+            inside.hessian.find({program.hessian[e].output, program.hessian[e].row, program.hessian[e].column});
         const Real exact = entry == inside.hessian.end() ? Real(0) : entry->second;
         const Interval range(plain.hessian[e].lower, plain.hessian[e].upper);
         ASSERT_TRUE(Inside(exact, range + Interval(-error.hessian[e], error.hessian[e]))) << "entry " << e;

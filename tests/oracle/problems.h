@@ -37,7 +37,8 @@ class Ramps {
       exact::Real along = 0;
       for (Eigen::Index l = 0; l < lipschitz_.cols(); ++l) {
         if (lipschitz_(k, l) == 0) continue;
-        along += exact::Real(ramp.weight(k, l)) * exact::Real(lipschitz_(k, l)) * (z[static_cast<std::size_t>(l)] - ramp.knee[l]);
+        along += exact::Real(ramp.weight(k, l)) * exact::Real(lipschitz_(k, l)) *
+                 (z[static_cast<std::size_t>(l)] - ramp.knee[l]);
       }
       sum += exact::Real(ramp.height[k]) * abs(along) / static_cast<double>(ramps_.size());
     }
@@ -70,16 +71,18 @@ struct Query {
   std::vector<Obstacle> obstacles;
 
   [[nodiscard]] Plan plan() const {
-    return {controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()), static_cast<int>(controls.rows())};
+    return {controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
+            static_cast<int>(controls.rows())};
   }
 };
 
 inline Eigen::VectorXd StateReach(bool bicycle) {
-  return bicycle ? (Eigen::VectorXd(6) << 40, 40, 3.14, 25, 3, 0.48).finished() : (Eigen::VectorXd(4) << 20, 20, 6, 6).finished();
+  return bicycle ? (Eigen::VectorXd(6) << 40, 40, 3.14, 25, 3, 0.48).finished()
+                 : (Eigen::VectorXd(4) << 20, 20, 6, 6).finished();
 }
 
-/** The bicycle or the point mass with `count` transitions. Few entries of L are not zero; a third of the coordinates have
-noise, up to its bound. */
+/** The bicycle or the point mass with `count` transitions. Few entries of L are not zero; a third of the coordinates
+have noise, up to its bound. */
 inline std::shared_ptr<Problem> AnyProblem(Random& random, bool bicycle, int count) {
   auto problem = std::make_shared<Problem>();
   problem->model = bicycle ? MakeKinematicBicycle(0.1, 2.5) : MakePointMass(0.15);
@@ -110,7 +113,8 @@ inline std::shared_ptr<Problem> AnyProblem(Random& random, bool bicycle, int cou
     const std::vector<exact::Real> exact_z(z.begin(), z.end()), nominal = NominalSuccessor(bicycle, exact_z);
     for (int k = 0; k < n; ++k) {
       const double noise = declaration.noise_bound[k] * (random.Coin(0.3) ? random.Sign() : random.Uniform(-1, 1));
-      problem->transitions.x_next(i, k) = (nominal[static_cast<std::size_t>(k)] + residual(exact_z, k) + noise).ToDouble();
+      problem->transitions.x_next(i, k) =
+          (nominal[static_cast<std::size_t>(k)] + residual(exact_z, k) + noise).ToDouble();
     }
     problem->transitions.z.row(i) = z;
   }
@@ -121,12 +125,14 @@ inline Query AnyQuery(Random& random, const Problem& problem) {
   const bool bicycle = problem.model->num_states() == 6;
   const int n = problem.model->num_states();
   const Eigen::VectorXd reach = StateReach(bicycle);
-  Eigen::VectorXd center = 0.3 * reach.cwiseProduct(random.Vector(n)), half = reach.cwiseProduct(random.Vector(n)).cwiseAbs();
+  Eigen::VectorXd center = 0.3 * reach.cwiseProduct(random.Vector(n)),
+                  half = reach.cwiseProduct(random.Vector(n)).cwiseAbs();
   half *= random.Coin(0.1) ? 0 : std::ldexp(1, -random.Integer(5, 12));
   Query query;
   query.initial_set = Zonotope::FromBox(center, half);
   const int steps = random.Integer(1, 12);
-  const Eigen::VectorXd input = (bicycle ? Eigen::Vector2d(2, 0.5) : Eigen::Vector2d(1, 1)).cwiseProduct(random.Vector(2));
+  const Eigen::VectorXd input =
+      (bicycle ? Eigen::Vector2d(2, 0.5) : Eigen::Vector2d(1, 1)).cwiseProduct(random.Vector(2));
   query.controls = input.replicate(1, steps);
   if (random.Coin()) query.controls += random.Matrix(2, steps, 0.2);
   for (int o = random.Integer(0, 4); o > 0; --o) {
@@ -134,7 +140,9 @@ inline Query AnyQuery(Random& random, const Problem& problem) {
     switch (random.Below(4)) {
       case 0: query.obstacles.push_back(Obstacle::Circle(place, random.Uniform(0, 2))); break;
       case 1: query.obstacles.push_back(Obstacle::AxisBox(place, place + random.Vector(2).cwiseAbs())); break;
-      case 2: query.obstacles.push_back(Obstacle::Polygon({place, place + random.Vector(2), place + random.Vector(2)})); break;
+      case 2:
+        query.obstacles.push_back(Obstacle::Polygon({place, place + random.Vector(2), place + random.Vector(2)}));
+        break;
       default: {
         const Eigen::VectorXd normal = random.Vector(2);
         query.obstacles.push_back(Obstacle::HalfSpace(normal, normal.dot(place) + random.Uniform(0, 8)));

@@ -1,5 +1,5 @@
-/** Seeded random inputs for property tests. FOREREACH_TEST_SEED=N in the environment shifts every seed, so a test can be
-run on fresh inputs; SCOPED_TRACE(random.trace()) prints what reproduces a failure. */
+/** Seeded random inputs for property tests. FOREREACH_TEST_SEED=N in the environment shifts every seed, so a test can
+be run on fresh inputs; SCOPED_TRACE(random.trace()) prints what reproduces a failure. */
 #pragma once
 
 #include <array>
@@ -53,45 +53,60 @@ class Random {
 
   /** A finite double: any bit pattern, a moderate one, one of few bits, or one where arithmetic changes its rules. */
   double Double() {
-    static constexpr std::array special{0.0, -0.0, 1.0, -1.0, 0x1p-1074, -0x1p-1074, 0x1p-1022, -0x1p-1022,
-                                        0x1.fffffffffffffp-1023, 0x1.fffffffffffffp+1023, -0x1.fffffffffffffp+1023,
-                                        0x1p+1023, 0x1p-960, 0x1.fffffffffffffp-961, 0x1p-537, 0x1p-480, 0x1p-538,
-                                        0x1.0000000000001p0, 0x1.fffffffffffffp-1, 3.0, 0x1p53, 0x1p511, 0x1p512,
-                                        1e300, -1e300, 1e-300, -1e-300, 0.1, -1.0 / 3};
+    static constexpr std::array special{0.0,
+                                        -0.0,
+                                        1.0,
+                                        -1.0,
+                                        0x1p-1074,
+                                        -0x1p-1074,
+                                        0x1p-1022,
+                                        -0x1p-1022,
+                                        0x1.fffffffffffffp-1023,
+                                        0x1.fffffffffffffp+1023,
+                                        -0x1.fffffffffffffp+1023,
+                                        0x1p+1023,
+                                        0x1p-960,
+                                        0x1.fffffffffffffp-961,
+                                        0x1p-537,
+                                        0x1p-480,
+                                        0x1p-538,
+                                        0x1.0000000000001p0,
+                                        0x1.fffffffffffffp-1,
+                                        3.0,
+                                        0x1p53,
+                                        0x1p511,
+                                        0x1p512,
+                                        1e300,
+                                        -1e300,
+                                        1e-300,
+                                        -1e-300,
+                                        0.1,
+                                        -1.0 / 3};
     switch (Below(8)) {
-      case 0:
-        return special[static_cast<std::size_t>(Below(static_cast<int>(special.size())))];
+      case 0: return special[static_cast<std::size_t>(Below(static_cast<int>(special.size())))];
       case 1:
       case 2: {
         const double any = std::bit_cast<double>(Bits());
         return std::isfinite(any) ? any : 1.0;
       }
-      case 3:
-        return std::ldexp(Sign() * Integer(0, 64), Integer(-6, 6));
-      case 4:
-        return std::ldexp(Uniform(-2, 2), Integer(-1074, -940));
-      default:
-        return std::ldexp(Uniform(-2, 2), Integer(-40, 40));
+      case 3: return std::ldexp(Sign() * Integer(0, 64), Integer(-6, 6));
+      case 4: return std::ldexp(Uniform(-2, 2), Integer(-1074, -940));
+      default: return std::ldexp(Uniform(-2, 2), Integer(-40, 40));
     }
   }
 
   /** Often a close relative of x, so that differences cancel. */
   double Near(double x) {
     switch (Below(6)) {
-      case 0:
-        return x;
-      case 1:
-        return -x;
-      case 2:
-        return std::nextafter(x, kMaxDouble);
-      case 3:
-        return -std::nextafter(x, -kMaxDouble);
+      case 0: return x;
+      case 1: return -x;
+      case 2: return std::nextafter(x, kMaxDouble);
+      case 3: return -std::nextafter(x, -kMaxDouble);
       case 4: {
         const double scaled = x * Uniform(-2, 2);
         return std::isfinite(scaled) ? scaled : x;
       }
-      default:
-        return Double();
+      default: return Double();
     }
   }
 

@@ -104,7 +104,9 @@ TEST(RemainderOracle, ContainsThemWhereProductsUnderflow) {
   Random random(614);
   SCOPED_TRACE(random.trace());
   const auto model = MakeKinematicBicycle(0.1, 2.5);
-  const auto any = [&](int lowest, int highest) { return random.Sign() * std::ldexp(1, random.Integer(lowest, highest)); };
+  const auto any = [&](int lowest, int highest) {
+    return random.Sign() * std::ldexp(1, random.Integer(lowest, highest));
+  };
   for (int trial = 0; trial < 3000 && !testing::Test::HasFatalFailure(); ++trial) {
     Case c(random, model->program());
     Eigen::MatrixXd generators(6, random.Integer(1, 3));
@@ -128,7 +130,8 @@ TEST(RemainderOracle, ContainsThemWhereHalvingRounds) {
   for (int trial = 0; trial < 3000 && !testing::Test::HasFatalFailure(); ++trial) {
     Case c(random, model->program());
     Eigen::MatrixXd generators = Eigen::MatrixXd::Identity(6, 6);
-    for (int k = 0; k < 6; ++k) generators(k, k) = random.Coin() ? 1 : std::ldexp(random.Integer(1, 3), -random.Integer(0, 3));
+    for (int k = 0; k < 6; ++k)
+      generators(k, k) = random.Coin() ? 1 : std::ldexp(random.Integer(1, 3), -random.Integer(0, 3));
     c.slice = Zonotope(Eigen::VectorXd::Zero(6), generators);
     Propagator::HalfWidths(c.slice, c.half_width.data());
     for (PlainInterval& h : c.hessian) {

@@ -92,12 +92,14 @@ struct Sample {
   Observations observations;
 };
 
-Sample Exactly(const Eigen::MatrixXd& lipschitz, const Eigen::MatrixXd& z, const Eigen::MatrixXd& residual, double noise = 0) {
+Sample Exactly(const Eigen::MatrixXd& lipschitz, const Eigen::MatrixXd& z, const Eigen::MatrixXd& residual,
+               double noise = 0) {
   return {{lipschitz, Eigen::VectorXd::Constant(lipschitz.rows(), noise)}, {z, residual, residual}};
 }
 
 Sample TwoPoints(double slope, double distance, double difference, double noise) {
-  return Exactly(Eigen::MatrixXd::Constant(1, 1, slope), Eigen::Vector2d(1, 1 + distance), Eigen::Vector2d(3, 3 + difference), noise);
+  return Exactly(Eigen::MatrixXd::Constant(1, 1, slope), Eigen::Vector2d(1, 1 + distance),
+                 Eigen::Vector2d(3, 3 + difference), noise);
 }
 
 TEST(FindViolation, DecidesAtTheLastBit) {
@@ -120,7 +122,10 @@ TEST(FindViolation, DecidesAtTheLastBit) {
 }
 
 TEST(FindViolation, ConstantCoordinatesDecideAtTheLastBit) {
-  EXPECT_FALSE([] { const Sample s = TwoPoints(0, 5, 0.5, 0.25); return FindViolation(s.declaration, s.observations); }());
+  EXPECT_FALSE([] {
+    const Sample s = TwoPoints(0, 5, 0.5, 0.25);
+    return FindViolation(s.declaration, s.observations);
+  }());
   const Sample s = TwoPoints(0, 5, 0.5 + 0x1p-50, 0.25);
   const auto violation = FindViolation(s.declaration, s.observations);
   ASSERT_TRUE(violation);
@@ -137,7 +142,8 @@ std::optional<Violation> BruteForce(const Sample& s) {
         Rational bound = 2 * Rational(s.declaration.noise_bound[k]);
         for (Eigen::Index l = 0; l < o.z.cols(); ++l)
           bound += Rational(s.declaration.lipschitz(k, l)) * abs(Rational(o.z(i, l)) - Rational(o.z(j, l)));
-        const Rational up = Rational(o.lower(i, k)) - Rational(o.upper(j, k)), down = Rational(o.lower(j, k)) - Rational(o.upper(i, k));
+        const Rational up = Rational(o.lower(i, k)) - Rational(o.upper(j, k)),
+                       down = Rational(o.lower(j, k)) - Rational(o.upper(i, k));
         if (std::max(up, down) > bound) return Violation{i, j, k, 0, 0};
       }
   return std::nullopt;
@@ -218,9 +224,12 @@ TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
       std::array<long double, 6> next;
       const Eigen::VectorXd z = data.z.row(i);
       const long double dt = 0.1, per_wheelbase = dt / 2.5L, v = z[3], delta = z[5];
-      next = {z[0] + dt * (v * std::cos(static_cast<long double>(z[2]))), z[1] + dt * (v * std::sin(static_cast<long double>(z[2]))),
+      next = {z[0] + dt * (v * std::cos(static_cast<long double>(z[2]))),
+              z[1] + dt * (v * std::sin(static_cast<long double>(z[2]))),
               z[2] + per_wheelbase * (v * std::tan(delta)) - slope_v * std::abs(v - 0.25L) + slope_delta * delta,
-              v + dt * z[4], z[4] + dt * z[6], delta + dt * z[7]};
+              v + dt * z[4],
+              z[4] + dt * z[6],
+              delta + dt * z[7]};
       for (int k = 0; k < 6; ++k) data.x_next(i, k) = static_cast<double>(next[static_cast<std::size_t>(k)]);
     }
     Declaration declaration{Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
@@ -277,7 +286,8 @@ Rational Distance(const Sample& s, int k, int i, const Zonotope& slice, const Ei
 void ExpectEnvelope(const Sample& s, const Zonotope& slice, const Eigen::VectorXd& input, double tolerance) {
   std::vector<ResidualBounds> all(3);
   Enclose(EnvelopeFor(s.declaration, s.observations, slice, View(input)), slice, View(input), all[0]);
-  Enclose(EnvelopeFor(s.declaration, s.observations, slice, View(input), {.max_flat_blocks = 0}), slice, View(input), all[1]);
+  Enclose(EnvelopeFor(s.declaration, s.observations, slice, View(input), {.max_flat_blocks = 0}), slice, View(input),
+          all[1]);
   const EnvelopeOptions one_leaf{.max_leaf_visits = 1, .max_flat_blocks = 0};
   Enclose(EnvelopeFor(s.declaration, s.observations, slice, View(input), one_leaf), slice, View(input), all[2]);
   ASSERT_FALSE(all[0].capped || all[1].capped);
@@ -289,7 +299,8 @@ void ExpectEnvelope(const Sample& s, const Zonotope& slice, const Eigen::VectorX
       lower.push_back(Rational(s.observations.lower(i, k)) - sigma - distance);
       upper.push_back(Rational(s.observations.upper(i, k)) + sigma + distance);
     }
-    const Rational highest = *std::max_element(lower.begin(), lower.end()), lowest = *std::min_element(upper.begin(), upper.end());
+    const Rational highest = *std::max_element(lower.begin(), lower.end()),
+                   lowest = *std::min_element(upper.begin(), upper.end());
     const auto row = static_cast<std::size_t>(k);
     for (const ResidualBounds& bounds : all) {
       ASSERT_TRUE(AtLeast(highest, bounds.lower[row])) << "coordinate " << k;
@@ -310,13 +321,14 @@ TEST_P(Envelope, IsTheExactOneRoundedOutward) {
   const int trials = active <= 3 ? 200 : active <= 8 ? 15 : active <= 12 ? 1 : 30;
   for (int trial = 0; trial < trials; ++trial) {
     const int count = active <= 3 ? random.Integer(1, 140) : 4, variables = states + inputs;
-    Sample s = Exactly(Eigen::MatrixXd::Zero(1, variables), random.Matrix(count, variables), random.Matrix(count, 1, 0.1),
-                       random.Coin() ? 0 : 0.01);
+    Sample s = Exactly(Eigen::MatrixXd::Zero(1, variables), random.Matrix(count, variables),
+                       random.Matrix(count, 1, 0.1), random.Coin() ? 0 : 0.01);
     s.observations.upper.array() += 1e-6;
     std::vector<int> columns(static_cast<std::size_t>(variables));
     for (int l = 0; l < variables; ++l) columns[static_cast<std::size_t>(l)] = l;
     for (int a = 0; a < active; ++a) {
-      std::swap(columns[static_cast<std::size_t>(a)], columns[static_cast<std::size_t>(random.Integer(a, variables - 1))]);
+      std::swap(columns[static_cast<std::size_t>(a)],
+                columns[static_cast<std::size_t>(random.Integer(a, variables - 1))]);
       s.declaration.lipschitz(0, columns[static_cast<std::size_t>(a)]) = random.Uniform(0, 1);
     }
     Zonotope slice = random.AnyZonotope(states, random.Integer(0, active <= 8 ? 20 : 5), random.Coin() ? 0.3 : 0.02);
@@ -336,8 +348,8 @@ TEST(EnvelopeOracle, HoldsForWildScales) {
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 500; ++trial) {
     const double scale = std::ldexp(1, random.Integer(-500, 480));
-    Sample s = Exactly(random.Matrix(2, 4).cwiseAbs() * std::ldexp(1, random.Integer(-500, 480)), random.Matrix(9, 4, scale),
-                       random.Matrix(9, 2, scale));
+    Sample s = Exactly(random.Matrix(2, 4).cwiseAbs() * std::ldexp(1, random.Integer(-500, 480)),
+                       random.Matrix(9, 4, scale), random.Matrix(9, 2, scale));
     s.declaration.lipschitz.col(random.Below(4)).setZero();
     const Zonotope slice = random.AnyZonotope(3, random.Integer(0, 9), scale);
     ExpectEnvelope(s, slice, random.Vector(1, scale), kInfinity);
@@ -348,7 +360,8 @@ TEST(EnvelopeOracle, HoldsForWildScales) {
 // Sums that overflow make infinities of both signs, and their NaN must not be mistaken for a small distance.
 TEST(EnvelopeOracle, OverflowNeverNarrows) {
   const double huge = 1e300;
-  const Sample s = Exactly(Eigen::MatrixXd::Constant(1, 3, huge), Eigen::MatrixXd::Zero(1, 3), Eigen::MatrixXd::Zero(1, 1));
+  const Sample s =
+      Exactly(Eigen::MatrixXd::Constant(1, 3, huge), Eigen::MatrixXd::Zero(1, 3), Eigen::MatrixXd::Zero(1, 1));
   Eigen::MatrixXd generators(2, 2);
   generators << 1e10, 1e10, 1e10, -1e10;
   const Zonotope slice(Eigen::Vector2d::Zero(), generators);
@@ -364,8 +377,8 @@ TEST(EnvelopeOracle, WildDoublesNeverNarrow) {
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 3000; ++trial) {
     const auto any = [&] { return random.Double(); };
-    const Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(1, 3, any).cwiseAbs(), Eigen::MatrixXd::NullaryExpr(3, 3, any),
-                             Eigen::MatrixXd::NullaryExpr(3, 1, any));
+    const Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(1, 3, any).cwiseAbs(),
+                             Eigen::MatrixXd::NullaryExpr(3, 3, any), Eigen::MatrixXd::NullaryExpr(3, 1, any));
     const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any), Eigen::MatrixXd::NullaryExpr(2, 4, any));
     const Eigen::VectorXd input = Eigen::VectorXd::NullaryExpr(1, any);
     ResidualBounds bounds;

@@ -35,7 +35,8 @@ Rational Cross(const Point& o, const Point& a, const Point& b) {
 
 // Andrew's monotone chain: corners only, counter-clockwise.
 std::vector<Point> Hull(std::vector<Point> points) {
-  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
+  std::sort(points.begin(), points.end(),
+            [](const Point& a, const Point& b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
   const auto chain = [](auto first, auto last) {
     std::vector<Point> half;
     for (; first != last; ++first) {
@@ -111,9 +112,13 @@ Zonotope AnySlice(Random& random) {
     switch (random.Below(7)) {
       case 0: generators.col(j) *= 1e-17; break;
       case 1: generators.col(j) *= 1e-300; break;
-      case 2: if (j > 0) generators.col(j) = generators.col(j - 1) * random.Uniform(-2, 2); break;
+      case 2:
+        if (j > 0) generators.col(j) = generators.col(j - 1) * random.Uniform(-2, 2);
+        break;
       case 3: generators(random.Below(2), j) = 0; break;
-      case 4: if (j > 0) generators.col(j) = generators.col(j - 1) + 1e-16 * random.Vector(2); break;
+      case 4:
+        if (j > 0) generators.col(j) = generators.col(j - 1) + 1e-16 * random.Vector(2);
+        break;
       default: break;
     }
   }
@@ -123,15 +128,14 @@ Zonotope AnySlice(Random& random) {
 Obstacle AnyPlanarObstacle(Random& random) {
   const Eigen::VectorXd center = random.Vector(2, 4);
   switch (random.Below(4)) {
-    case 0:
-      return Obstacle::Circle(center, random.Coin(0.2) ? 0 : random.Uniform(0, 2));
-    case 1:
-      return Obstacle::AxisBox(center, center + random.Vector(2, 2).cwiseAbs() * (random.Coin(0.1) ? 0 : 1));
+    case 0: return Obstacle::Circle(center, random.Coin(0.2) ? 0 : random.Uniform(0, 2));
+    case 1: return Obstacle::AxisBox(center, center + random.Vector(2, 2).cwiseAbs() * (random.Coin(0.1) ? 0 : 1));
     case 2: {  // with edges of rounding length, and repeated corners
       std::vector<Eigen::VectorXd> corners;
       for (int i = random.Integer(3, 8); i > 0; --i)
-        corners.push_back(!corners.empty() && random.Coin(0.3) ? Eigen::VectorXd(corners.back() + random.Vector(2, 1e-16))
-                                                               : Eigen::VectorXd(center + random.Vector(2)));
+        corners.push_back(!corners.empty() && random.Coin(0.3)
+                              ? Eigen::VectorXd(corners.back() + random.Vector(2, 1e-16))
+                              : Eigen::VectorXd(center + random.Vector(2)));
       return Obstacle::Polygon(corners);
     }
     default: {  // a segment
@@ -179,9 +183,11 @@ TEST(PlanarSeparation, AnyDoublesAreNeverWronglyProven) {
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 1500; ++trial) {
     const auto any = [&] { return random.Double(); };
-    const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any), Eigen::MatrixXd::NullaryExpr(2, random.Integer(0, 3), any));
+    const Zonotope slice(Eigen::VectorXd::NullaryExpr(2, any),
+                         Eigen::MatrixXd::NullaryExpr(2, random.Integer(0, 3), any));
     const Eigen::VectorXd point = Eigen::VectorXd::NullaryExpr(2, any);
-    const Obstacle obstacle = random.Coin() ? Obstacle::Circle(point, std::abs(random.Double())) : Obstacle::AxisBox(point, point);
+    const Obstacle obstacle =
+        random.Coin() ? Obstacle::Circle(point, std::abs(random.Double())) : Obstacle::AxisBox(point, point);
     for (const Separation& s : {Separate(slice, obstacle), SeparateByHulls(slice, obstacle)}) {
       if (!s.IsProven()) continue;
       ASSERT_LE(Rational(s.distance) * Rational(s.distance), SquaredDistance(slice, obstacle));
@@ -233,7 +239,8 @@ TEST(PlanarSeparation, PointsOneDoubleApartAreProven) {
 // A corner seen along a segment has no edge whose normal points at it.
 TEST(PlanarSeparation, FindsTheEndOfASegmentSeenHeadOn) {
   Eigen::MatrixXd generator(2, 1);
-  for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0.6, 0.8), Eigen::Vector2d(-1e-3, 1)}) {
+  for (const Eigen::Vector2d& direction :
+       {Eigen::Vector2d(1, 0), Eigen::Vector2d(0.6, 0.8), Eigen::Vector2d(-1e-3, 1)}) {
     generator.col(0) = direction;
     const Zonotope slice(5 * direction, generator);
     EXPECT_NEAR(Separate(slice, Obstacle::Circle(Eigen::Vector2d::Zero(), 1)).distance, 4 * direction.norm(), 1e-12);
@@ -267,7 +274,8 @@ double WidestSpatialGap(const Zonotope& slice, const Obstacle& box) {
     edges.back()[k] = 1;
   }
   for (int j = 0; j < slice.num_generators(); ++j)
-    edges.push_back({Rational(slice.generator(0, j)), Rational(slice.generator(1, j)), Rational(slice.generator(2, j))});
+    edges.push_back(
+        {Rational(slice.generator(0, j)), Rational(slice.generator(1, j)), Rational(slice.generator(2, j))});
   double widest = -kInfinity;
   for (std::size_t a = 0; a < edges.size(); ++a)
     for (std::size_t b = 0; b < a; ++b) {
@@ -318,7 +326,8 @@ TEST(LineSeparation, IsDecidedAtTheLastBit) {
     const Zonotope slice(random.Vector(1), random.Matrix(1, random.Integer(0, 5)));
     const Eigen::VectorXd lower = random.Vector(1, 4), upper = lower + random.Vector(1).cwiseAbs();
     const Separation s = Separate(slice, Obstacle::AxisBox(lower, upper));
-    const Rational right = Rational(slice.center(0)) + exact::HalfWidth(slice, 0), left = Rational(slice.center(0)) - exact::HalfWidth(slice, 0);
+    const Rational right = Rational(slice.center(0)) + exact::HalfWidth(slice, 0),
+                   left = Rational(slice.center(0)) - exact::HalfWidth(slice, 0);
     const Rational gap = std::max(Rational(Rational(lower[0]) - right), Rational(left - Rational(upper[0])));
     if (s.distance > 0) {
       ASSERT_LE(Rational(s.distance), gap);
@@ -328,7 +337,9 @@ TEST(LineSeparation, IsDecidedAtTheLastBit) {
     }
   }
   const Zonotope point(Eigen::VectorXd::Constant(1, 2), Eigen::MatrixXd(1, 0));
-  const auto from = [](double lower) { return Obstacle::AxisBox(Eigen::VectorXd::Constant(1, lower), Eigen::VectorXd::Constant(1, 9)); };
+  const auto from = [](double lower) {
+    return Obstacle::AxisBox(Eigen::VectorXd::Constant(1, lower), Eigen::VectorXd::Constant(1, 9));
+  };
   EXPECT_FALSE(Separate(point, from(2)).IsProven());
   EXPECT_TRUE(Separate(point, from(NextUp(2))).IsProven());
 }
@@ -345,7 +356,8 @@ TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
     const Rational gap = Rational(offset) - exact::Support(slice, View(normal));
     Rational square = 0;
     for (const double entry : normal) square += Rational(entry) * Rational(entry);
-    for (const Separation& s : {Separate(slice, Obstacle::HalfSpace(normal, offset)), SeparateByHulls(slice, Obstacle::HalfSpace(normal, offset))}) {
+    for (const Separation& s : {Separate(slice, Obstacle::HalfSpace(normal, offset)),
+                                SeparateByHulls(slice, Obstacle::HalfSpace(normal, offset))}) {
       ASSERT_EQ(s.threshold, 0);
       if (s.IsProven()) {
         ASSERT_LE(Rational(s.distance) * Rational(s.distance) * square, gap * gap);
@@ -394,7 +406,8 @@ TEST(ProjectionOracle, ContainsTheExactProjection) {
         return sum;
       };
       support += along([&](int l) { return slice.center(l); });
-      for (int j = 0; j < slice.num_generators(); ++j) support += abs(along([&](int l) { return slice.generator(l, j); }));
+      for (int j = 0; j < slice.num_generators(); ++j)
+        support += abs(along([&](int l) { return slice.generator(l, j); }));
       ASSERT_LE(support, exact::Support(projected, View(d)));
     }
   }

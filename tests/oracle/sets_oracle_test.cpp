@@ -25,7 +25,9 @@ Zonotope Adversarial(Random& random, int dim, int num_generators) {
       case 1: generators.col(j) *= 1e-17; break;
       case 2: generators.col(j) *= 1e6; break;
       case 3: generators.col(j) = random.Uniform(-1, 1) * Eigen::VectorXd::Unit(dim, random.Below(dim)); break;
-      case 4: if (j > 0) generators.col(j) = -generators.col(j - 1) * random.Uniform(0.5, 2); break;
+      case 4:
+        if (j > 0) generators.col(j) = -generators.col(j - 1) * random.Uniform(0.5, 2);
+        break;
       case 5: generators.col(j).setZero(); break;
       default: break;
     }
@@ -105,7 +107,8 @@ TEST(ZonotopeOracle, ReducedSetsContainTheOriginal) {
     Zonotope reduced = set;
     ReduceOrder(reduced, order);
     ASSERT_EQ(reduced.CenterVector(), set.CenterVector());
-    for (const Eigen::VectorXd& d : Directions(random, set)) ASSERT_GE(exact::Support(reduced, View(d)), exact::Support(set, View(d)));
+    for (const Eigen::VectorXd& d : Directions(random, set))
+      ASSERT_GE(exact::Support(reduced, View(d)), exact::Support(set, View(d)));
     for (int k = 0; k < n; ++k)  // Along the axes a box loses nothing but rounding.
       ASSERT_LE(exact::HalfWidth(reduced, k), exact::HalfWidth(set, k) * Rational(1 + 1e-13) + Rational(0x1p-1070));
   }
@@ -118,13 +121,15 @@ TEST(ZonotopeOracle, ReducesColumnsWhoseSizesOverflow) {
   for (int trial = 0; trial < 200; ++trial) {
     Eigen::MatrixXd generators = random.Matrix(6, 13);
     for (int huge = 0; huge < 4; ++huge)
-      generators.col(3 * huge + random.Below(3)) = 0.4e308 * Eigen::VectorXd::NullaryExpr(6, [&] { return random.Sign(); });
+      generators.col(3 * huge + random.Below(3)) =
+          0.4e308 * Eigen::VectorXd::NullaryExpr(6, [&] { return random.Sign(); });
     const Zonotope set(Eigen::VectorXd::Zero(6), generators);
     for (int order = 1; order <= 2; ++order) {
       Zonotope reduced = set;
       ReduceOrder(reduced, order);
       ASSERT_LE(reduced.num_generators(), order * 6);
-      for (const Eigen::VectorXd& d : Directions(random, set)) ASSERT_GE(exact::Support(reduced, View(d)), exact::Support(set, View(d)));
+      for (const Eigen::VectorXd& d : Directions(random, set))
+        ASSERT_GE(exact::Support(reduced, View(d)), exact::Support(set, View(d)));
     }
   }
 }

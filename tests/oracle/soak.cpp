@@ -1,5 +1,6 @@
-// Certify calls without end: random problems of both models and random queries, from typical to absurd, with the promises
-// of every outcome checked. `forereach_soak --count N --seed S`; exit 1 at the first broken promise, with what repeats it.
+// Certify calls without end: random problems of both models and random queries, from typical to absurd, with the
+// promises of every outcome checked. `forereach_soak --count N --seed S`; exit 1 at the first broken promise, with what
+// repeats it.
 #include <CLI/CLI.hpp>
 
 #include <array>
@@ -29,24 +30,22 @@ void Promise(bool kept, const char* what) {
 void Exaggerate(Random& random, Problem& problem) {
   const Eigen::Index n = problem.declaration.lipschitz.rows(), variables = problem.declaration.lipschitz.cols();
   const double huge = std::ldexp(1, random.Integer(0, 1000));
-  const Eigen::VectorXd reach = Eigen::VectorXd::Constant(n, huge), input = Eigen::VectorXd::Constant(variables - n, huge);
+  const Eigen::VectorXd reach = Eigen::VectorXd::Constant(n, huge),
+                        input = Eigen::VectorXd::Constant(variables - n, huge);
   switch (random.Below(5)) {
     case 0:  // a declaration that the data contradict
       problem.transitions.x_next(0, random.Below(static_cast<int>(n))) += 100;
       break;
-    case 1:
-      problem.declaration.lipschitz *= std::ldexp(1, random.Integer(-1000, 900));
-      break;
-    case 2:
-      problem.declaration.lipschitz.setConstant(std::ldexp(1, random.Integer(-1000, 1000)));
-      break;
-    case 3:
-      problem.declaration.noise_bound.setConstant(std::ldexp(1, random.Integer(-1074, 1023)));
-      break;
-    default:
-      break;
+    case 1: problem.declaration.lipschitz *= std::ldexp(1, random.Integer(-1000, 900)); break;
+    case 2: problem.declaration.lipschitz.setConstant(std::ldexp(1, random.Integer(-1000, 1000))); break;
+    case 3: problem.declaration.noise_bound.setConstant(std::ldexp(1, random.Integer(-1074, 1023))); break;
+    default: break;
   }
-  if (random.Coin()) problem.domain = {Box(-reach.cwiseMax(StateReach(n == 6)), reach.cwiseMax(StateReach(n == 6))), Box(-input.cwiseMax(20), input.cwiseMax(20)), {}, {}};
+  if (random.Coin())
+    problem.domain = {Box(-reach.cwiseMax(StateReach(n == 6)), reach.cwiseMax(StateReach(n == 6))),
+                      Box(-input.cwiseMax(20), input.cwiseMax(20)),
+                      {},
+                      {}};
 }
 
 // Controls, sets and obstacles of any doubles that a certifier accepts.
@@ -61,7 +60,8 @@ void Exaggerate(Random& random, Query& query) {
     center[random.Below(n)] = random.Double();
     query.initial_set = Zonotope(center, generators * std::ldexp(1, random.Integer(-1000, 0)));
   }
-  if (random.Coin()) query.obstacles.push_back(Obstacle::Circle(Eigen::VectorXd::NullaryExpr(2, any), std::abs(random.Double())));
+  if (random.Coin())
+    query.obstacles.push_back(Obstacle::Circle(Eigen::VectorXd::NullaryExpr(2, any), std::abs(random.Double())));
 }
 
 void CheckCertificate(const Certifier& certifier, const Query& query, const Decision& decision, const Tube& tube) {
@@ -84,12 +84,14 @@ void CheckAbstention(const Query& query, const Decision& decision, const Tube& t
   Promise(decision.cause != Cause::kNone, "an abstention has a cause");
   Promise(falsified || (0 <= decision.step && decision.step <= query.plan().num_steps), "an abstention has its step");
   if (decision.outcome == Outcome::kSafety) {
-    Promise(0 <= decision.obstacle && decision.obstacle < static_cast<int>(query.obstacles.size()), "S names its obstacle");
+    Promise(0 <= decision.obstacle && decision.obstacle < static_cast<int>(query.obstacles.size()),
+            "S names its obstacle");
     Promise(!(decision.margin > decision.threshold), "S has no margin");
   }
   if (decision.outcome == Outcome::kDomain) {
     Promise(tube.length() == decision.step && decision.step < query.plan().num_steps, "D ends the run");
-    Promise(decision.cause == Cause::kNoFiniteEnclosure || decision.exit.kind != DomainExit::Kind::kNone, "D names its bound");
+    Promise(decision.cause == Cause::kNoFiniteEnclosure || decision.exit.kind != DomainExit::Kind::kNone,
+            "D names its bound");
     Promise(decision.coordinate >= 0, "D names its coordinate");
   }
 }

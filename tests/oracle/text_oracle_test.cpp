@@ -61,8 +61,29 @@ TEST(RoundedText, IsOnTheSafeSideAndNextToTheNumber) {
 }
 
 TEST(RoundedText, OfHardNumbers) {
-  for (const double x : {0.1, 0.5, 0.25, 2.5, 0.9999999, 0.99999, 9.999995, 99999.95, 999999.5, 1e6, 999999.0, 1e-5, 9.9e-5, 1e-4,
-                         0x1p-1074, 0x3p-1074, 0x1.fffffffffffffp-1023, 0x1p-1022, kMaxDouble, 1e22, 1e23, 123456.5, 0.5 + 0x1p-53})
+  for (const double x : {0.1,
+                         0.5,
+                         0.25,
+                         2.5,
+                         0.9999999,
+                         0.99999,
+                         9.999995,
+                         99999.95,
+                         999999.5,
+                         1e6,
+                         999999.0,
+                         1e-5,
+                         9.9e-5,
+                         1e-4,
+                         0x1p-1074,
+                         0x3p-1074,
+                         0x1.fffffffffffffp-1023,
+                         0x1p-1022,
+                         kMaxDouble,
+                         1e22,
+                         1e23,
+                         123456.5,
+                         0.5 + 0x1p-53})
     for (const double sign : {1.0, -1.0})
       for (int digits = 1; digits <= 20; ++digits) ExpectOnBothSides(sign * x, digits);
 }

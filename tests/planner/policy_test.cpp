@@ -110,7 +110,8 @@ TEST(Policy, AFieldOfAMillionListsInOneAnotherIsRefused) {
   SavePolicy(path, Small());
   std::stringstream good;
   good << std::ifstream(path).rdbuf();
-  const std::string text = good.str(), field = "\"forereach-policy\"", deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+  const std::string text = good.str(), field = "\"forereach-policy\"",
+                    deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
   std::ofstream(path) << std::string(text).replace(text.find(field), field.size(), deep);
   EXPECT_THROW(static_cast<void>(LoadPolicy(path)), PolicyError);
 }

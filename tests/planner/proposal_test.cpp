@@ -156,12 +156,14 @@ TEST(Planner, ObstaclesCanBeReplaced) {
 }
 
 TEST(Planner, RefusesOptionsThatDoNotFit) {
-  for (const auto& spoil : std::vector<void (*)(PlannerOptions&)>{
-           [](PlannerOptions& options) { options.algorithm = "astar"; },
-           [](PlannerOptions& options) { options.goal = {}; },
-           [](PlannerOptions& options) { options.goal = {1, 2, 3}; },
-           [](PlannerOptions& options) { options.progress_steps = 0; },
-           [](PlannerOptions& options) { options.tail_steps = kMaxSteps; }}) {
+  for (const auto& spoil :
+       std::vector<void (*)(PlannerOptions&)>{[](PlannerOptions& options) { options.algorithm = "astar"; },
+                                              [](PlannerOptions& options) { options.goal = {}; },
+                                              [](PlannerOptions& options) {
+                                                options.goal = {1, 2, 3};
+                                              },
+                                              [](PlannerOptions& options) { options.progress_steps = 0; },
+                                              [](PlannerOptions& options) { options.tail_steps = kMaxSteps; }}) {
     Config config = Bicycle();
     EXPECT_NO_THROW(PlannerOf(config));
     spoil(config.planner);

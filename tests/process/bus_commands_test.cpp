@@ -35,8 +35,8 @@ class BusCommands : public testing::Test {
     config_.bus.url = PrivateBusUrl();
     config_.bus.key = key_;
     bus_ = OpenBusOfAllRoles(config_.bus);
-    certifier_ = std::make_unique<ChildProcess>(std::vector<std::string>{
-        FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", config_.bus.url, "--key", key_});
+    certifier_ = std::make_unique<ChildProcess>(
+        std::vector<std::string>{FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", config_.bus.url, "--key", key_});
     EXPECT_TRUE(certifier_->WaitForLog("ready on")) << certifier_->error();
   }
 
@@ -105,7 +105,8 @@ TEST_F(BusCommands, UnsignedCandidatesAndStatesDoNothing) {
   open->Publish(config_.bus.robot_state, state);
   open->Publish(config_.bus.candidate, CandidateFor(config_, 1, Eigen::Vector2d(0, 0)));
   auto status = nlohmann::json::parse(Say("status --json").text);
-  for (int i = 0; i < 10 && status["refused_unsigned"] != 2; ++i) status = nlohmann::json::parse(Say("status --json").text);
+  for (int i = 0; i < 10 && status["refused_unsigned"] != 2; ++i)
+    status = nlohmann::json::parse(Say("status --json").text);
   EXPECT_EQ(status["state"], "disarmed");
   EXPECT_EQ(status["candidates"], 0);
   EXPECT_EQ(status["refused_unsigned"], 2);
@@ -129,7 +130,8 @@ TEST_F(BusCommands, AForgedHeartbeatIsNoSignOfLife) {
       status.state = certifier_status_v3_t::ARMED;
       const auto bytes = Encode(status);
       open->Publish("CERTIFIER_STATUS", Bytes(bytes));
-      open->Publish("CERTIFIER_STATUS", Bytes(stranger.Sign(Role::kCertifier, "CERTIFIER_STATUS", bytes, status.utime)));
+      open->Publish("CERTIFIER_STATUS",
+                    Bytes(stranger.Sign(Role::kCertifier, "CERTIFIER_STATUS", bytes, status.utime)));
       for (const Role role : kAllRoles)
         if (role != Role::kCertifier)
           open->Publish("CERTIFIER_STATUS", Bytes(forger.Sign(role, "CERTIFIER_STATUS", bytes, status.utime)));
@@ -148,7 +150,8 @@ TEST_F(BusCommands, AForgedHeartbeatIsNoSignOfLife) {
 }
 
 TEST_F(BusCommands, AProcessWithAnotherRolesKeyDoesNotStart) {
-  ChildProcess process({FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", config_.bus.url, "--key", key_ + "/planner.key"});
+  ChildProcess process(
+      {FOREREACH_CERTIFIER, "--config", path_, "--lcm-url", config_.bus.url, "--key", key_ + "/planner.key"});
   EXPECT_EQ(process.WaitForExit(), 2);
   EXPECT_THAT(process.error(), HasSubstr("planner.key: line 3: role: is planner, this program speaks as certifier"));
 }
@@ -156,7 +159,8 @@ TEST_F(BusCommands, AProcessWithAnotherRolesKeyDoesNotStart) {
 TEST_F(BusCommands, DoctorLooksAtTheKeys) {
   EXPECT_THAT(Forereach("doctor --key '" + key_ + "' --lcm-url '" + config_.bus.url + "' 2>&1").text,
               HasSubstr("of robot test, for bus " + config_.bus.bus_name() + "; secrets of certifier, planner"));
-  std::filesystem::permissions(key_ + "/planner.key", std::filesystem::perms::others_read, std::filesystem::perm_options::add);
+  std::filesystem::permissions(key_ + "/planner.key", std::filesystem::perms::others_read,
+                               std::filesystem::perm_options::add);
   const Output bad = Forereach("doctor --key '" + key_ + "' --lcm-url '" + config_.bus.url + "' 2>&1");
   EXPECT_EQ(bad.code, 1);
   EXPECT_THAT(bad.text, HasSubstr("others can read it"));
@@ -172,7 +176,9 @@ TEST_F(BusCommands, OnEachChannelOnlyItsSpeakerIsHeard) {
   const auto ear = OpenBus(config_.bus, Role::kLogger);
   EXPECT_EQ(certifier_->Terminate(), 0);  // it speaks here too
   for (const auto& [channel, speaker] : config_.bus.speakers())
-    ear->Subscribe(channel, [&heard](const Received& r) { heard[r.channel] += std::ranges::equal(r.bytes, Bytes(DigestOf("good"))); });
+    ear->Subscribe(channel, [&heard](const Received& r) {
+      heard[r.channel] += std::ranges::equal(r.bytes, Bytes(DigestOf("good")));
+    });
   int forged = 0;
   const Digest good = DigestOf("good");
   for (const auto& [channel, speaker] : config_.bus.speakers()) {

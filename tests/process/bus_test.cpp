@@ -232,7 +232,8 @@ TEST(BusErrorTest, WithoutAMulticastRouteThereIsAdvice) {
     } catch (const BusError& thrown) {
       error = thrown.what();
     }
-  }).join();
+  })
+      .join();
   if (!alone) GTEST_SKIP() << "a network of its own needs root";
   EXPECT_THAT(error, HasSubstr("udpm://239.255.76.67:7667"));
   EXPECT_THAT(error, HasSubstr("ip route add 224.0.0.0/4 dev lo"));

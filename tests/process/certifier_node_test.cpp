@@ -144,7 +144,9 @@ class RefusingBus final : public Bus {
   bool Publish(const std::string&, Bytes) override { return false; }
   int Dispatch(int) override { return 0; }
   [[nodiscard]] std::int64_t dropped() const override { return 0; }
-  void Deliver(const std::string& channel, Bytes bytes) { handlers_.at(channel)(Received{channel, bytes, kNow, bytes}); }
+  void Deliver(const std::string& channel, Bytes bytes) {
+    handlers_.at(channel)(Received{channel, bytes, kNow, bytes});
+  }
 
  private:
   std::map<std::string, Handler> handlers_;
@@ -349,7 +351,8 @@ TEST_F(ObstaclesNodeTest, AllThatIsMissingIsNamed) {
   EXPECT_EQ(decision.cause, decision_t::CAUSE_NOT_ARMED);
   EXPECT_EQ(GetText(decision.message),
             "rejected: waits for the robot's state; waits for OBSTACLES: none has been heard yet");
-  EXPECT_EQ(GetText(status_.back().message), "waits for the robot's state; waits for OBSTACLES: none has been heard yet");
+  EXPECT_EQ(GetText(status_.back().message),
+            "waits for the robot's state; waits for OBSTACLES: none has been heard yet");
   Say({});
   EXPECT_EQ(GetText(Ask().message), "rejected: waits for the robot's state");
 }
@@ -416,7 +419,8 @@ class TwoCertifiersTest : public ObstaclesNodeTest {
     std::vector<decision_t> answers;
     for (SharedBus& bus : buses_)
       for (const auto& [channel, bytes] : bus.sent)
-        if (const auto decision = Decoded<decision_t>(bytes); decision && decision->plan_id == id) answers.push_back(*decision);
+        if (const auto decision = Decoded<decision_t>(bytes); decision && decision->plan_id == id)
+          answers.push_back(*decision);
     return answers;
   }
   certifier_status_v3_t Status(std::size_t i) const {
@@ -461,11 +465,11 @@ class TwoCertifiersTest : public ObstaclesNodeTest {
 using Charged = std::array<Charge::State, 2>;
 constexpr auto kInCharge = Charge::State::kInCharge, kStandingBy = Charge::State::kStandingBy;
 
-#define FOREREACH_START_BOTH() \
-  for (SharedBus& bus : buses_) bus.clock = clock_; \
-  Start(0); \
-  Pass(1'000'000); \
-  Start(1); \
+#define FOREREACH_START_BOTH()                       \
+  for (SharedBus & bus : buses_) bus.clock = clock_; \
+  Start(0);                                          \
+  Pass(1'000'000);                                   \
+  Start(1);                                          \
   Pass(1'000'000)
 
 TEST_F(TwoCertifiersTest, TheLaterOneRefusesToArmAndAnswersNobody) {
@@ -833,8 +837,9 @@ TEST_F(ArmedNodeTest, ARobotThatLeavesItsSliceLatches) {
   config_.robot.start = {0, 0, 1, 0.1};
   config_.robot.step_period_ms = 150;
   config_.robot.residual = "velocity_knee";
-  config_.robot.residual_parameters = {{"dt", 0.15}, {"damping", 4}, {"cross", 0.3}, {"knee", 0.1},
-                                       {"softplus_temperature", 0.14}, {"regularizer", 0.15}, {"smoothing", 1e-12}};
+  config_.robot.residual_parameters = {
+      {"dt", 0.15},          {"damping", 4},      {"cross", 0.3}, {"knee", 0.1}, {"softplus_temperature", 0.14},
+      {"regularizer", 0.15}, {"smoothing", 1e-12}};
   Restart();
   bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
   std::vector<robot_state_t> states;
@@ -1138,9 +1143,9 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
   EXPECT_EQ(GetDigest(status_.config_digest), before.digest);
   EXPECT_THAT(GetText(status_.message), testing::HasSubstr("nonsense"));
 
-  for (const auto& [change, what] : {std::pair{"bus: {channels: {decision: ELSEWHERE}}", "bus.channels"},
-                                     std::pair{"realtime: {lock_memory: no}", "realtime"},
-                                     std::pair{"realtime: {fifo_priority: 3}", "realtime"}}) {
+  for (const auto& [change, what] :
+       {std::pair{"bus: {channels: {decision: ELSEWHERE}}", "bus.channels"},
+        std::pair{"realtime: {lock_memory: no}", "realtime"}, std::pair{"realtime: {fifo_priority: 3}", "realtime"}}) {
     const std::int64_t failed = status_.failed_reloads;
     Copy([&](const std::string& text) { return text + "\n" + change + "\n"; });
     Reload(*node);
@@ -1151,13 +1156,17 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
   for (const auto& [gate, what] : {std::pair{"gate: {obstacles: bus}", "gate.obstacles cannot change while"},
                                    std::pair{"gate: {}", "gate.obstacles: missing"}}) {
     const std::int64_t failed = status_.failed_reloads;
-    Copy([&](const std::string& text) { return std::regex_replace(text, std::regex("gate: \\{obstacles: task\\}"), gate); });
+    Copy([&](const std::string& text) {
+      return std::regex_replace(text, std::regex("gate: \\{obstacles: task\\}"), gate);
+    });
     Reload(*node);
     EXPECT_EQ(status_.failed_reloads, failed + 1);
     EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what));
   }
 
-  Copy([](const std::string& text) { return std::regex_replace(text, std::regex("gate: \\{"), "gate: {state: elsewhere, "); });
+  Copy([](const std::string& text) {
+    return std::regex_replace(text, std::regex("gate: \\{"), "gate: {state: elsewhere, ");
+  });
   Reload(*node);
   EXPECT_THAT(GetText(status_.message), testing::HasSubstr("gate.state cannot change while"));
 
@@ -1175,7 +1184,8 @@ TEST_F(ReloadTest, TheKeyCannotChange) {
   };
   with_key(keys);
   auto node = std::make_unique<CertifierNode>(LoadConfig(path_), *bus_, Clocks{clock_, clock_});
-  bus_->Subscribe("CERTIFIER_STATUS", [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+  bus_->Subscribe("CERTIFIER_STATUS",
+                  [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
   node->Tick(kNow);
   bus_->Dispatch(0);
   const auto refused = [&](const char* why) {
@@ -1188,7 +1198,7 @@ TEST_F(ReloadTest, TheKeyCannotChange) {
   with_key("");
   refused("bus.key is missing, it was");
   with_key(others);
-  refused("bus.key is " );
+  refused("bus.key is ");
   with_key(keys);
   Reload(*node);
   EXPECT_EQ(status_.version, 2) << "the same key is taken";
@@ -1204,7 +1214,8 @@ TEST_F(ReloadTest, AKeyThatTheCommandLineGaveStays) {
   config.bus.key = MakeTestKeys(scratch_ / "keys");
   config.bus.key_is_given = true;
   auto node = std::make_unique<CertifierNode>(config, *bus_, Clocks{clock_, clock_});
-  bus_->Subscribe("CERTIFIER_STATUS", [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
+  bus_->Subscribe("CERTIFIER_STATUS",
+                  [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
   node->Tick(kNow);
   bus_->Dispatch(0);
   Reload(*node);

@@ -1,8 +1,8 @@
 #include "tests/process/child_process.h"
 
-#include <cstdlib>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <system_error>

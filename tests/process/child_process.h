@@ -55,7 +55,8 @@ class ChildProcess final {
   int status_ = 0;
 };
 
-/** An argument of env for a program that gets a preloaded library: a build with sanitizers wants to be the first library. */
+/** An argument of env for a program that gets a preloaded library: a build with sanitizers wants to be the first
+library. */
 [[nodiscard]] std::string SanitizerAfterPreload();
 
 }  // namespace forereach

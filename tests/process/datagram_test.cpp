@@ -46,7 +46,8 @@ TEST(DatagramTest, APayloadMayBeEmptyOrFillTheDatagram) {
 TEST(DatagramTest, EverythingShorterThanTheHeaderIsTooShort) {
   const RawDatagram whole = Named("A");
   for (std::size_t bytes = 0; bytes < kDatagramHeaderBytes; ++bytes)
-    EXPECT_EQ(KindOf({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(bytes)}), DatagramKind::kTooShort) << bytes;
+    EXPECT_EQ(KindOf({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(bytes)}), DatagramKind::kTooShort)
+        << bytes;
 }
 
 TEST(DatagramTest, OnlyTheTwoMagicsAreLcm) {
@@ -113,7 +114,8 @@ TEST(DatagramTest, RefusedOnesAreCountedByTheirCauseAndSaid) {
   EXPECT_EQ(counts.messages, 1);
   EXPECT_EQ(counts.refused(), 7);
   const std::string words = RefusedInWords(counts);
-  for (const char* part : {"2 fragments", "1 not of LCM", "1 too short", "1 without the end", "1 with a channel's name", "1 truncated"})
+  for (const char* part :
+       {"2 fragments", "1 not of LCM", "1 too short", "1 without the end", "1 with a channel's name", "1 truncated"})
     EXPECT_THAT(words, HasSubstr(part));
 }
 

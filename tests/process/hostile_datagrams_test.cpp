@@ -1,5 +1,5 @@
-// Datagrams that a stranger without a key sends to the bus of four signed processes: all four live on, still do their work,
-// and take no memory for what they were told.
+// Datagrams that a stranger without a key sends to the bus of four signed processes: all four live on, still do their
+// work, and take no memory for what they were told.
 #include <algorithm>
 #include <array>
 #include <functional>
@@ -23,10 +23,12 @@ namespace forereach {
 namespace {
 
 constexpr double kMegabyte = 1 << 20;
-constexpr double kMayGrowBy = 24 * kMegabyte;  // what the processes take by themselves while they start to drive is in it
+constexpr double kMayGrowBy =
+    24 * kMegabyte;  // what the processes take by themselves while they start to drive is in it
 constexpr std::size_t kRandomOnes = 100'000, kFewRandomOnes = 2'000, kChannels = 20'000;
 
-constexpr std::array<const char*, 3> kHeard{"ROBOT_STATE", "PLAN_CERTIFIED", "PLAN_CANDIDATE"};  // each process hears one
+constexpr std::array<const char*, 3> kHeard{"ROBOT_STATE", "PLAN_CERTIFIED",
+                                            "PLAN_CANDIDATE"};  // each process hears one
 
 struct Attack {
   const char* name;
@@ -99,7 +101,8 @@ class HostileDatagramsTest : public testing::TestWithParam<Attack> {
     std::array<std::size_t, 4> before{};
     for (std::size_t i = 0; i < processes_.size(); ++i) before[i] = probe_.heard(processes_[i].channel).size();
     return probe_.WaitUntil([&] {
-      if (std::ranges::any_of(processes_, [](Process& process) { return HasEnded(process); })) return true;  // say so at once
+      if (std::ranges::any_of(processes_, [](Process& process) { return HasEnded(process); }))
+        return true;  // say so at once
       for (std::size_t i = 0; i < processes_.size(); ++i)
         if (probe_.heard(processes_[i].channel).size() < before[i] + 2) return false;
       return true;

@@ -1,4 +1,5 @@
-// What a certifier does not forget when it ends: faults and contradictions, on disks that work and on disks that do not.
+// What a certifier does not forget when it ends: faults and contradictions, on disks that work and on disks that do
+// not.
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -60,7 +61,8 @@ class LatchTest : public testing::Test {
     bus_->Subscribe("PLAN_CERTIFIED", [this](const Received&) { ++certified_; });
     bus_->Subscribe("CERTIFIER_STATUS",
                     [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
-    node_ = std::make_unique<CertifierNode>(config_, *bus_, Clocks{clock_, clock_}, 0, std::make_unique<LatchFile>(directory_));
+    node_ = std::make_unique<CertifierNode>(config_, *bus_, Clocks{clock_, clock_}, 0,
+                                            std::make_unique<LatchFile>(directory_));
     Run();
   }
   void Run() {
@@ -349,19 +351,42 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Damage{"Empty", [](const std::string& file) { WriteFile(file, ""); }, "has 0 bytes, has to have 65536"},
         Damage{"Short", [](const std::string& file) { std::filesystem::resize_file(file, 65535); }, "65535 bytes"},
-        Damage{"Huge", [](const std::string& file) { std::filesystem::resize_file(file, std::uintmax_t{1} << 40); }, "bytes"},
+        Damage{"Huge", [](const std::string& file) { std::filesystem::resize_file(file, std::uintmax_t{1} << 40); },
+               "bytes"},
         Damage{"Zeros", [](const std::string& file) { WriteFile(file, std::string(65536, '\0')); }, "is damaged"},
         Damage{"Spaces", [](const std::string& file) { WriteFile(file, std::string(65536, ' ')); }, "is damaged"},
         Damage{"Deep", [](const std::string& file) { WriteFile(file, std::string(65536, '[')); }, "is damaged"},
-        Damage{"Half", [](const std::string& file) { std::string text = Contents(file); text.replace(400, 65136, 65136, '\0'); WriteFile(file, text); }, "is damaged"},
+        Damage{"Half",
+               [](const std::string& file) {
+                 std::string text = Contents(file);
+                 text.replace(400, 65136, 65136, '\0');
+                 WriteFile(file, text);
+               },
+               "is damaged"},
         Damage{"NoFault", Edit("\"fault\":{", "\"fault\":null,\"no\":{"), "digest"},
         Damage{"AnotherDigit", Edit("\"fault_t\":[", "\"fault_t\":[1"), "digest"},
         Damage{"AnotherVersion", Edit("\"version\":1", "\"version\":2"), "its version is 2, this certifier knows 1"},
         Damage{"AnotherFormat", Edit("forereach latch", "forereach match"), "its format is another"},
-        Damage{"Fifo", [](const std::string& file) { std::filesystem::remove(file); ASSERT_EQ(mkfifo(file.c_str(), 0600), 0); }, "is no regular file"},
-        Damage{"Directory", [](const std::string& file) { std::filesystem::remove(file); std::filesystem::create_directory(file); }, "is no regular file"},
-        Damage{"Link", [](const std::string& file) { std::filesystem::rename(file, file + "2"); std::filesystem::create_symlink(file + "2", file); }, "is a symbolic link"},
-        Damage{"OthersMayWrite", [](const std::string& file) { ASSERT_EQ(chmod(file.c_str(), 0622), 0); }, "others than its owner may write it"}),
+        Damage{"Fifo",
+               [](const std::string& file) {
+                 std::filesystem::remove(file);
+                 ASSERT_EQ(mkfifo(file.c_str(), 0600), 0);
+               },
+               "is no regular file"},
+        Damage{"Directory",
+               [](const std::string& file) {
+                 std::filesystem::remove(file);
+                 std::filesystem::create_directory(file);
+               },
+               "is no regular file"},
+        Damage{"Link",
+               [](const std::string& file) {
+                 std::filesystem::rename(file, file + "2");
+                 std::filesystem::create_symlink(file + "2", file);
+               },
+               "is a symbolic link"},
+        Damage{"OthersMayWrite", [](const std::string& file) { ASSERT_EQ(chmod(file.c_str(), 0622), 0); },
+               "others than its owner may write it"}),
     [](const auto& of) { return of.param.name; });
 
 TEST_F(LatchTest, NoAlteredByteIsTakenForAnythingElse) {

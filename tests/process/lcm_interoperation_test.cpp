@@ -1,5 +1,5 @@
-// On the wire it stays LCM: plain LCM, lcm-logger and lcm-logplayer understand what we send, and we understand them. And LCM
-// receives nothing in our processes.
+// On the wire it stays LCM: plain LCM, lcm-logger and lcm-logplayer understand what we send, and we understand them.
+// And LCM receives nothing in our processes.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -90,7 +90,9 @@ class LcmInteroperationTest : public testing::Test {
   static std::vector<Message> Sample() {
     certified_plan_t certified{};
     certified.sequence = 7;
-    return {{"PLAN_CERTIFIED", Encode(certified)}, {"EMPTY", {}}, {"A", std::vector<std::uint8_t>(LongestOn("A"), 5)},
+    return {{"PLAN_CERTIFIED", Encode(certified)},
+            {"EMPTY", {}},
+            {"A", std::vector<std::uint8_t>(LongestOn("A"), 5)},
             {std::string(kMaxChannelBytes, 'C'), {1, 2, 3}}};
   }
   static std::vector<Message> EventsOf(const std::string& log) {
@@ -108,7 +110,8 @@ class LcmInteroperationTest : public testing::Test {
   }
   static bool WaitFor(const std::function<bool()>& done) {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
-    while (!done() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    while (!done() && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
     return done();
   }
   void HearAll() {
@@ -200,7 +203,8 @@ TEST_F(LcmInteroperationTest, LcmLoggerRecordsWhatWeSend) {
   const auto sample = Sample();
   const auto recorded = [&] {
     std::vector<Message> events = EventsOf(log);
-    std::erase_if(events, [](const Message& event) { return event.first == "ARE_YOU_THERE" || event.first == "LCM_SELF_TEST"; });
+    std::erase_if(
+        events, [](const Message& event) { return event.first == "ARE_YOU_THERE" || event.first == "LCM_SELF_TEST"; });
     return events;
   };
   EXPECT_TRUE(WaitFor([&] {

@@ -22,7 +22,8 @@ namespace forereach {
 [[nodiscard]] double ResidentBytes(pid_t pid);
 
 /** The shipped point mass with a goal, a robot that steps every 100 ms from rest at the origin, and a gate that bears
-with a slow machine and does without a robot: candidates may be 20 s old. Its state is kept beside the task file. The robot finishes after `time_limit_s`. */
+with a slow machine and does without a robot: candidates may be 20 s old. Its state is kept beside the task file. The
+robot finishes after `time_limit_s`. */
 [[nodiscard]] std::string PatientTask(int time_limit_s = 60);
 
 /** Hears channels and keeps the messages that come, without their signatures, which it does not check. Fails with the

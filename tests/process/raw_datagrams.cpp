@@ -61,8 +61,8 @@ bool RawSender::Send(const std::vector<RawDatagram>& datagrams) const {
 bool RawSender::SendToHost(Bytes datagram) const {
   sockaddr_in host = group_;
   host.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  return ::sendto(handle_, datagram.data(), datagram.size(), 0, reinterpret_cast<const sockaddr*>(&host), sizeof host) ==
-         static_cast<ssize_t>(datagram.size());
+  return ::sendto(handle_, datagram.data(), datagram.size(), 0, reinterpret_cast<const sockaddr*>(&host),
+                  sizeof host) == static_cast<ssize_t>(datagram.size());
 }
 
 RawDatagram ShortMessage(std::string_view channel, Bytes payload, std::uint32_t sequence) {
@@ -127,8 +127,10 @@ RawDatagram Mutated(std::mt19937& random, RawDatagram datagram) {
     switch (datagram.empty() ? 2 : Below(random, 4)) {
       case 0: datagram[Below(random, reach)] = static_cast<std::uint8_t>(random()); break;
       case 1: datagram.resize(Below(random, datagram.size() + 1)); break;
-      case 2: datagram.insert(datagram.begin() + static_cast<std::ptrdiff_t>(datagram.empty() ? 0 : Below(random, reach)),
-                              static_cast<std::uint8_t>(random())); break;
+      case 2:
+        datagram.insert(datagram.begin() + static_cast<std::ptrdiff_t>(datagram.empty() ? 0 : Below(random, reach)),
+                        static_cast<std::uint8_t>(random()));
+        break;
       default: datagram[Below(random, reach)] = 0; break;
     }
   }

@@ -1,5 +1,5 @@
-// Errors of the socket: the receiving thread counts them, does not spin, and goes on once they are over. This program's own
-// recvmsg stands before the system's.
+// Errors of the socket: the receiving thread counts them, does not spin, and goes on once they are over. This program's
+// own recvmsg stands before the system's.
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -49,7 +49,8 @@ class NoErrorsTest : public testing::Test {
 };
 
 class ReceiveErrorsTest : public NoErrorsTest, public testing::WithParamInterface<int> {};
-INSTANTIATE_TEST_SUITE_P(Errors, ReceiveErrorsTest, testing::Values(ENETDOWN, ENOBUFS, ENOMEM, EHOSTUNREACH, EIO, EBADF),
+INSTANTIATE_TEST_SUITE_P(Errors, ReceiveErrorsTest,
+                         testing::Values(ENETDOWN, ENOBUFS, ENOMEM, EHOSTUNREACH, EIO, EBADF),
                          [](const auto& instance) { return "Errno" + std::to_string(instance.param); });
 
 TEST_P(ReceiveErrorsTest, AreCountedAndPassAndDoNotMakeItSpin) {

@@ -1,4 +1,5 @@
-// Reloads of a process whose task file stopped being a file, or whose mount stalls: it stays, says so, and ends in time.
+// Reloads of a process whose task file stopped being a file, or whose mount stalls: it stays, says so, and ends in
+// time.
 #include <csignal>
 #include <filesystem>
 #include <fstream>

@@ -49,7 +49,9 @@ class ScreenTest : public testing::TestWithParam<const char*> {
   };
 
   Bus::Handler Into(std::vector<Heard>& heard) {
-    return [&heard](const Received& r) { heard.push_back({{r.bytes.begin(), r.bytes.end()}, {r.raw.begin(), r.raw.end()}}); };
+    return [&heard](const Received& r) {
+      heard.push_back({{r.bytes.begin(), r.bytes.end()}, {r.raw.begin(), r.raw.end()}});
+    };
   }
   void Send(const std::string& channel, const Raw& raw) { ASSERT_TRUE(bus_->Publish(channel, Bytes(raw))); }
   // Everything sent before it has then been received: the order is kept.

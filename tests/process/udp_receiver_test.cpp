@@ -45,7 +45,8 @@ class UdpReceiverTest : public testing::Test {
   }
   bool WaitUntil(const std::function<bool()>& done) {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
-    while (!done() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (!done() && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     return done();
   }
   bool HeardLast(const std::string& channel) {
@@ -67,7 +68,8 @@ class UdpReceiverTest : public testing::Test {
 
 TEST_F(UdpReceiverTest, CountsWhatItRefusesByItsCause) {
   sender_.Send(Bytes());
-  for (const auto& datagrams : {WrappingFragment("A"), HugeClaims("A"), EndlessNames()}) ASSERT_TRUE(sender_.Send(datagrams));
+  for (const auto& datagrams : {WrappingFragment("A"), HugeClaims("A"), EndlessNames()})
+    ASSERT_TRUE(sender_.Send(datagrams));
   sender_.Send(Bytes(ShortMessage("", {})));
   sender_.Send(Bytes(RawDatagram(100, 'x')));
   sender_.Send(Bytes(ShortMessage("LAST", {})));
@@ -127,7 +129,8 @@ TEST_F(UdpReceiverTest, WithIpOptionsOrAnyTimeToLiveAMessageIsAMessage) {
 
 // A signal makes the receiving thread's recvmsg fail; it goes on.
 TEST_F(UdpReceiverTest, SignalsDoNotDisturbIt) {
-  struct sigaction action{}, before{};
+  struct sigaction action {
+  }, before{};
   action.sa_handler = [](int) {};
   ::sigaction(SIGUSR1, &action, &before);
   sigset_t mine, old;

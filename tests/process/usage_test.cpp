@@ -50,7 +50,8 @@ TEST_P(UsageTest, WithoutAKeyItWarns) {
     if (program() == FOREREACH_LOGGER) command.insert(command.end(), {"--directory", scratch_ / "log"});
     ChildProcess process(command);
     EXPECT_TRUE(process.WaitForLog("ready on")) << process.error();
-    EXPECT_EQ(process.error().find("UNSIGNED: anyone on this network can move this robot") == std::string::npos, with_key);
+    EXPECT_EQ(process.error().find("UNSIGNED: anyone on this network can move this robot") == std::string::npos,
+              with_key);
     EXPECT_EQ(process.Terminate(), 0);
   }
 }
@@ -101,7 +102,8 @@ TEST_P(UsageTest, ABusThatIsNoMulticastIsRefused) {
   ChildProcess process(
       {program(), "--config", scratch_.Write("task.yaml", PatientTask()), "--lcm-url", "udpm://1.2.3.4:7667?ttl=0"});
   EXPECT_EQ(process.WaitForExit(), 2);
-  EXPECT_THAT(LastLine(process), AllOf(HasSubstr("udpm://1.2.3.4:7667"), HasSubstr("\"1.2.3.4\" has to be one of IPv4 multicast")));
+  EXPECT_THAT(LastLine(process),
+              AllOf(HasSubstr("udpm://1.2.3.4:7667"), HasSubstr("\"1.2.3.4\" has to be one of IPv4 multicast")));
   EXPECT_THAT(process.error(), Not(HasSubstr("ready on")));
 }
 

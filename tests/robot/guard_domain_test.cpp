@@ -1,4 +1,5 @@
-// The guard's domain and the certifier's: no honest certificate is refused, however close to the domain's ends it comes.
+// The guard's domain and the certifier's: no honest certificate is refused, however close to the domain's ends it
+// comes.
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -70,8 +71,8 @@ TEST(GuardDomainProperty, EveryHonestCertificatePasses) {
     config.problem = std::make_shared<const Problem>(std::move(problem));
     const Domain& domain = config.problem->domain;
     GuardOptions options{domain.state.dim(), domain.input.dim(), 40'000, config.digest, config.model_digest};
-    options.domain = GuardDomain{Entries(domain.state.lower()), Entries(domain.state.upper()), Entries(domain.input.lower()),
-                                 Entries(domain.input.upper())};
+    options.domain = GuardDomain{Entries(domain.state.lower()), Entries(domain.state.upper()),
+                                 Entries(domain.input.lower()), Entries(domain.input.upper())};
     Gate gate(config);
     Guard guard(options);
     RandomCandidates candidates(config, seed);

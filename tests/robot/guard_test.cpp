@@ -189,11 +189,11 @@ TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
 
 TEST(GuardAccept, RefusesNumbersThatBoundNothing) {
   for (const double bad : {kNaN, kInf, -kInf}) {
-    for (const auto change : {+[](certified_plan_t& c, double x) { c.plan.initial_center[1] = x; },
-                              +[](certified_plan_t& c, double x) { c.plan.initial_half_width[0] = x; },
-                              +[](certified_plan_t& c, double x) { c.plan.control[2][0] = x; },
-                              +[](certified_plan_t& c, double x) { c.slice_lower[3][1] = x; },
-                              +[](certified_plan_t& c, double x) { c.slice_upper[0][0] = x; }}) {
+    for (const auto change : {+[](certified_plan_t&c, double x) { c.plan.initial_center[1] = x; },
+                              +[](certified_plan_t&c, double x) { c.plan.initial_half_width[0] = x; },
+                              +[](certified_plan_t&c, double x) { c.plan.control[2][0] = x; },
+                              +[](certified_plan_t&c, double x) { c.slice_lower[3][1] = x; },
+                              +[](certified_plan_t&c, double x) { c.slice_upper[0][0] = x; }}) {
       certified_plan_t certified = SmallPlan();
       change(certified, bad);
       EXPECT_EQ(AcceptedBy(certified), GuardCause::kNonFinite) << bad;
@@ -499,7 +499,7 @@ TEST(GuardAccept, ADigestOfZeroIsRefused) {
     Guard guard(TwoStates());
     return guard.Accept(Encode(certified), kNow);
   };
-  const auto zeroed = [&](std::uint8_t (certified_plan_t::*digest)[32], const char* name, bool reseal) {
+  const auto zeroed = [&](std::uint8_t(certified_plan_t::*digest)[32], const char* name, bool reseal) {
     const GuardVerdict verdict = cause([&](certified_plan_t& certified) {
       SetDigest(certified.*digest, {});
       if (reseal) SetDigest(certified.certificate_digest, CertificateDigest(certified));
@@ -599,8 +599,9 @@ TEST(GuardOptionsTest, ImpossibleOptionsThrow) {
   GuardOptions nameless = WithKeys();
   nameless.bus_name.clear();
   EXPECT_THROW(Guard{nameless}, std::invalid_argument);
-  for (const GuardDomain& bad : {GuardDomain{{0}, {1}, {0}, {1}}, GuardDomain{{0, 0}, {1, -1}, {0}, {1}},
-                                 GuardDomain{{0, kNaN}, {1, 1}, {0}, {1}}, GuardDomain{{0, 0}, {1, 1}, {0, 0}, {1, 1}}}) {
+  for (const GuardDomain& bad :
+       {GuardDomain{{0}, {1}, {0}, {1}}, GuardDomain{{0, 0}, {1, -1}, {0}, {1}},
+        GuardDomain{{0, kNaN}, {1, 1}, {0}, {1}}, GuardDomain{{0, 0}, {1, 1}, {0, 0}, {1, 1}}}) {
     GuardOptions options = TwoStates();
     options.domain = bad;
     EXPECT_THROW(Guard{options}, std::invalid_argument);

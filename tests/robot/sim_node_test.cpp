@@ -289,7 +289,9 @@ TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {
 TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) {
   const Config config = PointMassTask();
   Rig rig(config);
-  const auto send = [&](const std::string& channel, const auto& message) { rig.SendRaw(channel, Bytes(Encode(message))); };
+  const auto send = [&](const std::string& channel, const auto& message) {
+    rig.SendRaw(channel, Bytes(Encode(message)));
+  };
   rig.RunTo(0);
   rig.Send(Plan(config, 1, 1, kOrigin, 40));
   rig.RunTo(2);
@@ -342,7 +344,9 @@ TEST(RobotSim, AFaultHaltsItUntilAFreshResetAndItsRepetitionDoesNotHaltItAgain) 
 TEST(RobotSim, AFaultFromBeforeTheLastResetIsOver) {
   const Config config = PointMassTask();
   Rig rig(config);
-  const auto send = [&](const std::string& channel, const auto& message) { rig.SendRaw(channel, Bytes(Encode(message))); };
+  const auto send = [&](const std::string& channel, const auto& message) {
+    rig.SendRaw(channel, Bytes(Encode(message)));
+  };
   rig.RunTo(1);
   const command_t reset = ResetAt(BoundaryTime(1));
   send("COMMAND", reset);
@@ -597,8 +601,8 @@ TEST(RobotSim, APlanThatAnotherRoleSignedIsNotExecuted) {
   config.bus.url = "memq://";
   config.bus.keys = TestKeys();
   std::int64_t now = kT0;
-  const auto bus = OpenSignedBus("memq://", TestKeys(), config.bus.bus_name(),
-                                 {{config.bus.certified, Role::kPlanner}}, [&] { return now; });  // the thief's
+  const auto bus = OpenSignedBus("memq://", TestKeys(), config.bus.bus_name(), {{config.bus.certified, Role::kPlanner}},
+                                 [&] { return now; });  // the thief's
   std::ostringstream out;
   RobotSimNode node(config, *bus, out);
   for (int j = 0; j < 4; ++j, now += kPeriod) {
@@ -618,9 +622,9 @@ TEST(RobotSim, StopPrintsOneLineOfJson) {
   const std::string text = rig.printed();
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
   const auto summary = nlohmann::json::parse(text);
-  for (const char* key : {"boundaries", "steps_executed", "steps_inside_slice", "contacts", "goal_reached",
-                          "distance_to_goal", "stops", "plans_accepted", "plans_started", "plans_refused",
-                          "messages_not_sent"})
+  for (const char* key :
+       {"boundaries", "steps_executed", "steps_inside_slice", "contacts", "goal_reached", "distance_to_goal", "stops",
+        "plans_accepted", "plans_started", "plans_refused", "messages_not_sent"})
     EXPECT_TRUE(summary.contains(key)) << key;
   EXPECT_EQ(summary["boundaries"], 3);
   EXPECT_EQ(summary["distance_to_goal"], 100);

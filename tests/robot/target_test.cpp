@@ -121,9 +121,7 @@ Config Bicycle() {
               {{"dt", 0.1}, {"wheelbase", 2.5}});
 }
 
-Config PointMassTask() {
-  return Task(MakePointMass(0.15), {20, 20, 5.4, 5.4, 2, 2}, "velocity_knee", {{"dt", 0.15}});
-}
+Config PointMassTask() { return Task(MakePointMass(0.15), {20, 20, 5.4, 5.4, 2, 2}, "velocity_knee", {{"dt", 0.15}}); }
 
 std::vector<double> Step(const Target& target, const std::vector<double>& z, std::size_t n) {
   std::vector<double> next(n);

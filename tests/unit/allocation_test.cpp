@@ -101,10 +101,10 @@ TEST_F(Allocation, IsCounted) {
 }
 
 TEST_F(Allocation, CertifyDoesNone) {
-  std::vector<Obstacle> obstacles{Obstacle::Circle(Eigen::Vector2d(10, 8), 1),
-                                  Obstacle::AxisBox(Eigen::Vector2d(5, 6), Eigen::Vector2d(7, 9)),
-                                  Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 9),
-                                  Obstacle::Polygon({Eigen::Vector2d(5, -9), Eigen::Vector2d(7, -9), Eigen::Vector2d(6, -7)})};
+  std::vector<Obstacle> obstacles{
+      Obstacle::Circle(Eigen::Vector2d(10, 8), 1), Obstacle::AxisBox(Eigen::Vector2d(5, 6), Eigen::Vector2d(7, 9)),
+      Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 9),
+      Obstacle::Polygon({Eigen::Vector2d(5, -9), Eigen::Vector2d(7, -9), Eigen::Vector2d(6, -7)})};
   EXPECT_EQ(Count(10, 0, obstacles, Outcome::kCertified), 0);
   EXPECT_EQ(Count(30, 0, obstacles, Outcome::kDomain), 0);
   obstacles.push_back(Obstacle::Circle(Eigen::Vector2d(6, 0), 1));

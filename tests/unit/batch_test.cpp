@@ -93,9 +93,7 @@ TEST_F(BatchTest, OneInitialSetServesAll) {
     EXPECT_EQ(Fields(decisions[i]), Fields(certifier_.Certify(plans_[i], first[0], obstacles_, tube))) << i;
 }
 
-TEST_F(BatchTest, NoPlansNoDecisions) {
-  EXPECT_TRUE(CertifyAll(certifier_, {}, {}, obstacles_, 4).empty());
-}
+TEST_F(BatchTest, NoPlansNoDecisions) { EXPECT_TRUE(CertifyAll(certifier_, {}, {}, obstacles_, 4).empty()); }
 
 TEST_F(BatchTest, SaysWhatDoesNotFit) {
   using testing::HasSubstr;

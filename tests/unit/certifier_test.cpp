@@ -26,9 +26,11 @@ const double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr int kPx = 0, kVx = 2, kVy = 3, kAx = 4;
 constexpr int kTheta = 2, kV = 3, kDelta = 5, kJerk = 6;
 
-static_assert(noexcept(std::declval<const Certifier&>().Certify({}, std::declval<const Zonotope&>(), {}, std::declval<Tube&>())));
-static_assert(noexcept(std::declval<const Propagator&>().Step(std::declval<const Zonotope&>(), {}, std::declval<StepRecord&>(),
-                                                              std::declval<Zonotope&>(), nullptr)));
+static_assert(noexcept(std::declval<const Certifier&>().Certify({}, std::declval<const Zonotope&>(), {},
+                                                                std::declval<Tube&>())));
+static_assert(noexcept(std::declval<const Propagator&>().Step(std::declval<const Zonotope&>(), {},
+                                                              std::declval<StepRecord&>(), std::declval<Zonotope&>(),
+                                                              nullptr)));
 
 Eigen::VectorXd Vec(std::initializer_list<double> entries) {
   Eigen::VectorXd vector(static_cast<Eigen::Index>(entries.size()));
@@ -70,7 +72,8 @@ class Judge {
  public:
   explicit Judge(const Problem& problem) : certifier_(std::make_shared<Problem>(problem)) {}
 
-  Decision operator()(const Zonotope& initial_set, const Eigen::MatrixXd& controls, const std::vector<Obstacle>& obstacles) {
+  Decision operator()(const Zonotope& initial_set, const Eigen::MatrixXd& controls,
+                      const std::vector<Obstacle>& obstacles) {
     const Plan plan{controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
                     static_cast<int>(controls.rows())};
     certifier_.Require(plan, initial_set, obstacles);
@@ -125,7 +128,7 @@ TEST(AbstainSafety, AtTheStartTheMiddleAndTheEnd) {
   for (const int step : {0, 3, 6}) {
     Judge judge(PointMassProblem());
     const Decision d = judge(PointSet(Vec({0, 0, 2, 0})), Coast(6),
-                           {Obstacle::Circle(Vec({0, 50}), 1), Obstacle::Circle(Vec({1.0 * step, 1}), 1.25)});
+                             {Obstacle::Circle(Vec({0, 50}), 1), Obstacle::Circle(Vec({1.0 * step, 1}), 1.25)});
     EXPECT_EQ(d.outcome, Outcome::kSafety);
     EXPECT_EQ(d.cause, Cause::kObstacle);
     // Within 0.75 m along x the circle is met; one step is 1 m.
@@ -142,7 +145,9 @@ TEST(AbstainSafety, AtTheStartTheMiddleAndTheEnd) {
 TEST(AbstainSafety, WhereTheStartTouchesAnObstacle) {
   Judge judge(PointMassProblem());
   const Zonotope start = Zonotope::FromBox(Vec({0, 0, 2, 0}), Vec({1, 1, 0, 0}));
-  const auto at = [&](double left) { return judge(start, Coast(1), {Obstacle::AxisBox(Vec({-9, left}), Vec({9, 9}))}); };
+  const auto at = [&](double left) {
+    return judge(start, Coast(1), {Obstacle::AxisBox(Vec({-9, left}), Vec({9, 9}))});
+  };
   EXPECT_EQ(at(1).outcome, Outcome::kSafety);
   EXPECT_EQ(at(1).step, 0);
   EXPECT_EQ(at(1 + 1e-12).outcome, Outcome::kCertified);
@@ -272,7 +277,8 @@ TEST_P(NoStop, TheBoundIsClosedToTheLastBit) {
   EXPECT_EQ(d.threshold, GetParam() * NextDown(reached));
   ExpectNoWitness(d, true, false, false);
   EXPECT_EQ(judge_->tube().length(), 1);
-  EXPECT_THAT(Explain(d, judge_->certifier().problem()), HasSubstr("abstain D: at step 1 the plan ends, and vx reaches "));
+  EXPECT_THAT(Explain(d, judge_->certifier().problem()),
+              HasSubstr("abstain D: at step 1 the plan ends, and vx reaches "));
   EXPECT_EQ(Brake(0).cause, Cause::kNoStop);
 }
 
@@ -365,7 +371,9 @@ class Reproducible : public testing::TestWithParam<Method> {
     certifier_.emplace(std::make_shared<Problem>(problem));
   }
 
-  Decision Certify(Tube& tube) const { return certifier_->Certify({controls_.data(), 2, 12, 2}, start_, obstacles_, tube); }
+  Decision Certify(Tube& tube) const {
+    return certifier_->Certify({controls_.data(), 2, 12, 2}, start_, obstacles_, tube);
+  }
 
   static void ExpectSame(const Decision& a, const Tube& tube_a, const Decision& b, const Tube& tube_b) {
     EXPECT_EQ(a.outcome, b.outcome);
@@ -428,7 +436,11 @@ TEST(Certifier, NamesThePartThatDoesNotFit) {
   ExpectRefused([](Problem& p) { p.domain.state = Box(); }, "domain: state box");
   ExpectRefused([](Problem& p) { p.domain.input = Box(); }, "domain: input box");
   ExpectRefused([](Problem& p) { p.domain.inequalities.push_back({Vec({1}), 0}); }, "domain: inequality 0");
-  ExpectRefused([](Problem& p) { p.domain.inequalities.push_back({Eigen::VectorXd::Ones(6), kNan}); }, "domain: inequality 0");
+  ExpectRefused(
+      [](Problem& p) {
+        p.domain.inequalities.push_back({Eigen::VectorXd::Ones(6), kNan});
+      },
+      "domain: inequality 0");
   ExpectRefused([](Problem& p) { p.domain.balls.push_back({{}, Vec({}), 1}); }, "domain: ball 0");
   ExpectRefused([](Problem& p) { p.domain.balls.push_back({{6}, Vec({0}), 1}); }, "coordinate 6");
   ExpectRefused([](Problem& p) { p.domain.balls.push_back({{0}, Vec({0}), -1}); }, "radius -1");
@@ -445,7 +457,8 @@ TEST(Certifier, NamesThePartThatDoesNotFit) {
   ExpectRefused([](Problem& p) { p.projection.setZero(); }, "projection");
   ExpectRefused([](Problem& p) { p.rest = {{4, 1}}; }, "rest: coordinate 4");
   ExpectRefused([](Problem& p) { p.rest = {{-1, 1}}; }, "rest: coordinate -1");
-  for (const double bad : {-1.0, kNan, kInfinity}) ExpectRefused([bad](Problem& p) { p.rest = {{0, bad}}; }, "rest: coordinate 0");
+  for (const double bad : {-1.0, kNan, kInfinity})
+    ExpectRefused([bad](Problem& p) { p.rest = {{0, bad}}; }, "rest: coordinate 0");
   ExpectRefused([](Problem& p) { p.zonotope_order = 0; }, "zonotope_order: 0");
   ExpectRefused([](Problem& p) { p.zonotope_order = 27; }, "zonotope_order: 27");
   Problem largest = PointMassProblem();
@@ -488,8 +501,8 @@ TEST(Certifier, WorksAtTheLargestOrderAndHorizon) {
   problem.zonotope_order = 26;
   problem.declaration.noise_bound.setConstant(1e-9);
   Judge judge(problem);
-  const Decision d = judge(Zonotope::FromBox(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Constant(4, 1e-6)), Coast(kMaxSteps),
-                         {Obstacle::Circle(Vec({50, 0}), 1)});
+  const Decision d = judge(Zonotope::FromBox(Eigen::VectorXd::Zero(4), Eigen::VectorXd::Constant(4, 1e-6)),
+                           Coast(kMaxSteps), {Obstacle::Circle(Vec({50, 0}), 1)});
   EXPECT_EQ(d.outcome, Outcome::kCertified);
   EXPECT_EQ(judge.tube().length(), kMaxSteps);
   EXPECT_LE(judge.tube().slice(kMaxSteps).num_generators(), kMaxGenerators);

@@ -33,7 +33,8 @@ class LearnTest : public testing::Test {
 
   Eigen::VectorXd Draw() {
     const auto in = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); };
-    return (Eigen::VectorXd(8) << in(-5, 5), in(-5, 5), in(-1, 1), in(6, 14), in(-1, 1), in(-0.3, 0.3), in(-1, 1), in(-0.2, 0.2))
+    return (Eigen::VectorXd(8) << in(-5, 5), in(-5, 5), in(-1, 1), in(6, 14), in(-1, 1), in(-0.3, 0.3), in(-1, 1),
+            in(-0.2, 0.2))
         .finished();
   }
   Eigen::VectorXd Next(const Eigen::VectorXd& z, double error = 0) const {

@@ -1,5 +1,5 @@
-// Laws that hold for every set type, at empty dimension, point, flat, 1e-8 wide, huge and random sets. A new set type is
-// one more entry of SetTypes, and an adapter of five lines where its interface differs.
+// Laws that hold for every set type, at empty dimension, point, flat, 1e-8 wide, huge and random sets. A new set type
+// is one more entry of SetTypes, and an adapter of five lines where its interface differs.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,9 @@ using Point = std::vector<Rational>;
 
 struct ZonotopeLaws {
   using Set = Zonotope;
-  static Set FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd& half) { return Zonotope::FromBox(center, half); }
+  static Set FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd& half) {
+    return Zonotope::FromBox(center, half);
+  }
   static Interval Hull(const Set& set, int k) { return set.Hull(k); }
   static double SupportUpper(const Set& set, const Eigen::VectorXd& d) { return set.SupportUpper(View(d)); }
   static Rational Support(const Set& set, const Eigen::VectorXd& d) { return exact::Support(set, View(d)); }
@@ -40,7 +42,9 @@ struct ZonotopeLaws {
 
 struct BoxLaws {
   using Set = Box;
-  static Set FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd& half) { return Box::FromCenter(center, half); }
+  static Set FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd& half) {
+    return Box::FromCenter(center, half);
+  }
   static Interval Hull(const Set& set, int k) { return {set.lower()[k], set.upper()[k]}; }
   static double SupportUpper(const Set& set, const Eigen::VectorXd& d) {
     return Zonotope::Enclose(set).SupportUpper(View(d));
@@ -172,7 +176,8 @@ TYPED_TEST(SetLaws, HullEndsAreTheSupportAlongTheAxes) {
   ForEachExample<TypeParam>([](const auto& set, const Example&, Random&) {
     for (int k = 0; k < set.dim(); ++k) {
       const Eigen::VectorXd axis = Eigen::VectorXd::Unit(set.dim(), k);
-      const Rational width = abs(Rational(TypeParam::Hull(set, k).upper)) + abs(Rational(TypeParam::Hull(set, k).lower));
+      const Rational width =
+          abs(Rational(TypeParam::Hull(set, k).upper)) + abs(Rational(TypeParam::Hull(set, k).lower));
       const Rational slack = width * Rational(1e-14) + Rational(0x1p-1060);
       EXPECT_LE(Rational(TypeParam::Hull(set, k).upper) - TypeParam::Support(set, axis), slack);
       EXPECT_LE(-TypeParam::Support(set, -axis) - Rational(TypeParam::Hull(set, k).lower), slack);

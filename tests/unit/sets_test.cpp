@@ -41,7 +41,11 @@ TEST(Box, IsClosed) {
 
 TEST(Box, RefusesWhatIsNoBox) {
   EXPECT_THAT([] { Box(Vec({0}), Vec({1, 2})); }, ThrowsMessage<std::invalid_argument>(HasSubstr("lower has 1")));
-  EXPECT_THAT([] { Box(Vec({0, 2}), Vec({1, 1})); }, ThrowsMessage<std::invalid_argument>(HasSubstr("entry 1: [2, 1]")));
+  EXPECT_THAT(
+      [] {
+        Box(Vec({0, 2}), Vec({1, 1}));
+      },
+      ThrowsMessage<std::invalid_argument>(HasSubstr("entry 1: [2, 1]")));
   EXPECT_THROW(Box(Vec({kNan}), Vec({1})), std::invalid_argument);
   EXPECT_THROW(Box(Vec({0}), Vec({kInfinity})), std::invalid_argument);
   EXPECT_THROW(Box(Vec({-kInfinity}), Vec({0})), std::invalid_argument);
@@ -54,7 +58,8 @@ TEST(Zonotope, RefusesWhatIsNoZonotope) {
   EXPECT_THROW(Zonotope(Vec({0, 0}), Eigen::MatrixXd::Zero(3, 1)), std::invalid_argument);
   EXPECT_THROW(Zonotope(Vec({kNan}), Eigen::MatrixXd::Zero(1, 1)), std::invalid_argument);
   EXPECT_THROW(Zonotope(Vec({0}), Eigen::MatrixXd::Constant(1, 1, kInfinity)), std::invalid_argument);
-  EXPECT_THROW(Zonotope(Eigen::VectorXd::Zero(kMaxStates + 1), Eigen::MatrixXd(kMaxStates + 1, 0)), std::invalid_argument);
+  EXPECT_THROW(Zonotope(Eigen::VectorXd::Zero(kMaxStates + 1), Eigen::MatrixXd(kMaxStates + 1, 0)),
+               std::invalid_argument);
   EXPECT_THROW(Zonotope(Vec({0}), Eigen::MatrixXd::Zero(1, kMaxGenerators + 1)), std::invalid_argument);
   EXPECT_NO_THROW(Zonotope(Eigen::VectorXd::Zero(kMaxStates), Eigen::MatrixXd::Zero(kMaxStates, kMaxGenerators)));
   EXPECT_THROW((void)Zonotope::FromBox(Vec({0}), Vec({-1e-300})), std::invalid_argument);
@@ -121,7 +126,8 @@ Eigen::MatrixXd Reduced(const Eigen::MatrixXd& all, int order) {
   Eigen::MatrixXd reduced(n, kept);
   for (Eigen::Index j = 0; j < kept; ++j) reduced.col(j) = generators.col(columns[static_cast<std::size_t>(j)]);
   Eigen::VectorXd boxed = Eigen::VectorXd::Zero(n);
-  for (auto column = columns.begin() + kept; column != columns.end(); ++column) boxed += generators.col(*column).cwiseAbs();
+  for (auto column = columns.begin() + kept; column != columns.end(); ++column)
+    boxed += generators.col(*column).cwiseAbs();
   for (Eigen::Index k = 0; k < n; ++k) {
     if (boxed[k] == 0) continue;
     reduced.conservativeResize(n, reduced.cols() + 1);
@@ -149,7 +155,8 @@ TEST(ReduceOrder, KeepsTheBestColumnsAndTheEarlierOfEquals) {
     ASSERT_EQ(result.cols(), expected.cols());
     ASSERT_LE(result.cols(), std::max(order * n, 0));
     ASSERT_TRUE((result - expected).isZero(1e-11)) << result << "\n\n" << expected;
-    for (const auto column : expected.leftCols(std::min(expected.cols(), static_cast<Eigen::Index>((order - 1) * n))).colwise())
+    for (const auto column :
+         expected.leftCols(std::min(expected.cols(), static_cast<Eigen::Index>((order - 1) * n))).colwise())
       ASSERT_TRUE(HasColumn(result, column)) << "a kept column is kept to the last bit";
   }
 }

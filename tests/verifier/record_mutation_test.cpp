@@ -174,7 +174,8 @@ const char* WhyStillTrue(const Pointer& at, const std::string& what, const Json&
   }
   if (what == "delete" || what == "duplicate") {  // of a whole column, which is no more than rounding
     const Json& column = valid[at];
-    if (column.is_array() && std::all_of(column.begin(), column.end(), [](const Json& e) { return std::abs(e.get<double>()) <= 1e-11; }))
+    if (column.is_array() &&
+        std::all_of(column.begin(), column.end(), [](const Json& e) { return std::abs(e.get<double>()) <= 1e-11; }))
       return "less than what rounding was allowed for";
   }
   return nullptr;

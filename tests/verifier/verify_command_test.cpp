@@ -198,8 +198,8 @@ TEST_F(VerifyDecision, BadInputExitsWithTwo) {
 TEST(VerifyHelp, Teaches) {
   const Output output = Forereach("verify --help");
   EXPECT_EQ(output.code, 0);
-  for (const char* text :
-       {"DECISION|LOG|DATABASE", "exit 0", "forereach verify decision.json", "forereach verify run/log", "--config FILE"})
+  for (const char* text : {"DECISION|LOG|DATABASE", "exit 0", "forereach verify decision.json",
+                           "forereach verify run/log", "--config FILE"})
     EXPECT_THAT(output.text, HasSubstr(text));
 }
 

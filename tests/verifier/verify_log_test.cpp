@@ -46,7 +46,8 @@ std::string Edited(const ScratchDirectory& scratch, const std::function<bool(Log
 }
 
 // Changes the first certified plan, and if asked makes its digest good again.
-std::string EditedCertificate(const ScratchDirectory& scratch, bool reseal, const std::function<void(certified_plan_t&)>& edit) {
+std::string EditedCertificate(const ScratchDirectory& scratch, bool reseal,
+                              const std::function<void(certified_plan_t&)>& edit) {
   bool done = false;
   return Edited(scratch, [&](LogEvent& event) {
     auto certified = Decoded<certified_plan_t>(event.data);
@@ -84,9 +85,8 @@ TEST(VerifyLog, SliceShrunkenByOneUlp) {
 // The seal made good again covers no entry beyond those in use: these have to be zero.
 TEST(VerifyLog, AnEntryBeyondThoseInUse) {
   ScratchDirectory scratch;
-  const auto path = EditedCertificate(scratch, true, [](certified_plan_t& certified) {
-    certified.slice_lower[certified.plan.num_steps + 1][2] = 0.5;
-  });
+  const auto path = EditedCertificate(
+      scratch, true, [](certified_plan_t& certified) { certified.slice_lower[certified.plan.num_steps + 1][2] = 0.5; });
   const auto file = ReadCertificates(path, kConfig);
   ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
   EXPECT_THAT(file.certificates[0].mismatches[0].what, AllOf(HasSubstr("altered"), HasSubstr("slice_lower[")));
@@ -288,17 +288,29 @@ TEST_F(VerifyObstacles, AlteredDecisionsAreRefused) {
   };
   EXPECT_EQ(mismatches([](decision_t&) {}), std::pair(std::size_t{0}, Status::kConfirmed));
   for (const std::function<void(decision_t&)>& change : std::initializer_list<std::function<void(decision_t&)>>{
-           [](decision_t& d) { SetText(d.message, "certified: no obstacles"); }, [](decision_t& d) { d.message[0] ^= 1; },
-           [](decision_t& d) { d.message[60] ^= 1; }, [](decision_t& d) { SetText(d.message, ""); },
-           [](decision_t& d) { d.margin *= 1.001; }, [](decision_t& d) { d.margin = -d.margin; },
-           [](decision_t& d) { d.margin = std::nan(""); }, [](decision_t& d) { d.threshold += 0.5; },
-           [](decision_t& d) { d.obstacle = -1; }, [](decision_t& d) { d.obstacle = 99; }, [](decision_t& d) { d.step = 3; },
-           [](decision_t& d) { d.cause = 4; }, [](decision_t& d) { d.coordinate = 0; },
-           [](decision_t& d) { d.first_observation = 0; }, [](decision_t& d) { d.second_observation = 7; },
-           [](decision_t& d) { d.config_digest[3] ^= 1; }, [](decision_t& d) { d.model_digest[3] ^= 1; },
-           [](decision_t& d) { d.declaration_digest[3] ^= 1; }, [](decision_t& d) { d.observations_digest[3] ^= 1; },
-           [](decision_t& d) { d.obstacles_digest[3] ^= 1; }, [](decision_t& d) { ++d.plan_id; },
-           [](decision_t& d) { d.source[0] ^= 1; }, [](decision_t& d) { ++d.candidate_utime; }})
+           [](decision_t& d) { SetText(d.message, "certified: no obstacles"); },
+           [](decision_t& d) { d.message[0] ^= 1; },
+           [](decision_t& d) { d.message[60] ^= 1; },
+           [](decision_t& d) { SetText(d.message, ""); },
+           [](decision_t& d) { d.margin *= 1.001; },
+           [](decision_t& d) { d.margin = -d.margin; },
+           [](decision_t& d) { d.margin = std::nan(""); },
+           [](decision_t& d) { d.threshold += 0.5; },
+           [](decision_t& d) { d.obstacle = -1; },
+           [](decision_t& d) { d.obstacle = 99; },
+           [](decision_t& d) { d.step = 3; },
+           [](decision_t& d) { d.cause = 4; },
+           [](decision_t& d) { d.coordinate = 0; },
+           [](decision_t& d) { d.first_observation = 0; },
+           [](decision_t& d) { d.second_observation = 7; },
+           [](decision_t& d) { d.config_digest[3] ^= 1; },
+           [](decision_t& d) { d.model_digest[3] ^= 1; },
+           [](decision_t& d) { d.declaration_digest[3] ^= 1; },
+           [](decision_t& d) { d.observations_digest[3] ^= 1; },
+           [](decision_t& d) { d.obstacles_digest[3] ^= 1; },
+           [](decision_t& d) { ++d.plan_id; },
+           [](decision_t& d) { d.source[0] ^= 1; },
+           [](decision_t& d) { ++d.candidate_utime; }})
     EXPECT_GT(mismatches(change).first, 0u);
   // Consistent in itself, and more than there is.
   const auto [count, status] = mismatches([](decision_t& d) {
