@@ -23,8 +23,8 @@
 
 #include "bench/candidates.h"
 #include "bench/latencies.h"
+#include "bus/node.h"
 #include "certifier/process/certifier_node.h"
-#include "lcmtypes/node.h"
 
 namespace forereach::bench {
 namespace {

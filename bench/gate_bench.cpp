@@ -5,8 +5,8 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/candidates.h"
+#include "bus/authentic.h"
 #include "certifier/gate/gate.h"
-#include "lcmtypes/authentic.h"
 #include "lcmtypes/seal.h"
 
 namespace forereach::bench {

@@ -10,13 +10,13 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "bus/authentic.h"
+#include "bus/keys.h"
 #include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
-#include "lcmtypes/authentic.h"
-#include "lcmtypes/keys.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 

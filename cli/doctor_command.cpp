@@ -18,11 +18,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "bus/bus.h"
+#include "bus/udp_receiver.h"
 #include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
-#include "lcmtypes/bus.h"
-#include "lcmtypes/udp_receiver.h"
 
 namespace forereach {
 namespace {

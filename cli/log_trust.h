@@ -7,8 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bus/authentic.h"
 #include "certifier/task/config.h"
-#include "lcmtypes/authentic.h"
 
 namespace CLI {
 class App;

@@ -3,8 +3,8 @@
 #include <map>
 #include <set>
 
+#include "bus/authentic.h"
 #include "fuzz/fuzz.h"
-#include "lcmtypes/authentic.h"
 
 namespace forereach {
 namespace {

@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
+#include "bus/datagram.h"
+#include "bus/inbox.h"
 #include "fuzz/fuzz.h"
-#include "lcmtypes/datagram.h"
-#include "lcmtypes/inbox.h"
 
 namespace forereach {
 namespace {

@@ -1,6 +1,6 @@
 // Key files: public keys are read out of what MakeKeys writes, and of nothing else.
+#include "bus/keys.h"
 #include "fuzz/fuzz.h"
-#include "lcmtypes/keys.h"
 
 bool forereach::Try(Bytes data) {
   static MemoryFile file;

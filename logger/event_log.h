@@ -16,7 +16,7 @@ every length before it allocates, tells the end, a cut tail and damage apart, an
 #include <string>
 #include <vector>
 
-#include "lcmtypes/authentic.h"
+#include "bus/authentic.h"
 #include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 
@@ -34,7 +34,7 @@ struct LogEvent {
   std::string channel;
   std::vector<std::uint8_t> data;  ///< As it was on the bus.
 
-  /** The data without the signature, if there is one (lcmtypes/authentic.h). */
+  /** The data without the signature, if there is one (bus/authentic.h). */
   [[nodiscard]] Bytes message() const { return WithoutSignature(data); }
 };
 

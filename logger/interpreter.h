@@ -16,8 +16,8 @@ With a key, messages that are not authentic (log_authenticator.h) make no rows a
 #include <string>
 #include <utility>
 
+#include "bus/authentic.h"
 #include "certifier/task/config.h"
-#include "lcmtypes/authentic.h"
 #include "lcmtypes/codec.h"
 #include "logger/event_log.h"
 #include "logger/log_authenticator.h"

@@ -6,8 +6,8 @@ believes what the robot's processes believed, and passes over the rest. */
 #include <string>
 #include <utility>
 
+#include "bus/authentic.h"
 #include "certifier/task/config.h"
-#include "lcmtypes/authentic.h"
 #include "logger/event_log.h"
 
 namespace forereach {

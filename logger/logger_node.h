@@ -17,9 +17,9 @@ what Stop prints. Those of other channels that are too much become gaps, "unsign
 #include <string>
 #include <vector>
 
+#include "bus/bus.h"
+#include "bus/node.h"
 #include "certifier/task/config.h"
-#include "lcmtypes/bus.h"
-#include "lcmtypes/node.h"
 #include "logger/recorder.h"
 
 namespace forereach {

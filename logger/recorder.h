@@ -42,8 +42,8 @@ are never deleted, nor is any if that would not make room. */
 #include <utility>
 #include <vector>
 
+#include "bus/authentic.h"
 #include "certifier/task/config.h"
-#include "lcmtypes/authentic.h"
 #include "logger/database.h"
 #include "logger/event_log.h"
 #include "logger/interpreter.h"

@@ -29,12 +29,12 @@ and ignored. */
 #include <string>
 #include <vector>
 
+#include "bus/node.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
-#include "lcmtypes/node.h"
 #include "planner_bridge/lessons.h"
 #include "planner_bridge/proposer.h"
 #include "planner_bridge/residual_estimate.h"

@@ -31,8 +31,8 @@ Plan ids are compared whatever their source: a robot follows one planner. Single
 #include <utility>
 #include <vector>
 
+#include "bus/authentic.h"
 #include "forereach/certified_plan_t.hpp"
-#include "lcmtypes/authentic.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -109,7 +109,7 @@ struct GuardOptions {
   std::optional<Digest> config_digest;  ///< If set, plans certified under another configuration are refused.
   std::optional<Digest> model_digest;   ///< If set, plans certified for another model are refused.
   std::optional<KeyRing> keys = {};  ///< LoadKeys(PATH, Role::kRobot). If set, plans are refused that the certifier of
-                                     ///< these keys did not sign (lcmtypes/authentic.h) ...
+                                     ///< these keys did not sign (bus/authentic.h) ...
   std::string bus_name = {};         ///< ... for the bus of this name, "239.255.76.67:7667"; not empty with keys, ...
   std::string channel = "PLAN_CERTIFIED";  ///< ... and for this channel.
   std::optional<GuardDomain> domain = {};  ///< If set, plans that leave it are refused.

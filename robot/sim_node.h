@@ -32,10 +32,10 @@ take plans certified under the file as it is now (Guard::Expect); the robot and 
 #include <utility>
 #include <vector>
 
+#include "bus/node.h"
 #include "certifier/task/config.h"
 #include "certifier/task/reloading.h"
 #include "forereach/execution_event_t.hpp"
-#include "lcmtypes/node.h"
 #include "robot/guard.h"
 #include "robot/target.h"
 

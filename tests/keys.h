@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "lcmtypes/keys.h"
+#include "bus/keys.h"
 
 namespace forereach {
 

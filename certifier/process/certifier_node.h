@@ -30,6 +30,7 @@ knows that the plan was handed to the bus before. */
 #include <utility>
 #include <vector>
 
+#include "bus/node.h"
 #include "certifier/gate/charge.h"
 #include "certifier/gate/conformance.h"
 #include "certifier/gate/gate.h"
@@ -41,7 +42,6 @@ knows that the plan was handed to the bus before. */
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
-#include "lcmtypes/node.h"
 
 namespace forereach {
 

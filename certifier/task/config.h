@@ -8,10 +8,10 @@ and, made from it, in config/README.md. */
 #include <string>
 #include <vector>
 
+#include "bus/authentic.h"
 #include "certifier/certify/problem.h"
 #include "certifier/dynamics/parametric_residual.h"
 #include "certifier/task/canonical.h"
-#include "lcmtypes/authentic.h"
 #include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 

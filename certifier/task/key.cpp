@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "lcmtypes/bus_url.h"
+#include "bus/bus_url.h"
 
 namespace forereach {
 namespace {

@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "bus/keys.h"
 #include "certifier/task/config.h"
-#include "lcmtypes/keys.h"
 
 namespace forereach {
 

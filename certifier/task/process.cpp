@@ -10,9 +10,9 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
+#include "bus/authentic_bus.h"
 #include "certifier/task/key.h"
 #include "certifier/task/reloading.h"
-#include "lcmtypes/authentic_bus.h"
 #include "lcmtypes/printable.h"
 
 namespace forereach {

@@ -5,10 +5,10 @@
 #include <memory>
 #include <string>
 
+#include "bus/keys.h"
+#include "bus/node.h"
 #include "certifier/task/command_line.h"
 #include "certifier/task/config.h"
-#include "lcmtypes/keys.h"
-#include "lcmtypes/node.h"
 
 namespace CLI {
 class App;

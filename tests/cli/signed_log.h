@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "bus/authentic.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "lcmtypes/authentic.h"
 #include "logger/event_log.h"
 #include "tests/keys.h"
 #include "tests/scratch.h"

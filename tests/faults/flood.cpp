@@ -10,8 +10,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "lcmtypes/bus_url.h"
-#include "lcmtypes/clock.h"
+#include "bus/bus_url.h"
+#include "bus/clock.h"
 
 namespace forereach {
 namespace {

@@ -11,10 +11,10 @@ by a thread of its own, so nothing that is done with the answers delays the next
 #include <utility>
 #include <vector>
 
+#include "bus/bus.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
-#include "lcmtypes/bus.h"
 
 namespace forereach {
 

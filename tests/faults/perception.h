@@ -10,8 +10,8 @@ nonsense. */
 #include <thread>
 #include <vector>
 
+#include "bus/bus.h"
 #include "certifier/gate/obstacle_sender.h"
-#include "lcmtypes/bus.h"
 
 namespace forereach {
 

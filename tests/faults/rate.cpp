@@ -7,10 +7,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include "bus/authentic.h"
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
 #include "forereach/decision_t.hpp"
-#include "lcmtypes/authentic.h"
 #include "lcmtypes/names.h"
 #include "tests/faults/demo_task.h"
 #include "tests/faults/flood.h"

@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "lcmtypes/bus.h"
+#include "bus/bus.h"
 
 namespace forereach {
 

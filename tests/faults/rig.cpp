@@ -7,9 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "bus/authentic_bus.h"
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
-#include "lcmtypes/authentic_bus.h"
 #include "logger/check.h"
 #include "logger/event_log.h"
 #include "tests/keys.h"

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "bus/bus.h"
 #include "certifier/task/config.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
@@ -18,7 +19,6 @@
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
-#include "lcmtypes/bus.h"
 
 namespace forereach {
 

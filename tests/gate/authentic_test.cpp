@@ -1,5 +1,5 @@
 // Signed messages: what is refused, and that nothing but the message, its speaker and its freshness decides.
-#include "lcmtypes/authentic.h"
+#include "bus/authentic.h"
 
 #include <limits>
 #include <random>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "lcmtypes/authentic_bus.h"
+#include "bus/authentic_bus.h"
 #include "tests/keys.h"
 #include "tests/scratch.h"
 

@@ -1,5 +1,5 @@
 // Key files: who can read them, what is in them, and what is said of those that cannot be used.
-#include "lcmtypes/keys.h"
+#include "bus/keys.h"
 
 #include <csignal>
 #include <filesystem>

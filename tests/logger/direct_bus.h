@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "bus/bus.h"
 #include "forereach/logger_status_t.hpp"
-#include "lcmtypes/bus.h"
 
 namespace forereach {
 

@@ -1,4 +1,4 @@
-#include "lcmtypes/bus.h"
+#include "bus/bus.h"
 
 #include <stdexcept>
 #include <string>

@@ -1,4 +1,4 @@
-#include "lcmtypes/bus_url.h"
+#include "bus/bus_url.h"
 
 #include <string>
 

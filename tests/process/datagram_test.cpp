@@ -1,5 +1,5 @@
 // The parser of datagrams, at every boundary.
-#include "lcmtypes/datagram.h"
+#include "bus/datagram.h"
 
 #include <string>
 #include <vector>

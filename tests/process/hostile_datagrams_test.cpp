@@ -11,10 +11,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bus/authentic.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
-#include "lcmtypes/authentic.h"
 #include "tests/keys.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"

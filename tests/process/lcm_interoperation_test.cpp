@@ -18,9 +18,9 @@
 #include <gtest/gtest.h>
 #include <lcm/lcm-cpp.hpp>
 
+#include "bus/authentic.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "lcmtypes/authentic.h"
 #include "logger/event_log.h"
 #include "tests/process/process_fixture.h"
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "lcmtypes/authentic.h"
+#include "bus/authentic.h"
 
 namespace forereach {
 

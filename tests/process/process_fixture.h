@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "bus/bus.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "lcmtypes/bus.h"
 #include "tests/process/child_process.h"
 #include "tests/scratch.h"
 

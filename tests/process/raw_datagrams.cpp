@@ -9,8 +9,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "lcmtypes/bus_url.h"
-#include "lcmtypes/datagram.h"
+#include "bus/bus_url.h"
+#include "bus/datagram.h"
 
 namespace forereach {
 namespace {

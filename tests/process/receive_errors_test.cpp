@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
-#include "lcmtypes/udp_receiver.h"
+#include "bus/udp_receiver.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 

@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "lcmtypes/bus.h"
+#include "bus/bus.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -1,5 +1,5 @@
 // What comes to the socket: by group, port and kind; what is counted; what it costs in memory.
-#include "lcmtypes/udp_receiver.h"
+#include "bus/udp_receiver.h"
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +19,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "lcmtypes/bus.h"
+#include "bus/bus.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 

@@ -7,13 +7,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "bus/authentic_bus.h"
 #include "certifier/dynamics/models.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
-#include "lcmtypes/authentic_bus.h"
 #include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
 

@@ -1,4 +1,4 @@
-#include "lcmtypes/keys.h"
+#include "bus/keys.h"
 
 #include <algorithm>
 #include <cerrno>

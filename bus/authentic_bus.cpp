@@ -1,4 +1,4 @@
-#include "lcmtypes/authentic_bus.h"
+#include "bus/authentic_bus.h"
 
 #include <mutex>
 #include <utility>

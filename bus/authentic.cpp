@@ -1,4 +1,4 @@
-#include "lcmtypes/authentic.h"
+#include "bus/authentic.h"
 
 #include <algorithm>
 #include <cstring>

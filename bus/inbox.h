@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "lcmtypes/bus.h"
+#include "bus/bus.h"
 
 namespace forereach {
 

@@ -1,4 +1,4 @@
-#include "lcmtypes/bus.h"
+#include "bus/bus.h"
 
 #include <chrono>
 #include <condition_variable>
@@ -11,8 +11,8 @@
 
 #include <lcm/lcm-cpp.hpp>
 
-#include "lcmtypes/inbox.h"
-#include "lcmtypes/udp_receiver.h"
+#include "bus/inbox.h"
+#include "bus/udp_receiver.h"
 
 namespace forereach {
 namespace {

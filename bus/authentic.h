@@ -33,8 +33,8 @@ out. */
 #include <utility>
 #include <vector>
 
+#include "bus/keys.h"
 #include "lcmtypes/codec.h"
-#include "lcmtypes/keys.h"
 
 namespace forereach {
 

@@ -1,4 +1,4 @@
-#include "lcmtypes/udp_receiver.h"
+#include "bus/udp_receiver.h"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-#include "lcmtypes/clock.h"
+#include "bus/clock.h"
 
 namespace forereach {
 namespace {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "lcmtypes/authentic.h"
-#include "lcmtypes/bus.h"
+#include "bus/authentic.h"
+#include "bus/bus.h"
 
 namespace forereach {
 

@@ -1,4 +1,4 @@
-#include "lcmtypes/clock.h"
+#include "bus/clock.h"
 
 #include <chrono>
 

@@ -9,11 +9,11 @@ Handlers run in the thread that calls Dispatch, never in a receive thread, so a 
 #include <optional>
 #include <string>
 
-#include "lcmtypes/authentic.h"
-#include "lcmtypes/bus_url.h"
-#include "lcmtypes/clock.h"
+#include "bus/authentic.h"
+#include "bus/bus_url.h"
+#include "bus/clock.h"
+#include "bus/datagram.h"
 #include "lcmtypes/codec.h"
-#include "lcmtypes/datagram.h"
 
 namespace forereach {
 
@@ -52,7 +52,7 @@ class Bus {
     Subscribe(channel, std::move(handler));
   }
 
-  /** Sends; returns false if the bus refused, also a message that does not fit one datagram (lcmtypes/datagram.h),
+  /** Sends; returns false if the bus refused, also a message that does not fit one datagram (bus/datagram.h),
   which nobody would receive. May be called from any thread. */
   virtual bool Publish(const std::string& channel, Bytes bytes) = 0;
 
@@ -82,7 +82,7 @@ class Bus {
 /** Opens an LCM bus: `udpm://239.255.76.67:7667?ttl=0`, or `memq://`, which lives inside this object alone.
 
 A udpm bus sends by LCM and receives by itself, on a thread that only looks at headers, asks the screen and copies
-messages out (lcmtypes/udp_receiver.h); datagrams that are no whole message are counted and go no further. memq delivers
+messages out (bus/udp_receiver.h); datagrams that are no whole message are counted and go no further. memq delivers
 within Dispatch, in order, stamped by `clock`, so that several nodes in one process can run on a simulated one.
 @param screen null: every message is admitted.
 @throws BusError for any other kind of URL, or if the bus cannot be opened, for example without a multicast route; never

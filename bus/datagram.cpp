@@ -1,4 +1,4 @@
-#include "lcmtypes/datagram.h"
+#include "bus/datagram.h"
 
 #include <algorithm>
 #include <cstring>

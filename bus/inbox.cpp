@@ -1,4 +1,4 @@
-#include "lcmtypes/inbox.h"
+#include "bus/inbox.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "lcmtypes/node.h"
+#include "bus/node.h"
 
 #include <csignal>
 

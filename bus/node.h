@@ -7,7 +7,7 @@ wall clock; a test or a one-process run drives several on a clock of its own. */
 #include <memory>
 #include <string>
 
-#include "lcmtypes/bus.h"
+#include "bus/bus.h"
 
 namespace forereach {
 

@@ -9,8 +9,8 @@ LCM's own receiver is not used: what it does with a malformed header or a fragme
 #include <string_view>
 #include <thread>
 
-#include "lcmtypes/bus_url.h"
-#include "lcmtypes/datagram.h"
+#include "bus/bus_url.h"
+#include "bus/datagram.h"
 
 namespace forereach {
 
