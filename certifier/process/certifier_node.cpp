@@ -4,7 +4,6 @@
 #include <chrono>
 #include <initializer_list>
 #include <iostream>
-#include <limits>
 #include <random>
 #include <utility>
 
@@ -33,12 +32,6 @@ std::int64_t PageFaults() {
   rusage usage{};
   ::getrusage(RUSAGE_THREAD, &usage);
   return usage.ru_minflt + usage.ru_majflt;
-}
-
-// Of a candidate; of bytes that are none, never.
-std::int64_t StartOf(Bytes bytes) {
-  const auto candidate = Decoded<candidate_plan_t>(bytes);
-  return candidate ? candidate->start_utime : std::numeric_limits<std::int64_t>::max();
 }
 
 fault_t EmptyFault(std::int16_t cause) {
@@ -206,20 +199,16 @@ void CertifierNode::StandBy() {
   decided_ = 0;
 }
 
-void CertifierNode::LeaveWaiting() {
-  left_to_other_ += std::ssize(queue_);
-  queue_.clear();
-}
+void CertifierNode::LeaveWaiting() { left_to_other_ += static_cast<std::int64_t>(queue_.Clear()); }
 
 void CertifierNode::OnCandidate(const Received& received) {
   if (charge_.state() == Charge::State::kStandingBy) {
     ++left_to_other_;
     return;
   }
-  queue_.push_back({{received.bytes.begin(), received.bytes.end()}});
-  high_water_ = std::max(high_water_, queue_.size());
+  queue_.Add(received.bytes);
   if (is_in_charge() || queue_.size() <= kHeldAtMost) return;
-  queue_.pop_front();
+  (void)queue_.TakeOldest();
   ++left_to_other_;
 }
 
@@ -461,30 +450,20 @@ void CertifierNode::Tick(std::int64_t now_us) {
 void CertifierNode::AnswerWaiting() {
   if (!is_in_charge()) return;
   for (int i = 0; i < kAtOnce && !queue_.empty(); ++i) {
-    const Waiting newest = std::move(queue_.back());
-    queue_.pop_back();
-    Answer(newest.candidate, false);
+    Answer(queue_.TakeNewest(), false);
     AnswerDue();
   }
   const auto most = static_cast<std::size_t>(gate_->options().queue);
   for (int i = 1; queue_.size() > most; ++i) {
-    const Waiting oldest = std::move(queue_.front());
-    queue_.pop_front();
-    Answer(oldest.candidate, true);
+    Answer(queue_.TakeOldest(), true);
     if (i % kAtOnce == 0) AnswerDue();  // a flood takes longer to answer than the kept ones have
   }
 }
 
 // Those for which another decision would take too long: while their start has not passed.
 void CertifierNode::AnswerDue() {
-  for (Waiting& waiting : queue_)
-    if (!waiting.start_utime) waiting.start_utime = StartOf(waiting.candidate);
-  const std::int64_t last_start = clocks_.wall() + Microseconds(gate_->options().decision_budget_ms);
-  std::erase_if(queue_, [&](const Waiting& waiting) {
-    if (*waiting.start_utime >= last_start) return false;
-    Answer(waiting.candidate, false);
-    return true;
-  });
+  const auto last_start = [&] { return clocks_.wall() + Microseconds(gate_->options().decision_budget_ms); };
+  for (const CandidateQueue::Candidate& due : queue_.TakeStartingBefore(last_start)) Answer(due, false);
 }
 
 GateAnswer CertifierNode::Decide(Bytes candidate) {
@@ -651,7 +630,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   status.refused_replayed = refusals.replayed;
   status.page_faults = page_faults_;
   status.queue_depth = static_cast<std::int32_t>(queue_.size());
-  status.queue_high_water = static_cast<std::int32_t>(std::exchange(high_water_, queue_.size()));
+  status.queue_high_water = static_cast<std::int32_t>(queue_.TakeHighWater());
   status.elapsed_p50_us = ElapsedPercentile(0.5);
   status.elapsed_p99_us = ElapsedPercentile(0.99);
   status.elapsed_max_us = ElapsedPercentile(1);

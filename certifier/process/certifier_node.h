@@ -22,7 +22,6 @@ knows that the plan was handed to the bus before. */
 #pragma once
 
 #include <array>
-#include <deque>
 #include <future>
 #include <memory>
 #include <optional>
@@ -36,6 +35,7 @@ knows that the plan was handed to the bus before. */
 #include "certifier/gate/gate.h"
 #include "certifier/gate/issued_plans.h"
 #include "certifier/gate/watch.h"
+#include "certifier/process/candidate_queue.h"
 #include "certifier/process/latch_file.h"
 #include "certifier/task/reloading.h"
 #include "forereach/certifier_status_v3_t.hpp"
@@ -158,12 +158,7 @@ class CertifierNode final : public Node {
   Conformance conformance_;
   IssuedPlans issued_;
 
-  struct Waiting {
-    std::vector<std::uint8_t> candidate;
-    std::optional<std::int64_t> start_utime = {};  // known once another was decided on before it
-  };
-
-  std::deque<Waiting> queue_;  // the newest at the back
+  CandidateQueue queue_;
   robot_state_t last_state_{};
   transition_t last_transition_{};
 
@@ -184,7 +179,6 @@ class CertifierNode final : public Node {
   std::int64_t next_heartbeat_us_ = 0, next_warning_us_ = 0;  // by the steady clock
   std::int64_t last_heartbeat_us_ = 0;
   std::int64_t heartbeats_ = 0, heartbeats_aside_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
-  std::size_t high_water_ = 0;
   std::array<double, 1024> elapsed_us_{};  // of the last decisions, a ring
   std::size_t decided_ = 0;
 };
