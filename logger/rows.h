@@ -1,11 +1,12 @@
 /** What the database holds of a log, without SQL: made by the interpreter, written and read by the database. */
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
+
+#include "lcmtypes/stream_order.h"
 
 namespace forereach {
 
@@ -55,12 +56,6 @@ struct GapRow {
 */
   std::string reason;
 };
-
-/** Of two counts of lost messages. A sender may invent any sequence, so it ends at the largest number. */
-[[nodiscard]] inline std::int64_t SumOfLost(std::int64_t a, std::int64_t b) {
-  b = std::max<std::int64_t>(b, 0);
-  return std::min(a, INT64_MAX - b) + b;
-}
 
 struct Rows {
   std::vector<DecisionRow> decisions;
