@@ -2,16 +2,16 @@
 
 Every type on the bus that counts has a `sequence`, from 0 for each sender and channel (of candidates: for each source),
 and a stamp, `utime`. Compare answers by both. With n the newest message taken, u the latest stamp taken since the
-sender began (each stamp at most max_ahead_us after its arrival), z the stamp of the last message 0 taken, and p a
-message that arrives at `now`:
+sender began (each at most the horizon at its arrival), z the stamp of the last message 0 taken, and p a message that
+arrives at horizon h:
 
     kNewer      no message was taken before, or p.sequence > n.sequence
     kRepeated   p == n, or p.sequence == 0 and p.utime == z
-    kRestarted  none of these, and min(p.utime, now + max_ahead_us) > u or u > now + max_ahead_us
+    kRestarted  none of these, and min(p.utime, h) > u or u > h
     kRewound    none of these, and p.sequence == 0
     kLate       none of these
 
-A restarted sender is recognised by a later stamp. Where u lies ahead of now the clock was set back, and stamps tell no
+A restarted sender is recognised by a later stamp. Where u > h the receiver's clock was set back, and stamps tell no
 order. kRewound is ambiguous: the sender restarted and its clock was set back, or others overtook the first message. A
 receiver that acts on messages ignores it, so that an older message never replaces a newer one; its stream is accepted
 again once the stamps or the count have caught up. A reader of records takes it for a restart.
@@ -38,26 +38,28 @@ enum class Succession { kNewer, kRepeated, kLate, kRestarted, kRewound };
 
 class StreamOrder final {
  public:
-  /** A time of arrival for receivers without a clock: every stamp counts as it is. */
-  static constexpr std::int64_t kNoClock = std::numeric_limits<std::int64_t>::max();
+  /** For receivers without a clock: every stamp counts as it is. */
+  static constexpr std::int64_t kNoHorizon = std::numeric_limits<std::int64_t>::max();
 
-  /** @param max_ahead_us how far the sender's clock may be ahead of the receiver's; not negative. A stamp further ahead
-  counts as that far ahead, so that no message stays the latest for ever. */
-  explicit StreamOrder(std::int64_t max_ahead_us) : max_ahead_us_(max_ahead_us) {}
+  /** The latest stamp that a message can have at this time, if the sender's clock is ahead by at most max_ahead_us,
+  which is not negative. A later stamp counts as this one, so that no message stays the latest for ever. */
+  [[nodiscard]] static constexpr std::int64_t Horizon(std::int64_t now_us, std::int64_t max_ahead_us) {
+    return now_us > kNoHorizon - max_ahead_us ? kNoHorizon : now_us + max_ahead_us;
+  }
 
   /** As above. Any numbers; O(1). */
-  [[nodiscard]] Succession Compare(const StreamPosition& message, std::int64_t now_us) const {
+  [[nodiscard]] Succession Compare(const StreamPosition& message, std::int64_t horizon_us) const {
     if (!newest_ || message == *newest_) return newest_ ? Succession::kRepeated : Succession::kNewer;
     if (message.sequence > newest_->sequence) return Succession::kNewer;
     if (message.sequence == 0 && message.utime == begun_utime_) return Succession::kRepeated;
-    const std::int64_t horizon = Horizon(now_us);
-    if (std::min(message.utime, horizon) > latest_utime_ || latest_utime_ > horizon) return Succession::kRestarted;
+    if (std::min(message.utime, horizon_us) > latest_utime_ || latest_utime_ > horizon_us)
+      return Succession::kRestarted;
     return message.sequence == 0 ? Succession::kRewound : Succession::kLate;
   }
 
   /** The message counts: it is the newest from now on. If its sequence is not larger, its sender has begun anew. */
-  void Take(const StreamPosition& message, std::int64_t now_us) {
-    const std::int64_t utime = std::min(message.utime, Horizon(now_us));
+  void Take(const StreamPosition& message, std::int64_t horizon_us) {
+    const std::int64_t utime = std::min(message.utime, horizon_us);
     const bool goes_on = newest_ && message.sequence > newest_->sequence;
     latest_utime_ = goes_on ? std::max(latest_utime_, utime) : utime;
     if (message.sequence == 0) begun_utime_ = message.utime;
@@ -68,11 +70,6 @@ class StreamOrder final {
   [[nodiscard]] const std::optional<StreamPosition>& newest() const { return newest_; }
 
  private:
-  [[nodiscard]] std::int64_t Horizon(std::int64_t now_us) const {
-    return now_us > kNoClock - max_ahead_us_ ? kNoClock : now_us + max_ahead_us_;
-  }
-
-  std::int64_t max_ahead_us_;
   std::optional<StreamPosition> newest_;
   std::int64_t latest_utime_ = 0;
   std::optional<std::int64_t> begun_utime_;  // of the last message 0

@@ -56,13 +56,14 @@ class Histories {
   Histories(std::vector<Arrival> alphabet, std::int64_t max_ahead, Takes takes)
       : alphabet_(std::move(alphabet)), max_ahead_(max_ahead), takes_(takes) {}
 
-  void Try(int length) { Try(StreamOrder(max_ahead_), length); }
+  void Try(int length) { Try(StreamOrder(), length); }
   [[nodiscard]] const std::array<std::int64_t, 5>& seen() const { return seen_; }
 
  private:
   void Try(const StreamOrder& order, int left) {
     for (const Arrival& next : alphabet_) {
-      const Succession answer = order.Compare(next.message, next.now);
+      const std::int64_t horizon = StreamOrder::Horizon(next.now, max_ahead_);
+      const Succession answer = order.Compare(next.message, horizon);
       ++seen_[static_cast<std::size_t>(answer)];
       if (answer != Specified(taken_, next, max_ahead_)) {
         ADD_FAILURE() << taken_.size() << " taken, then sequence " << next.message.sequence << ", stamp "
@@ -71,7 +72,7 @@ class Histories {
       }
       if (left == 1 || !takes_(answer)) continue;
       StreamOrder after = order;
-      after.Take(next.message, next.now);
+      after.Take(next.message, horizon);
       ASSERT_EQ(after.newest(), next.message);
       taken_.push_back(next);
       Try(after, left - 1);
@@ -104,9 +105,9 @@ TEST(StreamOrderTest, EveryShortHistoryIsAnsweredAsSpecified) {
     }
 }
 
-TEST(StreamOrderTest, LongerOnesWithoutAClock) {
+TEST(StreamOrderTest, LongerOnesWithoutAHorizon) {
   for (const Takes takes : {ActsOn, Reads, AnyAtAll}) {
-    Histories histories(Alphabet({0, 1, 2}, {0, 1, 2}, {StreamOrder::kNoClock}), 0, takes);
+    Histories histories(Alphabet({0, 1, 2}, {0, 1, 2}, {StreamOrder::kNoHorizon}), 0, takes);
     histories.Try(6);
     for (const std::int64_t count : histories.seen()) EXPECT_GT(count, 0);
   }
@@ -121,7 +122,7 @@ TEST(StreamOrderTest, NumbersAtTheEndsOfTheirRange) {
 }
 
 TEST(StreamOrderTest, AReceiverThatActsNeverGoesBackToAnOlderStampOfThisStream) {
-  StreamOrder order(0);
+  StreamOrder order;
   for (const StreamPosition taken : {StreamPosition{0, 10}, {1, 20}, {2, 30}}) order.Take(taken, taken.utime);
   for (const StreamPosition old : {StreamPosition{0, 9}, {0, 10}, {0, 30}, {1, 20}, {1, 30}, {2, 29}, {2, 30}})
     EXPECT_FALSE(ActsOn(order.Compare(old, 30))) << old.sequence << " " << old.utime;
