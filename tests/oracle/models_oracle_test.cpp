@@ -434,6 +434,48 @@ TEST_P(Model, ExpansionErrorBoundsThePlainEvaluation) {
   }
 }
 
+// A heading known to half a turn or worse: the sine's slopes at both ends may have the same sign, and a maximum and a
+// minimum lie between them.
+TEST(BicycleModel, PlainRangesHoldForHeadingsWiderThanPi) {
+  Random random(510);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(kDt, kWheelbase);
+  const Program& program = model->program();
+  std::vector<Interval> domain(8, Interval(-1, 1));
+  domain[kTheta] = Interval(-20, 20);
+  domain[kV] = Interval(-20, 20);
+  const ExpansionError error = BoundExpansionError(program, model->parameters(), domain);
+  for (int trial = 0; trial < 3000; ++trial) {
+    std::vector<PlainInterval> ranges(8, {0, 0});
+    Eigen::VectorXd center = Eigen::VectorXd::Zero(8);
+    const double width = random.Uniform(3, 8);
+    center[kTheta] = random.Uniform(-7, 7);
+    ranges[kTheta] = {center[kTheta] - width / 2, center[kTheta] + width / 2};
+    center[kV] = random.Uniform(-10, 10);
+    ranges[kV] = {center[kV] - 1, center[kV] + 1};
+    Expansion plain;
+    model->Expand(View(center), ranges, plain);
+    std::vector<double> headings{ranges[kTheta].lower, ranges[kTheta].upper, center[kTheta]};
+    for (int quarter = -8; quarter <= 8; ++quarter) {
+      const double extremum = quarter * 1.5707963267948966;
+      if (ranges[kTheta].lower <= extremum && extremum <= ranges[kTheta].upper) headings.push_back(extremum);
+    }
+    for (const double heading : headings)
+      for (const double speed : {ranges[kV].lower, ranges[kV].upper}) {
+        std::vector<Real> z(center.begin(), center.end());
+        z[kTheta] = heading, z[kV] = speed;
+        const Formulas f = Bicycle(z);
+        for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e) {
+          const Program::Second& entry = program.hessian[e];
+          const Interval range(plain.hessian[e].lower, plain.hessian[e].upper);
+          ASSERT_TRUE(Inside(f.hessian.at({entry.output, entry.row, entry.column}),
+                             range + Interval(-error.hessian[e], error.hessian[e])))
+              << "heading " << heading << " of [" << ranges[kTheta].lower << ", " << ranges[kTheta].upper << "]";
+        }
+      }
+  }
+}
+
 // The plain ranges are no looser than interval arithmetic's, which are the true ones where each variable occurs once.
 TEST_P(Model, ExpansionRangesAreTight) {
   Random random(509);
