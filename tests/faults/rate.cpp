@@ -126,11 +126,12 @@ std::string OtherAnswers(const certifier_status_v3_t& status) {
 std::string Table(const Options& options, int steps, const std::vector<Row>& rows) {
   std::ostringstream text;
   text << "Made by `scripts/faults rate --seconds " << options.seconds << " --rate " << options.rate
-       << "`: candidates of " << steps << " steps, all to be certified, from one process to the\n"
-       << "certifier's. *Lost there*: candidates, by the certifier's count of gaps. *Lost back*: decisions, by gaps "
-          "heard.\n"
-       << "Latency from a candidate's stamp to the arrival of its answer; *gate*: of this the certifier's work on the "
-          "last 1024.\n\n"
+       << "`: candidates of " << steps << " steps, all certifiable, from one process to the\n"
+       << "certifier's. *Lost there*: candidates, by the certifier's count of gaps. *Lost back*: decisions, by gaps in "
+          "their sequence.\n"
+       << "Latency is from a candidate's stamp to the arrival of its answer; *gate* is the certifier's part of it, "
+          "over the last 1024.\n"
+       << "\n"
        << "| | sent | certified | other answers | answered twice | lost there | lost back | unaccounted | p50 us | p99 "
           "us "
        << "| worst us | gate p50 us | gate p99 us "
@@ -148,17 +149,17 @@ std::string Table(const Options& options, int steps, const std::vector<Row>& row
 
 std::string FloodTable(const Options& options, const std::vector<Row>& rows) {
   std::ostringstream text;
-  text
-      << "Made by `scripts/faults rate --flood " << options.flood << " --rate " << options.rate << " --seconds "
-      << options.seconds
-      << "`: signed candidates of 12 steps to the certifier's process\nwhile somebody without a key sends "
-      << "forged ones on the same channel: another robot's signatures, no signatures, and where they are as\nlong as a "
-      << "candidate also genuine ones once more and genuine trailers behind altered bodies. *Forged*: a second, as "
-         "many as "
-      << "were reached.\n*Lost*: candidates, by the certifier's count of gaps, and decisions, by gaps heard.\n\n"
-      << "| flood | forged | refused | sent | certified | other answers | lost there | lost back | p50 us | p99 us | "
-         "worst us |\n"
-      << "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  text << "Made by `scripts/faults rate --flood " << options.flood << " --rate " << options.rate << " --seconds "
+       << options.seconds << "`: signed candidates of 12 steps to the certifier's process, while\n"
+       << "a sender without a key floods the same channel with forged messages: with another robot's signatures, "
+          "without signatures, and, where\n"
+       << "they are as long as a candidate, also repeated genuine ones and altered bodies with genuine trailers. "
+          "*Forged*: the rate reached, a\n"
+       << "second. *Lost*: candidates, by the certifier's count of gaps, and decisions, by gaps in their sequence.\n"
+       << "\n"
+       << "| flood | forged | refused | sent | certified | other answers | lost there | lost back | p50 us | p99 us | "
+          "worst us |\n"
+       << "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const Row& row : rows) {
     const certifier_status_v3_t& status = row.status;
     text << "| " << row.name << " | " << static_cast<std::int64_t>(row.flood_per_s) << " | "

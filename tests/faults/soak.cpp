@@ -144,9 +144,9 @@ std::string Soak::Table(const std::vector<std::string>& faults) const {
   std::ostringstream text;
   text << "Made by `scripts/faults soak --minutes " << options_.minutes << " --rate " << options_.rate
        << "`: signed candidates of 12 steps, two of three certified, while the\n"
-       << "logger records. Microseconds from a candidate's stamp to the arrival of its answer; by how much a thread "
-          "that only\n"
-       << "sleeps wakes up too late on the same machine meanwhile; resident memory.\n\n"
+       << "logger records. Microseconds from a candidate's stamp to the arrival of its answer; the wake-up delay "
+          "of a thread\n"
+       << "that only sleeps, on the same machine at the same time; resident memory.\n\n"
        << "| minute | p50 us | p99 us | worst us | sleeper p99 us | certifier kB | logger kB |\n"
        << "|---:|---:|---:|---:|---:|---:|---:|\n";
   for (std::size_t i = 0; i < intervals_.size(); ++i)
