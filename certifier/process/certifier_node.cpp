@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/stamp.h"
+#include "certifier/process/faults.h"
 #include "certifier/task/key.h"
 #include "lcmtypes/names.h"
 
@@ -32,14 +33,6 @@ std::int64_t PageFaults() {
   rusage usage{};
   ::getrusage(RUSAGE_THREAD, &usage);
   return usage.ru_minflt + usage.ru_majflt;
-}
-
-fault_t EmptyFault(std::int16_t cause) {
-  fault_t fault{};
-  fault.cause = cause;
-  fault.plan_id = fault.first_observation = fault.second_observation = -1;
-  fault.step = fault.coordinate = -1;
-  return fault;
 }
 
 Config Checked(const Config& config) {
@@ -77,8 +70,8 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       has_begun_(is_in_charge()),
       issued_(config.gate, clocks_.steady()),
       reload_([path = config.path, channels = channels_] { return Load(path, channels); }),
-      latch_(std::move(latch)) {
-  if (latch_) OpenLatch();
+      contradictions_(config_),
+      latch_(watch_, contradictions_, std::move(latch)) {
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
     spdlog::warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
   if (const auto& violation = gate_->certifier().violation())
@@ -126,16 +119,7 @@ void CertifierNode::Heed(const certifier_status_v3_t& status) {
   const bool is_false = status.fault == fault_t::DECLARATION_FALSIFIED ||
                         (status.fault == 0 && status.level == certifier_status_v3_t::ERROR &&
                          status.latch != certifier_status_v3_t::LATCH_UNWRITABLE);
-  const std::pair declared{GetDigest(status.model_digest), GetDigest(status.declaration_digest)};
-  if (!is_false || std::ranges::find(known_false_, declared) != known_false_.end()) return;
-  if (known_false_.size() >= kMostKnownFalse) known_false_.erase(known_false_.begin());
-  known_false_.push_back(declared);
-  is_contradicted_ = is_contradicted_ || IsKnownFalse(config_);
-}
-
-bool CertifierNode::IsKnownFalse(const Config& config) const {
-  return std::ranges::find(known_false_, std::pair(config.model_digest, config.declaration_digest)) !=
-         known_false_.end();
+  if (is_false) contradictions_.AddReported(GetDigest(status.model_digest), GetDigest(status.declaration_digest));
 }
 
 // A datagram that says FAULT may be the last that the one in charge sends.
@@ -178,11 +162,11 @@ void CertifierNode::TakeCharge() {
   has_begun_ = true;
   issued_.TolerateFrom(clocks_.steady());
   if (fault_of_other_)
-    Fail(EmptyFault(fault_of_other_->cause),
-         "latched by the certifier that was in charge before: " + fault_of_other_->why);
-  else if (IsKnownFalse(config_))
-    Fail(EmptyFault(fault_t::DECLARATION_FALSIFIED),
-         "the certifier that was in charge before has seen it contradicted");
+    Fail(PlainFault(fault_of_other_->cause,
+                    "latched by the certifier that was in charge before: " + fault_of_other_->why));
+  else if (contradictions_.WasReported(config_))
+    Fail(
+        PlainFault(fault_t::DECLARATION_FALSIFIED, "the certifier that was in charge before has seen it contradicted"));
   fault_of_other_.reset();
 }
 
@@ -248,32 +232,10 @@ void CertifierNode::OnRobotState(const Received& received) {
   if (state.mode == robot_state_t::FINISHED) return watch_.RobotHasFinished();
   watch_.SeeRobot(received.utime);
   if (!is_in_charge()) return;  // the robot may execute another's plans
-  FailIfLeft(conformance_.Check(state));
-  FailIfUncertified(state);
-}
-
-// A certifier in shadow mode does not decide what the robot executes.
-void CertifierNode::FailIfUncertified(const robot_state_t& state) {
+  if (const auto departure = conformance_.Check(state)) Fail(SliceLeft(*departure));
+  // A certifier in shadow mode does not decide what the robot executes.
   const auto stranger = issued_.Judge(state, clocks_.steady());
-  if (!stranger || gate_->options().shadow) return;
-  fault_t fault = EmptyFault(fault_t::UNCERTIFIED_PLAN);
-  fault.plan_id = stranger->plan_id;
-  fault.step = static_cast<std::int16_t>(stranger->step);
-  Fail(fault, stranger->why);
-}
-
-void CertifierNode::FailIfLeft(const std::optional<Conformance::Departure>& departure) {
-  if (!departure) return;
-  fault_t fault = EmptyFault(fault_t::SLICE_LEFT);
-  fault.plan_id = departure->plan_id;
-  fault.step = static_cast<std::int16_t>(departure->step);
-  fault.coordinate = static_cast<std::int16_t>(departure->coordinate);
-  fault.value = departure->value;
-  fault.lower = departure->lower;
-  fault.upper = departure->upper;
-  Fail(fault,
-       fmt::format("plan {}: state coordinate {} is {} at step {}, its certified slice is [{}, {}]", departure->plan_id,
-                   departure->coordinate, departure->value, departure->step, departure->lower, departure->upper));
+  if (stranger && !gate_->options().shadow) Fail(UncertifiedPlan(*stranger));
 }
 
 void CertifierNode::OnTransition(const Received& received) {
@@ -282,7 +244,8 @@ void CertifierNode::OnTransition(const Received& received) {
   const auto transition = Decoded<transition_t>(received.bytes);
   if (transition) last_transition_ = *transition;
   if (gate_->options().learns) Learn(received.bytes);  // first: a false declaration is why a slice is left
-  if (transition && is_in_charge()) FailIfLeft(conformance_.Check(*transition));
+  if (!transition || !is_in_charge()) return;
+  if (const auto departure = conformance_.Check(*transition)) Fail(SliceLeft(*departure));
 }
 
 void CertifierNode::Learn(Bytes transition) {
@@ -291,19 +254,10 @@ void CertifierNode::Learn(Bytes transition) {
   if (!error.empty()) return Refuse(channels_.transition, error);
   const auto& violation = gate_->certifier().violation();
   if (was_falsified || !violation) return;
-  if (!is_contradicted_) contradictions_.push_back({gate_->model_digest(), gate_->certifier().Contradiction()});
-  is_contradicted_ = true;
-  fault_t fault = EmptyFault(fault_t::DECLARATION_FALSIFIED);
-  fault.coordinate = static_cast<std::int16_t>(violation->coordinate);
-  fault.first_observation = violation->first;
-  fault.second_observation = violation->second;
-  fault.value = violation->difference;
-  fault.upper = violation->bound;
-  Fail(fault, fmt::format("the executed transition {} contradicts the declaration: with observation {} its residual {} "
-                          "differs by {}, the declaration allows {}",
-                          violation->second, violation->first, violation->coordinate, violation->difference,
-                          violation->bound));
-  Keep();  // also where another fault stays
+  if (!contradictions_.ContradictInForce())
+    contradictions_.Add({gate_->model_digest(), gate_->certifier().Contradiction()});
+  Fail(DeclarationFalsified(*violation));
+  latch_.Store();  // also where another fault stays
 }
 
 void CertifierNode::OnCommand(const Received& received) {
@@ -320,8 +274,8 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
     case command_t::RESET:
       if (watch_.fault() && IsNotAfter(command.utime, watch_.fault()->utime, now_us, gate_->options()))
         return Refuse(channels_.command, "a reset from before the fault: nobody has seen it yet");
-      if (watch_.fault() && !ForgetFault())
-        return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_->why_not());
+      if (!latch_.Forget())
+        return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_.why_not());
       if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));
       next_heartbeat_us_ = 0;
       return;
@@ -332,9 +286,9 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
 
 // ---- Faults.
 
-void CertifierNode::Fail(fault_t fault, const std::string& why) {
-  const Watch::Fault latched{fault.cause, clocks_.wall(), why};
-  if (watch_.Latch(latched)) Announce(fault, latched);
+void CertifierNode::Fail(const FoundFault& found) {
+  const Watch::Fault latched{found.fault.cause, clocks_.wall(), found.why};
+  if (watch_.Latch(latched)) Announce(found.fault, latched);
 }
 
 void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
@@ -343,91 +297,18 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   fault.state = last_state_;
   fault.transition = last_transition_;
   SetText(fault.message, latched.why);
-  announced_ = fault;
-  // From the kernel's hands it survives this process; the disk may take longer than a robot can wait.
-  const bool is_kept = latch_ && latch_->Put(Kept());
+  latch_.Put(fault);
   SendFault();
-  if (is_kept) latch_->Flush();
-  LookForLatch();
+  latch_.Flush();  // the disk may take longer than a robot can wait
   spdlog::error("fault {}: {}; nothing is certified. What to do: {}", FaultName(latched.cause), latched.why,
                 FaultAdvice(latched.cause));
   next_heartbeat_us_ = 0;
 }
 
-// ---- What outlives the process.
-
-LatchFile::Content CertifierNode::Kept() const {
-  LatchFile::Content content{std::nullopt, "", contradictions_};
-  if (watch_.fault()) content.fault = announced_, content.why = watch_.fault()->why;
-  return content;
-}
-
-void CertifierNode::OpenLatch() {
-  if (const auto stored = latch_->Read()) TakeOver(*stored);
-  Keep();
-}
-
-void CertifierNode::Keep() {
-  if (latch_ && latch_->Put(Kept())) latch_->Flush();
-  LookForLatch();
-}
-
-void CertifierNode::LookForLatch() {
-  if (!latch_) return;
-  const bool could = watch_.Lacks(Watch::Need::kLatch).empty();
-  watch_.Set(Watch::Need::kLatch, latch_->ready() ? "" : "no fault could be stored: " + latch_->why_not());
-  if (could && !latch_->ready()) spdlog::error("nothing is certified: no fault could be stored: {}", latch_->why_not());
-  if (!could && latch_->ready()) spdlog::info("{} can be written", latch_->path());
-}
-
-void CertifierNode::TakeOver(const LatchFile::Content& stored) {
-  for (const LatchFile::Contradiction& one : stored.contradictions) {
-    const bool is_known = std::ranges::any_of(contradictions_, [&](const LatchFile::Contradiction& known) {
-      return known.model == one.model && known.pair.z == one.pair.z && known.pair.lower == one.pair.lower &&
-             known.pair.upper == one.pair.upper;
-    });
-    if (!is_known) contradictions_.push_back(one);
-  }
-  is_contradicted_ =
-      IsContradicted(gate_->model_digest(), gate_->certifier().problem().declaration) || IsKnownFalse(config_);
-  if (is_contradicted_)
-    spdlog::error("a transition from before this start contradicts the declaration: every candidate is F");
-  if (!stored.fault || !watch_.Latch({stored.fault->cause, stored.fault->utime, stored.why})) return;
-  announced_ = *stored.fault;
-  next_announcement_us_ = 0;
-  spdlog::error("fault {} from before this start: {}; nothing is certified. What to do: {}",
-                FaultName(stored.fault->cause), stored.why, FaultAdvice(stored.fault->cause));
-}
-
-void CertifierNode::CheckLatch() {
-  if (!latch_) return;
-  if (latch_->ready()) latch_->Look();
-  if (!latch_->ready()) OpenLatch();
-  LookForLatch();
-}
-
-bool CertifierNode::ForgetFault() {
-  if (!latch_) return true;
-  if (!latch_->ready()) OpenLatch();
-  LatchFile::Content content = Kept();
-  content.fault.reset();
-  content.why.clear();
-  const bool is_forgotten = latch_->ready() && latch_->Put(content) && latch_->Flush();
-  LookForLatch();
-  return is_forgotten;
-}
-
-bool CertifierNode::IsContradicted(const Digest& model, const Declaration& declaration) const {
-  return std::ranges::any_of(contradictions_, [&](const LatchFile::Contradiction& one) {
-    return one.model == model && one.pair.num_states() == declaration.lipschitz.rows() &&
-           one.pair.z.cols() == declaration.lipschitz.cols() && FindViolation(declaration, one.pair);
-  });
-}
-
 void CertifierNode::SendFault() {
   if (!is_in_charge()) return;
-  next_announcement_us_ = clocks_.steady() + kHeartbeatUs;
-  sender_.Send(channels_.fault, announced_);
+  latch_.Sent(clocks_.steady());
+  sender_.Send(channels_.fault, latch_.fault());
 }
 
 // ---- Candidates.
@@ -439,7 +320,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) {
     // By a clock that was set back a plan may begin later than it could.
     if (fault->cause == fault_t::CLOCK_JUMP) issued_.TolerateFrom(clocks_.steady());
-    Announce(EmptyFault(fault->cause), *fault);
+    Announce(PlainFault(fault->cause, fault->why).fault, *fault);
   }
   TakeReload();
   AnswerWaiting();
@@ -470,7 +351,7 @@ GateAnswer CertifierNode::Decide(Bytes candidate) {
   const std::int64_t now = clocks_.wall();
   LookForObstacles(now);
   if (const auto refusal = watch_.WhyNot()) return gate_->Refuse(candidate, now, refusal->cause, refusal->why);
-  if (is_contradicted_ && !gate_->certifier().violation())
+  if (contradictions_.ContradictInForce() && !gate_->certifier().violation())
     return gate_->Refuse(candidate, now, decision_t::CAUSE_PAIRWISE,
                          "a transition that was seen before contradicts the declaration; another has to be declared",
                          decision_t::ABSTAIN_FALSIFIED);
@@ -544,7 +425,7 @@ std::string CertifierNode::WhyNotTaken(const Config& config) const {
            {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
     if (changes) return config.path + ": " + what + " cannot change while the certifier runs";
   // What the robot has shown is not forgotten by reading a file.
-  if (IsContradicted(config.model_digest, after.declaration) || IsKnownFalse(config))
+  if (contradictions_.Contradict(config))
     return config.path + ": a transition that was executed contradicts its declaration; another has to be declared";
   return "";
 }
@@ -563,7 +444,7 @@ void CertifierNode::TakeReload() {
   config_ = std::move(loaded->config);
   watch_.Follow(OptionsOf(gate_->options()));
   issued_.Follow(gate_->options());
-  is_contradicted_ = false;  // WhyNotTaken has seen to that
+  contradictions_.Follow(config_);
   LookForObstacles(clocks_.wall());
   spdlog::info("version {} of {} is in force", ++version_, config_.path);
 }
@@ -574,9 +455,9 @@ std::string CertifierNode::WhyNotOk() const {
   if (!is_in_charge()) return WhyNotInCharge();
   if (watch_.fault())
     return std::string(FaultName(watch_.fault()->cause)) + ": " +
-           (CanLatch() ? "" : "not stored, lost by a restart! ") + watch_.fault()->why;
-  if (!CanLatch()) return watch_.WhyNot()->why;
-  if (gate_->certifier().violation() || is_contradicted_)
+           (latch_.ready() ? "" : "not stored, lost by a restart! ") + watch_.fault()->why;
+  if (!latch_.ready()) return watch_.WhyNot()->why;
+  if (gate_->certifier().violation() || contradictions_.ContradictInForce())
     return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a "
            "reset "
            "does not help";
@@ -591,13 +472,13 @@ std::string CertifierNode::WhyNotOk() const {
 }
 
 void CertifierNode::Heartbeat(std::int64_t now_us) {
-  CheckLatch();
+  latch_.Check();
   last_heartbeat_us_ = clocks_.steady();
   next_heartbeat_us_ =
       last_heartbeat_us_ + (charge_.state() == Charge::State::kListening ? kHeartbeatToOthersUs : kHeartbeatUs);
   certifier_status_v3_t status = gate_->Status(now_us);
-  const bool error =
-      is_in_charge() && (watch_.fault() || gate_->certifier().violation() || is_contradicted_ || !CanLatch());
+  const bool error = is_in_charge() && (watch_.fault() || gate_->certifier().violation() ||
+                                        contradictions_.ContradictInForce() || !latch_.ready());
   status.sequence = is_in_charge() ? heartbeats_++ : heartbeats_aside_++;
   status.instance = charge_.self().instance;
   status.started_utime = charge_.self().started_utime;
@@ -609,9 +490,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
                  : status.state == certifier_status_v3_t::ARMED ? certifier_status_v3_t::OK
                                                                 : certifier_status_v3_t::STALE;
   status.by_cause[decision_t::CAUSE_SECOND_CERTIFIER] += left_to_other_;
-  status.latch = !CanLatch()                ? certifier_status_v3_t::LATCH_UNWRITABLE
-                 : latch_ && watch_.fault() ? certifier_status_v3_t::LATCH_WRITTEN
-                                            : certifier_status_v3_t::NO_LATCH;
+  status.latch = latch_.status();
   if (watch_.fault()) {
     status.fault = watch_.fault()->cause;
     status.fault_utime = watch_.fault()->utime;
@@ -637,7 +516,7 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
   SetText(status.message, WhyNotOk());
   obstacles_refused_ = false;
   // First what a robot that has just begun has to know, then what a person reads and resets.
-  if (watch_.fault() && clocks_.steady() >= next_announcement_us_) SendFault();
+  if (latch_.IsDue(clocks_.steady())) SendFault();
   sender_.Send(channels_.status, status);
 }
 

@@ -36,6 +36,8 @@ knows that the plan was handed to the bus before. */
 #include "certifier/gate/issued_plans.h"
 #include "certifier/gate/watch.h"
 #include "certifier/process/candidate_queue.h"
+#include "certifier/process/contradictions.h"
+#include "certifier/process/fault_latch.h"
 #include "certifier/process/latch_file.h"
 #include "certifier/task/reloading.h"
 #include "forereach/certifier_status_v3_t.hpp"
@@ -50,6 +52,8 @@ struct Clocks {
   Clock wall = WallClockUs;
   Clock steady = SteadyClockUs;
 };
+
+struct FoundFault;
 
 class CertifierNode final : public Node {
  public:
@@ -86,7 +90,6 @@ class CertifierNode final : public Node {
   void OnCandidate(const Received& received);
   void OnStatus(const Received& received);
   void Heed(const certifier_status_v3_t& status);
-  [[nodiscard]] bool IsKnownFalse(const Config& config) const;
   void OnFault(const Received& received);
   void LookAtCharge();
   void FollowCharge(Charge::State before);
@@ -114,27 +117,10 @@ class CertifierNode final : public Node {
   [[nodiscard]] std::string WhyNotTaken(const Config& config) const;
 
   /** Latches and announces, unless a fault as grave is latched already. */
-  void Fail(fault_t fault, const std::string& why);
+  void Fail(const FoundFault& found);
   void Announce(fault_t fault, const Watch::Fault& latched);
   void SendFault();
   void Learn(Bytes transition);
-  void FailIfLeft(const std::optional<Conformance::Departure>& departure);
-  void FailIfUncertified(const robot_state_t& state);
-
-  /** What the latch file has to hold now. */
-  [[nodiscard]] LatchFile::Content Kept() const;
-  /** Reads the latch file, takes over what it holds, and writes all of it back. */
-  void OpenLatch();
-  void TakeOver(const LatchFile::Content& stored);
-  void Keep();
-  void CheckLatch();
-  /** Arms or disarms by it. */
-  void LookForLatch();
-  /** Writes that there is no fault. True also without a latch file. */
-  [[nodiscard]] bool ForgetFault();
-  [[nodiscard]] bool CanLatch() const { return !latch_ || latch_->ready(); }
-  /** Whether something known contradicts this declaration of this model. */
-  [[nodiscard]] bool IsContradicted(const Digest& model, const Declaration& declaration) const;
 
   void Refuse(const std::string& channel, const std::string& why);
 
@@ -162,17 +148,10 @@ class CertifierNode final : public Node {
   robot_state_t last_state_{};
   transition_t last_transition_{};
 
-  fault_t announced_{};                    // the last fault, sent again while it is latched: a datagram may be lost
-  std::int64_t next_announcement_us_ = 0;  // by the steady clock
-
   Reloading<Loaded> reload_;
   std::future<void> compaction_;  // of *gate_
-  const std::unique_ptr<LatchFile> latch_;
-  std::vector<LatchFile::Contradiction> contradictions_;  // one at most for each version of the task
-  static constexpr std::size_t kMostKnownFalse = 16;
-  /** Model and declaration that the certifier in charge has seen contradicted, while this one stood by. */
-  std::vector<std::pair<Digest, Digest>> known_false_;
-  bool is_contradicted_ = false;  // the declaration in force, by one of them
+  Contradictions contradictions_;
+  FaultLatch latch_;
   std::int64_t version_ = 1, failed_reloads_ = 0;
   std::string reload_error_;
 

@@ -1,0 +1,52 @@
+#include "certifier/process/faults.h"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace forereach {
+
+FoundFault PlainFault(std::int16_t cause, std::string why) {
+  fault_t fault{};
+  fault.cause = cause;
+  fault.plan_id = fault.first_observation = fault.second_observation = -1;
+  fault.step = fault.coordinate = -1;
+  return {fault, std::move(why)};
+}
+
+FoundFault SliceLeft(const Conformance::Departure& departure) {
+  FoundFault found = PlainFault(
+      fault_t::SLICE_LEFT,
+      fmt::format("plan {}: state coordinate {} is {} at step {}, its certified slice is [{}, {}]", departure.plan_id,
+                  departure.coordinate, departure.value, departure.step, departure.lower, departure.upper));
+  found.fault.plan_id = departure.plan_id;
+  found.fault.step = static_cast<std::int16_t>(departure.step);
+  found.fault.coordinate = static_cast<std::int16_t>(departure.coordinate);
+  found.fault.value = departure.value;
+  found.fault.lower = departure.lower;
+  found.fault.upper = departure.upper;
+  return found;
+}
+
+FoundFault UncertifiedPlan(const IssuedPlans::Stranger& stranger) {
+  FoundFault found = PlainFault(fault_t::UNCERTIFIED_PLAN, stranger.why);
+  found.fault.plan_id = stranger.plan_id;
+  found.fault.step = static_cast<std::int16_t>(stranger.step);
+  return found;
+}
+
+FoundFault DeclarationFalsified(const Violation& violation) {
+  FoundFault found = PlainFault(
+      fault_t::DECLARATION_FALSIFIED,
+      fmt::format("the executed transition {} contradicts the declaration: with observation {} its residual {} differs "
+                  "by {}, the declaration allows {}",
+                  violation.second, violation.first, violation.coordinate, violation.difference, violation.bound));
+  found.fault.coordinate = static_cast<std::int16_t>(violation.coordinate);
+  found.fault.first_observation = violation.first;
+  found.fault.second_observation = violation.second;
+  found.fault.value = violation.difference;
+  found.fault.upper = violation.bound;
+  return found;
+}
+
+}  // namespace forereach
