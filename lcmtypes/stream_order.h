@@ -36,6 +36,11 @@ struct StreamPosition {
 
 enum class Succession { kNewer, kRepeated, kLate, kRestarted, kRewound };
 
+/** Whether a receiver that acts on messages takes it. */
+[[nodiscard]] constexpr bool IsNews(Succession succession) {
+  return succession == Succession::kNewer || succession == Succession::kRestarted;
+}
+
 class StreamOrder final {
  public:
   /** For receivers without a clock: every stamp counts as it is. */

@@ -61,25 +61,32 @@ void PlannerNode::Tick(std::int64_t now_us) {
 
 void PlannerNode::OnRobotState(const Received& received) {
   robot_state_t state;
-  if (Decode(received.bytes, state) != DecodeStatus::kOk || !IsUsable(state, received.utime)) {
+  if (Decode(received.bytes, state) != DecodeStatus::kOk || !IsUsable(state, received.utime) ||
+      !TakeOrder(state, received.utime)) {
     ++ignored_;
     return;
   }
   if (finished_) return;
-  last_state_utime_ = state.utime;
   Follow(state);
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() &&
       NextPlanIsDue(state))
     BeginRound(state);
 }
 
-// One from the future would keep out all that come before that time.
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
   return state.num_states == config_.problem->model->num_states() &&
-         !IsNotAfter(state.utime, last_state_utime_, now_us, config_.gate) &&
          Judge(state.utime, now_us, config_.gate).freshness != Freshness::kFuture &&
          robot_state_t::STANDING <= state.mode && state.mode <= robot_state_t::FINISHED &&
          std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });
+}
+
+// True for a state that comes neither late nor again.
+bool PlannerNode::TakeOrder(const robot_state_t& state, std::int64_t now_us) {
+  const StreamPosition position{state.sequence, state.utime};
+  const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(config_.gate.max_ahead_ms));
+  if (!IsNews(states_.Compare(position, horizon))) return false;
+  states_.Take(position, horizon);
+  return true;
 }
 
 bool PlannerNode::IsAtGoal(const robot_state_t& state) const {

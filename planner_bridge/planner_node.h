@@ -35,6 +35,7 @@ and ignored. */
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "lcmtypes/stream_order.h"
 #include "planner_bridge/lessons.h"
 #include "planner_bridge/proposer.h"
 #include "planner_bridge/residual_estimate.h"
@@ -73,6 +74,7 @@ class PlannerNode final : public Node {
   void OnObstacles(const Received& received);
 
   [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
+  [[nodiscard]] bool TakeOrder(const robot_state_t& state, std::int64_t now_us);
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
   [[nodiscard]] std::optional<Eigen::VectorXd> PredictStart(const robot_state_t& state) const;
@@ -95,8 +97,8 @@ class PlannerNode final : public Node {
   std::optional<Round> round_;
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
   std::optional<std::int64_t> waiting_start_;       // of a certified plan that is still to begin
-  std::int64_t last_state_utime_ = 0;
-  std::int64_t next_plan_id_ = 0;  // 0 before the first tick
+  StreamOrder states_;                              // the robot's
+  std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
   ObstaclesInForce obstacles_;
   bool arrived_ = false, finished_ = false;
 

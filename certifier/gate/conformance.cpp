@@ -23,17 +23,18 @@ void Conformance::Remember(const certified_plan_t& certified) {
 std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state) {
   const std::span<const double> measured(state.state, static_cast<std::size_t>(state.num_states));
   const bool executing = state.mode == robot_state_t::EXECUTING;
+  const StreamPosition position{state.sequence, state.utime};
+  const Succession succession = order_.Compare(position, StreamOrder::kNoHorizon);
   const bool follows =
-      state.sequence > last_.sequence && state.sequence - 1 == last_.sequence;  // any numbers: no overflow
+      succession == Succession::kNewer && order_.newest() && state.sequence - 1 == order_.newest()->sequence;
   std::optional<Departure> departure;
   if (executing && follows && last_.plan_id >= 0) departure = Compare(last_.plan_id, last_.step + 1, measured);
   if (executing && !departure) departure = Compare(state.executing_plan_id, state.executing_step, measured);
-  // A late one says nothing of where the robot is now. One that began anew counts from 0, perhaps by a clock set back.
-  const bool is_newer = state.sequence > last_.sequence || state.utime > last_.utime;
-  const auto behind = static_cast<std::uint64_t>(last_.sequence) - static_cast<std::uint64_t>(state.sequence);
-  if (is_newer || behind >= kLate)
-    before_ = std::exchange(
-        last_, {state.sequence, state.utime, executing ? state.executing_plan_id : -1, state.executing_step});
+  // A late state does not tell where the robot is now.
+  if (IsNews(succession) || succession == Succession::kRewound) {
+    order_.Take(position, StreamOrder::kNoHorizon);
+    before_ = std::exchange(last_, {state.utime, executing ? state.executing_plan_id : -1, state.executing_step});
+  }
   return departure;
 }
 

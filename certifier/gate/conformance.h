@@ -14,13 +14,13 @@ certified on grounds that are known to be false. */
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/stream_order.h"
 
 namespace forereach {
 
 class Conformance final {
  public:
   static constexpr std::size_t kPlans = 64;  ///< The last certified ones are remembered, and the one that is executed.
-  static constexpr int kLate = 16;           ///< A state is late by fewer messages; else the robot has begun anew.
 
   struct Departure {
     std::int64_t plan_id;
@@ -46,7 +46,7 @@ class Conformance final {
 
  private:
   struct Place {
-    std::int64_t sequence = -1, utime = -1, plan_id = -1;  // plan -1: not executing
+    std::int64_t utime = -1, plan_id = -1;  // plan -1: not executing
     int step = -1;
   };
 
@@ -55,6 +55,7 @@ class Conformance final {
 
   std::vector<certified_plan_t> plans_;  // a ring
   std::size_t next_ = 0;
+  StreamOrder order_;
   Place last_, before_;  // where the robot was by the newest state heard, and by the one before
 };
 

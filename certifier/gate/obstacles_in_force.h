@@ -20,9 +20,11 @@ A reload does not forget what was heard. No bus, no clock in it. */
 #include <string>
 #include <vector>
 
+#include "certifier/gate/freshness.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/task/config.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/stream_order.h"
 
 namespace forereach {
 
@@ -32,8 +34,8 @@ class ObstaclesInForce final {
   explicit ObstaclesInForce(const Config& config);
 
   /** Takes the bytes of an obstacles_t that came at `now_us`: whole, or not at all. Its stamp has to be fresh
-  (stamp.h), and it newer than the one before: of a larger sequence or of a later stamp. Returns what is wrong, or an
-  empty text. */
+  (stamp.h), and it newer than the one before, or of a sender that restarted (stream_order.h). Returns what is wrong, or
+  an empty text. */
   [[nodiscard]] std::string Update(Bytes message, std::int64_t now_us);
 
   /** Why all() may not be all obstacles there are at this time; empty if they are, as far as is known. Cost O(1). */
@@ -51,12 +53,9 @@ class ObstaclesInForce final {
   [[nodiscard]] std::int64_t lost() const { return state_.lost; }
 
  private:
-  struct Heard {
-    std::int64_t sequence, utime;
-    std::vector<Obstacle> obstacles;
-  };
   struct State {
-    std::optional<Heard> heard;        // last
+    StreamOrder order;                 // of the messages taken
+    std::vector<Obstacle> heard;       // by the last of them
     std::optional<std::int64_t> next;  // the sequence after the last one seen, refused ones too
     std::string doubt;                 // the last message was refused: why
     int unconfirmed = 0;               // messages in order that are still needed
@@ -65,6 +64,7 @@ class ObstaclesInForce final {
 
   [[nodiscard]] std::string Doubt(const std::string& why);
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);
+  [[nodiscard]] Freshness FreshnessOfLast(std::int64_t now_us) const;
   // The task's, if so asked, and those heard last.
   void Put(bool of_task);
 

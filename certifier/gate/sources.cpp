@@ -4,10 +4,17 @@
 #include <cstdlib>
 
 namespace forereach {
+namespace {
+
+StreamPosition PositionOf(const candidate_plan_t& candidate) { return {candidate.sequence, candidate.utime}; }
+
+}  // namespace
 
 std::string Sources::NameOf(const candidate_plan_t& candidate) {
   return {reinterpret_cast<const char*>(candidate.source), sizeof candidate.source};
 }
+
+std::int64_t Sources::Horizon(std::int64_t now_us) const { return StreamOrder::Horizon(now_us, forget_after_us_); }
 
 void Sources::Source::ForgetAllBut(std::int64_t plan_id) {
   highest = plan_id;
@@ -44,7 +51,7 @@ Sources::Admission Sources::Admit(const candidate_plan_t& candidate, std::int64_
   if (known == sources_.end()) {
     if (sources_.size() >= kMaxSources && !MakeRoom(now_us)) return Admission::kTooManySources;
     known = sources_.emplace(name, Source{}).first;
-    known->second.StartCounting(candidate.sequence, candidate.utime);
+    known->second.StartCounting(PositionOf(candidate), Horizon(now_us));
     known->second.ForgetAllBut(candidate.plan_id);
   } else if (IsSilent(known->second, now_us)) {
     known->second.ForgetAllBut(candidate.plan_id);
@@ -67,10 +74,11 @@ bool Sources::MakeRoom(std::int64_t now_us) {
   return true;
 }
 
-void Sources::Source::StartCounting(std::int64_t sequence, std::int64_t utime) {
-  first_sequence = last_sequence = std::max<std::int64_t>(sequence, 0);
+void Sources::Source::StartCounting(const StreamPosition& position, std::int64_t horizon_us) {
+  order = {};
+  order.Take({std::max<std::int64_t>(position.sequence, 0), position.utime}, horizon_us);
+  first_sequence = last_sequence();
   came = 1;
-  newest_utime = utime;
 }
 
 void Sources::Hear(const candidate_plan_t& candidate, std::int64_t now_us) {
@@ -78,17 +86,16 @@ void Sources::Hear(const candidate_plan_t& candidate, std::int64_t now_us) {
   const auto known = sources_.find(NameOf(candidate));
   if (known == sources_.end() || candidate.sequence < 0) return;
   Source& source = known->second;
-  const std::int64_t utime = std::min(candidate.utime, now_us + forget_after_us_);  // else the newest for ever
-  const bool later = utime > source.newest_utime;
-  if ((later && candidate.sequence < source.last_sequence) || candidate.sequence < source.first_sequence - kBehind ||
-      candidate.sequence - source.last_sequence > kLeap) {
+  const StreamPosition position = PositionOf(candidate);
+  const Succession succession = source.order.Compare(position, Horizon(now_us));
+  if (succession == Succession::kRestarted || position.sequence < source.first_sequence - kBehind ||
+      position.sequence - source.last_sequence() > kLeap) {
     lost_before_ += source.lost();
-    source.StartCounting(candidate.sequence, utime);
+    source.StartCounting(position, Horizon(now_us));
     return;
   }
-  source.newest_utime = std::max(source.newest_utime, utime);
-  source.first_sequence = std::min(source.first_sequence, candidate.sequence);
-  source.last_sequence = std::max(source.last_sequence, candidate.sequence);
+  if (succession == Succession::kNewer) source.order.Take(position, Horizon(now_us));
+  source.first_sequence = std::min(source.first_sequence, position.sequence);
   ++source.came;
 }
 

@@ -13,6 +13,7 @@ nor a huge plan_id lock anybody out for long. */
 #include <string>
 
 #include "forereach/candidate_plan_t.hpp"
+#include "lcmtypes/stream_order.h"
 
 namespace forereach {
 
@@ -30,8 +31,8 @@ class Sources final {
   /** Goes on where others' counting stops. How long a source is remembered stays as given to these. */
   void Inherit(const Sources& before);
 
-  /** Every candidate that decodes, once, before anything else is asked of it. In whatever order they are taken up: a
-  source has begun to count anew if a later stamp has a smaller sequence. */
+  /** Every candidate that decodes, once, before any other question about it. They may come in any order; a source has
+  restarted where stream_order.h says kRestarted. */
   void Hear(const candidate_plan_t& candidate, std::int64_t now_us);
 
   /** If it is new, its plan_id is used from now on. */
@@ -46,17 +47,20 @@ class Sources final {
   struct Source {
     std::int64_t highest = 0, heard_us = 0;
     std::bitset<kWindow> used;  // bit i: highest - i
-    std::int64_t first_sequence = 0, last_sequence = 0, came = 0, newest_utime = 0;
+    StreamOrder order;          // the newest is of the largest sequence
+    std::int64_t first_sequence = 0, came = 0;
 
     void ForgetAllBut(std::int64_t plan_id);
     [[nodiscard]] bool Use(std::int64_t plan_id);
-    void StartCounting(std::int64_t sequence, std::int64_t utime);
+    void StartCounting(const StreamPosition& position, std::int64_t horizon_us);
+    [[nodiscard]] std::int64_t last_sequence() const { return order.newest()->sequence; }
     [[nodiscard]] std::int64_t lost() const {  // repetitions came too, so not below 0
-      return std::max<std::int64_t>(last_sequence - first_sequence + 1 - came, 0);
+      return std::max<std::int64_t>(last_sequence() - first_sequence + 1 - came, 0);
     }
   };
 
   [[nodiscard]] static std::string NameOf(const candidate_plan_t& candidate);
+  [[nodiscard]] std::int64_t Horizon(std::int64_t now_us) const;
   /** For so long that it may be forgotten. A clock that was set back leaves no source remembered from the future. */
   [[nodiscard]] bool IsSilent(const Source& source, std::int64_t now_us) const;
   bool MakeRoom(std::int64_t now_us);

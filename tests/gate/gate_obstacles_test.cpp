@@ -242,6 +242,9 @@ TEST_F(GateObstaclesTest, TheLastSequenceOfAllIsTaken) {
   Say(0, kNow + 1);
   Say(1, kNow + 2);
   EXPECT_EQ(Why(), "");
+  Say(std::numeric_limits<std::int64_t>::max(), kNow + 3);
+  EXPECT_EQ(gate_.Status(kNow).obstacles_lost, std::numeric_limits<std::int64_t>::max())
+      << "the count does not overflow";
 }
 
 TEST_F(GateObstaclesTest, OnlyANewerSequenceReplaces) {

@@ -47,8 +47,7 @@ Succession Specified(const std::vector<Arrival>& taken, const Arrival& next, std
 
 // Which answers a receiver takes: one that acts on messages, and a reader of records.
 using Takes = bool (*)(Succession);
-bool ActsOn(Succession succession) { return succession == Succession::kNewer || succession == Succession::kRestarted; }
-bool Reads(Succession succession) { return ActsOn(succession) || succession == Succession::kRewound; }
+bool Reads(Succession succession) { return IsNews(succession) || succession == Succession::kRewound; }
 bool AnyAtAll(Succession) { return true; }
 
 class Histories {
@@ -97,7 +96,7 @@ std::vector<Arrival> Alphabet(const std::vector<std::int64_t>& sequences, const 
 }
 
 TEST(StreamOrderTest, EveryShortHistoryIsAnsweredAsSpecified) {
-  for (const Takes takes : {ActsOn, Reads, AnyAtAll})
+  for (const Takes takes : {IsNews, Reads, AnyAtAll})
     for (const std::int64_t ahead : {0, 1, 5}) {
       Histories histories(Alphabet({0, 1, 2}, {0, 1, 2}, {0, 1, 3}), ahead, takes);
       histories.Try(4);
@@ -106,7 +105,7 @@ TEST(StreamOrderTest, EveryShortHistoryIsAnsweredAsSpecified) {
 }
 
 TEST(StreamOrderTest, LongerOnesWithoutAHorizon) {
-  for (const Takes takes : {ActsOn, Reads, AnyAtAll}) {
+  for (const Takes takes : {IsNews, Reads, AnyAtAll}) {
     Histories histories(Alphabet({0, 1, 2}, {0, 1, 2}, {StreamOrder::kNoHorizon}), 0, takes);
     histories.Try(6);
     for (const std::int64_t count : histories.seen()) EXPECT_GT(count, 0);
@@ -125,7 +124,7 @@ TEST(StreamOrderTest, AReceiverThatActsNeverGoesBackToAnOlderStampOfThisStream) 
   StreamOrder order;
   for (const StreamPosition taken : {StreamPosition{0, 10}, {1, 20}, {2, 30}}) order.Take(taken, taken.utime);
   for (const StreamPosition old : {StreamPosition{0, 9}, {0, 10}, {0, 30}, {1, 20}, {1, 30}, {2, 29}, {2, 30}})
-    EXPECT_FALSE(ActsOn(order.Compare(old, 30))) << old.sequence << " " << old.utime;
+    EXPECT_FALSE(IsNews(order.Compare(old, 30))) << old.sequence << " " << old.utime;
   EXPECT_EQ(order.Compare({0, 31}, 31), Succession::kRestarted);
   EXPECT_EQ(order.Compare({0, 9}, 29), Succession::kRestarted) << "the clock was set back";
 }
