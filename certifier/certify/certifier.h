@@ -1,8 +1,8 @@
-/** Algorithm 1 of the paper: certifies a plan, or abstains and says why.
+/** Algorithm 1 of the paper: certifies a plan, or abstains with a cause and a witness.
 
-What does not depend on the plan is computed once, in the constructor: residuals of the observations, the pairwise test,
-the envelope's tables. Certify then allocates nothing, locks nothing, logs nothing and throws nothing. What is observed
-later is added by Learn, between two calls of Certify. */
+The constructor computes everything that does not depend on the plan: the residuals of the observations, the pairwise
+test and the envelope's tables. Certify then allocates nothing, takes no lock, logs nothing and throws nothing. Learn
+adds later observations between two calls of Certify. */
 #pragma once
 
 #include <optional>
@@ -19,63 +19,67 @@ namespace forereach {
 
 class Certifier final {
  public:
-  /** @throws std::invalid_argument naming the part of the problem that does not fit: sizes, non-finite numbers, no
-  transitions, a transition outside the domain, an order out of range.
-  @throws std::runtime_error saying what to change if this program or thread does not compute as bounds need it
-  (certifier/numerics/arithmetic.h). */
+  /** @throws std::invalid_argument if a part of the problem is invalid: sizes, non-finite numbers, no transitions, a
+  transition outside the domain, an order out of range. The message names the part.
+  @throws std::runtime_error if the arithmetic of this program or thread is not round-to-nearest with subnormals
+  (certifier/numerics/arithmetic.h). The message says what to change.
+  Cost: about O(N log N) for a sparse L; the pairwise test of a dense L can take O(N^2). */
   explicit Certifier(std::shared_ptr<const Problem> problem);
 
   [[nodiscard]] const Problem& problem() const { return *problem_; }
   [[nodiscard]] const Projection& projection() const { return projection_; }
-  /** The pair of observations that contradicts the declaration, if there is one. Learned ones are numbered on from the
-  problem's. */
+  /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Learned
+  observations are numbered after those of the problem. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return known_.violation(); }
-  /** That pair's observations. @pre violation(). */
+  /** The two observations of violation(). @pre violation() has a value. */
   [[nodiscard]] Observations Contradiction() const { return known_.Contradiction(); }
   [[nodiscard]] std::size_t num_observations() const { return known_.size(); }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
   [[nodiscard]] bool uses_hull_distance() const { return known_.uses_hull_distance(); }
 
   enum class Learned {
-    kAdded,  ///< From now on every certificate rests on it; violation() says whether it falsifies the declaration.
-    kOutsideDomain,  ///< Not proven to lie in the domain: it says nothing about the residual there.
-    kUnusable,       ///< Not finite, or the nominal map has no finite enclosure there.
+    kAdded,          ///< Used by every later certificate. violation() has a value if it falsifies the declaration.
+    kOutsideDomain,  ///< Not used: z is not proven to lie in the domain, so the declaration does not cover it.
+    kUnusable,       ///< Not used: an entry is not finite, or the nominal map has no finite enclosure at z.
   };
-  /** Adds one executed transition (z, x+), d_z and n entries. Its errors must be within the declared noise bound.
-  Not to be called while Certify runs. Cost: about a microsecond, and a new index whenever Compact has not been called
-  for 256 of them. */
+  /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
+  noise bound. Do not call it while Certify runs. Cost: about a microsecond; if Compact has not been called for 256
+  transitions, it also builds an index. */
   Learned Learn(std::span<const double> z, std::span<const double> next);
-  /** Learned transitions that are not in the index yet. */
+  /** Number of learned transitions that are not in the index yet. */
   [[nodiscard]] int num_unindexed() const { return store_.tail_size(); }
-  /** Puts them into it. May run in a thread of its own beside anything; the next Learn takes it up. */
+  /** Builds an index that includes them. It may run in its own thread at any time; the next Learn uses the new index.
+   */
   void Compact() { store_.Compact(); }
 
-  /** What is proven of the distance between slice t of a tube and an obstacle: by interval hulls or by the best
-  direction, whichever proves more. */
+  /** The proven distance between P X_t of a tube and an obstacle: the larger of the bounds by interval hulls and by the
+  best direction. @pre 0 <= t <= tube.length(). */
   [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept;
 
-  /** Throws std::invalid_argument, naming value and bound, unless Certify may be called with these: sizes as the
-  problem's, 1..kMaxSteps steps, finite controls, obstacles in the safety dimension, X_0 with at most order * n
-  generators. */
+  /** Checks the preconditions of Certify: sizes as in the problem, 1..kMaxSteps steps, finite controls, obstacles of
+  the safety dimension p, and X_0 with at most order * n generators.
+  @throws std::invalid_argument with the value and its bound if one is violated. */
   void Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
 
-  /** Decides whether every admissible residual keeps the robot clear of the obstacles, from every state in
-  `initial_set`, under `plan`. The outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, the
-  slice `tube.slice(t)` contains every reachable state and its projection is disjoint from every obstacle.
+  /** Decides whether the plan is safe for every admissible residual and every initial state in `initial_set`. The
+  outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, `tube.slice(t)` contains every
+  reachable state and its projection is disjoint from every obstacle (Theorem "ForeReach containment").
 
-  Order of the tests: F; then for t < T the domain, the remainder, the envelope (D ends the run at its first step);
-  after the horizon the bounds of `Problem::rest` on the hull of X_T, in their order (D, kNoStop, at step T); then S, at
-  its first unsafe t in 0..T. X_T is not tested against the domain. Cost O(T (N + n m)) plus a clearance a slice and
-  obstacle that comes close. Any number of threads may call it, each with a tube of its own. @pre Require passes. */
+  The tests run in this order. First F. Then, for t < T, the domain, the remainder and the envelope; the first failure
+  ends the run. After the horizon, the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then
+  S, for t in 0..T; the first unsafe t is reported. X_T is not tested against the domain.
+  @param tube receives the slices. @pre Require passes.
+  Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
+  it, each with its own tube. */
   [[nodiscard]] Decision Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
                                  Tube& tube) const noexcept;
 
  private:
   [[nodiscard]] Decision Propagate(const Plan& plan, Tube& tube) const noexcept;
-  /** SeparateSlice, where what the hulls prove is known. */
+  /** SeparateSlice, given the result by hulls. */
   [[nodiscard]] Separation BetterOf(const Separation& by_hulls, const Tube& tube, int t,
                                     const Obstacle& obstacle) const noexcept;
-  /** Outcome kNone if the last slice provably stands. */
+  /** Outcome kNone if the last slice is provably at rest. */
   [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
   [[nodiscard]] Decision JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept;
 

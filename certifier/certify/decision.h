@@ -1,4 +1,4 @@
-/** The answer to one plan: a certificate, or an abstention with its cause and a witness. */
+/** The result for one plan: a certificate, or an abstention with its cause and a witness. */
 #pragma once
 
 #include <array>
@@ -14,36 +14,36 @@
 
 namespace forereach {
 
-/** Numbers as in lcmtypes/decision_t.lcm. Zero is not a certificate. */
+/** The numbers are those of lcmtypes/decision_t.lcm. Zero is not a certificate. */
 enum class Outcome { kNone = 0, kCertified = 1, kFalsified = 2, kDomain = 3, kSafety = 4 };
 enum class Cause { kNone = 0, kPairwise = 1, kDomainExit = 2, kNoFiniteEnclosure = 3, kObstacle = 4, kNoStop = 5 };
 
 struct Decision {
   Outcome outcome = Outcome::kNone;
   Cause cause = Cause::kNone;
-  /** The first step that fails: t of X_t. -1 for a certificate, and for F found before any step. */
+  /** The first t at which X_t fails. -1 for a certificate, and for F found before the first step. */
   int step = -1;
 
-  /** @name Witness: what the outcome rests on; -1 or kNone where it does not apply. */
+  /** @name Witness. A member that does not apply to the outcome is -1 or kNone. */
   ///@{
   DomainExit exit{};    ///< D by domain exit.
   int coordinate = -1;  ///< F: residual coordinate. D: coordinate of z, or state without a finite enclosure.
   int first_observation = -1, second_observation = -1;  ///< F: the violating pair.
-  int obstacle = -1;      ///< S: the obstacle. Certificate: the one that the tube comes closest to.
-  int closest_step = -1;  ///< Certificate: where it does.
+  int obstacle = -1;                                    ///< S: the obstacle. Certificate: the closest obstacle.
+  int closest_step = -1;                                ///< Certificate: the step of the closest slice.
   ///@}
 
-  /** The value that decided and what it was held to. Certificate and S: proven distance from slice to the obstacle's
-  core, and its radius (m). D: what the hull reaches, and the bound of the domain or of standing. F: difference, and
-  what L allows. */
+  /** The deciding value and the value that it is compared with. Certificate and S: proven distance from the slice to
+  the obstacle's core, and the obstacle's radius (m). D: extreme value of the hull, and the bound of the domain or of
+  rest. F: difference of two residuals, and the difference that the declaration allows. */
   double margin = 0, threshold = 0;
 
-  /** Whether a search for the tightest observation met its cap: the tube is as sound, and may be wider than it need be.
+  /** True if a search for the tightest observation reached its cap. The tube is sound but may be wider than necessary.
    */
   bool capped = false;
 };
 
-/** A fixed open-loop control sequence u_0 .. u_{T-1}, step by step in memory. Refers to numbers it does not own. */
+/** A fixed open-loop control sequence u_0 .. u_{T-1}, stored step by step. It does not own the numbers. */
 struct Plan {
   const double* controls = nullptr;
   int num_inputs = 0, num_steps = 0;
@@ -54,8 +54,8 @@ struct Plan {
   }
 };
 
-/** The reachable tube as far as it was computed: slices X_0 .. X_length and a record of each completed step.
-Made once, reused for every plan: it holds the longest horizon and is some 2 MB large. */
+/** The computed part of the reachable tube: slices X_0 .. X_length and a record of each completed step. Construct it
+once and reuse it for every plan: it has room for the longest horizon, about 2 MB. */
 class Tube final {
  public:
   Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps + 1) {}
@@ -64,13 +64,12 @@ class Tube final {
   [[nodiscard]] std::span<const double> half_width(int t) const {
     return {step(t).half_width.data(), static_cast<std::size_t>(slice(t).dim())};
   }
-  /** An interval that contains coordinate k of X_t, rounded outward. Cost O(1): the half-widths are those of the step.
-   */
+  /** An interval that contains coordinate k of every point of X_t, rounded outward. Cost O(1). */
   [[nodiscard]] Interval hull(int t, int k) const {
     const double center = slice(t).center(k), r = half_width(t)[static_cast<std::size_t>(k)];
     return {SubDown(center, r), AddUp(center, r)};
   }
-  /** Completed steps; X_0 .. X_length() are valid. */
+  /** Number of completed steps; X_0 .. X_length() are valid. */
   [[nodiscard]] int length() const { return length_; }
   [[nodiscard]] const Zonotope& slice(int t) const { return slices_[static_cast<std::size_t>(t)]; }
   [[nodiscard]] const StepRecord& step(int t) const { return steps_[static_cast<std::size_t>(t)]; }

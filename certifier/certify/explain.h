@@ -1,4 +1,4 @@
-/** Decisions in words. */
+/** Decisions as sentences. */
 #pragma once
 
 #include <string>
@@ -8,15 +8,16 @@
 
 namespace forereach {
 
-/** One sentence for a person: outcome, step, cause and witness by name, with values, bounds and units.
-Numbers have six digits, rounded so that the sentence stays true: a clearance down, a depth up. */
+/** One sentence with outcome, step, cause and witness by name, with values, bounds and units. Numbers have six digits
+and are rounded so that the sentence stays true: a clearance down, a depth up. */
 [[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem);
 
-/** The same of a certificate, without kCapped. @param obstacle that the tube comes closest to, at X_closest_step and by
-at least `clearance` metres; -1 without obstacles. */
+/** The sentence for a certificate, without kCapped. @param obstacle index of the closest obstacle, -1 without
+obstacles.
+@param closest_step step of the closest slice. @param clearance lower bound on their distance, in metres. */
 [[nodiscard]] std::string ExplainCertificate(int closest_step, int obstacle, double clearance);
 
-/** Added where Decision::capped. */
+/** Appended to the sentence if Decision::capped. */
 inline constexpr const char* kCapped = "; a search met max_leaf_visits";
 
 }  // namespace forereach

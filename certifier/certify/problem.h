@@ -1,5 +1,5 @@
-/** What stays fixed while a robot runs: the nominal model, what is known of its residual, where that knowledge
-holds, and which coordinates safety is judged in. */
+/** The inputs that stay fixed while a robot runs: nominal model, domain, declaration, observations and safety
+ * projection. */
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@ holds, and which coordinates safety is judged in. */
 
 namespace forereach {
 
-/** Part of what standing is: |x_coordinate| <= tolerance, in units of the state. */
+/** One condition of rest: |x_coordinate| <= tolerance, in the unit of that state. */
 struct RestBound {
   int coordinate = 0;
   double tolerance = 0;  ///< Not negative.
@@ -30,9 +30,9 @@ struct Problem {
   Eigen::MatrixXd projection;                 ///< P, p-by-n
   Method method = Method::kCentred;           ///< How the nominal remainder is bounded
   int max_leaf_visits = 512;                  ///< EnvelopeOptions: bounds the work of one search
-  int max_observations = 10'000'000;          ///< Beyond it those that never attain the envelope are forgotten
-  int zonotope_order = 5;                     ///< rho: at most rho * n generators after reduction
-  std::vector<RestBound> rest;                ///< A certified plan ends within all of these; empty: it may end moving
+  int max_observations = 10'000'000;  ///< Above this number, observations that never attain the envelope are removed
+  int zonotope_order = 5;             ///< rho: at most rho * n generators after reduction
+  std::vector<RestBound> rest;        ///< X_T of a certified plan satisfies all of these; empty: no condition
 };
 
 }  // namespace forereach

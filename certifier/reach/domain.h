@@ -1,4 +1,5 @@
-/** The certification domain Z_cert: where the declaration and the nominal enclosure hold. Closed and convex. */
+/** The certification domain Z_cert: the set of z = (x, u) on which the declaration and the nominal enclosure hold. It
+is closed and convex. Coordinates are in the units of the model, the states first, then the inputs. */
 #pragma once
 
 #include <array>
@@ -16,9 +17,9 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
-/** {z = (x, u) : x in state, u in input, all inequalities, all balls}. */
+/** Z_cert = {z = (x, u) : x in state, u in input, z in every inequality, z in every ball}; d_z = n + m coordinates. */
 struct Domain {
-  /** {z : coefficients . z <= bound}, d_z coefficients. */
+  /** {z : coefficients . z <= bound} with d_z coefficients. */
   struct Inequality {
     Eigen::VectorXd coefficients;
     double bound;
@@ -37,36 +38,40 @@ struct Domain {
   /** @throws std::invalid_argument naming the constraint if a size does not fit d_z or a number is not finite. */
   void Validate(int num_states, int num_inputs) const;
 
-  /** The range of each coordinate of z, the state's and then the input's. */
+  /** The range of each of the d_z coordinates, from the boxes `state` and `input`. */
   [[nodiscard]] std::vector<Interval> Ranges() const;
-  /** The same, lower ends and upper ends. */
+  /** The lower ends and the upper ends of Ranges(). */
   [[nodiscard]] std::pair<std::vector<double>, std::vector<double>> Corners() const;
 
-  /** True only if z provably lies inside. */
+  /** True only if z (d_z entries) provably lies in the domain. False if an entry is NaN. */
   [[nodiscard]] bool Contains(std::span<const double> z) const noexcept;
 };
 
-/** Where a box was not proven to stay inside: `value` is what it reaches, `bound` what it may reach. */
+/** The constraint that a box does not provably satisfy. `value` is the extreme value over the box, `bound` the limit.
+ */
 struct DomainExit {
   enum class Kind { kNone, kLower, kUpper, kInequality, kBall };
   Kind kind = Kind::kNone;
-  int index = -1;  ///< Coordinate of z for kLower and kUpper, else the inequality or ball.
+  int index = -1;  ///< Coordinate of z for kLower and kUpper; otherwise the index of the inequality or ball.
   double value = 0, bound = 0;
 };
 
-/** The first constraint that the box of d_z intervals does not provably satisfy; kind kNone if it lies inside. A bound
-that is met exactly is inside, for a ball where the squares of radius and distance are doubles; otherwise it may be a
-rounding error short of that. NaN is outside. Cost O(d_z) a constraint. */
+/** Tests whether a box of d_z intervals lies in the domain. Returns the first constraint that the box does not provably
+satisfy, in the order box, inequalities, balls, or kind kNone if all are satisfied. A value equal to its bound is
+inside; for a ball this holds if the squares of radius and distance are doubles, and otherwise the test may refuse
+values within a rounding error of the bound. NaN is outside. Cost O(d_z) for each constraint. */
 [[nodiscard]] DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept;
 
-/** The domain in a form that is quick to test against. */
+/** A fast form of FindExit for the boxes of the certify step. */
 class DomainTest final {
  public:
-  /** @param domain outlives the test. */
+  /** @param domain must outlive this object. */
   explicit DomainTest(const Domain& domain);
 
-  /** FindExit for the box {(x, input) : |x - center| <= half_width}: one that lies inside by a margin is found so in
-  plain arithmetic. @param center, half_width n entries, of kMaxStates that can be read. */
+  /** FindExit for the box {(x, input) : |x - center| <= half_width}. Plain arithmetic decides for a box that is inside
+  by a margin; directed rounding decides otherwise. @param center, half_width n entries; kMaxStates entries must be
+  readable.
+  @param input m entries. */
   [[nodiscard]] FOREREACH_INLINE DomainExit FindExit(const double* center, const double* half_width,
                                                      std::span<const double> input) const noexcept {
     const bool inside = StateLiesWellInside(center, half_width) && InputLiesWellInside(input);
@@ -75,7 +80,7 @@ class DomainTest final {
   }
 
  private:
-  static constexpr double kMargin = 0x1p-48;  // above the rounding of plain arithmetic
+  static constexpr double kMargin = 0x1p-48;  // larger than the rounding error of plain arithmetic
 
   FOREREACH_INLINE bool StateLiesWellInside(const double* center, const double* half_width) const noexcept {
     const Lanes margin = AllLanes(RoundingError(kMargin, 1));
@@ -93,7 +98,7 @@ class DomainTest final {
     }
     return inside;
   }
-  // What else there is to test, where the domain is not a box or the point not well inside of it.
+  // The remaining tests, for a domain that is not a box and for a box that is not inside by the margin.
   [[nodiscard, gnu::noinline]] DomainExit FindExitOf(const double* center, const double* half_width,
                                                      std::span<const double> input, bool inside_box) const noexcept;
   [[nodiscard]] bool MeetsConstraintsWell(const double* center, const double* half_width) const noexcept;

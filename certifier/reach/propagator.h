@@ -2,8 +2,9 @@
 
     X_{t+1} = red < f0(c) + rho + mu, [J G, diag(q), diag(h)] > + [-s', s'],
 
-with J = D_z f0(c), rho and q the middle and half-width of the remainder over Box(Z_t), mu and h those of the residual
-envelope. All rounding, that of f0(c), J and J G included, goes to the slack s', with |J| s of the slack before it. */
+with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder over Box(Z_t), and mu and h those of the
+residual envelope, Eq. (set-envelope). The paper has rho = 0; docs/mathematics.md defines it. The slack s' contains |J|
+s of the previous slack and all rounding errors, including those of f0(c), J and J G. */
 #pragma once
 
 #include <array>
@@ -18,39 +19,43 @@ envelope. All rounding, that of f0(c), J and J G included, goes to the slack s',
 
 namespace forereach {
 
-/** What one step found on its way. */
+/** Intermediate results of one step. */
 struct StepRecord {
-  std::array<double, kMaxStates> half_width;  ///< r, of the hull of X_t
-  ResidualBounds envelope;
-  Remainder remainder;
+  std::array<double, kMaxStates> half_width;  ///< r: upper bounds on the half-widths of Box(X_t), n entries in use.
+  ResidualBounds envelope;                    ///< The residual's lower and upper bounds over Z_t.
+  Remainder remainder;                        ///< rho and q.
 };
 
 struct StepResult {
   enum class Status {
     kDone,
-    kDomainExit,         ///< Box(Z_t) is not proven to lie in Z_cert; `exit` says where.
-    kNoFiniteEnclosure,  ///< The nominal map or the residual has no finite bound; `coordinate` says which.
-    kInconsistent        ///< No admissible residual exists over Z_t: lower > upper in `coordinate`.
+    kDomainExit,         ///< Box(Z_t) is not proven to lie in Z_cert; `exit` names the constraint.
+    kNoFiniteEnclosure,  ///< Coordinate `coordinate` of the nominal map or of the residual has no finite bound.
+    kInconsistent        ///< No admissible residual exists over Z_t: lower > upper in coordinate `coordinate`.
   };
   Status status = Status::kDone;
   DomainExit exit{};
   int coordinate = -1;
 };
 
-/** Immutable, so any number of threads may step at once. Refers to its parts, which must outlive it. */
+/** Computes single steps. It is immutable, so any number of threads may use it at once. */
 class Propagator final {
  public:
+  /** @param model, domain, residual must outlive this object. @param zonotope_order rho of Eq. (order-reduction): a
+  slice has at most zonotope_order * n generators after a step. @param method bounds the remainder. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual, int zonotope_order,
              Method method);
 
-  /** Advances `slice` under `input` into `next`. Where it does not reach kDone, `next` is unspecified. Allocates
-  nothing. @pre order * n + 2 n <= kMaxGenerators, and slice has at most order * n generators.
-  @param record its half_width is given (HalfWidths), the rest is set. @param next_half_width n entries: the same of
-  `next`, for the step after. */
+  /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
+  is unspecified. It allocates nothing.
+  @param record the caller sets half_width (see HalfWidths); the step sets the other members.
+  @param next_half_width n entries: set to the half-widths of `next`, for the following step.
+  @pre order * n + 2 n <= kMaxGenerators, and `slice` has at most order * n generators.
+  Cost O(n m) for m generators, plus the residual enclosure and the reduction. */
   [[nodiscard]] StepResult Step(const Zonotope& slice, std::span<const double> input, StepRecord& record,
                                 Zonotope& next, double* next_half_width) const noexcept;
 
-  /** Upper bounds on the half-widths of the slice's hull, n of them. */
+  /** Writes n upper bounds on the half-widths of Box(slice). */
   static void HalfWidths(const Zonotope& slice, double* half_width) noexcept;
 
  private:
@@ -60,7 +65,7 @@ class Propagator final {
                                                           std::span<const double> center,
                                                           std::span<const PlainInterval> hull, StepRecord& record,
                                                           Zonotope& next, double* next_half_width) const noexcept;
-  // Everything but what the model, the envelope and the reduction do, once for each instruction set.
+  // The step without model, envelope and reduction; compiled once for each instruction set.
   [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
                                                        StepRecord& record, Zonotope& next,
                                                        double* next_half_width) const noexcept;

@@ -1,6 +1,6 @@
-/** Unsafe sets in the safety coordinates y = P x, in metres. All closed and convex.
+/** Unsafe sets O in the safety coordinates y = P x in R^p, in metres. All are closed and convex.
 
-Each is a core, the convex hull of points or a half-space, grown by a radius:
+An unsafe set is a core plus a ball. The core is the convex hull of points, or a half-space:
     O = core + {y : |y|_2 <= radius}. */
 #pragma once
 
@@ -17,26 +17,29 @@ class Obstacle final {
  public:
   enum class Kind { kCircle = 1, kBox = 2, kPolygon = 3, kHalfSpace = 4 };  // as in lcmtypes/obstacle_t.lcm
 
-  /** Each throws std::invalid_argument naming value and bound: sizes, finite entries, radius >= 0, lower <= upper. */
-  /** {y : |y - center|_2 <= radius} in the plane. */
+  /** @name Factories. Each throws std::invalid_argument with value and bound if a size is wrong, an entry is not
+  finite, the radius is negative, or lower > upper. */
+  ///@{
+  /** {y : |y - center|_2 <= radius}, p = 2. */
   [[nodiscard]] static Obstacle Circle(const Eigen::VectorXd& center, double radius);
   /** {y : lower <= y <= upper}, p = 1, 2 or 3. */
   [[nodiscard]] static Obstacle AxisBox(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper);
-  /** The convex hull of 3 to 16 points in the plane, in any order. */
+  /** The convex hull of 3 to 16 points in any order, p = 2. */
   [[nodiscard]] static Obstacle Polygon(const std::vector<Eigen::VectorXd>& vertices);
-  /** {y : normal . y >= offset}, p = 1, 2 or 3: the normal points into the unsafe side and is not zero. */
+  /** {y : normal . y >= offset}, p = 1, 2 or 3. The normal points into the unsafe side and is not zero. */
   [[nodiscard]] static Obstacle HalfSpace(const Eigen::VectorXd& normal, double offset);
+  ///@}
 
   [[nodiscard]] Kind kind() const { return kind_; }
   [[nodiscard]] int dim() const { return dim_; }
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] double offset() const { return offset_; }
-  /** The points of the core: a circle's center, a box's lower and upper corner, a polygon's vertices in the order
-  given, a half-space's normal. */
+  /** The defining vectors: a circle's center, a box's lower and upper corner, a polygon's vertices in the given order,
+  or a half-space's normal. */
   [[nodiscard]] const std::vector<Eigen::VectorXd>& points() const { return points_; }
-  /** The points whose hull the core is; empty for a half-space. A box gives its 2^p corners. */
+  /** The points whose convex hull is the core; for a box its 2^p corners. Empty for a half-space. */
   [[nodiscard]] const std::vector<Eigen::Vector3d>& hull() const { return hull_; }
-  /** @name The bounding box of the core; everything for a half-space. Unused coordinates are zero. */
+  /** @name The bounding box of the core. For a half-space it is all of R^p. Unused coordinates are zero. */
   ///@{
   [[nodiscard]] const Eigen::Vector3d& lower() const { return lower_; }
   [[nodiscard]] const Eigen::Vector3d& upper() const { return upper_; }
@@ -54,8 +57,8 @@ class Obstacle final {
   Eigen::Vector3d lower_ = Eigen::Vector3d::Constant(-kInfinity), upper_ = Eigen::Vector3d::Constant(kInfinity);
 };
 
-/** Distance from a point y to the obstacle, negative inside, by plain arithmetic: for planning, simulation and
-display, not for bounds. */
+/** The distance in metres from a point y (p entries) to the obstacle, negative inside, in plain arithmetic. Use it for
+planning, simulation and display, not for bounds. */
 [[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y);
 
 }  // namespace forereach

@@ -1,4 +1,4 @@
-/** The safety projection P : R^n -> R^p, p = 1, 2 or 3. */
+/** The safety projection P : R^n -> R^p with p = 1, 2 or 3, from states to safety coordinates in metres. */
 #pragma once
 
 #include <vector>
@@ -16,10 +16,12 @@ class Projection final {
 
   [[nodiscard]] int dim() const { return dim_; }
 
-  /** Encloses the interval hull of P X, given X's center and upper bounds on its hull's half-widths. */
+  /** A hull that contains Box(P X). It depends only on the center of X and on the half-widths of its hull.
+  @param half_width n upper bounds on the half-widths of Box(X). Cost O(nonzeros of P). */
   [[nodiscard]] Hull EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept;
 
-  /** A zonotope that contains P X; exactly P X where each row of P copies a coordinate. */
+  /** Sets `projected` to a zonotope that contains P X. It equals P X if each row of P copies a coordinate.
+  @param half_width as in EncloseHull. Cost O(nonzeros of P * generators). */
   void Enclose(const Zonotope& slice, std::span<const double> half_width, Zonotope& projected) const noexcept {
     EncloseLinearImage(entries_, slice, half_width, dim_, projected);
   }

@@ -1,9 +1,10 @@
-/** Whether a projected slice is proven disjoint from an obstacle, by a dual bound: for any direction d,
+/** Proofs that a projected slice is disjoint from an obstacle, by a dual bound. For every direction d,
 
     min {d . w : w in core} - max {d . y : y in slice} <= |d|_2 * distance(core, slice).
 
-The search for a good d runs in plain arithmetic and may fail; the left side is then evaluated with outward rounding, so
-what is reported holds for whatever d was found. */
+The search for a good d runs in plain arithmetic and may fail. The left side is then evaluated with outward rounding, so
+the reported distance is valid for every d. The paper's test R_t < m_t, Eq. (safety-radius-margin), is a special case.
+*/
 #pragma once
 
 #include <array>
@@ -14,27 +15,29 @@ what is reported holds for whatever d was found. */
 namespace forereach {
 
 struct Separation {
-  /** A lower bound on the distance from slice to core. Not positive where none was proven. */
+  /** A lower bound on the distance from slice to core, in metres. Not positive if no distance was proven. */
   double distance = -kInfinity;
-  /** What the distance has to exceed: the obstacle's radius. */
+  /** The obstacle's radius, in metres. The slice is disjoint from the obstacle if distance > threshold. */
   double threshold = 0;
 
   [[nodiscard]] bool IsProven() const { return distance > threshold; }
-  /** A lower bound on the distance from slice to obstacle; not positive where none was proven. */
+  /** A lower bound on the distance from slice to obstacle, in metres. Not positive if no separation was proven. */
   [[nodiscard]] double clearance() const { return SubDown(distance, threshold); }
 };
 
-/** The hull of a projected slice: center +- half_width in each of p coordinates. */
+/** The interval hull of a projected slice: center +- half_width in each of p coordinates, in metres. */
 struct Hull {
   std::array<double, kMaxSafetyDim> center, half_width;
 };
 
-/** By the interval hulls of slice and core, for a half-space by its normal. Sound, O(p), and loose. */
+/** Separates the interval hulls of slice and core; for a half-space it uses the normal. Sound but not tight. Cost O(p).
+ */
 [[nodiscard]] Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept;
 
-/** By the best direction. In the plane and on the line its distance is exact up to rounding; in three dimensions it
-proves every separation that exists, up to rounding, by the normals of faces and pairs of edges. Cost O(m) for the few
-directions that a planar search takes, O(m^2) where that proves nothing, O(m^3) in space.
+/** Separates slice and core by the best direction that the search finds. For p <= 2 the distance is exact up to
+rounding. For p = 3 the search tries the normals of faces and of pairs of edges, and so proves every separation that
+exists, up to rounding. Cost for m generators: for p <= 2, O(m) if a few directions suffice and O(m^2) if these prove
+nothing; for p = 3, O(m^3).
 @pre slice.dim() == obstacle.dim() */
 [[nodiscard]] Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept;
 

@@ -1,6 +1,7 @@
-/** Eigen, for all headers of the library. Its objects cross the library's boundary, and how they are allocated, aligned
-and laid out follows the compiler's flags and Eigen's macros: with -mavx2 a vector is freed otherwise than without. So
-the library fixes what matters, its CMake target passes it on, and another choice is refused. */
+/** Includes Eigen for all headers of the library. Eigen objects cross the library's boundary. Their allocation,
+alignment and layout depend on the compiler's flags and on Eigen's macros: with -mavx2 a vector is freed by another
+function than without. So the library fixes these settings, its CMake target exports them, and a different setting is a
+compile error. */
 #pragma once
 
 #include <cstddef>
@@ -10,7 +11,7 @@ the library fixes what matters, its CMake target passes it on, and another choic
 
 #include <Eigen/Core>
 
-// As compile definitions of forereach_certifier have it. 16 is what x86-64 and aarch64 need, and what malloc gives.
+// The values of forereach_certifier's compile definitions. x86-64 and aarch64 need 16, and malloc provides it.
 #if EIGEN_MAX_ALIGN_BYTES != 16 || EIGEN_MAX_STATIC_ALIGN_BYTES != 16 || !EIGEN_MALLOC_ALREADY_ALIGNED
 #error \
     "ForeReach passes Eigen's vectors, so all files have to agree how those are aligned: \
@@ -27,8 +28,8 @@ static_assert(std::is_same_v<Eigen::Index, std::ptrdiff_t>,
 static_assert(sizeof(Eigen::VectorXd) == 16 && sizeof(Eigen::MatrixXd) == 24 && sizeof(Eigen::Vector2d) == 16,
               "ForeReach passes Eigen's vectors: compile without plugins that add members to them");
 
-// Defined in the library under the name of the Eigen it was built with: a file that was compiled with another does not
-// link.
+// The library defines this symbol under a name that contains its Eigen version. A file that was compiled with another
+// version does not link.
 #define FOREREACH_PASTE(a, b, c) this_library_was_built_with_another_eigen_than_##a##_##b##_##c
 #define FOREREACH_NAME(a, b, c) FOREREACH_PASTE(a, b, c)
 #define FOREREACH_EIGEN FOREREACH_NAME(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)

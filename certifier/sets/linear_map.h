@@ -1,4 +1,4 @@
-/** Linear images of zonotopes, with every rounding error accounted for. */
+/** Linear images of zonotopes. Rounding errors are enclosed in the slack. */
 #pragma once
 
 #include <span>
@@ -8,16 +8,16 @@
 
 namespace forereach {
 
-/** An entry of a sparse interval matrix M; entries that are not listed are zero. */
+/** A nonzero entry of a sparse interval matrix M. Entries that are not listed are zero. */
 struct MatrixEntry {
   int row, column;
   Interval value;
 };
 
-/** A zonotope that contains {M x : x in set}, M given by its nonzero entries, with as many generators as the set.
-Rounding goes to the slack; rows of M that copy one coordinate are copied without error.
-@param half_widths upper bounds on the half-widths of the set's interval hull. @param rows of M.
-Cost O(nonzeros of M times generators). */
+/** Sets `image` to a zonotope that contains {M x : x in set, M in the interval matrix} and has as many generators as
+`set`. The slack of `image` contains the rounding errors. A row of M that copies one coordinate is exact.
+@param matrix the nonzero entries of M. @param half_widths n upper bounds on the half-widths of Box(set).
+@param rows number of rows of M, at most kMaxStates. Cost O(nonzeros of M * generators). */
 void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
                         int rows, Zonotope& image) noexcept;
 

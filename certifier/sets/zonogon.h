@@ -1,4 +1,4 @@
-/** Zonotopes in the plane: their outline, and how far they reach from their center. */
+/** Outline and radius of zonotopes. */
 #pragma once
 
 #include <vector>
@@ -8,12 +8,13 @@
 
 namespace forereach {
 
-/** The corners of a planar zonotope, counter-clockwise, by plain arithmetic: for pictures, not for bounds.
-One corner for a point, two for a segment. Cost O(m log m). @pre set.dim() == 2 */
+/** The corners of a planar zonotope, counter-clockwise, in plain arithmetic. Use them for pictures, not for bounds.
+A point has one corner, a segment two. Cost O(m log m) for m generators. @pre set.dim() == 2 */
 [[nodiscard]] std::vector<Eigen::Vector2d> Outline(const Zonotope& set);
 
-/** An upper bound on R = max {|y - c|_2 : y in <c, G>}, Eq. (safety-radius-margin). Within 1e-11 of exact, relatively,
-in the plane; the half-diagonal of the interval hull in other dimensions. Cost O(m log m). */
+/** An upper bound on the radius R = max {|y - c|_2 : y in <c, G>} in metres, Eq. (safety-radius-margin). In the plane
+its relative error is at most 1e-11. In other dimensions it is the half-diagonal of the interval hull. Cost O(m log m).
+*/
 [[nodiscard]] double RadiusUpper(const Zonotope& set);
 
 }  // namespace forereach

@@ -1,12 +1,13 @@
-/** A zonotope <c, G> + [-s, s] = {c + G b + diag(s) b' : |b|_inf <= 1, |b'|_inf <= 1} in up to 16 dimensions, with up
-to 112 generators in G.
+/** A zonotope <c, G> + [-s, s] = {c + G b + diag(s) b' : |b|_inf <= 1, |b'|_inf <= 1}, Eq. (zonotope-definition), in up
+to 16 dimensions, with up to 112 generators in G.
 
-The box s, the slack, holds what rounding may have added. It is kept apart so that errors of 1e-15 neither count as
-generators nor push a real one out when the order is reduced; a set that was never rounded has none.
+The box [-s, s], called the slack, contains the rounding errors. It is separate from G so that errors of 1e-15 do not
+count as generators and do not displace a real generator in the order reduction. A set without rounding errors has s =
+0.
 
-A value of fixed capacity: no heap, trivially copyable, so the certify step can work on it in place. Row k of G, the
-part of every generator in coordinate k, is contiguous and ends in zeros up to a multiple of kLaneCount: a sum over
-generators runs along memory, four at a time. */
+The type is a value of fixed capacity. It uses no heap and is trivially copyable, so the certify step can work on it in
+place. Row k of G, which holds coordinate k of every generator, is contiguous and padded with zeros to a multiple of
+kLaneCount, so a sum over generators reads four consecutive doubles at a time. */
 #pragma once
 
 #include <array>
@@ -29,11 +30,11 @@ class Zonotope final {
   /** The point of dimension 0. */
   Zonotope() = default;
 
-  /** @param center n entries. @param generators n-by-m, any m up to kMaxGenerators; m = 0 is the point `center`.
+  /** @param center c, n entries. @param generators G, n-by-m with m <= kMaxGenerators; m = 0 gives the point `center`.
   @throws std::invalid_argument if sizes disagree or exceed the capacity, or an entry is not finite. */
   Zonotope(const Eigen::VectorXd& center, const Eigen::MatrixXd& generators);
 
-  /** {x : |x - center| <= half_width}, exactly; zero half-widths give no generator.
+  /** The set {x : |x - center| <= half_width}, exactly. A zero half-width gives no generator.
   @throws std::invalid_argument if sizes disagree or exceed the capacity, or a half-width is negative or not finite. */
   [[nodiscard]] static Zonotope FromBox(const Eigen::VectorXd& center, const Eigen::VectorXd& half_width);
 
@@ -51,31 +52,32 @@ class Zonotope final {
   }
   [[nodiscard]] double slack(int k) const { return slack_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] Eigen::VectorXd CenterVector() const;
-  /** All generators as columns: those of G, then s_k e_k for each slack that is not zero. */
+  /** All generators as columns: the columns of G, then s_k e_k for each k with s_k > 0. */
   [[nodiscard]] Eigen::MatrixXd GeneratorMatrix() const;
 
   /** An upper bound on sum_j |G_kj| + s_k, the half-width of the interval hull in coordinate k. Cost O(m). */
   [[nodiscard]] double HalfWidthUpper(int k) const noexcept;
-  /** An interval that contains coordinate k of the set: Box(Z)_k. Cost O(m). */
+  /** An interval that contains coordinate k of every point of the set: Box(Z)_k, rounded outward. Cost O(m). */
   [[nodiscard]] Interval Hull(int k) const noexcept;
-  /** An upper bound on the support function max {d . z : z in Z}, Eq. (zonotope-support). Cost O(n m). */
+  /** An upper bound on the support function max {d . z : z in Z}, Eq. (zonotope-support).
+  @param direction d, n entries. Cost O(n m). */
   [[nodiscard]] double SupportUpper(std::span<const double> direction) const noexcept;
 
-  /** The row with the zeros that follow it. */
+  /** The row with its padding of zeros. */
   [[nodiscard]] std::span<const double> padded_row(int k) const {
     return {rows_[static_cast<std::size_t>(k)].data(), padded_size()};
   }
-  /** num_generators() up to a multiple of kLaneCount. */
+  /** num_generators() rounded up to a multiple of kLaneCount. */
   [[nodiscard]] std::size_t padded_size() const { return PaddedToLanes(static_cast<std::size_t>(num_generators_)); }
 
-  /** @name In-place construction, for the kernels that own the set. No checks. */
+  /** @name In-place construction, for kernels that own the set. These functions check nothing. */
   ///@{
-  /** Sets sizes. Who then writes centers, slacks and rows keeps the rows' padding zero. */
+  /** Sets the sizes. The caller then writes centers, slacks and rows, and keeps the padding of the rows zero. */
   void Reset(int dim, int num_generators) {
     dim_ = dim;
     num_generators_ = num_generators;
   }
-  /** Leaves the first `kept` columns; those after them, up to `num_generators`, are zero. */
+  /** Keeps the first `kept` columns and sets the columns after them, up to `num_generators`, to zero. */
   FOREREACH_INLINE void Resize(int kept, int num_generators) noexcept {
     num_generators_ = num_generators;
     const std::size_t rest = static_cast<std::size_t>(kept) % kLaneCount, end = padded_size();
@@ -87,17 +89,17 @@ class Zonotope final {
     for (; j < end; j += kLaneCount)
       for (int k = 0; k < dim_; ++k) StoreLanes(AllLanes(0), mutable_row(k) + j);
   }
-  /** Copies what is in use of another set, some 2 kB where the whole value has 15. */
+  /** Copies only the entries in use of another set: about 2 kB of the 15 kB of the whole value. */
   void Assign(const Zonotope& other) noexcept;
   [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
-  /** kMaxStates entries each, of which dim() count. */
+  /** Arrays of kMaxStates entries; the first dim() are in use. */
   [[nodiscard]] const double* centers() const { return center_.data(); }
   [[nodiscard]] const double* slacks() const { return slack_.data(); }
   [[nodiscard]] double* mutable_slacks() { return slack_.data(); }
   [[nodiscard]] double* mutable_centers() { return center_.data(); }
   [[nodiscard]] double* mutable_row(int k) { return rows_[static_cast<std::size_t>(k)].data(); }
-  /** Appends length * e_k unless length is zero. */
+  /** Appends the generator length * e_k unless length is zero. */
   void AppendAxis(int k, double length) noexcept;
   ///@}
 
@@ -108,26 +110,26 @@ class Zonotope final {
   static_assert(kMaxGenerators % kLaneCount == 0);
 };
 
-/** The scores |g|_1 - |g|_inf of all columns, made unique: the index takes the last bits, so that no two are equal and
-the earlier of equals is the larger. -1 for zero columns. */
+/** The scores |g|_1 - |g|_inf of all columns, Eq. (order-reduction). The last bits of a score hold the column's index,
+so no two scores are equal, and of two equal values the earlier column's score is larger. Zero columns have score -1. */
 class ColumnScores {
  public:
   static constexpr std::size_t kBlock = 8 * kLaneCount;
 
-  /** Sets them, four after four. A local variable, whose state is in registers. */
+  /** Writes the scores of four columns at a time. Use it as a local variable, so that its state stays in registers. */
   class Writer {
    public:
     FOREREACH_INLINE explicit Writer(ColumnScores& scores) : scores_(scores) {}
-    /** From the sums and the largest of the next four columns' absolute values. */
+    /** Writes the next four scores. @param sum |g|_1 of each column. @param largest |g|_inf of each column. */
     FOREREACH_INLINE void Add(std::size_t first_column, const Lanes& sum, const Lanes& largest) {
-      const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so that bits of it are no NaN
+      const Lanes score = Min(sum - largest, AllLanes(kMaxDouble));  // finite, so changing its bits cannot give NaN
       const LaneMask bits = (Bits(score) & ~LaneMask{127, 127, 127, 127}) | index_;
       const LaneMask nonzero = largest > AllLanes(0);
       nonzero_ -= nonzero;
       index_ -= LaneMask{4, 4, 4, 4};
       StoreLanes(nonzero ? FromBits(bits) : AllLanes(-1), &scores_.scores_[first_column]);
     }
-    /** After all `count` columns. */
+    /** Writes the padding. Call it after all `count` columns. */
     FOREREACH_INLINE void Finish(std::size_t count) {
       scores_.num_nonzero_ = static_cast<int>((nonzero_[0] + nonzero_[1]) + (nonzero_[2] + nonzero_[3]));
       double* scores = scores_.scores_.data();
@@ -142,7 +144,7 @@ class ColumnScores {
     LaneMask nonzero_{}, index_{kMaxGenerators, kMaxGenerators - 1, kMaxGenerators - 2, kMaxGenerators - 3};
   };
 
-  /** One for each column; infinity behind the last, up to a multiple of kBlock. */
+  /** One score for each column, padded with infinity to a multiple of kBlock. */
   [[nodiscard]] const double* data() const { return scores_.data(); }
   [[nodiscard]] int num_nonzero() const { return num_nonzero_; }
 
@@ -151,11 +153,13 @@ class ColumnScores {
   alignas(32) std::array<double, (kMaxGenerators + kBlock - 1) / kBlock * kBlock> scores_;
 };
 
-/** Appends the axis-aligned generators first_k e_k, then second_k e_k, those that are not zero, and reduces the order
-as Girard does, Eq. (order-reduction): a set with more than order * n generators keeps the (order - 1) * n columns of
-largest |g|_1 - |g|_inf (ties, to 45 bits: the earlier) and encloses the rest in a box, rounded outward; zero columns
-are dropped. The slack stays. The result contains the set with all generators. Cost O(n m + m^2), m generators.
-@param scores of the set's columns. @param first, second n lengths each, of kMaxStates that can be read. */
+/** Appends the nonzero generators among first_k e_k, then among second_k e_k, and reduces the order by Girard's method,
+Eq. (order-reduction). If the set then has more than order * n generators, it keeps the (order - 1) * n columns of
+largest |g|_1 - |g|_inf and encloses the others in a box, rounded outward. Of columns whose scores agree to 45 bits, the
+earlier one is kept. Zero columns are removed. The slack does not change. The result contains the set with all
+generators.
+@param scores those of the set's columns. @param first, second n lengths; kMaxStates entries must be readable.
+Cost O(n m + m^2) for m generators. */
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second,
                      int order) noexcept;
 
