@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <initializer_list>
 #include <iostream>
 #include <random>
 #include <utility>
@@ -60,7 +59,6 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
                              std::unique_ptr<LatchFile> latch)
     : config_(Checked(config)),
       channels_(WithKeys(config.bus, Role::kCertifier)),
-      realtime_(config.realtime),
       clocks_(std::move(clocks)),
       bus_(bus),
       sender_(bus),
@@ -69,7 +67,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       charge_({clocks_.wall(), RandomInstance()}, listen_us),
       has_begun_(is_in_charge()),
       issued_(config.gate, clocks_.steady()),
-      reload_([path = config.path, channels = channels_] { return Load(path, channels); }),
+      reload_(config.path, channels_),
       contradictions_(config_),
       latch_(watch_, contradictions_, std::move(latch)) {
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
@@ -388,57 +386,15 @@ void CertifierNode::CompactIfDue() {
 }
 
 void CertifierNode::Reload() {
-  if (!reload_.Ask()) NotReloaded("the reloads before it have not ended; the task file is read again once one has");
-}
-
-void CertifierNode::NotReloaded(const std::string& why) {
-  reload_error_ = why;
-  ++failed_reloads_;
-  next_heartbeat_us_ = 0;
-  spdlog::error("not reloaded, version {} stays in force: {}", version_, why);
-}
-
-CertifierNode::Loaded CertifierNode::Load(const std::string& path, const BusOptions& in_force) try {
-  spdlog::info("reloading {}", path);
-  Loaded loaded{Checked(LoadConfig(path)), nullptr, ""};
-  loaded.error = WhyKeyCannotChange(in_force, loaded.config.bus, Role::kCertifier);
-  if (!loaded.error.empty()) loaded.error = path + ": " + loaded.error;
-  loaded.gate = std::make_unique<Gate>(loaded.config);
-  return loaded;
-} catch (const std::exception& error) {
-  return {{}, nullptr, error.what()};
-}
-
-std::string CertifierNode::WhyNotTaken(const Config& config) const {
-  const Problem &before = gate_->certifier().problem(), &after = *config.problem;
-  BusOptions bus = config.bus;
-  bus.url = channels_.url;  // a command line may have given another
-  bus.key = channels_.key, bus.keys = channels_.keys, bus.key_is_given = channels_.key_is_given;  // Load compares keys
-  for (const auto& [changes, what] : std::initializer_list<std::pair<bool, const char*>>{
-           {bus.name != channels_.name, "bus.name"},
-           {bus != channels_, "bus.channels"},
-           {config.realtime != realtime_, "realtime"},
-           {config.gate.obstacles != config_.gate.obstacles, "gate.obstacles"},
-           {config.gate.state != config_.gate.state, "gate.state"},
-           {after.model->num_states() != before.model->num_states(), "the number of states"},
-           {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},
-           {after.projection.rows() != before.projection.rows(), "the number of safety coordinates"}})
-    if (changes) return config.path + ": " + what + " cannot change while the certifier runs";
-  // What the robot has shown is not forgotten by reading a file.
-  if (contradictions_.Contradict(config))
-    return config.path + ": a transition that was executed contradicts its declaration; another has to be declared";
-  return "";
+  if (!reload_.Ask()) next_heartbeat_us_ = 0;
 }
 
 void CertifierNode::TakeReload() {
   if (compaction_.valid() && !IsReady(compaction_)) return;  // it works on *gate_
-  std::optional<Loaded> loaded = reload_.Take();
-  if (reload_.TakeStall()) NotReloaded("it has not ended yet: a file that it reads does not answer");
+  std::optional<TaskReload::Loaded> loaded = reload_.Take(config_, contradictions_);
   if (!loaded) return;
-  if (const std::string why = loaded->error.empty() ? WhyNotTaken(loaded->config) : loaded->error; !why.empty())
-    return NotReloaded(why);
-  reload_error_.clear();
   next_heartbeat_us_ = 0;
+  if (!loaded->error.empty()) return;
   loaded->gate->Inherit(*gate_);
   gate_ = std::move(loaded->gate);
   config_ = std::move(loaded->config);
@@ -446,7 +402,6 @@ void CertifierNode::TakeReload() {
   issued_.Follow(gate_->options());
   contradictions_.Follow(config_);
   LookForObstacles(clocks_.wall());
-  spdlog::info("version {} of {} is in force", ++version_, config_.path);
 }
 
 // ---- The heartbeat.
@@ -461,7 +416,7 @@ std::string CertifierNode::WhyNotOk() const {
     return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a "
            "reset "
            "does not help";
-  if (!reload_error_.empty()) return "the last reload failed: " + reload_error_;
+  if (!reload_.error().empty()) return "the last reload failed: " + reload_.error();
   if (const auto refusal = watch_.WhyNot()) return refusal->why;
   if (charge_.other())
     return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing",
@@ -495,8 +450,8 @@ void CertifierNode::Heartbeat(std::int64_t now_us) {
     status.fault = watch_.fault()->cause;
     status.fault_utime = watch_.fault()->utime;
   }
-  status.version = version_;
-  status.failed_reloads = failed_reloads_;
+  status.version = reload_.version();
+  status.failed_reloads = reload_.failed();
   status.messages_refused = refused_;
   status.messages_not_sent = sender_.refused();
   status.bus_dropped = bus_.dropped();

@@ -6,8 +6,8 @@ the grounds of decisions takes effect as it arrives: obstacles, the robot's stat
 
 Unless gate.arming is none, nothing is certified before the robot's state is heard. A fault (watch.h, conformance.h, a
 falsified declaration) is sent on bus.channels.fault, with every heartbeat again, and from then on every candidate is
-rejected until a person sends a reset, which has to be later than the fault. A reload reads the task file again, beside
-the running work, and takes it whole or not at all; what cannot change while it runs, WhyNotTaken says.
+rejected until a person sends a reset, which has to be later than the fault. A reload reads the task file again
+(task_reload.h).
 
 Of several certifiers on one bus one is in charge (charge.h). The others say nothing but their heartbeat. What they hear
 before they take charge they do not learn: one that takes charge knows as much as one that has just been started.
@@ -39,7 +39,7 @@ knows that the plan was handed to the bus before. */
 #include "certifier/process/contradictions.h"
 #include "certifier/process/fault_latch.h"
 #include "certifier/process/latch_file.h"
-#include "certifier/task/reloading.h"
+#include "certifier/process/task_reload.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -80,12 +80,6 @@ class CertifierNode final : public Node {
   [[nodiscard]] const Charge& charge() const { return charge_; }
 
  private:
-  struct Loaded {
-    Config config;
-    std::unique_ptr<Gate> gate;
-    std::string error;  ///< Else there are a config and its gate.
-  };
-
   [[nodiscard]] bool is_in_charge() const { return charge_.state() == Charge::State::kInCharge; }
   void OnCandidate(const Received& received);
   void OnStatus(const Received& received);
@@ -110,12 +104,7 @@ class CertifierNode final : public Node {
   [[nodiscard]] GateAnswer Decide(Bytes candidate);
   void Answer(Bytes candidate, bool displaced);
   void CompactIfDue();
-  [[nodiscard]] static Loaded Load(const std::string& path, const BusOptions& in_force);
   void TakeReload();
-  void NotReloaded(const std::string& why);
-  /** Why a task file, good in itself, cannot take the place of the one in force; empty if it can. */
-  [[nodiscard]] std::string WhyNotTaken(const Config& config) const;
-
   /** Latches and announces, unless a fault as grave is latched already. */
   void Fail(const FoundFault& found);
   void Announce(fault_t fault, const Watch::Fault& latched);
@@ -130,7 +119,6 @@ class CertifierNode final : public Node {
 
   Config config_;  // in force
   const BusOptions channels_;
-  const RealtimeOptions realtime_;
   const Clocks clocks_;
   Bus& bus_;
   Sender sender_;
@@ -148,13 +136,10 @@ class CertifierNode final : public Node {
   robot_state_t last_state_{};
   transition_t last_transition_{};
 
-  Reloading<Loaded> reload_;
+  TaskReload reload_;
   std::future<void> compaction_;  // of *gate_
   Contradictions contradictions_;
   FaultLatch latch_;
-  std::int64_t version_ = 1, failed_reloads_ = 0;
-  std::string reload_error_;
-
   std::int64_t next_heartbeat_us_ = 0, next_warning_us_ = 0;  // by the steady clock
   std::int64_t last_heartbeat_us_ = 0;
   std::int64_t heartbeats_ = 0, heartbeats_aside_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
