@@ -10,6 +10,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -19,12 +20,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
-
 #include "bench/candidates.h"
 #include "bench/latencies.h"
 #include "bus/node.h"
 #include "certifier/process/certifier_node.h"
+#include "command_line/command_line.h"
 
 namespace forereach::bench {
 namespace {
@@ -197,9 +197,13 @@ int main(int argc, char** argv) {
   using namespace forereach;
   using namespace forereach::bench;
   int rounds = 20'000;
-  CLI::App app("Round trips on the bus, by a bare echo and by the certifier: percentiles as JSON");
-  app.add_option("--rounds", rounds, "round trips of each kind")->check(CLI::Range(1, 10'000'000));
-  CLI11_PARSE(app, argc, argv);
+  const Command program{.name = "bus_round_trip",
+                        .purpose = "Round trips on the bus, by a bare echo and by the certifier: percentiles as JSON",
+                        .options = {{.name = "--rounds",
+                                     .variable = &rounds,
+                                     .help = "round trips of each kind",
+                                     .range = Between{1, 10'000'000}}}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   try {
     const nlohmann::json certified = Compare(MakeTask(Scenario::kBicycle, kObservations), true, rounds, 0);
     const nlohmann::json abstained = Compare(MakeBlockedTask(Scenario::kBicycle, kObservations), false, rounds, 2);

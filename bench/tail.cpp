@@ -2,11 +2,11 @@
 //   tail [--calls N] [--observations N]        prints one JSON document, microseconds
 #include <chrono>
 #include <iostream>
-
-#include <CLI/CLI.hpp>
+#include <optional>
 
 #include "bench/latencies.h"
 #include "bench/tasks.h"
+#include "command_line/command_line.h"
 
 namespace forereach::bench {
 namespace {
@@ -44,12 +44,15 @@ Latencies Clock(int calls) {
 }  // namespace forereach::bench
 
 int main(int argc, char** argv) {
+  using namespace forereach;
   using namespace forereach::bench;
   int calls = 1'000'000, observations = 400;
-  CLI::App app("Latency of single certify calls: percentiles as JSON");
-  app.add_option("--calls", calls, "calls measured")->check(CLI::Range(1, 100'000'000));
-  app.add_option("--observations", observations, "N")->check(CLI::Range(25, 1'000'000));
-  CLI11_PARSE(app, argc, argv);
+  const Command program{
+      .name = "tail",
+      .purpose = "Latency of single certify calls: percentiles as JSON",
+      .options = {{.name = "--calls", .variable = &calls, .help = "calls measured", .range = Between{1, 100'000'000}},
+                  {.name = "--observations", .variable = &observations, .help = "N", .range = Between{25, 1'000'000}}}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   std::cout << nlohmann::json{{"observations", observations},
                               {"bicycle", Measure(Scenario::kBicycle, observations, calls).ToJson()},
                               {"clock", Clock(calls).ToJson()}}

@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "bus/authentic.h"
@@ -172,7 +171,7 @@ int ShowStatus(const Options& options) {
 }
 
 // Sends a command, and shows the heartbeat that answers it.
-int Command(const Options& options, std::int16_t kind) {
+int Send(const Options& options, std::int16_t kind) {
   Line line(options);
   const auto before = line.Await();
   if (!before) return NobodyAnswers(line.channels());
@@ -201,50 +200,61 @@ int Command(const Options& options, std::int16_t kind) {
   return done ? 0 : 1;
 }
 
-void Add(CLI::App& app, Action& action, const std::string& name, const std::string& purpose,
-         const std::function<int(const Options&)>& run) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(name, purpose);
-  command->add_option("--config", options->config, "The task file of the certifier")->required()->type_name("FILE");
-  options->bus.AddTo(*command);
-  command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->footer("Example:\n  forereach " + name + " --config config/demo.yaml");
-  command->callback([options, run, &action] { action = [options, run] { return run(*options); }; });
-}
-
-void AddKeygenCommand(CLI::App& app, Action& action) {
-  auto robot = std::make_shared<std::string>(), directory = std::make_shared<std::string>();
-  CLI::App* keygen =
-      app.add_subcommand("keygen", "Make the keys of one robot: a directory with one key file for each role");
-  keygen
-      ->add_option("--robot", *robot, "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature")
-      ->required()
-      ->type_name("NAME");
-  keygen->add_option("directory", *directory, "The new directory")->required()->type_name("DIR");
-  keygen->footer(
-      "Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or name it under "
-      "bus.key in the task file. On another machine a process needs its own role's file alone, as in\n"
-      "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub holds no secret: report, "
-      "replay and verify judge logs by it.");
-  keygen->callback([robot, directory, &action] {
-    action = [robot, directory] {
-      MakeKeys(*robot, *directory);
-      std::cout << *directory << std::endl;
-      return 0;
-    };
-  });
+Command BusCommand(const std::string& name, const std::string& purpose, const std::function<int(const Options&)>& run) {
+  const auto options = std::make_shared<Options>();
+  Command command{.name = name,
+                  .purpose = purpose,
+                  .footer = "Example:\n  forereach " + name + " --config config/demo.yaml",
+                  .options = {ConfigOption(options->config, "The task file of the certifier"), JsonFlag(options->json)},
+                  .run = [options, run] { return run(*options); }};
+  options->bus.AddTo(command.options);
+  return command;
 }
 
 }  // namespace
 
-void AddBusCommands(CLI::App& app, Action& action) {
-  Add(app, action, "status", "Show the certifier's heartbeat: exit 0 if it would certify now, else 1", ShowStatus);
-  Add(app, action, "reset", "Clear a fault that the certifier and the robot have latched",
-      [](const Options& options) { return Command(options, command_t::RESET); });
-  Add(app, action, "reload", "Have the certifier read its task file again, whole or not at all",
-      [](const Options& options) { return Command(options, command_t::RELOAD); });
+Command StatusCommand() {
+  return BusCommand("status", "Show the certifier's heartbeat: exit 0 if it would certify now, else 1", ShowStatus);
+}
 
-  AddKeygenCommand(app, action);
+Command ResetCommand() {
+  return BusCommand("reset", "Clear a fault that the certifier and the robot have latched",
+                    [](const Options& options) { return Send(options, command_t::RESET); });
+}
+
+Command ReloadCommand() {
+  return BusCommand("reload", "Have the certifier read its task file again, whole or not at all",
+                    [](const Options& options) { return Send(options, command_t::RELOAD); });
+}
+
+Command KeygenCommand() {
+  struct Options {
+    std::string robot, directory;
+  };
+  const auto options = std::make_shared<Options>();
+  return {
+      .name = "keygen",
+      .purpose = "Make the keys of one robot: a directory with one key file for each role",
+      .footer =
+          "Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or name it under "
+          "bus.key in the task file. On another machine a process needs its own role's file alone, as in\n"
+          "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub holds no secret: report, "
+          "replay and verify judge logs by it.",
+      .options = {{.name = "--robot",
+                   .variable = &options->robot,
+                   .type = "NAME",
+                   .help = "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature",
+                   .required = true},
+                  {.name = "directory",
+                   .variable = &options->directory,
+                   .type = "DIR",
+                   .help = "The new directory",
+                   .required = true}},
+      .run = [options] {
+        MakeKeys(options->robot, options->directory);
+        std::cout << options->directory << std::endl;
+        return 0;
+      }};
 }
 
 }  // namespace forereach

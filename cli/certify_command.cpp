@@ -1,8 +1,6 @@
 #include <chrono>
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include "certifier/certify/explain.h"
 #include "certifier/numerics/text.h"
 #include "cli/commands.h"
@@ -58,18 +56,20 @@ int Certify(const Options& options) {
 
 }  // namespace
 
-void AddCertifyCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("certify", "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input");
-  command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
-  command->add_option("--plan", options->plan, "Controls, one row a step (CSV with a header)")
-      ->required()
-      ->type_name("FILE.csv");
-  command->add_flag("--json", options->json, "One JSON document on standard output, and nothing else there");
-  command->footer(
-      "Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv");
-  command->callback([options, &action] { action = [options] { return Certify(*options); }; });
+Command CertifyCommand() {
+  const auto options = std::make_shared<Options>();
+  return {
+      .name = "certify",
+      .purpose = "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input",
+      .footer = "Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv",
+      .options = {ConfigOption(options->config),
+                  {.name = "--plan",
+                   .variable = &options->plan,
+                   .type = "FILE.csv",
+                   .help = "Controls, one row a step (CSV with a header)",
+                   .required = true},
+                  JsonFlag(options->json, "One JSON document on standard output, and nothing else there")},
+      .run = [options] { return Certify(*options); }};
 }
 
 }  // namespace forereach

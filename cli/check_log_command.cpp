@@ -1,8 +1,6 @@
 #include <algorithm>
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include "cli/commands.h"
 #include "logger/check.h"
 #include "logger/json_text.h"
@@ -23,17 +21,21 @@ int RunCheckLog(const Options& options) {
 
 }  // namespace
 
-void AddCheckLogCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "check-log",
-      "Hold a logger's directory against itself: exit 0 if every event that a row of the database comes from "
-      "is in its log unchanged and no log is damaged or unknown to it, else 1; logs deleted for the quota "
-      "are no fault");
-  command->add_option("directory", options->directory, "The logger's directory")->required()->type_name("DIRECTORY");
-  command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->footer("Example:\n  forereach check-log run/log");
-  command->callback([options, &action] { action = [options] { return RunCheckLog(*options); }; });
+Command CheckLogCommand() {
+  const auto options = std::make_shared<Options>();
+  return {.name = "check-log",
+          .purpose =
+              "Hold a logger's directory against itself: exit 0 if every event that a row of the database comes "
+              "from is in its log unchanged and no log is damaged or unknown to it, else 1; logs deleted for "
+              "the quota are no fault",
+          .footer = "Example:\n  forereach check-log run/log",
+          .options = {{.name = "directory",
+                       .variable = &options->directory,
+                       .type = "DIRECTORY",
+                       .help = "The logger's directory",
+                       .required = true},
+                      JsonFlag(options->json)},
+          .run = [options] { return RunCheckLog(*options); }};
 }
 
 }  // namespace forereach

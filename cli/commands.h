@@ -1,12 +1,9 @@
-/** The subcommands of `forereach`. Each adds its options to the command line and, if it is the one called, leaves in
-`action` what to do; the action's result is the exit code: 0 as hoped, 1 not, 2 bad input. */
+/** The subcommands of `forereach`. Each one's exit code: 0 as hoped, 1 not, 2 bad input. */
 #pragma once
 
-#include <functional>
+#include <string>
 
-namespace CLI {
-class App;
-}
+#include "command_line/command_line.h"
 
 namespace forereach {
 
@@ -16,20 +13,31 @@ inline constexpr const char* kLogs = "LCM event log; several if the run was reco
 inline constexpr const char* kTaskOfLogs =
     "The task file it was recorded with; by default the one that the logger kept beside the log, in tasks/";
 
-using Action = std::function<int()>;
+// Options that several commands share.
+[[nodiscard]] inline Option ConfigOption(std::string& path, const char* help = "Task file (YAML)") {
+  return {.name = "--config", .variable = &path, .type = "FILE", .help = help, .required = true};
+}
+[[nodiscard]] inline Option JsonFlag(bool& json, const char* help = "One JSON document on standard output") {
+  return {.name = "--json", .variable = &json, .help = help};
+}
+[[nodiscard]] inline Option JobsOption(unsigned& jobs) {
+  return {.name = "--jobs", .variable = &jobs, .help = "Threads", .range = Between{1, 256}};
+}
 
-void AddCertifyCommand(CLI::App& app, Action& action);
-void AddPlanCommand(CLI::App& app, Action& action);
-void AddDeclareCommand(CLI::App& app, Action& action);
-void AddVerifyCommand(CLI::App& app, Action& action);
-void AddReplayCommand(CLI::App& app, Action& action);
-void AddReportCommand(CLI::App& app, Action& action);
-void AddCheckLogCommand(CLI::App& app, Action& action);
-void AddRunCommand(CLI::App& app, Action& action);
-void AddObstaclesCommand(CLI::App& app, Action& action);
-void AddDoctorCommand(CLI::App& app, Action& action);
-void AddKeysCommand(CLI::App& app, Action& action);
-/** status, reset, reload and keygen. */
-void AddBusCommands(CLI::App& app, Action& action);
+[[nodiscard]] Command CertifyCommand();
+[[nodiscard]] Command PlanCommand();
+[[nodiscard]] Command DeclareCommand();
+[[nodiscard]] Command VerifyCommand();
+[[nodiscard]] Command ReplayCommand();
+[[nodiscard]] Command ReportCommand();
+[[nodiscard]] Command CheckLogCommand();
+[[nodiscard]] Command RunCommand();
+[[nodiscard]] Command ObstaclesCommand();
+[[nodiscard]] Command DoctorCommand();
+[[nodiscard]] Command KeysCommand();
+[[nodiscard]] Command StatusCommand();
+[[nodiscard]] Command ResetCommand();
+[[nodiscard]] Command ReloadCommand();
+[[nodiscard]] Command KeygenCommand();
 
 }  // namespace forereach

@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <thread>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "certifier/declare/slope_bound.h"
@@ -288,51 +287,46 @@ int CheckCover(const Options& options) {
 
 }  // namespace
 
-void AddDeclareCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "declare",
-      "Bound how fast an analytic residual changes, over the whole domain and all its parameters: a declaration that "
-      "is proved. Exit 0 if every bound is within --gap of a point found, 1 if --max-boxes came first, 2 bad input");
-  command->add_option("--config", options->config, "Task file (YAML) with a section `residual`")
-      ->required()
-      ->type_name("FILE");
-  command
-      ->add_option("--gap", options->search.gap,
-                   "Ends when no bound is above the largest slope found by more than this part")
-      ->check(CLI::Validator(  // CLI::Range takes NaN
-          [](const std::string& text) {
-            double gap = 0;
-            const bool good = CLI::detail::lexical_cast(text, gap) && 1e-12 <= gap && gap <= 1e3;
-            return good ? std::string() : "Value " + text + " not in range 1e-12 to 1000";
-          },
-          "FLOAT in [1e-12 - 1000]"))
-      ->capture_default_str();
-  command->add_option("--max-boxes", options->search.max_boxes, "Ends here too, for each bound; what it has then holds")
-      ->check(CLI::Range(1u, 100'000'000u))
-      ->capture_default_str();
-  command->add_option("--cover", options->cover, "Where to leave the proof: the boxes, and a bound for each")
-      ->type_name("FILE.json");
-  CLI::Option* check = command
-                           ->add_option("--check", options->check,
-                                        "Check such a file instead, in 128 bits and with formulas of its own: exit 0 "
-                                        "confirmed, 1 not")
-                           ->type_name("FILE.json");
-  check->excludes("--cover");
-  command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON document on standard output; the matrix is `lipschitz`");
-  command->footer(
-      "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
-      "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
-      "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope found.\n"
-      "The last line of the output goes into the task file.\n\n"
-      "Examples:\n"
-      "  forereach declare --config config/bicycle.yaml\n"
-      "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
-      "  forereach declare --config config/point_mass.yaml --check cover.json");
-  command->callback([options, &action] {
-    action = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); };
-  });
+Command DeclareCommand() {
+  const auto options = std::make_shared<Options>();
+  return {
+      .name = "declare",
+      .purpose =
+          "Bound how fast an analytic residual changes, over the whole domain and all its parameters: a "
+          "declaration that is proved. Exit 0 if every bound is within --gap of a point found, 1 if --max-boxes "
+          "came first, 2 bad input",
+      .footer =
+          "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
+          "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
+          "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
+          "found.\n"
+          "The last line of the output goes into the task file.\n\n"
+          "Examples:\n"
+          "  forereach declare --config config/bicycle.yaml\n"
+          "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
+          "  forereach declare --config config/point_mass.yaml --check cover.json",
+      .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
+                  {.name = "--gap",
+                   .variable = &options->search.gap,
+                   .help = "Ends when no bound is above the largest slope found by more than this part",
+                   .range = Between{1e-12, 1e3}},
+                  {.name = "--max-boxes",
+                   .variable = &options->search.max_boxes,
+                   .help = "Ends here too, for each bound; what it has then holds",
+                   .range = Between{1, 100'000'000}},
+                  {.name = "--cover",
+                   .variable = &options->cover,
+                   .type = "FILE.json",
+                   .help = "Where to leave the proof: the boxes, and a bound for each"},
+                  {.name = "--check",
+                   .variable = &options->check,
+                   .type = "FILE.json",
+                   .help = "Check such a file instead, in 128 bits and with formulas of its own: exit 0 confirmed, 1 "
+                           "not",
+                   .excludes = "--cover"},
+                  JobsOption(options->jobs),
+                  JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
+      .run = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); }};
 }
 
 }  // namespace forereach

@@ -15,7 +15,6 @@
 #include <thread>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "bus/bus.h"
@@ -185,25 +184,29 @@ int Diagnose(const BusOptions& bus, bool json) {
 
 }  // namespace
 
-void AddDoctorCommand(CLI::App& app, Action& action) {
+Command DoctorCommand() {
   struct Options {
     std::string config;
     BusArguments bus;
     bool json = false;
   };
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("doctor", "Check the bus: route, buffers, a round trip; and say what to do");
-  command->add_option("--config", options->config, "A task file: its bus and its keys")->type_name("FILE");
-  options->bus.AddTo(*command);
-  command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->callback([options, &action] {
-    action = [options] {
-      BusOptions bus =
-          options->config.empty() ? BusOptions() : LoadConfig(options->config, TransitionsFile::kIgnore).bus;
-      options->bus.Override(bus);
-      return Diagnose(bus, options->json);
-    };
-  });
+  const auto options = std::make_shared<Options>();
+  Command command{.name = "doctor",
+                  .purpose = "Check the bus: route, buffers, a round trip; and say what to do",
+                  .options = {{.name = "--config",
+                               .variable = &options->config,
+                               .type = "FILE",
+                               .help = "A task file: its bus and its keys"},
+                              JsonFlag(options->json)},
+                  .run = [options] {
+                    BusOptions bus = options->config.empty()
+                                         ? BusOptions()
+                                         : LoadConfig(options->config, TransitionsFile::kIgnore).bus;
+                    options->bus.Override(bus);
+                    return Diagnose(bus, options->json);
+                  }};
+  options->bus.AddTo(command.options);
+  return command;
 }
 
 }  // namespace forereach

@@ -1,18 +1,21 @@
 #include "cli/log_trust.h"
 
-#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "logger/log_authenticator.h"
 
 namespace forereach {
 
-void LogKey::AddTo(CLI::App& command) {
-  CLI::Option* option = command.add_option(
-      "--key", file,
-      "Directory of keys, verify.pub or any key file: messages of a log that its roles did not sign are passed over; "
-      "by default the task file's bus.key");
-  option->type_name("PATH");
-  command.add_flag("--no-key", none, "Believe every message of a log, whoever sent it")->excludes(option);
+void LogKey::AddTo(std::vector<Option>& options) {
+  options.push_back({.name = "--key",
+                     .variable = &file,
+                     .type = "PATH",
+                     .help = "Directory of keys, verify.pub or any key file: messages of a log that its roles did not "
+                             "sign are passed over; by default the task file's bus.key"});
+  options.push_back({.name = "--no-key",
+                     .variable = &none,
+                     .help = "Believe every message of a log, whoever sent it",
+                     .excludes = "--key"});
 }
 
 void LogKey::Override(BusOptions& options) const {

@@ -5,14 +5,11 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "bus/authentic.h"
 #include "certifier/task/config.h"
-
-namespace CLI {
-class App;
-}
+#include "command_line/command_line.h"
 
 namespace forereach {
 
@@ -21,7 +18,7 @@ struct LogKey {
   std::string file;
   bool none = false;  ///< Everything is believed, whoever sent it.
 
-  void AddTo(CLI::App& command);
+  void AddTo(std::vector<Option>& options);
   void Override(BusOptions& options) const;
   /** Of a task that the logger kept, beside which there is no key. @throws ConfigError if it has one and the command
   line does not say which. */

@@ -1,10 +1,9 @@
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include <spdlog/spdlog.h>
-#include <CLI/CLI.hpp>
-
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/task/key.h"
@@ -19,7 +18,7 @@ constexpr double kMaxPeriodMs = 3.6e6;
 struct Options {
   std::string config;
   BusArguments bus;
-  double period_ms = 0;  // 0: of the task
+  std::optional<double> period_ms;
 };
 
 // Stands in for perception: it sees what a task file says.
@@ -63,7 +62,7 @@ int Send(const Options& options) {
   if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
   const std::unique_ptr<Bus> bus = OpenBus(config.bus, Role::kPerception);
   const std::int64_t period_us =
-      options.period_ms > 0 ? Microseconds(options.period_ms) : ObstacleSender::PeriodUs(config.gate);
+      options.period_ms ? Microseconds(*options.period_ms) : ObstacleSender::PeriodUs(config.gate);
   if (3 * period_us > Microseconds(config.gate.obstacles_timeout_ms))
     spdlog::warn(
         "every {} ms is less often than three times in gate.obstacles_timeout_ms: one lost message stops the robot",
@@ -77,26 +76,25 @@ int Send(const Options& options) {
 
 }  // namespace
 
-void AddObstaclesCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "obstacles",
-      "Send a task file's obstacles on the bus, again and again, until SIGTERM: stands in for perception. "
-      "SIGHUP reads the file again");
-  command->add_option("--config", options->config, "Task file (YAML) that has the obstacles and names the bus")
-      ->required()
-      ->type_name("FILE");
-  options->bus.AddTo(*command);
-  command
-      ->add_option("--period-ms", options->period_ms,
-                   "From one message to the next; by default a quarter of "
-                   "gate.obstacles_timeout_ms")
-      ->check(CLI::Range(1.0, kMaxPeriodMs))
-      ->type_name("MS");
-  command->footer(
-      "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nA certifier whose task says "
-      "gate.obstacles: bus certifies nothing before it has heard them, nor when they have fallen silent.");
-  command->callback([options, &action] { action = [options] { return Send(*options); }; });
+Command ObstaclesCommand() {
+  const auto options = std::make_shared<Options>();
+  Command command{
+      .name = "obstacles",
+      .purpose =
+          "Send a task file's obstacles on the bus, again and again, until SIGTERM: stands in for perception. "
+          "SIGHUP reads the file again",
+      .footer =
+          "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nA certifier whose task says "
+          "gate.obstacles: bus certifies nothing before it has heard them, nor when they have fallen silent.",
+      .options = {ConfigOption(options->config, "Task file (YAML) that has the obstacles and names the bus"),
+                  {.name = "--period-ms",
+                   .variable = &options->period_ms,
+                   .type = "MS",
+                   .help = "From one message to the next; by default a quarter of gate.obstacles_timeout_ms",
+                   .range = Between{1, kMaxPeriodMs}}},
+      .run = [options] { return Send(*options); }};
+  options->bus.AddTo(command.options);
+  return command;
 }
 
 }  // namespace forereach

@@ -5,8 +5,6 @@
 #include <sstream>
 #include <stdexcept>
 
-#include <CLI/CLI.hpp>
-
 #include "certifier/certify/explain.h"
 #include "certifier/task/config.h"
 #include "cli/commands.h"
@@ -81,23 +79,28 @@ int MakePlan(const Options& options) {
 
 }  // namespace
 
-void AddPlanCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "plan",
-      "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a CSV file, 1 if none was "
-      "found, 2 bad input");
-  command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
-  command->add_option("--out", options->out, "Where to write the controls")->required()->type_name("FILE.csv");
-  command->add_option("--seed", options->seed, "The same seed gives the same plan")
-      ->check(CLI::Range(std::uint32_t{0}, std::numeric_limits<std::uint32_t>::max()))
-      ->capture_default_str();
-  command->footer(
-      "The task's planner proposes, the task's certifier decides on each candidate. The plan that is written is "
-      "certified\n"
-      "and ends in a stop. It goes as far towards the goal as a plan could be certified.\n\n"
-      "Example:\n  forereach plan --config config/demo.yaml --out plan.csv");
-  command->callback([options, &action] { action = [options] { return MakePlan(*options); }; });
+Command PlanCommand() {
+  const auto options = std::make_shared<Options>();
+  return {.name = "plan",
+          .purpose =
+              "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a CSV file, 1 if "
+              "none was found, 2 bad input",
+          .footer =
+              "The task's planner proposes, the task's certifier decides on each candidate. The plan that is "
+              "written is certified\n"
+              "and ends in a stop. It goes as far towards the goal as a plan could be certified.\n\n"
+              "Example:\n  forereach plan --config config/demo.yaml --out plan.csv",
+          .options = {ConfigOption(options->config),
+                      {.name = "--out",
+                       .variable = &options->out,
+                       .type = "FILE.csv",
+                       .help = "Where to write the controls",
+                       .required = true},
+                      {.name = "--seed",
+                       .variable = &options->seed,
+                       .help = "The same seed gives the same plan",
+                       .range = Between{0, std::numeric_limits<std::uint32_t>::max()}}},
+          .run = [options] { return MakePlan(*options); }};
 }
 
 }  // namespace forereach

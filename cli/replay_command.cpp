@@ -1,7 +1,5 @@
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include "cli/commands.h"
 #include "cli/replay.h"
 #include "lcmtypes/printable.h"
@@ -51,23 +49,25 @@ int RunReplay(const Options& options) {
 
 }  // namespace
 
-void AddReplayCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "replay", "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1");
-  command->add_option("logs", options->logs, kLogs)->required()->type_name("LOG");
-  CLI::Option* config = command->add_option("--config", options->config, kTaskOfLogs);
-  config->type_name("FILE");
-  command
-      ->add_flag("--other-task", options->other_task,
-                 "Put it through the gate of another task, the one of --config: what would it have decided?")
-      ->needs(config);
-  options->key.AddTo(*command);
-  command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->footer(
-      "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
-      "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config config/demo.yaml");
-  command->callback([options, &action] { action = [options] { return RunReplay(*options); }; });
+Command ReplayCommand() {
+  const auto options = std::make_shared<Options>();
+  Command command{
+      .name = "replay",
+      .purpose = "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1",
+      .footer =
+          "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
+          "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config "
+          "config/demo.yaml",
+      .options = {{.name = "logs", .variable = &options->logs, .type = "LOG", .help = kLogs, .required = true},
+                  {.name = "--config", .variable = &options->config, .type = "FILE", .help = kTaskOfLogs},
+                  {.name = "--other-task",
+                   .variable = &options->other_task,
+                   .help = "Put it through the gate of another task, the one of --config: what would it have decided?",
+                   .needs = "--config"},
+                  JsonFlag(options->json)},
+      .run = [options] { return RunReplay(*options); }};
+  options->key.AddTo(command.options);
+  return command;
 }
 
 }  // namespace forereach

@@ -1,7 +1,5 @@
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
 #include "certifier/task/key.h"
@@ -58,15 +56,23 @@ int Run(const Options& options) {
 
 }  // namespace
 
-void AddRunCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
-      "run", "Planner, certifier, robot and logger in this one process, on LCM's in-memory bus and a simulated clock");
-  command->add_option("--config", options->config, "Task file (YAML)")->required()->type_name("FILE");
-  command->add_option("--directory", options->directory, "Where the logger writes")->type_name("DIR");
-  command->add_option("--key", options->key, "Directory of keys; by default the task file's bus.key")->type_name("DIR");
-  command->footer("Example:\n  forereach run --config config/demo.yaml --directory run/log");
-  command->callback([options, &action] { action = [options] { return Run(*options); }; });
+Command RunCommand() {
+  const auto options = std::make_shared<Options>();
+  return {.name = "run",
+          .purpose =
+              "Planner, certifier, robot and logger in this one process, on LCM's in-memory bus and a simulated "
+              "clock",
+          .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
+          .options = {ConfigOption(options->config),
+                      {.name = "--directory",
+                       .variable = &options->directory,
+                       .type = "DIR",
+                       .help = "Where the logger writes"},
+                      {.name = "--key",
+                       .variable = &options->key,
+                       .type = "DIR",
+                       .help = "Directory of keys; by default the task file's bus.key"}},
+          .run = [options] { return Run(*options); }};
 }
 
 }  // namespace forereach

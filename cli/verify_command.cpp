@@ -4,7 +4,6 @@
 #include <sstream>
 #include <thread>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "certifier/certify/certifier.h"
@@ -167,41 +166,42 @@ int Verify(const Options& options) {
 
 }  // namespace
 
-void AddVerifyCommand(CLI::App& app, Action& action) {
-  auto options = std::make_shared<Options>();
-  CLI::App* command =
-      app.add_subcommand("verify",
-                         "Derive recorded certificates anew, in high precision and with code of its own: exit 0 if "
-                         "there are any and all are "
-                         "confirmed, 1 with the first that is not and the first step of it that fails, 2 bad input");
-  command
-      ->add_option("files", options->files,
-                   "What holds the certificates: a decision (the output of certify --json), an LCM event log (several "
-                   "if the run "
-                   "was recorded in several, in their order), or a decision database with its logs beside it, or the "
-                   "directory of both")
-      ->required()
-      ->type_name("DECISION|LOG|DATABASE|DIRECTORY");
-  command
-      ->add_option(
-          "--config", options->config,
-          "The task file they were made with; by default the one that a decision names, or that the logger kept "
-          "beside a log, in tasks/")
-      ->type_name("FILE");
-  options->key.AddTo(*command);
-  command->add_option("--jobs", options->jobs, "Threads")->check(CLI::Range(1u, 256u))->capture_default_str();
-  command->add_flag("--json", options->json, "One JSON document on standard output");
-  command->footer(
-      "Each certificate is held against the digests of its inputs, then against a tube derived anew from these: every\n"
-      "recorded number has to cover what was derived, and the derived tube has to keep clear of every obstacle.\n"
-      "Abstentions claim nothing and are not verified.\n\n"
-      "Examples:\n"
-      "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > "
-      "decision.json\n"
-      "  forereach verify decision.json\n"
-      "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
-      "  forereach verify run/log");
-  command->callback([options, &action] { action = [options] { return Verify(*options); }; });
+Command VerifyCommand() {
+  const auto options = std::make_shared<Options>();
+  Command command{
+      .name = "verify",
+      .purpose =
+          "Derive recorded certificates anew, in high precision and with code of its own: exit 0 if there are "
+          "any and all are confirmed, 1 with the first that is not and the first step of it that fails, 2 bad "
+          "input",
+      .footer =
+          "Each certificate is held against the digests of its inputs, then against a tube derived anew from these: "
+          "every\n"
+          "recorded number has to cover what was derived, and the derived tube has to keep clear of every obstacle.\n"
+          "Abstentions claim nothing and are not verified.\n\n"
+          "Examples:\n"
+          "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > "
+          "decision.json\n"
+          "  forereach verify decision.json\n"
+          "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
+          "  forereach verify run/log",
+      .options = {{.name = "files",
+                   .variable = &options->files,
+                   .type = "DECISION|LOG|DATABASE|DIRECTORY",
+                   .help = "What holds the certificates: a decision (the output of certify --json), an LCM event log "
+                           "(several if the run was recorded in several, in their order), or a decision database with "
+                           "its logs beside it, or the directory of both",
+                   .required = true},
+                  {.name = "--config",
+                   .variable = &options->config,
+                   .type = "FILE",
+                   .help = "The task file they were made with; by default the one that a decision names, or that the "
+                           "logger kept beside a log, in tasks/"},
+                  JobsOption(options->jobs),
+                  JsonFlag(options->json)},
+      .run = [options] { return Verify(*options); }};
+  options->key.AddTo(command.options);
+  return command;
 }
 
 }  // namespace forereach

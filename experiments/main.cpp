@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <thread>
 
-#include <CLI/CLI.hpp>
-
+#include "command_line/command_line.h"
 #include "experiments/chunks/training.h"
 #include "experiments/run.h"
 
@@ -43,47 +43,55 @@ void Train(const std::string& file, unsigned threads) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  using namespace forereach;
   RunOptions options;
   bool quick = false;
-  int seeds = 0;
+  std::optional<int> seeds;
   options.threads = std::max(1u, std::thread::hardware_concurrency());
   std::string directory, report;
 
-  CLI::App app("The paper's experiments, done again.", "forereach-experiments");
-  app.footer(kFooter);
-  app.require_subcommand(1);
-  app.fallthrough();
-  app.add_flag("--quick", quick, "2 seeds, 30 plans a group, 24 rollouts a plan, the smallest and largest N");
-  app.add_option("--seeds", seeds, "how many seeds, 1 to 1000; the paper has 10")->check(CLI::Range(1, 1000));
-  app.add_option("--threads", options.threads, "how many cells at once; results do not depend on it")
-      ->check(CLI::Range(1u, 1024u))
-      ->capture_default_str();
-  app.add_option("--out", directory,
-                 "directory of results; default run/experiments, with --quick run/experiments-quick");
-  app.add_option("--report", report, "where the report goes; default report.md in --out");
-  for (const Experiment& experiment : Experiments()) app.add_subcommand(experiment.name, experiment.about);
-  app.add_subcommand("all", "all of them, in this order");
-  std::string policy = "config/policies/bicycle.json";
-  CLI::App* const train = app.add_subcommand("train", "make the policy that `chunks` asks for its plans");
-  train->add_option("--policy", policy, "where it goes")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  std::string name, policy = "config/policies/bicycle.json";
+  Command program{
+      .name = "forereach-experiments",
+      .purpose = "The paper's experiments, done again.",
+      .footer = kFooter,
+      .options = {{.name = "--quick",
+                   .variable = &quick,
+                   .help = "2 seeds, 30 plans a group, 24 rollouts a plan, the smallest and largest N"},
+                  {.name = "--seeds",
+                   .variable = &seeds,
+                   .help = "how many seeds; the paper has 10",
+                   .range = Between{1, 1000}},
+                  {.name = "--threads",
+                   .variable = &options.threads,
+                   .help = "how many cells at once; results do not depend on it",
+                   .range = Between{1, 1024}},
+                  {.name = "--out",
+                   .variable = &directory,
+                   .help = "directory of results; default run/experiments, with --quick run/experiments-quick"},
+                  {.name = "--report",
+                   .variable = &report,
+                   .help = "where the report goes; default report.md in --out"}},
+      .chosen = &name};
+  for (const Experiment& experiment : Experiments())
+    program.commands.push_back({.name = experiment.name, .purpose = experiment.about});
+  program.commands.push_back({.name = "all", .purpose = "all of them, in this order"});
+  program.commands.push_back({.name = "train",
+                              .purpose = "make the policy that `chunks` asks for its plans",
+                              .options = {{.name = "--policy", .variable = &policy, .help = "where it goes"}}});
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
-  const std::string name = app.get_subcommands().front()->get_name();
   for (const Experiment& experiment : Experiments())
     if (name == experiment.name || name == "all") options.names.push_back(experiment.name);
   options.scope.quick = quick;
   if (quick) options.scope.seeds = kQuickSeeds, options.effort = kQuickEffort;
-  if (seeds > 0) options.scope.seeds = seeds;
+  if (seeds) options.scope.seeds = *seeds;
   options.directory = !directory.empty() ? directory : quick ? "run/experiments-quick" : "run/experiments";
   options.report = report;
   options.command =
-      "experiments/run " + name + (quick ? " --quick" : "") + (seeds > 0 ? " --seeds " + std::to_string(seeds) : "");
+      "experiments/run " + name + (quick ? " --quick" : "") + (seeds ? " --seeds " + std::to_string(*seeds) : "");
   try {
-    if (train->parsed()) return Train(policy, options.threads), 0;
+    if (name == "train") return Train(policy, options.threads), 0;
     RunExperiments(options, std::cout);
   } catch (const std::exception& error) {
     std::cerr << "forereach-experiments: " << error.what() << "\n";

@@ -2,8 +2,6 @@
 #include <memory>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "certifier/task/process.h"
 #include "logger/logger_node.h"
 
@@ -24,8 +22,9 @@ int main(int argc, char** argv) {
       throw ConfigError(std::string("logger.directory: ") + error.what());
     }
   };
-  return RunProcess(argc, argv, description, make_node, [&directory](CLI::App& app) {
-    app.add_option("--directory", directory, "Where to write; by default the task file's logger.directory")
-        ->type_name("DIR");
-  });
+  return RunProcess(argc, argv, description, make_node,
+                    {{.name = "--directory",
+                      .variable = &directory,
+                      .type = "DIR",
+                      .help = "Where to write; by default the task file's logger.directory"}});
 }

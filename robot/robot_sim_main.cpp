@@ -5,9 +5,8 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
-
-#include <CLI/CLI.hpp>
 
 #include "certifier/task/config.h"
 #include "certifier/task/process.h"
@@ -26,19 +25,23 @@ struct SampleOptions {
   std::vector<std::string> ranges;
 };
 
-void AddSampleOptions(CLI::App& app, SampleOptions& options) {
-  auto* make = app.add_option("--make-transitions", options.output,
-                              "Instead of driving: write transitions of the target to this CSV file, and end")
-                   ->type_name("FILE");
-  app.add_option("--seed", options.seed, "Seed of the samples")->needs(make)->capture_default_str();
-  app.add_option("--count", options.count, "How many transitions")
-      ->needs(make)
-      ->check(CLI::Range(1, 10'000'000))
-      ->capture_default_str();
-  app.add_option("--range", options.ranges,
-                 "Narrows one coordinate of the domain, as in v=7.25:15.75; once for each coordinate")
-      ->needs(make)
-      ->type_name("NAME=LOWER:UPPER");
+std::vector<Option> Declared(SampleOptions& options) {
+  constexpr const char* kMake = "--make-transitions";
+  return {{.name = kMake,
+           .variable = &options.output,
+           .type = "FILE",
+           .help = "Instead of driving: write transitions of the target to this CSV file, and end"},
+          {.name = "--seed", .variable = &options.seed, .help = "Seed of the samples", .needs = kMake},
+          {.name = "--count",
+           .variable = &options.count,
+           .help = "How many transitions",
+           .range = Between{1, 10'000'000},
+           .needs = kMake},
+          {.name = "--range",
+           .variable = &options.ranges,
+           .type = "NAME=LOWER:UPPER",
+           .help = "Narrows one coordinate of the domain, as in v=7.25:15.75; once for each coordinate",
+           .needs = kMake}};
 }
 
 // All of `text` as a number.
@@ -73,14 +76,18 @@ void WriteTransitions(const std::string& config_path, const SampleOptions& optio
 }
 
 int RunWriteTransitions(int argc, char** argv) {
-  CLI::App app("Writes transitions of the task file's target, uniform over its domain.", kName);
   std::string config_path;
-  SampleOptions options;
-  app.add_option("--config", config_path, "The task file (YAML)")->required()->type_name("FILE");
-  AddSampleOptions(app, options);
-  if (const std::optional<int> code = ParseCommandLine(app, argc, argv)) return *code;
+  SampleOptions sample;
+  std::vector<Option> options = Declared(sample);
+  options.insert(
+      options.begin(),
+      {.name = "--config", .variable = &config_path, .type = "FILE", .help = "The task file (YAML)", .required = true});
+  const Command program{.name = kName,
+                        .purpose = "Writes transitions of the task file's target, uniform over its domain.",
+                        .options = std::move(options)};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   return Guarded(kName, [&] {
-    WriteTransitions(config_path, options);
+    WriteTransitions(config_path, sample);
     return 0;
   });
 }
@@ -106,6 +113,5 @@ int main(int argc, char** argv) {
        "  forereach-robot-sim --config config/demo.yaml --make-transitions made.csv --seed 1 --count 400 "
        "--range v=7.25:15.75",
        Role::kRobot},
-      [](const Config& config, Bus& bus) { return std::make_unique<RobotSimNode>(config, bus); },
-      [&](CLI::App& app) { AddSampleOptions(app, for_help); });
+      [](const Config& config, Bus& bus) { return std::make_unique<RobotSimNode>(config, bus); }, Declared(for_help));
 }

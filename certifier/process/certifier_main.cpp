@@ -2,8 +2,6 @@
 #include <string>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-
 #include "certifier/process/certifier_node.h"
 #include "certifier/process/latch_file.h"
 #include "certifier/process/realtime.h"
@@ -25,8 +23,8 @@ int main(int argc, char** argv) {
         BecomeRealtime(config.realtime);
         return node;
       },
-      [&state](CLI::App& app) {
-        app.add_option("--state", state, "Where a latched fault is kept; by default the task file's gate.state")
-            ->type_name("DIR");
-      });
+      {{.name = "--state",
+        .variable = &state,
+        .type = "DIR",
+        .help = "Where a latched fault is kept; by default the task file's gate.state"}});
 }

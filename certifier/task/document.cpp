@@ -14,8 +14,8 @@
 
 #include "certifier/task/config.h"
 #include "certifier/task/files.h"
-#include "certifier/task/nearest.h"
 #include "certifier/task/number.h"
+#include "command_line/nearest.h"
 
 namespace forereach {
 namespace {

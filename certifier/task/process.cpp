@@ -8,7 +8,6 @@
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
-#include <CLI/CLI.hpp>
 
 #include "bus/authentic_bus.h"
 #include "certifier/task/key.h"
@@ -104,10 +103,13 @@ std::unique_ptr<Bus> OpenBusOfAllRoles(const BusOptions& options, Clock clock) {
   return Open(options, AllKeysOf(options), std::move(clock));
 }
 
-void BusArguments::AddTo(CLI::App& app) {
-  app.add_option("--lcm-url", url, "The bus; by default the task file's bus.url")->type_name("URL");
-  app.add_option("--key", key, "Directory of keys, or this role's key file; by default the task file's bus.key")
-      ->type_name("PATH");
+void BusArguments::AddTo(std::vector<Option>& options) {
+  options.push_back(
+      {.name = "--lcm-url", .variable = &url, .type = "URL", .help = "The bus; by default the task file's bus.url"});
+  options.push_back({.name = "--key",
+                     .variable = &key,
+                     .type = "PATH",
+                     .help = "Directory of keys, or this role's key file; by default the task file's bus.key"});
 }
 
 void BusArguments::Override(BusOptions& options) const {
@@ -118,15 +120,19 @@ void BusArguments::Override(BusOptions& options) const {
 }
 
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
-               const std::function<void(CLI::App&)>& add_options) {
-  CLI::App app(description.purpose, description.name);
-  app.footer("Example:\n  " + description.example + "\n\nThe keys of a task file are explained in config/README.md.");
+               std::vector<Option> options) {
   std::string config_path;
   BusArguments bus_arguments;
-  app.add_option("--config", config_path, "The task file (YAML)")->required()->type_name("FILE");
-  bus_arguments.AddTo(app);
-  if (add_options) add_options(app);
-  if (const std::optional<int> code = ParseCommandLine(app, argc, argv)) return *code;
+  std::vector<Option> common{
+      {.name = "--config", .variable = &config_path, .type = "FILE", .help = "The task file (YAML)", .required = true}};
+  bus_arguments.AddTo(common);
+  options.insert(options.begin(), common.begin(), common.end());
+  const Command program{
+      .name = description.name,
+      .purpose = description.purpose,
+      .footer = "Example:\n  " + description.example + "\n\nThe keys of a task file are explained in config/README.md.",
+      .options = std::move(options)};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   SetUpLog(description.name);
   CatchStopSignals();
   const int code = Guarded(description.name, [&] {

@@ -4,15 +4,12 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "bus/keys.h"
 #include "bus/node.h"
-#include "certifier/task/command_line.h"
 #include "certifier/task/config.h"
-
-namespace CLI {
-class App;
-}
+#include "command_line/command_line.h"
 
 namespace forereach {
 
@@ -34,17 +31,17 @@ using MakeNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& 
 /** `--lcm-url URL` and `--key PATH`, which take precedence over the task file. */
 struct BusArguments {
   std::string url, key;
-  void AddTo(CLI::App& app);
+  void AddTo(std::vector<Option>& options);
   void Override(BusOptions& options) const;
 };
 
 /** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key PATH` until it is done or gets SIGTERM or
 SIGINT.
-@param add_options adds a process's own options, if it has any.
+@param options a process's own options, if it has any.
 @return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other
 error. */
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
-               const std::function<void(CLI::App&)>& add_options = {});
+               std::vector<Option> options = {});
 
 /** Logs go to standard error, under this name, from here on. Control characters in a line are escaped: it may name what
 others chose. */

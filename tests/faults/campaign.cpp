@@ -21,8 +21,6 @@
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <CLI/CLI.hpp>
-
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
 #include "forereach/command_t.hpp"
@@ -1156,16 +1154,22 @@ bool IsClean(const Row& row, const Options& options) {
 
 int Main(int argc, char** argv) {
   Options options;
-  CLI::App app("Hurts the four processes in every way it knows, and says what happened.", "forereach_faults");
-  const CLI::Range some(1, 10'000'000);
-  app.add_option("--kills", options.kills, "SIGKILLs in all")->capture_default_str()->check(some);
-  app.add_option("--others", options.others, "Tries of each other fault")->capture_default_str()->check(some);
-  app.add_option("--flood", options.floods, "Candidates in the flood")->capture_default_str()->check(some);
-  app.add_option("--seed", options.seed, "Of the random moments")->capture_default_str();
-  AddReportOption(app, options.report);
-  app.add_option("--only", options.only, "One kind of faults")->check(CLI::IsMember(Campaign::kKinds));
-  app.add_flag("--allow-untried", options.allow_untried, "What cannot be tried here, without root, is no failure");
-  CLI11_PARSE(app, argc, argv);
+  const Between some{1, 10'000'000};
+  std::vector<std::string> kinds;
+  for (const auto& [name, run] : Campaign::kKinds) kinds.emplace_back(name);
+  const Command program{
+      .name = "forereach_faults",
+      .purpose = "Hurts the four processes in every way it knows, and says what happened.",
+      .options = {{.name = "--kills", .variable = &options.kills, .help = "SIGKILLs in all", .range = some},
+                  {.name = "--others", .variable = &options.others, .help = "Tries of each other fault", .range = some},
+                  {.name = "--flood", .variable = &options.floods, .help = "Candidates in the flood", .range = some},
+                  {.name = "--seed", .variable = &options.seed, .help = "Of the random moments"},
+                  ReportOption(options.report),
+                  {.name = "--only", .variable = &options.only, .help = "One kind of faults", .one_of = kinds},
+                  {.name = "--allow-untried",
+                   .variable = &options.allow_untried,
+                   .help = "What cannot be tried here, without root, is no failure"}}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   const std::vector<Row> rows = Campaign(options).Run();
   Publish(options.report, "faults", Table(rows, options));
   for (const Row& row : rows)

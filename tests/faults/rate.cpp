@@ -5,8 +5,6 @@
 #include <optional>
 #include <sstream>
 
-#include <CLI/CLI.hpp>
-
 #include "bus/authentic.h"
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
@@ -195,15 +193,18 @@ bool AddsUp(const Options& options, const Row& row) {
 
 int Main(int argc, char** argv) {
   Options options;
-  CLI::App app(
-      "Full-size candidates at a steady rate through the certifier; says what is answered and what the bus loses.",
-      "forereach_rate_processes");
-  app.add_option("--seconds", options.seconds, "How long, for each row")->capture_default_str();
-  app.add_option("--rate", options.rate, "Candidates a second")->capture_default_str();
-  app.add_option("--flood", options.flood, "Forged messages a second beside them: says what becomes of the honest ones")
-      ->capture_default_str();
-  AddReportOption(app, options.report);
-  CLI11_PARSE(app, argc, argv);
+  const Command program{
+      .name = "forereach_rate_processes",
+      .purpose =
+          "Full-size candidates at a steady rate through the certifier; says what is answered and what the bus "
+          "loses.",
+      .options = {{.name = "--seconds", .variable = &options.seconds, .help = "How long, for each row"},
+                  {.name = "--rate", .variable = &options.rate, .help = "Candidates a second"},
+                  {.name = "--flood",
+                   .variable = &options.flood,
+                   .help = "Forged messages a second beside them: says what becomes of the honest ones"},
+                  ReportOption(options.report)}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   const ScratchDirectory scratch;
   Config config = LoadConfig(scratch.Write("task.yaml", DemoTaskWithGate(kGate)));
   if (options.flood > 0) return MeasureFlood(options, config);

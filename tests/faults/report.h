@@ -6,7 +6,7 @@
 #include <sstream>
 #include <string>
 
-#include <CLI/CLI.hpp>
+#include "command_line/command_line.h"
 
 namespace forereach {
 
@@ -26,8 +26,8 @@ inline void ReplaceBetween(const std::string& path, const std::string& name, con
 }
 
 /** The option that says which page. */
-inline void AddReportOption(CLI::App& app, std::string& report) {
-  app.add_option("--report", report, "Where the table goes; empty: to standard output alone")->capture_default_str();
+inline Option ReportOption(std::string& report) {
+  return {.name = "--report", .variable = &report, .help = "Where the table goes; empty: to standard output alone"};
 }
 
 inline void Publish(const std::string& report, const std::string& name, const std::string& table) {

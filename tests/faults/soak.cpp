@@ -6,8 +6,6 @@
 #include <sstream>
 
 #include <unistd.h>
-#include <CLI/CLI.hpp>
-
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "logger/database.h"
@@ -207,12 +205,13 @@ std::vector<std::string> Soak::Judge() const {
 
 int Main(int argc, char** argv) {
   Options options;
-  CLI::App app("Certifier and logger under a steady load; says whether memory, latency and counters hold.",
-               "forereach_soak_processes");
-  app.add_option("--minutes", options.minutes, "How long")->capture_default_str();
-  app.add_option("--rate", options.rate, "Candidates a second")->capture_default_str();
-  AddReportOption(app, options.report);
-  CLI11_PARSE(app, argc, argv);
+  const Command program{
+      .name = "forereach_soak_processes",
+      .purpose = "Certifier and logger under a steady load; says whether memory, latency and counters hold.",
+      .options = {{.name = "--minutes", .variable = &options.minutes, .help = "How long"},
+                  {.name = "--rate", .variable = &options.rate, .help = "Candidates a second"},
+                  ReportOption(options.report)}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   Soak soak(options);
   soak.Run();
   const std::vector<std::string> faults = soak.Judge();

@@ -1,6 +1,5 @@
 // The certifier against the verifier: random problems and plans, certified by the one and derived anew by the other.
 // `forereach_differential --count N --seed S --jobs J`; exit 1 if a certificate is refuted. `--problem P` repeats one.
-#include <CLI/CLI.hpp>
 
 #include <array>
 #include <atomic>
@@ -8,12 +7,14 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "command_line/command_line.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
 #include "tests/verifier/record.h"
@@ -246,22 +247,27 @@ Counts RunProblem(std::uint64_t seed, long number, Method method, Tube& tube, st
 
 int main(int argc, char** argv) {
   using namespace forereach;
-  CLI::App app{"Certifies random plans of random problems and lets the verifier derive every certificate anew."};
   long count = 100000, only = -1;
   std::uint64_t seed = 1;
   unsigned jobs = 1;
   double seconds = 0;
-  app.add_option("--count", count, "Certify calls")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--seed", seed, "Of the random numbers")->capture_default_str();
-  app.add_option("--jobs", jobs, "Threads; the problems are the same for any number")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
   std::string method = "paper";
-  app.add_option("--method", method, "How the remainder is bounded")
-      ->check(CLI::IsMember({"paper", "centred"}))
-      ->capture_default_str();
-  app.add_option("--problem", only, "This problem only");
-  CLI11_PARSE(app, argc, argv);
+  const Between positive{1, 1e9};
+  const Command program{
+      .name = "forereach_differential",
+      .purpose = "Certifies random plans of random problems and lets the verifier derive every certificate anew.",
+      .options = {{.name = "--count", .variable = &count, .help = "Certify calls", .range = positive},
+                  {.name = "--seed", .variable = &seed, .help = "Of the random numbers"},
+                  {.name = "--jobs",
+                   .variable = &jobs,
+                   .help = "Threads; the problems are the same for any number",
+                   .range = positive},
+                  {.name = "--method",
+                   .variable = &method,
+                   .help = "How the remainder is bounded",
+                   .one_of = {"paper", "centred"}},
+                  {.name = "--problem", .variable = &only, .help = "This problem only; negative: all"}}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   const auto begin = std::chrono::steady_clock::now();
 
   std::atomic<long> next = only < 0 ? 0 : only, called = 0;

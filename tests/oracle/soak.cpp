@@ -1,12 +1,12 @@
 // Certify calls without end: random problems of both models and random queries, from typical to absurd, with the
 // promises of every outcome checked. `forereach_soak --count N --seed S`; exit 1 at the first broken promise, with what
 // repeats it.
-#include <CLI/CLI.hpp>
 
 #include <array>
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -14,6 +14,7 @@
 #include "certifier/certify/certifier.h"
 #include "certifier/certify/explain.h"
 #include "certifier/safety/separation.h"
+#include "command_line/command_line.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
 
@@ -155,12 +156,15 @@ class Soak {
 }  // namespace forereach
 
 int main(int argc, char** argv) {
-  CLI::App app{"Certifies random plans of random problems and checks what every outcome promises."};
+  using namespace forereach;
   long count = 100000;
   std::uint64_t seed = 1;
-  app.add_option("--count", count, "Certify calls")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--seed", seed, "Of the random numbers")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+  const Command program{
+      .name = "forereach_soak",
+      .purpose = "Certifies random plans of random problems and checks what every outcome promises.",
+      .options = {{.name = "--count", .variable = &count, .help = "Certify calls", .range = Between{1, 1e9}},
+                  {.name = "--seed", .variable = &seed, .help = "Of the random numbers"}}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   forereach::Soak soak(seed);
   try {
     soak.Run(count);

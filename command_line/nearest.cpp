@@ -1,4 +1,4 @@
-#include "certifier/task/nearest.h"
+#include "command_line/nearest.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,0 +1,54 @@
+/** The command line of a program, declared as data: what options there are, what each may be, where its value goes. */
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace forereach {
+
+inline constexpr int kExitBadInput = 2;
+
+/** Where the value of an option goes. What it holds before parsing is the option's default. A bool makes a flag, a
+vector an option that may be repeated. The option of an empty optional has no default. */
+using Variable = std::variant<bool*, int*, unsigned*, std::int64_t*, std::uint64_t*, double*, std::string*,
+                              std::optional<int>*, std::optional<double>*, std::vector<std::string>*>;
+
+/** Closed. A value outside, or one that is not a number of the variable's type, is refused. */
+struct Between {
+  double lower = 0, upper = 0;
+};
+
+struct Option {
+  std::string name{};   ///< "--config"; without dashes the name of a positional argument.
+  Variable variable{};  ///< Has to live until the command line is parsed.
+  std::string type{};   ///< What help shows for its value, as in FILE; by default the kind of number, or TEXT.
+  std::string help{};
+  bool required = false;
+  std::optional<Between> range{};     ///< Of a number.
+  std::vector<std::string> one_of{};  ///< The words that it may be; empty: any text.
+  std::string needs{}, excludes{};    ///< The name of another option of this command.
+};
+
+/** A program, or one of the commands of a program. */
+struct Command {
+  std::string name{};
+  std::string purpose{};
+  std::string footer{};  ///< The end of its help: notes and examples.
+  std::vector<Option> options{};
+  std::function<int()> run{};       ///< What a chosen command does. @return its exit code.
+  std::vector<Command> commands{};  ///< Exactly one has to be chosen, if there are any.
+  std::string* chosen = nullptr;    ///< Gets the name of the command that was chosen.
+};
+
+/** Parses. Each program also takes --help and --version, each command --help. The program's own options may stand
+after the command as well.
+@return nothing if the program is to go on; otherwise its exit code, after the text it owes: 0 after --help and
+--version, kExitBadInput after a line that says what is wrong and, for an unknown command or option, what was probably
+meant. */
+[[nodiscard]] std::optional<int> ParseCommandLine(const Command& program, int argc, const char* const* argv);
+
+}  // namespace forereach
