@@ -1,5 +1,5 @@
-/** What proves a bound over a box: the box bisected again and again, with a bound for each part that was not bisected
-further. Plain data: whoever checks it needs to know nothing of how it was found. */
+/** A cover: the proof of a bound over a box. The box is bisected repeatedly, and each part that is not bisected further
+has a bound. It is plain data; a checker needs no knowledge of the search that found it. */
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@ further. Plain data: whoever checks it needs to know nothing of how it was found
 
 namespace forereach {
 
-/** A binary tree; node 0 stands for the whole box. An inner node cuts its box at w_argument = at into one part with
-w_argument <= at and one with w_argument >= at. The leaves' boxes therefore cover the whole box. */
+/** A binary tree. Node 0 has the whole box. An inner node cuts its box at w_argument = number into the part with
+w_argument <= number and the part with w_argument >= number. So the boxes of the leaves cover the whole box. */
 struct Cover {
   struct Node {
-    int argument = -1;           ///< The one that is cut; -1 for a leaf.
-    bool outside = false;        ///< Of a leaf: no point of its box lies in the domain.
-    double number = 0;           ///< Of a leaf: the bound over its box. Else: where it is cut.
-    int below = -1, above = -1;  ///< The two parts, by their place in `nodes`, behind their parent.
+    int argument = -1;           ///< Index of the argument that is cut; -1 for a leaf.
+    bool outside = false;        ///< Leaf: no point of its box lies in the domain.
+    double number = 0;           ///< Leaf: the bound over its box. Inner node: the place of the cut.
+    int below = -1, above = -1;  ///< Inner node: indices of the two parts in `nodes`, larger than its own.
   };
 
   std::vector<Node> nodes;

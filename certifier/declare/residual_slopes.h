@@ -1,5 +1,5 @@
-/** The partial derivatives of a residual, enclosed over boxes of coordinates and parameters: from its equations, given
-once as a template (dynamics/residuals.h). */
+/** Enclosures of the partial derivatives of a residual over boxes of coordinates and parameters. They are derived from
+the residual's equations, which are a template over the scalar type (dynamics/residuals.h). */
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ once as a template (dynamics/residuals.h). */
 
 namespace forereach {
 
-/** r : (z, theta) -> R^n, z d_z coordinates, theta parameters. Both together are its arguments w = (z, theta). */
+/** A residual r : (z, theta) -> R^n with d_z coordinates z and parameters theta. Its arguments are w = (z, theta). */
 class ResidualSlopes {
  public:
   ResidualSlopes(std::string name, int num_states, int num_variables, std::vector<std::string> parameter_names)
@@ -30,13 +30,14 @@ class ResidualSlopes {
   [[nodiscard]] int num_arguments() const { return num_variables_ + static_cast<int>(parameter_names_.size()); }
   [[nodiscard]] const std::vector<std::string>& parameter_names() const { return parameter_names_; }
 
-  /** Whether r_row may depend on an argument; if not, its derivative is zero by construction. */
+  /** Whether r_row may depend on an argument. If not, the derivative is exactly zero. */
   [[nodiscard]] virtual bool Occurs(int row, int argument) const = 0;
 
-  /** @param w num_arguments() ranges. @param active the arguments that gradient entries are wanted for, at most
-  Jet::kMaxArguments; `column` among them.
-  @return r_row: `slope` encloses its generalised partial derivative by z_column over w, `curvature[i]` the derivative
-  of that by active[i], unbounded where there is none. */
+  /** Encloses r_row and its derivatives over a box.
+  @param w num_arguments() ranges. @param active the arguments for which gradient entries are computed, at most
+  Jet::kMaxArguments; it contains `column`.
+  @return r_row as a Jet: `slope` encloses the generalised partial derivative by z_column over w, and `curvature[i]` the
+  derivative of `slope` by active[i]. `curvature[i]` is unbounded if that derivative does not exist. */
   [[nodiscard]] virtual Jet Enclose(int row, int column, std::span<const Interval> w,
                                     std::span<const int> active) const = 0;
 
@@ -88,12 +89,13 @@ class EquationsSlopes final : public ResidualSlopes {
   std::array<Occurrence, kStates> occurrence_;
 };
 
-/** Of a residual of dynamics/residuals.h, by name. @throws std::invalid_argument if there is none. */
+/** The slopes of the residual of dynamics/residuals.h with this name. @throws std::invalid_argument if there is none.
+ */
 [[nodiscard]] std::unique_ptr<ResidualSlopes> MakeResidualSlopes(const std::string& name);
 
 /** The ranges of the parameters, in the order of the equations.
-@throws std::invalid_argument naming the parameter unless they are exactly those of the equations, in their order, and
-lower <= upper, both finite. */
+@throws std::invalid_argument with the parameter's name unless the parameters are exactly those of the equations, in
+their order, with lower <= upper, both finite. */
 [[nodiscard]] std::vector<Interval> ParameterRanges(const ResidualSlopes& slopes, const ParametricResidual& residual);
 
 }  // namespace forereach

@@ -1,4 +1,5 @@
-/** A nominal model from one definition of its equations, compiled: its program is a constant. */
+/** A nominal model from one definition of its equations. The program is a compile-time constant. To add a model, write
+a struct like KinematicBicycle (kinematic_bicycle.h) and construct EquationsModel<YourModel>. */
 #pragma once
 
 #include <array>

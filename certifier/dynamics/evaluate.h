@@ -1,5 +1,5 @@
-/** Evaluates a program over any scalar, node by node: intervals for enclosures, extended precision for values. The hot
-step uses expand.h instead. */
+/** Evaluates a program node by node over any scalar type: intervals for enclosures, extended precision for values. The
+certify step uses expand.h instead. */
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ using NodeValues = std::array<T, Program::kMaxOperations>;
 
 inline long double sqr(long double x) { return x * x; }
 
-/** 2 t (1 + t^2), which increases in t: over an interval its ends span it. */
+/** 2 t (1 + t^2). It increases in t, so its range over an interval follows from the ends. */
 inline long double TanCurvature(long double t) { return 2 * t * (1 + t * t); }
 inline Interval TanCurvature(const Interval& t) {
   if (!t.IsFinite()) return Interval::Entire();
@@ -26,7 +26,7 @@ inline Interval TanCurvature(const Interval& t) {
   return {at(t.lower).lower, at(t.upper).upper};
 }
 
-/** Sets values[i] for every node i with needed[i]. */
+/** Sets values[i] for every node i with needed[i]. @param parameters the program's. @param z d_z entries. */
 template <class T>
 void Evaluate(const Program& program, const std::array<bool, Program::kMaxOperations>& needed,
               std::span<const double> parameters, std::span<const T> z, NodeValues<T>& values) noexcept {

@@ -1,6 +1,6 @@
-/** What the certify step takes of a nominal model, in plain arithmetic: expansion, remainder, and what is known of an
-image. expand.h, remainder.h and image.h make them, as straight-line code for a program that is known at compile time;
-rounding.h bounds, once and for the whole domain, how far each number can lie from the exact one. */
+/** The data that the certify step takes from a nominal model, in plain arithmetic: expansion, remainder and image sums.
+expand.h, remainder.h and image.h compute them, as straight-line code for a program that is known at compile time.
+rounding.h bounds the error of each number, once for the whole domain. */
 #pragma once
 
 #include <array>
@@ -10,25 +10,27 @@ rounding.h bounds, once and for the whole domain, how far each number can lie fr
 
 namespace forereach {
 
-/** An interval whose ends were rounded to nearest. */
+/** An interval whose ends are rounded to nearest, so it is not an enclosure by itself. */
 struct PlainInterval {
   double lower, upper;
 };
 
-/** f0(c), D_z f0(c), and the ranges of the second derivatives over a box, in the order of the model's pattern. */
+/** f0(c), the nonzero entries of D_z f0(c), and the ranges of the nonzero second derivatives over a box. Entries are in
+the order of the program's lists. */
 struct Expansion {
   std::array<double, kMaxStates> value;
   std::array<double, Program::kMaxFirst> jacobian;
   std::array<PlainInterval, Program::kMaxSecond> hessian;
 };
 
-/** How the remainder is bounded.
+/** The method that bounds the remainder rho_k(d) = 1/2 d^T H_k d over |d| <= r.
 kPaper: |rho_k| <= 1/2 r^T B_k r, Eq. (qt-formula), with B_k the largest absolute values of the Hessian.
-kCentred: rho_k in [lower, upper], whose middle moves the center. A diagonal term has d_i^2 in [0, r_i^2]. A mixed
-  product lies in [-N, P],  P, N = (sum_j |g_ij / r_i +- g_lj / r_l|)^2 r_i r_l / 4,  since d_i d_l is a quarter of
-  the difference of two squares; correlated generators make one of them small. Where a diagonal term and a mixed one
-  share a variable, a second bound is the exact range of 1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l, which their sum
-  overestimates; the better of the two counts. Never wider than kPaper, and as sound. */
+kCentred: rho_k lies in [lower, upper], and the middle of this interval moves the center. A diagonal term has d_i^2 in
+  [0, r_i^2]. A mixed product lies in [-N, P],  P, N = (sum_j |g_ij / r_i +- g_lj / r_l|)^2 r_i r_l / 4,  because d_i
+d_l is a quarter of the difference of two squares. Nearly parallel generators make one of N and P small. If a diagonal
+term and a mixed term share a variable, the exact range of 1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l is a second
+bound, and the tighter one is used. The interval is sound and never wider than that of kPaper. docs/mathematics.md
+derives it. */
 enum class Method { kPaper, kCentred };
 
 /** rho_k lies in center_k +- half_width_k. Zero where f0_k is affine. */
@@ -36,9 +38,9 @@ struct Remainder {
   std::array<double, kMaxStates> center, half_width;
 };
 
-/** What is known of an image beside its generators. */
+/** Sums over the generators of an image, computed with the image and used by the next step. */
 struct ImageSums {
-  std::array<double, kMaxStates> row;  ///< sum_j |(J G)_kj|, plain
+  std::array<double, kMaxStates> row;  ///< sum_j |(J G)_kj|, in plain arithmetic
   ColumnScores scores;
 };
 

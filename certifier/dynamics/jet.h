@@ -1,9 +1,9 @@
-/** Interval enclosures of an expression, of its derivative along one coordinate, and of the gradients of both, by the
-chain rule: what bounding a partial derivative over a box takes.
+/** Interval enclosures of an expression f, of its derivative df/dc along one coordinate c, and of the gradients of
+both, by the chain rule. ResidualSlopes uses them to bound a partial derivative over a box.
 
-A kink (abs, min, max) has no derivative. Over a box that meets one, `slope` and `gradient` contain Clarke's generalised
-gradient at every point, which is what a Lipschitz bound needs; the second derivatives are then unbounded, and whoever
-wants to expand `slope` sees that he cannot. */
+A kink (of abs, min or max) has no derivative. Over a box that contains a kink, `slope` and `gradient` contain Clarke's
+generalised gradient at every point, which is sufficient for a Lipschitz bound. The second derivatives are unbounded
+there, so `slope` cannot be expanded by the mean-value form. */
 #pragma once
 
 #include <array>
@@ -16,15 +16,16 @@ struct Jet {
   static constexpr int kMaxArguments = 16;
   using Row = std::array<Interval, kMaxArguments>;
 
-  Interval value{0.0}, slope{0.0};    ///< f and df/dc, c the coordinate.
-  Row gradient = {}, curvature = {};  ///< df/dw_i and d(df/dc)/dw_i for the first `size` arguments; else zero.
+  Interval value{0.0}, slope{0.0};  ///< f and df/dc.
+  Row gradient = {},
+      curvature = {};  ///< df/dw_i and d(df/dc)/dw_i for the first `size` arguments; zero for the others.
   int size = 0;
 
   Jet() = default;
   Jet(double constant) : value(constant) {}  // NOLINT: a number is an expression
   explicit Jet(const Interval& constant) : value(constant) {}
 
-  /** The argument w_index over a range. @param is_coordinate whether it is c. */
+  /** The argument w_index over a range. @param is_coordinate whether w_index is c. */
   [[nodiscard]] static Jet Argument(const Interval& range, int index, bool is_coordinate) {
     Jet jet(range);
     jet.slope = is_coordinate ? 1.0 : 0.0;
@@ -47,7 +48,7 @@ struct Jet {
 [[nodiscard]] Jet sin(const Jet& a);
 [[nodiscard]] Jet cos(const Jet& a);
 [[nodiscard]] Jet tan(const Jet& a);
-/** Of residuals.h. */
+/** The functions of the same names in residuals.h. */
 [[nodiscard]] Jet SmoothGate(const Jet& a);
 [[nodiscard]] Jet Softplus(const Jet& x, const Jet& temperature);
 

@@ -1,4 +1,9 @@
-/** Kinematic bicycle with jerk and steering rate as inputs, one explicit Euler step. */
+/** Kinematic bicycle with jerk and steering rate as inputs, one explicit Euler step:
+
+    x+ = x + dt v cos(theta),  y+ = y + dt v sin(theta),  theta+ = theta + dt / wheelbase v tan(delta),
+    v+ = v + dt a,  a+ = a + dt jerk,  delta+ = delta + dt steer_rate.
+
+Units: m, m, rad, m/s, m/s^2, rad; inputs m/s^3 and rad/s. */
 #pragma once
 
 #include <array>
@@ -20,7 +25,8 @@ struct KinematicBicycle {
   double dt;         ///< s
   double wheelbase;  ///< m
 
-  /** The equations, once, for every scalar: z = (x, y, theta, v, a, delta, jerk, steer_rate). */
+  /** The equations for every scalar type. @param parameters dt, wheelbase.
+  @param z (x, y, theta, v, a, delta, jerk, steer_rate). @param next the six states after the step. */
   template <class T>
   static constexpr void Step(std::span<const T> parameters, std::span<const T> z, std::span<T> next) {
     using std::cos, std::sin, std::tan;

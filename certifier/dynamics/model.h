@@ -1,6 +1,6 @@
-/** A nominal model f0 : (x, u) -> x+, known to the certifier by what it can enclose.
+/** A nominal model f0 : (x, u) -> x+, Eq. (dynamics), with enclosures of its values and derivatives.
 
-A model is the program of its equations (program.h) and the numbers of its parameters. z = (x, u) has
+A model consists of the program of its equations (program.h) and the values of its parameters. z = (x, u) has
 d_z = states + inputs entries. */
 #pragma once
 
@@ -18,7 +18,8 @@ d_z = states + inputs entries. */
 
 namespace forereach {
 
-/** Encloses f0(z) and its Jacobian at one point. Entries of the Jacobian that are not listed are exactly zero. */
+/** Enclosures of f0(z) and of its Jacobian at one point. Entries of the Jacobian that are not listed are exactly zero.
+ */
 struct Linearization {
   std::array<Interval, kMaxStates> value;
   std::array<MatrixEntry, Program::kMaxFirst> entries;
@@ -29,8 +30,8 @@ struct Linearization {
   }
 };
 
-/** Encloses the Hessians of all f0_k over a box. Entries with row <= column that are not listed are exactly zero;
-the matrices are symmetric. */
+/** Enclosures of the Hessians of all f0_k over a box. The matrices are symmetric; only entries with row <= column are
+listed, and those that are not listed are exactly zero. */
 struct HessianEnclosure {
   struct Entry {
     int output, row, column;
@@ -40,7 +41,7 @@ struct HessianEnclosure {
   int count = 0;
 };
 
-/** What a model is called, for people and digests. */
+/** The names of a model, its states, inputs and parameters, for messages and digests. */
 struct ModelNames {
   std::string name;
   std::vector<std::string> states, inputs, parameters;
@@ -48,7 +49,8 @@ struct ModelNames {
 
 class NominalModel {
  public:
-  /** @param program outlives the model. */
+  /** @param program must outlive the model. @param parameters its values, in the program's order, in the units of the
+  equations. */
   NominalModel(const Program& program, std::vector<double> parameters, ModelNames names)
       : program_(program), parameters_(std::move(parameters)), names_(std::move(names)) {}
   virtual ~NominalModel() = default;
@@ -59,33 +61,34 @@ class NominalModel {
   [[nodiscard]] const std::vector<std::string>& parameter_names() const { return names_.parameters; }
   [[nodiscard]] std::span<const double> parameters() const { return parameters_; }
   [[nodiscard]] const Program& program() const { return program_; }
-  /** Name and parameters, enough to tell two models apart: what the model's digest is made of. */
+  /** Name and parameters as text. It identifies the model; the model's digest is computed from it. */
   [[nodiscard]] std::string description() const;
 
   [[nodiscard]] int num_states() const { return program_.states; }
   [[nodiscard]] int num_inputs() const { return program_.variables - program_.states; }
   [[nodiscard]] int num_variables() const { return program_.variables; }
 
-  /** f0(z), evaluated in extended precision and rounded once. For planning, simulation and display, not for bounds. */
+  /** Sets `next` (n entries) to f0(z), evaluated in extended precision and rounded once. Use it for planning,
+  simulation and display, not for bounds. */
   void Evaluate(std::span<const double> z, std::span<double> next) const noexcept;
 
   /** Encloses f0(z) and D_z f0(z), Eq. (propagation), by interval arithmetic. */
   void Linearize(std::span<const double> z, Linearization& out) const noexcept;
 
-  /** Encloses every second derivative of f0 over the box of d_z intervals, Eq. (qt-formula), by interval arithmetic. An
-  entry may be infinite where no finite enclosure exists, for example where a steering interval meets the tangent's
-  pole. */
+  /** Encloses every second derivative of f0 over a box of d_z intervals, Eq. (qt-formula), by interval arithmetic. An
+  entry is infinite if no finite enclosure exists, for example if a steering interval contains a pole of the tangent. */
   void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept;
 
-  /** All of these at once in plain arithmetic, fast, for the certify step; rounding.h has the error.
-  @param z the center c of the box. */
+  /** Sets value, Jacobian and Hessian ranges in plain arithmetic, for the certify step. rounding.h bounds the error.
+  @param z the center c of the box, d_z entries. @param box d_z intervals that contain c. */
   virtual void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out) const noexcept = 0;
 
-  /** What the expansion leaves out. */
+  /** Encloses the Taylor remainder of the expansion; see remainder.h. */
   virtual void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width,
                                 const PlainInterval* hessian, const double* error, Remainder& out) const noexcept = 0;
 
-  /** The image of a slice's generators under the expansion's Jacobian. */
+  /** Sets the generators and the slack of `next` to the image of the slice under the expansion's Jacobian; see image.h.
+   */
   virtual void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
                    ImageSums& sums) const noexcept = 0;
 

@@ -7,10 +7,11 @@
 
 namespace forereach {
 
-/** point_mass.h with step dt in seconds. @throws std::invalid_argument unless dt is positive and finite. */
+/** The model of point_mass.h. @param dt step, s. @throws std::invalid_argument unless dt is positive and finite. */
 [[nodiscard]] std::shared_ptr<const NominalModel> MakePointMass(double dt);
 
-/** kinematic_bicycle.h with step dt in seconds and wheelbase in metres. Same errors for both. */
+/** The model of kinematic_bicycle.h. @param dt step, s. @param wheelbase metres.
+@throws std::invalid_argument unless both are positive and finite. */
 [[nodiscard]] std::shared_ptr<const NominalModel> MakeKinematicBicycle(double dt, double wheelbase);
 
 }  // namespace forereach

@@ -1,5 +1,5 @@
-/** A scalar that knows only which arguments it was computed from. Equations called with it tell which arguments each
-of their outputs may depend on; the others' derivatives are zero by construction. */
+/** A scalar type that records only the arguments from which it was computed. Evaluate equations with it to find the
+arguments on which each output may depend. The derivatives by all other arguments are exactly zero. */
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ class Occurrence final {
   constexpr Occurrence() = default;
   constexpr explicit Occurrence(double) {}
 
-  /** @param index below 64. */
+  /** The argument with this index. @pre 0 <= index < 64. */
   [[nodiscard]] static constexpr Occurrence Argument(int index) {
     Occurrence result;
     result.mask_ = std::uint64_t{1} << index;

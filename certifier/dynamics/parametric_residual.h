@@ -1,4 +1,4 @@
-/** A residual of which parameters are known to lie in intervals: what a modeller writes into a task file. */
+/** A residual whose parameters lie in intervals, as the section `residual` of a task file gives it. */
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace forereach {
 
-/** {r(.; theta) : lower <= theta <= upper}, r one of residuals.h by name. */
+/** The set {r(.; theta) : lower <= theta <= upper}, where r is a residual of residuals.h. */
 struct ParametricResidual {
   struct Parameter {
     std::string name;
@@ -16,7 +16,7 @@ struct ParametricResidual {
   };
 
   std::string name;
-  std::vector<Parameter> parameters;  ///< All of them, in the order of the equations.
+  std::vector<Parameter> parameters;  ///< All parameters, in the order of the equations and in their units.
 };
 
 }  // namespace forereach

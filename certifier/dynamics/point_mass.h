@@ -1,4 +1,5 @@
-/** Point mass in the plane: p+ = p + dt v + dt^2/2 u, v+ = v + dt u. Affine, so its remainder is exactly zero. */
+/** Point mass in the plane: p+ = p + dt v + dt^2/2 u, v+ = v + dt u, with p in m, v in m/s and u in m/s^2. The model is
+affine, so its remainder is exactly zero. */
 #pragma once
 
 #include <array>
@@ -17,7 +18,8 @@ struct PointMass {
 
   double dt;  ///< s
 
-  /** The equations, once, for every scalar: z = (px, py, vx, vy, ax, ay). */
+  /** The equations for every scalar type. @param parameters dt. @param z (px, py, vx, vy, ax, ay).
+  @param next the four states after the step. */
   template <class T>
   static constexpr void Step(std::span<const T> parameters, std::span<const T> z, std::span<T> next) {
     const T& dt = parameters[0];

@@ -1,9 +1,10 @@
-/** A nominal model's equations as a program: a list of elementary operations, with those of its first and second
-derivatives, made once from the equations themselves.
+/** The equations of a nominal model as a program: a list of elementary operations for the values and for the first and
+second derivatives.
 
-The equations are a function of a scalar type. Called with Symbol they write down what they do; Differentiate then adds
-every derivative that is not zero by construction, sharing what is equal. All of it can run at compile time, so the
-program of a model that comes with the library is a constant, and evaluating it (evaluate.h) is straight-line code. */
+The equations are a function template over the scalar type. Evaluated with Symbol, they record their operations.
+Differentiate then adds every derivative that is not identically zero and shares equal subexpressions. All of this can
+run at compile time. So the program of a model in the library is a constant, and its evaluation (expand.h) is
+straight-line code. */
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@ namespace forereach {
 
 enum class Op : unsigned char {
   kVariable,     ///< z_a
-  kParameter,    ///< parameter a, a double that is exactly what it is
+  kParameter,    ///< parameter a, an exact double
   kConstant,     ///< `constant`
   kAdd,          ///< a + b
   kSubtract,     ///< a - b
@@ -30,7 +31,7 @@ enum class Op : unsigned char {
   kTanCurvature  ///< 2 a (1 + a^2): the second derivative of the tangent whose value is a
 };
 
-/** One operation on nodes before it. */
+/** One operation. Its operands are earlier nodes. */
 struct Operation {
   Op op = Op::kConstant;
   short a = -1, b = -1;
@@ -39,8 +40,8 @@ struct Operation {
   friend constexpr bool operator==(const Operation&, const Operation&) = default;
 };
 
-/** Nodes in the order of evaluation, and which of them are f0, its Jacobian and its Hessians. Derivatives that are not
-listed are zero. */
+/** Nodes in the order of evaluation, and the lists of nodes that are the values, the Jacobian and the Hessians of f0.
+Derivatives that are not listed are zero. */
 struct Program {
   struct First {
     short row, column, node;
@@ -59,7 +60,7 @@ struct Program {
   std::array<Second, kMaxSecond> hessian{};
   int num_second = 0;
 
-  /** @name Which nodes a point evaluation of f0 and J, and an evaluation of the Hessians over a box, need. */
+  /** @name The nodes that the evaluation of f0 and J at a point needs, and those that the Hessians over a box need. */
   ///@{
   std::array<bool, kMaxOperations> at_point{}, over_box{};
   ///@}
@@ -67,7 +68,7 @@ struct Program {
   [[nodiscard]] constexpr const Operation& node(int i) const { return nodes[static_cast<std::size_t>(i)]; }
   [[nodiscard]] constexpr bool IsOne(int i) const { return node(i).op == Op::kConstant && node(i).constant == 1; }
 
-  /** The place of an operation, a new one unless the same was written down before. */
+  /** The index of the node with this operation. It adds a node unless an equal one exists. */
   constexpr short Add(const Operation& wanted) {
     for (int i = 0; i < size; ++i)
       if (node(i) == wanted) return static_cast<short>(i);
@@ -78,7 +79,7 @@ struct Program {
   constexpr short Constant(double value_of) { return Add({Op::kConstant, -1, -1, value_of}); }
 };
 
-/** A scalar that writes down what is done to it. */
+/** A scalar type that records the operations applied to it. */
 class Symbol {
  public:
   constexpr Symbol() = default;
@@ -113,7 +114,7 @@ class Symbol {
 
   static constexpr Symbol Binary(Op op, const Symbol& a, const Symbol& b) {
     Program* program = a.program_ != nullptr ? a.program_ : b.program_;
-    // Folding two numbers would round where nobody accounts for it.
+    // Folding two numbers would round without an error bound.
     if (program == nullptr) throw std::logic_error("program: an operation on two constants");
     const short left = a.In(*program), right = b.In(*program);
     return {program, program->Add({op, left, right})};
@@ -126,7 +127,7 @@ class Symbol {
 
 namespace internal {
 
-// Derivatives of a program's nodes; -1 is a derivative that is zero by construction.
+// Derivatives of a program's nodes; -1 means identically zero.
 class Differentiation {
  public:
   constexpr explicit Differentiation(Program& program) : program_(program) {}
@@ -145,7 +146,7 @@ class Differentiation {
         return rest == kZero ? kZero : program_.Add({Op::kDivide, rest, n.b});
       }
       case Op::kNegate: return Negated(Of(n.a, variable));
-      case Op::kSquare:  // only ever of a tangent, in 1 + t^2: half of its derivative is t t'
+      case Op::kSquare:  // occurs only in 1 + t^2 with a tangent t; half of its derivative is t t'
         return Product(program_.Constant(2), Product(n.a, Of(n.a, variable)));
       case Op::kSin: return Product(static_cast<short>(i + 1), Of(n.a, variable));
       case Op::kCos: return Product(Negated(static_cast<short>(i - 1)), Of(n.a, variable));
@@ -155,7 +156,8 @@ class Differentiation {
     throw std::logic_error("program: a third derivative");
   }
 
-  // Second derivatives: as Of, but the slope 1 + t^2 of a tangent t has a node of its own, exact over intervals.
+  // Second derivatives: as Of, except that the slope 1 + t^2 of a tangent t has its own node, which is exact over
+  // intervals.
   constexpr short OfSlope(short i, short variable) {
     const Operation n = program_.node(i);
     if (n.op == Op::kMultiply) return Sum(Product(n.a, OfSlope(n.b, variable)), Product(OfSlope(n.a, variable), n.b));
@@ -188,7 +190,8 @@ class Differentiation {
   Program& program_;
 };
 
-// Marks what `needed` rests on. Over a box a trigonometric function is expanded around its value at the center.
+// Marks the nodes on which the nodes in `needed` depend. Over a box, a trigonometric function is expanded around its
+// value at the center.
 constexpr void MarkOperands(const Program& program, std::array<bool, Program::kMaxOperations>& needed) {
   for (int i = program.size - 1; i >= 0; --i) {
     const Operation& n = program.node(i);
@@ -218,7 +221,7 @@ constexpr void MarkTrigonometryAtPoint(Program& program) {
 
 }  // namespace internal
 
-/** Adds the Jacobian and the Hessians to a program that has its values. */
+/** Adds the Jacobian and the Hessians to a program that has the values of f0. */
 constexpr void Differentiate(Program& program) {
   internal::Differentiation d(program);
   for (short k = 0; k < program.states; ++k)
@@ -241,7 +244,7 @@ constexpr void Differentiate(Program& program) {
   internal::MarkOperands(program, program.at_point);
 }
 
-/** The program of a model's equations (kinematic_bicycle.h shows the form). */
+/** The program of a model's equations, a struct like KinematicBicycle (kinematic_bicycle.h). */
 template <class Equations>
 [[nodiscard]] constexpr Program MakeProgram() {
   Program program;

@@ -1,7 +1,8 @@
-/** How the paper's real systems differ from their nominal models: r(z) = f*(z) - f0(z), each written once for every
-scalar, as a model is (kinematic_bicycle.h): parameters and coordinates in, the residual out. A scalar needs +, -, *, /,
-comparison, and the functions named below found by argument-dependent lookup; one that does not compare overloads
-SmoothGate and Softplus. */
+/** The residuals r(z) = f*(z) - f0(z) of the paper's target systems, Eq. (dynamics). Each is a template over the scalar
+type, like a model (kinematic_bicycle.h): Evaluate takes parameters and coordinates and sets the residual. A scalar type
+needs
++, -, *, /, comparison, and the functions used below, found by argument-dependent lookup. A type without comparison
+overloads SmoothGate and Softplus. */
 #pragma once
 
 #include <array>
@@ -17,7 +18,7 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
-/** exp(-1/e) for e > 0, else 0. All derivatives vanish at 0. */
+/** exp(-1/e) for e > 0, and 0 for e <= 0. All derivatives vanish at 0. */
 template <class T>
 T SmoothGate(const T& e) {
   using std::exp;
@@ -32,11 +33,10 @@ T Softplus(const T& x, const T& temperature) {
   return temperature * (u > T(0) ? u + log1p(exp(-u)) : log1p(exp(u)));
 }
 
-/** Lateral forces saturate: the car turns less than the kinematic bicycle. Over z = (x, y, theta, v, a, delta, jerk,
-steer_rate) its only nonzero output is the heading, Eq. (bicycle-residual-heading):
-    r_theta = -(dt understeer / wheelbase) v tan(delta) SmoothGate(E),
-    E = gate_temperature (|v^2 tan(delta) / wheelbase| - friction gravity).
-Exactly zero while the lateral acceleration stays below friction * gravity. Odd in delta. */
+/** Saturation of lateral forces: the car turns less than the kinematic bicycle. Over z = (x, y, theta, v, a, delta,
+jerk, steer_rate), only the heading has a nonzero residual, Eq. (bicycle-residual-heading): r_theta = -(dt understeer /
+wheelbase) v tan(delta) SmoothGate(E), E = gate_temperature (|v^2 tan(delta) / wheelbase| - friction gravity). The
+residual is exactly zero while the lateral acceleration is below friction * gravity. It is odd in delta. */
 struct HeadingSaturation {
   using Nominal = KinematicBicycle;
   static constexpr const char* kName = "heading_saturation";
@@ -73,12 +73,12 @@ struct HeadingSaturation {
   }
 };
 
-/** Drag and a sideways force that set in above a speed. Over z = (px, py, vx, vy, ax, ay),
+/** Drag and a lateral force that increase above a speed, the knee. Over z = (px, py, vx, vy, ax, ay),
 Eqs. (pointmass-residual-accel), (pointmass-discrete-residual):
     s = sqrt(|v|^2 + smoothing),
     g = Softplus(s - knee, softplus_temperature) / (s + regularizer),
     a_r = g M v,  M = [-damping, -cross; cross, -damping],  r = (dt^2/2 a_r, dt a_r).
-Odd in v; small below the knee, but not zero. */
+The residual is odd in v. Below the knee it is small but not zero. */
 struct VelocityKnee {
   using Nominal = PointMass;
   static constexpr const char* kName = "velocity_knee";

@@ -1,4 +1,4 @@
-/** How far the plain evaluation of a program (expand.h) can lie from exact arithmetic, anywhere in a domain. */
+/** Bounds on the rounding error of the plain evaluation of a program (expand.h), over a whole domain. */
 #pragma once
 
 #include <array>
@@ -11,33 +11,35 @@ namespace forereach {
 
 /** For every z in the domain and every box inside it:
     |Expansion.value_k - f0_k(z)| <= value_k,   |Expansion.jacobian_e - D f0(z)_e| <= jacobian_e,
-and each end of Expansion.hessian_e lies at most hessian_e inside of the true range. Infinite where there is no bound.
-*/
+and each end of Expansion.hessian_e lies at most hessian_e inside the true range. An entry is infinite if there is no
+bound. */
 struct ExpansionError {
   std::array<double, kMaxStates> value{};
   std::array<double, Program::kMaxFirst> jacobian{};
   std::array<double, Program::kMaxSecond> hessian{};
-  std::array<double, Program::kMaxFirst> jacobian_size{};  ///< |Expansion.jacobian_e| at most
+  std::array<double, Program::kMaxFirst> jacobian_size{};  ///< upper bounds on |Expansion.jacobian_e|
 };
 
-/** What a step adds to its slack and its remainder for rounding, other than what depends on the slice. */
+/** The contributions of rounding to a step's slack and remainder that do not depend on the slice. */
 struct StepError {
   std::array<double, kMaxStates> value{};  ///< as in ExpansionError
   /** For every slice whose hull has at most these half-widths r, every J' within `jacobian` of J, and |b|_inf <= 1:
       |(J' G b - fl(J G) b)_k| <= image_k,  image_k = sum_l (jacobian_kl + gamma |J_kl|) r_l,
-  gamma the relative error of a sum of as many products. Zero where row k of J copies one coordinate. */
+  gamma the relative error of a sum of that many products. Zero if row k of J copies one coordinate. */
   std::array<double, kMaxStates> image{};
-  /** Of each second derivative's term in the remainder: hessian_e r_i r_l, what underflow takes, and 2^-44 of both for
-  the sum. */
+  /** For the term of each second derivative in the remainder: hessian_e r_i r_l, plus the error by underflow, plus
+  2^-44 of both for the sum. */
   std::array<double, Program::kMaxSecond> remainder{};
 };
 
-/** @param half_width r, one for each variable; zero for an input. Evaluated upward. */
+/** The errors of a step for slices whose hull has half-widths of at most r, rounded up.
+@param half_width r, one entry for each of the d_z variables; zero for an input. */
 [[nodiscard]] StepError BoundStepError(const Program& program, const ExpansionError& error,
                                        std::span<const double> half_width) noexcept;
 
-/** Carries, through every operation, the range of its exact values over the domain and a bound on the error of the
-plain evaluation, at a point and over a box. Cost O(nodes), once for each task. */
+/** The errors of the plain evaluation over the domain. For every operation it propagates the range of the exact values
+over the domain and a bound on the error of the plain evaluation, at a point and over a box. @param domain d_z ranges.
+Cost O(nodes), once for each task. */
 [[nodiscard]] ExpansionError BoundExpansionError(const Program& program, std::span<const double> parameters,
                                                  std::span<const Interval> domain);
 

@@ -1,6 +1,7 @@
-/** The two functions by which residuals set in (residuals.h), over intervals: value, first and second derivative.
+/** Ranges of the functions SmoothGate and Softplus (residuals.h) and of their first and second derivatives over
+intervals.
 
-Each is monotone between extrema that are known in closed form, so the ranges are the exact ones but for rounding. */
+Each function is monotone between extrema with a closed form, so the ranges are exact up to outward rounding. */
 #pragma once
 
 #include "certifier/numerics/interval.h"
@@ -11,10 +12,10 @@ struct DerivativeRanges {
   Interval value, first, second;
 };
 
-/** exp(-1/e) for e > 0, else 0. Where e <= 0 all three are exactly zero. */
+/** SmoothGate: exp(-1/e) for e > 0, and 0 for e <= 0, where all three are exactly zero. */
 [[nodiscard]] DerivativeRanges SmoothGateRanges(const Interval& e);
 
-/** u = x / temperature against f = temperature log(1 + exp(u)), temperature > 0:
+/** Softplus: f = temperature log(1 + exp(u)) with u = x / temperature and temperature > 0. Its derivatives are
     f_x = p = 1 / (1 + exp(-u)),  f_t = log(1 + exp(u)) - u p,  (f_xx, f_xt, f_tt) = (1, -u, u^2) p (1 - p) /
 temperature. f increases in both. */
 struct SoftplusRanges {

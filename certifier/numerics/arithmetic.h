@@ -1,8 +1,10 @@
-/** Whether a program computes as bounds need it, where the preprocessor cannot tell (compilation.h).
+/** Run-time tests of the arithmetic that bounds rely on, for properties that the preprocessor cannot check
+(compilation.h).
 
-Every file that includes this tests itself when the program starts: a file whose compiler was told to fuse or to reorder
-operations says so to the library, and no Certifier can be made. So does a thread that makes a Certifier: flags at
-linking time, or other libraries, may have switched off subnormal numbers or changed the rounding. */
+Every file that includes this header tests its own arithmetic at program start. If its compiler fuses or reorders
+operations, it reports this to the library, and the construction of a Certifier fails. The constructor of a Certifier
+also tests its thread, because link-time flags or other libraries may have disabled subnormal numbers or changed the
+rounding mode. */
 #pragma once
 
 #include <bit>
@@ -13,15 +15,15 @@ linking time, or other libraries, may have switched off subnormal numbers or cha
 
 namespace forereach {
 
-/** Throws std::runtime_error, saying what to change, unless all files that include this compute as they are written,
-and this thread rounds to nearest and has subnormal numbers. */
+/** Checks that all files that include this header compute as written, and that this thread rounds to nearest and has
+subnormal numbers. @throws std::runtime_error that says what to change if one of these is false. */
 void RequireExactArithmetic();
 
 }  // namespace forereach
 
 namespace forereach::internal {
 
-/** Remembers it if a file does not compute as it is written. */
+/** Records the result of a file's test. */
 void ReportFile(bool computes_as_written) noexcept;
 
 }  // namespace forereach::internal
@@ -30,15 +32,16 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace {
 
-// Of each file that includes this one, so without linkage.
+// One for each file that includes this header, so it has internal linkage.
 struct ForeReachArithmetic {
   [[gnu::noinline]] static bool IsAsWritten() {
-    // Not known to the compiler.
+    // volatile: the compiler must not compute with the values.
     volatile double above = 1 + 0x1p-30, below = 1 - 0x1p-30, one = 1, tiny = 0x1p-60, three = 3, five = 5, nothing = 0,
                     no_number = std::numeric_limits<double>::quiet_NaN(),
                     endless = std::numeric_limits<double>::infinity();
     const double a = above, b = below, u = one, t = tiny, d = three, n = five, z = nothing, nan = no_number;
-    // 1 - 2^-60 is rounded to 1. Each product is read anew: one that is used twice need not be fused.
+    // 1 - 2^-60 is rounded to 1. Each product is computed separately, because a compiler may not fuse one that is used
+    // twice.
     const double difference = a * b - u, negated = u - above * below, product = above * below, later = product - one;
     const bool fuses = difference != 0 || negated != 0 || later != 0;
     const bool reorders = (u + t) - u != 0 || (t + u) - u != 0;

@@ -1,18 +1,19 @@
-/** What a program that includes ForeReach's headers has to be compiled with. Every installed header includes this one.
+/** Checks the compiler flags of a program that includes ForeReach's headers. Every installed header includes this one.
 
-A certificate is a theorem about rounded numbers, and parts of the library are compiled in the user's program: models
-are templates. So some flags change what is proven, and others change the layout of what crosses the library's boundary.
-Such a flag is refused here, by a sentence. All other flags give the same bits: optimisation levels, instruction sets,
-sanitizers, assertions, debug symbols.
+A certificate is a theorem about rounded numbers, and the user's program compiles parts of the library, because models
+are templates. So some flags would invalidate proofs, and others would change the layout of objects that cross the
+library's boundary. These flags are compile errors with an explanation. All other flags give the same bits: optimisation
+levels, instruction sets, sanitizers, assertions and debug symbols.
 
-What the preprocessor cannot see is tested when the program starts (arithmetic.h), or does not link (sets/eigen.h). */
+Properties that the preprocessor cannot check are tested at program start (arithmetic.h) or prevent linking
+(sets/eigen.h). */
 #pragma once
 
 #if __cplusplus < 202002L
 #error "ForeReach is written in C++20: compile with -std=c++20 or later"
 #endif
 
-#include <version>  // defines what the standard library was compiled as
+#include <version>  // defines the macros of the standard library
 
 #if !defined(__GNUC__) || !defined(__LP64__) || !(defined(__x86_64__) || defined(__aarch64__))
 #error "ForeReach needs g++ or clang++ and a 64-bit machine, x86-64 or aarch64: compile without -m32 and -mx32"
@@ -48,7 +49,7 @@ What the preprocessor cannot see is tested when the program starts (arithmetic.h
 
 namespace forereach::internal {
 
-// What has no macro of its own.
+// Flags without a macro.
 static_assert(0.1 != 0.1f, "ForeReach's constants are doubles: compile without -fsingle-precision-constant");
 struct CharAndDouble {
   char c;

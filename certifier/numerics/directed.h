@@ -1,9 +1,9 @@
-/** Directed rounding: the one module that turns floating-point results into bounds in real arithmetic.
+/** Directed rounding: turns floating-point results into bounds in real arithmetic. XUp(a, b) >= a X b >= XDown(a, b).
 
-Everything runs in round-to-nearest. The rounding error of a sum or product is itself a double (TwoSum, fused
-multiply-add), so its sign says whether the rounded result lies above or below the exact one. An exact result is
-returned as it is: bounds do not widen where nothing was rounded. NaN stays NaN, and every comparison in the library is
-written so that NaN fails it. */
+All arithmetic is round-to-nearest. The rounding error of a sum or product is itself a double (TwoSum, fused
+multiply-add), and its sign tells whether the rounded result lies above or below the exact one. An exact result is
+returned unchanged, so bounds do not widen without a rounding error. NaN stays NaN, and every comparison in the library
+is written so that NaN fails it. Cost: some operations each; no branch on the rounding mode. */
 #pragma once
 
 #include <bit>
@@ -21,20 +21,20 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kMaxDouble = std::numeric_limits<double>::max();
 inline constexpr double kUnitRoundoff = 0x1p-53;
 
-/** Whether the certify step counts its rounding errors. It does; bench/ compiles the library a second time, under
-another name, to measure what that costs. */
+/** Whether the certify step bounds its rounding errors. It always does in the product. bench/ compiles the library a
+second time without it, under another name, to measure the cost. */
 #ifdef FOREREACH_WITHOUT_ROUNDING
 inline constexpr bool kCountsRounding = false;
 #else
 inline constexpr bool kCountsRounding = true;
 #endif
 
-/** What plain operations may be off by whose errors add up to `relative` times `size` at most. */
+/** The error of plain operations whose rounding errors add up to at most `relative` times `size`. */
 [[nodiscard]] inline double RoundingError(double relative, double size) noexcept {
   return kCountsRounding ? relative * size : 0;
 }
 
-/** The smallest double above x; infinity and NaN stay. */
+/** The smallest double above x. Infinity and NaN are returned unchanged. */
 [[nodiscard]] inline double NextUp(double x) noexcept {
   if (!(x < kInfinity)) return x;
   if (x == 0) return std::numeric_limits<double>::denorm_min();
@@ -42,27 +42,27 @@ inline constexpr bool kCountsRounding = true;
   return std::bit_cast<double>(x > 0 ? bits + 1 : bits - 1);
 }
 
-/** The largest double below x; minus infinity and NaN stay. */
+/** The largest double below x. Minus infinity and NaN are returned unchanged. */
 [[nodiscard]] inline double NextDown(double x) noexcept { return -NextUp(-x); }
 
 namespace internal {
 
-// Below this a product's error may not be a double, and its sign not be seen.
+// Below this, the error of a product may not be a double, so its sign is not available.
 inline constexpr double kSafeProduct = 0x1p-960;
 
-// NaN, from an error whose computation overflowed, counts as below.
+// A NaN error, from an overflow in its computation, counts as positive.
 [[nodiscard]] inline double UpIfBelow(double rounded, double error) noexcept {
   return error <= 0 ? rounded : NextUp(rounded);
 }
 
-// An overflow to minus infinity is no upper bound of the finite number it stands for.
+// An overflow to minus infinity is not an upper bound of the exact finite result.
 [[nodiscard]] inline double UpperOfOverflow(double rounded, bool operands_finite) noexcept {
   return rounded < 0 && operands_finite ? -kMaxDouble : rounded;
 }
 
 }  // namespace internal
 
-/** The least double >= a + b, or the one above it where b is the largest double or its negative. */
+/** The least double >= a + b, or the next one above it if b is the largest double or its negative. */
 [[nodiscard]] inline double AddUp(double a, double b) noexcept {
   const double sum = a + b;
   if (!std::isfinite(sum)) return internal::UpperOfOverflow(sum, std::isfinite(a) && std::isfinite(b));
@@ -78,7 +78,7 @@ inline constexpr double kSafeProduct = 0x1p-960;
   return internal::UpIfBelow(product, std::fma(a, b, -product));
 }
 
-/** A double >= a / b, b not zero: the least one, or one above it where a or the quotient is below 2^-960. */
+/** A double >= a / b: the least one, or one above it if |a| or |a / b| is below 2^-960. @pre b != 0. */
 [[nodiscard]] inline double DivUp(double a, double b) noexcept {
   const double quotient = a / b;
   if (!std::isfinite(quotient)) return internal::UpperOfOverflow(quotient, std::isfinite(a) && b != 0);
@@ -88,7 +88,7 @@ inline constexpr double kSafeProduct = 0x1p-960;
   return internal::UpIfBelow(quotient, b > 0 ? remainder : -remainder);
 }
 
-/** A double >= sqrt(x), x >= 0. */
+/** A double >= sqrt(x). @pre x >= 0. */
 [[nodiscard]] inline double SqrtUp(double x) noexcept {
   const double root = std::sqrt(x);
   if (x == 0 || !std::isfinite(root)) return root;
@@ -96,7 +96,7 @@ inline constexpr double kSafeProduct = 0x1p-960;
   return internal::UpIfBelow(root, std::fma(-root, root, x));
 }
 
-/** The least double >= x / 2: halving rounds where x is subnormal and odd. */
+/** The least double >= x / 2. Halving rounds if x is subnormal and odd. */
 [[nodiscard]] inline double HalfUp(double x) noexcept {
   const double half = x / 2;
   return 2 * half < x ? NextUp(half) : half;
@@ -108,7 +108,7 @@ inline constexpr double kSafeProduct = 0x1p-960;
 [[nodiscard]] inline double MulDown(double a, double b) noexcept { return -MulUp(-a, b); }
 [[nodiscard]] inline double DivDown(double a, double b) noexcept { return -DivUp(-a, b); }
 
-/** A double <= sqrt(x), x >= 0. */
+/** A double <= sqrt(x). @pre x >= 0. */
 [[nodiscard]] inline double SqrtDown(double x) noexcept {
   const double root = std::sqrt(x);
   if (x == 0 || !std::isfinite(root)) return root;
@@ -116,16 +116,16 @@ inline constexpr double kSafeProduct = 0x1p-960;
   return std::fma(-root, root, x) < 0 ? NextDown(root) : root;
 }
 
-/** Bounds the exact sum of `terms` non-negative doubles from above, given their plain floating-point sum taken in any
-order: the relative error of such a sum is below terms * u / (1 - terms * u), and additions do not underflow. */
+/** An upper bound on the exact sum of `terms` non-negative doubles, given their plain floating-point sum in any order.
+The relative error of such a sum is below terms * u / (1 - terms * u), and additions do not underflow. */
 [[nodiscard]] inline double SumUpper(double plain_sum, int terms) noexcept {
   if (terms <= 1 || plain_sum == 0) return plain_sum;
   return NextUp(MulUp(plain_sum, 1 + (2.0 * terms) * kUnitRoundoff));
 }
 
-/** Bounds from above the error |fl(sum_l a_l b_l) - sum_l a_l b_l| of a plain dot product of `terms` products, in any
-order, given an upper bound on sum_l |a_l b_l|. Twice the textbook bound gamma_terms, and a smallest double for each
-product that may have underflowed. */
+/** An upper bound on the error |fl(sum_l a_l b_l) - sum_l a_l b_l| of a plain dot product of `terms` products in any
+order, given an upper bound `magnitude` on sum_l |a_l b_l|. It is twice the textbook bound gamma_terms plus a smallest
+double for each product, which may have underflowed. */
 [[nodiscard]] inline double DotErrorUpper(double magnitude, int terms) noexcept {
   if (magnitude == 0) return 0;
   return AddUp(MulUp(magnitude, (2.0 * terms) * kUnitRoundoff), terms * std::numeric_limits<double>::denorm_min());

@@ -1,5 +1,4 @@
-/** Ranges of the functions around the exponential over intervals, rounded outward, as interval.h has them of the
-trigonometric ones. */
+/** Enclosures of the ranges of exp, log1p and sqrt over intervals, rounded outward. */
 #pragma once
 
 #include "certifier/numerics/interval.h"
@@ -9,10 +8,10 @@ namespace forereach {
 /** {e^x}. */
 [[nodiscard]] Interval exp(const Interval& x);
 
-/** {log(1 + x) : x > -1}; where x may reach -1 or below, [-inf, inf]. */
+/** {log(1 + x)} if all of x lies above -1; otherwise [-inf, inf]. */
 [[nodiscard]] Interval log1p(const Interval& x);
 
-/** {sqrt(x) : x >= 0}; [-inf, inf] where there is no such x. */
+/** {sqrt(t) : t in x, t >= 0}; [-inf, inf] if there is no such t. */
 [[nodiscard]] Interval sqrt(const Interval& x);
 
 }  // namespace forereach

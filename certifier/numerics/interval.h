@@ -1,7 +1,8 @@
-/** Closed intervals of reals, rounded outward: every result contains all values the operation takes on its operands.
+/** Closed intervals of reals with outward rounding: a result contains every value of the operation on points of its
+operands.
 
-Where a bound is not finite the result is not either, whatever is computed from it, so a caller checks IsFinite once at
-the end. `lower <= upper` always holds; there is no empty interval. */
+A result computed from an interval that is not finite is not finite either, so a caller can check IsFinite once at the
+end. `lower <= upper` always holds. There is no empty interval. */
 #pragma once
 
 #include <algorithm>
@@ -25,16 +26,16 @@ struct Interval {
   [[nodiscard]] bool IsFinite() const { return lower > -kInfinity && upper < kInfinity; }
   [[nodiscard]] bool Contains(double x) const { return lower <= x && x <= upper; }
 
-  /** A double inside, the midpoint up to rounding. */
+  /** A double in the interval: the midpoint up to rounding. */
   [[nodiscard]] double Middle() const {
     const double middle = lower / 2 + upper / 2;
     return std::clamp(middle, lower, upper);
   }
-  /** An upper bound on |x - y| over x inside, for a given double y. */
+  /** An upper bound on |x - y| over all x in the interval. */
   [[nodiscard]] double DistanceUpper(double y) const { return std::max(SubUp(upper, y), SubUp(y, lower)); }
   /** An upper bound on half the width. */
   [[nodiscard]] double HalfWidthUpper() const { return AddUp(HalfUp(upper), HalfUp(-lower)); }
-  /** The largest |x| over x inside. */
+  /** The largest |x| over all x in the interval, exactly. */
   [[nodiscard]] double Magnitude() const { return std::max(std::abs(lower), std::abs(upper)); }
 
   Interval operator-() const { return {-upper, -lower}; }
@@ -67,7 +68,7 @@ struct Interval {
   friend bool operator==(const Interval&, const Interval&) = default;
 
  private:
-  // Overflow and NaN end here.
+  // Turns overflow and NaN into the entire line.
   static Interval Checked(double lower_bound, double upper_bound) {
     const Interval result(lower_bound, upper_bound);
     return lower_bound <= upper_bound ? result : Entire();
@@ -79,8 +80,8 @@ struct Interval {
   return {std::min(a.lower, b.lower), std::max(a.upper, b.upper)};
 }
 
-/** A result of the C library's, moved outward by two doubles: the exact one is within one unit in the last place of it
-(glibc's manual, "Known Maximum Errors"). */
+/** A result of the C library moved outward by two doubles. The exact value is within one unit in the last place of the
+result (glibc's manual, "Known Maximum Errors"). */
 [[nodiscard]] inline double WidenUp(double x) { return NextUp(NextUp(x)); }
 [[nodiscard]] inline double WidenDown(double x) { return NextDown(NextDown(x)); }
 
@@ -92,8 +93,9 @@ struct Interval {
   return {MulDown(near, near), MulUp(far, far)};
 }
 
-/** The true ranges, widened by the error bound of the C library's functions (elementary.cpp). [-1, 1] where the
-argument is too large to reduce; tan over an interval that may meet a pole gives [-inf, inf]. */
+/** The true ranges, widened by the error bound of the C library's functions (elementary.cpp). sin and cos give [-1, 1]
+if the argument is too large to reduce. tan gives [-inf, inf] if the interval may contain a pole. Arguments are in
+radians. */
 [[nodiscard]] Interval sin(const Interval& x);
 [[nodiscard]] Interval cos(const Interval& x);
 [[nodiscard]] Interval tan(const Interval& x);

@@ -1,4 +1,5 @@
-/** The largest sizes anything has, so that the certify step needs no heap. They are those of the bus contract. */
+/** Upper bounds on all sizes, so that the certify step needs no heap. They are the limits of the bus messages
+ * (docs/bus.md). */
 #pragma once
 
 #include "certifier/numerics/compilation.h"

@@ -1,4 +1,4 @@
-/** A loop on several threads. */
+/** A parallel for-loop. */
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,9 @@
 
 namespace forereach {
 
-/** Calls work(i, thread) once for each i below `count`, in no fixed order, thread being below min(threads, count). The
-calling thread is one of them, number 0. After an exception no further i is begun, and the last one is thrown again.
+/** Calls work(i, thread) once for each i < count, in no fixed order, on min(threads, count) threads. `thread` is the
+number of the calling thread; the caller's own is 0. After an exception no further i is started, and the last exception
+is rethrown.
 @pre threads >= 1. */
 template <class Work>
 void ForEachInParallel(std::size_t count, unsigned threads, const Work& work) {

@@ -1,4 +1,4 @@
-/** The pairwise consistency test, Proposition 1. */
+/** The pairwise consistency test, Proposition 1, Eq. (falsification). */
 #pragma once
 
 #include <optional>
@@ -8,22 +8,24 @@
 
 namespace forereach {
 
-/** Observations i and j contradict the declaration in coordinate k:
+/** A proof that observations i = first and j = second contradict the declaration in coordinate k:
     |r~_ik - r~_jk| >= difference > bound >= sum_l L_kl |z_il - z_jl| + 2 sigma_k. */
 struct Violation {
   int first, second, coordinate;
   double difference, bound;
 };
 
-/** The test of one pair, rounded in favour of the declaration: a violation is one in real arithmetic. */
+/** Tests one pair in one coordinate. Rounding favours the declaration, so a returned violation holds in real
+arithmetic. Cost O(d_z). */
 [[nodiscard]] std::optional<Violation> TestPair(const Declaration& declaration, const Observations& observations,
                                                 int first, int second, int coordinate);
 
-/** A provable violation of Eq. (falsification), in the lowest coordinate k that has one: its first pair in the order
-i < j, or its worst where row k of L is zero. None if no pair provably violates it: rounding alone never falsifies a
-declaration. Plain arithmetic over an ObservationIndex finds suspects, TestPair decides. Cost, for each row with
-columns, that of the index, then about N steps down its tree: 10^6 observations in a fraction of a second. Pairs that
-meet the declaration's bound to within some units in the last place are all tested. */
+/** Searches all pairs for a provable violation of Eq. (falsification). Returns one in the lowest coordinate k that has
+any: the first pair in the order i < j, or the pair of largest difference if row k of L is zero. Returns none if no pair
+provably violates the inequality, so rounding alone never falsifies a declaration. Plain arithmetic over an
+ObservationIndex finds suspects, and TestPair decides. Cost for each row of L with nonzero columns: construction of the
+index, then about N descents of its tree; 10^6 observations take a fraction of a second. Every pair within some units in
+the last place of its bound is tested exactly, so many such pairs cost more. */
 [[nodiscard]] std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations);
 
 }  // namespace forereach

@@ -1,9 +1,9 @@
 /** Row k of the declaration as a distance between locations: d_k(z, z') = sum_l L_kl |z_l - z'_l|, over the columns l
 with L_kl > 0.
 
-A row with one to three columns is an infinity norm in coordinates of its own, one for each sign pattern s (last sign
-+): alpha^s = sum_l s_l L_kl z_l and d_k(z, z') = max_s |alpha^s - alpha'^s|. Any other is a 1-norm in the coordinates
-L_kl z_l. A row without columns declares a constant: no coordinates, d_k = 0. */
+For a row with one to three columns, d_k is an infinity norm in new coordinates, one for each sign pattern s with last
+sign +: alpha^s = sum_l s_l L_kl z_l and d_k(z, z') = max_s |alpha^s - alpha'^s|. For more columns, d_k is a 1-norm in
+the coordinates L_kl z_l. A row without columns declares a constant residual: it has no coordinates, and d_k = 0. */
 #pragma once
 
 #include <array>
@@ -30,12 +30,13 @@ class LipschitzRow final {
   [[nodiscard]] const std::vector<Column>& columns() const { return columns_; }
   [[nodiscard]] bool is_constant() const { return columns_.empty(); }
   [[nodiscard]] bool has_patterns() const { return !is_constant() && columns_.size() <= kMaxPatternColumns; }
-  /** Coordinates a location has in this row: 2^(a-1), a or none, for a columns. */
+  /** The number of coordinates of a location in this row: 2^(a-1) with patterns, otherwise a, for a columns. */
   [[nodiscard]] std::size_t num_coordinates() const {
     return has_patterns() ? std::size_t{1} << (columns_.size() - 1) : columns_.size();
   }
 
-  /** Coordinates of the location z, entries by z(l), in plain arithmetic: a product and up to a - 1 sums each. */
+  /** Writes the num_coordinates() coordinates of the location z, whose entries are z(l), in plain arithmetic. Each
+  coordinate takes at most one product for each column and a - 1 sums. */
   template <class Location>
   void Map(const Location& z, double* coordinates) const {
     if (!has_patterns()) {
@@ -70,11 +71,10 @@ double LipschitzRow::WeightedUpper(const Magnitude& magnitude) const {
   return sum;
 }
 
-/** What plain arithmetic may be off by, in any order: an upper bound on |computed - exact| for an expression of sums,
-products of two, |.|, max and min in which each leaf passes at most `roundings` roundings and the magnitudes of all
-leaves add up to `magnitude` at most, with `products` products that may underflow. Each leaf is exact up to a factor
-within 1 +- gamma_roundings, gamma_p = p u / (1 - p u) <= 2 p u, and |.|, max and min pass an error on undiminished at
-most. */
+/** An upper bound on the error |computed - exact| of plain arithmetic, in any order, for an expression of sums,
+products of two factors, |.|, max and min. Each leaf passes at most `roundings` roundings, the magnitudes of all leaves
+add up to at most `magnitude`, and at most `products` products may underflow. Proof: each leaf is exact up to a factor
+within 1 +- gamma_roundings, gamma_p = p u / (1 - p u) <= 2 p u, and |.|, max and min do not increase an error. */
 [[nodiscard]] inline double PlainErrorUpper(double magnitude, int roundings, int products) noexcept {
   return AddUp(MulUp(magnitude, 2.0 * roundings * kUnitRoundoff), products * std::numeric_limits<double>::denorm_min());
 }

@@ -1,8 +1,8 @@
-/** Observed residuals, Eq. (data): r~_i = x_i+ - f0(z_i), enclosed.
+/** Enclosures of the observed residuals r~_i = x_i+ - f0(z_i), Eq. (data).
 
-A recorded successor is a rounded number, known to its last bit only: one unit in the last place of it counts as
-observation error on top of sigma. So [lower, upper] contains x_i+ - f0(z_i) +- ulp(x_i+), and every admissible residual
-satisfies  lower_ik - sigma_k <= r_k(z_i) <= upper_ik + sigma_k. */
+A recorded successor is a rounded number. One unit in its last place counts as observation error in addition to sigma.
+So [lower, upper] contains x_i+ - f0(z_i) +- ulp(x_i+), and every admissible residual satisfies lower_ik - sigma_k <=
+r_k(z_i) <= upper_ik + sigma_k. */
 #pragma once
 
 #include "certifier/dynamics/model.h"
@@ -12,15 +12,15 @@ satisfies  lower_ik - sigma_k <= r_k(z_i) <= upper_ik + sigma_k. */
 namespace forereach {
 
 struct Observations {
-  Eigen::MatrixXd z;             ///< N-by-d_z
-  Eigen::MatrixXd lower, upper;  ///< N-by-n: enclosures of the observed residuals
+  Eigen::MatrixXd z;             ///< N-by-d_z: the locations z_i, one row each
+  Eigen::MatrixXd lower, upper;  ///< N-by-n: enclosures of the observed residuals, in the units of the states
 
   [[nodiscard]] int size() const { return static_cast<int>(z.rows()); }
   [[nodiscard]] int num_states() const { return static_cast<int>(lower.cols()); }
 };
 
-/** @throws std::invalid_argument if there are none, a size does not fit the model, a number is not finite, or f0 has no
-finite enclosure at a recorded location; names the row. */
+/** Computes the observations from transitions. @throws std::invalid_argument if there are none, a size does not match
+the model, a number is not finite, or f0 has no finite enclosure at a location; the message names the row. Cost O(N). */
 [[nodiscard]] Observations Observe(const NominalModel& model, const Transitions& transitions);
 
 }  // namespace forereach

@@ -6,8 +6,8 @@
 namespace forereach {
 
 struct Transitions {
-  Eigen::MatrixXd z;       ///< N-by-d_z: state, then input.
-  Eigen::MatrixXd x_next;  ///< N-by-n
+  Eigen::MatrixXd z;       ///< N-by-d_z: one row z_i each, the state and then the input, in the model's units.
+  Eigen::MatrixXd x_next;  ///< N-by-n: the observed successor x_i+ of each row.
 
   [[nodiscard]] int size() const { return static_cast<int>(z.rows()); }
 };
