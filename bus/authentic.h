@@ -1,27 +1,31 @@
-/** Who may speak. LCM lets anybody on the network publish. With keys (keys.h) every channel of ours belongs to one
-role, and a message counts only if that role signed it, for this robot, on this bus, on this channel, and once.
+/** Message authentication. LCM lets every program on the network publish. With keys (keys.h), every channel of
+ForeReach belongs to one role, and a message counts only if that role signed it for this robot, this bus and this
+channel, and only once.
 
     signed message = message | bus (8) | sender (8) | counter (8) | signature (64) | tag (16) | "FRSIGN02"
 
-Numbers are big-endian. The trailer stands behind the message, so programs that do not know it still decode the message.
+Numbers are big-endian. The trailer follows the message, so programs that do not know the trailer can decode the
+message.
 
     bus        the first 8 bytes of BLAKE2b-256 of the bus's name
     sender     64 random bits of one process
     counter    of that process: microseconds since the Unix epoch, or one more than the last
-    signature  Ed25519 by the role's secret of: "ForeReach message 2" | BLAKE2b-256 of the robot's name (32) | role (1)
-| bus | sender | counter | BLAKE2b-256 of (length of the channel's name (8) | channel | message) tag        BLAKE2b-128,
-keyed with the group key, of: "ForeReach trailer 2" | length of the channel's name (8) | channel | length of the message
-(8) | bus | sender | counter | signature
+    signature  Ed25519, by the role's secret, of:
+                 "ForeReach message 2" | BLAKE2b-256 of the robot's name (32) | role (1) | bus | sender | counter
+                 | BLAKE2b-256 of (length of the channel's name (8) | channel | message)
+    tag        BLAKE2b-128, keyed with the group key, of:
+                 "ForeReach trailer 2" | length of the channel's name (8) | channel | length of the message (8)
+                 | bus | sender | counter | signature
 
-A receiver checks the cheap things first. The tag covers about 130 bytes, whatever the message's size: a stranger's
-message costs one short keyed hash. A genuine trailer that was heard before is refused by its counter. Only a fresh and
+A receiver makes the cheap checks first. The tag covers about 130 bytes for every message size, so a stranger's message
+costs one short keyed hash. A genuine trailer that was received before is refused by its counter. Only a fresh and
 genuine trailer reaches the hash of the message and Ed25519.
 
-A receiver takes of each sender and channel only counters above the last, and of nobody one from before it began itself.
-So a message that was recorded earlier is refused, even by a process that has just started. Sender and receiver need
-clocks that agree: a sender whose clock is behind is not heard until it has passed the receiver's beginning. What a
-receiver remembers of a channel depends on that channel's role alone: no other role can use up its counters or push it
-out. */
+A receiver accepts a counter only if it is above the last one of that sender on that channel and not from before the
+receiver's start. So an earlier recorded message is refused, even by a process that has just started. The clocks of
+sender and receiver have to agree: messages of a sender whose clock is behind are refused until its clock has passed the
+receiver's start. The stored counters of a channel depend only on messages of that channel's role, so no other role can
+use up or displace them. */
 #pragma once
 
 #include <array>
@@ -40,22 +44,22 @@ namespace forereach {
 
 inline constexpr std::size_t kTrailerBytes = 3 * 8 + sizeof(Signature) + sizeof(GroupTag) + 8;
 
-/** The message without its trailer, if it has one. Checks nothing. */
+/** The message without its trailer, if it has one. It checks nothing. */
 [[nodiscard]] Bytes WithoutSignature(Bytes bytes);
 
 using BusId = std::array<std::uint8_t, 8>;
 [[nodiscard]] BusId BusIdOf(const std::string& bus_name);
 
-/** The role that speaks on each channel. Channels that are not in it are nobody's. */
+/** The role that owns each channel. Channels that are not listed belong to no role. */
 using Speakers = std::map<std::string, Role>;
 
 class Signer final {
  public:
-  /** @param sender tells this process from all others: by default 64 random bits. */
+  /** @param sender identifies this process; 64 random bits by default. */
   Signer(KeyRing keys, const std::string& bus_name, std::uint64_t sender = RandomSender());
 
-  /** The message with its trailer. Any thread may call it. @throws std::logic_error if the ring does not hold the role.
-   */
+  /** The message with its trailer. Any thread may call it. @throws std::logic_error if the ring lacks the role's
+   * secret. */
   [[nodiscard]] std::vector<std::uint8_t> Sign(Role role, const std::string& channel, Bytes message,
                                                std::int64_t now_us);
 
@@ -71,12 +75,12 @@ class Signer final {
 enum class Authenticity {
   kAuthentic,
   kUnsigned,  ///< No trailer.
-  kForged,    ///< Tag or signature are wrong: altered, another role's, another robot's, or on another channel.
-  kReplayed,  ///< Its counter was used, or is from before the receiver began.
-  kForeign,   ///< Of this robot, but for another bus.
+  kForged,    ///< Wrong tag or signature: altered, another role's, another robot's, or for another channel.
+  kReplayed,  ///< Its counter was used before, or is from before the receiver's start.
+  kForeign,   ///< From this robot, but for another bus.
 };
 
-/** Messages refused, by reason. */
+/** Numbers of refused messages by reason. */
 struct Refusals {
   std::int64_t unsigned_ones = 0, forged = 0, replayed = 0, foreign = 0;
 
@@ -92,22 +96,24 @@ struct Refusals {
 
 class Authenticator final {
  public:
-  /** Senders on a channel that are remembered; the one with the lowest counter is dropped, and no counter up to its
-  last is taken on that channel again. */
+  /** The number of senders that are remembered for each channel. If more appear, the one with the lowest counter is
+  forgotten, and no counter up to its last is accepted on that channel again. */
   static constexpr std::size_t kMaxSenders = 16;
-  /** So many altered messages behind one genuine trailer are looked at; then the trailer is refused. A stranger could
-  else spend this receiver's time with the trailer of a message that was lost on its way here. */
+  /** The number of altered messages with one genuine trailer that are verified; then the trailer is refused. Otherwise
+  a stranger could use the trailer of a message that this receiver lost to consume its time. */
   static constexpr int kMaxTries = 32;
 
-  /** @param keys a ring of public keys checks no tags. @param bus_name nothing: the bus of the first authentic message.
-  @param begun_us microseconds since the Unix epoch: nothing from before is taken. */
+  /** @param keys a ring with public keys only checks no tags. @param bus_name empty: the bus of the first authentic
+  message.
+  @param speakers the role of each channel. @param begun_us microseconds since the Unix epoch; earlier messages are
+  refused. */
   Authenticator(KeyRing keys, const std::optional<std::string>& bus_name, Speakers speakers, std::int64_t begun_us);
 
-  /** Whether the channel is somebody's, so that what comes on it has to be checked. */
+  /** Whether a role owns the channel, so that its messages have to be checked. */
   [[nodiscard]] bool IsSpoken(const std::string& channel) const { return channels_.contains(channel); }
 
-  /** The message inside if it is authentic, which uses its counter up; else `refusals` grows. On a channel that is
-  nobody's nothing is authentic. */
+  /** Checks a message. If it is authentic, returns the message without trailer and uses up its counter. Otherwise it
+  counts the refusal. On a channel without a role no message is authentic. */
   [[nodiscard]] std::pair<Authenticity, Bytes> Check(const std::string& channel, Bytes bytes);
 
   [[nodiscard]] const Refusals& refusals() const { return refusals_; }
@@ -116,7 +122,7 @@ class Authenticator final {
   struct Trailer;
   struct Channel {
     Role role;
-    std::int64_t oldest;                                 // counters up to this are refused
+    std::int64_t oldest;                                 // counters up to this one are refused
     std::map<std::uint64_t, std::int64_t> last_counter;  // by sender
   };
   struct Doubt {

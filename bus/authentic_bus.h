@@ -1,4 +1,4 @@
-/** A bus that signs what it sends, and hands out what the right role has signed. */
+/** A bus that signs sent messages and delivers only authentic ones. */
 #pragma once
 
 #include <memory>
@@ -9,10 +9,10 @@
 
 namespace forereach {
 
-/** Opens a bus (bus.h). On every channel of `speakers`, Publish signs as that role, and returns false where `keys` do
-not hold its secret; handlers get authentic messages only, without their trailer, and what is refused is counted
-(Bus::refusals). Other channels pass as they are.
-@param bus_name is part of every signature. @param clock of the counters, and of memq. @throws BusError. */
+/** Opens a bus (bus.h). On every channel of `speakers`, Publish signs as the channel's role and returns false if `keys`
+lack its secret. Handlers receive only authentic messages, without their trailer; refused messages are counted
+(Bus::refusals). Other channels carry messages unchanged.
+@param bus_name is part of every signature. @param clock for the counters and for memq. @throws BusError as OpenBus. */
 [[nodiscard]] std::unique_ptr<Bus> OpenSignedBus(const std::string& url, const KeyRing& keys,
                                                  const std::string& bus_name, const Speakers& speakers,
                                                  Clock clock = WallClockUs);

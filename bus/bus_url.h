@@ -1,4 +1,4 @@
-/** Where a bus is: the text of `bus.url` and `--lcm-url`, checked. */
+/** The address of a bus: parses and checks `bus.url` and `--lcm-url`. */
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace forereach {
 
-/** The bus cannot be opened; the text says what to do about it. */
+/** The bus cannot be opened. The text says what to do. */
 class BusError : public BadInput {
  public:
   using BadInput::BadInput;
@@ -18,15 +18,15 @@ class BusError : public BadInput {
 struct MulticastUrl {
   std::string group = "239.255.76.67";  ///< Dotted decimal, 224.0.0.0 to 239.255.255.255.
   std::uint16_t port = 7667;
-  int ttl = 0;                    ///< 0 stays on this machine, 1 on this network.
-  long receive_buffer_bytes = 0;  ///< recv_buf_size; 0: the URL does not say.
+  int ttl = 0;                    ///< Time to live: 0 stays on this machine, 1 on this network.
+  long receive_buffer_bytes = 0;  ///< recv_buf_size in bytes; 0 if the URL does not set it.
 
-  /** What LCM is given: its own parser reads nothing that a person wrote. */
+  /** The canonical URL for LCM. LCM's parser never reads text from a user. */
   [[nodiscard]] std::string ForSending() const;
 };
 
-/** `udpm://` alone stands for LCM's defaults. Options are separated by `&` or `,`, as LCM has them.
-@throws BusError naming the URL, the part of it that is wrong and what it has to be. */
+/** Parses a URL. `udpm://` alone means LCM's defaults. Options are separated by `&` or `,`, as in LCM.
+@throws BusError with the URL, the wrong part and the requirement. */
 [[nodiscard]] MulticastUrl ParseMulticastUrl(const std::string& url);
 
 }  // namespace forereach

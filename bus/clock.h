@@ -1,4 +1,4 @@
-/** What time it is. */
+/** Clocks. */
 #pragma once
 
 #include <cstdint>
@@ -6,10 +6,11 @@
 
 namespace forereach {
 
-/** Microseconds since the Unix epoch. */
+/** A source of the time in microseconds since the Unix epoch. */
 using Clock = std::function<std::int64_t()>;
+/** The system's wall clock, in microseconds since the Unix epoch. */
 [[nodiscard]] std::int64_t WallClockUs();
-/** Microseconds since some time, by a clock that nobody sets. */
+/** The monotonic clock, in microseconds since an arbitrary time. */
 [[nodiscard]] std::int64_t SteadyClockUs();
 
 }  // namespace forereach

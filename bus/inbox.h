@@ -1,4 +1,4 @@
-/** What has arrived on a bus and waits to be handed out: subscriptions, the screen, and two bounded queues. */
+/** The received messages of a bus that wait for dispatch: subscriptions, the screen, and two bounded queues. */
 #pragma once
 
 #include <atomic>
@@ -23,14 +23,14 @@ class Inbox final {
   /** As Bus::Subscribe and, with `unchecked`, Bus::SubscribeUnchecked. */
   void Subscribe(const std::string& channel, Bus::Handler handler, bool unchecked);
 
-  /** Takes a message in, if somebody wants it. From any one thread at a time. */
+  /** Stores a message if there is a subscription for it. Only one thread at a time may call it. */
   void Put(std::string_view channel, Bytes raw, std::int64_t utime) noexcept;
 
-  /** As Bus::Dispatch, for what has been put. */
+  /** As Bus::Dispatch, for the stored messages. */
   int HandOut(int timeout_ms);
 
-  /** Gives the memory of a burst that has been handed out back to the system. That takes some milliseconds, so call it
-  when there is time, on the thread that hands out. */
+  /** Returns freed heap to the system once a burst has been dispatched. This takes some milliseconds, so call it when
+  the process is idle, on the thread that calls HandOut. */
   void GiveBack();
 
   [[nodiscard]] std::int64_t dropped() const { return admitted_.dropped; }
@@ -65,11 +65,11 @@ class Inbox final {
   const std::shared_ptr<Screen> screen_;
   std::mutex mutex_;  // guards subscriptions_, the queues and next_number_
   std::condition_variable arrived_;
-  std::deque<Subscription> subscriptions_;       // grows only: what points into it stays
+  std::deque<Subscription> subscriptions_;       // only grows, so pointers into it stay valid
   Queue admitted_{4096, std::size_t{32} << 20};  // 800 certified plans
   Queue refused_{256, std::size_t{4} << 20};
   std::uint64_t next_number_ = 0;
-  bool was_in_burst_ = false, is_in_burst_ = false;  // of the thread that hands out
+  bool was_in_burst_ = false, is_in_burst_ = false;  // used only by the thread that calls HandOut
 };
 
 }  // namespace forereach

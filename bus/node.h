@@ -1,5 +1,5 @@
-/** A process's inside: something that listens on a bus and acts as time passes. Each process runs one node on the
-wall clock; a test or a one-process run drives several on a clock of its own. */
+/** The main part of a process: it receives messages from a bus and acts as time passes. Each process runs one node on
+the wall clock. A test or a one-process run drives several nodes on a simulated clock. */
 #pragma once
 
 #include <cstdint>
@@ -15,33 +15,32 @@ class Node {
  public:
   virtual ~Node() = default;
 
-  /** Called after each wait for messages, which lasts `kTickMs` milliseconds at most. `now_us`: microseconds since the
-  Unix epoch, or a simulated clock. */
+  /** Called after each wait for messages, at most every `kTickMs` milliseconds.
+  @param now_us microseconds since the Unix epoch, or the time of a simulated clock. */
   virtual void Tick(std::int64_t now_us) = 0;
 
-  /** True while work waits: Tick is then called again at once. */
+  /** True while work is pending; Tick is then called again at once. */
   [[nodiscard]] virtual bool busy() const { return false; }
 
-  /** The process got SIGHUP: read again what can change while it runs. */
+  /** Called after SIGHUP: reads the configuration again. */
   virtual void Reload() {}
 
-  /** True once the node has nothing left to do; its process then ends. */
+  /** True once the node has finished; its process then ends. */
   [[nodiscard]] virtual bool done() const { return false; }
 
-  /** Called once before the process ends: flush, close, print a summary. */
+  /** Called once before the process ends: flushes, closes, prints a summary. */
   virtual void Stop() {}
 
-  /** Asked after Stop: whether its process ends with exit status 1, because something that it was there to keep is
-  lost. */
+  /** Called after Stop. True if the process has to end with exit status 1, for example because data were lost. */
   [[nodiscard]] virtual bool failed() const { return false; }
 };
 
-/** A node's way out: sends, and counts what the bus refused. */
+/** Sends a node's messages and counts those that the bus refused. */
 class Sender final {
  public:
   explicit Sender(Bus& bus) : bus_(bus) {}
 
-  /** False if the bus refused the message; it is then lost. */
+  /** Sends a message. False if the bus refused it; the message is then lost. */
   template <class Message>
   bool Send(const std::string& channel, const Message& message) {
     const bool sent = bus_.Publish(channel, message);
@@ -58,8 +57,8 @@ class Sender final {
 
 inline constexpr int kTickMs = 2;
 
-/** From here on SIGTERM and SIGINT end RunNode instead of the process, and SIGHUP reloads. RunNode does it too; a
-process that calls it first also ends cleanly if the signal comes while it starts. */
+/** Installs signal handlers: SIGTERM and SIGINT end RunNode instead of the process, and SIGHUP reloads. RunNode calls
+it; a process that calls it earlier also ends cleanly if a signal arrives during its start. */
 void CatchStopSignals();
 
 /** Runs `node` on `bus` until it is done or the process gets SIGTERM or SIGINT, then stops it. */

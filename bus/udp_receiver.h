@@ -1,5 +1,5 @@
-/** Receives the datagrams of one multicast group and port, on a thread of its own, and hands on the messages in them.
-LCM's own receiver is not used: what it does with a malformed header or a fragment is not under our control. */
+/** Receives the datagrams of one multicast group and port on its own thread and delivers the messages in them. It
+replaces LCM's receiver, which can crash on a malformed header and allocates the size that a fragment claims. */
 #pragma once
 
 #include <atomic>
@@ -16,20 +16,20 @@ namespace forereach {
 
 class UdpReceiver final {
  public:
-  /** Gets each message on the receiving thread, with the time in microseconds since the Unix epoch at which the kernel
-  took the datagram. Must not throw. */
+  /** Called for each message on the receive thread. @param utime when the kernel received the datagram, microseconds
+  since the Unix epoch. It must not throw. */
   using Deliver = std::function<void(std::string_view channel, Bytes payload, std::int64_t utime)>;
 
-  /** Joins the group by the interface that the machine's routes say, and begins to receive. Unless the URL says how
-  large the receive buffer is to be, it asks for `kReceiveBufferBytes`, of which the kernel gives as much as it grants.
-  @throws std::system_error naming the step that failed. */
+  /** Joins the group on the interface that the routing table selects and begins to receive. It asks for a receive
+  buffer of the size in the URL, or of `kReceiveBufferBytes`; the kernel may grant less.
+  @throws std::system_error with the name of the step that failed. */
   UdpReceiver(const MulticastUrl& url, Deliver deliver);
-  /** Takes up to 50 ms. */
+  /** Ends the thread. Takes up to 50 ms. */
   ~UdpReceiver();
   UdpReceiver(const UdpReceiver&) = delete;
   UdpReceiver& operator=(const UdpReceiver&) = delete;
 
-  /** From any thread. */
+  /** The counts so far. Any thread may call it. */
   [[nodiscard]] DatagramCounts counts() const;
 
  private:
@@ -53,15 +53,15 @@ class UdpReceiver final {
   const Socket socket_;
   mutable std::mutex mutex_;  // guards counts_
   DatagramCounts counts_;
-  std::uint32_t last_lost_ = 0;  // the kernel's count, of the receiving thread
+  std::uint32_t last_lost_ = 0;  // the kernel's count; used only by the receive thread
   std::atomic<bool> stopping_ = false;
   std::thread thread_;
 };
 
-/** The receive buffer that a bus asks for: Debian's default, 208 kB, holds four certified plans. */
+/** The size of the receive buffer that a bus asks for. Debian's default of 208 kB holds only four certified plans. */
 inline constexpr long kReceiveBufferBytes = long{2} << 20;
 
-/** The largest receive buffer that the kernel grants; 0 if it does not say. */
+/** The largest receive buffer that the kernel grants, in bytes; 0 if it is unknown. */
 [[nodiscard]] long GrantedReceiveBufferBytes();
 
 }  // namespace forereach

@@ -1,7 +1,7 @@
-/** What a person gave cannot be used: a task file, a plan, a log, a database, a bus, an option.
+/** The exception for invalid input from outside: a task file, a plan, a log, a database, a bus address or an option.
 
-Each kind of it has a class of its own derived from this; the text names the place, the value and what it has to be.
-A program that gets one says the text in one line and exits with 2. */
+Each kind of input derives its own class. The text names the place, the value and the requirement. A program prints the
+text in one line and exits with 2. */
 #pragma once
 
 #include <stdexcept>

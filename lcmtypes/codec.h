@@ -1,7 +1,7 @@
-/** Bytes to messages and back: the one place where a message is decoded, and where bytes are digested.
+/** Encoding, decoding and digests of messages. All messages are decoded here.
 
-A message is accepted only if its fingerprint is the type's own and decoding consumes exactly the bytes received.
-Nothing here looks at values; whoever receives a message validates them. Needs no running bus. */
+A message is accepted only if its fingerprint is the type's own and decoding consumes exactly the received bytes. These
+functions do not check values; the receiver of a message validates them. They need no running bus. */
 #pragma once
 
 #include <array>
@@ -21,17 +21,17 @@ namespace forereach {
 
 using Bytes = std::span<const std::uint8_t>;
 
-/** BLAKE2b-256 of some bytes. */
+/** A BLAKE2b-256 digest. */
 using Digest = std::array<std::uint8_t, 32>;
 
 [[nodiscard]] Digest DigestOf(Bytes bytes);
 [[nodiscard]] Digest DigestOf(std::string_view text);
-/** Of a digest and some bytes behind it: of data that grows. */
+/** The digest of `before` followed by `bytes`, for data that grows. */
 [[nodiscard]] Digest ChainedDigest(const Digest& before, Bytes bytes);
 /** Lower-case hexadecimal, 64 characters. */
 [[nodiscard]] std::string ToHex(const Digest& digest);
 
-/** As messages, logs and signatures spell numbers. */
+/** The bytes of an integer in big-endian order, as in messages, logs and signatures. */
 template <std::integral Integer>
 [[nodiscard]] std::array<std::uint8_t, sizeof(Integer)> BigEndian(Integer value) {
   std::array<std::uint8_t, sizeof(Integer)> bytes;
@@ -40,7 +40,7 @@ template <std::integral Integer>
   return bytes;
 }
 
-/** The number that `bytes` begin with; there have to be as many as it has. */
+/** The big-endian integer at the beginning of `bytes`. @pre bytes.size() >= sizeof(Integer). */
 template <std::integral Integer>
 [[nodiscard]] Integer FromBigEndian(Bytes bytes) {
   std::uint64_t value = 0;
@@ -50,6 +50,7 @@ template <std::integral Integer>
 
 enum class DecodeStatus { kOk, kWrongLength, kTrailingBytes, kUnknownFingerprint };
 
+/** The bytes of a message as they are on the bus, fingerprint included. */
 template <class Message>
 [[nodiscard]] std::vector<std::uint8_t> Encode(const Message& message) {
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
@@ -57,14 +58,15 @@ template <class Message>
   return bytes;
 }
 
-/** The size of every message of a fixed-size type, fingerprint included. */
+/** The size in bytes of a message of a fixed-size type, fingerprint included. */
 template <class Message>
 [[nodiscard]] std::size_t EncodedSize() {
   static const auto size = static_cast<std::size_t>(Message{}.getEncodedSize());
   return size;
 }
 
-/** Decodes `bytes` into `message`, which is left zero unless the result is kOk. */
+/** Decodes `bytes` into `message`. Unless the result is kOk, `message` is zero. Cost: linear in the size of the type.
+ */
 template <class Message>
 [[nodiscard]] DecodeStatus Decode(Bytes bytes, Message& message) {
   message = Message{};
@@ -80,7 +82,7 @@ template <class Message>
   return DecodeStatus::kOk;
 }
 
-/** The same for callers that need no reason. */
+/** The decoded message, or nothing if `bytes` are not a message of this type. */
 template <class Message>
 [[nodiscard]] std::optional<Message> Decoded(Bytes bytes) {
   Message message;
@@ -88,14 +90,14 @@ template <class Message>
   return message;
 }
 
-/** Writes `text` into a fixed field, cut to leave at least one zero, zero-padded. */
+/** Writes `text` into a fixed field, truncated so that at least one zero follows, and pads with zeros. */
 template <std::size_t N>
 void SetText(std::uint8_t (&field)[N], std::string_view text) {
   std::memset(field, 0, N);
   std::memcpy(field, text.data(), text.size() < N ? text.size() : N - 1);
 }
 
-/** Reads a zero-padded field; bytes that are not printable ASCII become '?'. */
+/** Reads a zero-padded field. Bytes that are not printable ASCII become '?'. */
 template <std::size_t N>
 [[nodiscard]] std::string GetText(const std::uint8_t (&field)[N]) {
   std::string text;

@@ -1,4 +1,4 @@
-/** What certifier_status_v3_t and certifier_status_v2_t have in common: for readers of recorded logs. */
+/** The common part of certifier_status_v3_t and certifier_status_v2_t, for readers of recorded logs. */
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,12 @@ namespace forereach {
 
 struct Heartbeat {
   std::int64_t utime, sequence, version;
-  /** False while the certifier listens for another one, or stands by: it then decides nothing. */
+  /** False while the certifier listens for another one or stands by; it then decides nothing. */
   bool in_charge;
   Digest config_digest;
 };
 
-/** Reads a certifier_status_v3_t or a certifier_status_v2_t; nothing for other bytes. */
+/** Decodes a certifier_status_v3_t or a certifier_status_v2_t. Nothing for other bytes. */
 [[nodiscard]] std::optional<Heartbeat> ReadHeartbeat(Bytes message);
 
 }  // namespace forereach

@@ -1,4 +1,4 @@
-/** The words for the numbers in decisions and events: one place for the command, the database and the reports. */
+/** The names of the numbers in messages, for the command, the database and the reports. */
 #pragma once
 
 #include <cstdint>
@@ -21,10 +21,11 @@ any other number. */
 /** "robot_state_lost", ... as fault_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view FaultName(std::int16_t cause);
 
-/** What a person does about a fault, as words that follow "what to do: ". Says so where a reset alone does not help. */
+/** The operator's action for a fault, as text that follows "what to do: ". It says so if a reset alone does not help.
+ */
 [[nodiscard]] std::string_view FaultAdvice(std::int16_t cause);
 
-/** True of the faults that say that what the executing plan rests on does not hold: a robot stops. */
+/** True for faults that invalidate the executing plan's certificate: a robot stops. */
 [[nodiscard]] bool StopsTheRobot(std::int16_t cause);
 
 /** "OK", "STALE", "ERROR": the level of certifier_status_v3_t; "unknown" for any other number. */

@@ -1,4 +1,4 @@
-/** Text that others chose, on a terminal. */
+/** Output of untrusted text to a terminal. */
 #pragma once
 
 #include <string>
@@ -6,12 +6,13 @@
 
 namespace forereach {
 
-/** The text with each byte as "\xHH" that may not reach a terminal as it is: control characters, what is no UTF-8, and
-characters that change the direction or place of the text around them. All others stay. Whoever may name a channel, a
-source or a file may choose such bytes. */
+/** The text with each unsafe byte replaced by "\xHH": control characters, bytes that are not UTF-8, and characters that
+change the direction or place of the text around them. Names of channels, sources and files can contain such bytes. Cost
+O(bytes). */
 [[nodiscard]] std::string Printable(std::string_view text);
 
-/** The same, but line ends stay: for text of several lines of which each part is one's own or printable. */
+/** The same, except that line ends stay. Use it for text of several lines whose parts are trusted or already printable.
+ */
 [[nodiscard]] std::string PrintableLines(std::string_view text);
 
 }  // namespace forereach

@@ -1,14 +1,14 @@
-/** The seal of a certified plan: what tells a receiver that not one bit of it has changed since it was made.
+/** The seal of a certified plan. It detects every changed bit.
 
-`certificate_digest` is the BLAKE2b-256 of the message's own bytes, in their order on the bus and big-endian as there,
-fingerprint included, without three parts:
-- `plan`: `plan_digest` stands for it, the BLAKE2b-256 of its bytes as a candidate_plan_t;
-- the slice entries that are not in use: t > plan.num_steps or k >= plan.num_states;
+`certificate_digest` is the BLAKE2b-256 of the message's bytes in their order on the bus, big-endian and with the
+fingerprint, without three parts:
+- `plan`; it is represented by `plan_digest`, the BLAKE2b-256 of its bytes as a candidate_plan_t;
+- the unused slice entries: those with t > plan.num_steps or k >= plan.num_states;
 - `certificate_digest` itself.
-So the seal holds only if plan_digest is that of the plan, which also fixes what is in use, and the entries not in use
-are zero, every bit of them. Where num_steps or num_states is outside its range no slice is in use.
+So the seal holds only if `plan_digest` is the digest of the plan (which also determines the entries in use) and every
+bit of the unused entries is zero. If num_steps or num_states is out of range, no slice entry is in use.
 
-It shows damage and mix-ups. It is no signature: who can write a message can seal it. */
+The seal detects damage and mix-ups. It is not a signature: every writer of a message can compute its seal. */
 #pragma once
 
 #include <string>
@@ -19,22 +19,22 @@ It shows damage and mix-ups. It is no signature: who can write a message can sea
 
 namespace forereach {
 
-/** What `certificate_digest` has to be. Cost: a digest of 224 bytes and 16 for each slice and state. */
+/** The correct value of `certificate_digest`. Cost: a digest of 224 bytes, plus 16 bytes for each slice and state. */
 [[nodiscard]] Digest CertificateDigest(const certified_plan_t& certified);
 
-/** One way in which a seal does not hold. */
+/** A violation of a seal. */
 struct SealFault {
   enum class Kind { kPlanDigest, kCertificateDigest, kUnusedEntry };
 
   Kind kind;
   std::string field;               ///< "plan_digest", "certificate_digest", "slice_lower[40][3]", ...
-  std::string expected, found;     ///< What it has to be, and what it is.
-  int step = -1, coordinate = -1;  ///< kUnusedEntry: the first one, those of slice_lower before those of slice_upper.
-  double value = 0;                ///< The same.
+  std::string expected, found;     ///< The required and the actual value.
+  int step = -1, coordinate = -1;  ///< kUnusedEntry: the first one; slice_lower comes before slice_upper.
+  double value = 0;                ///< kUnusedEntry: its value.
 };
 
-/** All faults, at most one of each kind, in the order of kinds; none if the seal holds. Whoever acts on a certified
-plan asks this first. Cost: two digests and a look at every entry. */
+/** All violations, at most one of each kind, in the order of kinds. Empty if the seal holds. Call it before any use of
+a certified plan. Cost: two digests, and a test of every slice entry. */
 [[nodiscard]] std::vector<SealFault> FindSealFaults(const certified_plan_t& certified);
 
 }  // namespace forereach

@@ -13,8 +13,8 @@ arrives at horizon h:
 
 A restarted sender is recognised by a later stamp. Where u > h the receiver's clock was set back, and stamps tell no
 order. kRewound is ambiguous: the sender restarted and its clock was set back, or others overtook the first message. A
-receiver that acts on messages ignores it, so that an older message never replaces a newer one; its stream is accepted
-again once the stamps or the count have caught up. A reader of records takes it for a restart.
+receiver that acts on messages ignores it, so that an older message never replaces a newer one; it accepts the stream
+again once the stamps or the count have caught up. A reader of records treats it as a restart.
 
 A restart with a clock that was set back, whose message 0 is lost, is kLate until the count or the stamps catch up. */
 #pragma once
@@ -43,16 +43,16 @@ enum class Succession { kNewer, kRepeated, kLate, kRestarted, kRewound };
 
 class StreamOrder final {
  public:
-  /** For receivers without a clock: every stamp counts as it is. */
+  /** For receivers without a clock: stamps are not limited. */
   static constexpr std::int64_t kNoHorizon = std::numeric_limits<std::int64_t>::max();
 
-  /** The latest stamp that a message can have at this time, if the sender's clock is ahead by at most max_ahead_us,
-  which is not negative. A later stamp counts as this one, so that no message stays the latest for ever. */
+  /** The latest stamp that a message can have at time now_us, if the sender's clock is ahead by at most max_ahead_us >=
+  0. A later stamp is treated as this one, so that no message stays the latest for ever. */
   [[nodiscard]] static constexpr std::int64_t Horizon(std::int64_t now_us, std::int64_t max_ahead_us) {
     return now_us > kNoHorizon - max_ahead_us ? kNoHorizon : now_us + max_ahead_us;
   }
 
-  /** As above. Any numbers; O(1). */
+  /** Classifies a message by the table above. All numbers are valid. Cost O(1). */
   [[nodiscard]] Succession Compare(const StreamPosition& message, std::int64_t horizon_us) const {
     if (!newest_ || message == *newest_) return newest_ ? Succession::kRepeated : Succession::kNewer;
     if (message.sequence > newest_->sequence) return Succession::kNewer;
@@ -62,7 +62,7 @@ class StreamOrder final {
     return message.sequence == 0 ? Succession::kRewound : Succession::kLate;
   }
 
-  /** The message counts: it is the newest from now on. If its sequence is not larger, its sender has begun anew. */
+  /** Takes the message as the newest one. If its sequence is not larger than the last one, its sender has restarted. */
   void Take(const StreamPosition& message, std::int64_t horizon_us) {
     const std::int64_t utime = std::min(message.utime, horizon_us);
     const bool goes_on = newest_ && message.sequence > newest_->sequence;
@@ -80,8 +80,8 @@ class StreamOrder final {
   std::optional<std::int64_t> begun_utime_;  // of the last message 0
 };
 
-/** Of two counts of lost messages; a negative one counts as 0. A sender may invent any sequence, so the sum ends at the
-largest number. */
+/** The sum of two counts of lost messages; a negative count is taken as 0. A sender can send any sequence number, so
+the sum saturates at the largest number. */
 [[nodiscard]] constexpr std::int64_t SumOfLost(std::int64_t a, std::int64_t b) {
   const std::int64_t more = std::max<std::int64_t>(b, 0);
   return a > std::numeric_limits<std::int64_t>::max() - more ? std::numeric_limits<std::int64_t>::max() : a + more;
