@@ -69,7 +69,8 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       issued_(config.gate, clocks_.steady()),
       reload_(config.path, channels_),
       contradictions_(config_),
-      latch_(watch_, contradictions_, std::move(latch)) {
+      latch_(watch_, contradictions_, std::move(latch)),
+      reporter_({channels_, bus_, sender_, watch_, charge_, contradictions_, latch_, reload_, queue_}) {
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
     spdlog::warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
   if (const auto& violation = gate_->certifier().violation())
@@ -105,8 +106,7 @@ void CertifierNode::OnStatus(const Received& received) {
   charge_.Hear({status->started_utime, status->instance}, its_state);
   if (its_state == Charge::State::kInCharge) Heed(*status);
   FollowCharge(before);
-  // It has to hear of this one before it takes charge.
-  if (is_in_charge()) next_heartbeat_us_ = std::min(next_heartbeat_us_, last_heartbeat_us_ + kHeartbeatToOthersUs);
+  if (is_in_charge()) reporter_.HurryToOthers();
 }
 
 // What the one in charge says counts for this one if it takes over.
@@ -138,7 +138,7 @@ void CertifierNode::LookAtCharge() {
 void CertifierNode::FollowCharge(Charge::State before) {
   watch_.Set(Watch::Need::kCharge, WhyNotInCharge());
   if (charge_.state() == before) return;
-  next_heartbeat_us_ = 0;
+  reporter_.Hurry();
   if (charge_.state() == Charge::State::kStandingBy) StandBy();
   if (is_in_charge()) TakeCharge();
 }
@@ -177,31 +177,30 @@ void CertifierNode::StandBy() {
   if (compaction_.valid()) compaction_.wait();  // it works on *gate_
   gate_ = std::make_unique<Gate>(config_);
   conformance_ = {};
-  heartbeats_ = 0;
-  decided_ = 0;
+  reporter_.Restart();
 }
 
-void CertifierNode::LeaveWaiting() { left_to_other_ += static_cast<std::int64_t>(queue_.Clear()); }
+void CertifierNode::LeaveWaiting() { reporter_.counts.left_to_other += static_cast<std::int64_t>(queue_.Clear()); }
 
 void CertifierNode::OnCandidate(const Received& received) {
   if (charge_.state() == Charge::State::kStandingBy) {
-    ++left_to_other_;
+    ++reporter_.counts.left_to_other;
     return;
   }
   queue_.Add(received.bytes);
   if (is_in_charge() || queue_.size() <= kHeldAtMost) return;
   (void)queue_.TakeOldest();
-  ++left_to_other_;
+  ++reporter_.counts.left_to_other;
 }
 
 // ---- What changes the grounds of decisions.
 
 void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
-  ++refused_;
+  ++reporter_.counts.refused;
   const std::int64_t now = clocks_.steady();
   if (now < next_warning_us_) return;  // whoever floods the bus does not flood the log, nor wait for its reader
   next_warning_us_ = now + kHeartbeatUs;
-  spdlog::warn("{}: refused: {} ({} messages in all)", channel, why, refused_);
+  spdlog::warn("{}: refused: {} ({} messages in all)", channel, why, reporter_.counts.refused);
 }
 
 void CertifierNode::OnObstacles(const Received& received) {
@@ -210,7 +209,7 @@ void CertifierNode::OnObstacles(const Received& received) {
   const std::string error = gate_->UpdateObstacles(received.bytes, received.utime);
   LookForObstacles(received.utime);
   if (error.empty()) return;
-  obstacles_refused_ = true;
+  reporter_.counts.obstacles_refused = true;
   Refuse(channels_.obstacles, error);
 }
 
@@ -275,7 +274,7 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
       if (!latch_.Forget())
         return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_.why_not());
       if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));
-      next_heartbeat_us_ = 0;
+      reporter_.Hurry();
       return;
     case command_t::RELOAD: return Reload();
     default: return Refuse(channels_.command, "unknown kind " + std::to_string(command.kind));
@@ -291,7 +290,7 @@ void CertifierNode::Fail(const FoundFault& found) {
 
 void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   fault.utime = latched.utime;
-  fault.sequence = faults_++;
+  fault.sequence = reporter_.counts.faults++;
   fault.state = last_state_;
   fault.transition = last_transition_;
   SetText(fault.message, latched.why);
@@ -300,7 +299,7 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   latch_.Flush();  // the disk may take longer than a robot can wait
   spdlog::error("fault {}: {}; nothing is certified. What to do: {}", FaultName(latched.cause), latched.why,
                 FaultAdvice(latched.cause));
-  next_heartbeat_us_ = 0;
+  reporter_.Hurry();
 }
 
 void CertifierNode::SendFault() {
@@ -314,7 +313,7 @@ void CertifierNode::SendFault() {
 void CertifierNode::Tick(std::int64_t now_us) {
   LookAtCharge();
   LookForObstacles(now_us);
-  if (heartbeats_ == 0 && is_in_charge()) Heartbeat(now_us);  // says that nothing has been decided or learned yet
+  if (reporter_.IsFirst() && is_in_charge()) Heartbeat(now_us);  // says that nothing has been decided or learned yet
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) {
     // By a clock that was set back a plan may begin later than it could.
     if (fault->cause == fault_t::CLOCK_JUMP) issued_.TolerateFrom(clocks_.steady());
@@ -323,7 +322,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
   TakeReload();
   AnswerWaiting();
   CompactIfDue();
-  if (clocks_.steady() >= next_heartbeat_us_) Heartbeat(now_us);
+  if (reporter_.IsDue(clocks_.steady())) Heartbeat(now_us);
 }
 
 void CertifierNode::AnswerWaiting() {
@@ -355,7 +354,7 @@ GateAnswer CertifierNode::Decide(Bytes candidate) {
                          decision_t::ABSTAIN_FALSIFIED);
   const std::int64_t before = PageFaults();
   GateAnswer answer = gate_->Decide(candidate, clocks_.wall);
-  if (decided_ > 0) page_faults_ += PageFaults() - before;
+  reporter_.CountPageFaults(PageFaults() - before);
   return answer;
 }
 
@@ -373,7 +372,7 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
     conformance_.Remember(*answer.certified);
     issued_.Add(*answer.certified, clocks_.steady());
   }
-  elapsed_us_[decided_++ % elapsed_us_.size()] = elapsed.count();
+  reporter_.CountDecision(elapsed.count());
 }
 
 // ---- Work beside.
@@ -386,14 +385,14 @@ void CertifierNode::CompactIfDue() {
 }
 
 void CertifierNode::Reload() {
-  if (!reload_.Ask()) next_heartbeat_us_ = 0;
+  if (!reload_.Ask()) reporter_.Hurry();
 }
 
 void CertifierNode::TakeReload() {
   if (compaction_.valid() && !IsReady(compaction_)) return;  // it works on *gate_
   std::optional<TaskReload::Loaded> loaded = reload_.Take(config_, contradictions_);
   if (!loaded) return;
-  next_heartbeat_us_ = 0;
+  reporter_.Hurry();
   if (!loaded->error.empty()) return;
   loaded->gate->Inherit(*gate_);
   gate_ = std::move(loaded->gate);
@@ -404,107 +403,18 @@ void CertifierNode::TakeReload() {
   LookForObstacles(clocks_.wall());
 }
 
-// ---- The heartbeat.
-
-std::string CertifierNode::WhyNotOk() const {
-  if (!is_in_charge()) return WhyNotInCharge();
-  if (watch_.fault())
-    return std::string(FaultName(watch_.fault()->cause)) + ": " +
-           (latch_.ready() ? "" : "not stored, lost by a restart! ") + watch_.fault()->why;
-  if (!latch_.ready()) return watch_.WhyNot()->why;
-  if (gate_->certifier().violation() || contradictions_.ContradictInForce())
-    return "the observations contradict the declaration: every candidate is F until a larger bound is reloaded; a "
-           "reset "
-           "does not help";
-  if (!reload_.error().empty()) return "the last reload failed: " + reload_.error();
-  if (const auto refusal = watch_.WhyNot()) return refusal->why;
-  if (charge_.other())
-    return fmt::format("another certifier, instance {:016x}, is on this bus and decides nothing",
-                       charge_.other()->instance);
-  if (gate_->options().obstacles == ObstaclesSource::kBus) return "";
-  return fmt::format("gate.obstacles is task: the {} of the task file are all there are{}", gate_->obstacles().size(),
-                     obstacles_refused_ ? "; " + channels_.obstacles + " is refused" : "");
-}
-
 void CertifierNode::Heartbeat(std::int64_t now_us) {
   latch_.Check();
-  last_heartbeat_us_ = clocks_.steady();
-  next_heartbeat_us_ =
-      last_heartbeat_us_ + (charge_.state() == Charge::State::kListening ? kHeartbeatToOthersUs : kHeartbeatUs);
-  certifier_status_v3_t status = gate_->Status(now_us);
-  const bool error = is_in_charge() && (watch_.fault() || gate_->certifier().violation() ||
-                                        contradictions_.ContradictInForce() || !latch_.ready());
-  status.sequence = is_in_charge() ? heartbeats_++ : heartbeats_aside_++;
-  status.instance = charge_.self().instance;
-  status.started_utime = charge_.self().started_utime;
-  status.other_instance = charge_.other() ? charge_.other()->instance : 0;
-  status.state = static_cast<std::int16_t>(watch_.state());
-  if (charge_.state() == Charge::State::kListening) status.state = certifier_status_v3_t::LISTENING;
-  if (charge_.state() == Charge::State::kStandingBy) status.state = certifier_status_v3_t::STANDBY;
-  status.level = error                                          ? certifier_status_v3_t::ERROR
-                 : status.state == certifier_status_v3_t::ARMED ? certifier_status_v3_t::OK
-                                                                : certifier_status_v3_t::STALE;
-  status.by_cause[decision_t::CAUSE_SECOND_CERTIFIER] += left_to_other_;
-  status.latch = latch_.status();
-  if (watch_.fault()) {
-    status.fault = watch_.fault()->cause;
-    status.fault_utime = watch_.fault()->utime;
-  }
-  status.version = reload_.version();
-  status.failed_reloads = reload_.failed();
-  status.messages_refused = refused_;
-  status.messages_not_sent = sender_.refused();
-  status.bus_dropped = bus_.dropped();
-  status.datagrams_refused = bus_.datagrams().refused();
-  const Refusals refusals = bus_.refusals();
-  status.refused_unsigned = refusals.unsigned_ones;
-  status.refused_forged = refusals.forged;
-  status.refused_foreign = refusals.foreign;
-  status.is_unsigned = channels_.keys ? 0 : 1;
-  status.refused_replayed = refusals.replayed;
-  status.page_faults = page_faults_;
-  status.queue_depth = static_cast<std::int32_t>(queue_.size());
-  status.queue_high_water = static_cast<std::int32_t>(queue_.TakeHighWater());
-  status.elapsed_p50_us = ElapsedPercentile(0.5);
-  status.elapsed_p99_us = ElapsedPercentile(0.99);
-  status.elapsed_max_us = ElapsedPercentile(1);
-  SetText(status.message, WhyNotOk());
-  obstacles_refused_ = false;
-  // First what a robot that has just begun has to know, then what a person reads and resets.
+  const certifier_status_v3_t status = reporter_.Report(*gate_, now_us, clocks_.steady());
+  // The fault comes first, for a robot that has just begun.
   if (latch_.IsDue(clocks_.steady())) SendFault();
   sender_.Send(channels_.status, status);
-}
-
-double CertifierNode::ElapsedPercentile(double fraction) const {
-  const std::size_t count = std::min(decided_, elapsed_us_.size());
-  if (count == 0) return 0;
-  auto sorted = elapsed_us_;
-  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(count - 1));
-  std::nth_element(sorted.begin(), at, sorted.begin() + static_cast<std::ptrdiff_t>(count));
-  return *at;
 }
 
 void CertifierNode::Stop() {
   if (!is_in_charge()) LeaveWaiting();
   while (!queue_.empty()) AnswerWaiting();
-  const certifier_status_v3_t status = gate_->Status(0);
-  const auto count = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
-  std::cout << nlohmann::json{{"candidates", status.candidates},
-                              {"certified", count(decision_t::CERTIFIED)},
-                              {"abstained",
-                               {{"falsified", count(decision_t::ABSTAIN_FALSIFIED)},
-                                {"domain", count(decision_t::ABSTAIN_DOMAIN)},
-                                {"safety", count(decision_t::ABSTAIN_SAFETY)},
-                                {"deadline", count(decision_t::ABSTAIN_DEADLINE)}}},
-                              {"rejected", count(decision_t::REJECTED)},
-                              {"observations", status.observations},
-                              {"learned", status.learned},
-                              {"left_to_another_certifier", left_to_other_},
-                              {"faults", faults_},
-                              {"messages_refused", refused_},
-                              {"messages_not_sent", sender_.refused()},
-                              {"elapsed_us", {{"p50", ElapsedPercentile(0.5)}, {"p99", ElapsedPercentile(0.99)}}}}
-            << std::endl;
+  std::cout << reporter_.Summary(*gate_) << std::endl;
 }
 
 }  // namespace forereach

@@ -1,27 +1,30 @@
 /** The certifier on a bus: candidates in; decisions, certified plans and a heartbeat out.
 
-Every candidate is answered once. The newest is decided on first, since it is the one that a planner still wants. Those
-that wait are answered before their deadline passes, and of more than `gate.queue` the oldest are rejected. What changes
-the grounds of decisions takes effect as it arrives: obstacles, the robot's state, executed transitions, commands.
+The node wires the classes that each answer one question; how they work is said there:
 
-Unless gate.arming is none, nothing is certified before the robot's state is heard. A fault (watch.h, conformance.h, a
-falsified declaration) is sent on bus.channels.fault, with every heartbeat again, and from then on every candidate is
-rejected until a person sends a reset, which has to be later than the fault. A reload reads the task file again
-(task_reload.h).
+    candidate_queue.h   which candidate is decided next; Gate (gate/gate.h) decides
+    watch.h             whether anything may be certified now, and which fault is latched
+    fault_latch.h       the latched fault as a message, and what outlives the process (latch_file.h)
+    contradictions.h    which declarations are known to be false
+    charge.h            which of several certifiers on one bus decides
+    task_reload.h       which task is in force
+    status_reporter.h   what the heartbeat reports, and when
 
-Of several certifiers on one bus one is in charge (charge.h). The others say nothing but their heartbeat. What they hear
-before they take charge they do not learn: one that takes charge knows as much as one that has just been started.
+Every candidate is answered once. The newest is decided first. The others are answered before their deadline passes, and
+of more than `gate.queue` the oldest are rejected. Obstacles, the robot's state, executed transitions and commands take
+effect as they arrive.
 
-With a latch file (latch_file.h) a fault is handed to the kernel before it is announced, and written to the disk right
-after. The next certifier begins with the same fault, and says it again. While no fault could be written, every
-candidate is rejected (CAUSE_LATCH_UNWRITABLE); a reset that cannot be written clears nothing. What has contradicted a
-declaration is kept there too, over resets: candidates under a declaration that it contradicts get F.
+A fault is handed to the kernel, sent on bus.channels.fault, then written to the disk. It is sent again with every
+heartbeat, and every candidate is rejected, until a person sends a reset that is later than the fault. A candidate under
+a declaration that is known to be false is answered ABSTAIN_FALSIFIED; a reset does not change that.
 
-First goes out the certified plan, which the robot waits for, then the decision: a planner that hears of a certificate
-knows that the plan was handed to the bus before. */
+A certifier that is not in charge sends its heartbeat only, and learns nothing: one that takes charge knows as much as
+one that has just been started.
+
+The certified plan, for which the robot waits, is sent before the decision: a planner that receives the decision knows
+that the plan was handed to the bus before. */
 #pragma once
 
-#include <array>
 #include <future>
 #include <memory>
 #include <optional>
@@ -39,6 +42,7 @@ knows that the plan was handed to the bus before. */
 #include "certifier/process/contradictions.h"
 #include "certifier/process/fault_latch.h"
 #include "certifier/process/latch_file.h"
+#include "certifier/process/status_reporter.h"
 #include "certifier/process/task_reload.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
@@ -57,10 +61,9 @@ struct FoundFault;
 
 class CertifierNode final : public Node {
  public:
-  static constexpr std::int64_t kHeartbeatUs = 500'000;
-  static constexpr std::int64_t kHeartbeatToOthersUs = 100'000;  ///< While it listens for others, and to one that does.
-  static constexpr std::size_t kHeldAtMost = 4096;               ///< Candidates that wait while it listens for others.
-  static constexpr int kAtOnce = 8;  ///< Candidates decided on before the bus is looked at again.
+  static constexpr std::int64_t kHeartbeatUs = StatusReporter::kPeriodUs;
+  static constexpr std::size_t kHeldAtMost = 4096;  ///< Candidates that wait while it listens for others.
+  static constexpr int kAtOnce = 8;                 ///< Candidates decided on before the bus is looked at again.
 
   /** @param listen_us how long it listens for another certifier before it takes charge; Charge::kListenUs on a bus that
   others can be on. @param latch may be null: then a restart forgets a fault. @throws ConfigError if the task does not
@@ -114,8 +117,6 @@ class CertifierNode final : public Node {
   void Refuse(const std::string& channel, const std::string& why);
 
   void Heartbeat(std::int64_t now_us);
-  [[nodiscard]] std::string WhyNotOk() const;
-  [[nodiscard]] double ElapsedPercentile(double fraction) const;
 
   Config config_;  // in force
   const BusOptions channels_;
@@ -127,8 +128,6 @@ class CertifierNode final : public Node {
   Charge charge_;
   bool has_begun_ = false;                      // has been in charge, and no other since
   std::optional<Watch::Fault> fault_of_other_;  // of the one in charge, by its last heartbeat
-  std::int64_t left_to_other_ = 0;              // candidates
-  bool obstacles_refused_ = false;              // since the last heartbeat, for gate.obstacles is task
   Conformance conformance_;
   IssuedPlans issued_;
 
@@ -140,11 +139,8 @@ class CertifierNode final : public Node {
   std::future<void> compaction_;  // of *gate_
   Contradictions contradictions_;
   FaultLatch latch_;
-  std::int64_t next_heartbeat_us_ = 0, next_warning_us_ = 0;  // by the steady clock
-  std::int64_t last_heartbeat_us_ = 0;
-  std::int64_t heartbeats_ = 0, heartbeats_aside_ = 0, faults_ = 0, refused_ = 0, page_faults_ = 0;
-  std::array<double, 1024> elapsed_us_{};  // of the last decisions, a ring
-  std::size_t decided_ = 0;
+  StatusReporter reporter_;
+  std::int64_t next_warning_us_ = 0;  // by the steady clock
 };
 
 }  // namespace forereach
