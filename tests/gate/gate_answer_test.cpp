@@ -163,6 +163,23 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
   ExpectDigestsOf(config_, status);
 }
 
+TEST_F(GateAnswerTest, WhatWasUsedBeforeAReloadIsUsedAfterIt) {
+  ASSERT_TRUE(Decide(Candidate(7)).certified);
+  ASSERT_FALSE(Decide(Candidate(8, kAccelerationOutsideDomain)).certified);
+  Gate reloaded{config_};
+  reloaded.Inherit(gate_);
+  for (const std::int64_t used : {7, 8}) {
+    const GateAnswer again = reloaded.Decide(Encode(Candidate(used)), kNow);
+    EXPECT_EQ(again.decision.cause, decision_t::CAUSE_DUPLICATE) << used;
+    EXPECT_FALSE(again.certified);
+  }
+  const GateAnswer next = reloaded.Decide(Encode(Candidate(9)), kNow);
+  ASSERT_TRUE(next.certified);
+  EXPECT_EQ(next.decision.sequence, 4);
+  EXPECT_EQ(next.certified->sequence, 1);
+  EXPECT_EQ(reloaded.Status(kNow).candidates, 5);
+}
+
 TEST_F(GateAnswerTest, FirstSliceContainsTheInitialSetAndAllAreTheTubesHulls) {
   const candidate_plan_t candidate = Candidate(1);
   const GateAnswer answer = Decide(candidate);

@@ -82,6 +82,20 @@ TEST(WatchTest, ALostRobotLatchesAndALaterFaultThatStopsItTakesItsPlace) {
   EXPECT_EQ(watch.fault()->cause, fault_t::SLICE_LEFT);
 }
 
+TEST(WatchTest, AClockThatJumpsForwardOrBackIsAFault) {
+  constexpr std::int64_t kBegin = 1'000'000, kMost = 200;
+  for (const std::int64_t direction : {1, -1}) {
+    Watch watch({false, 1000, kMost});
+    EXPECT_FALSE(watch.Advance(kBegin, 10));
+    EXPECT_FALSE(watch.Advance(kBegin + 50 + direction * kMost, 60)) << "as far as it may";
+    EXPECT_FALSE(watch.Advance(kBegin + 100 + 2 * direction * kMost, 110)) << "it counts from where it was last";
+    const auto fault = watch.Advance(kBegin + 150 + 3 * direction * kMost + direction, 160);
+    ASSERT_TRUE(fault) << direction;
+    EXPECT_EQ(fault->cause, fault_t::CLOCK_JUMP);
+    EXPECT_EQ(watch.state(), Watch::State::kFault);
+  }
+}
+
 TEST(WatchTest, OptionsThatAreFollowedDecideWhetherTheRobotIsNeeded) {
   Watch watch({false, 1000, 200});
   EXPECT_EQ(watch.state(), Watch::State::kArmed);

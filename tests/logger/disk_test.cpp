@@ -338,6 +338,24 @@ TEST_F(DiskTest, ADatabaseThatLagsIsStale) {
   EXPECT_EQ(std::ssize(ReadRows().events), fed_);
 }
 
+// A file is not ended while rows of it wait for the database: after a crash nobody would make them again.
+TEST_F(DiskTest, AFileWhoseRowsWaitIsNotEndedSoThatACrashLosesNone) {
+  config_.logger.rotate_minutes = 1;
+  Start();
+  Feed(600);
+  Sql("CREATE TRIGGER full BEFORE INSERT ON execution_events BEGIN SELECT RAISE(ABORT, 'no more'); END");
+  Feed(600);
+  for (int i = 0; i < 3; ++i) node_->Tick(bus_.now_us += kMinuteUs);
+  Feed(600);
+  node_.reset();  // a crash: nothing is ended, and the rows in memory are gone
+  bus_.Disconnect();
+  Sql("DROP TRIGGER full");
+  EXPECT_LT(std::ssize(ReadRows().events), fed_) << "otherwise nothing was at stake";
+  { const LoggerNode recovery(config_, bus_, out_); }
+  EXPECT_EQ(Recorded(), UpTo(fed_));
+  EXPECT_EQ(std::ssize(ReadRows().events), fed_);
+}
+
 // Rows of events come back from the log; that of a loss which no event shows is the only word of it.
 TEST_F(DiskTest, ADatabaseThatRefusesForLongCostsNoGapWithoutAnEvent) {
   config_.logger.flush_ms = 1000;

@@ -154,6 +154,27 @@ TEST(PlanarSeparation, IsTheExactDistanceFromBelow) {
   }
 }
 
+// A slice's slack is as much a part of it as its generators, whichever way its distance is found.
+TEST(PlanarSeparation, CountsTheSlack) {
+  Random random(709);
+  SCOPED_TRACE(random.trace());
+  int proven = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    Zonotope slice = AnySlice(random);
+    for (int k = 0; k < 2; ++k)
+      if (random.Coin(0.8)) slice.mutable_slack(k) = std::ldexp(random.Uniform(1, 2), -random.Integer(1, 30));
+    const Zonotope same(slice.CenterVector(), slice.GeneratorMatrix());
+    const Obstacle obstacle = AnyPlanarObstacle(random);
+    const Rational square = SquaredDistance(same, obstacle);
+    for (const Separation& s : {Separate(slice, obstacle), SeparateByHulls(slice, obstacle)}) {
+      if (!(s.distance > 0)) continue;
+      ASSERT_LE(Rational(s.distance) * Rational(s.distance), square) << "trial " << trial;
+      ++proven;
+    }
+  }
+  EXPECT_GT(proven, 1000);
+}
+
 TEST(PlanarSeparation, HoldsFarFromTheOriginAndAtEveryScale) {
   Random random(702);
   SCOPED_TRACE(random.trace());
@@ -385,6 +406,35 @@ TEST(HalfSpaceSeparation, TouchingIsNotProven) {
   EXPECT_FALSE(Separate(point, side(7)).IsProven());
   EXPECT_FALSE(Separate(point, side(NextDown(7))).IsProven());
   EXPECT_TRUE(Separate(point, side(NextUp(7))).IsProven());
+}
+
+// What the sums cancel their rounding does not: the hull's margin is of their terms' size.
+TEST(ProjectionOracle, HullsContainTheExactProjectionWhereItCancels) {
+  Random random(710);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 5000; ++trial) {
+    const int n = random.Integer(2, 6), p = random.Integer(1, 3);
+    const Eigen::MatrixXd matrix = random.Matrix(p, n);
+    Eigen::VectorXd center = random.Vector(n, std::ldexp(1, random.Integer(-20, 40)));
+    double rest = 0;
+    for (int l = 0; l + 1 < n; ++l) rest += matrix(0, l) * center[l];
+    if (random.Coin(0.8) && matrix(0, n - 1) != 0) center[n - 1] = -rest / matrix(0, n - 1);
+    const Zonotope slice(center, random.Coin() ? Eigen::MatrixXd(n, 0)
+                                               : random.Matrix(n, random.Integer(1, 12), random.Coin() ? 1e-17 : 1));
+    const std::vector<double> half_width = HalfWidths(slice);
+    const forereach::Hull hull = Projection(matrix, n).EncloseHull(slice, half_width);
+    for (int k = 0; k < p; ++k) {
+      Rational middle = 0, reach = 0;
+      for (int l = 0; l < n; ++l) {
+        middle += Rational(matrix(k, l)) * Rational(center[l]);
+        reach += abs(Rational(matrix(k, l))) * Rational(half_width[static_cast<std::size_t>(l)]);
+      }
+      const Rational found(hull.center[static_cast<std::size_t>(k)]),
+          width(hull.half_width[static_cast<std::size_t>(k)]);
+      ASSERT_LE(middle + reach, found + width) << "trial " << trial;
+      ASSERT_GE(middle - reach, found - width) << "trial " << trial;
+    }
+  }
 }
 
 TEST(ProjectionOracle, ContainsTheExactProjection) {

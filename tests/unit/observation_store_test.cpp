@@ -3,13 +3,32 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
+#include <functional>
+#include <new>
 #include <set>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "certifier/residual/observation_store.h"
 #include "certifier/residual/retention.h"
 #include "tests/oracle/random.h"
+
+namespace {
+
+// Called once, at the next allocation of the thread that set it: what comes between two steps of one call.
+thread_local std::function<void()>* at_next_allocation = nullptr;
+
+}  // namespace
+
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  if (at_next_allocation) (*std::exchange(at_next_allocation, nullptr))();
+  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace forereach {
 namespace {
@@ -293,6 +312,110 @@ TEST(ObservationStore, IsReadWhileItGrows) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(wrong, 0);
   EXPECT_EQ(store.snapshot().size(), 1550u);
+}
+
+// Compact merges the tail, then builds the index: what is inserted between both has to be in the new tail.
+TEST(ObservationStore, CompactKeepsWhatArrivesWhileItBuilds) {
+  Random random(811);
+  SCOPED_TRACE(random.trace());
+  for (const int arrivals : {1, 2, 9}) {
+    std::vector<Sample> samples = Observe(random, 40);
+    ObservationStore store = StoreOf(samples, Options(32));
+    for (int i = 0; i < 5; ++i) samples.push_back(Observe(random)), Insert(store, samples.back());
+    std::vector<int> ids;
+    std::function<void()> arrive = [&] {
+      for (int i = 0; i < arrivals; ++i) {
+        samples.push_back(Observe(random));
+        ids.push_back(Insert(store, samples.back()).id);
+      }
+    };
+    at_next_allocation = &arrive;
+    store.Compact();
+    ASSERT_EQ(at_next_allocation, nullptr) << "Compact allocated nothing";
+    ASSERT_EQ(std::ssize(ids), arrivals);
+    EXPECT_EQ(ids.front(), 45);
+    EXPECT_EQ(store.snapshot().size(), samples.size());
+    EXPECT_EQ(store.tail_size(), arrivals);
+    ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
+    store.Compact();
+    EXPECT_EQ(store.tail_size(), 0);
+    EXPECT_EQ(store.snapshot().size(), samples.size());
+    ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
+  }
+}
+
+TEST(ObservationStore, CompactKeepsAContradictionThatArrivesWhileItBuilds) {
+  Random random(812);
+  SCOPED_TRACE(random.trace());
+  std::vector<Sample> samples = Observe(random, 40);
+  ObservationStore store = StoreOf(samples, Options(32, 200));
+  Sample liar = samples[7];
+  liar.lower[1] += 0.5, liar.upper = liar.lower;
+  std::function<void()> arrive = [&] { Insert(store, liar); };
+  at_next_allocation = &arrive;
+  store.Compact();
+  for (int round = 0; round < 3; ++round, store.Compact()) {
+    ASSERT_TRUE(store.snapshot().violation());
+    ASSERT_TRUE(FindViolation(MakeDeclaration(), store.snapshot().Contradiction()));
+  }
+}
+
+// With a contradiction among them nothing is dropped for want of room, however often the index is built anew.
+TEST(ObservationStore, AContradictionOutlivesAnyNumberOfCompactions) {
+  Random random(813);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 20; ++trial) {
+    ObservationStore store = StoreOf(Observe(random, 30), Options(16, 40));
+    const Sample honest = Observe(random);
+    Sample liar = honest;
+    const int coordinate = trial % kStates;
+    liar.lower[coordinate] += random.Sign() * 0.02, liar.upper = liar.lower;
+    Insert(store, honest);
+    ASSERT_FALSE(store.snapshot().violation());
+    const auto insertion = Insert(store, liar);
+    ASSERT_TRUE(insertion.violation);
+    for (int round = 0; round < 4; ++round) {
+      for (int i = 0; i < 20; ++i) Insert(store, Observe(random));
+      store.Compact();
+      const auto snapshot = store.snapshot();
+      ASSERT_TRUE(snapshot.violation()) << "round " << round;
+      ASSERT_EQ(snapshot.violation()->second, insertion.id);
+      const Observations pair = snapshot.Contradiction();
+      ASSERT_EQ(pair.size(), 2) << "round " << round;
+      ASSERT_TRUE(FindViolation(MakeDeclaration(), pair)) << "round " << round;
+    }
+  }
+}
+
+TEST(EnvelopeTail, BoundsAreRoundedOutwardAndValuesBeyondTheHeadroomAreNotCovered) {
+  Random random(814);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 500; ++trial) {
+    Declaration declaration = MakeDeclaration();
+    for (double& sigma : declaration.noise_bound) sigma = std::ldexp(random.Uniform(0.5, 1), -random.Integer(0, 8));
+    const std::vector<Sample> samples = Observe(random, 4);
+    const LipschitzEnvelope envelope(declaration, Join(samples), kLower, kUpper, {.value_headroom = 2});
+    EnvelopeTail tail(declaration, envelope, 4);
+    const Sample sample = Observe(random);
+    tail.Append(View(sample.z), View(sample.lower), View(sample.upper));
+    for (int k = 0; k < kStates; ++k) {
+      const long double sigma = declaration.noise_bound[k];  // both sums are exact in 64 bits
+      const double floor = tail.HighestFloor(k, 1), ceiling = -tail.HighestNegatedCeiling(k, 1);
+      EXPECT_LE(floor, sample.lower[k] - sigma);
+      EXPECT_GE(ceiling, sample.upper[k] + sigma);
+      EXPECT_GT(NextUp(floor), sample.lower[k] - sigma);
+      EXPECT_LT(NextDown(ceiling), sample.upper[k] + sigma);
+      if (envelope.row(k).is_constant()) continue;
+      const double limit = SubDown(envelope.value_limit(k), declaration.noise_bound[k]);
+      for (const double sign : {1.0, -1.0}) {
+        Sample large{sample.z, Eigen::VectorXd::Zero(kStates), Eigen::VectorXd::Zero(kStates)};
+        large.lower[k] = large.upper[k] = sign * limit;
+        EXPECT_TRUE(tail.Covers(View(large.lower), View(large.upper)));
+        (sign > 0 ? large.upper : large.lower)[k] = sign * NextUp(limit);
+        EXPECT_FALSE(tail.Covers(View(large.lower), View(large.upper)));
+      }
+    }
+  }
 }
 
 TEST(ObservationStore, KeepsToItsBudget) {
