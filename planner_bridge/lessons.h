@@ -1,4 +1,4 @@
-/** What the abstentions from one start ask of the next candidate from there. */
+/** Requirements on the next candidate from one start, learned from the abstentions of earlier candidates from it. */
 #pragma once
 
 #include <Eigen/Core>
@@ -10,19 +10,19 @@ namespace forereach {
 
 class Lessons final {
  public:
-  /** Nothing has been learned: planner.clearance, and no margin from the domain's bounds. */
+  /** Starts with planner.clearance and without a margin from the domain's bounds. */
   explicit Lessons(const PlannerOptions& options) : clearance_(options.clearance), step_(options.clearance_step) {}
 
   /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. No other outcome
   changes anything. */
   void Learn(Outcome outcome);
 
-  /** What the next candidate keeps from obstacles, metres. */
+  /** The distance that the next candidate keeps from obstacles, metres. */
   [[nodiscard]] double clearance() const { return clearance_; }
-  /** What it keeps from the bounds of the state domain, n entries in model units: for each abstention D twice the
-  half-width of X_0, by which the tube is certain to reach beyond its center, or planner.clearance_step for a state that
-  the projection reads.
-  @param half_width  of X_0, n entries. @param projection  P, p-by-n. */
+  /** The distance that the next candidate keeps from the bounds of the state domain, n entries in model units. Each
+  abstention D adds twice the half-width of X_0, because the tube reaches at least one half-width beyond its center, or
+  planner.clearance_step for a state that the projection uses.
+  @param half_width of X_0, n entries. @param projection P, p-by-n. */
   [[nodiscard]] Eigen::VectorXd DomainMargin(const Eigen::VectorXd& half_width,
                                              const Eigen::MatrixXd& projection) const;
 

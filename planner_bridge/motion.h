@@ -1,4 +1,5 @@
-/** How a nominal model moves and stops: what planning needs beyond its equations. A new model adds its own Motion. */
+/** Driving and braking of a nominal model: the functions that planning needs in addition to its equations. To plan for
+a new model, implement Motion for it. */
 #pragma once
 
 #include <memory>
@@ -14,26 +15,26 @@ class Motion {
  public:
   virtual ~Motion() = default;
 
-  /** Time of one step, s. */
+  /** Duration of one step, s. */
   [[nodiscard]] virtual double dt() const = 0;
 
   /** Speed in state x, m/s; negative in reverse, which plans do not use. */
   [[nodiscard]] virtual double Speed(std::span<const double> x) const = 0;
 
-  /** A control for one step that takes x towards driving at `speed` (m/s) in the direction of travel `heading` (rad, in
-  the plane of the first two coordinates), smoothly and within the input domain: a hint for the search. */
+  /** Sets u to a control for one step that steers x smoothly towards speed `speed` (m/s) and direction of travel
+  `heading` (rad, in the plane of the first two coordinates), within the input domain. It is a hint for the search. */
   virtual void Pursue(std::span<const double> x, double heading, double speed, std::span<double> u) const = 0;
 
-  /** Turns x into the state in which the robot's hold mode leaves it: at rest where it is. */
+  /** Sets x to the state in which the robot's hold mode leaves it: at rest at its position. */
   virtual void Hold(std::span<double> x) const = 0;
 
-  /** Shapes of braking tail to choose from; 0 is the plainest and is to be tried first. */
+  /** The number of shapes of braking tails. Shape 0 is the simplest; try it first. */
   [[nodiscard]] virtual int num_tails() const = 0;
 
-  /** Controls, one column a step, that bring the nominal model from x to standstill: speed and its rate end at zero up
-  to rounding. Within the input domain; the states in between are the caller's to check.
-  @param tail 0 .. num_tails() - 1.
-  @return false, with `controls` unspecified, if it takes more than max_steps. */
+  /** Computes controls that bring the nominal model from x to rest: speed and acceleration end at zero up to rounding.
+  The controls lie within the input domain; the caller checks the states.
+  @param tail shape, 0 .. num_tails() - 1. @param controls is set, one column for each step.
+  @return false, with `controls` unspecified, if this takes more than max_steps. */
   [[nodiscard]] virtual bool Brake(std::span<const double> x, int tail, int max_steps,
                                    Eigen::MatrixXd& controls) const = 0;
 };

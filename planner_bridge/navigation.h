@@ -1,4 +1,4 @@
-/** How far it still is to the goal, around the obstacles: what a receding horizon descends. */
+/** The travel distance to the goal around the obstacles. The search minimises it. */
 #pragma once
 
 #include <vector>
@@ -10,20 +10,21 @@
 
 namespace forereach {
 
-/** In the plane: the travel distance from y to the goal inside a region and among obstacles grown by a clearance, a
-little more where it passes close to either, from a grid solved once by the fast marching method. On the line and in
-space: the straight distance. For planning, not for bounds. Refers to nothing of its arguments. */
+/** For p = 2: the travel distance from y to the goal inside a region and around obstacles grown by a clearance, with a
+small penalty close to either. It is computed once on a grid by the fast marching method. For p = 1 and p = 3: the
+straight distance. Use it for planning, not for bounds. It keeps no reference to its arguments. */
 class NavigationField final {
  public:
-  /** @param region where the robot may be; outside it answers as at its edge. @param clearance metres.
-  Cost O(cells (obstacles + log cells)), 60,000 cells at most. */
+  /** @param region the region of the robot's positions, metres; a point outside has the value at the nearest edge.
+  @param clearance metres. @param goal p entries, metres. Cost O(cells (obstacles + log cells)) with at most 60,000
+  cells. */
   NavigationField(const Box& region, const std::vector<Obstacle>& obstacles, double clearance,
                   const Eigen::VectorXd& goal);
 
-  /** Metres. Inside a grown obstacle it is finite, large, and falls towards the way out. */
+  /** The distance in metres. Inside a grown obstacle it is finite and large, and decreases towards the outside. */
   [[nodiscard]] double DistanceToGo(const Eigen::VectorXd& y) const;
 
-  /** The unit vector along which it falls fastest; zero where it is flat. */
+  /** The unit vector of steepest descent; zero if the field is flat. */
   [[nodiscard]] Eigen::VectorXd Descent(const Eigen::VectorXd& y) const;
 
  private:

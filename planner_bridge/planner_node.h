@@ -1,25 +1,22 @@
-/** The planner on a bus: robot states and decisions in, candidates out.
+/** The planner's node: it receives robot states and decisions, and sends candidates.
 
-A round answers one robot state: it looks for a certificate of a plan that starts lead_steps boundaries later, from
-where the executing plan will have taken the robot by then. Rounds begin while the robot stands, and once that start is
-not before the end of its plan's progress part; not while a certified plan waits for its own start. A round sends one
-candidate at a time and waits for its decision:
-    certified          -> the round ends, the plan waits for its start
-    abstention S       -> the next candidate keeps clearance_step more from obstacles
-    abstention D       -> the next candidate keeps further inside the domain's bounds
-                           (a policy's follows another reference instead, policy_proposer.h)
-    abstention F       -> the round ends: no candidate can pass
-    rejected           -> the next candidate; the round ends where the certifier is not armed, does not know the
-                           obstacles, or has latched a fault
+A round searches for a certified plan in response to one robot state. The plan starts lead_steps boundaries later, at
+the state that the executing plan will have reached by then. A round begins while the robot holds still, or when that
+start is at or after the end of the executing plan's progress part. No round begins while a certified plan waits for its
+start. A round sends one candidate at a time and waits for its decision: certified          -> the round ends, the plan
+waits for its start abstention S       -> the next candidate keeps clearance_step more from obstacles abstention D ->
+the next candidate keeps further inside the domain's bounds (a policy's candidate follows another reference instead,
+policy_proposer.h) abstention F       -> the round ends, because no candidate can be certified rejected           -> the
+next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has latched a fault
     abstained, no time -> the next candidate
-It ends without a certificate after `candidates` searches, or when too little time is left until its start; the next
-state begins another. Where gate.obstacles is bus, no round begins before the obstacles are known, and a round ends when
-they are not known any more (obstacles_in_force.h). All planning is done in Tick, one search at a time. Once the robot
-has been at the goal, or has said FINISHED, no round begins any more.
+A round ends without a certificate after `candidates` searches, or when too little time is left until its start; the
+next state begins another round. With gate.obstacles bus, no round begins before the obstacles are known, and a round
+ends when they become unknown (obstacles_in_force.h). All planning runs in Tick, one search at a time. After the robot
+has reached the goal, or has reported FINISHED, no round begins.
 
-Messages that do not decode, contain what is not finite, are stamped ahead of the clock by more than gate.max_ahead_ms,
-are obstacles that the gate would not take (obstacles_in_force.h), or concern somebody else's candidates are counted
-and ignored. */
+Some messages are counted and ignored: those that do not decode, that contain a number that is not finite, or that are
+stamped ahead of the clock by more than gate.max_ahead_ms; obstacles that the gate would refuse (obstacles_in_force.h);
+and decisions on candidates of other planners. */
 #pragma once
 
 #include <iostream>
@@ -46,14 +43,14 @@ class PlannerNode final : public Node {
  public:
   static constexpr const char* kSource = "forereach-planner";
 
-  /** @param bus has to outlive the node. @param out gets the summary at Stop.
-  @throws ConfigError if the planner's part of the task does not fit the model. */
+  /** @param bus must outlive the node. @param out receives the summary at Stop.
+  @throws ConfigError if the planner's part of the task does not match the model. */
   PlannerNode(const Config& config, Bus& bus, std::ostream& out = std::cout);
 
   void Tick(std::int64_t now_us) override;
-  /** True once the robot has said FINISHED. */
+  /** True once the robot has reported FINISHED. */
   [[nodiscard]] bool done() const override { return finished_; }
-  /** Prints Summary() on a line of its own. */
+  /** Prints Summary() on one line. */
   void Stop() override;
 
   /** One JSON object: proposed, certified, abstained and rejected (counts by cause), unanswered, rounds,
@@ -66,7 +63,7 @@ class PlannerNode final : public Node {
     Eigen::VectorXd center;  // of X_0
     Lessons lessons;
     int searches = 0;
-    std::int64_t awaited_plan = -1;  // whose decision is to come, -1 if none
+    std::int64_t awaited_plan = -1;  // the plan whose decision is outstanding, -1 if none
   };
 
   void OnRobotState(const Received& received);
@@ -96,7 +93,7 @@ class PlannerNode final : public Node {
 
   std::optional<Round> round_;
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
-  std::optional<std::int64_t> waiting_start_;       // of a certified plan that is still to begin
+  std::optional<std::int64_t> waiting_start_;       // start of a certified plan that has not begun yet
   StreamOrder states_;                              // the robot's
   std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
   ObstaclesInForce obstacles_;

@@ -1,10 +1,9 @@
-/** A learned policy as it is used: a file of weights, and its evaluation. How it was trained is not known here.
+/** A learned policy: its file of weights and its evaluation. This code does not depend on the training.
 
-A fully connected network with hidden layers of tanh maps features to a block of controls for steps t = 0..T-1, inputs
-of a step next to each other:
-    h_0 = (features - input.offset) / input.scale,   h_l = tanh(W_l h_{l-1} + b_l),
-    block = output.offset + output.scale * (W_L h_{L-1} + b_L).
-What the features of the bicycle are is in reference.h. A policy promises nothing: its blocks are candidates. */
+A fully connected network with hidden layers of tanh maps features to a block of controls for steps t = 0..T-1, stored
+step by step: h_0 = (features - input.offset) / input.scale,   h_l = tanh(W_l h_{l-1} + b_l), block = output.offset +
+output.scale * (W_L h_{L-1} + b_L). reference.h defines the features of the bicycle. A policy's blocks have no
+guarantee; they are only candidates. */
 #pragma once
 
 #include <span>
@@ -17,14 +16,14 @@ What the features of the bicycle are is in reference.h. A policy promises nothin
 
 namespace forereach {
 
-/** A policy file that cannot be used: the text names file, field, value and bound. */
+/** A policy file cannot be used. The text names file, field, value and bound. */
 class PolicyError : public BadInput {
  public:
   using BadInput::BadInput;
 };
 
 struct Policy {
-  /** Entry by entry; scales are positive. */
+  /** An affine map for each entry. Scales are positive. */
   struct Scaling {
     Eigen::VectorXd offset, scale;
   };
@@ -33,15 +32,16 @@ struct Policy {
     Eigen::VectorXd bias;
   };
 
-  std::string model;   ///< The nominal model it was trained with: NominalModel::description()
+  std::string model;   ///< NominalModel::description() of the model that it was trained with
   int num_inputs = 0;  ///< m
   Scaling input, output;
-  std::vector<Layer> layers;  ///< One at least; each as wide as the one before is high
+  std::vector<Layer> layers;  ///< At least one. The columns of each are the rows of the one before.
 
   [[nodiscard]] int num_features() const { return static_cast<int>(input.offset.size()); }
   [[nodiscard]] int num_steps() const { return static_cast<int>(output.offset.size()) / num_inputs; }
 
-  /** The block, m-by-T, a column a step. @param features num_features() entries. Cost: a multiplication a weight. */
+  /** The block of controls, m-by-T, one column for each step. @param features num_features() entries. Cost: one
+  multiplication for each weight. */
   [[nodiscard]] Eigen::MatrixXd Act(const Eigen::VectorXd& features) const;
 };
 
@@ -59,7 +59,7 @@ struct Policy {
 Numbers are finite, scales positive. @throws PolicyError. */
 [[nodiscard]] Policy LoadPolicy(const std::string& path);
 
-/** Writes it so that LoadPolicy gives it back to the last bit. @throws PolicyError if the file cannot be written. */
+/** Writes a policy file. LoadPolicy reads back the same bits. @throws PolicyError if the file cannot be written. */
 void SavePolicy(const std::string& path, const Policy& policy);
 
 }  // namespace forereach

@@ -1,9 +1,9 @@
 /** Candidate plans from a learned policy of the bicycle: the first progress_steps of its block, then a braking tail.
 
-The policy sees neither obstacles nor bounds, and nothing is checked here but that inputs lie in their domain: what may
-not be driven, the certifier refuses, and the next candidate follows another reference. References start where the robot
-is, at its speed, and change it towards cruise_speed. The first steers along the arc to the goal; the following ones
-along kFan angles over the range that the policy was taught (reference.h), nearest to that arc first. */
+The policy does not take obstacles or bounds into account. The proposer checks only that inputs lie in their domain. If
+the certifier refuses a candidate, the next candidate follows another reference. References start at the robot's state
+and speed and change the speed towards cruise_speed. The first one follows the arc to the goal. The next ones follow
+kFan steering angles over the range of the training (reference.h), starting with the angle nearest to that arc. */
 #pragma once
 
 #include <memory>
@@ -19,14 +19,15 @@ class PolicyProposer final : public Proposer {
  public:
   static constexpr int kFan = 9;
 
-  /** @throws std::invalid_argument unless the policy is of the problem's model, a bicycle judged in x and y, and has 12
-  features and progress_steps steps; or if goal or steps do not fit. */
+  /** @throws std::invalid_argument unless the policy belongs to the problem's model, the model is a bicycle with x and
+  y as safety coordinates, and the policy has 12 features and progress_steps steps; also if the goal or the steps are
+  invalid. */
   PolicyProposer(std::shared_ptr<const Problem> problem, PlannerOptions options, Policy policy);
 
   void SetObstacles(std::vector<Obstacle>) override {}
   [[nodiscard]] const Motion& motion() const override { return *motion_; }
-  /** None after 1 + kFan attempts, or if no tail of at most tail_steps ends the plan. Clearance, margin and seed are
-  not looked at. */
+  /** One candidate. Nothing after 1 + kFan attempts, or if no braking tail of at most tail_steps ends the plan.
+  Clearance, margin and seed of the request are ignored. */
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
 
  private:

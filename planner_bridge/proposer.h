@@ -1,5 +1,5 @@
-/** Where candidate plans come from: a request for one start in, a plan with its braking tail out. A proposal is no
-proof: candidates are certified or not by somebody else. */
+/** The interface of planners: from a request for one start to a plan with its braking tail. A proposal has no
+guarantee; the certifier decides on it. */
 #pragma once
 
 #include <cstdint>
@@ -16,17 +16,18 @@ proof: candidates are certified or not by somebody else. */
 namespace forereach {
 
 struct PlanRequest {
-  Eigen::VectorXd state;          ///< Where the plan starts: n entries, model units.
-  double clearance = 0;           ///< Kept from obstacles, m. One that is nearer at the start counts as it is there.
-  Eigen::VectorXd domain_margin;  ///< Kept from the bounds of the state domain, n entries or none.
+  Eigen::VectorXd state;  ///< Initial state of the plan: n entries, model units.
+  double clearance = 0;   ///< Distance to keep from obstacles, m; less if the start is nearer to an obstacle.
+  Eigen::VectorXd
+      domain_margin;  ///< Distance to keep from the bounds of the state domain: n entries, or empty for none.
   std::uint32_t seed = 1;
-  int attempt = 0;  ///< How often this start was asked for before.
+  int attempt = 0;  ///< Number of earlier requests for this start.
 };
 
 struct Proposal {
-  Eigen::MatrixXd controls;  ///< One column a step, input units.
-  int progress_steps = 0;    ///< The braking tail are the columns after these.
-  Eigen::MatrixXd states;    ///< The nominal rollout, one column more than controls.
+  Eigen::MatrixXd controls;  ///< One column for each step, input units.
+  int progress_steps = 0;    ///< Number of columns before the braking tail.
+  Eigen::MatrixXd states;    ///< The nominal rollout, with one column more than controls.
 };
 
 class Proposer {
@@ -35,16 +36,17 @@ class Proposer {
 
   virtual void SetObstacles(std::vector<Obstacle> obstacles) = 0;
   [[nodiscard]] virtual const Motion& motion() const = 0;
-  /** One candidate, or none if it finds none. Depends on the request and what it was made with alone. */
+  /** One candidate, or nothing if none was found. The result depends only on the request, the construction and the
+   * obstacles. */
   [[nodiscard]] virtual std::optional<Proposal> Propose(const PlanRequest& request) = 0;
 };
 
-/** What planner.source names. @throws std::invalid_argument if the options do not fit the problem, PolicyError if the
-policy cannot be used. */
+/** Makes the proposer that planner.source names. @throws std::invalid_argument if the options do not match the problem,
+PolicyError if the policy cannot be used. */
 [[nodiscard]] std::unique_ptr<Proposer> MakeProposer(const Config& config);
 
-/** @throws std::invalid_argument unless there is a goal with an entry for each safety coordinate, and progress part and
-braking tail together have 1 to kMaxSteps steps. */
+/** Checks goal and steps. @throws std::invalid_argument unless the goal has an entry for each safety coordinate, and
+progress part and braking tail together have 1 to kMaxSteps steps. */
 void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options);
 
 }  // namespace forereach

@@ -1,4 +1,4 @@
-/** A best guess of the residual from the recorded transitions, to predict where the robot will be. Proves nothing. */
+/** An estimate of the residual from the recorded transitions, to predict the robot's state. It has no guarantee. */
 #pragma once
 
 #include <memory>
@@ -13,9 +13,10 @@ class ResidualEstimate final {
  public:
   explicit ResidualEstimate(std::shared_ptr<const Problem> problem);
 
-  /** Predicts the successor f0(z) + r(z), r(z)_k being the mean of the nearest observed residuals in the distance
-  sum_l L_kl |z_l - z_il|, weighted by the inverse square of that distance. A coordinate whose row of L is zero takes
-  the mean of all. Cost O(N) a coordinate. @param z d_z entries. @param next n entries. */
+  /** Predicts the successor f0(z) + r(z), where r(z)_k is the mean of the nearest observed residuals in the distance
+  sum_l L_kl |z_l - z_il|, weighted by the inverse square of that distance. If row k of L is zero, r(z)_k is the mean of
+  all.
+  @param z d_z entries. @param next n entries, is set. Cost O(N) for each coordinate. */
   void Predict(std::span<const double> z, std::span<double> next) const;
 
  private:

@@ -1,4 +1,4 @@
-/** What interval arithmetic says of a claim: it holds, it does not, or more bits are needed to tell. */
+/** Three-valued answers of interval arithmetic to a claim: true, false, or undecided at this precision. */
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace forereach::verifier {
 
 enum class Answer { kYes, kNo, kUnknown };
 
-/** Whether a <= b (a < b) for the numbers meant. */
+/** Whether a <= b (a < b) for the exact numbers that the intervals enclose. */
 [[nodiscard]] inline Answer IsAtMost(const Real& a, const Real& b) {
   if (CertainlyAtMost(a, b)) return Answer::kYes;
   return CertainlyBelow(b, a) ? Answer::kNo : Answer::kUnknown;
@@ -19,13 +19,14 @@ enum class Answer { kYes, kNo, kUnknown };
   return CertainlyAtMost(b, a) ? Answer::kNo : Answer::kUnknown;
 }
 
-/** A claim that does not hold, or could not be told. */
+/** A claim that is false or undecided. */
 struct Failure {
-  int step = -1;             ///< t of X_t, -1 where none applies.
-  std::string what;          ///< The claim, in words.
-  std::string found, bound;  ///< A number, and what it was held to: "at most 4.5".
-  bool certain = true;       ///< False: more bits might tell.
-  /** found - bound against the larger of the two, 1 where that says nothing. A tiny one is a rounding error's size. */
+  int step = -1;             ///< t of X_t; -1 if no step applies.
+  std::string what;          ///< The claim, as text.
+  std::string found, bound;  ///< The number found and its bound, for example "at most 4.5".
+  bool certain = true;       ///< False: undecided; more bits may decide.
+  /** |found - bound| relative to the larger of the two; 1 if this is not defined. Tiny if only rounding is the cause.
+   */
   double excess = 1;
 };
 

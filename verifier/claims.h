@@ -1,4 +1,4 @@
-/** What a record claims of each slice, held against a tube of the verifier's own. */
+/** Checks the claims of a record about each slice against the verifier's own tube. */
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@
 
 namespace forereach::verifier {
 
-/** The first claim that does not hold, in the order of steps:
-- the recorded hull, and the set that the recorded generators span, contain X_t, and no generator reaches beyond the
-hull;
-- the recorded envelope and remainder contain the derived ones, the envelope is not empty, the radius is no smaller;
-- X_t keeps clear of every obstacle, by at least the recorded clearance;
-- X_T stands by the problem's `rest`, and so does what was recorded of it.
-@pre the tube is whole and sizes agree. */
+/** The first false or undecided claim, in the order of steps. Nothing if all hold. With X_t the derived slices, the
+claims are:
+- the recorded hull contains X_t; the set of the recorded generators contains X_t and lies in the recorded hull;
+- the recorded envelope and remainder contain the derived ones, the envelope is not empty, and the radius is no smaller;
+- X_t is disjoint from every obstacle, with at least the recorded clearance;
+- X_T satisfies the problem's `rest`, and so does the recorded last slice.
+@pre the tube is complete and sizes agree. */
 [[nodiscard]] std::optional<Failure> FindFalseClaim(const Problem& problem, const Certificate& certificate,
                                                     const Tube& tube);
 

@@ -1,8 +1,8 @@
-/** Confirms or refutes a declared slope: a cover of the domain with a bound for each of its boxes, in intervals of 128
-bits.
+/** Confirms or refutes a declared slope by its cover, in intervals of 128 bits. A cover divides the domain into boxes
+with a bound each.
 
-That the boxes cover the domain follows from the tree: a cut inside a box leaves two parts that together are the box.
-Each bound is then derived anew, from the verifier's own formulas of the derivative. */
+The boxes cover the domain because of the tree: a cut inside a box leaves two parts whose union is the box. Each bound
+is rederived from the verifier's own formulas of the derivative. */
 #pragma once
 
 #include <cstddef>
@@ -18,29 +18,30 @@ Each bound is then derived anew, from the verifier's own formulas of the derivat
 
 namespace forereach::verifier {
 
-/** That |d r_row / d z_column| <= bound over the domain and all parameters, and what it rests on. */
+/** The claim |d r_row / d z_column| <= bound over the domain and all parameters, with the cover that proves it. */
 struct SlopeClaim {
   int row, column;
   double bound;
   Cover cover;
 };
 
-/** kYes: holds. kNo: does not, or the cover is none. kUnknown: neither was shown. */
+/** kYes: the claim is proved. kNo: it is false, or the cover is invalid. kUnknown: neither is shown. */
 struct CoverVerdict {
   Answer answer = Answer::kYes;
   std::string what;  ///< Unless kYes: the claim that fails, with its numbers.
 };
 
-/** For all claims of one residual over one domain. Any number of threads may check at once. */
+/** Checks the claims about one residual over one domain. Any number of threads may check at once. */
 class CoverChecker final {
  public:
-  /** @param domain valid. @throws std::invalid_argument for a residual that the verifier does not know. */
+  /** @param domain valid for the residual. @throws std::invalid_argument for a residual that the verifier does not
+   * implement. */
   CoverChecker(const Domain& domain, const ParametricResidual& residual);
 
-  /** The derivatives that are not zero everywhere: each needs a claim. */
+  /** The derivatives (row, column) that are not identically zero. Each of them needs a claim. */
   [[nodiscard]] std::vector<std::pair<int, int>> Entries() const { return slopes_->Entries(); }
 
-  /** About 1 ms a box of the point mass. @param checked is called after each leaf. */
+  /** Checks one claim. @param checked is called after each leaf. Cost: for the point mass about 1 ms for each box. */
   [[nodiscard]] CoverVerdict Check(const SlopeClaim& claim, const std::function<void()>& checked = {}) const;
 
  private:

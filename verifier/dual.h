@@ -1,4 +1,4 @@
-/** A number with its gradient, both as intervals: derivatives of formulas by the chain rule. */
+/** A value with its gradient, both as intervals, for derivatives by the chain rule. */
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ struct Dual {
   Dual() = default;
   Dual(double constant) : value(constant) {}  // NOLINT: as numbers do
   explicit Dual(Real constant) : value(std::move(constant)) {}
-  /** The variable of that place in the gradient. */
+  /** The variable with this index in the gradient. */
   [[nodiscard]] static Dual Variable(const Real& range, std::size_t place);
 };
 
@@ -25,15 +25,16 @@ struct Dual {
 [[nodiscard]] Dual operator/(const Dual& a, const Dual& b);
 [[nodiscard]] Dual sqr(const Dual& a);
 [[nodiscard]] Dual sqrt(const Dual& a);
-/** Where a may be zero, the gradient contains those of both sides. */
+/** |a|. If a may be zero, the gradient contains those of both sides. */
 [[nodiscard]] Dual abs(const Dual& a);
 [[nodiscard]] Dual tan(const Dual& a);
 
-/** phi(e) = exp(-1/e) for e > 0, else 0, and its derivative phi'. */
+/** phi(e) = exp(-1/e) for e > 0 and 0 for e <= 0, and its derivative phi'. */
 [[nodiscard]] Dual Gate(const Dual& e);
 [[nodiscard]] Dual GateSlope(const Dual& e);
 
-/** t log(1 + exp(x / t)), which grows in x and t, and its derivative by x, the logistic function of x / t. t > 0. */
+/** t log(1 + exp(x / t)), which increases in x and t, and its derivative by x, the logistic function of x / t. @pre t >
+ * 0. */
 [[nodiscard]] Dual SoftRamp(const Dual& x, const Dual& t);
 [[nodiscard]] Dual SoftStep(const Dual& x, const Dual& t);
 

@@ -1,4 +1,4 @@
-/** The nominal models' equations once more, with first and second derivatives written out by hand. */
+/** The verifier's own equations of the nominal models, with hand-written first and second derivatives. */
 #pragma once
 
 #include <memory>
@@ -22,7 +22,7 @@ struct SecondDerivative {
   Real value;
 };
 
-/** f0 : z = (x, u) -> x+. Derivatives that are not listed are zero. Over a box of z each result contains its range. */
+/** f0 : z = (x, u) -> x+. Derivatives that are not listed are zero. For a box of z, each result contains the range. */
 class Equations {
  public:
   virtual ~Equations() = default;
@@ -31,7 +31,7 @@ class Equations {
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;
 };
 
-/** By the model's name and parameters; nothing for a model that the verifier does not know. */
+/** The equations for a model's name and parameters; null for a model that the verifier does not implement. */
 [[nodiscard]] std::unique_ptr<Equations> EquationsOf(const NominalModel& model);
 
 }  // namespace forereach::verifier

@@ -1,7 +1,7 @@
-/** A real number known to lie between two numbers of many bits (MPFI): the verifier's arithmetic.
+/** The verifier's arithmetic: a real number enclosed between two multiprecision numbers (MPFI).
 
-Every operation gives an interval that contains the exact result for all numbers of its operands. Exponents have 62
-bits, so nothing overflows and nothing is subnormal. */
+The result of an operation is an interval that contains the exact result for all numbers in the operands. Exponents have
+62 bits, so in practice no result overflows or is subnormal. */
 #pragma once
 
 #include <mpfi.h>
@@ -11,7 +11,7 @@ bits, so nothing overflows and nothing is subnormal. */
 
 namespace forereach::verifier {
 
-/** While one lives, this thread's new numbers have so many bits; without one 256. */
+/** During its lifetime, this thread's new numbers have `bits` bits. The default is 256. */
 class Precision final {
  public:
   explicit Precision(int bits) : before_(std::exchange(bits_, bits)) {}
@@ -29,7 +29,7 @@ class Precision final {
 class Real final {
  public:
   Real() : Real(0.0) {}
-  /** Exactly x. */
+  /** The point x, exactly. */
   Real(double x);  // NOLINT: as numbers do
   Real(const Real& other);
   Real(Real&& other) noexcept { *value_ = std::exchange(*other.value_, Empty()); }
@@ -42,24 +42,24 @@ class Real final {
     if (value_->left._mpfr_d != nullptr) Release();
   }
 
-  /** Everything from the lower end of a to the upper end of b; the empty case a > b is the caller's to exclude. */
+  /** The interval from the lower end of a to the upper end of b. @pre a <= b. */
   [[nodiscard]] static Real FromTo(const Real& a, const Real& b);
 
-  /** The ends, as numbers that are known exactly. */
+  /** The ends, as point intervals. */
   [[nodiscard]] Real lower() const;
   [[nodiscard]] Real upper() const;
-  /** A number between the ends. */
+  /** A point between the ends. */
   [[nodiscard]] Real middle() const;
   /** The largest absolute value. */
   [[nodiscard]] Real magnitude() const;
 
   [[nodiscard]] bool IsZero() const { return mpfi_is_zero(value_) > 0; }
   [[nodiscard]] bool IsFinite() const { return mpfi_bounded_p(value_) != 0; }
-  /** The double nearest to the middle, after a multiplication by two to the power `shift`. Not a bound. */
+  /** The double nearest to the middle times 2^shift. Not a bound. */
   [[nodiscard]] double ToDouble(long shift = 0) const;
-  /** e with |x| < 2^e for the upper end of |x|; the least number possible for zero. */
+  /** The e with |x| < 2^e for the upper end of |x|; the least possible number for zero. */
   [[nodiscard]] long exponent() const;
-  /** In decimal, 17 digits of the middle. */
+  /** The middle in decimal with 17 digits. */
   [[nodiscard]] std::string text() const;
 
   Real& operator+=(const Real& other);
@@ -84,7 +84,7 @@ class Real final {
   friend Real max(const Real& a, const Real& b);
   friend Real min(const Real& a, const Real& b);
 
-  /** Whether every number of a is at most (below) every number of b: then the numbers meant are, for certain. */
+  /** Whether every number in a is at most (below) every number in b. Then the exact numbers are too. */
   friend bool CertainlyAtMost(const Real& a, const Real& b);
   friend bool CertainlyBelow(const Real& a, const Real& b);
 

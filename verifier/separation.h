@@ -1,8 +1,8 @@
-/** How far a projected slice is from an obstacle: lower bounds from directions, each evaluated in high precision.
+/** Lower bounds on the distance from a projected slice to an obstacle, from directions evaluated in high precision.
 
-For any direction d:   min {d . w : w in core} - max {d . y : y in P X} <= |d|_2 * distance(core, P X).
-The largest value belongs to the direction of the nearest point of {core - P X}, found by Wolfe's algorithm with the
-bits of Precision, so that nothing that a double can tell is lost. */
+For every direction d:   min {d . w : w in core} - max {d . y : y in P X} <= |d|_2 * distance(core, P X).
+The direction of the nearest point of {core - P X} maximises the left side. Wolfe's algorithm finds it with the bits of
+Precision, so it separates every pair of sets that doubles can separate. */
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@ bits of Precision, so that nothing that a double can tell is lost. */
 
 namespace forereach::verifier {
 
-/** P X, p = 1, 2 or 3. */
+/** The projection P X of a slice, p = 1, 2 or 3. */
 class ProjectedSlice final {
  public:
   ProjectedSlice(const Slice& slice, const Eigen::MatrixXd& projection);
@@ -26,7 +26,7 @@ class ProjectedSlice final {
 
   /** max {d . y : y in P X}. */
   [[nodiscard]] Real Support(const std::vector<Real>& d) const;
-  /** A lower bound on max {|y - P c| : y in P X}; in the plane and on the line the maximum itself. */
+  /** A lower bound on max {|y - P c|_2 : y in P X}; for p <= 2 it is the maximum. */
   [[nodiscard]] Real Radius() const;
 
  private:
@@ -34,8 +34,8 @@ class ProjectedSlice final {
   std::vector<std::vector<Real>> generators_;
 };
 
-/** Whether the distance from slice to obstacle is above zero, and at least `clearance`. kYes is a proof; kNo says that
-the best direction gives none. @param best the largest lower bound found. */
+/** Whether the distance from slice to obstacle is positive and at least `clearance` (metres). kYes is a proof. kNo
+means that the best direction gives no proof. @param best is set to the largest lower bound found. */
 [[nodiscard]] Answer IsClear(const ProjectedSlice& slice, const Obstacle& obstacle, double clearance, Real& best);
 
 }  // namespace forereach::verifier

@@ -1,5 +1,5 @@
-/** The residuals' partial derivatives once more, by the paper's formulas, Eqs. (bicycle-certified-partials) and
-(pointmass-residual-jacobian), written out by hand. */
+/** The verifier's own partial derivatives of the residuals, hand-written from the paper's formulas, Eqs.
+(bicycle-certified-partials) and (pointmass-residual-jacobian). */
 #pragma once
 
 #include <memory>
@@ -16,14 +16,14 @@ class Slopes {
  public:
   virtual ~Slopes() = default;
 
-  /** (row, column) of each derivative that is not zero everywhere. */
+  /** (row, column) of each derivative that is not identically zero. */
   [[nodiscard]] virtual std::vector<std::pair<int, int>> Entries() const = 0;
-  /** |d r_row / d z_column| or d r_row / d z_column itself, of one of the entries.
-  @param z the coordinates, all of them. @param p the parameters, in the residual's order. */
+  /** d r_row / d z_column or its absolute value, for one of the entries.
+  @param z all d_z coordinates. @param p the parameters, in the residual's order. */
   [[nodiscard]] virtual Dual At(int row, int column, std::span<const Dual> z, std::span<const Dual> p) const = 0;
 };
 
-/** By the residual's name and its parameters' names; nothing for one that the verifier does not know. */
+/** The slopes for a residual's name and parameter names; null for a residual that the verifier does not implement. */
 [[nodiscard]] std::unique_ptr<Slopes> SlopesOf(const ParametricResidual& residual);
 
 }  // namespace forereach::verifier

@@ -1,5 +1,5 @@
-/** The reachable tube derived anew in high precision from a problem's doubles: Eq. (propagation), (order-reduction) and
-the residual envelope, plainly. Shares the problem's data types with the certifier, none of its arithmetic.
+/** The verifier's own reachable tube in high precision, from a problem's doubles: Eqs. (propagation), (order-reduction)
+and (set-envelope), implemented directly. It shares data types with the certifier, but no arithmetic.
 
 For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h)] >. */
 #pragma once
@@ -18,13 +18,13 @@ For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h)
 
 namespace forereach::verifier {
 
-/** How the second-order part of f0 is enclosed, with r the half-widths of Box(Z_t) and H_k the Hessian over it.
+/** The enclosure of the second-order part of f0, with r the half-widths of Box(Z_t) and H_k the Hessian over it.
 kPaper: q_k = 1/2 sum_ij r_i max|H_ij| r_j, both signs.
 kCentred: in [lo, hi] = sum_i 1/2 r_i^2 [min(0, H_ii), max(0, H_ii)] + sum_{i<j} r_i r_j max|H_ij| [-1, 1]; its middle
 moves the center. */
 enum class Method { kPaper, kCentred };
 
-/** <center, columns>. */
+/** The zonotope <center, columns>. */
 struct Slice {
   std::vector<Real> center;
   std::vector<std::vector<Real>> columns;
@@ -36,8 +36,8 @@ struct Slice {
 
 /** X_0: a box, or a zonotope of doubles. */
 struct InitialSet {
-  Eigen::VectorXd lower, upper;  ///< A box if these have entries, ...
-  Eigen::VectorXd center;        ///< ... else <center, generators>.
+  Eigen::VectorXd lower, upper;  ///< If these have entries: the box [lower, upper].
+  Eigen::VectorXd center;        ///< Otherwise: the zonotope <center, generators>.
   Eigen::MatrixXd generators;
 };
 
@@ -45,24 +45,23 @@ struct Bounds {
   Real lower, upper;
 };
 
-/** What one step found on its way, per state. */
+/** Intermediate results of one step, one entry for each state. */
 struct Step {
-  std::vector<Bounds> envelope;   ///< Of the residual over Z_t.
-  std::vector<Bounds> remainder;  ///< Of the second-order part over Z_t.
+  std::vector<Bounds> envelope;   ///< Bounds of the residual over Z_t.
+  std::vector<Bounds> remainder;  ///< Bounds of the second-order part over Z_t.
 };
 
 struct Tube {
-  std::vector<Slice> slices;  ///< X_0 .. as far as it went.
+  std::vector<Slice> slices;  ///< X_0, X_1, ... up to the last computed slice.
   std::vector<Step> steps;
-  /** Why it went no further: Box(Z_t) leaves the domain, or something has no finite enclosure. */
+  /** Why the tube ends early: Box(Z_t) leaves the domain, or a quantity has no finite enclosure. */
   std::optional<Failure> failure;
-  /** Not zero if some reduction chose between columns whose scores differ by no more than a double's rounding, or that
-  a double cannot hold: the certifier may have chosen otherwise, and this is what it may have lost, relative to the
-  slice. */
+  /** Not zero if a reduction chose between columns whose scores differ by no more than a double's rounding, or exceed
+  the range of doubles. The certifier may have chosen other columns; this bounds the effect, relative to the slice. */
   double ambiguity = 0;
 };
 
-/** Which of the problem's transitions were known: the first `base`, and from then on [begin, end). */
+/** The transitions of the problem that the certifier knew: the first `base`, and those in [begin, end). */
 struct KnownRows {
   int base = std::numeric_limits<int>::max();
   int begin = 0, end = 0;
@@ -70,22 +69,23 @@ struct KnownRows {
   [[nodiscard]] bool Contains(int i) const { return i < base || (begin <= i && i < end); }
 };
 
-/** Ways to a tube that is sound all the same, and tighter. */
+/** Variants of the tube. All are sound; the options can make it tighter. */
 struct TubeOptions {
-  bool reduce = true;            ///< Reduce the order as the certifier does, or never.
-  bool split_remainder = false;  ///< Bound the Hessian over half the box too: the integral remainder in two parts.
+  bool reduce = true;            ///< Reduce the order by the certifier's rule, or never.
+  bool split_remainder = false;  ///< Also bound the Hessian over half the box: the integral remainder in two parts.
   KnownRows known = {};
-  /** If not null, the generators recorded of each slice: the columns nearest to those that were kept are kept. */
+  /** If not null: the recorded generators of each slice. The reduction keeps the columns nearest to the recorded ones.
+   */
   const std::vector<Eigen::MatrixXd>* follow = nullptr;
 };
 
-/** A problem prepared for any number of plans, with as many bits as Precision said when it was made. Immutable. */
+/** Computes tubes for any number of plans of one problem, with the precision at its construction. Immutable. */
 class TubeMaker final {
  public:
-  /** @pre the problem is one that a Certifier accepts. Refers to it. */
+  /** @param problem, equations must outlive this object. @pre a Certifier accepts the problem. */
   TubeMaker(const Problem& problem, const Equations& equations, Method method);
 
-  /** @param controls inputs-by-T. */
+  /** The tube of a plan. @param controls m-by-T, one column for each step. */
   [[nodiscard]] Tube Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls,
                           const TubeOptions& options) const;
 
@@ -106,9 +106,9 @@ class TubeMaker final {
   /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included; [observation][state].
    */
   std::vector<std::vector<Bounds>> residuals_;
-  /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|, the size of the numbers a residual is made of; [observation][state]. */
+  /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;
-  /** What rounding may have added to the certifier's columns by way of the remainder. */
+  /** The rounding error that the remainder may have added to the certifier's columns. */
   double remainder_rounding_;
 };
 

@@ -1,7 +1,7 @@
-/** Confirms or refutes a certificate by deriving it anew from its inputs, in intervals of 256 bits and more.
+/** Confirms or refutes a certificate. It rederives the certificate from its inputs, in intervals of 256 bits and more.
 
-Confirmed: a tube of the verifier's own, sound for the given doubles in real arithmetic, stays in the domain, lies
-inside everything that was recorded, and keeps clear of every obstacle. Refuted: one of these does not hold. */
+Confirmed: the verifier's own tube, which is sound for the given doubles in real arithmetic, stays in the domain, lies
+inside every recorded set, and is disjoint from every obstacle. Refuted: one of these is false. */
 #pragma once
 
 #include <map>
@@ -20,47 +20,47 @@ inside everything that was recorded, and keeps clear of every obstacle. Refuted:
 
 namespace forereach::verifier {
 
-/** The method that the problem asks for. */
+/** The verifier's method for the problem's method. */
 [[nodiscard]] Method MethodOf(const Problem& problem);
 
-/** What was recorded of X_t; what has no entries was not recorded. */
+/** The record of X_t. A member without entries was not recorded. */
 struct RecordedSlice {
-  Eigen::VectorXd lower, upper;        ///< The hull by its ends ...
-  Eigen::VectorXd center, half_width;  ///< ... or by its middle.
+  Eigen::VectorXd lower, upper;        ///< The hull by its ends, or
+  Eigen::VectorXd center, half_width;  ///< the hull by center and half-widths.
   Eigen::MatrixXd generators;          ///< X_t = <center, generators>, if has_generators.
   bool has_generators = false;
-  std::vector<double> clearance;  ///< Per obstacle.
+  std::vector<double> clearance;  ///< For each obstacle, metres.
   std::optional<double> radius;
   Eigen::VectorXd envelope_lower, envelope_upper, remainder;
 };
 
-/** A plan said to be certified. */
+/** A recorded certificate. */
 struct Certificate {
   InitialSet initial_set;
   Eigen::MatrixXd controls;  ///< inputs-by-T
   std::vector<Obstacle> obstacles;
-  KnownRows known;                    ///< Of the problem's transitions.
-  std::vector<RecordedSlice> slices;  ///< T + 1 of them, or none: then only safety is derived.
+  KnownRows known;                    ///< The problem's transitions that the certifier knew.
+  std::vector<RecordedSlice> slices;  ///< T + 1 slices, or none. Without them only safety is checked.
 };
 
 enum class Status { kConfirmed, kRefuted, kCannotVerify };
 
 struct Verdict {
   Status status = Status::kCannotVerify;
-  Failure failure;  ///< Unless confirmed: the first step that fails, and why.
+  Failure failure;  ///< Unless confirmed: the first claim that fails.
 };
 
-/** For all certificates of one problem. Any number of threads may verify at once. */
+/** Verifies the certificates of one problem. Any number of threads may verify at once. */
 class Verifier final {
  public:
-  /** @pre the problem is one that a Certifier accepts. */
+  /** @pre a Certifier accepts the problem. */
   Verifier(std::shared_ptr<const Problem> problem, Method method);
 
-  /** Cost some 0.1 s for 50 steps, 400 observations and 10 obstacles. Repeats with more bits, at last
-  so many that sums of products of doubles are exact, where 256 cannot tell. */
+  /** Verifies one certificate. If 256 bits do not decide, it repeats with more bits; with the last precision, sums of
+  products of doubles are exact. Cost: about 0.1 s for 50 steps, 400 observations and 10 obstacles. */
   [[nodiscard]] Verdict Verify(const Certificate& certificate) const;
 
-  /** The tube alone, for display and tests. @pre knows_model. */
+  /** The tube alone, for display and tests. @pre knows_model(). */
   [[nodiscard]] Tube Derive(const Certificate& certificate) const;
   [[nodiscard]] bool knows_model() const { return equations_ != nullptr; }
 
