@@ -1,15 +1,14 @@
-/** Which of several certifiers on one bus decides. One of them is in charge; the others decide nothing and answer
-nobody, so that each candidate gets one decision. A state machine over the heartbeats of others. No bus, no clock in it.
+/** Selects the certifier in charge among several on one bus. The others answer no candidate, so each candidate gets one
+decision. It is a state machine over the heartbeats of other certifiers. It uses no bus and no clock.
 
-    listening    --has listened for listen_us, and heard none that goes before--> in charge
+    listening    --listened for listen_us, and heard neither of the two below--> in charge
     listening    --hears one in charge, or an earlier one that listens--> standing by
-    standing by  --none in charge is heard for kSilenceUs--> listening
+    standing by  --hears none in charge for kSilenceUs--> listening
     in charge    --hears an earlier one in charge--> standing by
-    in charge    --was itself kept from running for kLapseUs--> listening
+    in charge    --was itself paused for kLapseUs--> listening
 
-The earlier one was started first; of two started in the same microsecond it has the smaller instance.
-kLapseUs is shorter than kSilenceUs: one that was paused sends nothing before it knows that it may have been replaced.
-*/
+A certifier is earlier if it has the smaller started_utime, or an equal one and the smaller instance. kLapseUs is
+shorter than kSilenceUs, so a paused certifier knows that it may have been replaced before it sends anything. */
 #pragma once
 
 #include <compare>
@@ -23,7 +22,8 @@ class Charge final {
   static constexpr std::int64_t kListenUs = 300'000;
   static constexpr std::int64_t kLapseUs = 1'500'000;
   static constexpr std::int64_t kSilenceUs = 2'000'000;
-  /** Time between two calls of Advance counts as listened or silent up to this: who was paused has heard nothing. */
+  /** The time between two calls of Advance counts as listening or silence only up to this limit, because a paused
+  certifier receives nothing. */
   static constexpr std::int64_t kStepUs = 20'000;
 
   enum class State { kListening, kInCharge, kStandingBy };
@@ -33,17 +33,18 @@ class Charge final {
     friend auto operator<=>(const Identity&, const Identity&) = default;
   };
 
-  /** @param listen_us before it takes charge; 0 for one that nobody else can be beside: it is in charge at once. */
+  /** @param self this certifier. @param listen_us how long it listens before it takes charge, microseconds. 0: it is in
+  charge at once; use it only where no other certifier can exist. */
   Charge(const Identity& self, std::int64_t listen_us);
 
-  /** A heartbeat of a certifier. One's own are ignored. */
+  /** Processes a certifier's heartbeat. Its own heartbeats are ignored. */
   void Hear(const Identity& other, State its_state);
-  /** Time has passed, by a clock that nobody sets. */
+  /** Processes the passing of time, by a monotonic clock in microseconds. */
   void Advance(std::int64_t steady_us);
 
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] const Identity& self() const { return self_; }
-  /** The one heard last, for as long as it has not been silent for kSilenceUs. */
+  /** The other certifier that was heard last, unless it has been silent for kSilenceUs. */
   [[nodiscard]] const std::optional<Identity>& other() const { return other_; }
 
  private:

@@ -1,8 +1,8 @@
-/** Runtime conformance: is the robot where its certificate says?
+/** Runtime conformance: tests whether the robot's measured states lie in their certified slices.
 
-A state measured outside its certified slice refutes what the certificate rests on: the model, the declaration, its
-noise bound, or the measurement. The robot's guard looks for it too; the certifier does so that nothing more is
-certified on grounds that are known to be false. */
+A state outside its certified slice refutes an assumption of the certificate: the model, the declaration, its noise
+bound, or the measurement. The robot's guard makes the same test. The certifier repeats it so that it certifies nothing
+more under a false assumption. */
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,8 @@ namespace forereach {
 
 class Conformance final {
  public:
-  static constexpr std::size_t kPlans = 64;  ///< The last certified ones are remembered, and the one that is executed.
+  static constexpr std::size_t kPlans =
+      64;  ///< Number of remembered plans: the last certified ones and the executing one.
 
   struct Departure {
     std::int64_t plan_id;
@@ -30,18 +31,18 @@ class Conformance final {
 
   Conformance() { plans_.reserve(kPlans); }
 
-  /** In the place of one of the same plan_id, unless that is executed: a guard does not take the plan_id it executes.
-   */
+  /** Remembers a certified plan. It replaces a plan of the same plan_id, unless that plan is executing: a guard does
+  not accept the plan_id that it executes. */
   void Remember(const certified_plan_t& certified);
 
-  /** Holds a usable state of the robot against the slice of the step that it says it is at, and, if it has gone on by
-  one boundary while executing, against that of the plan it was executing before. Nothing if it lies in them, or no
-  certificate for its plan is remembered. Cost O(n). */
+  /** Tests a usable state against the slice of the step that it names. If the robot has advanced by one boundary while
+  executing, it also tests the state against the slice of the plan that was executing before. Nothing if the state lies
+  in the slices, or if the plan is not remembered. Cost O(n). */
   [[nodiscard]] std::optional<Departure> Check(const robot_state_t& state);
 
-  /** Holds the end of a step that began with one of the last two states heard against the slice after it. A robot that
-  ends its plan there, or whose guard stops it, stands from then on, and its states say nothing of slices; that it
-  stands may be heard first. */
+  /** Tests the end of a step that began at one of the last two received states against the slice after it. If the robot
+  ends its plan or its guard stops it, its later states name no slice, so only the transition shows the departure. The
+  transition may arrive after the state that reports the stop. */
   [[nodiscard]] std::optional<Departure> Check(const transition_t& transition) const;
 
  private:
@@ -56,7 +57,7 @@ class Conformance final {
   std::vector<certified_plan_t> plans_;  // a ring
   std::size_t next_ = 0;
   StreamOrder order_;
-  Place last_, before_;  // where the robot was by the newest state heard, and by the one before
+  Place last_, before_;  // from the newest received state and from the one before
 };
 
 }  // namespace forereach

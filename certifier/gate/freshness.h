@@ -1,4 +1,4 @@
-/** Is a stamp recent? A pure function of times, with three answers. */
+/** The freshness of a stamp, as a pure function of times. */
 #pragma once
 
 #include <cstdint>

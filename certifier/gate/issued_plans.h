@@ -1,9 +1,9 @@
-/** Which plans may be executing: those that were certified, and not too long ago.
+/** The certified plans that the robot may be executing now.
 
-A guard executes certified plans only, and begins none after its certificate has expired. So a robot that reports
-executing another plan, or a step that its plan does not have, or a plan that began too late, has no such guard, or one
-that does not work. Plans of another certifier, for example of the process before this one, are not known here. For as
-long as such a plan might still be executing, unknown plans are tolerated. */
+A guard executes only certified plans and begins none after its certificate has expired. So a robot that reports another
+plan, a step that its plan does not have, or a plan that began too late, has no guard or a defective one. This class
+does not know the plans of other certifiers, for example of the process before a restart. It tolerates unknown plans for
+as long as such a plan may be executing. */
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace forereach {
 
 class IssuedPlans final {
  public:
-  static constexpr std::size_t kPlans = 32768;  ///< More at a time are not remembered; then unknown ones are tolerated.
+  static constexpr std::size_t kPlans = 32768;  ///< Capacity. If it is exceeded, unknown plans are tolerated.
 
   struct Stranger {
     std::int64_t plan_id;
@@ -28,31 +28,31 @@ class IssuedPlans final {
     std::string why;  ///< A sentence with the values.
   };
 
-  /** All times `steady_us` are of a clock that nobody sets, in microseconds. */
+  /** @param gate the task's options. @param steady_us here and below: time of a monotonic clock, microseconds. */
   IssuedPlans(const GateOptions& gate, std::int64_t steady_us);
 
-  /** From here on by these. */
+  /** Uses new options from now on. */
   void Follow(const GateOptions& gate);
-  /** Another certifier may have issued plans until now: tolerates unknown ones for as long as these may be executing.
-   */
+  /** Notes that another certifier may have issued plans until now. Unknown plans are tolerated while these may be
+   * executing. */
   void TolerateFrom(std::int64_t steady_us);
 
-  /** A plan was certified and sent. Cost O(1) on average. */
+  /** Adds a plan that was certified and sent. Cost O(1) on average. */
   void Add(const certified_plan_t& certified, std::int64_t steady_us);
 
-  /** What is wrong with what a robot says that it executes; nothing if it stands, or may execute that.
-  @param state usable and fresh (Gate::CheckRobotState). Cost O(plans remembered): some 30 us at most. */
+  /** The violation in the robot's report of the plan that it executes. Nothing if it executes none or an allowed one.
+  @param state usable and fresh (Gate::CheckRobotState). Cost O(remembered plans), at most about 30 us. */
   [[nodiscard]] std::optional<Stranger> Judge(const robot_state_t& state, std::int64_t steady_us);
 
  private:
   struct Issued {
     std::int64_t plan_id, expires_utime, step_us;
-    std::int64_t may_run_until_us;  // by the steady clock
+    std::int64_t may_run_until_us;  // by the monotonic clock
     int num_steps;
-    bool has_begun;  // and not too late
+    bool has_begun;  // in time
   };
 
-  /** After a certificate is issued, its plan is over within this time. */
+  /** The longest time from the issue of a certificate to the end of its plan. */
   [[nodiscard]] std::int64_t LongestLife(int num_steps) const;
   [[nodiscard]] std::string WhyNot(Issued& issued, const robot_state_t& state) const;
 

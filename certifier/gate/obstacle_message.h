@@ -1,4 +1,4 @@
-/** Obstacles to and from the bus. */
+/** Conversion between obstacles and messages. */
 #pragma once
 
 #include <vector>
@@ -8,7 +8,8 @@
 
 namespace forereach {
 
-/** @throws std::invalid_argument naming the obstacle and what is wrong with it, also if its dimension is not `dim`. */
+/** The obstacles of a message. @throws std::invalid_argument with the obstacle's index and its error if an obstacle is
+invalid or its dimension is not `dim`. */
 [[nodiscard]] std::vector<Obstacle> FromMessage(const obstacles_t& message, int dim);
 
 /** @pre at most kMaxObstacles. */

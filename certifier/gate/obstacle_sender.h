@@ -1,11 +1,11 @@
-/** For a program that sees obstacles: what to send on OBSTACLES, and when. It repeats the whole set, so that receivers
-know that somebody looks. No bus, no clock in it:
+/** The sending side of OBSTACLES, for a perception program. It repeats the whole set, so that receivers know that
+perception is running. It uses no bus and no clock:
 
     ObstacleSender sender(ObstacleSender::PeriodUs(config.gate));
-    sender.Set(obstacles);                                                  // whenever they have changed
+    sender.Set(obstacles);                                                  // after each change
     if (const auto message = sender.Due(now_us)) bus.Publish("OBSTACLES", *message);  // at least every period
 
-One sender for a bus. A sender that restarts begins at sequence 0, which receivers accept with a later stamp. */
+A bus has one sender. A restarted sender begins at sequence 0, which receivers accept with a later stamp. */
 #pragma once
 
 #include <cstdint>
@@ -20,19 +20,19 @@ namespace forereach {
 
 class ObstacleSender final {
  public:
-  /** At which receivers of this task lose nothing when two messages in a row are lost: a quarter of
-  gate.obstacles_timeout_ms. */
+  /** The period at which receivers of this task tolerate two consecutive lost messages: a quarter of
+  gate.obstacles_timeout_ms, in microseconds. */
   [[nodiscard]] static std::int64_t PeriodUs(const GateOptions& options);
 
-  /** @param period_us from one message to the next, positive: at most a third of what receivers bear. */
+  /** @param period_us time from one message to the next, positive; at most a third of the receivers' timeout. */
   explicit ObstacleSender(std::int64_t period_us);
 
-  /** All obstacles that are seen from now on. They are due at once if they differ from those before.
+  /** Sets all obstacles. If they differ from the last ones, the next message is due at once.
   @throws std::invalid_argument for more than kMaxObstacles. */
   void Set(const std::vector<Obstacle>& obstacles);
 
-  /** The next message if it is time for it, stamped `now_us`: microseconds since the Unix epoch. Nothing before the
-  first Set. A clock that was set back delays none. */
+  /** The next message, if it is due, with the stamp `now_us` in microseconds since the Unix epoch. Nothing before the
+  first Set. A clock that is set back does not delay a message. */
   [[nodiscard]] std::optional<obstacles_t> Due(std::int64_t now_us);
 
  private:

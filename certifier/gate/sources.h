@@ -1,9 +1,9 @@
-/** Who has sent which candidates: none is decided on twice, and what never arrived is counted.
+/** The plan ids that each source has used, so that no candidate is decided twice, and the number of lost candidates.
 
-A plan_id may be used once. Candidates need not be taken up in their order: of each source the last kWindow plan_ids
-below the highest are told apart, older ones count as used. What a source has used is forgotten when it has been silent
-for so long that whatever it sent before would be stale now, and it makes room for another, so neither invented sources
-nor a huge plan_id lock anybody out for long. */
+A source may use a plan_id once. Candidates may be decided in any order: for each source the kWindow plan_ids below the
+highest are stored, and older ones count as used. When a source has been silent for so long that its earlier candidates
+are stale, it is forgotten if another source needs the place. So neither invented sources nor a huge plan_id block other
+sources for long. */
 #pragma once
 
 #include <algorithm>
@@ -24,23 +24,23 @@ class Sources final {
 
   enum class Admission { kNew, kUsed, kTooManySources };
 
-  /** @param forget_after_us a source is forgotten when none of its candidates was new for so long: at least as long as
-  a candidate stays fresh. */
+  /** @param forget_after_us a source may be forgotten when it has sent no new candidate for this long, microseconds; at
+  least the time for which a candidate stays fresh. */
   explicit Sources(std::int64_t forget_after_us) : forget_after_us_(forget_after_us) {}
 
-  /** Goes on where others' counting stops. How long a source is remembered stays as given to these. */
+  /** Continues with the state of another object, after a reload. forget_after_us stays this object's own. */
   void Inherit(const Sources& before);
 
-  /** Every candidate that decodes, once, before any other question about it. They may come in any order; a source has
-  restarted where stream_order.h says kRestarted. */
+  /** Counts a candidate for the number of lost ones. Call it once for every candidate that decodes, before Admit.
+  Candidates may arrive in any order. A source has restarted if stream_order.h gives kRestarted. */
   void Hear(const candidate_plan_t& candidate, std::int64_t now_us);
 
-  /** If it is new, its plan_id is used from now on. */
+  /** Whether the candidate's plan_id is new. If it is, it counts as used from now on. Cost O(log sources). */
   [[nodiscard]] Admission Admit(const candidate_plan_t& candidate, std::int64_t now_us);
 
-  /** Candidates missing between those that came, by their `sequence`. */
+  /** The number of lost candidates, from gaps in their `sequence`. */
   [[nodiscard]] std::int64_t lost() const;
-  /** The highest plan_id a source has used; 0 if it is not known. */
+  /** The highest plan_id that the candidate's source has used; 0 for an unknown source. */
   [[nodiscard]] std::int64_t HighestPlanId(const candidate_plan_t& candidate) const;
 
  private:
@@ -54,20 +54,21 @@ class Sources final {
     [[nodiscard]] bool Use(std::int64_t plan_id);
     void StartCounting(const StreamPosition& position, std::int64_t horizon_us);
     [[nodiscard]] std::int64_t last_sequence() const { return order.newest()->sequence; }
-    [[nodiscard]] std::int64_t lost() const {  // repetitions came too, so not below 0
+    [[nodiscard]] std::int64_t lost() const {  // not below 0, since repetitions count as arrived
       return std::max<std::int64_t>(last_sequence() - first_sequence + 1 - came, 0);
     }
   };
 
   [[nodiscard]] static std::string NameOf(const candidate_plan_t& candidate);
   [[nodiscard]] std::int64_t Horizon(std::int64_t now_us) const;
-  /** For so long that it may be forgotten. A clock that was set back leaves no source remembered from the future. */
+  /** Whether the source has been silent for forget_after_us_. After the clock was set back, a source heard in the
+  future counts as silent. */
   [[nodiscard]] bool IsSilent(const Source& source, std::int64_t now_us) const;
   bool MakeRoom(std::int64_t now_us);
 
   std::int64_t forget_after_us_;
   std::map<std::string, Source> sources_;
-  std::int64_t lost_before_ = 0;  // of sources that made room or began anew
+  std::int64_t lost_before_ = 0;  // losses of sources that were forgotten or restarted
 };
 
 }  // namespace forereach

@@ -1,4 +1,4 @@
-/** A message's stamp against the clock, by what a task allows: gate.max_age_ms and gate.max_ahead_ms. */
+/** Tests of a message's stamp by the limits of a task, gate.max_age_ms and gate.max_ahead_ms. */
 #pragma once
 
 #include <cstdint>
@@ -11,21 +11,22 @@ namespace forereach {
 
 struct Stamp {
   Freshness freshness;
-  std::string fault;  ///< Why it is not fresh, in words; empty if it is.
+  std::string fault;  ///< The reason why it is not fresh, as text; empty if it is fresh.
 };
 
-/** Of a message stamped `utime` that came at `now_us`, both microseconds since the Unix epoch. */
+/** The freshness of a message with the stamp `utime` that arrived at `now_us`, both microseconds since the Unix epoch.
+ */
 [[nodiscard]] Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options);
 
-/** True if a fresh message stamped `utime` is no later than what happened at `then_us`. Where the clock has been set
-back since, so that `then_us` lies ahead, nothing is known of their order: false. */
+/** Whether a fresh message with the stamp `utime` is not later than an event at `then_us`. False if the order is
+unknown, because the clock was set back after the event and `then_us` lies in the future. */
 [[nodiscard]] bool IsNotAfter(std::int64_t utime, std::int64_t then_us, std::int64_t now_us,
                               const GateOptions& options);
 
-/** To the nearest microsecond. */
+/** Milliseconds as microseconds, rounded to the nearest. */
 [[nodiscard]] std::int64_t Microseconds(double milliseconds);
 
-/** Of microseconds, to the nearest millisecond: "12 ms". */
+/** The difference of two times in microseconds as text, to the nearest millisecond: "12 ms". */
 [[nodiscard]] std::string Milliseconds(std::int64_t later_us, std::int64_t earlier_us);
 
 }  // namespace forereach

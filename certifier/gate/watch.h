@@ -1,10 +1,10 @@
-/** Whether anything may be certified at all: a state machine over what is known of the world. No bus, no clock in it.
+/** Decides whether the certifier may certify at all. It is a state machine that uses no bus and no clock.
 
-    disarmed --all needs are met--> armed --one is lacking--> disarmed
-    any state --Latch, or what Advance notices--> fault --Reset--> disarmed
+    disarmed --all needs are met--> armed --one need is missing--> disarmed
+    any state --Latch, or a fault found by Advance--> fault --Reset--> disarmed
 
-Only a person clears a fault, after a look at what made it. The first fault is kept; a later one takes its place only if
-it stops the robot and the first does not. */
+Only an operator clears a fault, after an inspection of its cause. The first fault is kept. A later fault replaces it
+only if it stops the robot and the first one does not. */
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ it stops the robot and the first does not. */
 namespace forereach {
 
 struct WatchOptions {
-  bool needs_robot_state = true;  ///< Else it is armed without.
+  bool needs_robot_state = true;  ///< False: the robot's state is not needed.
   std::int64_t robot_timeout_us = 0, max_clock_jump_us = 0;
 };
 
@@ -27,43 +27,44 @@ class Watch final {
     std::int64_t utime;
     std::string why;
   };
-  /** What has to hold before anything is certified. Of several that are lacking the first gives the cause. To add one:
-  an entry here, its cause in watch.cpp. */
+  /** The preconditions of certifying. If several are missing, the first one gives the cause. To add a need, add an
+  entry here and its cause in watch.cpp. */
   enum class Need { kCharge, kLatch, kRobotState, kObstacles };
   static constexpr std::size_t kNeeds = 4;
   struct Refusal {
     std::int16_t cause;  ///< decision_t's
-    std::string why;     ///< Names everything that is lacking.
+    std::string why;     ///< Names everything that is missing.
   };
 
   explicit Watch(const WatchOptions& options);
 
-  /** From here on by these. What was seen, and a fault, stay. */
+  /** Uses new options from now on. Observed state and a latched fault stay. */
   void Follow(const WatchOptions& options);
 
-  /** @param why_not a clause that says why the need is not met; empty: it is met. Every need but the robot's state is
-  met at first, and the robot's state is this class's own affair. */
+  /** Sets whether a need is met. @param why_not a clause with the reason why it is not; empty: it is met. All needs are
+  met at first, except the robot's state, which SeeRobot and Advance maintain. */
   void Set(Need need, std::string why_not);
 
-  /** What Set has said of it. */
+  /** The text of the last Set for this need. */
   [[nodiscard]] const std::string& Lacks(Need need) const { return lacking_[static_cast<std::size_t>(need)]; }
 
-  /** A usable state of the robot has been heard. */
+  /** Notes a usable state of the robot. @param now_us microseconds since the Unix epoch. */
   void SeeRobot(std::int64_t now_us);
-  /** The robot has said that it ends, or what was heard of it counts no more: its silence is no fault. */
+  /** Notes that the robot has finished, or that its earlier states do not count any more. Its silence is then not a
+   * fault. */
   void RobotHasFinished();
 
-  /** Time has passed: `now_us` by the wall clock, `steady_us` by one that nobody sets. Latches ROBOT_STATE_LOST and
-  CLOCK_JUMP. @return the fault if this call latched it. */
+  /** Processes the passing of time and latches ROBOT_STATE_LOST and CLOCK_JUMP. @param now_us by the wall clock.
+  @param steady_us by a monotonic clock. @return the fault if this call latched it. */
   std::optional<Fault> Advance(std::int64_t now_us, std::int64_t steady_us);
 
-  /** @return true if it is the one that is latched now. */
+  /** Latches a fault. @return whether this fault is the latched one now. */
   bool Latch(Fault fault);
-  /** Clears a fault. True if there was one. */
+  /** Clears the latched fault. @return whether there was one. */
   bool Reset();
 
   [[nodiscard]] State state() const;
-  /** Why nothing may be certified now; nothing if it is armed. */
+  /** The reason why nothing may be certified now. Nothing if it is armed. */
   [[nodiscard]] std::optional<Refusal> WhyNot() const;
   [[nodiscard]] const std::optional<Fault>& fault() const { return fault_; }
 
@@ -72,9 +73,9 @@ class Watch final {
 
   WatchOptions options_;
   std::optional<Fault> fault_;
-  std::array<std::string, kNeeds> lacking_;  // why, by Need
+  std::array<std::string, kNeeds> lacking_;  // the reason, by Need
   std::optional<std::int64_t> robot_seen_us_;
-  std::optional<std::int64_t> offset_us_;  // of the wall clock from the steady one, at the last call
+  std::optional<std::int64_t> offset_us_;  // wall clock minus monotonic clock at the last call
 };
 
 }  // namespace forereach
