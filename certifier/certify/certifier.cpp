@@ -104,40 +104,44 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       known_(store_.snapshot()),
       propagator_(*problem_->model, problem_->domain, known_, problem_->zonotope_order, problem_->method) {}
 
-Certifier::Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
-  const auto finite = [](double value) { return std::isfinite(value); };
-  if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kUnusable;
-  if (!problem_->domain.Contains(z)) return Learned::kOutsideDomain;
-  const auto row = [](std::span<const double> values) {
-    return Eigen::Map<const Eigen::RowVectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
+  Observations observed;
+  if (const Learned learned = Observe(*problem_, z, next, observed); learned != Learned::kAdded) return learned;
+  const auto entries = [](const Eigen::MatrixXd& one_row) {
+    return std::span<const double>(one_row.data(), static_cast<std::size_t>(one_row.size()));
   };
-  try {
-    const Observations observed = Observe(*problem_->model, {row(z), row(next)});
-    const auto entries = [](const Eigen::MatrixXd& one_row) {
-      return std::span<const double>(one_row.data(), static_cast<std::size_t>(one_row.size()));
-    };
-    if (store_.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0) return Learned::kOutsideDomain;
-  } catch (const std::invalid_argument&) {
-    return Learned::kUnusable;
-  }
+  if (store_.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0) return Learned::kOutsideDomain;
   known_ = store_.snapshot();
   return Learned::kAdded;
 }
 
-void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+std::optional<Certifier::Misfit> Certifier::FindMisfit(const Plan& plan) const {
   const NominalModel& model = *problem_->model;
   const auto number = [](auto value) { return std::to_string(value); };
-  RequireThat(plan.num_inputs == model.num_inputs(),
-              "plan: " + number(plan.num_inputs) + " inputs, the model has " + number(model.num_inputs()));
-  RequireThat(plan.stride >= plan.num_inputs,
-              "plan: stride " + number(plan.stride) + ", must be at least its " + number(plan.num_inputs) + " inputs");
-  RequireThat(1 <= plan.num_steps && plan.num_steps <= kMaxSteps,
-              "plan: " + number(plan.num_steps) + " steps, must be 1 to " + number(kMaxSteps));
-  RequireThat(plan.controls != nullptr, "plan: no controls, its pointer is null");
+  const auto size = [](const std::string& what) { return Misfit{Misfit::Kind::kSize, "plan: " + what}; };
+  if (plan.num_inputs != model.num_inputs())
+    return size(number(plan.num_inputs) + " inputs, the model has " + number(model.num_inputs()));
+  if (plan.stride < plan.num_inputs)
+    return size("stride " + number(plan.stride) + ", must be at least its " + number(plan.num_inputs) + " inputs");
+  if (plan.num_steps < 1 || plan.num_steps > kMaxSteps)
+    return size(number(plan.num_steps) + " steps, must be 1 to " + number(kMaxSteps));
+  if (plan.controls == nullptr) return size("no controls, its pointer is null");
   for (int t = 0; t < plan.num_steps; ++t)
     for (std::size_t k = 0; k < plan.input(t).size(); ++k)
-      RequireThat(std::isfinite(plan.input(t)[k]), "plan: step " + number(t) + ": " + model.input_names()[k] + " is " +
-                                                       number(plan.input(t)[k]) + ", must be finite");
+      if (!std::isfinite(plan.input(t)[k]))
+        return Misfit{Misfit::Kind::kNumber, "plan: step " + number(t) + ": " + model.input_names()[k] + " is " +
+                                                 number(plan.input(t)[k]) + ", must be finite"};
+  return std::nullopt;
+}
+
+void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+  if (const auto misfit = FindMisfit(plan)) throw std::invalid_argument(misfit->what);
+  Require(initial_set, obstacles);
+}
+
+void Certifier::Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
+  const NominalModel& model = *problem_->model;
+  const auto number = [](auto value) { return std::to_string(value); };
   RequireThat(initial_set.dim() == model.num_states(), "initial set: dimension " + number(initial_set.dim()) +
                                                            ", the model has " + number(model.num_states()) + " states");
   const int most = problem_->zonotope_order * model.num_states();

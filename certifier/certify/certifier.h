@@ -9,6 +9,7 @@ adds later observations between two calls of Certify. */
 #include <span>
 
 #include "certifier/certify/decision.h"
+#include "certifier/certify/learned.h"
 #include "certifier/certify/problem.h"
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/observation_store.h"
@@ -37,11 +38,7 @@ class Certifier final {
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
   [[nodiscard]] bool uses_hull_distance() const { return known_.uses_hull_distance(); }
 
-  enum class Learned {
-    kAdded,          ///< Used by every later certificate. violation() has a value if it falsifies the declaration.
-    kOutsideDomain,  ///< Not used: z is not proven to lie in the domain, so the declaration does not cover it.
-    kUnusable,       ///< Not used: an entry is not finite, or the nominal map has no finite enclosure at z.
-  };
+  using Learned = forereach::Learned;
   /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
   noise bound. Do not call it while Certify runs. Cost: about a microsecond; if Compact has not been called for 256
   transitions, it also builds an index. */
@@ -56,10 +53,20 @@ class Certifier final {
   best direction. @pre 0 <= t <= tube.length(). */
   [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept;
 
-  /** Checks the preconditions of Certify: sizes as in the problem, 1..kMaxSteps steps, finite controls, obstacles of
-  the safety dimension p, and X_0 with at most order * n generators.
-  @throws std::invalid_argument with the value and its bound if one is violated. */
+  /** What keeps a plan from being certified: `what` names value and bound. */
+  struct Misfit {
+    enum class Kind { kSize, kNumber } kind;
+    std::string what;
+  };
+  /** The first misfit of a plan: sizes other than the problem's or not 1..kMaxSteps steps, then a control that is not
+  finite. Nothing if there is none. Its controls are read only if the sizes fit. */
+  [[nodiscard]] std::optional<Misfit> FindMisfit(const Plan& plan) const;
+
+  /** Checks the preconditions of Certify: a plan without a misfit, X_0 in the states with at most order * n generators,
+  obstacles of the safety dimension p. @throws std::invalid_argument with the value and its bound if one is violated. */
   void Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
+  /** The same without the plan, which FindMisfit has passed. */
+  void Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
 
   /** Decides whether the plan is safe for every admissible residual and every initial state in `initial_set`. The
   outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, `tube.slice(t)` contains every

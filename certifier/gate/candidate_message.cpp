@@ -18,4 +18,13 @@ Zonotope InitialSetOf(const candidate_plan_t& candidate) {
                            Eigen::Map<const Eigen::VectorXd>(candidate.initial_half_width, n));
 }
 
+std::int64_t StartOf(Bytes candidate) {
+  // After the fingerprint, utime, sequence, plan_id and source.
+  constexpr std::size_t kStartsAt = 4 * sizeof(std::int64_t) + sizeof candidate_plan_t::source;
+  if (candidate.size() != EncodedSize<candidate_plan_t>() ||
+      FromBigEndian<std::int64_t>(candidate) != candidate_plan_t::getHash())
+    return INT64_MAX;
+  return FromBigEndian<std::int64_t>(candidate.subspan(kStartsAt));
+}
+
 }  // namespace forereach

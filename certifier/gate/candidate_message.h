@@ -1,8 +1,11 @@
 /** A candidate from the bus, as a certifier takes it. */
 #pragma once
 
+#include <cstdint>
+
 #include "certifier/certify/decision.h"
 #include "forereach/candidate_plan_t.hpp"
+#include "lcmtypes/codec.h"
 
 namespace forereach {
 
@@ -11,5 +14,9 @@ namespace forereach {
 
 /** X_0. @throws std::invalid_argument if num_states is not 1 to 16, or as Zonotope::FromBox does. */
 [[nodiscard]] Zonotope InitialSetOf(const candidate_plan_t& candidate);
+
+/** start_utime of the bytes of a candidate, read where it lies in them: nothing is decoded. INT64_MAX for bytes that
+Decode refuses. */
+[[nodiscard]] std::int64_t StartOf(Bytes candidate);
 
 }  // namespace forereach

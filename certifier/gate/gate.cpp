@@ -20,11 +20,6 @@ static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
               static_cast<int>(Cause::kObstacle) == decision_t::CAUSE_OBSTACLE &&
               static_cast<int>(Cause::kNoStop) == decision_t::CAUSE_NO_STOP);
 
-template <class Range>
-bool AllFinite(const Range& values) {
-  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
-}
-
 }  // namespace
 
 Gate::Gate(const Config& config)
@@ -73,7 +68,8 @@ GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection
   SetDigest(decision.plan_digest, DigestOf(bytes));
   try {
     candidate_plan_t candidate{};
-    std::optional<Rejection> rejection = Admit(bytes, candidate, now_us);
+    Zonotope initial_set;
+    std::optional<Rejection> rejection = Admit(bytes, candidate, initial_set, now_us);
     if (!rejection) rejection = std::move(from_outside);
     if (!rejection) rejection = CheckDeadline(candidate, now_us);
     decision.candidate_utime = candidate.utime;
@@ -85,7 +81,7 @@ GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection
       SetText(decision.message,
               (rejection->outcome == decision_t::REJECTED ? "rejected: " : "abstained: ") + rejection->why);
     } else {
-      Certify(candidate, answer);
+      Certify(candidate, initial_set, answer);
       WithdrawIfLate(answer, clock());
     }
   } catch (const std::exception& error) {
@@ -99,7 +95,8 @@ GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection
   return answer;
 }
 
-std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candidate, std::int64_t now_us) {
+std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
+                                           std::int64_t now_us) {
   const std::string size = std::to_string(bytes.size()) + " bytes";
   switch (Decode(bytes, candidate)) {
     case DecodeStatus::kUnknownFingerprint:
@@ -113,28 +110,28 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
     case DecodeStatus::kOk: break;
   }
   sources_.Hear(candidate, now_us);
-  if (auto rejection = CheckContent(candidate)) return rejection;
+  if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
   return CheckSource(candidate, now_us);
 }
 
-std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candidate) const {
+std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const {
   const NominalModel& model = *certifier_.problem().model;
-  const int states = candidate.num_states, inputs = candidate.num_inputs, steps = candidate.num_steps;
-  if (states != model.num_states() || inputs != model.num_inputs() || steps < 1 || steps > kMaxSteps ||
-      candidate.progress_steps < 0 || candidate.progress_steps > steps)
+  const int states = candidate.num_states, steps = candidate.num_steps;
+  const auto misfit = certifier_.FindMisfit(PlanOf(candidate));
+  if (states != model.num_states() || candidate.progress_steps < 0 || candidate.progress_steps > steps ||
+      (misfit && misfit->kind == Certifier::Misfit::Kind::kSize))
     return Rejection{decision_t::CAUSE_WRONG_DIMENSION,
-                     std::to_string(states) + " states, " + std::to_string(inputs) + " inputs, " +
+                     std::to_string(states) + " states, " + std::to_string(candidate.num_inputs) + " inputs, " +
                          std::to_string(candidate.progress_steps) + " of " + std::to_string(steps) +
                          " steps; the task has " + std::to_string(model.num_states()) + " and " +
                          std::to_string(model.num_inputs()) + ", at most " + std::to_string(kMaxSteps) + " steps"};
-  const auto first = [](const auto& field, int count) { return std::span(field, static_cast<std::size_t>(count)); };
-  bool finite =
-      AllFinite(first(candidate.initial_center, states)) && AllFinite(first(candidate.initial_half_width, states));
-  for (int t = 0; t < steps; ++t) finite &= AllFinite(first(candidate.control[t], inputs));
-  if (!finite) return Rejection{decision_t::CAUSE_NON_FINITE, "NaN or infinity in its initial set or controls"};
-  for (const double half_width : first(candidate.initial_half_width, states))
-    if (half_width < 0) return Rejection{decision_t::CAUSE_NON_FINITE, "negative half-width " + ToText(half_width)};
+  if (misfit) return Rejection{decision_t::CAUSE_NON_FINITE, misfit->what};
+  try {
+    initial_set = InitialSetOf(candidate);
+  } catch (const std::invalid_argument& error) {
+    return Rejection{decision_t::CAUSE_NON_FINITE, std::string("initial set: ") + error.what()};
+  }
   return std::nullopt;
 }
 
@@ -174,19 +171,22 @@ std::optional<Gate::Rejection> Gate::CheckSource(const candidate_plan_t& candida
                    "more than " + std::to_string(Sources::kMaxSources) + " sources send candidates"};
 }
 
+std::int64_t Gate::EarliestStart(std::int64_t now_us) const {
+  const std::int64_t budget_us = Microseconds(options_.decision_budget_ms);
+  return now_us > INT64_MAX - budget_us ? INT64_MAX : now_us + budget_us;
+}
+
 std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const {
-  if (candidate.start_utime - now_us >= Microseconds(options_.decision_budget_ms)) return std::nullopt;
+  if (candidate.start_utime >= EarliestStart(now_us)) return std::nullopt;
   return Rejection{decision_t::CAUSE_DEADLINE,
                    "it starts in " + ToText(static_cast<double>(candidate.start_utime - now_us) / 1e3) +
                        " ms, a decision may take " + ToText(options_.decision_budget_ms) + " ms",
                    decision_t::ABSTAIN_DEADLINE};
 }
 
-void Gate::Certify(const candidate_plan_t& candidate, GateAnswer& answer) {
-  const Zonotope initial_set = InitialSetOf(candidate);
-  const Plan plan = PlanOf(candidate);
-  certifier_.Require(plan, initial_set, obstacles_.all());
-  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
+void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer) {
+  certifier_.Require(initial_set, obstacles_.all());
+  const Decision verdict = certifier_.Certify(PlanOf(candidate), initial_set, obstacles_.all(), tube_);
 
   decision_t& decision = answer.decision;
   decision.outcome = static_cast<std::int16_t>(verdict.outcome);
@@ -239,7 +239,8 @@ std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) { return obs
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
   const int n = certifier_.problem().model->num_states();
   if (state.num_states != n) return std::to_string(state.num_states) + " states, the task has " + std::to_string(n);
-  if (!AllFinite(std::span(state.state, static_cast<std::size_t>(n)))) return "NaN or infinity in it";
+  const std::span measured(state.state, static_cast<std::size_t>(n));
+  if (!std::ranges::all_of(measured, [](double value) { return std::isfinite(value); })) return "NaN or infinity in it";
   if (state.mode < robot_state_t::STANDING || state.mode > robot_state_t::FINISHED)
     return "unknown mode " + std::to_string(state.mode);
   return CheckFresh(state.utime, now_us);
@@ -249,10 +250,10 @@ std::string Gate::Learn(Bytes bytes) {
   if (!options_.learns) return "the task has gate.learn: none";
   const auto message = Decoded<transition_t>(bytes);
   if (!message) return "not a transition_t of " + std::to_string(EncodedSize<transition_t>()) + " bytes";
-  const ExecutedTransition transition = FromMessage(*message, certifier_.problem());
+  const ExecutedTransition transition = FromMessage(*message, *certifier_.problem().model);
   if (!transition.refusal.empty()) return transition.refusal;
-  if (certifier_.Learn(transition.z, transition.next) != Certifier::Learned::kAdded)
-    return "the nominal model has no finite value there";
+  if (const Learned learned = certifier_.Learn(transition.z, transition.next); learned != Learned::kAdded)
+    return Explain(learned);
   observations_digest_ = ChainedDigest(observations_digest_, bytes);
   ++counts_.learned;
   return {};

@@ -58,13 +58,17 @@ class Gate final {
   [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why,
                                   std::int16_t outcome = decision_t::REJECTED) noexcept;
 
+  /** The earliest start of a plan for which there is time to decide on it at `now_us`: gate.decision_budget_ms later.
+  Both in microseconds since the Unix epoch. */
+  [[nodiscard]] std::int64_t EarliestStart(std::int64_t now_us) const;
+
   /** Takes the obstacles of an obstacles_t, as gate.obstacles says (obstacles_in_force.h). Whole or not at all: returns
   what is wrong with the message, or an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
-  /** Adds an executed transition to the observations, if the task has it learn, and chains observations_digest:
-  BLAKE2b-256 of the digest before and the message's bytes. Returns what is wrong with it, and nothing has changed, or
-  an empty text. Whether it falsifies the declaration, certifier().violation() says. */
+  /** Adds an executed transition to the observations, if the task has gate.learn, and chains observations_digest:
+  BLAKE2b-256 of the digest before and the message's bytes. Returns which check refused it (certify/learned.h), and
+  nothing has changed, or an empty text. certifier().violation() tells whether it falsifies the declaration. */
   [[nodiscard]] std::string Learn(Bytes transition);
 
   /** What keeps a robot's state from being believed: sizes, numbers, a stamp that is stale or ahead; empty if nothing.
@@ -93,12 +97,13 @@ class Gate final {
   };
 
   [[nodiscard]] GateAnswer Answer(Bytes candidate, const Clock& clock, std::optional<Rejection> from_outside) noexcept;
-  [[nodiscard]] std::optional<Rejection> Admit(Bytes bytes, candidate_plan_t& candidate, std::int64_t now_us);
-  [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate) const;
+  [[nodiscard]] std::optional<Rejection> Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
+                                               std::int64_t now_us);
+  [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const;
   [[nodiscard]] std::optional<Rejection> CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const;
   [[nodiscard]] std::optional<Rejection> CheckSource(const candidate_plan_t& candidate, std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const;
-  void Certify(const candidate_plan_t& candidate, GateAnswer& answer);
+  void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer);
   void WithdrawIfLate(GateAnswer& answer, std::int64_t now_us) const;
   /** Fills and seals a message of zeros. */
   void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);

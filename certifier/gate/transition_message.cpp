@@ -1,12 +1,11 @@
 #include "certifier/gate/transition_message.h"
 
-#include <algorithm>
-#include <cmath>
+#include "certifier/certify/learned.h"
 
 namespace forereach {
 
-ExecutedTransition FromMessage(const transition_t& message, const Problem& problem) {
-  const int n = problem.model->num_states(), m = problem.model->num_inputs();
+ExecutedTransition FromMessage(const transition_t& message, const NominalModel& model) {
+  const int n = model.num_states(), m = model.num_inputs();
   ExecutedTransition transition;
   if (message.num_states != n || message.num_inputs != m) {
     transition.refusal = std::to_string(message.num_states) + " states and " + std::to_string(message.num_inputs) +
@@ -16,11 +15,14 @@ ExecutedTransition FromMessage(const transition_t& message, const Problem& probl
   transition.z.assign(message.state, message.state + n);
   transition.z.insert(transition.z.end(), message.input, message.input + m);
   transition.next.assign(message.next_state, message.next_state + n);
-  const auto finite = [](double value) { return std::isfinite(value); };
-  if (!std::ranges::all_of(transition.z, finite) || !std::ranges::all_of(transition.next, finite))
-    transition.refusal = "NaN or infinity in it";
-  else if (!problem.domain.Contains(transition.z))
-    transition.refusal = "it lies outside the certification domain";
+  return transition;
+}
+
+ExecutedTransition FromMessage(const transition_t& message, const Problem& problem) {
+  ExecutedTransition transition = FromMessage(message, *problem.model);
+  Observations observed;
+  if (transition.refusal.empty())
+    transition.refusal = Explain(Observe(problem, transition.z, transition.next, observed));
   return transition;
 }
 

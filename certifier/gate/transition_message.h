@@ -11,9 +11,13 @@ namespace forereach {
 
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+
-  std::string refusal;          ///< What keeps it from being learned: sizes, NaN, outside the domain. Empty if nothing.
+  std::string refusal;          ///< What keeps it from being learned. Empty if nothing does.
 };
 
+/** Refuses sizes other than the model's. */
+[[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const NominalModel& model);
+
+/** Refuses also what a certifier would not learn (certify/learned.h): for readers of logs, who have no certifier. */
 [[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
 
 }  // namespace forereach

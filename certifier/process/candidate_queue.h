@@ -7,8 +7,6 @@ newer ones displace them. Every candidate that was added is taken once, or count
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <functional>
-#include <optional>
 #include <vector>
 
 #include "lcmtypes/codec.h"
@@ -25,10 +23,9 @@ class CandidateQueue final {
   [[nodiscard]] Candidate TakeNewest();
   [[nodiscard]] Candidate TakeOldest();
 
-  /** All candidates with start_utime < `utime()`, microseconds since the Unix epoch, the oldest first. Bytes that are
-  no candidate have no start and stay. Each candidate is decoded once, however often this is called.
-  @param utime is called once, after the decoding, so that a clock in it is read late. */
-  [[nodiscard]] std::vector<Candidate> TakeStartingBefore(const std::function<std::int64_t()>& utime);
+  /** All candidates with start_utime < `utime`, microseconds since the Unix epoch, the oldest first. Bytes that are no
+  candidate have no start and stay. Decodes nothing. */
+  [[nodiscard]] std::vector<Candidate> TakeStartingBefore(std::int64_t utime);
 
   /** Forgets all candidates. @return how many. */
   std::size_t Clear();
@@ -39,12 +36,7 @@ class CandidateQueue final {
   [[nodiscard]] std::size_t TakeHighWater();
 
  private:
-  struct Waiting {
-    Candidate candidate;
-    std::optional<std::int64_t> start_utime = {};  // known once TakeStartingBefore has decoded it
-  };
-
-  std::deque<Waiting> waiting_;  // the newest at the back
+  std::deque<Candidate> waiting_;  // the newest at the back
   std::size_t high_water_ = 0;
 };
 

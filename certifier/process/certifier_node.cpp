@@ -99,7 +99,7 @@ void CertifierNode::OnStatus(const Received& received) {
   if (!status || status->instance == charge_.self().instance) return;
   // Clocks that disagree must not hide two certifiers from each other; a log that somebody plays must not look like
   // one.
-  if (status->utime < received.utime - kClocksApartUs || status->utime > received.utime + kClocksApartUs)
+  if (FreshnessOf(status->utime, received.utime, kClocksApartUs, kClocksApartUs) != Freshness::kFresh)
     return Refuse(channels_.status, "a heartbeat from another time");
   LookAtCharge();
   const Charge::State before = charge_.state(), its_state = ChargeOf(status->state);
@@ -340,8 +340,8 @@ void CertifierNode::AnswerWaiting() {
 
 // Those for which another decision would take too long: while their start has not passed.
 void CertifierNode::AnswerDue() {
-  const auto last_start = [&] { return clocks_.wall() + Microseconds(gate_->options().decision_budget_ms); };
-  for (const CandidateQueue::Candidate& due : queue_.TakeStartingBefore(last_start)) Answer(due, false);
+  const std::int64_t earliest = gate_->EarliestStart(clocks_.wall());
+  for (const CandidateQueue::Candidate& due : queue_.TakeStartingBefore(earliest)) Answer(due, false);
 }
 
 GateAnswer CertifierNode::Decide(Bytes candidate) {

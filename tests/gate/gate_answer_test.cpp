@@ -2,13 +2,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "certifier/gate/candidate_message.h"
 #include "certifier/gate/gate.h"
+#include "forereach/transition_t.hpp"
 #include "lcmtypes/seal.h"
 #include "tests/gate/small_task.h"
 
@@ -249,6 +252,46 @@ TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheSeal) {
       ASSERT_THAT(FindSealFaults(*tampered), Not(IsEmpty())) << i;
     }
   }
+}
+
+TEST(GateTransitionTest, ARefusedOneNamesTheCheckThatRefusedItAndChangesNothing) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  Config config = SmallTask();
+  config.gate.learns = true;
+  Gate gate(config);
+  transition_t good{};
+  good.num_states = 4;
+  good.num_inputs = 2;
+  const auto expect_refused = [&](auto change, const char* why) {
+    transition_t bad = good;
+    change(bad);
+    EXPECT_THAT(gate.Learn(Encode(bad)), testing::HasSubstr(why));
+    EXPECT_EQ(gate.observations_digest(), config.observations_digest);
+  };
+  expect_refused([](auto& t) { t.num_states = 5; }, "5 states and 2 inputs, the task has 4 and 2");
+  expect_refused([](auto& t) { t.num_inputs = -1; }, "4 states and -1 inputs");
+  expect_refused([](auto& t) { t.state[3] = kNaN; }, "NaN or infinity");
+  expect_refused([](auto& t) { t.next_state[0] = HUGE_VAL; }, "NaN or infinity");
+  expect_refused([](auto& t) { t.state[0] = 20.5; }, "outside the certification domain");
+  expect_refused([](auto& t) { t.input[1] = -3.5; }, "outside the certification domain");
+  EXPECT_EQ(gate.Learn(Encode(good)), "");
+  EXPECT_NE(gate.observations_digest(), config.observations_digest);
+}
+
+TEST(CandidateMessageTest, TheStartIsReadFromTheBytesAsADecoderReadsIt) {
+  for (const std::int64_t start : {std::int64_t{0}, kNow, std::int64_t{-1}, INT64_MIN, INT64_MAX}) {
+    candidate_plan_t candidate = Candidate(7);
+    candidate.start_utime = start;
+    EXPECT_EQ(StartOf(Encode(candidate)), start);
+  }
+  std::vector<std::uint8_t> bytes = Encode(Candidate(7));
+  for (std::size_t size : {std::size_t{0}, std::size_t{7}, std::size_t{8}, bytes.size() - 1})
+    EXPECT_EQ(StartOf(Bytes(bytes).first(size)), INT64_MAX) << size;
+  bytes[0] ^= 1;
+  EXPECT_EQ(StartOf(bytes), INT64_MAX) << "of another type";
+  bytes[0] ^= 1;
+  bytes.push_back(0);
+  EXPECT_EQ(StartOf(bytes), INT64_MAX);
 }
 
 }  // namespace

@@ -107,10 +107,26 @@ TEST_F(LearnTest, TheWholeDomainCountsNotItsBoxAlone) {
   EXPECT_EQ(Learn(certifier, z, Next(z)), Certifier::Learned::kOutsideDomain) << "inside the box, outside the ball";
   z = Draw();
   z[0] = std::nan("");
-  EXPECT_EQ(Learn(certifier, z, Next(Draw())), Certifier::Learned::kUnusable);
+  EXPECT_EQ(Learn(certifier, z, Next(Draw())), Certifier::Learned::kNotFinite);
   z = Draw();
-  EXPECT_EQ(Learn(certifier, z, Eigen::VectorXd::Constant(6, INFINITY)), Certifier::Learned::kUnusable);
+  EXPECT_EQ(Learn(certifier, z, Eigen::VectorXd::Constant(6, INFINITY)), Certifier::Learned::kNotFinite);
   EXPECT_EQ(certifier.num_observations(), 2u);
+}
+
+TEST_F(LearnTest, WhereTheNominalModelHasNoFiniteValueNothingIsLearned) {
+  Problem problem;
+  problem.model = MakePointMass(10);
+  constexpr double kHuge = 1.5e308;
+  problem.domain.state = Box(Eigen::Vector4d::Constant(-kHuge), Eigen::Vector4d::Constant(kHuge));
+  problem.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
+  problem.declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
+  problem.projection = Eigen::MatrixXd::Identity(2, 4);
+  problem.transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
+  Certifier certifier(std::make_shared<Problem>(problem));
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(6);
+  z[2] = kHuge;
+  EXPECT_EQ(certifier.Learn({z.data(), 6}, {z.data(), 4}), Certifier::Learned::kNoNominalValue);
+  EXPECT_EQ(certifier.num_observations(), 1u);
 }
 
 TEST_F(LearnTest, AContradictionNamesThePairAndFalsifies) {
