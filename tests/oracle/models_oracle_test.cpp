@@ -495,6 +495,56 @@ TEST_P(Model, ExpansionRangesAreTight) {
   }
 }
 
+// Differences of large squares: what their rounding leaves is many times their size, and it is all the error of the
+// products and quotients made of them.
+struct Differences {
+  static constexpr int kStates = 4, kInputs = 0;
+  static constexpr const char* kName = "differences";
+  static constexpr std::array<const char*, kStates> kStateNames{"(u^2 - w^2) y", "y (u^2 - w^2)", "(u^2 - w^2) / y",
+                                                                "y / (u^2 - w^2 + 1e4)"};
+  static constexpr std::array<const char*, 0> kInputNames{};
+  static constexpr std::array<const char*, 0> kParameterNames{};
+
+  template <class T>
+  static constexpr void Step(std::span<const T>, std::span<const T> z, std::span<T> next) {
+    const T &u = z[0], &w = z[1], &y = z[2];
+    const T difference = u * u - w * w;
+    next[0] = difference * y;
+    next[1] = y * difference;
+    next[2] = difference / y;
+    next[3] = y / (difference + T(1e4));
+  }
+  [[nodiscard]] std::array<double, 0> parameters() const { return {}; }
+};
+
+TEST(ExpansionError, BoundsProductsAndQuotientsOfDifferencesThatCancel) {
+  Random random(511);
+  SCOPED_TRACE(random.trace());
+  const EquationsModel<Differences> model{Differences{}};
+  const std::vector<Interval> domain{{1e6, 1e6 + 1e-3}, {1e6, 1e6 + 1e-3}, {0.5, 1e3}, {0, 1}};
+  const ExpansionError error = BoundExpansionError(model.program(), model.parameters(), domain);
+  std::array<double, 4> worst{};
+  for (int trial = 0; trial < 3000; ++trial) {
+    std::vector<double> z;
+    std::vector<PlainInterval> ranges;
+    for (const Interval& side : domain) {
+      z.push_back(random.Uniform(side.lower, side.upper));
+      ranges.push_back({z.back(), z.back()});
+    }
+    if (random.Coin()) z[2] = random.Coin() ? 1e3 : 0.5;
+    Expansion plain;
+    model.Expand(z, ranges, plain);
+    const Rational u(z[0]), w(z[1]), y(z[2]), difference = u * u - w * w;
+    const Rational values[] = {difference * y, y * difference, difference / y, y / (difference + 10000)};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Rational off = abs(values[k] - Rational(plain.value[k]));
+      ASSERT_LE(off, Rational(error.value[k])) << Differences::kStateNames[k];
+      worst[k] = std::max(worst[k], off.get_d() / error.value[k]);
+    }
+  }
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_GT(worst[k], 0.05) << "the bound of " << Differences::kStateNames[k];
+}
+
 TEST(ExpansionError, IsInfiniteWhereTheDomainHoldsAPole) {
   const auto model = MakeKinematicBicycle(kDt, kWheelbase);
   std::vector<Interval> domain(8, Interval(-1, 1));

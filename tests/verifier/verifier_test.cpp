@@ -6,7 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/models.h"
+#include "tests/oracle/random.h"
 #include "tests/verifier/record.h"
+#include "verifier/equations.h"
+#include "verifier/tube.h"
 
 namespace forereach::verifier {
 namespace {
@@ -63,6 +66,64 @@ void ExpectRefuted(const Verdict& verdict, int step, const std::string& what) {
 }
 
 TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), OneStep())); }
+
+// f0(z) - f0(c) - J (z - c) lies inside the split remainder, wherever in the slice z is.
+TEST(SplitRemainder, HoldsAllOverTheSlice) {
+  Random random(51);
+  SCOPED_TRACE(random.trace());
+  const auto problem = std::make_shared<Problem>();
+  problem->model = MakeKinematicBicycle(0.1, 2.5);
+  Eigen::VectorXd reach(6);
+  reach << 1e3, 1e3, 20, 100, 10, 1.5;
+  problem->domain.state = Box(-reach, reach);
+  problem->domain.input = Box(Eigen::Vector2d(-10, -1), Eigen::Vector2d(10, 1));
+  problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+  problem->transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
+  problem->projection = Eigen::MatrixXd::Identity(2, 6);
+  const auto equations = EquationsOf(*problem->model);
+  constexpr int kTheta = 2, kV = 3, kDelta = 5;
+  for (int trial = 0; trial < 300; ++trial) {
+    Eigen::VectorXd center = Eigen::VectorXd::Zero(6), half = Eigen::VectorXd::Zero(6);
+    center[kTheta] = random.Uniform(-3, 3), center[kV] = random.Uniform(-20, 20),
+    center[kDelta] = random.Uniform(-0.6, 0.6);
+    half[kTheta] = random.Uniform(0, random.Coin() ? 0.1 : 3);
+    if (random.Coin()) half[kV] = random.Uniform(0, 5);
+    if (random.Coin()) half[kDelta] = random.Uniform(0, random.Coin() ? 0.01 : 0.4);
+    if (random.Coin(0.3))
+      center[kDelta] = random.Sign() * random.Uniform(0.8, 1), half[kDelta] = 0.49;  // next to the pole
+    InitialSet initial_set;
+    initial_set.center = center;
+    initial_set.generators = half.asDiagonal();
+    for (const Method method : {Method::kPaper, Method::kCentred}) {
+      const Tube tube = TubeMaker(*problem, *equations, method)
+                            .Make(initial_set, Eigen::MatrixXd::Zero(2, 1), {.split_remainder = true});
+      ASSERT_FALSE(tube.failure);
+      std::vector<Real> c(center.begin(), center.end());
+      c.resize(8);
+      const std::vector<Real> nominal = equations->Value(c);
+      const auto jacobian = equations->First(c);
+      for (int sample = 0; sample < 20; ++sample) {
+        std::vector<Real> z = c, d(8);
+        for (const int k : {kTheta, kV, kDelta}) {
+          const auto i = static_cast<std::size_t>(k);
+          d[i] = Real(random.Coin(0.7) ? random.Sign() : random.Uniform(-1, 1)) * Real(half[k]);
+          z[i] += d[i];
+        }
+        std::vector<Real> rest = equations->Value(z);
+        for (std::size_t k = 0; k < 6; ++k) rest[k] -= nominal[k];
+        for (const auto& [output, variable, value] : jacobian)
+          rest[static_cast<std::size_t>(output)] -= value * d[static_cast<std::size_t>(variable)];
+        for (std::size_t k = 0; k < 6; ++k) {
+          const auto& [lower, upper] = tube.steps[0].remainder[k];
+          const Real rounding(0x1p-150);  // of 256 bits
+          ASSERT_TRUE(CertainlyAtMost(lower - rounding, rest[k]) && CertainlyAtMost(rest[k], upper + rounding))
+              << "trial " << trial << ", coordinate " << k << ": " << rest[k].text() << " outside [" << lower.text()
+              << ", " << upper.text() << "]";
+        }
+      }
+    }
+  }
+}
 
 TEST(HandMade, APlanThatDoesNotEndStandingIsRefuted) {
   const auto within = [](int coordinate, double tolerance) {

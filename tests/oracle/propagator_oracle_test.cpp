@@ -1,0 +1,124 @@
+// A step of an affine model against exact rationals: the successor's support is nowhere below that of the exact image,
+// whichever way the model is expanded.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/dynamics/models.h"
+#include "certifier/reach/propagator.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/random.h"
+
+namespace forereach {
+namespace {
+
+using exact::Rational;
+
+constexpr double kDt = 0.15;
+constexpr int kStates = 4, kInputs = 2, kOrder = 5;
+
+// The point mass with a constant residual, observed once with an error of up to sigma.
+struct Task {
+  std::shared_ptr<Problem> problem = std::make_shared<Problem>();
+  std::array<Rational, kStates> lowest, highest;  // of the residuals that are admissible
+
+  // @param reach of the domain: beyond some size the expansion is made of intervals.
+  Task(Random& random, double reach) {
+    problem->model = MakePointMass(kDt);
+    problem->domain.state = Box(Eigen::Vector4d::Constant(-reach), Eigen::Vector4d::Constant(reach));
+    problem->domain.input = Box(Eigen::Vector2d(-3, -3), Eigen::Vector2d(3, 3));
+    problem->declaration = {Eigen::MatrixXd::Zero(kStates, 6), Eigen::VectorXd::Zero(kStates)};
+    problem->projection = Eigen::MatrixXd::Identity(2, kStates);
+    problem->zonotope_order = kOrder;
+    problem->transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, kStates)};
+    for (int k = 0; k < kStates; ++k) {  // from rest at the origin: f0 is zero, and the successor is the residual
+      const double residual = random.Coin(0.3) ? 0 : random.Uniform(-1, 1) * std::ldexp(1, -random.Integer(0, 40));
+      const double sigma = random.Coin() ? 0 : std::ldexp(random.Uniform(0, 1), -random.Integer(0, 40));
+      problem->transitions.x_next(0, k) = residual;
+      problem->declaration.noise_bound[k] = sigma;
+      const auto i = static_cast<std::size_t>(k);
+      lowest[i] = Rational(residual) - Rational(sigma);
+      highest[i] = Rational(residual) + Rational(sigma);
+    }
+  }
+};
+
+// max {d . x+ : x in slice, residual admissible}.
+Rational ImageSupport(const Task& task, const Zonotope& slice, std::span<const double> input,
+                      std::span<const double> d) {
+  const Rational dt(kDt), half_square = dt * dt / 2;
+  std::array<Rational, kStates> pulled;  // A^T d
+  Rational support = 0;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const Rational of_position(d[axis]), of_speed(d[axis + 2]), u(input[axis]);
+    pulled[axis] = of_position;
+    pulled[axis + 2] = dt * of_position + of_speed;
+    support += (half_square * of_position + dt * of_speed) * u;
+  }
+  for (int k = 0; k < kStates; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    support += pulled[i] * Rational(slice.center(k)) + abs(pulled[i]) * Rational(slice.slack(k));
+    support += std::max<Rational>(Rational(d[i]) * task.lowest[i], Rational(d[i]) * task.highest[i]);
+  }
+  for (int j = 0; j < slice.num_generators(); ++j) {
+    Rational along = 0;
+    for (int k = 0; k < kStates; ++k) along += pulled[static_cast<std::size_t>(k)] * Rational(slice.generator(k, j));
+    support += abs(along);
+  }
+  return support;
+}
+
+class StepOracle : public testing::TestWithParam<double> {};
+
+TEST_P(StepOracle, TheSuccessorContainsTheExactImage) {
+  Random random(630);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 200; ++trial) {
+    const Task task(random, GetParam());
+    const Certifier certifier(task.problem);
+    Eigen::VectorXd center = random.Vector(kStates, std::ldexp(1, random.Integer(-20, 3)));
+    for (int axis = 0; axis < 2; ++axis)  // position and the way of a step often cancel
+      if (random.Coin()) center[axis] = -kDt * center[axis + 2] * (1 + random.Integer(-2, 2) * 0x1p-52);
+    const int columns = random.Coin(0.2) ? 0 : random.Integer(1, kOrder * kStates);
+    const Zonotope initial_set(center, random.Matrix(kStates, columns, std::ldexp(1, -random.Integer(4, 20))));
+    const Eigen::MatrixXd controls =
+        random.Coin(0.3) ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(2, 3)) : random.Matrix(2, 3);
+    const Plan plan{controls.data(), kInputs, 3, kInputs};
+    Tube tube;
+    ASSERT_EQ(certifier.Certify(plan, initial_set, {}, tube).outcome, Outcome::kCertified);
+    for (int t = 0; t < 3; ++t) {
+      for (int i = 0; i < 8; ++i) {
+        Eigen::VectorXd d = random.Vector(kStates);
+        if (i < kStates) d = random.Sign() * Eigen::VectorXd::Unit(kStates, i);
+        ASSERT_GE(exact::Support(tube.slice(t + 1), View(d)), ImageSupport(task, tube.slice(t), plan.input(t), View(d)))
+            << "trial " << trial << ", step " << t;
+      }
+      for (int k = 0; k < kStates; ++k)
+        ASSERT_GE(Rational(tube.half_width(t + 1)[static_cast<std::size_t>(k)]), exact::HalfWidth(tube.slice(t + 1), k))
+            << "trial " << trial << ", step " << t;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(DomainsOfAnySize, StepOracle, testing::Values(100.0, 1e12));
+
+TEST(PropagatorOracle, HalfWidthsAreNeverBelowTheExactOnes) {
+  Random random(631);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 2000; ++trial) {
+    Zonotope slice = random.AnyZonotope(kStates, random.Integer(0, 60), std::ldexp(1, random.Integer(-40, 40)));
+    for (int k = 0; k < kStates; ++k)
+      if (random.Coin()) slice.mutable_slack(k) = random.Uniform(0, 1);
+    std::array<double, kMaxStates> half_width{};
+    Propagator::HalfWidths(slice, half_width.data());
+    for (int k = 0; k < kStates; ++k)
+      ASSERT_GE(Rational(half_width[static_cast<std::size_t>(k)]), exact::HalfWidth(slice, k)) << "trial " << trial;
+  }
+}
+
+}  // namespace
+}  // namespace forereach
