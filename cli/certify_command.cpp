@@ -4,7 +4,7 @@
 #include "certifier/certify/explain.h"
 #include "certifier/numerics/text.h"
 #include "cli/commands.h"
-#include "cli/decision_json.h"
+#include "records/decision_json.h"
 
 namespace forereach {
 namespace {

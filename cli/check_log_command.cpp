@@ -2,8 +2,8 @@
 #include <iostream>
 
 #include "cli/commands.h"
-#include "logger/check.h"
-#include "logger/json_text.h"
+#include "records/check.h"
+#include "records/json_text.h"
 
 namespace forereach {
 namespace {

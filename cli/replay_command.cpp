@@ -1,10 +1,11 @@
 #include <iostream>
 
 #include "cli/commands.h"
-#include "cli/replay.h"
+#include "cli/key_options.h"
 #include "lcmtypes/printable.h"
-#include "logger/json_text.h"
-#include "logger/log_tasks.h"
+#include "records/json_text.h"
+#include "records/log_tasks.h"
+#include "records/replay.h"
 
 namespace forereach {
 namespace {
@@ -66,7 +67,7 @@ Command ReplayCommand() {
                    .needs = "--config"},
                   JsonFlag(options->json)},
       .run = [options] { return RunReplay(*options); }};
-  options->key.AddTo(command.options);
+  AddKeyOptions(command.options, options->key);
   return command;
 }
 

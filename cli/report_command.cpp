@@ -1,7 +1,7 @@
 #include <iostream>
 
 #include "cli/commands.h"
-#include "logger/report.h"
+#include "records/report.h"
 
 namespace forereach {
 

@@ -8,11 +8,12 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/numerics/parallel.h"
-#include "cli/certificate_files.h"
 #include "cli/commands.h"
+#include "cli/key_options.h"
 #include "cli/progress.h"
 #include "lcmtypes/printable.h"
-#include "logger/json_text.h"
+#include "records/certificate_files.h"
+#include "records/json_text.h"
 
 namespace forereach {
 namespace {
@@ -200,7 +201,7 @@ Command VerifyCommand() {
                   JobsOption(options->jobs),
                   JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};
-  options->key.AddTo(command.options);
+  AddKeyOptions(command.options, options->key);
   return command;
 }
 

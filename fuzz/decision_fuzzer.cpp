@@ -1,7 +1,7 @@
 // `forereach verify`'s JSON: any bytes are a document that is confirmed or not, or refused with a ConfigError.
-#include "cli/certificate_files.h"
 #include "fuzz/fuzz.h"
 #include "fuzz/json_mutator.h"
+#include "records/certificate_files.h"
 
 namespace forereach {
 namespace {

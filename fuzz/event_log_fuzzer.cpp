@@ -1,7 +1,7 @@
 // The log reader and the writer's recovery over any bytes: they end, account for every byte, hold no more than one
 // event of the allowed size, and recovery keeps as much as the reader read.
 #include "fuzz/fuzz.h"
-#include "logger/event_log.h"
+#include "records/event_log.h"
 
 namespace forereach {
 namespace {

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "forereach/logger_status_t.hpp"
-#include "logger/log_authenticator.h"
+#include "records/log_authenticator.h"
 
 namespace forereach {
 namespace {

@@ -22,7 +22,7 @@ already. The directory is made again if need be; where no new file can be made r
 second. A database that is no longer in its place is opened or made anew. What it lacks of logs that are there is made
 again by the next start; gaps without an event that it alone held are lost.
 
-**Tasks.** The task file and the files that it names are kept beside the logs (logger/kept_tasks.h), so that a log can
+**Tasks.** The task file and the files that it names are kept beside the logs (records/kept_tasks.h), so that a log can
 be read without them. When the certifier's heartbeats tell of a reload the task file is read again, and kept too if it
 is the one that they name. A kept task is deleted with the last log whose decisions name it.
 
@@ -44,12 +44,12 @@ are never deleted, nor is any if that would not make room. */
 
 #include "bus/authentic.h"
 #include "certifier/task/config.h"
-#include "logger/database.h"
-#include "logger/event_log.h"
-#include "logger/interpreter.h"
-#include "logger/kept_tasks.h"
-#include "logger/log_directory.h"
-#include "logger/summary.h"
+#include "records/database.h"
+#include "records/event_log.h"
+#include "records/interpreter.h"
+#include "records/kept_tasks.h"
+#include "records/log_directory.h"
+#include "records/summary.h"
 
 namespace forereach {
 
@@ -76,7 +76,7 @@ class Recorder final {
   static constexpr std::size_t kMaxWaitingRows = 100'000;
 
   /** Makes the directory if need be, opens the database in it and mends earlier runs. With bus.key only authentic
-  messages make rows (logger/interpreter.h).
+  messages make rows (records/interpreter.h).
   @throws LogError, DatabaseError if the directory cannot be written to, KeyError. */
   Recorder(const Config& config, FreeSpace free_space);
 

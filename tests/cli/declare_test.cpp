@@ -10,7 +10,7 @@
 #include "certifier/task/config.h"
 #include "cli/cover_file.h"
 #include "tests/cli/program.h"
-#include "tests/logger/logs.h"
+#include "tests/records/logs.h"
 
 namespace forereach {
 namespace {

@@ -11,10 +11,10 @@
 
 #include "certifier/task/config.h"
 #include "forereach/decision_t.hpp"
-#include "logger/database.h"
-#include "logger/event_log.h"
-#include "logger/kept_tasks.h"
-#include "logger/log_directory.h"
+#include "records/database.h"
+#include "records/event_log.h"
+#include "records/kept_tasks.h"
+#include "records/log_directory.h"
 #include "tests/cli/program.h"
 #include "tests/scratch.h"
 

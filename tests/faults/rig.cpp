@@ -10,8 +10,8 @@
 #include "bus/authentic_bus.h"
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
-#include "logger/check.h"
-#include "logger/event_log.h"
+#include "records/check.h"
+#include "records/event_log.h"
 #include "tests/keys.h"
 
 namespace forereach {

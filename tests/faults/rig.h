@@ -78,7 +78,7 @@ class Rig final {
   was heard; of one before it also those that stood in them when the next was started, once more after that one has
   mended them. What a logger cannot write it does not confirm. */
   [[nodiscard]] std::int64_t TakeLost();
-  /** Holds all logs against the databases of their directories (logger/check.h). No logger may run.
+  /** Holds all logs against the databases of their directories (records/check.h). No logger may run.
   @return one entry for each directory in which something is amiss. */
   [[nodiscard]] std::vector<std::string> CheckRecords() const;
 

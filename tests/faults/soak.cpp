@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
-#include "logger/database.h"
+#include "records/database.h"
 #include "tests/faults/load.h"
 #include "tests/faults/report.h"
 #include "tests/keys.h"

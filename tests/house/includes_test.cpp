@@ -46,10 +46,10 @@ class IncludesTest : public testing::Test {
     Write("robot/guard.h", "#include \"forereach/certified_plan_t.hpp\"\n#include \"lcmtypes/codec.h\"\n");
     Write("robot/guard.cpp", "#include \"robot/guard.h\"\n");
     Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"certifier/sets/box.h\"\n");
-    Write("logger/database.cpp", "#include <sqlite3.h>\n#include <cairo-svg.h>\n");
+    Write("records/database.cpp", "#include <sqlite3.h>\n#include <cairo-svg.h>\n");
     Write("verifier/real.h", "#include <mpfi.h>\n");
     Write("verifier/tube.cpp", "#include \"certifier/sets/box.h\"\n#include \"verifier/real.h\"\n");
-    Write("tests/logger/log_test.cpp", "#include <lcm/lcm-cpp.hpp>\n");
+    Write("tests/records/log_test.cpp", "#include <lcm/lcm-cpp.hpp>\n");
     Write("bench/gate_bench.cpp", "#include \"certifier/gate/gate.h\"\n#include <benchmark/benchmark.h>\n");
   }
 
@@ -116,11 +116,12 @@ TEST_F(IncludesTest, TheLibraryNeedsEigenOnly) {
 
 TEST_F(IncludesTest, ThePartsOfTheHouse) {
   Refuse("lcmtypes/bad.h", "\"certifier/sets/box.h\"", "lcmtypes may not include certifier");
-  Refuse("certifier/process/bad.cpp", "\"logger/database.h\"", "certifier may not include logger");
+  Refuse("certifier/process/bad.cpp", "\"records/database.h\"", "certifier may not include records");
   for (const char* other : {"planner_bridge", "logger", "robot", "cli", "bench"})
     Refuse("certifier/gate/bad.cpp", std::string("\"") + other + "/x.h\"",
            std::string("certifier may not include ") + other);
   Refuse("robot/bad.cpp", "\"planner_bridge/x.h\"", "robot may not include planner_bridge");
+  Refuse("records/bad.cpp", "\"logger/x.h\"", "records may not include logger");
   Refuse("bench/bad.cpp", "\"logger/x.h\"", "bench may not include logger");
   Refuse("experiments/bad.cpp", "\"robot/x.h\"", "experiments may not include robot");
   Refuse("experiments/bad.cpp", "\"cli/commands.h\"",
@@ -128,7 +129,7 @@ TEST_F(IncludesTest, ThePartsOfTheHouse) {
   Refuse("experiments/bad.cpp", "\"planner_bridge/proposal.h\"",
          "experiments may include certifier, policies and cli/progress.h only");
   Refuse("certifier/gate/bad.cpp", "\"experiments/x.h\"", "certifier may not include experiments");
-  Refuse("logger/bad.cpp", "\"tests/logger/logs.h\"", "logger may not include tests");
+  Refuse("logger/bad.cpp", "\"tests/records/logs.h\"", "logger may not include tests");
   ExpectRefused();
 }
 
@@ -153,8 +154,8 @@ TEST_F(IncludesTest, OtherPeoplesHeadersHaveOneOwner) {
        {"certifier/process/bad.cpp", "robot/bad.cpp", "logger/bad.cpp", "cli/bad.cpp", "bus/node.cpp"})
     Refuse(file, "<lcm/lcm-cpp.hpp>", "LCM belongs to bus/bus.cpp alone");
   Refuse("robot/bad.cpp", "<ompl/util/Console.h>", "OMPL belongs to planner_bridge/ alone");
-  Refuse("cli/bad.cpp", "<sqlite3.h>", "SQLite belongs to logger/ alone");
-  Refuse("robot/bad.cpp", "<cairo.h>", "cairo belongs to logger/ alone");
+  Refuse("cli/bad.cpp", "<sqlite3.h>", "SQLite belongs to records/ alone");
+  Refuse("robot/bad.cpp", "<cairo.h>", "cairo belongs to records/ alone");
   Refuse("cli/bad.cpp", "<yaml-cpp/yaml.h>", "yaml-cpp belongs to certifier/task/document.cpp alone");
   Refuse("robot/bad.cpp", "<sodium.h>", "libsodium belongs to (bus/(authentic|keys)|lcmtypes/codec).cpp alone");
   ExpectRefused();

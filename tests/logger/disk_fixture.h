@@ -16,7 +16,7 @@
 #include "forereach/logger_status_t.hpp"
 #include "logger/logger_node.h"
 #include "tests/logger/direct_bus.h"
-#include "tests/logger/logs.h"
+#include "tests/records/logs.h"
 #include "tests/small_disk.h"
 
 namespace forereach {

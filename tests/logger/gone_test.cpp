@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "logger/check.h"
+#include "records/check.h"
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach {

@@ -15,7 +15,7 @@
 #include "forereach/robot_state_t.hpp"
 #include "tests/keys.h"
 #include "tests/logger/direct_bus.h"
-#include "tests/logger/logs.h"
+#include "tests/records/logs.h"
 
 namespace forereach {
 namespace {

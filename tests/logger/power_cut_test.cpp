@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "logger/recorder.h"
-#include "tests/logger/logs.h"
+#include "tests/records/logs.h"
 
 namespace {
 

@@ -21,7 +21,7 @@
 #include "bus/authentic.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "logger/event_log.h"
+#include "records/event_log.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "cli/certificate_files.h"
-#include "cli/decision_json.h"
+#include "records/certificate_files.h"
+#include "records/decision_json.h"
 #include "tests/cli/program.h"
 #include "tests/scratch.h"
 

@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "cli/decision_json.h"
 #include "cli/progress.h"
+#include "records/decision_json.h"
 #include "tests/cli/program.h"
-#include "tests/logger/logs.h"
+#include "tests/records/logs.h"
 
 namespace forereach {
 namespace {

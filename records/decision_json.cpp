@@ -1,0 +1,150 @@
+#include "records/decision_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "certifier/certify/explain.h"
+#include "certifier/safety/separation.h"
+#include "certifier/sets/zonogon.h"
+#include "lcmtypes/names.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+Json SliceJson(const Tube& tube, int t, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+  const Zonotope& slice = tube.slice(t);
+  Json half_width = Json::array(), generators = Json::array(), clearance = Json::array();
+  for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
+  const Eigen::MatrixXd matrix = slice.GeneratorMatrix();
+  for (const auto column : matrix.colwise()) generators.push_back(std::vector(column.begin(), column.end()));
+  Zonotope projected;
+  certifier.projection().Enclose(slice, tube.half_width(t), projected);
+  for (const Obstacle& obstacle : obstacles)
+    clearance.push_back(std::max(certifier.SeparateSlice(tube, t, obstacle).clearance(), -kMaxDouble));
+  return {{"center", slice.center()},
+          {"half_width", half_width},
+          {"generators", generators},
+          {"clearance", clearance},
+          {"radius", RadiusUpper(projected)}};
+}
+
+Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+  Json slices = Json::array();
+  const auto n = static_cast<std::size_t>(certifier.problem().model->num_states());
+  for (int t = 0; t <= tube.length(); ++t) {
+    Json slice = SliceJson(tube, t, certifier, obstacles);
+    if (t < tube.length()) {
+      const StepRecord& step = tube.step(t);
+      slice["envelope"] = {{"lower", std::span(step.envelope.lower.data(), n)},
+                           {"upper", std::span(step.envelope.upper.data(), n)}};
+      slice["remainder"] = std::span(step.remainder.half_width.data(), n);
+    }
+    slices.push_back(std::move(slice));
+  }
+  return slices;
+}
+
+Json IndexJson(int index) { return index < 0 ? Json(nullptr) : Json(index); }
+Json NumberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+const char* KindName(DomainExit::Kind kind) {
+  switch (kind) {
+    case DomainExit::Kind::kLower: return "lower";
+    case DomainExit::Kind::kUpper: return "upper";
+    case DomainExit::Kind::kInequality: return "inequality";
+    case DomainExit::Kind::kBall: return "ball";
+    case DomainExit::Kind::kNone: break;
+  }
+  return nullptr;
+}
+
+// Adds what the outcome rests on.
+void AddWitness(const Decision& decision, Json& document) {
+  const char* const exit = KindName(decision.exit.kind);
+  document["step"] = IndexJson(decision.step);
+  document["coordinate"] = IndexJson(decision.coordinate);
+  document["exit"] = exit ? Json(exit) : Json(nullptr);
+  document["first_observation"] = IndexJson(decision.first_observation);
+  document["second_observation"] = IndexJson(decision.second_observation);
+  document["obstacle"] = IndexJson(decision.obstacle);
+  document["closest_step"] = IndexJson(decision.closest_step);
+  document["margin"] = NumberJson(decision.margin);
+  const bool without_obstacles = decision.outcome == Outcome::kCertified && decision.obstacle < 0;
+  document["threshold"] = without_obstacles ? Json(nullptr) : NumberJson(decision.threshold);
+}
+
+Json InputsJson(const Eigen::MatrixXd& controls, const Config& config) {
+  Json steps = Json::array();
+  for (const auto column : controls.colwise()) steps.push_back(std::vector(column.begin(), column.end()));
+  const Box& set = config.initial_set;
+  return {{"config",
+           {{"given", config.path}, {"absolute", std::filesystem::absolute(config.path).lexically_normal().string()}}},
+          {"controls", steps},
+          {"initial_set",
+           {{"lower", std::vector(set.lower().begin(), set.lower().end())},
+            {"upper", std::vector(set.upper().begin(), set.upper().end())}}}};
+}
+
+void Append(CanonicalBytes& bytes, const Json& value) {
+  if (value.is_object()) {
+    bytes.Text("object");
+    bytes.Count(static_cast<std::int64_t>(value.size()));
+    for (const auto& [key, entry] : value.items()) {  // sorted by key
+      bytes.Text(key);
+      Append(bytes, entry);
+    }
+  } else if (value.is_array()) {
+    bytes.Text("array");
+    bytes.Count(static_cast<std::int64_t>(value.size()));
+    for (const Json& entry : value) Append(bytes, entry);
+  } else if (value.is_number() && std::isfinite(value.get<double>())) {
+    bytes.Text("number");
+    bytes.Number(value.get<double>());
+  } else {
+    bytes.Text(value.is_string() ? value.get<std::string>() : "null");
+  }
+}
+
+}  // namespace
+
+Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set) {
+  CanonicalBytes bytes("plan");
+  bytes.Numbers(controls);
+  bytes.Numbers(initial_set.lower());
+  bytes.Numbers(initial_set.upper());
+  return bytes.digest();
+}
+
+Digest TubeDigest(const nlohmann::json& tube) {
+  CanonicalBytes bytes("forereach tube");
+  Append(bytes, tube);
+  return bytes.digest();
+}
+
+nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certifier& certifier, const Config& config) {
+  const Decision& decision = result.decision;
+  const bool before_any_step = decision.outcome == Outcome::kFalsified && decision.step < 0;
+  Json document;
+  document["outcome"] = OutcomeName(static_cast<std::int16_t>(decision.outcome));
+  AddWitness(decision, document);
+  document["cause"] =
+      decision.cause == Cause::kNone ? Json(nullptr) : Json(CauseName(static_cast<std::int16_t>(decision.cause)));
+  document["capped"] = decision.capped;
+  document["message"] = Explain(decision, certifier.problem());
+  document["inputs"] = InputsJson(result.controls, config);
+  document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles);
+  document["digests"] = {{"plan", ToHex(PlanDigest(result.controls, config.initial_set))},
+                         {"tube", ToHex(TubeDigest(document["tube"]))},
+                         {"config", ToHex(config.digest)},
+                         {"model", ToHex(config.model_digest)},
+                         {"declaration", ToHex(config.declaration_digest)},
+                         {"observations", ToHex(config.observations_digest)},
+                         {"obstacles", ToHex(config.obstacles_digest)}};
+  document["elapsed_us"] = result.elapsed_us;
+  return document;
+}
+
+}  // namespace forereach

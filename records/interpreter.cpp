@@ -1,0 +1,166 @@
+#include "records/interpreter.h"
+
+#include <algorithm>
+
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/fault_t.hpp"
+#include "forereach/logger_status_t.hpp"
+#include "forereach/obstacles_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "lcmtypes/heartbeat.h"
+#include "lcmtypes/names.h"
+
+namespace forereach {
+namespace {
+
+// By which a sender's clock may be ahead.
+constexpr std::int64_t kApartUs = 1'000'000;
+
+template <class Message>
+std::optional<Position> PositionOf(Bytes bytes) {
+  const auto message = Decoded<Message>(bytes);
+  return message ? std::optional(Position{message->sequence, message->utime}) : std::nullopt;
+}
+
+DecisionRow MakeRow(const decision_t& decision, LogReference event) {
+  DecisionRow row;
+  row.event = std::move(event);
+  row.utime = decision.utime;
+  row.candidate_utime = decision.candidate_utime;
+  row.sequence = decision.sequence;
+  row.plan_id = decision.plan_id;
+  row.source = GetText(decision.source);
+  row.outcome = OutcomeName(decision.outcome);
+  row.cause = CauseName(decision.cause);
+  row.message = GetText(decision.message);
+  row.step = decision.step;
+  row.coordinate = decision.coordinate;
+  row.obstacle = decision.obstacle;
+  row.first_observation = decision.first_observation;
+  row.second_observation = decision.second_observation;
+  row.margin = decision.margin;
+  row.threshold = decision.threshold;
+  row.elapsed_us = decision.elapsed_us;
+  row.plan_digest = ToHex(GetDigest(decision.plan_digest));
+  row.config_digest = ToHex(GetDigest(decision.config_digest));
+  row.model_digest = ToHex(GetDigest(decision.model_digest));
+  row.declaration_digest = ToHex(GetDigest(decision.declaration_digest));
+  row.observations_digest = ToHex(GetDigest(decision.observations_digest));
+  row.obstacles_digest = ToHex(GetDigest(decision.obstacles_digest));
+  return row;
+}
+
+EventRow MakeRow(const execution_event_t& event, LogReference reference) {
+  EventRow row;
+  row.event = std::move(reference);
+  row.utime = event.utime;
+  row.sequence = event.sequence;
+  row.plan_id = event.plan_id;
+  row.kind = EventName(event.kind);
+  row.message = GetText(event.message);
+  row.step = event.step;
+  row.coordinate = event.coordinate;
+  row.state.assign(event.state, event.state + std::clamp<int>(event.num_states, 0, 16));
+  row.value = event.value;
+  return row;
+}
+
+}  // namespace
+
+Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys)
+    : channels_(std::move(channels)), log_file_(std::move(log_file)), authenticator_(channels_, std::move(keys)) {}
+
+std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
+  const Stream plain{channel, ""};
+  if (channel == channels_.candidate) {
+    const auto candidate = Decoded<candidate_plan_t>(bytes);
+    if (!candidate) return {plain, std::nullopt};
+    return {Stream{channel, GetText(candidate->source)}, Position{candidate->sequence, candidate->utime}};
+  }
+  if (channel == channels_.decision) return {plain, PositionOf<decision_t>(bytes)};
+  if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
+  if (channel == channels_.robot_state) return {plain, PositionOf<robot_state_t>(bytes)};
+  if (channel == channels_.transition) return {plain, PositionOf<transition_t>(bytes)};
+  if (channel == channels_.status) {
+    const auto heartbeat = ReadHeartbeat(bytes);
+    if (!heartbeat || !heartbeat->in_charge) return {plain, std::nullopt};  // a second certifier counts for itself
+    return {plain, Position{heartbeat->sequence, heartbeat->utime}};
+  }
+  if (channel == channels_.fault) return {plain, PositionOf<fault_t>(bytes)};
+  if (channel == channels_.event) return {plain, PositionOf<execution_event_t>(bytes)};
+  if (channel == channels_.logger_status) return {plain, PositionOf<logger_status_t>(bytes)};
+  if (channel == channels_.obstacles) return {plain, PositionOf<obstacles_t>(bytes)};
+  return {plain, std::nullopt};
+}
+
+void Interpreter::Observe(const LogEvent& event, Rows& rows) {
+  if (!authenticator_.IsAuthentic(event)) return;
+  const auto reference = [&] { return LogReference{log_file_, event.number, ToHex(DigestOf(event))}; };
+  if (std::optional<GapRow> gap = CheckSequence(event)) {
+    gap->event = reference();
+    rows.gaps.push_back(std::move(*gap));
+  }
+  if (event.channel == channels_.candidate) {
+    candidates_.emplace_back(DigestOf(event.message()), event.utime);
+    if (candidates_.size() > kMaxCandidates) candidates_.pop_front();
+  } else if (event.channel == channels_.decision) {
+    if (const auto decision = Decoded<decision_t>(event.message())) {
+      DecisionRow row = MakeRow(*decision, reference());
+      row.latency_us = LatencyUs(GetDigest(decision->plan_digest), event.utime);
+      rows.decisions.push_back(std::move(row));
+    }
+  } else if (event.channel == channels_.event) {
+    if (const auto execution = Decoded<execution_event_t>(event.message()))
+      rows.events.push_back(MakeRow(*execution, reference()));
+  }
+}
+
+void Interpreter::Forgive(const Stream& stream, std::int64_t lost) {
+  const auto found = streams_.find(stream);
+  if (found != streams_.end()) found->second.forgiven += lost;
+}
+
+// 0 is a new beginning whatever its stamp, for the sender's clock may have been set back; but not the last 0 once more.
+bool Interpreter::Count::IsLateOrRepeated(const Position& behind) const {
+  return behind.sequence == 0 ? begun_utime == behind.utime : behind.utime <= newest_utime;
+}
+
+std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
+  auto [stream, position] = Identify(event.channel, event.message());
+  if (!position || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return std::nullopt;
+  Count& count = streams_[stream];
+  if (count.last == position) return std::nullopt;  // the same once more, however stamped
+  count.last = position;
+  // Else a stamp far ahead would be the newest for ever.
+  position->utime = std::min(position->utime, std::min(event.utime, INT64_MAX - kApartUs) + kApartUs);
+  const std::int64_t got = position->sequence, expected = count.next.value_or(got), forgiven = count.forgiven;
+  if (got < expected && count.IsLateOrRepeated(*position)) return std::nullopt;
+  count.newest_utime = count.next && got >= expected ? std::max(count.newest_utime, position->utime) : position->utime;
+  count.next = got < INT64_MAX ? got + 1 : got;
+  count.forgiven = 0;
+  if (got == 0) count.begun_utime = position->utime;
+  if (got == expected) return std::nullopt;
+  GapRow gap{{}, stream.channel, stream.source, expected, got, 0, event.utime, "restart"};
+  if (got > expected) {
+    gap.lost = expected < 0 ? 0 : std::max<std::int64_t>(got - expected - forgiven, 0);
+    gap.reason = "bus";
+    if (gap.lost == 0) return std::nullopt;
+  } else if (got > 0) {
+    gap.lost = std::max<std::int64_t>(got - forgiven, 0);  // it began anew, and its first messages are missing
+  }
+  return gap;
+}
+
+double Interpreter::LatencyUs(const Digest& plan, std::int64_t utime) {
+  const auto found = std::ranges::find(candidates_, plan, &std::pair<Digest, std::int64_t>::first);
+  if (found == candidates_.end()) return kUnknown;
+  const auto latency = static_cast<double>(utime - found->second);
+  candidates_.erase(found);
+  return latency;
+}
+
+}  // namespace forereach

@@ -1,0 +1,83 @@
+/** Turns what the bus carried, in the order of the log, into database rows. No file, no SQL, no clock: the same events
+give the same rows, live and when a log is read again.
+
+Sequence numbers. A message ahead of its stream's count makes a gap "bus". One behind it is late or repeated and makes
+none, unless its sender has begun anew: then its stamp is later than all of the stream, or its sequence is 0. A late
+message that a gap has counted as lost stays counted.
+
+With a key, messages that are not authentic (log_authenticator.h) make no rows and do not count. */
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "bus/authentic.h"
+#include "certifier/task/config.h"
+#include "lcmtypes/codec.h"
+#include "records/event_log.h"
+#include "records/log_authenticator.h"
+#include "records/rows.h"
+
+namespace forereach {
+
+/** Messages that share one sequence count: those of a channel, on the candidates' channel those of one source. */
+struct Stream {
+  std::string channel, source;
+  auto operator<=>(const Stream&) const = default;
+};
+
+/** A message's own sequence and utime. */
+struct Position {
+  std::int64_t sequence, utime;
+  friend bool operator==(const Position&, const Position&) = default;
+};
+
+class Interpreter final {
+ public:
+  /** @param keys as LogAuthenticator's. */
+  Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys = {});
+
+  /** The stream of a message, and its place in it if it is one of a type that counts them. */
+  [[nodiscard]] std::pair<Stream, std::optional<Position>> Identify(const std::string& channel, Bytes bytes) const;
+
+  /** The next event is the first of another file, which goes on where this one ends. */
+  void Continue(std::string log_file) { log_file_ = std::move(log_file); }
+
+  /** Adds the rows that the next event of the log gives. */
+  void Observe(const LogEvent& event, Rows& rows);
+
+  /** `lost` messages of the stream, the next ones of its count, are accounted for already: they make no second gap. */
+  void Forgive(const Stream& stream, std::int64_t lost);
+
+  /** Messages that were not authentic. */
+  [[nodiscard]] Refusals refusals() const { return authenticator_.refusals(); }
+
+ private:
+  static constexpr std::size_t kMaxStreams = 1024;     // a sender that invents sources must not fill the memory
+  static constexpr std::size_t kMaxCandidates = 1024;  // undecided
+
+  struct Count {
+    std::optional<std::int64_t> next;
+    std::int64_t forgiven = 0, newest_utime = 0;
+    std::optional<std::int64_t> begun_utime;  // of the last message 0
+    std::optional<Position> last;             // as it was heard
+
+    [[nodiscard]] bool IsLateOrRepeated(const Position& behind) const;
+  };
+
+  [[nodiscard]] std::optional<GapRow> CheckSequence(const LogEvent& event);  // without its event
+  [[nodiscard]] double LatencyUs(const Digest& plan, std::int64_t utime);
+
+  BusOptions channels_;
+  std::string log_file_;
+  LogAuthenticator authenticator_;
+  std::map<Stream, Count> streams_;
+  std::deque<std::pair<Digest, std::int64_t>> candidates_;  // received and not yet decided
+};
+
+}  // namespace forereach

@@ -1,0 +1,176 @@
+#include "records/kept_tasks.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "certifier/task/files.h"
+#include "certifier/task/named_files.h"
+#include "records/event_log.h"
+
+namespace forereach {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char *kTasks = "tasks", *kTask = "task.yaml";
+constexpr std::string_view kTransitions = "transitions-", kTransitionsEnding = ".csv", kPolicy = "policy-";
+constexpr std::int64_t kLargestFile = 256 * kMegabyte;
+constexpr std::size_t kHexDigits = 64;
+
+bool IsDigest(std::string_view text) {
+  return text.size() == kHexDigits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
+
+std::string BytesOf(const std::string& path) { return ReadWhole(path, kLargestFile); }
+
+[[noreturn]] void FailToWrite(const std::string& path) {
+  throw ConfigError(path + ": cannot be written: " + std::strerror(errno));
+}
+
+void Confirm(const std::string& directory) {
+  const int file = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) FailToWrite(directory);
+  const bool confirmed = ::fsync(file) == 0 || errno == EINVAL;  // EINVAL: this file system knows no such thing
+  ::close(file);
+  if (!confirmed) FailToWrite(directory);
+}
+
+// A file beside `path` until it is renamed.
+class Part final {
+ public:
+  Part(const std::string& path, const std::string& bytes) : path_(path), part_(path + ".part") {
+    ::unlink(part_.c_str());  // of a logger that was killed
+    const int file = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
+    if (file < 0) FailToWrite(part_);
+    std::size_t at = 0;
+    while (at < bytes.size()) {
+      const ssize_t count = ::write(file, bytes.data() + at, bytes.size() - at);
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) break;
+      at += static_cast<std::size_t>(count);
+    }
+    const bool whole = at == bytes.size() && ::fsync(file) == 0;
+    ::close(file);
+    if (!whole) FailToWrite(part_);
+  }
+  ~Part() { ::unlink(part_.c_str()); }
+  Part(const Part&) = delete;
+  Part& operator=(const Part&) = delete;
+
+  [[nodiscard]] const std::string& path() const { return part_; }
+  void Finish() const {
+    if (::rename(part_.c_str(), path_.c_str()) != 0) FailToWrite(path_);
+  }
+
+ private:
+  std::string path_, part_;
+};
+
+// The digests in the names of the files that begin and end so; sorted.
+std::vector<std::string> DigestsOfNames(const std::string& directory, std::string_view beginning,
+                                        std::string_view ending) {
+  std::vector<std::string> digests;
+  std::error_code error;
+  for (fs::directory_iterator file(directory, error), end; !error && file != end; file.increment(error)) {
+    const std::string name = file->path().filename().string();
+    if (name.size() != beginning.size() + kHexDigits + ending.size() || !name.starts_with(beginning) ||
+        !name.ends_with(ending))
+      continue;
+    if (const std::string digest = name.substr(beginning.size(), kHexDigits); IsDigest(digest))
+      digests.push_back(digest);
+  }
+  std::ranges::sort(digests);
+  return digests;
+}
+
+std::string TransitionsFileOf(const std::string& directory, const std::string& digest) {
+  return directory + "/" + std::string(kTransitions) + digest + std::string(kTransitionsEnding);
+}
+
+std::string PolicyFileOf(const std::string& directory, const std::string& digest) {
+  return directory + "/" + std::string(kPolicy) + digest;
+}
+
+}  // namespace
+
+TaskCopy CopyTask(const Config& config) {
+  TaskCopy copy{config.digest, config.observations_digest, config.problem->model, BytesOf(config.path), {}, {}};
+  if (DigestOf(copy.task) != config.digest) throw ConfigError(config.path + ": has changed since it was read");
+  const NamedFiles named = FilesNamedBy(config.path);
+  copy.transitions = BytesOf(named.transitions);
+  if (!named.policy.empty()) copy.policy = BytesOf(named.policy);
+  return copy;
+}
+
+KeptTasks::KeptTasks(const std::string& log_directory) : path_((fs::path(log_directory) / kTasks).string()) {}
+
+std::string KeptTasks::PathOf(const Digest& digest) const { return path_ + "/" + ToHex(digest); }
+
+void KeptTasks::Keep(const TaskCopy& copy) const {
+  const std::string directory = PathOf(copy.digest), task = directory + "/" + kTask;
+  const std::string transitions = TransitionsFileOf(directory, ToHex(copy.observations_digest));
+  const std::string policy = copy.policy.empty() ? "" : PolicyFileOf(directory, ToHex(DigestOf(copy.policy)));
+  if (fs::exists(task) && fs::exists(transitions) && (policy.empty() || fs::exists(policy))) return;
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) throw ConfigError(directory + ": cannot be made: " + error.message());
+  const Part data(transitions, copy.transitions);
+  if (ObservationsDigest(*copy.model, LoadTransitions(data.path(), *copy.model)) != copy.observations_digest)
+    throw ConfigError("the transitions of the task have changed since they were read");
+  data.Finish();
+  if (!policy.empty()) Part(policy, copy.policy).Finish();
+  Part(task, copy.task).Finish();  // last: with it the task is there
+  Confirm(directory);
+  Confirm(path_);
+}
+
+std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Digest>& observations) const {
+  const std::string directory = PathOf(digest), task = directory + "/" + kTask;
+  std::error_code no_path;
+  if (!fs::exists(task, no_path)) return std::nullopt;
+  std::vector<std::string> versions = DigestsOfNames(directory, kTransitions, kTransitionsEnding);
+  if (versions.empty()) throw ConfigError(task + ": its transitions are not kept beside it");
+  if (versions.size() > 1)
+    std::erase_if(versions, [&](const std::string& version) {
+      return std::ranges::none_of(observations, [&](const Digest& seen) { return ToHex(seen) == version; });
+    });
+  if (versions.size() != 1)
+    throw ConfigError(task + ": of the versions of its transitions beside it the log names " +
+                      (versions.empty() ? "none" : "several") +
+                      "; copy the right one to where the task file has it, and "
+                      "name the task with --config");
+  const std::string transitions = TransitionsFileOf(directory, versions.front());
+  NamedFiles instead{transitions, {}};
+  for (const std::string& policy : DigestsOfNames(directory, kPolicy, "")) {
+    instead.policy = PolicyFileOf(directory, policy);
+    if (ToHex(DigestOf(BytesOf(instead.policy))) != policy)
+      throw ConfigError(instead.policy + ": is damaged: its digest is not its name's");
+  }
+  Config config = LoadConfig(task, instead);
+  if (config.digest != digest)
+    throw ConfigError(task + ": is damaged: its digest is " + ToHex(config.digest) + ", not its directory's");
+  if (ToHex(config.observations_digest) != versions.front())
+    throw ConfigError(transitions + ": is damaged: its digest is " + ToHex(config.observations_digest) +
+                      ", not its name's");
+  return config;
+}
+
+void KeptTasks::Remove(const std::string& digest) const {
+  if (!IsDigest(digest)) return;
+  const std::string directory = path_ + "/" + digest;
+  std::error_code ignored;
+  fs::remove(directory + "/" + kTask, ignored);
+  for (const std::string& version : DigestsOfNames(directory, kTransitions, kTransitionsEnding))
+    fs::remove(TransitionsFileOf(directory, version), ignored);
+  for (const std::string& version : DigestsOfNames(directory, kPolicy, ""))
+    fs::remove(PolicyFileOf(directory, version), ignored);
+  fs::remove(directory, ignored);
+}
+
+}  // namespace forereach

@@ -1,0 +1,46 @@
+/** What a file is that somebody names as a log, and whether logs belong together. */
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "lcmtypes/codec.h"
+#include "records/event_log.h"
+
+namespace forereach {
+
+/** What logs hold, whatever their channels are called: messages are told by their types. */
+struct LogSurvey {
+  static constexpr std::size_t kMaxConfigs = 256;  ///< Who invents digests must not fill the memory.
+  static constexpr std::size_t kMaxObservations = 1 << 16;
+
+  struct Recorded {
+    std::int64_t decisions = 0;       ///< And certified plans.
+    std::set<Digest> observations{};  ///< The observations digests in them; the first kMaxObservations.
+  };
+
+  std::int64_t events = 0, candidates = 0, decisions = 0;
+  std::map<Digest, Recorded>
+      configs;                ///< By the config digest of decisions and certified plans; the first kMaxConfigs.
+  std::vector<Digest> order;  ///< Of these, as they came first.
+};
+
+/** Reads logs that follow one another, as the files of one run do.
+@throws BadInput if a file is no event log, and says what it is; if a log is of another run than those before it: the
+heartbeats of the certifier or of the logger go on from file to file of one run, and where there are none nothing is
+known; if one is named twice. Cost: one pass over the logs. */
+[[nodiscard]] LogSurvey Survey(const std::vector<std::string>& logs);
+
+/** As Survey, but logs that hold neither a candidate nor a decision are bad input too. */
+[[nodiscard]] LogSurvey SurveyRun(const std::vector<std::string>& logs);
+
+/** The first bytes of each, as the first look tells it. */
+enum class FileKind { kDirectory, kEmpty, kEventLog, kDatabase, kJson, kOther };
+
+/** @throws LogError if the file cannot be read. */
+[[nodiscard]] FileKind KindOf(const std::string& path);
+
+}  // namespace forereach

@@ -1,0 +1,59 @@
+#include "records/log_tasks.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+
+#include "records/kept_tasks.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::size_t kMaxNamed = 4;
+
+// The digests of the survey, with how many decisions carry each and where its task is kept.
+std::string InWords(const LogSurvey& survey, const KeptTasks& kept) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(survey.order.size(), kMaxNamed); ++i) {
+    const Digest& digest = survey.order[i];
+    const bool is_kept = std::filesystem::exists(kept.PathOf(digest));
+    text += (i > 0 ? "; " : "") + ToHex(digest) + " (" + std::to_string(survey.configs.at(digest).decisions) +
+            " decisions and certified plans" +
+            (is_kept ? ", kept in " + kept.PathOf(digest) : ", not kept beside the log") + ")";
+  }
+  return text + (survey.order.size() > kMaxNamed ? "; and others" : "");
+}
+
+}  // namespace
+
+std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, const std::string& directory,
+                            const std::string& given) {
+  const KeptTasks kept(directory);
+  std::optional<Config> task;
+  if (!given.empty()) task = LoadConfig(given);
+  if (survey.order.empty()) {  // candidates, and no decision
+    if (!task)
+      throw ConfigError(logs + ": nothing in it was decided, so nothing names its task: name it with --config FILE");
+    return {*task};
+  }
+  if (task && !survey.configs.contains(task->digest))
+    throw ConfigError(given + ": is not the task that " + logs + " was recorded with: its config digest is " +
+                      ToHex(task->digest) + ", the log has " + InWords(survey, kept) +
+                      "; a task that is kept is found without --config");
+  std::vector<Config> tasks;
+  for (const Digest& digest : survey.order)
+    if (task && task->digest == digest)
+      tasks.push_back(*task);
+    else if (auto found = kept.Find(digest, survey.configs.at(digest).observations))
+      tasks.push_back(std::move(*found));
+  if (tasks.empty())
+    throw ConfigError(logs + ": its task is not kept beside it; name it with --config FILE: its config digest is " +
+                      InWords(survey, kept));
+  return tasks;
+}
+
+std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given) {
+  return TasksOf(SurveyRun(logs), logs.front(), std::filesystem::path(logs.front()).parent_path().string(), given);
+}
+
+}  // namespace forereach

@@ -1,0 +1,42 @@
+#include "records/log_trust.h"
+
+#include <nlohmann/json.hpp>
+
+#include "records/log_authenticator.h"
+
+namespace forereach {
+
+void LogKey::Override(BusOptions& options) const {
+  if (none || !file.empty()) options.key = file;
+}
+
+void LogKey::Override(std::vector<Config>& tasks, const std::string& given) const {
+  for (Config& task : tasks) {
+    if (!task.bus.key.empty() && task.path != given && file.empty() && !none)
+      throw ConfigError(task.path +
+                        ": the task has a key, bus.key, and keys are not kept: name it with --key FILE, or believe "
+                        "every message with --no-key");
+    Override(task.bus);
+  }
+}
+
+std::string InWords(const PassedOver& passed_over) {
+  const std::string refused = InWords(passed_over.not_authentic);
+  std::string text;
+  if (!refused.empty()) text += "; not authentic and passed over: " + refused;
+  if (passed_over.undecodable > 0)
+    text += "; no certified plan and passed over: " + std::to_string(passed_over.undecodable);
+  return text;
+}
+
+nlohmann::json ToJson(const PassedOver& passed_over) {
+  const Refusals& refused = passed_over.not_authentic;
+  return {{"not_authentic",
+           {{"unsigned", refused.unsigned_ones},
+            {"forged", refused.forged},
+            {"replayed", refused.replayed},
+            {"of_another_bus", refused.foreign}}},
+          {"undecodable", passed_over.undecodable}};
+}
+
+}  // namespace forereach

@@ -1,0 +1,320 @@
+#include "records/report.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "certifier/certify/batch.h"
+#include "certifier/certify/certifier.h"
+#include "certifier/gate/candidate_message.h"
+#include "certifier/gate/obstacles_in_force.h"
+#include "certifier/gate/transition_message.h"
+#include "certifier/sets/zonogon.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "records/event_log.h"
+#include "records/json_text.h"
+#include "records/log_tasks.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::size_t kMaxUndecided = 1024;
+constexpr std::size_t kBatch = 256;
+
+class PictureMaker final {
+ public:
+  /** @param tasks nothing: every decision is of this config. Else those that other makers draw, and the digests of
+  others still are this one's if it `counts_unknown`. */
+  explicit PictureMaker(const Config& config, const std::vector<Config>* tasks = nullptr, bool counts_unknown = true)
+      : digest_(config.digest),
+        tasks_(tasks),
+        counts_unknown_(counts_unknown),
+        channels_(config.bus),
+        certifier_(config.problem),
+        obstacles_(config),
+        learns_(config.gate.learns) {
+    if (certifier_.projection().dim() != 2)
+      throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}",
+                                     certifier_.projection().dim()));
+    const std::vector<double>& goal = config.planner.goal;
+    if (goal.size() == 2) result_.picture.goal = Picture::Circle{{goal[0], goal[1]}, config.planner.goal_radius};
+  }
+
+  void Add(const LogEvent& event) {
+    if (event.channel == channels_.candidate) {
+      candidates_.emplace_back(DigestOf(event.message()),
+                               std::vector<std::uint8_t>(event.message().begin(), event.message().end()));
+      if (candidates_.size() > kMaxUndecided) candidates_.pop_front();
+    } else if (event.channel == channels_.decision) {
+      if (const auto decision = Decoded<decision_t>(event.message())) AddDecision(*decision);
+    } else if (event.channel == channels_.obstacles) {
+      ObstaclesInForce after = obstacles_;
+      if (!after.Update(event.message(), event.utime).empty()) return;  // as the gate, but for the time between both
+      if (after.digest() != obstacles_.digest()) CertifyAgain();
+      obstacles_ = std::move(after);
+    } else if (event.channel == channels_.transition) {
+      if (const auto transition = Decoded<transition_t>(event.message()); transition && learns_) Learn(*transition);
+    } else if (event.channel == channels_.robot_state) {
+      if (const auto state = Decoded<robot_state_t>(event.message())) AddState(*state);
+    } else if (event.channel == channels_.event) {
+      if (const auto execution = Decoded<execution_event_t>(event.message())) AddExecution(*execution);
+    }
+  }
+
+  LogPicture Finish() {
+    CertifyAgain();
+    Picture& picture = result_.picture;
+    for (auto& [plan_id, tube] : tubes_)
+      for (std::size_t t = 0; t < tube.size(); ++t)
+        (executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed : picture.certified)
+            .push_back(std::move(tube[t]));
+    for (const Obstacle& obstacle : obstacles_.all()) AddObstacle(obstacle);
+    return std::move(result_);
+  }
+
+ private:
+  struct Decided {
+    candidate_plan_t candidate;
+    int outcome, step;
+  };
+
+  void AddDecision(const decision_t& decision) {
+    const auto found = std::ranges::find(candidates_, GetDigest(decision.plan_digest),
+                                         &std::pair<Digest, std::vector<std::uint8_t>>::first);
+    if (found == candidates_.end()) return;
+    const auto candidate = Decoded<candidate_plan_t>(found->second);
+    candidates_.erase(found);
+    if (!IsMine(GetDigest(decision.config_digest))) return;
+    const bool certified = decision.outcome == decision_t::CERTIFIED;
+    if (!candidate || (!certified && decision.outcome != decision_t::ABSTAIN_SAFETY)) return;
+    decided_.push_back({*candidate, decision.outcome, decision.step});
+    if (decided_.size() >= kBatch) CertifyAgain();
+  }
+
+  [[nodiscard]] bool IsMine(const Digest& digest) const {
+    if (!tasks_ || digest == digest_) return true;
+    return counts_unknown_ && std::ranges::find(*tasks_, digest, &Config::digest) == tasks_->end();
+  }
+
+  // As the gate did, so that what comes after is decided on with it.
+  void Learn(const transition_t& message) {
+    const ExecutedTransition transition = FromMessage(message, certifier_.problem());
+    if (!transition.refusal.empty()) return;
+    CertifyAgain();
+    static_cast<void>(certifier_.Learn(transition.z, transition.next));
+  }
+
+  // All that were decided on under the obstacles in force; leaves out those whose answer is not the recorded one.
+  void CertifyAgain() {
+    if (decided_.empty()) return;
+    std::vector<Plan> plans;
+    std::vector<Zonotope> initial_sets;
+    std::vector<const Decided*> asked;
+    for (const Decided& decided : decided_) try {
+        const Zonotope initial_set = InitialSetOf(decided.candidate);
+        const Plan plan = PlanOf(decided.candidate);
+        certifier_.Require(plan, initial_set, obstacles_.all());
+        plans.push_back(plan);
+        initial_sets.push_back(initial_set);
+        asked.push_back(&decided);
+      } catch (const std::invalid_argument&) {
+        ++result_.disagreements;
+      }
+    std::vector<std::vector<Picture::Polygon>> outlines(asked.size());
+    const auto draw = [&](std::size_t i, const Decision& again, const Tube& tube) {
+      if (static_cast<int>(again.outcome) == asked[i]->outcome && again.step == asked[i]->step)
+        outlines[i] = Outlines(tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
+    };
+    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+    (void)CertifyAll(certifier_, plans, initial_sets, obstacles_.all(), threads, draw);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      if (outlines[i].empty())
+        ++result_.disagreements;
+      else if (asked[i]->outcome == decision_t::CERTIFIED)
+        tubes_[asked[i]->candidate.plan_id] = std::move(outlines[i]);
+      else
+        result_.picture.abstained.push_back(std::move(outlines[i]));
+    }
+    decided_.clear();
+  }
+
+  std::vector<Picture::Polygon> Outlines(const Tube& tube, int last_step) const {
+    std::vector<Picture::Polygon> outlines;
+    Zonotope projected;
+    for (int t = 0; t <= std::min(last_step, tube.length()); ++t) {
+      certifier_.projection().Enclose(tube.slice(t), tube.half_width(t), projected);
+      outlines.push_back(Outline(projected));
+    }
+    return outlines;
+  }
+
+  std::optional<Eigen::Vector2d> PositionOf(const double* state, int num_states) const {
+    if (num_states != certifier_.problem().model->num_states()) return std::nullopt;
+    return certifier_.problem().projection * Eigen::Map<const Eigen::VectorXd>(state, num_states);
+  }
+
+  void AddState(const robot_state_t& message) {
+    if (const auto position = PositionOf(message.state, message.num_states)) result_.picture.path.push_back(*position);
+  }
+
+  void AddExecution(const execution_event_t& event) {
+    if (event.kind == execution_event_t::STARTED || event.kind == execution_event_t::STEP_INSIDE)
+      executed_.insert({event.plan_id, event.step});
+    if (event.kind == execution_event_t::GOAL_REACHED) arrived_ = true;
+    const bool stops = event.kind == execution_event_t::STANDING || event.kind == execution_event_t::STEP_OUTSIDE;
+    const auto position = PositionOf(event.state, event.num_states);
+    if (stops && !arrived_ && position) result_.picture.stops.push_back(*position);
+  }
+
+  void AddObstacle(const Obstacle& obstacle) {
+    Picture& picture = result_.picture;
+    const auto& points = obstacle.points();
+    switch (obstacle.kind()) {
+      case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
+      case Obstacle::Kind::kBox:
+        picture.polygons.push_back(
+            {points[0], {points[1].x(), points[0].y()}, points[1], {points[0].x(), points[1].y()}});
+        break;
+      case Obstacle::Kind::kPolygon: picture.polygons.push_back(InOrder({points.begin(), points.end()})); break;
+      case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
+    }
+  }
+
+  // The hull's corners counter-clockwise (Andrew's chain): a polygon obstacle may list its points in any order.
+  static Picture::Polygon InOrder(Picture::Polygon points) {
+    std::ranges::sort(points,
+                      [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
+    Picture::Polygon hull;
+    for (int pass = 0; pass < 2; ++pass) {
+      const std::size_t base = hull.size();
+      for (const Eigen::Vector2d& point : points) {
+        while (hull.size() >= base + 2) {
+          const Eigen::Vector2d edge = hull.back() - hull[hull.size() - 2], next = point - hull.back();
+          if (edge.x() * next.y() - edge.y() * next.x() > 0) break;
+          hull.pop_back();
+        }
+        hull.push_back(point);
+      }
+      hull.pop_back();
+      std::ranges::reverse(points);
+    }
+    return hull;
+  }
+
+  const Digest digest_;
+  const std::vector<Config>* tasks_;
+  const bool counts_unknown_;
+  BusOptions channels_;
+  Certifier certifier_;
+  ObstaclesInForce obstacles_;
+  const bool learns_;
+  std::vector<Decided> decided_;  // under the obstacles in force, and not yet certified again
+  std::deque<std::pair<Digest, std::vector<std::uint8_t>>> candidates_;  // received and not yet decided
+  std::map<std::int64_t, std::vector<Picture::Polygon>> tubes_;          // of certified plans, by plan_id
+  std::set<std::pair<std::int64_t, int>> executed_;                      // plan_id and step
+  bool arrived_ = false;
+  LogPicture result_;
+};
+
+std::string TitleOf(const Config& config) {
+  std::string name = config.problem->model->name();
+  std::ranges::replace(name, '_', ' ');
+  if (!name.empty()) name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
+  return name + ": certified tubes and the driven path";
+}
+
+std::string InWords(double microseconds) {
+  return microseconds < 1000 ? fmt::format("{:.0f} \u00b5s", microseconds)
+                             : fmt::format("{:.1f} ms", microseconds / 1000);
+}
+
+std::vector<std::string> KeyNumbers(const Summary& summary) {
+  const auto abstained = [&summary](const char* cause) {
+    const auto found = summary.abstained.find(cause);
+    return found == summary.abstained.end() ? std::int64_t{0} : found->second;
+  };
+  std::vector<std::string> numbers{fmt::format("{} plans proposed", summary.proposed),
+                                   fmt::format("{} certified", summary.certified)};
+  const auto add = [&numbers](std::int64_t count, const char* name) {
+    if (count > 0) numbers.push_back(fmt::format("{} {}", count, name));
+  };
+  add(abstained("pairwise"), "abstained F");
+  add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
+  add(abstained("obstacle"), "abstained S");
+  if (summary.latency_us.WasMeasured())
+    numbers.push_back(
+        fmt::format("decided in {} (p50), {} (p99)", InWords(summary.latency_us.p50), InWords(summary.latency_us.p99)));
+  numbers.push_back(
+      fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
+  numbers.push_back(fmt::format("{} contacts", summary.contacts));
+  return numbers;
+}
+
+}  // namespace
+
+LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config) {
+  PictureMaker maker(config);
+  ForEachEvent(logs, [&maker](const LogEvent& event, const std::string&) { maker.Add(event); });
+  return maker.Finish();
+}
+
+LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
+  if (tasks.size() == 1) return PictureFromLogs(logs, tasks.front());
+  LogPicture all;
+  for (const Config& task : tasks) {
+    const bool is_last = &task == &tasks.back();
+    PictureMaker maker(task, &tasks, is_last);
+    ForEachEvent(logs, [&maker](const LogEvent& event, const std::string&) { maker.Add(event); });
+    LogPicture drawn = maker.Finish();
+    const auto add = [](auto& to, auto& from) { to.insert(to.begin(), from.begin(), from.end()); };
+    add(drawn.picture.certified, all.picture.certified);
+    add(drawn.picture.executed, all.picture.executed);
+    add(drawn.picture.abstained, all.picture.abstained);
+    drawn.disagreements += all.disagreements;
+    all = std::move(drawn);
+  }
+  return all;
+}
+
+void Report(const ReportOptions& options, std::ostream& out) {
+  const std::vector<std::string> files =
+      options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
+  const std::vector<Config> tasks = TasksOf(options.logs, options.config);
+  const Config& config = tasks.back();
+  const Summary summary = SummarizeLogs(options.logs, config);
+  LogPicture drawn;
+  if (!files.empty()) {
+    drawn = PictureFromLogs(options.logs, tasks);
+    drawn.picture.title = TitleOf(config);
+    drawn.picture.key_numbers = KeyNumbers(summary);
+  }
+  for (const std::string& file : files) DrawPicture(drawn.picture, file, options.width, options.height);
+
+  if (options.json) {
+    nlohmann::json json = ToJson(summary);
+    json["logs"] = options.logs;
+    json["pictures"] = files;
+    json["tubes_left_out"] = drawn.disagreements;
+    out << JsonText(json, 2) << "\n";
+    return;
+  }
+  out << ToText(summary);
+  for (const std::string& file : files) out << fmt::format("{:<26}{}\n", "picture", file);
+  if (drawn.disagreements > 0)
+    out << fmt::format("{:<26}{} (this task file decides them otherwise than the log)\n", "tubes left out",
+                       drawn.disagreements);
+}
+
+}  // namespace forereach

@@ -1,0 +1,222 @@
+#include "records/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "forereach/robot_state_t.hpp"
+#include "lcmtypes/printable.h"
+
+namespace forereach {
+namespace {
+
+double NearestRank(std::vector<double>& values, double fraction) {
+  if (values.empty()) return kUnknown;
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(fraction * static_cast<double>(values.size()))) - 1;
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
+
+std::int64_t Total(const std::map<std::string, std::int64_t>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), std::int64_t{0},
+                         [](std::int64_t sum, const auto& entry) { return sum + entry.second; });
+}
+
+std::string Listed(const std::map<std::string, std::int64_t>& counts) {
+  std::string text;
+  for (const auto& [name, count] : counts)
+    text += fmt::format("{}{} {}", text.empty() ? " (" : ", ", Printable(name), count);
+  return text.empty() ? text : text + ")";
+}
+
+std::string Microseconds(const Quantiles& quantiles) {
+  if (!quantiles.WasMeasured()) return "not measured";
+  return fmt::format("p50 {:.1f} us, p99 {:.1f} us", quantiles.p50, quantiles.p99);
+}
+
+// A robot that has been at the goal may have driven on.
+std::string DistanceToGoal(const Summary& summary) {
+  const double distance = *summary.distance_to_goal_m;
+  if (!summary.goal_reached) return fmt::format("{:.2f} m (goal not reached)", distance);
+  if (distance <= summary.goal_radius_m) return fmt::format("{:.2f} m (goal reached)", distance);
+  return fmt::format("{:.2f} m at the end (the goal was reached before, within {:g} m)", distance,
+                     summary.goal_radius_m);
+}
+
+nlohmann::json ToJson(const Quantiles& quantiles) {
+  if (!quantiles.WasMeasured()) return {{"p50", nullptr}, {"p99", nullptr}};
+  return {{"p50", quantiles.p50}, {"p99", quantiles.p99}};
+}
+
+}  // namespace
+
+std::string ToText(const Summary& summary) {
+  std::string text;
+  const auto line = [&text](std::string_view name, const std::string& value) {
+    text += fmt::format("{:<26}{}\n", name, value);
+  };
+  line("plans proposed", std::to_string(summary.proposed));
+  line("  certified", std::to_string(summary.certified));
+  line("  abstained", std::to_string(Total(summary.abstained)) + Listed(summary.abstained));
+  line("  rejected", std::to_string(Total(summary.rejected)) + Listed(summary.rejected));
+  line("decision latency", Microseconds(summary.latency_us));
+  line("certify step", Microseconds(summary.certify_us));
+  if (summary.distance_to_goal_m) line("distance to goal", DistanceToGoal(summary));
+  line("contacts", std::to_string(summary.contacts));
+  line("steps in certified slice",
+       fmt::format("{} of {}", summary.steps_inside, summary.steps_inside + summary.steps_outside));
+  line("stops", fmt::format("{} ({} braking tails begun)", summary.stops, summary.tails));
+  line("refused by the guard", std::to_string(summary.refused));
+  line("messages", std::to_string(Total(summary.messages)) + Listed(summary.messages));
+  line("messages lost", std::to_string(Total(summary.lost)) + Listed(summary.lost));
+  if (summary.backlog > 0) line("discarded by the bus", std::to_string(summary.backlog));
+  line("senders restarted", std::to_string(summary.restarts));
+  if (summary.corruptions > 0)
+    line("damage in the log", fmt::format("{} places, {} bytes skipped", summary.corruptions, summary.skipped_bytes));
+  line("duration", fmt::format("{:.1f} s", summary.duration_s));
+  return text;
+}
+
+nlohmann::json ToJson(const Summary& summary) {
+  nlohmann::json json;
+  json["plans"] = {{"proposed", summary.proposed},
+                   {"decided", summary.decided},
+                   {"certified", summary.certified},
+                   {"abstained", summary.abstained},
+                   {"rejected", summary.rejected}};
+  json["decision_latency_us"] = ToJson(summary.latency_us);
+  json["certify_us"] = ToJson(summary.certify_us);
+  json["distance_to_goal_m"] = nullptr;
+  if (summary.distance_to_goal_m) json["distance_to_goal_m"] = *summary.distance_to_goal_m;
+  json["goal_reached"] = summary.goal_reached;
+  json["contacts"] = summary.contacts;
+  json["steps"] = {{"inside", summary.steps_inside}, {"outside", summary.steps_outside}};
+  json["tails"] = summary.tails;
+  json["stops"] = summary.stops;
+  json["refused"] = summary.refused;
+  json["messages"] = summary.messages;
+  json["lost"] = summary.lost;
+  json["backlog"] = summary.backlog;
+  json["restarts"] = summary.restarts;
+  json["damage"] = {{"places", summary.corruptions}, {"bytes", summary.skipped_bytes}};
+  json["duration_s"] = summary.duration_s;
+  return json;
+}
+
+SummaryBuilder::SummaryBuilder(const Config& config)
+    : channels_(config.bus), goal_(config.planner.goal), goal_radius_m_(config.planner.goal_radius) {
+  latency_.values.reserve(kMaxSamples);
+  certify_.values.reserve(kMaxSamples);
+  if (config.problem) projection_ = config.problem->projection;
+}
+
+void SummaryBuilder::Samples::Add(double value) {
+  if (std::isnan(value)) return;
+  if (values.size() < kMaxSamples) {
+    values.push_back(value);
+  } else {
+    values[next++ % kMaxSamples] = value;
+  }
+}
+
+Quantiles SummaryBuilder::Samples::Get() const {
+  std::vector<double> copy = values;
+  return {NearestRank(copy, 0.5), NearestRank(copy, 0.99)};
+}
+
+void SummaryBuilder::SetTime(std::int64_t utime) {
+  if (!first_utime_) first_utime_ = utime;
+  last_utime_ = utime;
+}
+
+void SummaryBuilder::Add(const LogEvent& event) {
+  SetTime(event.utime);
+  auto& messages = summary_.messages;
+  ++messages[messages.size() < Summary::kMaxChannels || messages.contains(event.channel) ? event.channel : "*"];
+  if (event.channel == channels_.candidate) ++summary_.proposed;
+  if (event.channel != channels_.robot_state) return;
+  if (const auto state = Decoded<robot_state_t>(event.message()))
+    SetState({state->state, state->state + std::clamp<int>(state->num_states, 0, 16)});
+}
+
+void SummaryBuilder::Add(const DecisionRow& row) {
+  ++summary_.decided;
+  if (row.outcome == "certified") {
+    ++summary_.certified;
+  } else {
+    ++(row.outcome == "rejected" ? summary_.rejected : summary_.abstained)[row.cause];
+  }
+  latency_.Add(row.latency_us);
+  if (row.outcome != "rejected") certify_.Add(row.elapsed_us);
+}
+
+void SummaryBuilder::Add(const EventRow& row) {
+  if (row.kind == "refused") ++summary_.refused;
+  if (row.kind == "step_inside") ++summary_.steps_inside;
+  if (row.kind == "step_outside") ++summary_.steps_outside;
+  if (row.kind == "goal_reached") summary_.goal_reached = true;
+  if (!summary_.goal_reached) {
+    if (row.kind == "tail_begun") ++summary_.tails;
+    if (row.kind == "standing" || row.kind == "step_outside") ++summary_.stops;
+  }
+  if (row.kind == "contact") ++summary_.contacts;
+  if (!row.state.empty()) SetState(row.state);
+}
+
+void SummaryBuilder::Add(const GapRow& row) {
+  if (row.reason == "backlog") {
+    summary_.backlog = SumOfLost(summary_.backlog, row.lost);
+  } else if (row.lost > 0) {
+    std::int64_t& sum = summary_.lost[row.reason];
+    sum = SumOfLost(sum, row.lost);
+  }
+  if (row.reason == "restart") ++summary_.restarts;
+}
+
+void SummaryBuilder::Add(const Rows& rows) {
+  for (const DecisionRow& row : rows.decisions) Add(row);
+  for (const EventRow& row : rows.events) Add(row);
+  for (const GapRow& row : rows.gaps) Add(row);
+}
+
+void SummaryBuilder::Add(const LogDamage& damage) {
+  summary_.corruptions += damage.places;
+  summary_.skipped_bytes += damage.bytes;
+}
+
+Summary SummaryBuilder::Finish() const {
+  Summary summary = summary_;
+  if (summary.proposed == 0) summary.proposed = summary.decided;
+  summary.goal_radius_m = goal_radius_m_;
+  summary.latency_us = latency_.Get();
+  summary.certify_us = certify_.Get();
+  summary.duration_s = static_cast<double>(last_utime_ - first_utime_.value_or(last_utime_)) * 1e-6;
+  const auto states = static_cast<Eigen::Index>(state_.size()), goals = static_cast<Eigen::Index>(goal_.size());
+  if (goals > 0 && projection_.rows() == goals && projection_.cols() == states)
+    summary.distance_to_goal_m = (projection_ * Eigen::Map<const Eigen::VectorXd>(state_.data(), states) -
+                                  Eigen::Map<const Eigen::VectorXd>(goal_.data(), goals))
+                                     .norm();
+  return summary;
+}
+
+Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config) {
+  Interpreter interpreter(config.bus, "");
+  SummaryBuilder builder(config);
+  builder.Add(ForEachEvent(logs, [&](const LogEvent& event, const std::string&) {
+    Rows rows;
+    interpreter.Observe(event, rows);
+    builder.Add(event);
+    builder.Add(rows);
+  }));
+  return builder.Finish();
+}
+
+Summary SummarizeDatabase(Database& database, const std::string& log_file, const Config& config) {
+  SummaryBuilder builder(config);
+  builder.Add(database.Read(log_file));
+  return builder.Finish();
+}
+
+}  // namespace forereach

@@ -1,0 +1,372 @@
+#include "records/event_log.h"
+
+#include <csignal>
+#include <cstring>
+#include <random>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include <lcm/lcm-cpp.hpp>
+
+#include "tests/records/logs.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kHeader = 28;
+
+void WriteSample(const std::string& path, int events = 5) {
+  EventLogWriter writer(path);
+  for (int i = 0; i < events; ++i) {
+    const std::vector<std::uint8_t> data(static_cast<std::size_t>(10 * i), static_cast<std::uint8_t>(i));
+    ASSERT_EQ(writer.Append(1'000'000 + i, "CHANNEL_" + std::to_string(i), data), i);
+  }
+  ASSERT_TRUE(writer.Flush());
+}
+
+/** Offset of record `index` of the sample. */
+std::size_t RecordOffset(int index) {
+  std::size_t offset = 0;
+  for (int i = 0; i < index; ++i) offset += static_cast<std::size_t>(kHeader + 9 + 10 * i);
+  return offset;
+}
+
+void PutLength(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t value) {
+  for (int i = 0; i < 4; ++i)
+    bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
+}
+
+TEST(EventLog, RoundTrip) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log");
+  const LogContents contents = ReadLog(scratch / "log");
+  ASSERT_EQ(contents.events.size(), 5u);
+  EXPECT_EQ(contents.end, LogStatus::kEnd);
+  EXPECT_EQ(contents.corruptions, 0);
+  for (int i = 0; i < 5; ++i) {
+    const LogEvent& event = contents.events[static_cast<std::size_t>(i)];
+    EXPECT_EQ(event.number, i);
+    EXPECT_EQ(event.utime, 1'000'000 + i);
+    EXPECT_EQ(event.channel, "CHANNEL_" + std::to_string(i));
+    EXPECT_EQ(event.data, std::vector<std::uint8_t>(static_cast<std::size_t>(10 * i), static_cast<std::uint8_t>(i)));
+  }
+}
+
+TEST(EventLog, OffsetIsTheFileSizeAfterFlush) {
+  const ScratchDirectory scratch;
+  EventLogWriter writer(scratch / "log");
+  const std::vector<std::uint8_t> data(7);
+  writer.Append(1, "C", data);
+  EXPECT_EQ(writer.offset(), 0);
+  EXPECT_EQ(writer.pending_bytes(), kHeader + 1 + 7);
+  ASSERT_TRUE(writer.Flush());
+  EXPECT_EQ(writer.offset(), kHeader + 1 + 7);
+  EXPECT_EQ(std::filesystem::file_size(scratch / "log"), static_cast<std::uintmax_t>(writer.offset()));
+}
+
+TEST(EventLog, LcmReadsOurFile) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log");
+  lcm::LogFile file(scratch / "log", "r");
+  ASSERT_TRUE(file.good());
+  for (int i = 0; i < 5; ++i) {
+    const lcm::LogEvent* event = file.readNextEvent();
+    ASSERT_NE(event, nullptr) << i;
+    EXPECT_EQ(event->eventnum, i);
+    EXPECT_EQ(event->timestamp, 1'000'000 + i);
+    EXPECT_EQ(event->channel, "CHANNEL_" + std::to_string(i));
+    ASSERT_EQ(event->datalen, 10 * i);
+    for (int k = 0; k < event->datalen; ++k) EXPECT_EQ(static_cast<std::uint8_t*>(event->data)[k], i);
+  }
+  EXPECT_EQ(file.readNextEvent(), nullptr);
+}
+
+TEST(EventLog, WeReadLcmsFile) {
+  const ScratchDirectory scratch;
+  std::string data = "payload";
+  {
+    lcm::LogFile file(scratch / "log", "w");
+    ASSERT_TRUE(file.good());
+    lcm::LogEvent event{};
+    event.timestamp = 42;
+    event.channel = "FROM_LCM";
+    event.datalen = static_cast<std::int32_t>(data.size());
+    event.data = data.data();
+    for (int i = 0; i < 3; ++i) ASSERT_EQ(file.writeEvent(&event), 0);
+  }
+  const LogContents contents = ReadLog(scratch / "log");
+  ASSERT_EQ(contents.events.size(), 3u);
+  EXPECT_EQ(contents.end, LogStatus::kEnd);
+  EXPECT_EQ(contents.events[2].number, 2);
+  EXPECT_EQ(contents.events[2].channel, "FROM_LCM");
+  EXPECT_EQ(std::string(contents.events[2].data.begin(), contents.events[2].data.end()), data);
+}
+
+TEST(EventLog, EmptyFileEnds) {
+  const ScratchDirectory scratch;
+  WriteBytes(scratch / "log", {});
+  EXPECT_EQ(ReadLog(scratch / "log").end, LogStatus::kEnd);
+  EXPECT_THROW(EventLogReader(scratch / "missing"), LogError);
+  EXPECT_THROW(EventLogReader(scratch.path()), LogError);
+}
+
+TEST(EventLog, CutAtEveryByteOfTheLastRecord) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log");
+  const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");
+  const std::size_t last = RecordOffset(4);
+  for (std::size_t size = last; size < whole.size(); ++size) {
+    SCOPED_TRACE(size);
+    WriteBytes(scratch / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)});
+    const LogContents contents = ReadLog(scratch / "cut");
+    EXPECT_EQ(contents.events.size(), 4u);
+    EXPECT_EQ(contents.end, size == last ? LogStatus::kEnd : LogStatus::kCutTail);
+    EXPECT_EQ(contents.corruptions, 0);
+
+    EventLogWriter writer(scratch / "cut");
+    EXPECT_EQ(writer.recovery().events, 4);
+    EXPECT_EQ(writer.recovery().cut_bytes, static_cast<std::int64_t>(size - last));
+    EXPECT_EQ(writer.recovery().corruptions, 0);
+    EXPECT_EQ(writer.recovery().last_utime, 1'000'003);
+    EXPECT_EQ(writer.Append(7, "AFTER", {}), 4);
+    ASSERT_TRUE(writer.Flush());
+    const LogContents mended = ReadLog(scratch / "cut");
+    ASSERT_EQ(mended.events.size(), 5u);
+    EXPECT_EQ(mended.end, LogStatus::kEnd);
+    EXPECT_EQ(mended.events[4].channel, "AFTER");
+  }
+}
+
+class CorruptLength : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(CorruptLength, LosesThatRecordOnly) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log");
+  for (const std::size_t field : {20u, 24u}) {
+    SCOPED_TRACE(field);
+    std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+    PutLength(bytes, RecordOffset(2) + field, GetParam());
+    WriteBytes(scratch / "bad", bytes);
+    const LogContents contents = ReadLog(scratch / "bad");
+    EXPECT_EQ(contents.end, LogStatus::kEnd);
+    EXPECT_EQ(contents.corruptions, 1);
+    EXPECT_EQ(contents.skipped_bytes, kHeader + 9 + 20);
+    ASSERT_EQ(contents.events.size(), 4u);
+    EXPECT_EQ(contents.events[2].number, 3);
+    EXPECT_EQ(contents.events[3].number, 4);
+  }
+}
+
+// Implausible ones, plausible ones that point behind the end, and one (60) that swallows the record behind it.
+INSTANTIATE_TEST_SUITE_P(HugeNegativeAndSwallowing, CorruptLength,
+                         testing::Values(0x7fffffffu, 0x80000000u, 0xffffffffu, 1u << 24, (1u << 24) + 1, 1u << 20,
+                                         60u));
+
+TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log");
+  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+  bytes[RecordOffset(3)] ^= 1;
+  WriteBytes(scratch / "log", bytes);
+  EventLogReader reader(scratch / "log");
+  LogEvent event;
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(reader.Next(event), LogStatus::kEvent) << i;
+  EXPECT_EQ(reader.Next(event), LogStatus::kCorrupt);
+  EXPECT_EQ(reader.offset(), static_cast<std::int64_t>(RecordOffset(4)));
+  ASSERT_EQ(reader.Next(event), LogStatus::kEvent);
+  EXPECT_EQ(event.number, 4);
+  EXPECT_EQ(reader.Next(event), LogStatus::kEnd);
+  EXPECT_EQ(reader.skipped_bytes(), static_cast<std::int64_t>(RecordOffset(4) - RecordOffset(3)));
+}
+
+TEST(EventLog, FindsASyncWordWhereverItLies) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log", 1);
+  const std::vector<std::uint8_t> record = ReadBytes(scratch / "log");
+  for (std::size_t garbage = 1; garbage < (1 << 18); garbage += garbage < 2000 ? 1 : 997) {
+    std::vector<std::uint8_t> bytes(garbage, 0x55);
+    bytes.insert(bytes.end(), record.begin(), record.end());
+    WriteBytes(scratch / "bad", bytes);
+    const LogContents contents = ReadLog(scratch / "bad");
+    ASSERT_EQ(contents.events.size(), 1u) << garbage;
+    ASSERT_EQ(contents.skipped_bytes, static_cast<std::int64_t>(garbage));
+  }
+}
+
+// A record that lost 1, 2, 3 bytes claims as many of the next one.
+TEST(EventLog, BytesCutOutCostThatRecordOnly) {
+  const ScratchDirectory scratch;
+  for (const int cut : {1, 2, 3, 4, 5}) {
+    std::filesystem::remove(scratch / "log");
+    WriteSample(scratch / "log");
+    std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+    const auto at = bytes.begin() + static_cast<std::ptrdiff_t>(RecordOffset(2) + kHeader + 12);
+    bytes.erase(at, at + cut);
+    WriteBytes(scratch / "log", bytes);
+    const LogContents contents = ReadLog(scratch / "log");
+    ASSERT_EQ(contents.events.size(), 4u) << cut;
+    EXPECT_EQ(contents.events[2].number, 3);
+    EXPECT_EQ(contents.corruptions, 1);
+  }
+}
+
+TEST(EventLog, TheDigestCoversEveryByteOfTheRecord) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log", 3);
+  const std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+  const LogEvent event = ReadLog(scratch / "log").events[2];
+  const Bytes record = Bytes(bytes).subspan(RecordOffset(2));
+  EXPECT_EQ(DigestOf(event), DigestOf(record));
+  EXPECT_EQ(RecordBytes(event), std::ssize(record));
+}
+
+TEST(EventLog, RecoveryKeepsWhatFollowsDamage) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log");
+  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+  PutLength(bytes, RecordOffset(1) + 24, 0x7fffffff);
+  bytes.erase(bytes.end() - 3, bytes.end());
+  WriteBytes(scratch / "log", bytes);
+  const EventLogWriter writer(scratch / "log");
+  EXPECT_EQ(writer.recovery().events, 3);
+  EXPECT_EQ(writer.recovery().corruptions, 1);
+  EXPECT_EQ(writer.recovery().cut_bytes, kHeader + 9 + 40 - 3);
+  EXPECT_EQ(std::filesystem::file_size(scratch / "log"), RecordOffset(4));
+  EXPECT_EQ(writer.next_number(), 4);
+}
+
+TEST(EventLog, RecoveryRemovesNoGarbage) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log");
+  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+  const std::size_t size = bytes.size();
+  bytes.resize(size + 100);
+  WriteBytes(scratch / "log", bytes);
+  EventLogWriter writer(scratch / "log");
+  EXPECT_EQ(writer.recovery().cut_bytes, 0);
+  EXPECT_EQ(writer.recovery().skipped_bytes, 100);
+  writer.Append(9, "AFTER", {});
+  ASSERT_TRUE(writer.Flush());
+  const LogContents contents = ReadLog(scratch / "log");
+  ASSERT_EQ(contents.events.size(), 6u);
+  EXPECT_EQ(contents.events[5].number, 5);
+  EXPECT_GT(std::filesystem::file_size(scratch / "log"), size + 100);
+}
+
+TEST(EventLog, OneWriterAFile) {
+  const ScratchDirectory scratch;
+  const EventLogWriter writer(scratch / "log");
+  EXPECT_THROW(EventLogWriter(scratch / "log"), LogError);
+}
+
+/** While it lives, no file of this process grows beyond so many bytes: writes stop there and fail. */
+class FileSizeLimit final {
+ public:
+  explicit FileSizeLimit(std::int64_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    EXPECT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
+    const rlimit limit{static_cast<rlim_t>(bytes), before_.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  }
+  ~FileSizeLimit() { EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &before_), 0); }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+// A flush fails half-way, and the file cannot be cut back: it is sealed against that here.
+TEST(EventLog, NothingConfirmedIsLostWhereTheFileCannotBePutBack) {
+  const int file = ::memfd_create("log", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  ASSERT_GE(file, 0);
+  ASSERT_EQ(::fcntl(file, F_ADD_SEALS, F_SEAL_SHRINK), 0);
+  const std::string path = "/proc/self/fd/" + std::to_string(file);
+  const std::vector<std::uint8_t> data(100, 7);
+  EventLogWriter writer(path);
+  const auto flush = [&](const std::string& channel) {
+    writer.Append(1, channel, data);
+    return writer.Flush();
+  };
+  const auto flush_with_room_for_half = [&](const std::string& channel) {
+    const FileSizeLimit limit(writer.offset() + 50);
+    return flush(channel);
+  };
+  EXPECT_TRUE(flush("KEPT_1"));
+  EXPECT_FALSE(flush_with_room_for_half("LOST_2"));
+  EXPECT_NE(writer.problem().find("cannot put the file back"), std::string::npos) << writer.problem();
+  EXPECT_TRUE(flush("KEPT_3"));
+  EXPECT_FALSE(flush_with_room_for_half("LOST_4"));
+  writer.Append(1, "S", {});
+  EXPECT_FALSE(writer.Flush()) << "some of what failed would stay behind it";
+  EXPECT_TRUE(flush("KEPT_5"));
+  const LogContents contents = ReadLog(path);
+  ::close(file);
+  ASSERT_EQ(contents.events.size(), 3u);
+  EXPECT_EQ(contents.events[0].channel, "KEPT_1");
+  EXPECT_EQ(contents.events[1].channel, "KEPT_3");
+  EXPECT_EQ(contents.events[2].channel, "KEPT_5");
+  EXPECT_EQ(contents.end, LogStatus::kEnd);
+  EXPECT_EQ(contents.corruptions, 0);
+}
+
+TEST(EventLog, RefusesWhatTheFormatCannotHold) {
+  const ScratchDirectory scratch;
+  EventLogWriter writer(scratch / "log");
+  EXPECT_NO_THROW(writer.Append(0, std::string(63, 'c'), {}));
+  EXPECT_THROW(writer.Append(0, std::string(64, 'c'), {}), std::invalid_argument);
+  EXPECT_THROW(writer.Append(0, "", {}), std::invalid_argument);
+  const std::vector<std::uint8_t> large(static_cast<std::size_t>(kMaxLogDataBytes) + 1);
+  EXPECT_THROW(writer.Append(0, "C", large), std::invalid_argument);
+}
+
+// Whatever is changed, the reader ends, accounts for every byte, and returns only records that are in the file.
+TEST(EventLog, SurvivesMutation) {
+  const ScratchDirectory scratch;
+  WriteSample(scratch / "log", 12);
+  const std::vector<std::uint8_t> whole = ReadBytes(scratch / "log");
+  const unsigned seed = std::random_device{}();
+  RecordProperty("seed", std::to_string(seed));
+  std::mt19937 random(seed);
+  const auto below = [&random](std::size_t bound) {
+    return std::uniform_int_distribution<std::size_t>(0, bound - 1)(random);
+  };
+  for (int round = 0; round < 1000; ++round) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed << " round " << round);
+    std::vector<std::uint8_t> bytes = whole;
+    for (std::size_t changes = 1 + below(6); changes > 0 && !bytes.empty(); --changes) {
+      const auto at = static_cast<std::ptrdiff_t>(below(bytes.size()));
+      switch (below(4)) {
+        case 0: bytes[static_cast<std::size_t>(at)] ^= static_cast<std::uint8_t>(1u << below(8)); break;
+        case 1:
+          bytes.erase(bytes.begin() + at, bytes.begin() + std::min<std::ptrdiff_t>(at + 9, std::ssize(bytes)));
+          break;
+        case 2: bytes.insert(bytes.begin() + at, {0xED, 0xA1, 0xDA, 0x01, 0, 0, 0}); break;
+        default: bytes.resize(static_cast<std::size_t>(at));
+      }
+    }
+    WriteBytes(scratch / "bad", bytes);
+    EventLogReader reader(scratch / "bad");
+    LogEvent event;
+    LogStatus status;
+    std::int64_t passed = 0, skipped = 0;
+    while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt) {
+      const std::int64_t record = kHeader + std::ssize(event.channel) + std::ssize(event.data);
+      const std::int64_t expected =
+          status == LogStatus::kEvent ? passed + record : passed + reader.skipped_bytes() - skipped;
+      ASSERT_EQ(reader.offset(), expected);
+      ASSERT_GT(reader.offset(), passed);
+      passed = reader.offset();
+      skipped = reader.skipped_bytes();
+    }
+    ASSERT_LE(passed, reader.size());
+    ASSERT_EQ(status == LogStatus::kEnd, passed == reader.size());
+    ASSERT_EQ(reader.Next(event), status);
+  }
+}
+
+}  // namespace
+}  // namespace forereach

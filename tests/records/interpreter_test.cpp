@@ -1,0 +1,108 @@
+// Sequence numbers: what is missing, what is late or comes twice, and what has begun anew.
+#include "records/interpreter.h"
+
+#include <limits>
+#include <optional>
+
+#include <gtest/gtest.h>
+
+#include "tests/records/logs.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kNow = 1'700'000'000'000'000, kSecond = 1'000'000;
+
+class InterpreterTest : public testing::Test {
+ protected:
+  /** A candidate with this sequence, stamped so long after kNow, and heard then or at another time after kNow. */
+  void Hear(std::int64_t sequence, std::int64_t stamp, std::optional<std::int64_t> heard = {}) {
+    candidate_plan_t candidate = MakeCandidate(sequence, sequence);
+    candidate.utime = kNow + stamp;
+    interpreter_.Observe({number_++, kNow + heard.value_or(stamp), "PLAN_CANDIDATE", Encode(candidate)}, rows_);
+  }
+
+  void ExpectOneGap(const std::string& reason, std::int64_t expected, std::int64_t got, std::int64_t lost) const {
+    ASSERT_EQ(rows_.gaps.size(), 1u);
+    EXPECT_EQ(rows_.gaps[0].reason, reason);
+    EXPECT_EQ(rows_.gaps[0].expected, expected);
+    EXPECT_EQ(rows_.gaps[0].got, got);
+    EXPECT_EQ(rows_.gaps[0].lost, lost);
+  }
+
+  Interpreter interpreter_{{}, "log"};
+  Rows rows_;
+  std::int64_t number_ = 0;
+};
+
+TEST_F(InterpreterTest, AMessageThatComesTwiceIsNoLoss) {
+  for (const std::int64_t sequence : {49'999, 50'000, 50'000, 50'001, 49'999, 50'002}) Hear(sequence, sequence);
+  EXPECT_TRUE(rows_.gaps.empty());
+}
+
+TEST_F(InterpreterTest, AnOvertakenMessageCostsOneGap) {
+  for (const std::int64_t sequence : {1, 3, 2, 4}) Hear(sequence, sequence);
+  ExpectOneGap("bus", 2, 3, 1);  // what comes late stays counted
+}
+
+TEST_F(InterpreterTest, ZeroIsANewBeginningWhateverItsStamp) {
+  for (const std::int64_t first : {std::int64_t{0}, 100 * kSecond, 50 * kSecond})
+    for (std::int64_t sequence = 0; sequence < 10; ++sequence) Hear(sequence, first + sequence);
+  ASSERT_EQ(rows_.gaps.size(), 2u);
+  for (const GapRow& gap : rows_.gaps) {
+    EXPECT_EQ(gap.reason, "restart");
+    EXPECT_EQ(gap.expected, 10);
+    EXPECT_EQ(gap.got, 0);
+    EXPECT_EQ(gap.lost, 0);
+  }
+}
+
+TEST_F(InterpreterTest, WhatIsSaidAgainAndAgainIsNoRestartThoughItsClockIsAhead) {
+  for (const std::int64_t sequence : {0, 7}) {
+    Interpreter fresh({}, "log");
+    std::swap(interpreter_, fresh);
+    for (std::int64_t heard = 0; heard < 5; ++heard) Hear(sequence, 100 * kSecond, heard * kSecond / 2);
+    EXPECT_TRUE(rows_.gaps.empty()) << sequence;
+  }
+}
+
+TEST_F(InterpreterTest, ZeroThatComesTwiceIsNone) {
+  for (const std::int64_t sequence : {0, 0, 1, 2, 0, 3}) Hear(sequence, sequence);
+  EXPECT_TRUE(rows_.gaps.empty());
+}
+
+TEST_F(InterpreterTest, ALaterStampWithASmallerSequenceIsANewBeginning) {
+  for (const std::int64_t sequence : {7, 8, 9}) Hear(sequence, sequence);
+  Hear(3, kSecond);
+  Hear(2, kSecond - 1);
+  Hear(4, kSecond + 1);
+  ExpectOneGap("restart", 10, 3, 3);  // lost: the first ones of the new count
+}
+
+TEST_F(InterpreterTest, AStampFarAheadHidesNoNewBeginning) {
+  Hear(7, 3600 * kSecond, 0);
+  Hear(8, std::numeric_limits<std::int64_t>::max() - kNow, 1);
+  Hear(3, 2 * kSecond);
+  ASSERT_EQ(rows_.gaps.size(), 1u);
+  EXPECT_EQ(rows_.gaps[0].reason, "restart");
+  EXPECT_EQ(rows_.gaps[0].got, 3);
+}
+
+TEST_F(InterpreterTest, SequencesAtTheEndsOfTheirRange) {
+  using Limits = std::numeric_limits<std::int64_t>;
+  constexpr std::int64_t kMin = Limits::min(), kMax = Limits::max();
+  std::int64_t stamp = 0;
+  for (const std::int64_t sequence : {kMin, std::int64_t{-1}, kMax, kMax, kMin, kMax, std::int64_t{0}})
+    Hear(sequence, ++stamp, kMax - kNow);
+  for (const GapRow& gap : rows_.gaps) EXPECT_GE(gap.lost, 0);
+}
+
+TEST(GapsTest, ASumOfLossesEndsAtTheLargestNumber) {
+  EXPECT_EQ(SumOfLost(2, 3), 5);
+  EXPECT_EQ(SumOfLost(INT64_MAX - 3, 3), INT64_MAX);
+  EXPECT_EQ(SumOfLost(INT64_MAX - 2, 3), INT64_MAX);
+  EXPECT_EQ(SumOfLost(2, -3), 2) << "a database may hold anything";
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,104 @@
+// The tasks of a logger's runs lie beside its logs: those of reloads too, and no longer than a log needs them.
+#include "records/kept_tasks.h"
+
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "forereach/certifier_status_v2_t.hpp"
+#include "tests/logger/disk_fixture.h"
+
+namespace forereach {
+namespace {
+
+namespace fs = std::filesystem;
+
+class KeptTest : public DiskTest {
+ protected:
+  KeptTest() {
+    fs::copy(FOREREACH_SOURCE_DIR "/tests/data/course_transitions.csv", scratch_ / "course_transitions.csv");
+    std::ifstream file(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+    text_.assign(std::istreambuf_iterator<char>(file), {});
+    Write("");
+    StartWithTask();
+  }
+  void Write(const std::string& more) { scratch_.Write("task.yaml", text_ + more); }
+  [[nodiscard]] Config Task() const { return LoadConfig(scratch_ / "task.yaml"); }
+  void StartWithTask() {
+    const LoggerOptions options = config_.logger;
+    config_ = Task();
+    config_.logger = options;
+    Start();
+    node_->Tick(bus_.now_us += 1000);
+  }
+  void Heartbeat(const Digest& config, std::int64_t version) {
+    certifier_status_v2_t status{};
+    status.sequence = heartbeats_++;
+    status.version = version;
+    SetDigest(status.config_digest, config);
+    bus_.Publish("CERTIFIER_STATUS", status);
+    node_->Tick(bus_.now_us += 2'000'000);
+  }
+  void Decide(const Digest& config) {
+    const candidate_plan_t candidate = MakeCandidate(fed_, fed_);
+    decision_t decision = MakeDecision(candidate, fed_++, decision_t::CERTIFIED, 0);
+    SetDigest(decision.config_digest, config);
+    bus_.Publish("PLAN_CANDIDATE", candidate);
+    bus_.Publish("PLAN_DECISION", decision);
+    node_->Tick(bus_.now_us += 20'000);
+  }
+  [[nodiscard]] bool IsKept(const Digest& digest) const {
+    return KeptTasks(scratch_ / "log").Find(digest, {}).has_value();
+  }
+
+  std::string text_;
+  std::int64_t heartbeats_ = 0;
+};
+
+TEST_F(KeptTest, AReloadedTaskIsKeptIfItIsTheOneThatTheHeartbeatNames) {
+  const Digest first = Task().digest;
+  EXPECT_TRUE(IsKept(first));
+  Heartbeat(first, 1);
+  Write("# more\n");
+  const Digest second = Task().digest;
+  Digest unknown = second;
+  unknown[0] ^= 1;
+  Heartbeat(unknown, 2);
+  EXPECT_FALSE(IsKept(second)) << "somebody else's";
+  Heartbeat(second, 3);
+  EXPECT_TRUE(IsKept(second));
+  EXPECT_FALSE(IsKept(unknown));
+  Stop();
+}
+
+TEST_F(KeptTest, ADeletedDirectoryGetsItsTasksAgain) {
+  fs::remove_all(scratch_ / "log");
+  fs::remove(scratch_ / "task.yaml");
+  Feed(20);
+  EXPECT_TRUE(IsKept(config_.digest));
+  Stop();
+}
+
+TEST_F(KeptTest, TheQuotaTakesATaskWithTheLastLogThatNeedsIt) {
+  const Digest first = config_.digest;
+  Decide(first);
+  Stop();
+  Write("# more\n");
+  config_.logger.rotate_mb = 0.02;
+  config_.logger.quota_mb = 0.06;
+  StartWithTask();
+  const Digest second = config_.digest;
+  Decide(first);  // as of a certifier that has not reloaded yet
+  EXPECT_TRUE(IsKept(first));
+  const std::string needs = node_->recorder().log_path();
+  while (fs::exists(needs)) {
+    EXPECT_TRUE(IsKept(first));
+    Decide(second);
+  }
+  EXPECT_FALSE(IsKept(first));
+  EXPECT_TRUE(IsKept(second));
+  Stop();
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,86 @@
+/** What the logger's tests share: files as bytes, logs as lists, and messages. */
+#pragma once
+
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "lcmtypes/codec.h"
+#include "records/event_log.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+
+inline std::vector<std::uint8_t> ReadBytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+inline void WriteBytes(const std::string& path, const std::vector<std::uint8_t>& bytes) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+/** All that can be read of a log, and how it ended. */
+struct LogContents {
+  std::vector<LogEvent> events;
+  LogStatus end = LogStatus::kEnd;
+  std::int64_t corruptions = 0, skipped_bytes = 0;
+};
+
+inline LogContents ReadLog(const std::string& path) {
+  EventLogReader reader(path);
+  LogContents contents;
+  LogEvent event;
+  while ((contents.end = reader.Next(event)) == LogStatus::kEvent || contents.end == LogStatus::kCorrupt)
+    if (contents.end == LogStatus::kEvent) contents.events.push_back(event);
+  contents.corruptions = reader.corruptions();
+  contents.skipped_bytes = reader.skipped_bytes();
+  return contents;
+}
+
+/** Copies a log, each event changed by `edit`, which leaves it out where it returns false. */
+template <class Edit>
+void CopyLog(const std::string& from, const std::string& to, Edit edit) {
+  EventLogReader reader(from);
+  EventLogWriter writer(to);
+  LogEvent event;
+  while (reader.Next(event) == LogStatus::kEvent)
+    if (edit(event)) writer.Append(event.utime, event.channel, event.data);
+  EXPECT_TRUE(writer.Flush());
+}
+
+inline candidate_plan_t MakeCandidate(std::int64_t sequence, std::int64_t plan_id, const std::string& source = "test") {
+  candidate_plan_t candidate{};
+  candidate.sequence = sequence;
+  candidate.plan_id = plan_id;
+  SetText(candidate.source, source);
+  return candidate;
+}
+
+inline decision_t MakeDecision(const candidate_plan_t& candidate, std::int64_t sequence, std::int16_t outcome,
+                               std::int16_t cause) {
+  decision_t decision{};
+  decision.sequence = sequence;
+  decision.plan_id = candidate.plan_id;
+  SetText(decision.source, GetText(candidate.source));
+  decision.outcome = outcome;
+  decision.cause = cause;
+  SetDigest(decision.plan_digest, DigestOf(Encode(candidate)));
+  return decision;
+}
+
+inline execution_event_t MakeEvent(std::int64_t sequence, std::int16_t kind) {
+  execution_event_t event{};
+  event.sequence = sequence;
+  event.kind = kind;
+  return event;
+}
+
+}  // namespace forereach

@@ -1,0 +1,103 @@
+#include "records/picture.h"
+
+#include <filesystem>
+#include <iterator>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/records/logs.h"
+
+namespace forereach {
+namespace {
+
+Picture Sample() {
+  Picture picture;
+  picture.title = "Title";
+  picture.key_numbers = {"1 plan"};
+  picture.circles = {{{5, 3}, 1}};
+  picture.polygons = {{{0, 5}, {1, 5}, {1, 6}}};
+  picture.half_planes = {{{0, -1}, 4}};
+  picture.executed = {{{0, 0}, {1, 0}, {1, 1}}};
+  picture.certified = {{{2, 0}, {3, 0}, {3, 1}}};
+  picture.abstained = {{}, {{{4, 0}, {5, 0}, {5, 1}}}};
+  picture.path = {{0, 0}, {3, 0.5}};
+  picture.stops = {{1, 0}};
+  picture.goal = Picture::Circle{{9, 0}, 1};
+  return picture;
+}
+
+TEST(Picture, WritesBothFormats) {
+  const ScratchDirectory scratch;
+  DrawPicture(Sample(), scratch / "a.svg");
+  DrawPicture(Sample(), scratch / "a.png", 600, 400);
+  const std::vector<std::uint8_t> svg = ReadBytes(scratch / "a.svg"), png = ReadBytes(scratch / "a.png");
+  EXPECT_THAT(std::string(svg.begin(), svg.end()), testing::HasSubstr("</svg>"));
+  ASSERT_GT(png.size(), 24u);
+  EXPECT_EQ(std::string(png.begin() + 1, png.begin() + 4), "PNG");
+  EXPECT_EQ(png[18] << 8 | png[19], 600);
+  EXPECT_EQ(png[22] << 8 | png[23], 400);
+}
+
+TEST(Picture, SameInputSameBytes) {
+  const ScratchDirectory scratch;
+  DrawPicture(Sample(), scratch / "a.png");
+  DrawPicture(Sample(), scratch / "b.png");
+  EXPECT_EQ(ReadBytes(scratch / "a.png"), ReadBytes(scratch / "b.png"));
+  Picture other = Sample();
+  other.circles[0].radius = 1.2;
+  DrawPicture(other, scratch / "c.png");
+  EXPECT_NE(ReadBytes(scratch / "a.png"), ReadBytes(scratch / "c.png"));
+}
+
+TEST(Picture, DrawsNothingAndDegenerateThings) {
+  const ScratchDirectory scratch;
+  EXPECT_NO_THROW(DrawPicture({}, scratch / "empty.svg"));
+  Picture picture;
+  picture.path = {{1, 1}};
+  picture.executed = {{{1, 1}}, {}};
+  picture.circles = {{{NAN, 0}, 1}, {{0, 0}, 0}};
+  EXPECT_NO_THROW(DrawPicture(picture, scratch / "point.png"));
+}
+
+TEST(Picture, SaysWhatItCannotWrite) {
+  const ScratchDirectory scratch;
+  EXPECT_THROW(DrawPicture({}, scratch / "a.jpg"), PictureError);
+  EXPECT_THROW(DrawPicture({}, scratch / "a.png", 100, 800), PictureError);
+  EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.png"), PictureError);
+  EXPECT_THROW(DrawPicture({}, scratch / "no/such/a.svg"), PictureError);
+}
+
+TEST(Picture, FilesAreThoseOfTheNameOrRefusedWithASentence) {
+  using Files = std::vector<std::string>;
+  const ScratchDirectory scratch;
+  const auto in = [&](const std::string& name) { return scratch / name; };
+  EXPECT_EQ(PictureFiles(in("a.svg")), Files{in("a.svg")});
+  EXPECT_EQ(PictureFiles(in("a.png")), Files{in("a.png")});
+  EXPECT_EQ(PictureFiles(in("a.pdf")), Files{in("a.pdf")});
+  EXPECT_EQ(PictureFiles(in("a")), (Files{in("a.svg"), in("a.png")}));
+  const auto refused = [](const std::string& name, const std::string& why) {
+    EXPECT_THAT([&] { (void)PictureFiles(name); }, testing::ThrowsMessage<PictureError>(testing::HasSubstr(why)));
+  };
+  for (const char* ending : {".jpg", ".PNG", ".v2", "."})
+    refused(in(std::string("a") + ending), std::string("ends in ") + ending + "; it has to end in .svg, .png or .pdf");
+  refused(in("none/a.svg"), "there is no directory " + in("none"));
+  refused(in(""), "names no file");
+  refused("", "names no file");
+  std::filesystem::create_directory(in("b.svg"));
+  refused(in("b.svg"), "b.svg is a directory");
+  refused(in("b"), "b.svg is a directory");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1) << "no file is touched";
+}
+
+TEST(Picture, APdfIsAPdf) {
+  const ScratchDirectory scratch;
+  DrawPicture(Sample(), scratch / "a.pdf");
+  const std::vector<std::uint8_t> bytes = ReadBytes(scratch / "a.pdf");
+  ASSERT_GT(bytes.size(), 500u);
+  EXPECT_EQ(std::string(bytes.begin(), bytes.begin() + 5), "%PDF-");
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,307 @@
+// A recorded log through the same gate gives the same decisions, and a changed one does not.
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/gate/gate.h"
+#include "certifier/gate/obstacle_message.h"
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "records/event_log.h"
+#include "records/replay.h"
+#include "tests/cli/program.h"
+#include "tests/gate/small_task.h"
+#include "tests/records/logs.h"
+#include "tests/records/signed_log.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+// The gate decides as expected, and the log has what came and what went.
+void DecideAndLog(Gate& gate, const std::vector<std::uint8_t>& candidate, std::int16_t expected, const Config& config,
+                  EventLogWriter& log) {
+  const decision_t decision = gate.Decide(candidate, kNow).decision;
+  EXPECT_EQ(decision.outcome, expected);
+  log.Append(kNow, config.bus.candidate, candidate);
+  log.Append(kNow, config.bus.decision, Encode(decision));
+}
+
+// Each decision of the log is made again.
+void ExpectAgreed(const std::string& path, const Config& config, int decisions) {
+  const ReplayResult result = Replay({path}, config);
+  EXPECT_EQ(result.agreed, decisions);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+}
+
+class ReplayTest : public testing::Test {
+ protected:
+  // The path of a log that is not there yet.
+  std::string NewLog() { return scratch_ / std::to_string(logs_++); }
+
+  // A copy of the log, as CopyLog changes it.
+  template <class Edit>
+  std::string Edited(Edit edit) {
+    const std::string path = NewLog();
+    CopyLog(kLog, path, edit);
+    return path;
+  }
+
+ private:
+  const ScratchDirectory scratch_;
+  int logs_ = 0;
+};
+
+TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
+  const Config config = LoadConfig(kConfig);
+  const ReplayResult result = Replay({kLog}, config);
+  EXPECT_TRUE(result.differences.empty()) << result.differences.front();
+  EXPECT_EQ(result.agreed, result.candidates);
+  EXPECT_GE(result.candidates, 10);
+  EXPECT_EQ(result.corruptions, 0);
+}
+
+TEST_F(ReplayTest, RecordedLogHasCertificatesAndBothAbstentions) {
+  int certified = 0, domain = 0, safety = 0;
+  EventLogReader reader(kLog);
+  LogEvent event;
+  while (reader.Next(event) == LogStatus::kEvent) {
+    const auto decision = Decoded<decision_t>(event.data);
+    if (!decision) continue;
+    certified += decision->outcome == decision_t::CERTIFIED;
+    domain += decision->outcome == decision_t::ABSTAIN_DOMAIN;
+    safety += decision->outcome == decision_t::ABSTAIN_SAFETY;
+  }
+  EXPECT_GT(certified, 0);
+  EXPECT_GT(domain, 0);
+  EXPECT_GT(safety, 0);
+}
+
+TEST_F(ReplayTest, ChangedOutcomeIsListed) {
+  bool changed = false;
+  const std::string path = Edited([&](LogEvent& event) {
+    if (auto decision = Decoded<decision_t>(event.data); decision && !changed) {
+      changed = true;
+      decision->outcome =
+          decision->outcome == decision_t::CERTIFIED ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED;
+      event.data = Encode(*decision);
+    }
+    return true;
+  });
+  EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u);
+}
+
+TEST_F(ReplayTest, MissingDecisionAndMissingCandidateAreListed) {
+  for (const bool drop_decision : {true, false}) {
+    bool dropped = false;
+    const std::string path = Edited([&](LogEvent& event) {
+      const bool wanted = drop_decision ? Decoded<decision_t>(event.data).has_value()
+                                        : Decoded<candidate_plan_t>(event.data).has_value();
+      if (dropped || !wanted) return true;
+      dropped = true;
+      return false;
+    });
+    EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u) << drop_decision;
+  }
+}
+
+TEST_F(ReplayTest, ACertifiedPlanThatWasAlteredIsListed) {
+  const auto difference = [this](auto alter) {
+    bool altered = false;
+    const std::string path = Edited([&](LogEvent& event) {
+      auto certified = Decoded<certified_plan_t>(event.data);
+      if (!certified || altered) return true;
+      altered = true;
+      alter(*certified);
+      event.data = Encode(*certified);
+      return true;
+    });
+    const ReplayResult result = Replay({path}, LoadConfig(kConfig));
+    EXPECT_EQ(result.differences.size(), 1u);
+    return result.differences.empty() ? std::string() : result.differences.front();
+  };
+  EXPECT_THAT(difference([](auto& c) { c.slice_upper[3][0] = std::nextafter(c.slice_upper[3][0], 0); }),
+              HasSubstr("seal does not hold: certificate_digest"));
+  EXPECT_THAT(difference([](auto& c) { c.slice_upper[100][0] = 0.5; }),
+              HasSubstr("slice_upper[100][0] is 0.5, it has to be 0"));
+  EXPECT_THAT(difference([](auto& c) { c.plan.control[0][0] += 1; }), HasSubstr("plan_digest"));
+  EXPECT_THAT(difference([](auto& c) { c.expires_utime += 1; }), HasSubstr("certificate_digest"));
+}
+
+// The seam lies between a candidate and its decision.
+TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
+  std::vector<std::string> logs;
+  for (const bool second : {false, true}) {
+    bool behind = false;
+    logs.push_back(Edited([&](LogEvent& event) {
+      const bool here = behind == second;
+      if (event.number >= 200 && Decoded<candidate_plan_t>(event.data)) behind = true;
+      return here;
+    }));
+  }
+  const Config config = LoadConfig(kConfig);
+  const ReplayResult whole = Replay({kLog}, config), parts = Replay(logs, config);
+  EXPECT_TRUE(parts.differences.empty()) << parts.differences.front();
+  EXPECT_EQ(parts.candidates, whole.candidates);
+  EXPECT_EQ(parts.agreed, whole.agreed);
+  EXPECT_THAT(Replay({logs[1]}, config).differences, testing::Not(testing::IsEmpty()));
+}
+
+// A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if
+// the certifier itself began after them.
+TEST_F(ReplayTest, ObstaclesBeforeTheFirstHeartbeatCountUnlessTheCertifierBeganWithIt) {
+  Config config = SmallTask();
+  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
+  obstacles_t on_the_way = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)});
+  on_the_way.utime = kNow;
+  for (const std::int64_t heartbeat : {0, 7}) {
+    Gate gate(config);
+    if (heartbeat > 0) {
+      EXPECT_EQ(gate.UpdateObstacles(Encode(on_the_way), kNow), "");
+    }
+    certifier_status_v3_t status{};
+    status.sequence = heartbeat;
+    const std::string path = NewLog();
+    {
+      EventLogWriter writer(path);
+      writer.Append(kNow, config.bus.obstacles, Encode(on_the_way));
+      writer.Append(kNow, config.bus.status, Encode(status));
+      DecideAndLog(gate, Encode(Candidate(1)), heartbeat > 0 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED,
+                   config, writer);
+      EXPECT_TRUE(writer.Flush());
+    }
+    ExpectAgreed(path, config, 1);
+  }
+}
+
+// What was heard before a reload counts after it, beside the task's own.
+TEST_F(ReplayTest, AReloadKeepsTheObstaclesThatWereHeard) {
+  Config config = SmallTask();
+  config.gate.obstacles = ObstaclesSource::kUnsaid;  // as logs of old
+  obstacles_t far_away = ToMessage({Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
+  far_away.utime = kNow;
+  Gate before(config), after(config);
+  certifier_status_v3_t first{}, second{};
+  second.sequence = 1;
+  first.version = 1, second.version = 2;
+  const std::string path = NewLog();
+  {
+    EventLogWriter writer(path);
+    writer.Append(kNow, config.bus.status, Encode(first));
+    writer.Append(kNow, config.bus.obstacles, Encode(far_away));
+    EXPECT_EQ(before.UpdateObstacles(Encode(far_away), kNow), "");
+    DecideAndLog(before, Encode(Candidate(1, kAccelerationIntoTheCircle)), decision_t::CERTIFIED, config, writer);
+    after.Inherit(before);
+    writer.Append(kNow, config.bus.status, Encode(second));
+    DecideAndLog(after, Encode(Candidate(2, kAccelerationIntoTheCircle)), decision_t::ABSTAIN_SAFETY, config, writer);
+    EXPECT_TRUE(writer.Flush());
+  }
+  ExpectAgreed(path, config, 2);
+}
+
+// The whole set comes again and again; a second certifier's heartbeats are none of the one that decides; where the
+// obstacles were not known nothing is compared.
+TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
+  const Config config = SmallTaskOnTheBus();
+  const std::string path = NewLog();
+  int decided = 0;
+  {
+    EventLogWriter writer(path);
+    certifier_status_v3_t mine{}, others{};
+    mine.state = certifier_status_v3_t::ARMED, mine.instance = 1;
+    others.state = certifier_status_v3_t::STANDBY, others.instance = 2;
+    std::int64_t id = 1;
+    for (int start = 0; start < 2; ++start) {  // it is killed, and starts again
+      Gate gate(config);
+      mine.sequence = 0;
+      writer.Append(kNow, config.bus.status, Encode(mine));
+      const auto unknown = Encode(Candidate(id++));
+      writer.Append(kNow, config.bus.candidate, unknown);
+      writer.Append(kNow, config.bus.decision,
+                    Encode(gate.Refuse(unknown, kNow, decision_t::CAUSE_NO_OBSTACLES, "").decision));
+      for (int i = 0; i < 12; ++i) {
+        obstacles_t message = ToMessage(i / 4 == 1 ? std::vector{Obstacle::Circle(Eigen::Vector2d(1, 0), 0.3)}
+                                                   : std::vector{Obstacle::Circle(Eigen::Vector2d(0, 15), 1)});
+        message.utime = kNow + 100 * start + i;
+        message.sequence = 20 * start + i;
+        writer.Append(kNow, config.bus.obstacles, Encode(message));
+        EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
+        others.sequence = 3 + i % 5;
+        writer.Append(kNow, config.bus.status, Encode(others));
+        DecideAndLog(gate, Encode(Candidate(id++)), i / 4 == 1 ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED,
+                     config, writer);
+        ++decided;
+        ++mine.sequence;
+        writer.Append(kNow, config.bus.status, Encode(mine));
+      }
+    }
+    EXPECT_TRUE(writer.Flush());
+  }
+  const ReplayResult result = Replay({path}, config);
+  EXPECT_TRUE(result.differences.empty()) << result.differences.front();
+  EXPECT_EQ(result.agreed, decided);
+  EXPECT_EQ(result.circumstances, 2);
+}
+
+TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
+  const ScratchDirectory scratch;
+  const auto [key, log] = SignedLog(scratch, kLog);
+  Config config = LoadConfig(kConfig);
+  const ReplayResult before = Replay({kLog}, config), believed = Replay({log}, config);
+  EXPECT_EQ(believed.differences.size(), 4u) << "three undecided candidates, an altered certificate";
+  EXPECT_EQ(InWords(believed.passed_over), "");
+  config.bus.key = key;
+  const ReplayResult result = Replay({log}, config);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_EQ(result.agreed, before.agreed);
+  EXPECT_EQ(result.candidates, before.candidates);
+  EXPECT_EQ(result.passed_over.not_authentic.unsigned_ones, kUnsigned);
+  EXPECT_EQ(result.passed_over.not_authentic.forged, kForged);
+  EXPECT_EQ(result.passed_over.not_authentic.replayed, kRepeated);
+  EXPECT_EQ(InWords(result.passed_over), "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
+  config.bus.key = scratch / "none";
+  EXPECT_THROW((void)Replay({log}, config), KeyError);
+}
+
+TEST_F(ReplayTest, ThroughTheCommandWithAKeyAndWithout) {
+  const ScratchDirectory scratch;
+  const auto [key, log] = SignedLog(scratch, kLog);
+  const std::string replay = "replay " + log + " --config " + kConfig;
+  const Output judged = Forereach(replay + " --key " + key), believed = Forereach(replay + " --no-key");
+  EXPECT_EQ(judged.code, 0) << judged.text;
+  EXPECT_THAT(judged.text, HasSubstr("passed over: 5 (unsigned 2, forged 1, replayed 2)"));
+  EXPECT_EQ(believed.code, 1) << believed.text;
+}
+
+TEST_F(ReplayTest, WhatIsNoCertifiedPlanIsPassedOver) {
+  bool done = false;
+  const std::string path = Edited([&](LogEvent& event) {
+    if (event.channel != "PLAN_CERTIFIED" || done) return true;
+    done = true;
+    event.data = {1, 2, 3};
+    return true;
+  });
+  const ReplayResult result = Replay({path}, LoadConfig(kConfig));
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+  EXPECT_EQ(InWords(result.passed_over), "; no certified plan and passed over: 1");
+}
+
+TEST_F(ReplayTest, AnotherTaskIsNoticed) {
+  Config config = LoadConfig(kConfig);
+  config.declaration_digest[0] ^= 1;
+  const ReplayResult result = Replay({kLog}, config);
+  EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
+}
+
+}  // namespace
+}  // namespace forereach

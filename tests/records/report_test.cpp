@@ -1,0 +1,179 @@
+#include "records/report.h"
+
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/models.h"
+#include "certifier/gate/obstacle_message.h"
+#include "forereach/obstacles_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "tests/records/logs.h"
+
+namespace forereach {
+namespace {
+
+/** A point mass without residual, and one circle at (3, 0). */
+Config PointMassConfig() {
+  auto problem = std::make_shared<Problem>();
+  problem->model = MakePointMass(0.15);
+  problem->domain.state = Box(Eigen::VectorXd::Constant(4, -20), Eigen::VectorXd::Constant(4, 20));
+  problem->domain.input = Box(Eigen::VectorXd::Constant(2, -1), Eigen::VectorXd::Constant(2, 1));
+  problem->declaration.lipschitz = Eigen::MatrixXd::Zero(4, 6);
+  problem->declaration.noise_bound = Eigen::VectorXd::Zero(4);
+  problem->transitions.z = Eigen::MatrixXd::Zero(1, 6);
+  problem->transitions.x_next = Eigen::MatrixXd::Zero(1, 4);
+  problem->projection = Eigen::MatrixXd::Identity(2, 4);
+  Config config;
+  config.problem = problem;
+  config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3, 0), 0.5)};
+  config.planner.goal = {0, 5};
+  return config;
+}
+
+/** Ten steps from the origin at 3 m/s along x or along y. */
+candidate_plan_t Drive(std::int64_t plan_id, bool along_x) {
+  candidate_plan_t candidate = MakeCandidate(plan_id, plan_id);
+  candidate.num_states = 4;
+  candidate.num_inputs = 2;
+  candidate.num_steps = 10;
+  candidate.initial_center[along_x ? 2 : 3] = 3;
+  candidate.initial_half_width[0] = candidate.initial_half_width[1] = 0.1;
+  return candidate;
+}
+
+class LogPictureTest : public testing::Test {
+ protected:
+  template <class Message>
+  void Append(const std::string& channel, const Message& message) {
+    writer_.Append(++now_, channel, Encode(message));
+    ASSERT_TRUE(writer_.Flush());
+  }
+
+  void Decide(const candidate_plan_t& candidate, std::int16_t outcome, std::int16_t step) {
+    Append("PLAN_CANDIDATE", candidate);
+    decision_t decision = MakeDecision(candidate, candidate.plan_id, outcome, 0);
+    decision.step = step;
+    Append("PLAN_DECISION", decision);
+  }
+
+  void Step(std::int64_t plan_id, std::int16_t kind, int step) {
+    execution_event_t event = MakeEvent(step, kind);
+    event.plan_id = plan_id;
+    event.step = static_cast<std::int16_t>(step);
+    event.num_states = 4;
+    event.state[1] = 0.45 * step;
+    Append("EXECUTION_EVENT", event);
+  }
+
+  ScratchDirectory scratch_;
+  EventLogWriter writer_{scratch_ / "log"};
+  std::int64_t now_ = 0;
+};
+
+TEST_F(LogPictureTest, DrawsWhatHappened) {
+  // Along x the slice of step 6, at 2.7 m, is the first that may touch the circle, which begins at 2.5 m.
+  Decide(Drive(0, true), decision_t::ABSTAIN_SAFETY, 6);
+  Decide(Drive(1, false), decision_t::CERTIFIED, -1);
+  Step(1, execution_event_t::STARTED, 0);
+  for (int step = 1; step <= 4; ++step) Step(1, execution_event_t::STEP_INSIDE, step);
+  Step(1, execution_event_t::STANDING, 4);
+  robot_state_t state{};
+  state.num_states = 4;
+  state.state[1] = 1.8;
+  Append("ROBOT_STATE", state);
+
+  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, PointMassConfig());
+  EXPECT_EQ(drawn.disagreements, 0);
+  EXPECT_EQ(drawn.picture.executed.size(), 5u);
+  EXPECT_EQ(drawn.picture.certified.size(), 6u);
+  ASSERT_EQ(drawn.picture.abstained.size(), 1u);
+  EXPECT_EQ(drawn.picture.abstained[0].size(), 7u) << "up to the slice that may touch";
+  ASSERT_EQ(drawn.picture.path.size(), 1u);
+  EXPECT_EQ(drawn.picture.path[0], Eigen::Vector2d(0, 1.8));
+  ASSERT_EQ(drawn.picture.stops.size(), 1u);
+  EXPECT_EQ(drawn.picture.stops[0], Eigen::Vector2d(0, 1.8));
+  ASSERT_EQ(drawn.picture.circles.size(), 1u);
+  EXPECT_EQ(drawn.picture.circles[0].radius, 0.5);
+  ASSERT_TRUE(drawn.picture.goal.has_value());
+  EXPECT_EQ(drawn.picture.goal->center, Eigen::Vector2d(0, 5));
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& corner : drawn.picture.executed[4])
+    middle += corner / static_cast<double>(drawn.picture.executed[4].size());
+  EXPECT_NEAR(middle.x(), 0, 1e-9);
+  EXPECT_NEAR(middle.y(), 1.8, 1e-9);
+}
+
+TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
+  Decide(Drive(0, true), decision_t::ABSTAIN_SAFETY, 6);
+  Append("OBSTACLES", ToMessage({Obstacle::AxisBox(Eigen::Vector2d(-2, 1), Eigen::Vector2d(2, 2)),
+                                 Obstacle::Polygon({Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 6), Eigen::Vector2d(6, 5),
+                                                    Eigen::Vector2d(5, 6), Eigen::Vector2d(5.5, 5.5)}),
+                                 Obstacle::HalfSpace(Eigen::Vector2d(0, 1), 10)}));
+  obstacles_t ahead = ToMessage({Obstacle::Circle(Eigen::Vector2d(3, 0), 0.5)});
+  ahead.sequence = 1;
+  ahead.utime = now_ + 1 + 50'001;  // gate.max_ahead_ms is 50: the gate refused it
+  Append("OBSTACLES", ahead);
+  Decide(Drive(1, true), decision_t::CERTIFIED, -1);
+  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, PointMassConfig());
+  EXPECT_EQ(drawn.disagreements, 0);
+  EXPECT_TRUE(drawn.picture.circles.empty());
+  ASSERT_EQ(drawn.picture.polygons.size(), 2u);
+  EXPECT_EQ(drawn.picture.polygons[0].size(), 4u);
+  EXPECT_THAT(drawn.picture.polygons[1], testing::ElementsAre(Eigen::Vector2d(5, 5), Eigen::Vector2d(6, 5),
+                                                              Eigen::Vector2d(6, 6), Eigen::Vector2d(5, 6)));
+  EXPECT_EQ(drawn.picture.half_planes.size(), 1u);
+}
+
+TEST_F(LogPictureTest, LeavesOutWhatItCannotConfirm) {
+  Decide(Drive(0, true), decision_t::CERTIFIED, -1);
+  Decide(Drive(1, true), decision_t::ABSTAIN_SAFETY, 5);
+  candidate_plan_t wrong_size = Drive(2, false);
+  wrong_size.num_states = 6;
+  Decide(wrong_size, decision_t::CERTIFIED, -1);
+  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, PointMassConfig());
+  EXPECT_EQ(drawn.disagreements, 3);
+  EXPECT_TRUE(drawn.picture.certified.empty());
+  EXPECT_TRUE(drawn.picture.abstained.empty());
+}
+
+TEST_F(LogPictureTest, WantsAPlane) {
+  Config config = PointMassConfig();
+  auto line = std::make_shared<Problem>(*config.problem);
+  line->projection = Eigen::MatrixXd::Identity(1, 4);
+  config.problem = line;
+  EXPECT_THROW((void)PictureFromLogs({scratch_ / "log"}, config), PictureError);
+}
+
+TEST_F(LogPictureTest, TheReportSaysWhatIsWrong) {
+  Append("PLAN_CANDIDATE", Drive(0, true));
+  std::ostringstream out;
+  EXPECT_THAT(
+      [&] {
+        Report({{scratch_ / "log"}, scratch_ / "missing.yaml", ""}, out);
+      },
+      testing::ThrowsMessage<BadInput>(testing::HasSubstr("missing.yaml")));
+  EXPECT_EQ(out.str(), "");
+}
+
+TEST_F(LogPictureTest, TheReportRefusesAPictureItCannotWriteBeforeItReadsAnything) {
+  std::ostringstream out;
+  EXPECT_THAT(
+      [&] {
+        Report({{"none.lcmlog"}, "none.yaml", scratch_ / "x.gif"}, out);
+      },
+      testing::ThrowsMessage<BadInput>(testing::HasSubstr("x.gif ends in .gif")));
+}
+
+// The name of a channel may be any bytes.
+TEST_F(LogPictureTest, TheReportIsJsonWhateverTheLogHolds) {
+  Append("PLAN_CANDIDATE", Drive(0, true));
+  Append("CH\xff\xfe", MakeEvent(0, 0));
+  std::ostringstream out;
+  Report({{scratch_ / "log"}, FOREREACH_SOURCE_DIR "/tests/data/course.yaml", "", true}, out);
+  EXPECT_EQ(nlohmann::json::parse(out.str())["messages"].size(), 2u);
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,160 @@
+#include "records/summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forereach/robot_state_t.hpp"
+#include "tests/records/logs.h"
+
+namespace forereach {
+namespace {
+
+Config GoalConfig() {
+  Config config;
+  auto problem = std::make_shared<Problem>();
+  problem->projection = Eigen::MatrixXd::Identity(2, 4);
+  config.problem = problem;
+  config.planner.goal = {3, 4};
+  return config;
+}
+
+/** A hundred candidates, decided after 1 .. 100 microseconds, and some driving. */
+void WriteRun(const std::string& path) {
+  EventLogWriter writer(path);
+  std::int64_t now = 1'000'000;
+  for (int i = 0; i < 100; ++i) {
+    const candidate_plan_t candidate = MakeCandidate(i, i);
+    writer.Append(now, "PLAN_CANDIDATE", Encode(candidate));
+    now += i + 1;
+    decision_t decision = MakeDecision(candidate, i, decision_t::CERTIFIED, decision_t::CAUSE_NONE);
+    if (i < 30) decision = MakeDecision(candidate, i, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE);
+    if (i < 10) decision = MakeDecision(candidate, i, decision_t::ABSTAIN_DOMAIN, decision_t::CAUSE_DOMAIN_EXIT);
+    if (i < 2) decision = MakeDecision(candidate, i, decision_t::REJECTED, decision_t::CAUSE_STALE);
+    decision.elapsed_us = i;
+    writer.Append(now, "PLAN_DECISION", Encode(decision));
+  }
+  int sequence = 0;
+  using E = execution_event_t;
+  for (const std::int16_t kind :
+       {E::ACCEPTED, E::REFUSED, E::STARTED, E::STEP_INSIDE, E::STEP_INSIDE, E::STEP_INSIDE, E::TAIL_BEGUN, E::STANDING,
+        E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::GOAL_REACHED})
+    writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence++, kind)));
+  writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence + 4, E::STANDING)));
+  robot_state_t state{};
+  state.num_states = 4;
+  state.state[0] = 3;
+  state.state[1] = 3.5;
+  writer.Append(3'000'000, "ROBOT_STATE", Encode(state));
+  ASSERT_TRUE(writer.Flush());
+}
+
+TEST(Summary, CountsAHandMadeLog) {
+  const ScratchDirectory scratch;
+  WriteRun(scratch / "log");
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
+  EXPECT_EQ(summary.proposed, 100);
+  EXPECT_EQ(summary.decided, 100);
+  EXPECT_EQ(summary.certified, 70);
+  EXPECT_EQ(summary.abstained, (std::map<std::string, std::int64_t>{{"domain_exit", 8}, {"obstacle", 20}}));
+  EXPECT_EQ(summary.rejected, (std::map<std::string, std::int64_t>{{"stale", 2}}));
+  EXPECT_EQ(summary.latency_us.p50, 50);
+  EXPECT_EQ(summary.latency_us.p99, 99);
+  EXPECT_EQ(summary.certify_us.p50, 50) << "rejected ones, 0 and 1, are not certify steps";
+  EXPECT_EQ(summary.distance_to_goal_m, 0.5);
+  EXPECT_TRUE(summary.goal_reached);
+  EXPECT_EQ(summary.contacts, 1);
+  EXPECT_EQ(summary.steps_inside, 3);
+  EXPECT_EQ(summary.steps_outside, 1);
+  EXPECT_EQ(summary.tails, 1);
+  EXPECT_EQ(summary.stops, 3);
+  EXPECT_EQ(summary.refused, 1);
+  EXPECT_EQ(summary.lost, (std::map<std::string, std::int64_t>{{"bus", 4}}));
+  EXPECT_EQ(summary.restarts, 0);
+  EXPECT_DOUBLE_EQ(summary.duration_s, 2.0);
+  EXPECT_EQ(summary.messages.at("PLAN_CANDIDATE"), 100);
+}
+
+TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
+  const ScratchDirectory scratch;
+  WriteRun(scratch / "log");
+  Database database(scratch / "d.sqlite");
+  EventLogReader reader(scratch / "log");
+  Interpreter interpreter({}, "log");
+  LogEvent event;
+  Rows rows;
+  while (reader.Next(event) == LogStatus::kEvent) interpreter.Observe(event, rows);
+  ASSERT_TRUE(database.Write(rows, "log", event.number + 1));
+  nlohmann::json of_log = ToJson(SummarizeLogs({scratch / "log"}, GoalConfig()));
+  nlohmann::json of_database = ToJson(SummarizeDatabase(database, "log", GoalConfig()));
+  for (const char* log_only : {"messages", "duration_s", "distance_to_goal_m"}) {
+    of_log.erase(log_only);
+    of_database.erase(log_only);
+  }
+  EXPECT_EQ(of_log, of_database);
+}
+
+TEST(Summary, OfNothingIsUnknownNotZero) {
+  const ScratchDirectory scratch;
+  WriteBytes(scratch / "log", {});
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
+  EXPECT_EQ(summary.proposed, 0);
+  EXPECT_EQ(summary.distance_to_goal_m, std::nullopt);
+  const nlohmann::json json = ToJson(summary);
+  EXPECT_TRUE(json["decision_latency_us"]["p50"].is_null());
+  EXPECT_TRUE(json["distance_to_goal_m"].is_null());
+  EXPECT_THAT(ToText(summary), testing::HasSubstr("not measured"));
+}
+
+// A robot that has been at the goal may have driven on.
+TEST(Summary, SaysHowFarTheGoalIsAndWhetherItWasReached) {
+  Summary summary;
+  summary.goal_radius_m = 3;
+  const auto line = [&](double distance, bool reached) {
+    summary.distance_to_goal_m = distance;
+    summary.goal_reached = reached;
+    const std::string text = ToText(summary);
+    const std::size_t at = text.find("distance to goal") + 26;
+    return text.substr(at, text.find('\n', at) - at);
+  };
+  EXPECT_EQ(line(0.78, true), "0.78 m (goal reached)");
+  EXPECT_EQ(line(3, true), "3.00 m (goal reached)");
+  EXPECT_EQ(line(5.49, true), "5.49 m at the end (the goal was reached before, within 3 m)");
+  EXPECT_EQ(line(5.49, false), "5.49 m (goal not reached)");
+}
+
+// The simulated clock of `forereach run` stands still while something is computed.
+TEST(Summary, TimesOfASimulatedClockAreNotMeasurements) {
+  Summary summary;
+  summary.latency_us = summary.certify_us = {0, 0};
+  const std::string text = ToText(summary);
+  EXPECT_THAT(text, testing::HasSubstr("decision latency          not measured\n"));
+  EXPECT_THAT(text, testing::HasSubstr("certify step              not measured\n"));
+  EXPECT_TRUE(ToJson(summary)["decision_latency_us"]["p50"].is_null());
+  summary.latency_us = {0, 3};
+  EXPECT_THAT(ToText(summary), testing::HasSubstr("p50 0.0 us, p99 3.0 us"));
+}
+
+TEST(Summary, InventedChannelsAreCountedTogether) {
+  SummaryBuilder builder(GoalConfig());
+  for (int i = 0; i < 1000; ++i) builder.Add(LogEvent{i, i, "invented " + std::to_string(i), {}});
+  for (int i = 0; i < 3; ++i) builder.Add(LogEvent{1000 + i, i, "PLAN_CANDIDATE", {}});
+  const Summary summary = builder.Finish();
+  EXPECT_EQ(summary.messages.size(), Summary::kMaxChannels + 1);
+  EXPECT_EQ(summary.messages.at("*"), 1003 - static_cast<std::int64_t>(Summary::kMaxChannels));
+  EXPECT_EQ(summary.proposed, 3);
+}
+
+TEST(Summary, PassesDamageAndCountsIt) {
+  const ScratchDirectory scratch;
+  WriteRun(scratch / "log");
+  std::vector<std::uint8_t> bytes = ReadBytes(scratch / "log");
+  bytes[0] = 0;
+  WriteBytes(scratch / "log", bytes);
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
+  EXPECT_EQ(summary.proposed, 99);
+  EXPECT_EQ(summary.corruptions, 1);
+  EXPECT_GT(summary.skipped_bytes, 0);
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,336 @@
+// `forereach verify` on event logs and decision databases: recorded ones, and ones with one message changed.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/gate.h"
+#include "certifier/gate/obstacle_message.h"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "lcmtypes/names.h"
+#include "lcmtypes/seal.h"
+#include "records/certificate_files.h"
+#include "tests/cli/program.h"
+#include "tests/records/logs.h"
+#include "tests/records/signed_log.h"
+
+namespace forereach {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using verifier::Status;
+using verifier::Verdict;
+
+constexpr std::int64_t kStart = 1'700'000'000'000'000;
+const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+Verdict Judge(const CertificateFile& file, std::size_t i) {
+  return verifier::Verifier(file.config.problem, verifier::MethodOf(*file.config.problem))
+      .Verify(file.certificates[i].certificate);
+}
+
+// A copy of the recorded log, as CopyLog changes it.
+std::string Edited(const ScratchDirectory& scratch, const std::function<bool(LogEvent&)>& edit) {
+  const std::string path = scratch / "edited.lcmlog";
+  std::filesystem::remove(path);
+  CopyLog(kLog, path, edit);
+  return path;
+}
+
+// Changes the first certified plan, and if asked makes its digest good again.
+std::string EditedCertificate(const ScratchDirectory& scratch, bool reseal,
+                              const std::function<void(certified_plan_t&)>& edit) {
+  bool done = false;
+  return Edited(scratch, [&](LogEvent& event) {
+    auto certified = Decoded<certified_plan_t>(event.data);
+    if (!certified || done) return true;
+    done = true;
+    edit(*certified);
+    if (reseal) SetDigest(certified->certificate_digest, CertificateDigest(*certified));
+    event.data = Encode(*certified);
+    return true;
+  });
+}
+
+TEST(VerifyLog, RecordedCourseIsConfirmed) {
+  const CertificateFile file = ReadCertificates(kLog, kConfig);
+  EXPECT_GE(file.certificates.size(), 10u);
+  EXPECT_GT(file.not_certificates, 0u);
+  for (std::size_t i = 0; i < file.certificates.size(); ++i) {
+    EXPECT_TRUE(file.certificates[i].mismatches.empty()) << file.certificates[i].name;
+    const Verdict verdict = Judge(file, i);
+    EXPECT_EQ(verdict.status, Status::kConfirmed) << file.certificates[i].name << ": " << verdict.failure.what;
+  }
+}
+
+TEST(VerifyLog, SliceShrunkenByOneUlp) {
+  ScratchDirectory scratch;
+  const auto path = EditedCertificate(scratch, false, [](certified_plan_t& certified) {
+    certified.slice_upper[9][0] = std::nextafter(certified.slice_upper[9][0], -HUGE_VAL);
+  });
+  const auto file = ReadCertificates(path, kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("altered"));
+  EXPECT_TRUE(file.certificates[1].mismatches.empty());
+}
+
+// The seal made good again covers no entry beyond those in use: these have to be zero.
+TEST(VerifyLog, AnEntryBeyondThoseInUse) {
+  ScratchDirectory scratch;
+  const auto path = EditedCertificate(
+      scratch, true, [](certified_plan_t& certified) { certified.slice_lower[certified.plan.num_steps + 1][2] = 0.5; });
+  const auto file = ReadCertificates(path, kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, AllOf(HasSubstr("altered"), HasSubstr("slice_lower[")));
+  EXPECT_EQ(file.certificates[0].mismatches[0].found, "0.5");
+  EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed) << "the mathematics does not see it";
+}
+
+TEST(VerifyLog, ALaterExpiry) {
+  ScratchDirectory scratch;
+  const auto path =
+      EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1'000'000; });
+  const auto file = ReadCertificates(path, kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("certificate_digest"));
+}
+
+TEST(VerifyLog, SliceShrunkenAndResealed) {
+  ScratchDirectory scratch;
+  const auto path =
+      EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.slice_upper[9][0] -= 1e-9; });
+  const auto file = ReadCertificates(path, kConfig);
+  EXPECT_TRUE(file.certificates[0].mismatches.empty());
+  const Verdict verdict = Judge(file, 0);
+  EXPECT_EQ(verdict.status, Status::kRefuted);
+  EXPECT_EQ(verdict.failure.step, 9);
+  EXPECT_THAT(verdict.failure.what, HasSubstr("contains x"));
+}
+
+TEST(VerifyLog, ChangedControlOfTheCertifiedPlan) {
+  ScratchDirectory scratch;
+  const auto path =
+      EditedCertificate(scratch, true, [](certified_plan_t& certified) { certified.plan.control[4][0] += 0.01; });
+  const auto file = ReadCertificates(path, kConfig);
+  EXPECT_EQ(file.certificates[0].mismatches.size(), 2u);  // the plan's digest, and no such candidate was sent
+  EXPECT_EQ(Judge(file, 0).failure.step, 5);
+}
+
+TEST(VerifyLog, AFileWhoseNameIsNoTextIsStillNamedInJson) {
+  ScratchDirectory scratch;
+  const std::string path = scratch / "\xff.lcmlog";
+  std::filesystem::rename(
+      EditedCertificate(scratch, false, [](certified_plan_t& certified) { certified.expires_utime += 1; }), path);
+  const std::string next = scratch.Write("next.lcmlog", "");  // files are named where there are several
+  const Output output = Forereach("verify --json --config " + kConfig + " " + path + " " + next);
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(nlohmann::json::parse(output.text)["failures"][0]["certificate"], HasSubstr("\uFFFD.lcmlog event "));
+}
+
+TEST(VerifyLog, MissingCertifiedPlanIsNoticed) {
+  ScratchDirectory scratch;
+  bool dropped = false;
+  const auto path = Edited(scratch, [&](LogEvent& event) {
+    if (dropped || !Decoded<certified_plan_t>(event.data)) return true;
+    dropped = true;
+    return false;
+  });
+  const auto whole = ReadCertificates(kLog, kConfig), file = ReadCertificates(path, kConfig);
+  EXPECT_EQ(file.certificates.size(), whole.certificates.size());
+  EXPECT_THAT(file.certificates.back().missing, HasSubstr("no certified plan"));
+}
+
+TEST(VerifyLog, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
+  ScratchDirectory scratch;
+  const auto [key, log] = SignedLog(scratch, kLog);
+  const auto is_whole = [](const RecordedCertificate& c) { return c.missing.empty() && c.mismatches.empty(); };
+  EXPECT_FALSE(std::ranges::all_of(ReadCertificates(log, kConfig).certificates, is_whole)) << "all are believed";
+  const auto whole = ReadCertificates(kLog, kConfig), file = ReadCertificates(log, kConfig, {key});
+  EXPECT_EQ(file.certificates.size(), whole.certificates.size());
+  EXPECT_TRUE(std::ranges::all_of(file.certificates, is_whole));
+  EXPECT_EQ(file.not_certificates, whole.not_certificates);
+  EXPECT_EQ(InWords(file.passed_over), "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
+  EXPECT_EQ(ReadLogs({log}, kConfig, {key}).passed_over.not_authentic.replayed, kRepeated);
+  EXPECT_THROW((void)ReadCertificates(log, kConfig, {scratch / "none"}), KeyError);
+  const Output output = Forereach("verify --json " + log + " --config " + kConfig + " --key " + key);
+  EXPECT_EQ(output.code, 0);
+  EXPECT_EQ(nlohmann::json::parse(output.text)["passed_over"]["not_authentic"]["forged"], kForged);
+}
+
+TEST(VerifyLog, WhatIsNoCertifiedPlanIsPassedOver) {
+  ScratchDirectory scratch;
+  const auto path = Edited(scratch, [](LogEvent&) { return true; });
+  {
+    EventLogWriter writer(path);
+    writer.Append(kStart, "PLAN_CERTIFIED", std::vector<std::uint8_t>{1, 2, 3});
+    ASSERT_TRUE(writer.Flush());
+  }
+  const auto file = ReadCertificates(path, kConfig);
+  EXPECT_EQ(file.certificates.size(), ReadCertificates(kLog, kConfig).certificates.size());
+  EXPECT_EQ(file.passed_over.undecodable, 1);
+}
+
+TEST(VerifyLog, DamageIsNoticed) {
+  ScratchDirectory scratch;
+  std::filesystem::copy(kLog, scratch / "damaged.lcmlog");
+  std::fstream log(scratch / "damaged.lcmlog", std::ios::in | std::ios::out | std::ios::binary);
+  log.seekp(4000);
+  log << std::string(300, 'x');
+  log.close();
+  const auto file = ReadCertificates(scratch / "damaged.lcmlog", kConfig);
+  EXPECT_TRUE(std::ranges::any_of(file.certificates,
+                                  [](const auto& c) { return !c.missing.empty() || !c.mismatches.empty(); }));
+}
+
+// ---- Obstacles that come by the bus.
+
+class VerifyObstacles : public testing::Test {
+ protected:
+  VerifyObstacles() : config_(LoadConfig(kConfig)) {
+    EventLogReader reader(kLog);
+    LogEvent event;
+    while (reader.Next(event) == LogStatus::kEvent) {
+      const auto certified = Decoded<certified_plan_t>(event.data);
+      if (!certified) continue;
+      candidate_ = certified->plan;
+      break;
+    }
+    candidate_.utime = kStart + 2;
+    candidate_.start_utime = kStart + 100'000;
+  }
+
+  [[nodiscard]] obstacles_t Message(double x, std::int64_t sequence, std::int64_t utime) const {
+    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)});
+    message.utime = utime;
+    message.sequence = sequence;
+    return message;
+  }
+
+  // Obstacles, a candidate, and what the gate says of it. `edit` changes what is written, not what is decided on.
+  std::string RecordWith(const std::function<void(decision_t&)>& edit) {
+    edit_decision_ = edit;
+    return Record();
+  }
+  std::string Record(const std::function<void(obstacles_t&, certified_plan_t&)>& edit = {}) {
+    Gate gate(config_);
+    obstacles_t obstacles = Message(80, 0, kStart);
+    EXPECT_EQ(gate.UpdateObstacles(Encode(obstacles), kStart + 1), "");
+    const auto bytes = Encode(candidate_);
+    GateAnswer answer = gate.Decide(bytes, kStart + 3);
+    EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
+    certified_plan_t certified = answer.certified.value_or(certified_plan_t{});
+    if (edit) edit(obstacles, certified);
+    if (edit_decision_) edit_decision_(answer.decision);
+    const std::string path = scratch_ / "log.lcmlog";
+    std::filesystem::remove(path);  // a writer goes on with a log that is there
+    EventLogWriter writer(path);
+    writer.Append(kStart + 1, config_.bus.obstacles, Encode(obstacles));
+    writer.Append(kStart + 3, config_.bus.candidate, bytes);
+    writer.Append(kStart + 4, config_.bus.decision, Encode(answer.decision));
+    writer.Append(kStart + 5, config_.bus.obstacles, Encode(Message(60, 1, kStart + 5)));
+    writer.Append(kStart + 6, config_.bus.certified, Encode(certified));
+    EXPECT_TRUE(writer.Flush());
+    return path;
+  }
+
+  ScratchDirectory scratch_;
+  Config config_;
+  candidate_plan_t candidate_{};
+  std::function<void(decision_t&)> edit_decision_;
+};
+
+TEST_F(VerifyObstacles, ThoseInForceAreTaken) {
+  const auto file = ReadCertificates(Record(), kConfig);
+  ASSERT_EQ(file.certificates.size(), 1u);
+  EXPECT_TRUE(file.certificates[0].mismatches.empty());
+  EXPECT_EQ(file.certificates[0].certificate.obstacles[0].points()[0][0], 80);
+  EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed);
+}
+
+TEST_F(VerifyObstacles, MovedOntoThePath) {
+  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+                                       obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
+                                       obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
+                                     }),
+                                     kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("obstacles in force"));
+  EXPECT_THAT(Judge(file, 0).failure.what, HasSubstr("clear of obstacle 0"));
+}
+
+TEST_F(VerifyObstacles, MovedOntoThePathAndResealed) {
+  const auto file =
+      ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+                         obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
+                         obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
+                         SetDigest(certified.obstacles_digest, ObstaclesDigest(FromMessage(obstacles, 2)));
+                         SetDigest(certified.certificate_digest, CertificateDigest(certified));
+                       }),
+                       kConfig);
+  for (const Mismatch& mismatch : file.certificates[0].mismatches)
+    EXPECT_THAT(mismatch.what, HasSubstr("its decision's"));
+  EXPECT_EQ(Judge(file, 0).status, Status::kRefuted);
+}
+
+// The sentence and the numbers of the decision that goes with a certified plan.
+TEST_F(VerifyObstacles, AlteredDecisionsAreRefused) {
+  const auto mismatches = [&](const std::function<void(decision_t&)>& change) {
+    const auto file = ReadCertificates(RecordWith(change), kConfig);
+    return std::pair(file.certificates.at(0).mismatches.size(), Judge(file, 0).status);
+  };
+  EXPECT_EQ(mismatches([](decision_t&) {}), std::pair(std::size_t{0}, Status::kConfirmed));
+  for (const std::function<void(decision_t&)>& change : std::initializer_list<std::function<void(decision_t&)>>{
+           [](decision_t& d) { SetText(d.message, "certified: no obstacles"); },
+           [](decision_t& d) { d.message[0] ^= 1; },
+           [](decision_t& d) { d.message[60] ^= 1; },
+           [](decision_t& d) { SetText(d.message, ""); },
+           [](decision_t& d) { d.margin *= 1.001; },
+           [](decision_t& d) { d.margin = -d.margin; },
+           [](decision_t& d) { d.margin = std::nan(""); },
+           [](decision_t& d) { d.threshold += 0.5; },
+           [](decision_t& d) { d.obstacle = -1; },
+           [](decision_t& d) { d.obstacle = 99; },
+           [](decision_t& d) { d.step = 3; },
+           [](decision_t& d) { d.cause = 4; },
+           [](decision_t& d) { d.coordinate = 0; },
+           [](decision_t& d) { d.first_observation = 0; },
+           [](decision_t& d) { d.second_observation = 7; },
+           [](decision_t& d) { d.config_digest[3] ^= 1; },
+           [](decision_t& d) { d.model_digest[3] ^= 1; },
+           [](decision_t& d) { d.declaration_digest[3] ^= 1; },
+           [](decision_t& d) { d.observations_digest[3] ^= 1; },
+           [](decision_t& d) { d.obstacles_digest[3] ^= 1; },
+           [](decision_t& d) { ++d.plan_id; },
+           [](decision_t& d) { d.source[0] ^= 1; },
+           [](decision_t& d) { ++d.candidate_utime; }})
+    EXPECT_GT(mismatches(change).first, 0u);
+  // Consistent in itself, and more than there is.
+  const auto [count, status] = mismatches([](decision_t& d) {
+    d.margin += 1;
+    char number[32];
+    std::string text(reinterpret_cast<const char*>(d.message));
+    const std::size_t end = text.find(" m from"), begin = text.rfind(' ', end - 1) + 1;
+    std::snprintf(number, sizeof number, "%.6g", d.margin - d.threshold);
+    SetText(d.message, text.replace(begin, end - begin, number));
+  });
+  EXPECT_EQ(count, 0u);
+  EXPECT_EQ(status, Status::kRefuted);
+}
+
+TEST_F(VerifyObstacles, StaleOnesWereNeverInForce) {
+  const auto file = ReadCertificates(
+      Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kConfig);
+  EXPECT_GE(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
+}
+
+}  // namespace
+}  // namespace forereach
