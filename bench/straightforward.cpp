@@ -35,7 +35,7 @@ MatrixXd WithoutZeroColumns(const MatrixXd& matrix) {
   return matrix(Eigen::all, kept);
 }
 
-MatrixXd Beside(const MatrixXd& a, const MatrixXd& b, const MatrixXd& c) {
+MatrixXd ConcatenateColumns(const MatrixXd& a, const MatrixXd& b, const MatrixXd& c) {
   MatrixXd all(a.rows(), a.cols() + b.cols() + c.cols());
   all << a, b, c;
   return all;
@@ -53,7 +53,7 @@ MatrixXd Reduce(const MatrixXd& generators, int order) {
   const std::vector<int> kept(columns.begin(), columns.begin() + (order - 1) * n);
   const std::vector<int> boxed(columns.begin() + (order - 1) * n, columns.end());
   const VectorXd box = generators(Eigen::all, boxed).cwiseAbs().rowwise().sum();
-  return Beside(generators(Eigen::all, kept), WithoutZeroColumns(box.asDiagonal()), MatrixXd(n, 0));
+  return ConcatenateColumns(generators(Eigen::all, kept), WithoutZeroColumns(box.asDiagonal()), MatrixXd(n, 0));
 }
 
 // The corners of a planar zonotope in order: its generators sorted by angle, walked once up and once down.
@@ -254,8 +254,8 @@ std::optional<PlainZonotope> Straightforward::Step(const PlainZonotope& slice, c
   VectorXd from_below, from_above;
   Envelope(query, from_below, from_above);
   const VectorXd middle = (from_above + from_below) / 2, half_width = (from_above - from_below) / 2;
-  const MatrixXd generators =
-      Beside(model_.jacobian(query.center) * query.generators, remainder.asDiagonal(), half_width.asDiagonal());
+  const MatrixXd generators = ConcatenateColumns(model_.jacobian(query.center) * query.generators,
+                                                 remainder.asDiagonal(), half_width.asDiagonal());
   return PlainZonotope{model_.value(query.center) + middle,
                        Reduce(WithoutZeroColumns(generators), problem_->zonotope_order)};
 }

@@ -34,7 +34,7 @@ Latencies Measure(Scenario scenario, int observations, int calls) {
 }
 
 // What the clock itself adds to each latency.
-Latencies Clock(int calls) {
+Latencies MeasureClock(int calls) {
   Latencies latencies(static_cast<std::size_t>(calls));
   for (int call = 0; call < calls; ++call) latencies.Add(MicrosecondsSince(std::chrono::steady_clock::now()));
   return latencies;
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   std::cout << nlohmann::json{{"observations", observations},
                               {"bicycle", Measure(Scenario::kBicycle, observations, calls).ToJson()},
-                              {"clock", Clock(calls).ToJson()}}
+                              {"clock", MeasureClock(calls).ToJson()}}
                    .dump(2)
             << std::endl;
 }

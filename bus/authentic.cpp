@@ -174,7 +174,7 @@ Authenticator::Authenticator(KeyRing keys, const std::optional<std::string>& bus
 }
 
 std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, Bytes bytes) {
-  const Authenticity authenticity = Judge(channel, bytes);
+  const Authenticity authenticity = Classify(channel, bytes);
   switch (authenticity) {
     case Authenticity::kAuthentic: return {authenticity, WithoutSignature(bytes)};
     case Authenticity::kUnsigned: ++refusals_.unsigned_ones; break;
@@ -186,7 +186,7 @@ std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, 
 }
 
 // From cheap to dear: whoever is refused early costs little.
-Authenticity Authenticator::Judge(const std::string& name, Bytes bytes) {
+Authenticity Authenticator::Classify(const std::string& name, Bytes bytes) {
   if (!HasTrailer(bytes)) return Authenticity::kUnsigned;
   const auto found = channels_.find(name);
   if (found == channels_.end()) return Authenticity::kForged;

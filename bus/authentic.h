@@ -130,7 +130,7 @@ class Authenticator final {
     int tries = 0;  // signatures found wrong
   };
 
-  [[nodiscard]] Authenticity Judge(const std::string& channel, Bytes bytes);
+  [[nodiscard]] Authenticity Classify(const std::string& channel, Bytes bytes);
   [[nodiscard]] static bool IsFresh(const Channel& channel, const Trailer& trailer);
   [[nodiscard]] static bool Take(Channel& channel, const Trailer& trailer);
   [[nodiscard]] bool IsDoubted(const GroupTag& tag) const;

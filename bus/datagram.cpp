@@ -44,7 +44,7 @@ void DatagramCounts::Count(DatagramKind kind) {
   }
 }
 
-std::string RefusedInWords(const DatagramCounts& counts) {
+std::string DescribeRefused(const DatagramCounts& counts) {
   std::string words;
   const auto add = [&words](std::int64_t count, const char* what) {
     if (count > 0) words += (words.empty() ? "" : ", ") + std::to_string(count) + " " + what;

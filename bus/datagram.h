@@ -5,7 +5,7 @@ LCM's short message is accepted:
 
 LCM splits a message that does not fit one datagram into fragments, "LC03". To join fragments, a receiver has to
 allocate the size that the sender claims. Every message of ForeReach fits one datagram, so fragments are refused. These
-functions do not allocate or throw, except RefusedInWords. */
+functions do not allocate or throw, except DescribeRefused. */
 #pragma once
 
 #include <cstddef>
@@ -65,6 +65,6 @@ struct DatagramCounts {
 
 /** The refused datagrams as text, for example "3 fragments, 1 without the end of its channel's name". Empty if there
  * are none. */
-[[nodiscard]] std::string RefusedInWords(const DatagramCounts& counts);
+[[nodiscard]] std::string DescribeRefused(const DatagramCounts& counts);
 
 }  // namespace forereach

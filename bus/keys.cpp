@@ -24,15 +24,15 @@ constexpr std::string_view kKeyFormat = "forereach-key-2", kVerifyFormat = "fore
 constexpr std::size_t kMaxName = 64, kMaxFileBytes = 2048;
 constexpr std::string_view kNameSigns = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-";
 
-using Key = std::array<std::uint8_t, 32>;
-static_assert(sizeof(Key) == crypto_sign_SEEDBYTES && sizeof(Key) == crypto_generichash_KEYBYTES);
+using SecretKey = std::array<std::uint8_t, 32>;
+static_assert(sizeof(SecretKey) == crypto_sign_SEEDBYTES && sizeof(SecretKey) == crypto_generichash_KEYBYTES);
 static_assert(sizeof(PublicKey) == crypto_sign_PUBLICKEYBYTES && sizeof(Signature) == crypto_sign_BYTES);
 static_assert(sizeof(GroupTag) == crypto_generichash_BYTES_MIN);
 
 struct Secrets {
-  std::array<Key, kAllRoles.size()> seed;
+  std::array<SecretKey, kAllRoles.size()> seed;
   std::array<std::array<std::uint8_t, crypto_sign_SECRETKEYBYTES>, kAllRoles.size()> key;  // made of the seeds
-  Key group;
+  SecretKey group;
 };
 
 std::size_t At(Role role) { return static_cast<std::size_t>(role) - 1; }
@@ -68,8 +68,8 @@ class SecretText final {
     Append(value);
     Append("\n");
   }
-  void AppendLine(std::string_view field, const Key& key) {
-    std::array<char, 2 * sizeof(Key) + 1> hex;
+  void AppendLine(std::string_view field, const SecretKey& key) {
+    std::array<char, 2 * sizeof(SecretKey) + 1> hex;
     sodium_bin2hex(hex.data(), hex.size(), key.data(), key.size());
     AppendLine(field, std::string_view(hex.data(), hex.size() - 1));
     sodium_memzero(hex.data(), hex.size());
@@ -112,7 +112,7 @@ struct KeyRing::Content {
   Content(const Content&) = delete;
   Content& operator=(const Content&) = delete;
 
-  void Hold(Role role, const Key& seed) {
+  void Hold(Role role, const SecretKey& seed) {
     const std::size_t i = At(role);
     secrets->seed[i] = seed;
     crypto_sign_seed_keypair(public_keys[i].data(), secrets->key[i].data(), secrets->seed[i].data());
@@ -153,7 +153,7 @@ bool KeyRing::IsSigned(Role role, Bytes bytes, const Signature& signature) const
 GroupTag KeyRing::Tag(Bytes bytes) const {
   if (!HoldsGroup()) throw std::logic_error("KeyRing: the group key is not held");
   GroupTag tag;
-  const Key& group = content_->secrets->group;
+  const SecretKey& group = content_->secrets->group;
   crypto_generichash(tag.data(), tag.size(), bytes.data(), bytes.size(), group.data(), group.size());
   return tag;
 }
@@ -172,11 +172,11 @@ std::shared_ptr<KeyRing::Content> MakeContent(const std::string& robot, const Di
   RequireName(what, "", robot);
   auto content = std::make_shared<KeyRing::Content>();
   content->robot = robot;
-  const auto derive = [&](std::string_view purpose, Key& key) {
+  const auto derive = [&](std::string_view purpose, SecretKey& key) {
     crypto_generichash(key.data(), key.size(), reinterpret_cast<const std::uint8_t*>(purpose.data()), purpose.size(),
                        entropy.data(), entropy.size());
   };
-  Key seed;
+  SecretKey seed;
   for (const Role role : kAllRoles) {
     derive(RoleName(role), seed);
     content->Hold(role, seed);
@@ -219,11 +219,11 @@ class LineReader final {
     if (!line.starts_with(field + " ")) Complain("has to begin with \"" + field + " \"");
     return line.substr(field.size() + 1);
   }
-  [[nodiscard]] Key KeyOf(const std::string& field) {
+  [[nodiscard]] SecretKey KeyOf(const std::string& field) {
     const std::string_view hex = Value(field);
-    Key key{};
+    SecretKey key{};
     std::size_t bytes = 0;
-    const bool plain = hex.size() == 2 * sizeof(Key) && hex.find_first_not_of("0123456789abcdef") == hex.npos;
+    const bool plain = hex.size() == 2 * sizeof(SecretKey) && hex.find_first_not_of("0123456789abcdef") == hex.npos;
     if (!plain || sodium_hex2bin(key.data(), key.size(), hex.data(), hex.size(), nullptr, &bytes, nullptr) != 0 ||
         bytes != key.size())
       Complain(field + ": has to be 64 lower-case hexadecimal digits");
@@ -286,7 +286,7 @@ KeyFile Parse(const std::string& path, std::string_view text) {
   file.content->robot = robot;
   if (format == kKeyFormat) {
     file.role = ReadRole(reader);
-    Key seed = reader.KeyOf("secret");
+    SecretKey seed = reader.KeyOf("secret");
     file.content->Hold(*file.role, seed);
     sodium_memzero(seed.data(), seed.size());
     file.content->secrets->group = reader.KeyOf("group");
@@ -410,7 +410,7 @@ KeyRing LoadAllKeys(const std::string& directory) {
       all->public_keys = one.public_keys;
       all->secrets->group = one.secrets->group;
     } else if (all->robot != one.robot || all->public_keys != one.public_keys ||
-               sodium_memcmp(all->secrets->group.data(), one.secrets->group.data(), sizeof(Key)) != 0) {
+               sodium_memcmp(all->secrets->group.data(), one.secrets->group.data(), sizeof(SecretKey)) != 0) {
       Fail(path, "belongs to other keys than " + FileOf(kAllRoles.front()) + " beside it");
     }
     all->Hold(role, one.secrets->seed[At(role)]);

@@ -70,8 +70,8 @@ bool IsFree(const Config& config, std::size_t parameter) {
 
 constexpr int kDigits = 10;  // of a bound
 
-std::string BoxInWords(const std::vector<Interval>& box, const std::vector<std::string>& names,
-                       const std::function<bool(std::size_t)>& counts) {
+std::string BoxText(const std::vector<Interval>& box, const std::vector<std::string>& names,
+                    const std::function<bool(std::size_t)>& counts) {
   std::string text;
   for (std::size_t i = 0; i < box.size(); ++i)
     if (counts(i))
@@ -89,11 +89,11 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
       throw std::runtime_error(
           "no finite bound for the slope of " + names[static_cast<std::size_t>(bound.row)] + " by " +
           names[static_cast<std::size_t>(bound.column)] + ": " + config.residual->name + " has none over " +
-          BoxInWords(bound.unbounded, names,
-                     [&](std::size_t i) {
-                       return slopes.Occurs(bound.row, static_cast<int>(i)) &&
-                              (i < parameters_begin || IsFree(config, i - parameters_begin));
-                     }) +
+          BoxText(bound.unbounded, names,
+                  [&](std::size_t i) {
+                    return slopes.Occurs(bound.row, static_cast<int>(i)) &&
+                           (i < parameters_begin || IsFree(config, i - parameters_begin));
+                  }) +
           ", found after " + std::to_string(bound.boxes) + " boxes; take this box out of `domain` in " + config.path +
           " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, or raise --max-boxes "
           "if the box is wide");

@@ -36,7 +36,7 @@ std::string Quoted(const std::string& word) {
   return quoted + "'";
 }
 
-std::string InWords(const Eigen::VectorXd& position) {
+std::string PositionText(const Eigen::VectorXd& position) {
   std::ostringstream text;
   text.precision(4);
   for (Eigen::Index k = 0; k < position.size(); ++k) text << (k == 0 ? "(" : ", ") << position(k);
@@ -66,7 +66,7 @@ int MakePlan(const Options& options) {
   const auto& goal = config.planner.goal;
   const double away = (plan.end - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm();
   std::cout << options.out << ": " << plan.controls.cols() << " steps, the last "
-            << plan.controls.cols() - plan.progress_steps << " brake to a stand at about " << InWords(plan.end)
+            << plan.controls.cols() - plan.progress_steps << " brake to a stand at about " << PositionText(plan.end)
             << "\n  " << Explain(plan.decision, *config.problem) << "\n";
   if (!plan.reaches_goal)
     std::cout << "  The goal is " << away

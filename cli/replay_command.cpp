@@ -43,7 +43,7 @@ int RunReplay(const Options& options) {
       std::cout << ", " << result.circumstances
                 << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";
     if (result.corruptions > 0) std::cout << "; the log is damaged in " << result.corruptions << " places";
-    std::cout << InWords(result.passed_over) << std::endl;
+    std::cout << DescribePassedOver(result.passed_over) << std::endl;
   }
   return result.differences.empty() && result.corruptions == 0 && result.candidates > 0 ? 0 : 1;
 }

@@ -66,7 +66,7 @@ Summary Count(const std::vector<Verdict>& verdicts) {
   return summary;
 }
 
-std::string InWords(const RecordedCertificate& recorded, const Verdict& verdict) {
+std::string DescribeVerdict(const RecordedCertificate& recorded, const Verdict& verdict) {
   std::ostringstream text;
   text << (verdict.status == Status::kRefuted ? "refuted: " : "cannot verify: ") << Printable(recorded.name) << "\n";
   for (const Mismatch& mismatch : recorded.mismatches)
@@ -133,14 +133,14 @@ std::string Extent(const CertificateFile& file) {
 void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& verdicts, const Summary& summary) {
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i].status == Status::kConfirmed) continue;
-    std::cout << PrintableLines(InWords(file.certificates[i], verdicts[i]));
+    std::cout << PrintableLines(DescribeVerdict(file.certificates[i], verdicts[i]));
     break;
   }
   std::cout << "verify: " << verdicts.size() << " certificates, " << summary.confirmed << " confirmed, "
             << summary.refuted << " refuted, " << summary.cannot_verify << " cannot be verified";
   if (file.not_certificates > 0)
     std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
-  std::cout << InWords(file.passed_over) << "\n" << Extent(file) << std::endl;
+  std::cout << DescribePassedOver(file.passed_over) << "\n" << Extent(file) << std::endl;
 }
 
 int Verify(const Options& options) {

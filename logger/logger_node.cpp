@@ -93,7 +93,7 @@ void LoggerNode::Drain(std::int64_t now_us) {
 void LoggerNode::SendStatus(std::int64_t now_us, std::int64_t queue_depth) {
   heartbeat_.Start(now_us);
   const std::string trouble = recorder_.trouble(), silence = Silence(now_us);
-  const std::string refused = InWords(refusals());
+  const std::string refused = DescribeRefusals(refusals());
   logger_status_t status{};
   status.utime = now_us;
   status.sequence = heartbeats_++;
@@ -132,7 +132,7 @@ void LoggerNode::Stop() {
   if (recorder_.files() > 1) out_ << ", the last of " << recorder_.files();
   out_ << "\ndatabase                  " << recorder_.database_path() << "\n" << ToText(recorder_.summary());
   if (!recorder_.gone().empty()) out_ << "gone                      " << recorder_.gone() << "\n";
-  const std::string refused = InWords(refusals());
+  const std::string refused = DescribeRefusals(refusals());
   if (!refused.empty()) out_ << "not authentic             " << refused << ", in no row\n";
   out_ << std::flush;
 }

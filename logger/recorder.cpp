@@ -40,7 +40,7 @@ void Count(std::map<std::string, std::int64_t>& counts, const std::string& chann
   counts[counts.size() < kMaxChannels || counts.contains(channel) ? channel : "*"] += events;
 }
 
-const char* InWords(FilePlace place) {
+const char* DescribePlace(FilePlace place) {
   switch (place) {
     case FilePlace::kDeleted: return "was deleted or replaced";
     case FilePlace::kElsewhere: return "was moved";
@@ -404,8 +404,8 @@ void Recorder::GiveUpLog(FilePlace place, std::int64_t now_us) {
     if (lost > 0) CountLoss({channel, ""}, lost, now_us, "gone");
     events += lost;
   }
-  if (events > 0) gone_ = fmt::format("{} {}, {} confirmed events are gone", log_file_, InWords(place), events);
-  spdlog::error("{} {} while it was written: {} confirmed events are gone", log_path_, InWords(place), events);
+  if (events > 0) gone_ = fmt::format("{} {}, {} confirmed events are gone", log_file_, DescribePlace(place), events);
+  spdlog::error("{} {} while it was written: {} confirmed events are gone", log_path_, DescribePlace(place), events);
 }
 
 // Those for the quota are not among them.

@@ -54,7 +54,7 @@ LogCheck Check(Database& database, const LogDirectory& directory, const RunRow& 
   return check;
 }
 
-std::string InWords(const LogCheck& check) {
+std::string DescribeCheck(const LogCheck& check) {
   if (check.log == LogCheck::Log::kDeleted)
     return fmt::format("deleted for the quota, {} events of rows went with it", check.missing.size());
   if (check.log == LogCheck::Log::kMissing) return fmt::format("missing, {} rows have no event", check.missing.size());
@@ -112,7 +112,7 @@ std::vector<LogCheck> CheckLogs(const std::string& path) {
 std::string ToText(const std::vector<LogCheck>& checks) {
   std::string text;
   for (const LogCheck& check : checks) {
-    text += fmt::format("{}: {}\n", Printable(check.log_file), InWords(check));
+    text += fmt::format("{}: {}\n", Printable(check.log_file), DescribeCheck(check));
     if (check.log != LogCheck::Log::kThere) continue;
     List(text, check.changed, "changed");
     List(text, check.missing, "missing");

@@ -19,7 +19,7 @@ bool LogAuthenticator::IsAuthentic(const LogEvent& event) {
   return authenticator_->Check(event.channel, event.data).first == Authenticity::kAuthentic;
 }
 
-std::string InWords(const Refusals& refusals) {
+std::string DescribeRefusals(const Refusals& refusals) {
   if (refusals.all() == 0) return "";
   return fmt::format("{} (unsigned {}, forged {}, replayed {}{})", refusals.all(), refusals.unsigned_ones,
                      refusals.forged, refusals.replayed,

@@ -34,6 +34,6 @@ class LogAuthenticator final {
 };
 
 /** "3 (unsigned 1, forged 1, replayed 1)"; empty if there are none. */
-[[nodiscard]] std::string InWords(const Refusals& refusals);
+[[nodiscard]] std::string DescribeRefusals(const Refusals& refusals);
 
 }  // namespace forereach

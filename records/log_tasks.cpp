@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kMaxNamed = 4;
 
 // The digests of the survey, with how many decisions carry each and where its task is kept.
-std::string InWords(const LogSurvey& survey, const KeptTasks& kept) {
+std::string DescribeTask(const LogSurvey& survey, const KeptTasks& kept) {
   std::string text;
   for (std::size_t i = 0; i < std::min(survey.order.size(), kMaxNamed); ++i) {
     const Digest& digest = survey.order[i];
@@ -38,7 +38,7 @@ std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, co
   }
   if (task && !survey.configs.contains(task->digest))
     throw ConfigError(given + ": is not the task that " + logs + " was recorded with: its config digest is " +
-                      ToHex(task->digest) + ", the log has " + InWords(survey, kept) +
+                      ToHex(task->digest) + ", the log has " + DescribeTask(survey, kept) +
                       "; a task that is kept is found without --config");
   std::vector<Config> tasks;
   for (const Digest& digest : survey.order)
@@ -48,7 +48,7 @@ std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, co
       tasks.push_back(std::move(*found));
   if (tasks.empty())
     throw ConfigError(logs + ": its task is not kept beside it; name it with --config FILE: its config digest is " +
-                      InWords(survey, kept));
+                      DescribeTask(survey, kept));
   return tasks;
 }
 

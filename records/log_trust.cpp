@@ -20,8 +20,8 @@ void LogKey::Override(std::vector<Config>& tasks, const std::string& given) cons
   }
 }
 
-std::string InWords(const PassedOver& passed_over) {
-  const std::string refused = InWords(passed_over.not_authentic);
+std::string DescribePassedOver(const PassedOver& passed_over) {
+  const std::string refused = DescribeRefusals(passed_over.not_authentic);
   std::string text;
   if (!refused.empty()) text += "; not authentic and passed over: " + refused;
   if (passed_over.undecodable > 0)

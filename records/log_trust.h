@@ -30,7 +30,7 @@ struct PassedOver {
 };
 
 /** As the end of a sentence, empty if nothing was. */
-[[nodiscard]] std::string InWords(const PassedOver& passed_over);
+[[nodiscard]] std::string DescribePassedOver(const PassedOver& passed_over);
 [[nodiscard]] nlohmann::json ToJson(const PassedOver& passed_over);
 
 }  // namespace forereach

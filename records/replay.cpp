@@ -20,7 +20,7 @@
 namespace forereach {
 namespace {
 
-std::string InWords(const decision_t& decision) {
+std::string DescribeDecision(const decision_t& decision) {
   std::string text(OutcomeName(decision.outcome));
   text += ", cause " + std::string(CauseName(decision.cause));
   return text + ", step " + std::to_string(decision.step);
@@ -29,7 +29,7 @@ std::string InWords(const decision_t& decision) {
 // Empty if they agree.
 std::string Difference(const decision_t& recorded, const decision_t& replayed) {
   if (recorded.outcome != replayed.outcome || recorded.cause != replayed.cause || recorded.step != replayed.step)
-    return "recorded " + InWords(recorded) + "; replayed " + InWords(replayed);
+    return "recorded " + DescribeDecision(recorded) + "; replayed " + DescribeDecision(replayed);
   const auto differs = [](const auto& a, const auto& b) { return GetDigest(a) != GetDigest(b); };
   if (differs(recorded.config_digest, replayed.config_digest)) return "another config";
   if (differs(recorded.model_digest, replayed.model_digest)) return "another model";

@@ -235,7 +235,7 @@ std::string TitleOf(const Config& config) {
   return name + ": certified tubes and the driven path";
 }
 
-std::string InWords(double microseconds) {
+std::string DurationText(double microseconds) {
   return microseconds < 1000 ? fmt::format("{:.0f} \u00b5s", microseconds)
                              : fmt::format("{:.1f} ms", microseconds / 1000);
 }
@@ -254,8 +254,8 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
   add(abstained("obstacle"), "abstained S");
   if (summary.latency_us.WasMeasured())
-    numbers.push_back(
-        fmt::format("decided in {} (p50), {} (p99)", InWords(summary.latency_us.p50), InWords(summary.latency_us.p99)));
+    numbers.push_back(fmt::format("decided in {} (p50), {} (p99)", DurationText(summary.latency_us.p50),
+                                  DurationText(summary.latency_us.p99)));
   numbers.push_back(
       fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
   numbers.push_back(fmt::format("{} contacts", summary.contacts));

@@ -44,7 +44,7 @@ class DatagramWatch final : public Node {
     if (amiss == std::exchange(said_, amiss)) return false;
     spdlog::warn(
         "from the network, since the start: {} datagrams refused{}{}; {} lost to a full receive buffer; {} errors",
-        counts.refused(), counts.refused() > 0 ? ": " : "", RefusedInWords(counts), counts.lost_by_kernel,
+        counts.refused(), counts.refused() > 0 ? ": " : "", DescribeRefused(counts), counts.lost_by_kernel,
         counts.receive_errors);
     return true;
   }

@@ -110,7 +110,7 @@ TEST_F(DiskTest, CountsGoOnFromFileToFile) {
 }
 
 /** Every row in words, so that sets of them can be compared. */
-std::vector<std::string> InWords(const Rows& rows) {
+std::vector<std::string> RowTexts(const Rows& rows) {
   std::vector<std::string> words;
   const auto reference = [](const LogReference& event) {
     return event.log_file + " " + std::to_string(event.event_number) + " " + event.digest + " ";
@@ -140,14 +140,14 @@ TEST_F(DiskTest, RowsMadeAgainAreTheSame) {
     bus_.Publish("PLAN_DECISION", MakeDecision(candidate, i, decision_t::CERTIFIED, 0));
   }
   Stop();
-  const std::vector<std::string> live = InWords(ReadRows());
+  const std::vector<std::string> live = RowTexts(ReadRows());
   EXPECT_GT(Runs().size(), 10u);
   EXPECT_EQ(live.size(), 120 + ReadRows().gaps.size());
 
   Sql("DELETE FROM decisions; DELETE FROM execution_events; DELETE FROM gaps;"
       "UPDATE runs SET end_utime = NULL, events = 0");
   { const LoggerNode recovery(config_, bus_, out_); }
-  EXPECT_EQ(InWords(ReadRows()), live);
+  EXPECT_EQ(RowTexts(ReadRows()), live);
 }
 
 // As after a power cut that took the database's last words, or the database.
@@ -157,7 +157,7 @@ TEST_F(DiskTest, ALogThatNoRunKnowsIsTakenAndItsRowsAreMade) {
   Feed(25);
   Stop();
   const std::vector<RunRow> before = Runs();
-  const std::vector<std::string> live = InWords(ReadRows());
+  const std::vector<std::string> live = RowTexts(ReadRows());
   Sql("DELETE FROM execution_events; DELETE FROM runs");
   const std::string old_name = "events-20231114-221319.lcmlog";
   std::filesystem::copy(PathOf(before[0]), scratch_ / ("log/" + old_name));
@@ -174,7 +174,7 @@ TEST_F(DiskTest, ALogThatNoRunKnowsIsTakenAndItsRowsAreMade) {
   }
   EXPECT_EQ(ReadRows().events.size(), 35u);
   Sql(("DELETE FROM execution_events WHERE log_file = '" + old_name + "'").c_str());
-  EXPECT_EQ(InWords(ReadRows()), live);
+  EXPECT_EQ(RowTexts(ReadRows()), live);
   EXPECT_EQ(std::filesystem::file_size(scratch_ / "log/stray.lcmlog"), 3u);
 }
 

@@ -106,14 +106,14 @@ TEST(DatagramTest, RefusedOnesAreCountedByTheirCauseAndSaid) {
   DatagramCounts counts;
   counts.Count(DatagramKind::kMessage);
   EXPECT_EQ(counts.refused(), 0);
-  EXPECT_EQ(RefusedInWords(counts), "");
+  EXPECT_EQ(DescribeRefused(counts), "");
   for (const DatagramKind kind : {DatagramKind::kTooShort, DatagramKind::kNotLcm, DatagramKind::kFragment,
                                   DatagramKind::kFragment, DatagramKind::kUnterminatedName, DatagramKind::kBadName})
     counts.Count(kind);
   counts.truncated = 1;
   EXPECT_EQ(counts.messages, 1);
   EXPECT_EQ(counts.refused(), 7);
-  const std::string words = RefusedInWords(counts);
+  const std::string words = DescribeRefused(counts);
   for (const char* part :
        {"2 fragments", "1 not of LCM", "1 too short", "1 without the end", "1 with a channel's name", "1 truncated"})
     EXPECT_THAT(words, HasSubstr(part));

@@ -259,7 +259,7 @@ TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   Config config = LoadConfig(kConfig);
   const ReplayResult before = Replay({kLog}, config), believed = Replay({log}, config);
   EXPECT_EQ(believed.differences.size(), 4u) << "three undecided candidates, an altered certificate";
-  EXPECT_EQ(InWords(believed.passed_over), "");
+  EXPECT_EQ(DescribePassedOver(believed.passed_over), "");
   config.bus.key = key;
   const ReplayResult result = Replay({log}, config);
   EXPECT_THAT(result.differences, testing::IsEmpty());
@@ -268,7 +268,8 @@ TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   EXPECT_EQ(result.passed_over.not_authentic.unsigned_ones, kUnsigned);
   EXPECT_EQ(result.passed_over.not_authentic.forged, kForged);
   EXPECT_EQ(result.passed_over.not_authentic.replayed, kRepeated);
-  EXPECT_EQ(InWords(result.passed_over), "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
+  EXPECT_EQ(DescribePassedOver(result.passed_over),
+            "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
   config.bus.key = scratch / "none";
   EXPECT_THROW((void)Replay({log}, config), KeyError);
 }
@@ -293,7 +294,7 @@ TEST_F(ReplayTest, WhatIsNoCertifiedPlanIsPassedOver) {
   });
   const ReplayResult result = Replay({path}, LoadConfig(kConfig));
   EXPECT_THAT(result.differences, testing::IsEmpty());
-  EXPECT_EQ(InWords(result.passed_over), "; no certified plan and passed over: 1");
+  EXPECT_EQ(DescribePassedOver(result.passed_over), "; no certified plan and passed over: 1");
 }
 
 TEST_F(ReplayTest, AnotherTaskIsNoticed) {
