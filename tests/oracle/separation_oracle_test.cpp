@@ -392,6 +392,37 @@ TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
 }
 
 // The normal of a generator whose squares underflow is no unit vector.
+// Hulls that reach to the boundary up to a few roundings.
+TEST(HalfSpaceSeparation, OfHullsNextToItIsNeverWronglyProven) {
+  Random random(711);
+  SCOPED_TRACE(random.trace());
+  int proven = 0;
+  for (int trial = 0; trial < 5000; ++trial) {
+    const int p = random.Integer(1, 3);
+    const Eigen::VectorXd normal = random.Vector(p, std::ldexp(1, random.Integer(-10, 10)));
+    forereach::Hull hull{};
+    Rational reach = 0, square = 0;
+    for (int k = 0; k < p; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      hull.center[i] = random.Uniform(-1, 1) * std::ldexp(1, random.Integer(-10, 30));
+      hull.half_width[i] = random.Coin() ? 0 : random.Uniform(0, 1);
+      reach += Rational(normal[k]) * Rational(hull.center[i]) + abs(Rational(normal[k])) * Rational(hull.half_width[i]);
+      square += Rational(normal[k]) * Rational(normal[k]);
+    }
+    double offset = exact::Floor(reach);
+    for (int ulps = random.Integer(-1, 20); ulps != 0; ulps -= ulps > 0 ? 1 : -1)
+      offset = ulps > 0 ? NextUp(offset) : NextDown(offset);
+    if (random.Coin(0.2)) offset += std::abs(offset) * 1e-12;
+    const Separation s = SeparateHulls(hull, Obstacle::HalfSpace(normal, offset));
+    if (!s.IsProven()) continue;
+    const Rational gap = Rational(offset) - reach;
+    ASSERT_GT(gap, 0) << "trial " << trial;
+    ASSERT_LE(Rational(s.distance) * Rational(s.distance) * square, gap * gap) << "trial " << trial;
+    ++proven;
+  }
+  EXPECT_GT(proven, 500);
+}
+
 TEST(PlanarSeparation, TinyGeneratorsProveNothingWrong) {
   for (const double tiny : {1.22 * 0x1p-537, 0x1p-538, 0x1p-600, 0x1p-1074}) {
     const Zonotope slice(Eigen::Vector2d::Zero(), Eigen::Vector2d(tiny, 0));

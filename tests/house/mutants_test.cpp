@@ -1,0 +1,101 @@
+// scripts/mutants --check: the list of mutations fits the tree, and the script sees where one does not.
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include "tests/scratch.h"
+
+namespace {
+
+using testing::HasSubstr;
+
+struct Result {
+  int exit_code;
+  std::string output;  // standard output and error
+};
+
+Result Check(const std::string& root) {
+  std::FILE* pipe =
+      popen(("'" FOREREACH_SOURCE_DIR "/scripts/mutants' --check --root '" + root + "' 2>&1").c_str(), "r");
+  if (!pipe) return {-1, "cannot run the script"};
+  std::string output;
+  std::array<char, 4096> buffer;
+  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), size);
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
+}
+
+// A small tree with one mutant, which fits.
+class MutantsTest : public testing::Test {
+ protected:
+  MutantsTest() {
+    Write("sum.cpp", "int Sum(int a, int b) { return a + b; }\n");
+    Write("tests/CMakeLists.txt", "forereach_test(sum_test SOURCES sum_test.cpp)\n");
+    Write("tests/sum_test.cpp", "TEST(Sum, Adds) {}\n");
+    WriteMutant();
+  }
+
+  void Write(const std::string& file, const std::string& text) {
+    std::filesystem::create_directories((root_ / file).parent_path());
+    std::ofstream(root_ / file) << text;
+  }
+  void WriteMutant(const std::string& text = "a + b", const std::string& test = "sum_test Sum.*",
+                   const std::string& file = "sum.cpp") {
+    Write("tests/mutants/all.toml", "[[mutant]]\nname = 'subtracts'\nfile = '" + file + "'\ntext = '" + text +
+                                        "'\nbecomes = 'a - b'\ntests = ['" + test + "']\n");
+  }
+  void ExpectFault(const std::string& what) const {
+    const auto [exit_code, output] = Check(root_.string());
+    EXPECT_EQ(exit_code, 1);
+    EXPECT_THAT(output, HasSubstr("subtracts: " + what));
+  }
+
+ private:
+  const forereach::ScratchDirectory scratch_;
+  const std::filesystem::path root_ = scratch_.path();
+};
+
+TEST(Mutants, TheListFitsTheTree) {
+  const auto [exit_code, output] = Check(FOREREACH_SOURCE_DIR);
+  EXPECT_EQ(exit_code, 0) << output;
+}
+
+TEST_F(MutantsTest, ATextThatIsGoneIsNamed) {
+  WriteMutant("a * b");
+  ExpectFault("its text occurs 0 times in sum.cpp");
+}
+
+TEST_F(MutantsTest, ATextThatOccursTwiceIsNamed) {
+  Write("sum.cpp", "int x = a + b, y = a + b;\n");
+  ExpectFault("its text occurs 2 times in sum.cpp");
+}
+
+TEST_F(MutantsTest, AFileThatIsGoneIsNamed) {
+  WriteMutant("a + b", "sum_test Sum.*", "total.cpp");
+  ExpectFault("there is no file total.cpp");
+}
+
+TEST_F(MutantsTest, ATestThatIsGoneIsNamed) {
+  WriteMutant("a + b", "sum_test Total.*");
+  ExpectFault("no test matches 'Total.*'");
+}
+
+TEST_F(MutantsTest, AProgramThatIsGoneIsNamed) {
+  WriteMutant("a + b", "total_test Sum.*");
+  ExpectFault("no test program is named total_test");
+}
+
+TEST_F(MutantsTest, AMutantThatChangesNothingIsNamed) {
+  WriteMutant("a - b");
+  Write("sum.cpp", "int Sum(int a, int b) { return a - b; }\n");
+  ExpectFault("changes nothing");
+}
+
+}  // namespace
