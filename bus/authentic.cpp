@@ -52,7 +52,7 @@ bool HasTrailer(Bytes bytes) {
          std::memcmp(bytes.data() + bytes.size() - kMark.size(), kMark.data(), kMark.size()) == 0;
 }
 
-// bus, sender and counter as they stand in the trailer.
+// bus, sender and counter in the form of the trailer.
 using Numbers = std::array<std::uint8_t, 3 * kNumberBytes>;
 
 Numbers NumbersOf(const BusId& bus, std::uint64_t sender, std::int64_t counter) {
@@ -220,7 +220,7 @@ bool Authenticator::Take(Channel& channel, const Trailer& trailer) {
     known->second = trailer.counter();
     return true;
   }
-  if (last.size() >= kMaxSenders) {  // what is forgotten must not be taken a second time
+  if (last.size() >= kMaxSenders) {  // counters of a forgotten sender must not be accepted again
     const auto lowest = std::ranges::min_element(last, {}, [](const auto& sender) { return sender.second; });
     channel.oldest = std::max(channel.oldest, lowest->second);
     last.erase(lowest);

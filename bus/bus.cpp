@@ -82,7 +82,7 @@ class MemoryBus final : public InboxBus {
   std::deque<Sent> sent_;
 };
 
-// LCM sends, and nothing else: an lcm_t through which nobody subscribes opens no receiving side.
+// LCM only sends: an lcm_t without subscriptions opens no receiving socket.
 class MulticastBus final : public InboxBus {
  public:
   MulticastBus(const MulticastUrl& url, std::shared_ptr<Screen> screen)

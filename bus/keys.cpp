@@ -213,7 +213,7 @@ class LineReader final {
     rest_.remove_prefix(end + 1);
     return line;
   }
-  // What stands behind `field` and a space.
+  // The text after `field` and a space.
   [[nodiscard]] std::string_view Value(const std::string& field) {
     const std::string_view line = Line();
     if (!line.starts_with(field + " ")) Complain("has to begin with \"" + field + " \"");
@@ -302,7 +302,7 @@ bool IsDirectory(const std::string& path) {
   return ::stat(path.c_str(), &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-// Of a file, which is looked at once it is open: what was looked at is what is read.
+// Checks the open file, so that the checked file is the one that is read.
 KeyFile Load(const std::string& path) {
   RequireSodium(path);
   const File file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
@@ -326,7 +326,7 @@ KeyFile Load(const std::string& path) {
 // A new file of the directory, on the disk.
 void WriteNew(int directory, const std::string& path, const std::string& name, mode_t mode, std::string_view text) {
   const File file(::openat(directory, name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
-  errno = file.get() < 0 ? errno : ENOSPC;  // what a short write means
+  errno = file.get() < 0 ? errno : ENOSPC;  // a short write means a full disk
   if (file.get() < 0 || ::fchmod(file.get(), mode) != 0 ||
       ::write(file.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()) || ::fsync(file.get()) != 0)
     FailSystem(path + "/" + name, "cannot be written");

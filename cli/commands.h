@@ -7,9 +7,9 @@
 
 namespace forereach {
 
-/** What commands say of their LOG arguments. */
+/** The help text for LOG arguments. */
 inline constexpr const char* kLogs = "LCM event log; several if the run was recorded in several, in their order";
-/** What they say of --config. */
+/** The help text for --config. */
 inline constexpr const char* kTaskOfLogs =
     "The task file it was recorded with; by default the one that the logger kept beside the log, in tasks/";
 

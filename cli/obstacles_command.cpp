@@ -21,7 +21,7 @@ struct Options {
   std::optional<double> period_ms;
 };
 
-// Stands in for perception: it sees what a task file says.
+// Replaces perception: it sends the obstacles of a task file.
 class ObstaclesNode final : public Node {
  public:
   ObstaclesNode(const Config& config, Bus& bus, std::int64_t period_us)

@@ -23,7 +23,7 @@ void Deliver(Bus& bus) {
   }
 }
 
-// All four nodes in this thread. Time is simulated: it stands still while somebody computes, so the run is the same on
+// All four nodes in this thread. Time is simulated and does not advance during computations, so the run is the same on
 // every machine.
 int Run(const Options& options) {
   Config config = LoadConfig(options.config);
@@ -38,7 +38,7 @@ int Run(const Options& options) {
   CertifierNode certifier(config, *bus, {clock, clock});
   PlannerNode planner(config, *bus);
   RobotSimNode robot(config, *bus);
-  ObstacleSender perception(ObstacleSender::PeriodUs(config.gate));  // nobody else can speak on this bus
+  ObstacleSender perception(ObstacleSender::PeriodUs(config.gate));  // this bus has no other sender
   if (config.gate.obstacles == ObstaclesSource::kBus) perception.Set(config.obstacles);
   certifier.Tick(now);  // as a process does before it hears anything
   Deliver(*bus);

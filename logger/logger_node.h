@@ -1,13 +1,13 @@
-/** Records everything the bus carries: all messages in LCM event logs, decisions, execution events and gaps in the
-database (logger/recorder.h says how, and what can be lost), and sends a heartbeat that says how it fares.
+/** Records the bus: all messages in LCM event logs; decisions, execution events and gaps in the database
+(logger/recorder.h describes the files and possible losses). It sends a heartbeat with its state.
 
-Handlers only copy into a bounded queue, and Tick takes from it, whatever the disk does: what does not fit the queue is
-dropped, counted and becomes a gap.
+Handlers only copy messages into a bounded queue, and Tick takes them from it, so the disk never blocks the bus.
+Messages that do not fit are dropped, counted, and become a gap.
 
-With keys a stranger on the network can neither fill the disk nor displace honest logs: all authentic messages are
-recorded, with their trailer. Of what nobody signed (refused messages, and those on channels that are not ForeReach's)
-only logger.unsigned_kb_per_s are. Refused ones make no rows; how many there were is in the heartbeat's sentence and in
-what Stop prints. Those of other channels that are too much become gaps, "unsigned". */
+With keys, a stranger on the network can neither fill the disk nor displace authentic logs. All authentic messages are
+recorded, with their trailer. Refused messages, and messages on channels that do not belong to ForeReach, are recorded
+only up to logger.unsigned_kb_per_s. Refused messages make no rows; the heartbeat's sentence and the summary at Stop
+have their number. Messages of other channels above the limit become gaps "unsigned". */
 #pragma once
 
 #include <cstdint>
@@ -29,15 +29,15 @@ class LoggerNode final : public Node {
   static constexpr std::int64_t kHeartbeatUs = 500'000;
   static constexpr std::int64_t kSilenceUs = 2'000'000;  ///< Without a message this long the bus counts as silent.
 
-  /** Opens the database, mends earlier runs and subscribes to all.
-  @param out where Stop prints the summary. @throws LogError, DatabaseError if the directory cannot be written to,
+  /** Opens the database, repairs earlier runs and subscribes to all channels.
+  @param out receives the summary at Stop. @throws LogError, DatabaseError if the directory cannot be written to,
   KeyError if bus.key cannot be used. */
   LoggerNode(const Config& config, Bus& bus, std::ostream& out, FreeSpace free_space = FreeBytes);
 
   /** The first call opens the log file, named after its time. @throws LogError, DatabaseError if it cannot. */
   void Tick(std::int64_t now_us) override;
   void Stop() override;
-  /** Something that was on the disk is gone, see Recorder::gone. */
+  /** True if recorded events are missing from the disk; see Recorder::gone. */
   [[nodiscard]] bool failed() const override { return !recorder_.gone().empty(); }
 
   [[nodiscard]] const Recorder& recorder() const { return recorder_; }
@@ -58,7 +58,7 @@ class LoggerNode final : public Node {
 
   std::deque<LogEvent> queue_;
   std::map<Stream, std::int64_t> overflow_;  // dropped since the last Tick
-  std::int64_t bus_dropped_;                 // as of the last Tick
+  std::int64_t bus_dropped_;                 // at the last Tick
   const Speakers speakers_;                  // empty without keys
   const double unsigned_bytes_per_us_;
   double unsigned_allowance_ = 0;  // bytes

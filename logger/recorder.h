@@ -1,36 +1,35 @@
-/** Brings messages to log files and the database, rotates the files, keeps within the disk. Knows no bus.
+/** Writes messages to log files and the database, rotates the files, and limits the disk usage. It uses no bus.
 
-**Loss window.** Take puts a message into the log's buffer. Every logger.flush_ms the buffer goes to the file (write,
-then fdatasync) and after it the rows of those events go to the database in one transaction. So the database never knows
-more than the log, and a recorder that is killed loses at most what came since the last flush; a machine that loses
-power the same, for a log's entry in its directory and its run are on the disk before its first event. When it begins,
-log files that were not ended are mended: a cut tail is removed and missing rows are made again. So are files that are
-named like a logger's and that no run knows, but none that another logger writes. Rows that the database refuses wait.
-Beyond kMaxWaitingRows those that come from an event are dropped: the next start makes them again. Gaps without an
-event, which no log holds, wait on, those of one stream and reason as one. What they count is not counted once more
-where the log is read again.
+**Loss window.** Take puts a message into the log's buffer. Every logger.flush_ms the buffer is written to the file
+(write, then fdatasync); then the rows of these events are written to the database in one transaction. So the database
+never has more events than the log, and a killed recorder loses at most the messages since the last flush. The same
+holds for a power failure, because a log's directory entry and its run are on the disk before its first event. At its
+start the recorder repairs log files that were not ended: it removes a cut tail and makes missing rows again. It does
+the same with files that have a logger's name and belong to no run, unless another logger is writing them. Rows that the
+database refuses wait. Above kMaxWaitingRows, rows that come from an event are dropped, and the next start makes them
+again. Gaps without an event, which no log holds, continue to wait; those of one stream and reason are merged. Their
+losses are not counted again when the log is read again.
 
-**Files.** One row of the database's runs for each file. A file ends, and the next begins, before the event with which
-it would exceed logger.rotate_mb, after logger.rotate_minutes, and when it finds no room within logger.quota_mb; event
-numbers begin anew, sequence counts and waiting candidates go on. A file that the database has not all rows of is not
-ended before it has.
+**Files.** Each file has one row in the database's table runs. The next file begins before an event that would make the
+current one exceed logger.rotate_mb, after logger.rotate_minutes, and when logger.quota_mb leaves no room. Event numbers
+restart; sequence counts and waiting candidates continue. A file is not ended before the database has all of its rows.
 
-**Files that go while they are written.** At each flush the log and the database are looked at. A log that was deleted,
-moved, replaced or cut short is given up: what the disk had confirmed of it and cannot be read at its place any more is
-counted as gaps "gone", and a new file goes on with the events that wait in memory, under the numbers that they have
-already. The directory is made again if need be; where no new file can be made recording pauses and it is tried every
-second. A database that is no longer in its place is opened or made anew. What it lacks of logs that are there is made
-again by the next start; gaps without an event that it alone held are lost.
+**Files that disappear.** At each flush the recorder checks the log and the database. If the log was deleted, moved,
+replaced or cut short, it is given up: events that the disk had confirmed and that cannot be read at their place any
+more are counted as gaps "gone". A new file continues with the events that wait in memory, under their existing numbers.
+The directory is made again if necessary. If no new file can be made, recording pauses and the recorder tries again
+every second. A missing database is opened or made again. The next start makes its missing rows again from the logs;
+gaps without an event, which only the database held, are lost.
 
-**Tasks.** The task file and the files that it names are kept beside the logs (records/kept_tasks.h), so that a log can
-be read without them. When the certifier's heartbeats tell of a reload the task file is read again, and kept too if it
-is the one that they name. A kept task is deleted with the last log whose decisions name it.
+**Tasks.** Copies of the task file, and of the files that it names, are kept next to the logs (records/kept_tasks.h), so
+that a log can be read without the originals. When the certifier's heartbeats report a reload, the task file is read
+again and kept if its digest is the reported one. A kept task is deleted with the last log whose decisions name it.
 
-**Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: what comes
-is counted by channel, and the counts become gaps. With a flush that fails it is the same for the events of that flush.
-Gaps of this kind are written when recording goes on, and until then every ten seconds. For the quota the logs of ended
-runs are deleted, oldest first, each marked in the database before; the file being written and runs that were not ended
-are never deleted, nor is any if that would not make room. */
+**Full disk.** With less than logger.min_free_mb free, or no room within logger.quota_mb, recording pauses: messages are
+counted by channel, and the counts become gaps. The same happens to the events of a failed flush. These gaps are written
+when recording resumes, and every ten seconds until then. For the quota the logs of ended runs are deleted, oldest
+first, after each is marked in the database. The current file and runs that were not ended are never deleted. No log is
+deleted if that would not make enough room. */
 #pragma once
 
 #include <cstdint>
@@ -56,8 +55,8 @@ namespace forereach {
 /** Free bytes of a directory's disk. */
 using FreeSpace = std::function<std::int64_t(const std::string& directory)>;
 
-/** A period on a clock that may jump: over once it has passed since the start, and if the clock went back behind that.
- */
+/** A period on a clock that may jump. It is over once it has passed since the start, and if the clock is set back
+before the start. */
 class Period final {
  public:
   explicit Period(double us) : us_(static_cast<std::int64_t>(us)) {}
@@ -75,44 +74,43 @@ class Recorder final {
  public:
   static constexpr std::size_t kMaxWaitingRows = 100'000;
 
-  /** Makes the directory if need be, opens the database in it and mends earlier runs. With bus.key only authentic
+  /** Makes the directory if necessary, opens the database in it and repairs earlier runs. With bus.key only authentic
   messages make rows (records/interpreter.h).
   @throws LogError, DatabaseError if the directory cannot be written to, KeyError. */
   Recorder(const Config& config, FreeSpace free_space);
 
-  /** Opens the first log file, named after its time; the rest is to be called after it. @throws as the constructor. */
+  /** Opens the first log file, named after its time. Call it before the functions below. @throws as the constructor. */
   void Begin(std::int64_t now_us);
   [[nodiscard]] bool begun() const { return log_ != nullptr; }
   [[nodiscard]] bool has_keys() const { return keys_.has_value(); }
 
   /** The next message; its `number` is not read. */
   void Take(LogEvent event, std::int64_t now_us);
-  /** `lost` messages of the stream, the next ones of its count, reached this process and not Take: they make one gap.
-   */
+  /** Notes that the next `lost` messages of the stream reached this process but not Take. They make one gap. */
   void Lose(const Stream& stream, std::int64_t lost, std::int64_t utime, const std::string& reason);
-  /** Flushes and rotates where it is time. */
+  /** Flushes and rotates if due. */
   void Tick(std::int64_t now_us);
-  /** Flushes and ends the run; nothing may be called after it. */
+  /** Flushes and ends the run. Call no function after it. */
   void End(std::int64_t now_us);
 
   [[nodiscard]] const Interpreter& interpreter() const { return interpreter_; }
   [[nodiscard]] const std::string& database_path() const { return database_path_; }
   [[nodiscard]] Summary summary() const { return summary_.Finish(); }
-  /** One line for each earlier run that was mended. */
+  /** One line for each earlier run that was repaired. */
   [[nodiscard]] const std::vector<std::string>& recovered() const { return recovered_; }
   [[nodiscard]] const std::string& log_path() const { return log_path_; }
   /** Log files of this run. */
   [[nodiscard]] int files() const { return files_; }
 
   [[nodiscard]] bool recording() const { return pause_.empty() && failed_flushes_ == 0; }
-  /** What is wrong, for a person; empty if nothing is. */
+  /** The problem as a sentence; empty if there is none. */
   [[nodiscard]] std::string trouble() const;
-  /** Flushes in a row that failed or found recording paused. */
+  /** Number of consecutive flushes that failed or found recording paused. */
   [[nodiscard]] int failed_flushes() const { return failed_flushes_; }
-  /** What was on the disk and is no more, of the files that this run has written; the last such event in words, empty
-  if there was none. */
+  /** The last loss of recorded events from the disk in this run's files, as a sentence; empty if there was none. */
   [[nodiscard]] const std::string& gone() const { return gone_; }
-  /** Events that the disk confirmed, and messages that are in no log: gone from it, or never written. */
+  /** The number of events that the disk confirmed, and the number of messages that are in no log, because they
+  disappeared or were never written. */
   [[nodiscard]] std::int64_t written() const { return written_; }
   [[nodiscard]] std::int64_t lost() const { return lost_; }
   [[nodiscard]] std::int64_t file_bytes() const { return log_->offset() + log_->pending_bytes(); }

@@ -97,7 +97,7 @@ bool PlannerNode::IsAtGoal(const robot_state_t& state) const {
          config_.planner.goal_radius;
 }
 
-// What the state says of earlier plans: which of them is executing, and which start has passed.
+// Updates the earlier plans from the state: the executing plan, and the starts that have passed.
 void PlannerNode::Follow(const robot_state_t& state) {
   finished_ = state.mode == robot_state_t::FINISHED;
   arrived_ = arrived_ || IsAtGoal(state);

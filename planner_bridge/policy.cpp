@@ -23,7 +23,7 @@ constexpr const char* kFormat = "forereach-policy";
 constexpr const char* kActivation = "tanh";
 constexpr int kVersion = 1, kLargestLayer = 1024, kMostSizes = 9;
 
-/** A value of the file and where it stands: "file: layers[1].bias". */
+/** A value of the file with its place: "file: layers[1].bias". */
 class Field final {
  public:
   Field(std::string file, std::string name, const Json& json)

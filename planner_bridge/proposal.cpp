@@ -48,7 +48,7 @@ struct Ambition {
   double share;    // of the distance that cruising straight at the goal would gain
   double heading;  // least cosine between the motion at the end and the way to the goal
   bool room;       // to drive on from where the tail ends
-  bool at_rest;    // only for a robot that stands: it may have to turn round, and has to take what it gets
+  bool at_rest;    // only for a robot at rest: it may have to turn round, and takes any progress
 };
 constexpr std::array<Ambition, 6> kAmbitions{{{0.9, 0.98, true, false},
                                               {0.8, 0.92, true, false},

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// A value of the document, and what it is called there.
+// A value of the document with its name in it.
 class Field {
  public:
   Field(const std::string& path, std::string name, const Json& value)

@@ -1,4 +1,4 @@
-/** A decision's JSON document, read back. Strict: what docs/decision.md names has to be there, whole, and nothing else.
+/** Reads a decision's JSON document. The reader is strict: the document has exactly the keys of docs/decision.md.
  */
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace forereach {
 
-/** Something recorded that is not what it has to be. */
+/** A mismatch between a recorded and the required value. */
 struct Mismatch {
   std::string what, expected, found;
 };

@@ -93,7 +93,7 @@ EventLogReader::Found EventLogReader::Examine(std::int64_t offset, Header& heade
   return size_ - offset - kHeaderBytes >= header.channel_bytes + header.data_bytes ? Found::kWhole : Found::kCut;
 }
 
-// True at the end of the file, and where a sync word or the beginning of one that was cut stands.
+// True at the end of the file, at a sync word, and at the beginning of a cut one.
 bool EventLogReader::SyncAt(std::int64_t offset) {
   std::array<std::uint8_t, 4> bytes{};
   const std::int64_t left = std::min<std::int64_t>(size_ - offset, 4);
@@ -127,12 +127,12 @@ LogStatus EventLogReader::Next(LogEvent& event) {
     const std::int64_t channel = offset_ + kHeaderBytes, data = channel + header.channel_bytes;
     const std::int64_t end = data + header.data_bytes;
     next = SyncAt(end) ? end : FindRecord(offset_ + 1, end);
-    if (next == end) {  // else the claim is not believed, and no room is made for it
+    if (next == end) {  // otherwise the length is not trusted, and nothing is allocated for it
       event.number = header.number;
       event.utime = header.utime;
       event.channel.resize(static_cast<std::size_t>(header.channel_bytes));
       const auto data_bytes = static_cast<std::size_t>(header.data_bytes);
-      // Growing would hold the old bytes beside the new.
+      // Growing the buffer would hold the old and the new bytes at once.
       if (event.data.capacity() < data_bytes) std::vector<std::uint8_t>().swap(event.data);
       event.data.resize(data_bytes);
       if (ReadAt(channel, event.channel.data(), header.channel_bytes) &&

@@ -4,8 +4,9 @@ A log is a sequence of records, all numbers big-endian:
 
     uint32 0xEDA1DA01 | int64 event number | int64 utime | int32 channel bytes | int32 data bytes | channel | data
 
-LCM 1.3.1's own reader allocates what a length field claims and returns NULL for the end as for damage. This one bounds
-every length before it allocates, tells the end, a cut tail and damage apart, and goes on behind damage. */
+LCM 1.3.1's own reader allocates the size that a length field claims and returns NULL both at the end and for damage.
+This reader bounds every length before it allocates, distinguishes the end, a cut tail and damage, and continues after
+damage. */
 #pragma once
 
 #include <cstdint>
@@ -38,7 +39,7 @@ struct LogEvent {
   [[nodiscard]] Bytes message() const { return WithoutSignature(data); }
 };
 
-/** BLAKE2b-256 of the event's record as it stands in the file: any bit of it that changes changes the digest. */
+/** BLAKE2b-256 of the event's record in the file, so every changed bit changes the digest. */
 [[nodiscard]] Digest DigestOf(const LogEvent& event);
 /** Bytes of that record. */
 [[nodiscard]] std::int64_t RecordBytes(const LogEvent& event);
@@ -50,7 +51,7 @@ enum class LogStatus {
   kEvent,    ///< One whole record was read.
   kEnd,      ///< The file ends behind a whole record.
   kCutTail,  ///< What is left is the beginning of one record: its writer was killed, or writes still.
-  kCorrupt,  ///< Some bytes were no record and have been skipped; the next call goes on behind them.
+  kCorrupt,  ///< Some bytes were not a record and have been skipped; the next call continues after them.
 };
 
 class EventLogReader final {
@@ -119,7 +120,7 @@ enum class FilePlace {
   kThere,      ///< Its path leads to it.
   kDeleted,    ///< No name leads to it any more.
   kElsewhere,  ///< It has a name, but its path leads to nothing or to another file.
-  kCut,        ///< Its path leads to it, but some of what the disk has confirmed is gone from it.
+  kCut,        ///< The file is at its path, but some bytes that the disk had confirmed are missing.
   kUnknown,    ///< Its path cannot be looked at, as without the permission to do so.
 };
 
@@ -176,7 +177,7 @@ class EventLogWriter final {
 
   const std::string path_;
   int file_ = -1;
-  bool is_torn_ = false;  // something may stand behind offset_
+  bool is_torn_ = false;  // there may be bytes after offset_
   std::vector<std::uint8_t> buffer_;
   std::vector<std::uint8_t> mark_;  // the header of a record that the last Flush has written, which is not all zero
   std::int64_t mark_at_ = 0;

@@ -150,7 +150,7 @@ std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
     gap.reason = "bus";
     if (gap.lost == 0) return std::nullopt;
   } else if (got > 0) {
-    gap.lost = std::max<std::int64_t>(got - forgiven, 0);  // it began anew, and its first messages are missing
+    gap.lost = std::max<std::int64_t>(got - forgiven, 0);  // the sender restarted, and its first messages are missing
   }
   return gap;
 }

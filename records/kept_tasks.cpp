@@ -41,7 +41,7 @@ void Confirm(const std::string& directory) {
   if (!confirmed) FailToWrite(directory);
 }
 
-// A file beside `path` until it is renamed.
+// The name of the temporary file next to `path`, before it is renamed.
 class Part final {
  public:
   Part(const std::string& path, const std::string& bytes) : path_(path), part_(path + ".part") {

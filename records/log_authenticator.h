@@ -1,5 +1,5 @@
-/** Which messages of a log are authentic. The log holds every message as it was heard; who reads it with the key
-believes what the robot's processes believed, and passes over the rest. */
+/** Selects the authentic messages of a log. The log holds every message as it was received. A reader with the key
+accepts the messages that the robot's processes accepted, and skips the others. */
 #pragma once
 
 #include <optional>

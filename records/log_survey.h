@@ -12,7 +12,7 @@
 
 namespace forereach {
 
-/** What logs hold, whatever their channels are called: messages are told by their types. */
+/** The content of logs for any names of channels: messages are recognised by their types. */
 struct LogSurvey {
   static constexpr std::size_t kMaxConfigs = 256;  ///< Who invents digests must not fill the memory.
   static constexpr std::size_t kMaxObservations = 1 << 16;

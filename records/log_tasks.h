@@ -1,4 +1,4 @@
-/** The tasks that logs were recorded with: as given, or as the logger kept them beside the logs. */
+/** The tasks under which logs were recorded: the given one, or the copies that the logger kept next to the logs. */
 #pragma once
 
 #include <string>

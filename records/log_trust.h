@@ -23,7 +23,7 @@ struct LogKey {
   void Override(std::vector<Config>& tasks, const std::string& given) const;
 };
 
-/** What nobody who was meant to hear it believed either. */
+/** Numbers of skipped messages, which the robot's processes refused too. */
 struct PassedOver {
   Refusals not_authentic;        ///< Where there is a key (records/log_authenticator.h).
   std::int64_t undecodable = 0;  ///< On the channel of certified plans, and none.

@@ -1,4 +1,4 @@
-/** What `forereach report` says of a recorded run: its numbers, and a picture with the tubes computed again. */
+/** The output of `forereach report` for a recorded run: its numbers, and a picture with recomputed tubes. */
 #pragma once
 
 #include <iosfwd>

@@ -41,7 +41,7 @@ struct EventRow {
   double value = kUnknown;
 };
 
-/** Messages that are missing, or whose count began anew. */
+/** A gap: missing messages, or a restart of their sender. */
 struct GapRow {
   LogReference event;  ///< The first message behind the gap; event_number -1 where there is none.
   std::string channel, source;

@@ -1,4 +1,4 @@
-/** The numbers of a run, from a log or from the database: what was proposed, what became of it, how the robot fared. */
+/** The numbers of a run, from a log or from the database: proposals, decisions, and the robot's drive. */
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ struct Summary {
   std::int64_t refused = 0;                         ///< Certified plans that the guard refused.
   std::map<std::string, std::int64_t> lost;         ///< Messages missing, by reason.
   std::int64_t backlog = 0;                         ///< Discarded by the bus before the logger took them, see rows.h.
-  std::int64_t restarts = 0;                        ///< Senders that began to count anew.
+  std::int64_t restarts = 0;                        ///< Restarts of senders.
   std::int64_t corruptions = 0, skipped_bytes = 0;  ///< Damaged places of the log, and the bytes in them.
 };
 

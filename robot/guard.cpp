@@ -332,7 +332,7 @@ GuardVerdict Guard::ExamineNumbers(const certified_plan_t& certified) const {
   return {};
 }
 
-// The last slice is what the plan leads to: the certifier does not hold it against the domain.
+// Without the last slice: no step starts from it, so the certifier does not test it against the domain.
 GuardVerdict Guard::ExamineDomain(const certified_plan_t& certified) const {
   const auto task = FindExpected(certified);
   const std::optional<GuardDomain>& domain = task != expected_.end() && task->domain ? task->domain : options_.domain;

@@ -113,7 +113,7 @@ class SliceCheck {
     }
   }
 
-  // Of the last slice: what was derived stands, and so does what was recorded.
+  // The last slice: both the derived and the recorded one are at rest.
   void CheckRest() {
     for (const RestBound& bound : problem_.rest) {
       if (failure_) return;

@@ -74,7 +74,7 @@ class ClaimCheck {
     return Holds(node.number, box, kMostCuts);
   }
 
-  // Whether |slope| <= bound over the box, which is cut further where that cannot be told at once.
+  // Whether |slope| <= bound over the box. If one evaluation does not decide, the box is cut further.
   [[nodiscard]] CoverVerdict Holds(double bound, const Box& box, int cuts) const {
     if (LiesOutside(box)) return {};
     Trial trial{-1, box};

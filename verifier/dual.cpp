@@ -28,7 +28,7 @@ Dual Chain(Real value, const Real& slope, const Dual& a) {
   return Chain(std::move(value), slope, a, Real(0.0), none);
 }
 
-// Derivatives cost as much as values: none where nobody asks for them.
+// Derivatives cost as much as values, so they are computed only if the gradient is used.
 bool Varies(const Dual& a) { return !a.gradient.empty(); }
 
 Real Hull(const Real& a, const Real& b) { return Real::FromTo(min(a, b), max(a, b)); }

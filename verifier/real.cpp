@@ -19,7 +19,7 @@ struct Pool {
   ~Pool() {
     Clear();
     closed = true;
-    mpfr_free_cache2(MPFR_FREE_LOCAL_CACHE);  // what the library keeps for this thread
+    mpfr_free_cache2(MPFR_FREE_LOCAL_CACHE);  // the library's cache of this thread
   }
   void Clear() {
     for (__mpfi_struct& number : numbers) mpfi_clear(&number);

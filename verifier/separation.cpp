@@ -34,7 +34,7 @@ RealVector Middle(RealVector vector) {
 
 bool IsPositive(const Real& x) { return CertainlyBelow(Real(), x); }
 
-// The points whose hull the obstacle's core is.
+// The points whose convex hull is the obstacle's core.
 std::vector<RealVector> CorePoints(const Obstacle& obstacle) {
   std::vector<RealVector> points;
   const auto& given = obstacle.points();

@@ -269,7 +269,7 @@ Real Slice::HalfWidth(int k) const {
   return sum;
 }
 
-// What data and declaration say of r_k over one Z_t.
+// The bounds on r_k over one Z_t from data and declaration.
 struct TubeMaker::Known {
   Bounds bounds;
   bool contradiction = false;  // one that doubles show too

@@ -78,7 +78,7 @@ void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z)
 
 // ---- The search.
 
-// At least 0; what is not a number bounds nothing.
+// At least 0. NaN bounds nothing.
 double NonNegative(double bound) { return std::isnan(bound) ? kInfinity : std::max(0.0, bound); }
 
 // Of two numbers that are not negative, for comparisons only: positive where both are, and finite.

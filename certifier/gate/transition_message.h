@@ -17,7 +17,8 @@ struct ExecutedTransition {
 /** Refuses sizes other than the model's. */
 [[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const NominalModel& model);
 
-/** Refuses also what a certifier would not learn (certify/learned.h): for readers of logs, who have no certifier. */
+/** Also refuses transitions that a certifier would not learn (certify/learned.h). For readers of logs, which have no
+ * certifier. */
 [[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
 
 }  // namespace forereach

@@ -230,7 +230,7 @@ void CertifierNode::OnRobotState(const Received& received) {
   watch_.SeeRobot(received.utime);
   if (!is_in_charge()) return;  // the robot may execute another's plans
   if (const auto departure = conformance_.Check(state)) Fail(SliceLeft(*departure));
-  // A certifier in shadow mode does not decide what the robot executes.
+  // In shadow mode another certifier decides which plans the robot executes.
   const auto stranger = issued_.Judge(state, clocks_.steady());
   if (stranger && !gate_->options().shadow) Fail(UncertifiedPlan(*stranger));
 }
@@ -375,7 +375,7 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
   reporter_.CountDecision(elapsed.count());
 }
 
-// ---- Work beside.
+// ---- Background work.
 
 void CertifierNode::CompactIfDue() {
   if (gate_->certifier().num_unindexed() < kUnindexedAtMost) return;

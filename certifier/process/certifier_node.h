@@ -51,7 +51,7 @@ that the plan was handed to the bus before. */
 
 namespace forereach {
 
-/** A wall clock and one that nobody sets, both in microseconds. A simulation gives the same for both. */
+/** A wall clock and a monotonic clock, both in microseconds. A simulation gives the same for both. */
 struct Clocks {
   Clock wall = WallClockUs;
   Clock steady = SteadyClockUs;

@@ -1,4 +1,4 @@
-/** The latched fault as a message, and what is stored of it.
+/** The latched fault as a message, and its storage.
 
 Watch decides which fault is latched. This class keeps the fault_t that was announced for it, says when it has to be
 sent again (a datagram may be lost), and stores it with the contradictions in the latch file, if there is one. While no
@@ -46,7 +46,7 @@ class FaultLatch final {
 
   /** What was put last. */
   [[nodiscard]] const fault_t& fault() const { return fault_; }
-  /** True if a fault is latched and was not sent for kRepeatUs. @param steady_us of a clock that nobody sets. */
+  /** True if a fault is latched and was not sent for kRepeatUs. @param steady_us time of a monotonic clock. */
   [[nodiscard]] bool IsDue(std::int64_t steady_us) const { return watch_.fault() && steady_us >= next_us_; }
   /** It is sent now. */
   void Sent(std::int64_t steady_us) { next_us_ = steady_us + kRepeatUs; }

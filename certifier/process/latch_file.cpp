@@ -106,7 +106,7 @@ std::string TextOf(const LatchFile::Content& content) {
   return text;
 }
 
-// @throws Json::exception saying what is wrong.
+// @throws Json::exception with the error.
 LatchFile::Content ContentOf(const std::string& text) {
   const Json json = ParseJson<Json>(text);
   if (json.at("format") != kFormat) throw Json::other_error::create(501, "its format is another", nullptr);

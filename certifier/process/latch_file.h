@@ -1,8 +1,9 @@
-/** What a certifier must not forget when it ends: the latched fault, and what has contradicted a declaration.
+/** The state that survives the end of a certifier: the latched fault, and the observations that contradict a
+declaration.
 
 One file, latch.json, in a directory that belongs to one robot, locked while a certifier lives. The file always has the
 same size and is rewritten in place, so a disk that is full later still takes a fault. It is JSON with a digest of its
-content, so a write that was cut short, and any other damage, is noticed: what is not known to be "no fault" is not
+content, so an interrupted write and any other damage is noticed. Content that is not known to be "no fault" is not
 taken for it. Then, and where the file cannot be written, ready() is false and the certifier does not certify.
 
 A file that does not exist holds nothing: a person may delete it. No other damage is mended by this class. */
@@ -36,7 +37,7 @@ class LatchFile final {
     std::vector<Contradiction> contradictions;
   };
 
-  /** Makes the directory if it does not exist, and locks it. Whatever else is wrong, why_not() says.
+  /** Makes the directory if it does not exist, and locks it. why_not() reports every other error.
   @throws BadInput if another process holds the lock. */
   explicit LatchFile(std::string directory);
   ~LatchFile();

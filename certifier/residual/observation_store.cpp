@@ -43,7 +43,7 @@ struct ObservationStore::Known {
   }
 };
 
-// An index and its tail. Entries of the tail below its size, and everything else, do not change any more.
+// An index and its tail. Entries of the tail below its size do not change any more, and neither does the index.
 struct ObservationStore::Generation {
   Observations observations;  // of the index
   std::vector<int> ids;
@@ -163,7 +163,7 @@ int ObservationStore::tail_size() const {
 
 void ObservationStore::Swap(std::shared_ptr<Generation> generation) {
   const std::lock_guard lock(current_lock_);
-  current_.swap(generation);  // the old one goes after the lock, if nobody holds it
+  current_.swap(generation);  // the old one is destroyed after the lock is released, unless a snapshot holds it
 }
 
 std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Known known) const {

@@ -75,7 +75,8 @@ Gains GainsOf(const Declaration& declaration, const Observations& observations) 
   return gains;
 }
 
-// Drops what gains nothing, then the least gains until `most` are left, but nobody whose word another's going rests on.
+// Removes observations without gain, then those of least gain until `most` are left. It removes no observation because
+// of which another one is removed in the same round.
 std::vector<int> OneRound(const Gains& gains, std::size_t most) {
   std::vector<std::uint32_t> order(gains.gain.size());
   std::iota(order.begin(), order.end(), 0);

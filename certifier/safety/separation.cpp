@@ -236,7 +236,7 @@ Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
 }  // namespace
 
 Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
-  constexpr double kMargin = 0x1p-47;  // above the rounding of the few operations here, relative to what they add up
+  constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
   const auto p = static_cast<std::size_t>(obstacle.dim());
   double square = 0;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {

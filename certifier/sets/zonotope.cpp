@@ -102,7 +102,7 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
     for (std::size_t j = 0; j < entries.size(); ++j) along[j] += d * entries[j];
   }
   const double spread = AbsoluteSumUpper({along.data(), padded_size()}, 0);
-  // Every |d . g_j| is off by a rounding error whose sum over j the magnitude bounds.
+  // The rounding errors of all |d . g_j| add up to at most the bound by the magnitude.
   const double underflow = num_generators_ * dim_ * std::numeric_limits<double>::denorm_min();
   const double error = AddUp(DotErrorUpper(magnitude, dim_), underflow);
   return AddUp(value.upper, AddUp(AddUp(spread, slack_along), error));
@@ -204,7 +204,7 @@ FOREREACH_INLINE double Smallest(const double* scores, std::size_t count, std::s
   return *at;
 }
 
-// Lengths along the axes, of which the sum of what is boxed is made.
+// Lengths along the axes of the generators that become the box.
 using Lengths = std::array<double, kMaxStates>;
 
 // Moves all columns but those of a score up to `largest` to the front, in their order, in kRows rows from row k on, and
@@ -248,7 +248,7 @@ FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const double* scores
   (std::make_index_sequence<kMaxRows>());
 }
 
-// Axis-aligned generators lengths_k e_k, those whose bit k is set.
+// The axis-aligned generators lengths_k e_k for which bit k is set.
 struct Axes {
   const double* lengths;
   unsigned which;
