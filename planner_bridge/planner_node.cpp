@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <ostream>
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
+#include "certifier/gate/robot_state_message.h"
 #include "certifier/gate/stamp.h"
 #include "lcmtypes/names.h"
 
@@ -74,10 +74,8 @@ void PlannerNode::OnRobotState(const Received& received) {
 }
 
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
-  return state.num_states == config_.problem->model->num_states() &&
-         Judge(state.utime, now_us, config_.gate).freshness != Freshness::kFuture &&
-         robot_state_t::STANDING <= state.mode && state.mode <= robot_state_t::FINISHED &&
-         std::all_of(state.state, state.state + state.num_states, [](double value) { return std::isfinite(value); });
+  return FaultOf(state, config_.problem->model->num_states()).empty() &&
+         Judge(state.utime, now_us, config_.gate).freshness != Freshness::kFuture;
 }
 
 // True for a state that comes neither late nor again.

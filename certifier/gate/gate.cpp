@@ -1,11 +1,11 @@
 #include "certifier/gate/gate.h"
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 
 #include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
+#include "certifier/gate/robot_state_message.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/gate/transition_message.h"
 #include "certifier/numerics/text.h"
@@ -237,13 +237,8 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
 std::string Gate::UpdateObstacles(Bytes bytes, std::int64_t now_us) { return obstacles_.Update(bytes, now_us); }
 
 std::string Gate::CheckRobotState(const robot_state_t& state, std::int64_t now_us) const {
-  const int n = certifier_.problem().model->num_states();
-  if (state.num_states != n) return std::to_string(state.num_states) + " states, the task has " + std::to_string(n);
-  const std::span measured(state.state, static_cast<std::size_t>(n));
-  if (!std::ranges::all_of(measured, [](double value) { return std::isfinite(value); })) return "NaN or infinity in it";
-  if (state.mode < robot_state_t::STANDING || state.mode > robot_state_t::FINISHED)
-    return "unknown mode " + std::to_string(state.mode);
-  return CheckFresh(state.utime, now_us);
+  const std::string fault = FaultOf(state, certifier_.problem().model->num_states());
+  return fault.empty() ? CheckFresh(state.utime, now_us) : fault;
 }
 
 std::string Gate::Learn(Bytes bytes) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "certifier/residual/lipschitz_envelope.h"
 #include "certifier/residual/observation_index.h"
 #include "certifier/residual/pairs.h"
 
@@ -40,18 +41,27 @@ std::optional<Violation> FirstOf(const Declaration& declaration, const Observati
   return first;
 }
 
-std::optional<Violation> TestRow(const Declaration& declaration, const Observations& o, int k) {
+// By an index of these entries, or one that is built for it.
+std::optional<Violation> TestRow(const Declaration& declaration, const Observations& o, int k,
+                                 const LipschitzEnvelope* envelope) {
   const LipschitzRow row(declaration, k);
   if (row.is_constant()) return TestConstant(declaration, o, k);
   const ObservationIndex::Entries entries = EntriesOf(row, declaration, o, k);
   const double margin = MarginUpper(row, entries, o);
   if (!std::isfinite(margin)) return TestAllPairs(declaration, o, k);
-  const ObservationIndex index(entries);
-  const PairSearch search(index, margin);
+  const ObservationIndex built = envelope ? ObservationIndex() : ObservationIndex(entries);
+  const PairSearch search(envelope ? envelope->index(k) : built, margin);
   const bool violated = search.AnyPair([&](std::uint32_t i, std::uint32_t j) {
     return TestPair(declaration, o, static_cast<int>(i), static_cast<int>(j), k).has_value();
   });
   return violated ? FirstOf(declaration, o, k, search, entries) : std::nullopt;
+}
+
+std::optional<Violation> TestRows(const Declaration& declaration, const Observations& o,
+                                  const LipschitzEnvelope* envelope) {
+  for (int k = 0; k < o.num_states(); ++k)
+    if (const auto violation = TestRow(declaration, o, k, envelope)) return violation;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -70,9 +80,12 @@ std::optional<Violation> TestPair(const Declaration& declaration, const Observat
 }
 
 std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations) {
-  for (int k = 0; k < observations.num_states(); ++k)
-    if (const auto violation = TestRow(declaration, observations, k)) return violation;
-  return std::nullopt;
+  return TestRows(declaration, observations, nullptr);
+}
+
+std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations,
+                                       const LipschitzEnvelope& envelope) {
+  return TestRows(declaration, observations, &envelope);
 }
 
 }  // namespace forereach

@@ -8,6 +8,8 @@
 
 namespace forereach {
 
+class LipschitzEnvelope;
+
 /** A proof that observations i = first and j = second contradict the declaration in coordinate k:
     |r~_ik - r~_jk| >= difference > bound >= sum_l L_kl |z_il - z_jl| + 2 sigma_k. */
 struct Violation {
@@ -27,5 +29,9 @@ ObservationIndex finds suspects, and TestPair decides. Cost for each row of L wi
 index, then about N descents of its tree; 10^6 observations take a fraction of a second. Every pair within some units in
 the last place of its bound is tested exactly, so many such pairs cost more. */
 [[nodiscard]] std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations);
+
+/** The same by the indexes of an envelope of these observations under this declaration: none is built. */
+[[nodiscard]] std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations,
+                                                     const LipschitzEnvelope& envelope);
 
 }  // namespace forereach

@@ -133,11 +133,14 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
   if (options.max_observations < 1)
     throw std::invalid_argument("observation store: max_observations must be at least 1");
   options_.envelope.value_headroom = kValueHeadroom;
-  violation_ = FindViolation(declaration_, observations);
   next_id_ = observations.size();
   std::vector<int> ids(static_cast<std::size_t>(next_id_));
   std::iota(ids.begin(), ids.end(), 0);
+  // Where not all are kept, the contradiction has to be known before: Build then keeps all.
+  const bool keeps_all = ids.size() <= options_.max_observations;
+  if (!keeps_all) violation_ = FindViolation(declaration_, observations);
   current_ = Build({observations, std::move(ids)});
+  if (keeps_all) violation_ = FindViolation(declaration_, current_->observations, current_->envelope);
 }
 
 ObservationStore::~ObservationStore() = default;

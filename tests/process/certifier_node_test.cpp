@@ -23,6 +23,7 @@
 #include "robot/sim_node.h"
 #include "tests/gate/small_task.h"
 #include "tests/keys.h"
+#include "tests/reset.h"
 #include "tests/scratch.h"
 
 namespace forereach {
@@ -603,10 +604,7 @@ TEST_F(TwoCertifiersTest, ADeclarationThatTheFirstHasSeenContradictedStaysFalse)
   listener_.Publish("TRANSITION", wrong);
   Pass(700'000);
   const auto reset = [this] {
-    command_t command{};
-    command.utime = now_us_;
-    command.kind = command_t::RESET;
-    listener_.Publish("COMMAND", command);
+    listener_.Publish("COMMAND", ResetAt(now_us_));
     Pass(700'000);
   };
   reset();
@@ -676,10 +674,7 @@ class ArmedNodeTest : public CertifierNodeTest {
     Run();
   }
   void Reset(std::int64_t utime) {
-    command_t command{};
-    command.utime = utime;
-    command.kind = command_t::RESET;
-    bus_->Publish("COMMAND", command);
+    bus_->Publish("COMMAND", ResetAt(utime));
     Run();
   }
   void Reset() {

@@ -14,6 +14,7 @@
 
 #include "certifier/process/certifier_node.h"
 #include "tests/gate/small_task.h"
+#include "tests/reset.h"
 #include "tests/scratch.h"
 #include "tests/small_disk.h"
 
@@ -107,10 +108,7 @@ class LatchTest : public testing::Test {
     Run();
   }
   void Reset(std::int64_t utime) {
-    command_t command{};
-    command.utime = utime;
-    command.kind = command_t::RESET;
-    bus_->Publish("COMMAND", command);
+    bus_->Publish("COMMAND", ResetAt(utime));
     Run();
   }
   void Reset() {

@@ -15,6 +15,7 @@
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "tests/keys.h"
+#include "tests/reset.h"
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach {
@@ -162,13 +163,6 @@ certified_plan_t PlanThatIsLeft(const Config& config) {
   certified_plan_t certified = Plan(config, 1, 1, kOrigin);
   certified.slice_upper[2][2] = 0.2;
   return certified;
-}
-
-command_t ResetAt(std::int64_t utime) {
-  command_t command{};
-  command.kind = command_t::RESET;
-  command.utime = utime;
-  return command;
 }
 
 TEST(RobotSim, StandsAndReportsAtEveryBoundary) {

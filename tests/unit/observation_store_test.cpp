@@ -181,6 +181,16 @@ TEST(ObservationStore, FindsTheContradictionWhereverItIs) {
     samples.push_back(liar);
     const auto insertion = Insert(store, liar);
     const auto expected = FindViolation(MakeDeclaration(), Join(samples));
+    for (const std::size_t most : {samples.size(), samples.size() / 2}) {  // all are kept, or some if there is none
+      StoreOptions options;
+      options.max_observations = most;
+      const auto at_load = StoreOf(samples, options).snapshot().violation();
+      ASSERT_EQ(at_load.has_value(), expected.has_value());
+      if (!expected) continue;
+      ASSERT_EQ(at_load->first, expected->first);
+      ASSERT_EQ(at_load->second, expected->second);
+      ASSERT_EQ(at_load->coordinate, expected->coordinate);
+    }
     ASSERT_EQ(insertion.violation.has_value(), expected.has_value());
     ASSERT_EQ(store.snapshot().violation().has_value(), expected.has_value());
     if (!expected) continue;

@@ -1,0 +1,17 @@
+/** What a person sends to clear a fault. */
+#pragma once
+
+#include <cstdint>
+
+#include "forereach/command_t.hpp"
+
+namespace forereach {
+
+inline command_t ResetAt(std::int64_t utime) {
+  command_t command{};
+  command.utime = utime;
+  command.kind = command_t::RESET;
+  return command;
+}
+
+}  // namespace forereach
