@@ -59,7 +59,7 @@ class Reader final {
       options.remove_prefix(end == std::string_view::npos ? options.size() : end + 1);
       const std::size_t equals = option.find('=');
       const std::string_view name = option.substr(0, equals);
-      if (!seen.insert(name).second) Fail("the option " + std::string(name) + " is there twice");
+      if (!seen.insert(name).second) Fail("the option " + std::string(name) + " is given twice");
       ReadOption(name, equals == std::string_view::npos ? "" : option.substr(equals + 1));
     }
   }

@@ -19,7 +19,7 @@ constexpr std::size_t kBurstBytes = std::size_t{1} << 20;
 std::size_t OffsetIn(Bytes whole, Bytes part) {
   const std::less_equal<const std::uint8_t*> in_order;
   if (!in_order(whole.data(), part.data()) || !in_order(part.data() + part.size(), whole.data() + whole.size()))
-    throw std::invalid_argument("Screen::Admit: what it returned is no part of the message");
+    throw std::invalid_argument("Screen::Admit: the returned bytes are not a part of the message");
   return static_cast<std::size_t>(part.data() - whole.data());
 }
 

@@ -309,7 +309,7 @@ KeyFile Load(const std::string& path) {
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailSystem(path, "cannot be read");
   if (!S_ISREG(status.st_mode)) Fail(path, "is no regular file");
-  if (status.st_uid != ::geteuid() && status.st_uid != 0) Fail(path, "belongs to somebody else");
+  if (status.st_uid != ::geteuid() && status.st_uid != 0) Fail(path, "belongs to another user");
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) Fail(path, "others can write it; do: chmod go-w " + path);
   SecretText text;
   std::array<char, kMaxFileBytes> buffer;
@@ -389,7 +389,7 @@ void MakeKeys(const std::string& robot, const std::string& directory) {
 KeyRing LoadKeys(const std::string& path, Role role) {
   const std::string file = IsDirectory(path) ? path + "/" + FileOf(role) : path;
   KeyFile key = Load(file);
-  if (!key.role) Fail(file, "holds public keys alone; this program needs " + FileOf(role));
+  if (!key.role) Fail(file, "contains only public keys; this program needs " + FileOf(role));
   if (*key.role != role)
     Fail(file, "line 3: role: is " + std::string(RoleName(*key.role)) + ", this program speaks as " +
                    std::string(RoleName(role)) + ": give it " + FileOf(role) + " or the directory of the keys");
@@ -411,7 +411,7 @@ KeyRing LoadAllKeys(const std::string& directory) {
       all->secrets->group = one.secrets->group;
     } else if (all->robot != one.robot || all->public_keys != one.public_keys ||
                sodium_memcmp(all->secrets->group.data(), one.secrets->group.data(), sizeof(SecretKey)) != 0) {
-      Fail(path, "belongs to other keys than " + FileOf(kAllRoles.front()) + " beside it");
+      Fail(path, "belongs to other keys than " + FileOf(kAllRoles.front()) + " in the same directory");
     }
     all->Hold(role, one.secrets->seed[At(role)]);
   }

@@ -66,7 +66,7 @@ int MakePlan(const Options& options) {
   const auto& goal = config.planner.goal;
   const double away = (plan.end - Eigen::Map<const Eigen::VectorXd>(goal.data(), std::ssize(goal))).norm();
   std::cout << options.out << ": " << plan.controls.cols() << " steps, the last "
-            << plan.controls.cols() - plan.progress_steps << " brake to a stand at about " << PositionText(plan.end)
+            << plan.controls.cols() - plan.progress_steps << " brake to a stop at about " << PositionText(plan.end)
             << "\n  " << Explain(plan.decision, *config.problem) << "\n";
   if (!plan.reaches_goal)
     std::cout << "  The goal is " << away

@@ -88,13 +88,13 @@ std::string_view FaultAdvice(std::int16_t cause) {
     case fault_t::ROBOT_STATE_LOST: return "bring the robot's state messages back, then `forereach reset`";
     case fault_t::CLOCK_JUMP: return "set the clock right and keep it from jumping again, then `forereach reset`";
     case fault_t::SLICE_LEFT:
-      return "find what is not true (declaration, domain, noise bound or initial set), correct the task file, "
+      return "find the false assumption (declaration, domain, noise bound or initial set), correct the task file, "
              "`forereach reload`, then `forereach reset`; after a reset alone it happens again";
     case fault_t::DECLARATION_FALSIFIED:
       return "a reset alone does not help, every candidate stays F: declare a larger bound in the task file, "
              "`forereach reload`, then `forereach reset`";
     case fault_t::UNCERTIFIED_PLAN:
-      return "find what commands the robot without the guard, or which certifier certifies beside this one; then "
+      return "find the program that commands the robot without the guard, or the other certifier on this bus; then "
              "`forereach reset`";
     default: return "find the reason, then `forereach reset`";
   }

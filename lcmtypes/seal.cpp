@@ -54,7 +54,7 @@ std::optional<SealFault> FindUnusedEntry(const char* name, const Slices& slices,
       char text[32];
       std::snprintf(text, sizeof text, "%.17g", value);
       const std::string field = std::string(name) + "[" + std::to_string(t) + "][" + std::to_string(k) + "]";
-      return SealFault{SealFault::Kind::kUnusedEntry, field, "0, as it is not in use", text, t, k, value};
+      return SealFault{SealFault::Kind::kUnusedEntry, field, "0, because it is not in use", text, t, k, value};
     }
   return std::nullopt;
 }

@@ -249,7 +249,7 @@ void Recorder::AddTask(const Config& config) {
     tasks_.push_back(CopyTask(config));
     tasks_in_use_.insert(ToHex(config.digest));
   } catch (const BadInput& error) {
-    spdlog::error("the task is not kept beside the log: {}", error.what());
+    spdlog::error("the task is not kept next to the log: {}", error.what());
   }
 }
 
@@ -257,7 +257,7 @@ void Recorder::KeepTasks() const {
   for (const TaskCopy& task : tasks_) try {
       kept_tasks_.Keep(task);
     } catch (const BadInput& error) {
-      spdlog::error("the task {} is not kept beside the log: {}", ToHex(task.digest), error.what());
+      spdlog::error("the task {} is not kept next to the log: {}", ToHex(task.digest), error.what());
     }
 }
 
@@ -281,7 +281,7 @@ void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
     AddTask(config);
     KeepTasks();
   } catch (const BadInput& error) {
-    spdlog::warn("the certifier's task, config digest {}, is not kept beside the log: {}", ToHex(heard.first),
+    spdlog::warn("the certifier's task, config digest {}, is not kept next to the log: {}", ToHex(heard.first),
                  error.what());
   }
 }
@@ -396,7 +396,7 @@ void Recorder::GiveUpLog(FilePlace place, std::int64_t now_us) {
       ForEachEvent(reader,
                    [&](const LogEvent& event) { ++left[confirmed_.contains(event.channel) ? event.channel : "*"]; });
     } catch (const LogError& error) {
-      spdlog::error("{}: what is left of it cannot be read: {}", log_file_, error.what());
+      spdlog::error("{}: its remaining part cannot be read: {}", log_file_, error.what());
     }
   std::int64_t events = CountEarlierFilesGone(now_us);
   for (const auto& [channel, confirmed] : std::exchange(confirmed_, {})) {
@@ -457,7 +457,7 @@ void Recorder::WatchDatabase(std::int64_t now_us) {
   if (database_) {
     const std::optional<std::string> displaced = database_->FindDisplaced();
     if (!displaced) return;
-    spdlog::error("database: {}; it is opened anew", *displaced);
+    spdlog::error("database: {}; it is opened again", *displaced);
     database_problem_ = displaced_ = "database: " + *displaced;
     database_->Checkpoint();
     database_.reset();

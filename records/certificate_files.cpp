@@ -513,7 +513,7 @@ std::vector<CertificateFile> FromDatabase(const std::string& path, const std::st
         std::ranges::move(database.Read(run.log_file).decisions, std::back_inserter(rows));
       } else {
         const char* why =
-            run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not beside the database";
+            run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not in the database's directory";
         without_task.push_back({run.log_file, {}, why, {}});
         why_none = path + ": " + run.log_file + ": " + why;
       }

@@ -282,7 +282,7 @@ std::vector<RunRow> Database::Runs() {
                 run.log_deleted_utime);
     for (const std::string& file : {run.log_file, run.continues})
       if (file.find_first_of(std::string_view("/\0", 2)) != std::string::npos || file == "." || file == "..")
-        throw DatabaseError("database: " + path_ + ": a run names a log that is not beside it: " + file);
+        throw DatabaseError("database: " + path_ + ": a run names a log that is not in its directory: " + file);
   }
   return runs;
 }

@@ -135,7 +135,7 @@ std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Diges
   std::error_code no_path;
   if (!fs::exists(task, no_path)) return std::nullopt;
   std::vector<std::string> versions = DigestsOfNames(directory, kTransitions, kTransitionsEnding);
-  if (versions.empty()) throw ConfigError(task + ": its transitions are not kept beside it");
+  if (versions.empty()) throw ConfigError(task + ": its transitions are not kept next to it");
   if (versions.size() > 1)
     std::erase_if(versions, [&](const std::string& version) {
       return std::ranges::none_of(observations, [&](const Digest& seen) { return ToHex(seen) == version; });

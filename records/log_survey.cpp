@@ -25,9 +25,10 @@ namespace fs = std::filesystem;
     case FileKind::kDirectory:
       throw LogError(path + ": is a directory; name the event logs in it, events-*.lcmlog of one run");
     case FileKind::kDatabase:
-      throw LogError(path +
-                     ": is an SQLite database, not an LCM event log; name the event logs beside it, events-*.lcmlog of "
-                     "one run");
+      throw LogError(
+          path +
+          ": is an SQLite database, not an LCM event log; name the event logs in its directory, events-*.lcmlog of "
+          "one run");
     case FileKind::kJson:
       throw LogError(path +
                      ": is a JSON document, not an LCM event log; a decision of `forereach certify --json` is for "

@@ -19,7 +19,7 @@ std::string DescribeTask(const LogSurvey& survey, const KeptTasks& kept) {
     const bool is_kept = std::filesystem::exists(kept.PathOf(digest));
     text += (i > 0 ? "; " : "") + ToHex(digest) + " (" + std::to_string(survey.configs.at(digest).decisions) +
             " decisions and certified plans" +
-            (is_kept ? ", kept in " + kept.PathOf(digest) : ", not kept beside the log") + ")";
+            (is_kept ? ", kept in " + kept.PathOf(digest) : ", not kept next to the log") + ")";
   }
   return text + (survey.order.size() > kMaxNamed ? "; and others" : "");
 }
@@ -47,7 +47,7 @@ std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, co
     else if (auto found = kept.Find(digest, survey.configs.at(digest).observations))
       tasks.push_back(std::move(*found));
   if (tasks.empty())
-    throw ConfigError(logs + ": its task is not kept beside it; name it with --config FILE: its config digest is " +
+    throw ConfigError(logs + ": its task is not kept next to it; name it with --config FILE: its config digest is " +
                       DescribeTask(survey, kept));
   return tasks;
 }

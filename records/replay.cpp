@@ -166,7 +166,7 @@ class Replayer {
     if (!task)
       return Differ(candidate.name, recorded->plan_id,
                     "decided under another task, of config digest " + ToHex(GetDigest(recorded->config_digest)) +
-                        ", which is not kept beside the log");
+                        ", which is not kept next to the log");
     FollowReload(*task);
     CatchUp(*recorded);
     if (IsCircumstance(*recorded)) {

@@ -74,8 +74,9 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
     spdlog::warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
   if (const auto& violation = gate_->certifier().violation())
-    spdlog::warn("observations {} and {} contradict the declaration: every candidate will be abstained from (F)",
-                 violation->first, violation->second);
+    spdlog::warn(
+        "observations {} and {} contradict the declaration: every candidate will be answered ABSTAIN_FALSIFIED (F)",
+        violation->first, violation->second);
   if (gate_->certifier().uses_hull_distance())
     spdlog::warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
                  LipschitzEnvelope::kMaxExactColumns);
@@ -270,7 +271,7 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
   switch (command.kind) {
     case command_t::RESET:
       if (watch_.fault() && IsNotAfter(command.utime, watch_.fault()->utime, now_us, gate_->options()))
-        return Refuse(channels_.command, "a reset from before the fault: nobody has seen it yet");
+        return Refuse(channels_.command, "the reset was sent before the fault, so nobody has inspected the fault");
       if (!latch_.Forget())
         return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_.why_not());
       if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));

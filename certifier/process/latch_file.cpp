@@ -155,7 +155,7 @@ bool LatchFile::OpenDirectory() {
     if (cause == EWOULDBLOCK)
       throw BadInput("gate.state: " + directory_ +
                      ": another certifier keeps its state there; each robot and each "
-                     "certifier that stands by needs a directory of its own (--state)");
+                     "standby certifier needs its own directory (--state)");
     return Fail(directory_ + ": cannot be locked: " + std::generic_category().message(cause));
   }
   if (lock_ >= 0) ::close(lock_);
@@ -206,7 +206,7 @@ std::optional<LatchFile::Content> LatchFile::Read() {
 }
 
 std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
-  const std::string advice = "; nobody knows whether a fault was latched. Once it is known why, delete the file";
+  const std::string advice = "; it is unknown whether a fault was latched. Find the cause, then delete the file";
   struct stat its {};
   if (::fstat(file, &its) != 0) return FailedTo("looked at"), std::nullopt;
   if (emptied_ && its.st_size == 0) return Content();

@@ -125,7 +125,7 @@ TEST_F(KeptTaskTest, AnotherTaskIsRefusedAndItsOwnIsNamed) {
     ExpectRefused(command + log + " --config " + TaskOf("two"),
                   {TaskOf("two"), digest, *scratch_ / "log/tasks/" + digest});
     ExpectRefused(command + log + " --config " + kSource + "/config/point_mass.yaml", {digest});
-    ExpectRefused(command + kCourseLog + " --config " + TaskOf("two"), {"not kept beside the log"});
+    ExpectRefused(command + kCourseLog + " --config " + TaskOf("two"), {"not kept next to the log"});
     ExpectRefused(command + kCourseLog, {"--config"});
   }
   const Output other = Forereach("replay " + log + " --other-task --config " + TaskOf("two"));
@@ -156,7 +156,7 @@ TEST_F(KeptTaskTest, ADamagedTaskIsNotUsed) {
   std::ofstream(transitions) << text;
   ExpectRefused("verify " + In(copy, logs_->front()), {"is damaged", transitions});
   fs::remove(transitions);
-  ExpectRefused("report " + In(copy, logs_->front()), {"not kept beside it"});
+  ExpectRefused("report " + In(copy, logs_->front()), {"not kept next to it"});
 }
 
 TEST_F(KeptTaskTest, OfSeveralVersionsOfTheTransitionsTheLogNamesTheRightOne) {
@@ -263,8 +263,8 @@ TEST_F(KeptTaskTest, ADatabaseDoesNotLeadOutOfItsDirectory) {
   const std::string copy = Copied();
   fs::copy(logs_->front(), elsewhere_ / "outside.lcmlog");
   Database(copy + "/decisions.sqlite").BeginRun("../outside.lcmlog", 0);
-  ExpectRefused("verify " + copy, {"not beside it", "../outside.lcmlog"});
-  ExpectRefused("check-log " + copy, {"not beside it"});
+  ExpectRefused("verify " + copy, {"not in its directory", "../outside.lcmlog"});
+  ExpectRefused("check-log " + copy, {"not in its directory"});
 }
 
 }  // namespace

@@ -131,7 +131,7 @@ TEST_F(KeyFiles, ANameIsBounded) {
 TEST_F(KeyFiles, OfAnotherRoleAreRefused) {
   const std::string problem = Problem("planner.key", Role::kCertifier);
   EXPECT_THAT(problem, HasSubstr("planner.key: line 3: role: is planner, this program speaks as certifier"));
-  EXPECT_THAT(Problem("verify.pub"), HasSubstr("holds public keys alone"));
+  EXPECT_THAT(Problem("verify.pub"), HasSubstr("contains only public keys"));
   EXPECT_THAT(ProblemOf([&] { (void)LoadAllKeys(File("planner.key")); }), HasSubstr("needs the directory"));
 }
 

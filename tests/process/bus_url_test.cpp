@@ -59,7 +59,7 @@ TEST(BusUrlTest, AWrongPartIsNamedWithWhatItHasToBe) {
            {"udpm://?ttl=1=1", "the ttl \"1=1\""},
            {"udpm://?recv_buf_size=0", "the recv_buf_size \"0\""},
            {"udpm://?recv_buf_size=2147483648", "the recv_buf_size \"2147483648\""},
-           {"udpm://?ttl=1&ttl=1", "the option ttl is there twice"},
+           {"udpm://?ttl=1&ttl=1", "the option ttl is given twice"},
            {"udpm://?tll=1", "the option \"tll\" has to be ttl or recv_buf_size"},
            {"udpm://?&ttl=1", "the option \"\""},
        }) {

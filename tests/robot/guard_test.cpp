@@ -182,7 +182,7 @@ TEST(GuardAccept, RefusesWhatTheSealDoesNotAllow) {
   EXPECT_EQ(verdict.step, 4);
   EXPECT_EQ(verdict.coordinate, 1);
   EXPECT_EQ(verdict.value, 5);
-  EXPECT_EQ(verdict.message, "slice_upper[4][1] is 5, it has to be 0, as it is not in use");
+  EXPECT_EQ(verdict.message, "slice_upper[4][1] is 5, it has to be 0, because it is not in use");
   EXPECT_EQ(altered([](auto& c) { c.slice_lower[0][2] = -0.0; }).cause, GuardCause::kUnusedEntry);
   EXPECT_EQ(altered([](auto& c) { c.slice_lower[128][15] = kNaN; }).cause, GuardCause::kUnusedEntry);
 }
