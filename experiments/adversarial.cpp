@@ -90,11 +90,10 @@ std::vector<Table> FamilyTables(const Scope& scope, const Results& results) {
       "the paper prints no formula. Noiseless data from below the knee, N = 100, the same for every lambda. Largest "
       "velocity slope over the deployed matrix's: a proved bound on the true one, and LACKI's estimate from the data.",
       {}};
-  Table outcomes{
-      "Adversarial residual family: plans",
-      "The same data. Declared are the true slopes, the matrix deployed for lambda = 1 whatever the target, or the "
-      "estimate. None of the three is refuted by the data.",
-      {}};
+  Table outcomes{"Adversarial residual family: plans",
+                 "The same data. The declaration is the true slopes, the matrix deployed for lambda = 1 for every "
+                 "target, or the estimate. The data refute none of the three.",
+                 {}};
   const double last = LambdasOf(scope).back();
   for (const double lambda : LambdasOf(scope)) {
     const std::string where = "lambda = " + std::to_string(static_cast<int>(lambda)) + ": ";
@@ -137,7 +136,8 @@ Plot SlopePlot(const Scope& scope) {
     lines += DataLine(
         {lambda, deployed * TruePart(lambda), deployed * EstimatedPart(scope, lambda).mean.value_or(0), deployed});
   return {"adversarial-slopes",
-          "Adversarial family: the true slope passes every declared bound; the data and what is read off them stay.",
+          "Adversarial family: the true slope passes every declared bound; the data and the estimates from them do not "
+          "change.",
           720, 400, DataBlock("slope", lines) + R"(set logscale xy; set xrange [1:32]; set yrange [1e-4:10]
 set format y '10^{%T}'; set xtics (1, 2, 4, 8, 16, 32)
 set xlabel 'lambda'; set ylabel 'largest velocity slope'

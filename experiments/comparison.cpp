@@ -112,16 +112,17 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
              " notitle, '' using 1:2:3 with points ps variable pt " + (m == 0 ? "3" : "7") + " lw 2 lc rgb " + color +
              " title \"" + method.name + "\"";
   }
-  return {{"methods",
-           "Coverage of complete tubes where there are no data (B) against recall where there are (C), bicycle, by "
-           "method; larger marks, more observations. A method without a complete tube stands at coverage 1. Only the "
-           "upper right corner is both sound and informative.",
-           840, 480,
-           data +
-               "set xrange [-0.03:1.04]; set yrange [-0.04:1.05]\n"
-               "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
-               "set key outside right top\nset label 'certify nothing: " +
-               useless + "' at 0.97, 0.04 right font ',11'\n" + lines + "\n"}};
+  return {
+      {"methods",
+       "Coverage of complete tubes where there are no data (B) against recall where there are (C), bicycle, by "
+       "method; larger marks, more observations. A method without a complete tube is plotted at coverage 1. Only the "
+       "upper right corner is both sound and informative.",
+       840, 480,
+       data +
+           "set xrange [-0.03:1.04]; set yrange [-0.04:1.05]\n"
+           "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
+           "set key outside right top\nset label 'certify nothing: " +
+           useless + "' at 0.97, 0.04 right font ',11'\n" + lines + "\n"}};
 }
 
 }  // namespace

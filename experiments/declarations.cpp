@@ -59,8 +59,8 @@ int Rejections(const Scope& scope, Layout layout, double factor) {
 std::vector<Table> TestTables(const Scope& scope) {
   Table table{
       "Incorrect declarations, pairwise test",
-      "The deployed matrix times a factor: how many of the data sets of every N, channel and seed of both systems "
-      "contradict it. Below the knee the residual does not show, so data from there contradict nothing.",
+      "The deployed matrix times a factor: the number of data sets, over every N, channel and seed of both systems, "
+      "that contradict it. Below the knee the residual is not visible, so data from there contradict nothing.",
       {}};
   for (const double factor : kFactors) {
     const std::string times = "L times " + Short(factor);
@@ -75,11 +75,10 @@ std::vector<Table> TestTables(const Scope& scope) {
 }
 
 std::vector<Table> IncorrectTables(const Scope& scope, const Results& results) {
-  Table table{
-      "Incorrect declarations, plans",
-      "Data from below the knee, noiseless, the largest N; plans as ever. What the test cannot see the tubes show: "
-      "too small a matrix gives tubes that the target leaves, and false certificates.",
-      {}};
+  Table table{"Incorrect declarations, plans",
+              "Data from below the knee, noiseless, the largest N; the usual plans. The tubes show errors that the "
+              "test cannot detect: too small a matrix gives tubes that the target leaves, and false certificates.",
+              {}};
   for (const System* system : Systems())
     for (const double factor : kFactors) {
       const Cell cell = Scaled(*system, factor);
@@ -183,7 +182,8 @@ std::vector<Table> GridTables(const Scope&, const Results&) {
   const BicycleGrid bicycle = PaperBicycleGrid(HeadingSaturation{0.1, 2.5});
   return {
       {"Certified declarations",
-       "L_cert by the paper's own fixed grids, rounded as it rounds. Proved bounds, a little lower, are in declare.md.",
+       "L_cert by the paper's fixed grids, with the paper's rounding. Proved bounds, which are slightly lower, are in "
+       "declare.md.",
        {{"point mass, position diagonal", Paper("grids.position_diagonal"),
          Exactly(Rounded(point_mass.position_diagonal)), 9, ""},
         {"point mass, position cross", Paper("grids.position_cross"), Exactly(Rounded(point_mass.position_cross)), 9,

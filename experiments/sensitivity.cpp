@@ -147,7 +147,7 @@ std::vector<Plot> NoisePlots(const Scope& scope, const Results& results) {
     paper += DataLine({std::stod(multiple), Paper(std::string("noise.recall.") + multiple).value});
   return {{"noise",
            "Recall of group C at N = 400 as the observations get noisier; mean and one standard deviation over the "
-           "seeds. What sigma the paper declares of its Gaussian noise is not in its text; here it is 3 s.",
+           "seeds. The paper's text does not give the sigma declared for its Gaussian noise; here it is 3 s.",
            720, 400,
            DataBlock("ours", ours) + DataBlock("paper", paper) + R"(set xrange [-0.15:3.6]; set yrange [0.8:1.01]
 set xlabel 'noise scale s, in multiples of the median residual'; set ylabel 'certified recall, bicycle C'

@@ -62,8 +62,8 @@ const char* const kWhy = "the paper's errands, obstacles and sample points are n
 Table OutcomeTable(const Scope& scope, const Results& results, double noise) {
   Table table{noise == 0 ? "Action chunks" : "Action chunks, sub-Gaussian channel",
               noise == 0
-                  ? "Blocks of 20 steps of a behaviour-cloned policy, groups A to C together, noiseless. What the "
-                    "policy is asked for, how it was taught, the grid and the corridor are ours: "
+                  ? "Blocks of 20 steps of a behaviour-cloned policy, groups A to C together, noiseless. The policy's "
+                    "task, its training, the grid and the corridor are our own: "
                     "`experiments/chunks/demonstrations.h` and `blocks.h`."
                   : "The same, s = 4.16e-6, cut at sigma = 3 s. The paper: within one point of its noiseless rows.",
               {}};
@@ -113,7 +113,7 @@ Table SupportTable(const Scope& scope, const Results& results) {
       "Action chunks and distance to the data",
       "d: the largest distance of a nominal state to its nearest observation, in units of the paper. Noiseless, "
       "every N and seed. The paper's 45,000 records are those of one layout, and its text does not say which: "
-      "it is set beside the fixed grid here.",
+      "it is compared with the fixed grid here.",
       {}};
   for (const Layout layout : kLayouts) {
     const auto paper = [&](const char* key) {
