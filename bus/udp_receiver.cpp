@@ -81,8 +81,8 @@ void UdpReceiver::Open(const MulticastUrl& url) {
   SetOption(socket, SOL_SOCKET, SO_TIMESTAMP, kOn, "time stamps");
   SetOption(socket, SOL_SOCKET, SO_RXQ_OVFL, kOn, "count of lost datagrams");
   SetOption(socket, SOL_SOCKET, SO_RCVTIMEO, timeval{0, kReceivePollUs}, "receive timeout");
-  // Of what comes to this port only the group's, from the interface by which it was joined: not what is sent to one of
-  // the machine's own addresses, nor the groups that others have joined here.
+  // Receives only datagrams to this group, from the interface on which it was joined. Datagrams to the machine's own
+  // addresses, and to groups that other programs have joined, are not received.
   SetOption(socket, IPPROTO_IP, IP_MULTICAST_ALL, kOff, "own group alone");
   sockaddr_in place{};
   place.sin_family = AF_INET;

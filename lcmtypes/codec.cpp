@@ -5,7 +5,8 @@
 namespace forereach {
 
 Digest DigestOf(Bytes bytes) {
-  // Lets libsodium take the code for this processor, two thirds of the time; without it digests are the same.
+  // Lets libsodium select the code for this processor, which takes two thirds of the time. Digests are the same without
+  // it.
   [[maybe_unused]] static const int initialised = sodium_init();
   Digest digest;
   crypto_generichash(digest.data(), digest.size(), bytes.data(), bytes.size(), nullptr, 0);

@@ -355,8 +355,7 @@ double Planner::Search::Shortfall(const double* s, const Ambition& ambition) con
   return BestOf(s) - std::max(start_distance_ - ambition.share * gain_, near_enough);
 }
 
-// Judged a little ahead, so that wheels that are still turned count. A robot that stands still heads nowhere, which is
-// well.
+// Evaluated a short time ahead, so that the steering angle counts. A robot at rest has no heading and passes.
 bool Planner::Search::HeadsWell(std::span<const double> x, double cosine) const {
   const std::array<double, kMaxInputs> rest{};
   std::array<double, kMaxStates> ahead;

@@ -71,11 +71,11 @@ class Analysis {
       }
       case Op::kTan: {
         const double t = range_[static_cast<std::size_t>(&n - program_.nodes.data())].Magnitude();
-        // The angle's own error has to be small for its slope to bound what it does.
+        // The slope bounds the effect of the angle's error only if that error is small.
         if (!(Size(n.a) <= 0x1p20 && t < 0x1p10 && error(n.a).point <= 0x1p-30 && error(n.a).box <= 0x1p-30))
           return {infinity, infinity};
-        // Slope 1 + t^2. Sine over cosine, the latter at least 1 / sqrt(1 + t^2); over a box a quotient whose
-        // denominator is as large, of numbers of size (1 + t)^2.
+        // The slope is 1 + t^2. At a point, tan is sine over cosine, and the cosine is at least 1 / sqrt(1 + t^2). Over
+        // a box it is a quotient of numbers of size (1 + t)^2 with a denominator of the same size.
         const double slope = AddUp(1, MulUp(t, t)), wide = MulUp(MulUp(1 + t, 1 + t), MulUp(slope, 4));
         const double turns = AddUp(error(n.a).box, Rounding(4 * Size(n.a)));
         return {AddUp(MulUp(MulUp(2, slope), error(n.a).point), MulUp(wide, 0x1p-50)),

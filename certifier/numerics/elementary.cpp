@@ -1,9 +1,10 @@
 // Ranges of the trigonometric functions.
 //
-// Between its extrema each function is monotone, so its range over an interval is spanned by the values at the ends and
-// by the extrema inside. The ends come from the C library, whose results are within one unit in the last place of the
-// exact value (glibc's manual, "Known Maximum Errors"); we widen by two. Extrema are found by comparing with enclosures
-// of multiples of pi: where that is undecided the extremum counts as inside, which only widens.
+// Each function is monotone between its extrema, so its range over an interval is spanned by the values at the ends and
+// by the extrema inside. The values come from the C library, whose results are within one unit in the last place of the
+// exact value (glibc's manual, "Known Maximum Errors"); we widen by two. Extrema are found by comparison with
+// enclosures of multiples of pi. If the comparison is undecided, the extremum counts as inside, which can only widen
+// the range.
 #include "certifier/numerics/interval.h"
 
 namespace forereach {

@@ -145,7 +145,7 @@ using Lists = std::array<Lanes, 8>;
 
 FOREREACH_INLINE void Order(Lists& x, std::size_t i, std::size_t j) {
   const Lanes low = Min(x[j], x[i]);
-  x[j] = Max(x[j], x[i]);  // a comparison of its own, or the compiler makes of both what takes three operations
+  x[j] = Max(x[j], x[i]);  // a separate comparison: with a shared one the compiler emits three operations
   x[i] = low;
 }
 
