@@ -34,11 +34,12 @@ bool IsInCharge(const certifier_status_v3_t& status) {
   return status.state != certifier_status_v3_t::LISTENING && status.state != certifier_status_v3_t::STANDBY;
 }
 
-// A line to the certifier: commands to it, heartbeats from it. With a key only heartbeats that the certifier has
-// signed.
-class Line final {
+// The connection to the certifier: sends commands, receives heartbeats. With a key it accepts only heartbeats that the
+// certifier has signed.
+class CertifierConnection final {
  public:
-  explicit Line(const Options& options) : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
+  explicit CertifierConnection(const Options& options)
+      : channels_(LoadConfig(options.config, TransitionsFile::kIgnore).bus) {
     options.bus.Override(channels_);
     channels_ = WithKeys(std::move(channels_), Role::kOperator);
     if (!channels_.keys) std::cerr << "forereach: warning: " << kUnsignedWarning << std::endl;
@@ -51,7 +52,7 @@ class Line final {
     });
   }
 
-  // The first heartbeat from now on that passes, or nothing.
+  // The first heartbeat from now on that `passes` accepts, or nothing.
   std::optional<certifier_status_v3_t> Await(const std::function<bool(const certifier_status_v3_t&)>& passes) {
     const std::int64_t end = SteadyClockUs() + kPatienceMs * 1000;
     for (heard_.clear(); SteadyClockUs() < end; bus_->Dispatch(50)) {
@@ -60,7 +61,7 @@ class Line final {
     }
     return std::nullopt;
   }
-  // Of the certifier in charge; where none is heard, of any.
+  // A heartbeat of the certifier in charge; if none arrives, of any certifier.
   std::optional<certifier_status_v3_t> Await() {
     if (auto status = Await(IsInCharge)) return status;
     return heard_.empty() ? std::nullopt : std::optional(heard_.back());
@@ -156,42 +157,42 @@ void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
   std::cout << std::endl;
 }
 
-int NobodyAnswers(const BusOptions& bus) {
+int NoCertifierAnswers(const BusOptions& bus) {
   std::cerr << "forereach: no certifier answered on " << bus.url << " (" << bus.status << ") within "
             << kPatienceMs / 1000 << " s; `forereach doctor` checks the bus" << std::endl;
   return 1;
 }
 
 int ShowStatus(const Options& options) {
-  Line line(options);
-  const auto status = line.Await();
-  if (!status) return NobodyAnswers(line.channels());
-  Print(*status, options.json, line.channels().keys.has_value());
+  CertifierConnection certifier(options);
+  const auto status = certifier.Await();
+  if (!status) return NoCertifierAnswers(certifier.channels());
+  Print(*status, options.json, certifier.channels().keys.has_value());
   return status->level == certifier_status_v3_t::OK ? 0 : 1;
 }
 
 // Sends a command, and shows the heartbeat that answers it.
 int Send(const Options& options, std::int16_t kind) {
-  Line line(options);
-  const auto before = line.Await();
-  if (!before) return NobodyAnswers(line.channels());
+  CertifierConnection certifier(options);
+  const auto before = certifier.Await();
+  if (!before) return NoCertifierAnswers(certifier.channels());
   command_t command{};
   command.utime = WallClockUs();
   command.kind = kind;
   SetText(command.source, "forereach");
-  line.Send(command);
+  certifier.Send(command);
   const auto refused = [](const certifier_status_v3_t& status) {
     return status.messages_refused + status.refused_unsigned + status.refused_forged + status.refused_replayed;
   };
-  const auto after = line.Await([&](const certifier_status_v3_t& status) {
+  const auto after = certifier.Await([&](const certifier_status_v3_t& status) {
     if (status.instance != before->instance) return false;
     if (refused(status) > refused(*before)) return true;
     return kind == command_t::RESET
                ? status.utime >= command.utime
                : status.version != before->version || status.failed_reloads != before->failed_reloads;
   });
-  if (!after) return NobodyAnswers(line.channels());
-  Print(*after, options.json, line.channels().keys.has_value());
+  if (!after) return NoCertifierAnswers(certifier.channels());
+  Print(*after, options.json, certifier.channels().keys.has_value());
   const bool done =
       kind == command_t::RESET ? after->state != certifier_status_v3_t::FAULT : after->version > before->version;
   if (!done && refused(*after) > refused(*before))
