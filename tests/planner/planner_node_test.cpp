@@ -352,6 +352,21 @@ TEST_F(PlannerNodeTest, AStateIsUsedOnce) {
   EXPECT_EQ(Summary()["messages_ignored"], 1);
 }
 
+TEST_F(PlannerNodeTest, AStateThatComesLateIsIgnored) {
+  const auto say = [&](std::int64_t sequence, std::int64_t stamp) {
+    robot_state_t state = Standing();
+    state.sequence = sequence;
+    state.utime = now_ + stamp;
+    Say(state);
+    return Summary()["messages_ignored"].get<int>();
+  };
+  EXPECT_EQ(say(5, -100), 0);
+  EXPECT_EQ(say(4, -200), 1) << "overtaken";
+  EXPECT_EQ(say(0, -200), 2) << "an older stamp never replaces a newer one";
+  EXPECT_EQ(say(6, -300), 2) << "the robot's clock was set back, its count goes on";
+  EXPECT_EQ(say(0, -50), 2) << "the robot restarted";
+}
+
 TEST_F(PlannerNodeTest, AStateFromTheFutureDoesNotKeepOutThoseOfNow) {
   robot_state_t state = Standing();
   state.utime = now_ + 50'001;  // gate.max_ahead_ms is 50
