@@ -14,7 +14,7 @@ constexpr std::string_view kMark = "FRSIGN02";
 constexpr std::string_view kSignatureContext = "ForeReach message 2", kTagContext = "ForeReach trailer 2";
 constexpr std::size_t kNumberBytes = 8, kMaxChannel = 255;
 
-// What is signed or tagged: it is put together on the stack, from parts of fixed length and a channel's name.
+// The signed or tagged bytes. They are joined on the stack, from parts of fixed length and a channel's name.
 class Covered final {
  public:
   void Append(Bytes part) {
@@ -185,7 +185,7 @@ std::pair<Authenticity, Bytes> Authenticator::Check(const std::string& channel, 
   return {authenticity, {}};
 }
 
-// From cheap to dear: whoever is refused early costs little.
+// The checks run from cheap to expensive, so that an early refusal costs little.
 Authenticity Authenticator::Classify(const std::string& name, Bytes bytes) {
   if (!HasTrailer(bytes)) return Authenticity::kUnsigned;
   const auto found = channels_.find(name);

@@ -6,7 +6,7 @@
 namespace forereach {
 namespace {
 
-// The receiving thread asks it; the thread that reads the counts is another.
+// The receive thread calls Admit; another thread reads the counts.
 class KeyScreen final : public Screen {
  public:
   explicit KeyScreen(Authenticator authenticator) : authenticator_(std::move(authenticator)) {}
@@ -35,7 +35,7 @@ class SignedBus final : public Bus {
         speakers_(speakers),
         clock_(std::move(clock)),
         signer_(keys, bus_name),
-        // Its own first message may be of the microsecond in which it begins.
+        // Its own first message may have the microsecond of its start.
         screen_(std::make_shared<KeyScreen>(Authenticator(keys, bus_name, speakers, clock_() - 1))),
         bus_(OpenBus(url, clock_, screen_)) {}
 

@@ -17,7 +17,7 @@
 namespace forereach {
 namespace {
 
-// What both kinds of bus have in common.
+// The common part of both kinds of bus.
 class InboxBus : public Bus {
  public:
   explicit InboxBus(std::shared_ptr<Screen> screen) : inbox_(std::move(screen)) {}

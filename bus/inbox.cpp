@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kBurstBytes = std::size_t{1} << 20;
 
-// Where `part` begins in `whole`.
+// The offset of `part` in `whole`.
 std::size_t OffsetIn(Bytes whole, Bytes part) {
   const std::less_equal<const std::uint8_t*> in_order;
   if (!in_order(whole.data(), part.data()) || !in_order(part.data() + part.size(), whole.data() + whole.size()))
@@ -61,7 +61,7 @@ void Inbox::Put(std::string_view channel, Bytes raw, std::int64_t utime) noexcep
   ++admitted_.dropped;
 }
 
-// The oldest make room.
+// Discards the oldest messages if the queue is full.
 void Inbox::Queue::Push(Stored stored) {
   bytes += stored.raw.size();
   messages.push_back(std::move(stored));

@@ -53,7 +53,7 @@ void RequireName(const std::string& path, const std::string& where, std::string_
          where + "a robot's name has to be 1 to " + std::to_string(kMaxName) + " letters, digits, '.', '_' or '-'");
 }
 
-// Text with secrets in it, which is wiped. It never grows, so no copy of it stays behind.
+// Text with secrets, which is wiped at the end. It never grows, so no unwiped copy is left.
 class SecretText final {
  public:
   SecretText() { text_.reserve(kMaxFileBytes + 1); }
@@ -233,7 +233,7 @@ class LineReader final {
     ++line_;
     if (!rest_.empty()) Complain("the file has to end before it");
   }
-  // Never with the value: it may be a secret.
+  // The message does not contain the value, which may be a secret.
   [[noreturn]] void Complain(const std::string& why) const {
     Fail(path_, "line " + std::to_string(line_) + ": " + why);
   }

@@ -20,7 +20,7 @@ void CatchStopSignals() {
 
 void RunNode(Node& node, Bus& bus) {
   CatchStopSignals();
-  node.Tick(WallClockUs());  // its first sign of life comes before anything that it hears
+  node.Tick(WallClockUs());  // the node sends its first message before it receives any
   while (!stop_requested && !node.done()) {
     bus.Dispatch(node.busy() ? 0 : kTickMs);
     if (reload_requested) {

@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t kBufferBytes = std::size_t{64} << 10;
 static_assert(kBufferBytes > kMaxDatagramBytes);
 constexpr suseconds_t kReceivePollUs = 50'000;             // how soon the thread sees that it has to stop
-constexpr std::chrono::milliseconds kPauseAfterError{10};  // an error that stays is no reason to spin
+constexpr std::chrono::milliseconds kPauseAfterError{10};  // a persistent error must not cause a busy loop
 
 void Require(bool done, const char* step) {
   if (!done) throw std::system_error(errno, std::generic_category(), step);

@@ -1,4 +1,4 @@
-// Commands for a system that runs: keygen, reset, reload, status.
+// Commands for a running system: keygen, reset, reload, status.
 #include <algorithm>
 #include <functional>
 #include <iostream>

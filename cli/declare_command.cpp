@@ -80,7 +80,7 @@ std::string BoxText(const std::vector<Interval>& box, const std::vector<std::str
   return text;
 }
 
-// A slope without a finite bound declares nothing. @throws std::runtime_error that names it and a box.
+// Rejects a slope without a finite bound. @throws std::runtime_error that names the slope and a box.
 void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, const ResidualSlopes& slopes) {
   const std::vector<std::string> names = ArgumentNames(config);
   const std::size_t parameters_begin = names.size() - config.residual->parameters.size();
@@ -102,7 +102,7 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
   }
 }
 
-// What goes into a task file's `declaration`.
+// The text for a task file's `declaration`.
 std::string Yaml(const std::vector<SlopeBound>& bounds, const std::vector<std::string>& names) {
   std::string text = "lipschitz: {";
   for (std::size_t i = 0; i < bounds.size(); ++i) {
@@ -216,7 +216,7 @@ struct Finding {
   std::string entry, what;
 };
 
-// What needs no mathematics: that the record is whole, this task's, and has each entry once.
+// The checks without mathematics: the record is complete, belongs to this task, and has each entry once.
 std::vector<Finding> CheckRecord(const CoverFile& file, const Config& config, const verifier::CoverChecker& checker) {
   std::vector<Finding> findings;
   const auto refute = [&](std::string entry, std::string what) {

@@ -18,7 +18,7 @@ struct Options {
   std::uint32_t seed = 1;
 };
 
-// A task that certifies need not be one that plans: it may have no goal, or a model without a way to brake.
+// A task for certifying may be unusable for planning: it may have no goal, or a model without Motion.
 std::unique_ptr<Proposer> ProposerOf(const Config& config) {
   try {
     return MakeProposer(config);
@@ -27,7 +27,7 @@ std::unique_ptr<Proposer> ProposerOf(const Config& config) {
   }
 }
 
-// As a shell reads it back.
+// Quoted for a shell.
 std::string Quoted(const std::string& word) {
   constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-./=:,+@%";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;

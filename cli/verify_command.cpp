@@ -114,7 +114,7 @@ void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts
             << std::endl;
 }
 
-// What "confirmed" means.
+// The meaning of "confirmed".
 std::string Extent(const CertificateFile& file) {
   if (file.certificates.empty()) return "  checked: nothing, for there are no certificates";
   if (file.of_decision)

@@ -32,7 +32,7 @@ void LoggerNode::Receive(const Received& received) {
   if (!speakers_.empty()) {
     const bool is_ours = speakers_.contains(received.channel),
                is_refused = received.bytes.empty() && !received.raw.empty();
-    // A log is judged by the bus of its first authentic message, so nothing refused stands before that.
+    // Readers take the bus of a log from its first authentic message, so no refused message is recorded before it.
     if (is_ours && !is_refused) authentic_heard_ = true;
     if (is_refused && !authentic_heard_) return;
     if ((!is_ours || is_refused) && !MayTakeUnsigned(received.raw.size())) {
@@ -50,7 +50,8 @@ void LoggerNode::Receive(const Received& received) {
   ++overflow_[stream];
 }
 
-// An allowance that grows with time, to that of one second at most. A clock set back stops it until the next message.
+// The allowance grows with time, up to that of one second. If the clock is set back, it does not grow until the next
+// message.
 bool LoggerNode::MayTakeUnsigned(std::size_t bytes) {
   constexpr double kSecondUs = 1e6, kOverheadBytes = 1000;
   const auto elapsed = static_cast<double>(now_us_ - std::exchange(allowance_us_, now_us_));
@@ -62,7 +63,7 @@ bool LoggerNode::MayTakeUnsigned(std::size_t bytes) {
   return true;
 }
 
-// Of a bus that looks, those that it refused; else those that the log holds.
+// The refusals of a signed bus; otherwise those found in the log.
 Refusals LoggerNode::refusals() const {
   const Refusals refused = bus_.refusals();
   return refused.all() > 0 ? refused : recorder_.interpreter().refusals();

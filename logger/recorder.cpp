@@ -15,7 +15,7 @@ namespace forereach {
 namespace {
 
 constexpr std::int64_t kMaxBufferBytes = 4 << 20;
-constexpr std::size_t kMaxLosses = 256, kMaxChannels = 256;  // a sender that invents channels must not fill the memory
+constexpr std::size_t kMaxLosses = 256, kMaxChannels = 256;  // invented channels must not fill the memory
 constexpr std::size_t kMaxTasks = 16, kMaxTasksInUse = 256;
 constexpr int kEventsPerTransaction = 4096;
 constexpr double kScanUs = 1e6, kGapsUs = 10e6, kRetryUs = 1e6;
@@ -26,7 +26,8 @@ void MoveTo(std::vector<Row>& to, std::vector<Row>& from) {
   from.clear();
 }
 
-// Takes from a gap found again what gaps without an event have counted already; false if nothing is left of it.
+// Subtracts from a gap that is found again the losses that gaps without an event already contain. False if none are
+// left.
 bool IsMore(GapRow& gap, std::map<std::string, std::int64_t>& counted) {
   const auto known = counted.find(gap.channel);
   if (known == counted.end()) return true;
@@ -49,7 +50,7 @@ const char* DescribePlace(FilePlace place) {
   }
 }
 
-// Of gaps found in events that are in no log.
+// For gaps between events that are in no log.
 void WithoutEvents(std::vector<GapRow>& gaps) {
   for (GapRow& gap : gaps) {
     gap.event.event_number = -1;
@@ -57,7 +58,7 @@ void WithoutEvents(std::vector<GapRow>& gaps) {
   }
 }
 
-// Where losses of this reason and stream are counted in such a map: once it is full, new streams are counted as one.
+// The entry of the map for losses of this reason and stream. Once the map is full, all new streams share one entry.
 template <class Counts>
 std::pair<std::string, Stream> KeyIn(const Counts& counts, const std::string& reason, const Stream& stream) {
   std::pair key{reason, stream};
@@ -65,7 +66,7 @@ std::pair<std::string, Stream> KeyIn(const Counts& counts, const std::string& re
   return key;
 }
 
-// The gaps without an event, those of one stream and reason as one.
+// The gaps without an event, merged by stream and reason.
 std::vector<GapRow> MergedWithoutEvents(const std::vector<GapRow>& gaps) {
   std::map<std::pair<std::string, Stream>, GapRow> merged;
   for (const GapRow& gap : gaps) {
@@ -115,8 +116,8 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
     if (!run.end_utime) Recover(run);
 }
 
-// Listed before the runs are read: another logger's file has its run by then, or is locked. A file without a byte of an
-// event is what a logger leaves that is killed between making it and recording its run.
+// The files are listed before the runs are read, so another logger's file has its run by then, or is locked. A file
+// without an event is left by a logger that was killed between making the file and recording its run.
 void Recorder::AdoptLogs() {
   const std::vector<std::string> logs = directory_.Logs();
   const std::vector<RunRow> runs = database_->Runs();
@@ -151,7 +152,7 @@ void Recorder::Recover(const RunRow& run) {
 
 std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
   const std::string path = directory_.PathOf(run.log_file);
-  const EventLogWriter mended(path);  // removes a cut tail, and keeps others from doing the same meanwhile
+  const EventLogWriter mended(path);  // removes a cut tail, and locks the file against other loggers
   EventLogReader reader(path);
   Interpreter interpreter = InterpreterFor(run);
   const std::set<std::int64_t> known = database_->EventsBehindGaps(run.log_file);
@@ -182,7 +183,7 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
       found.events, found.cut_bytes, found.corruptions, found.skipped_bytes, new_rows);
 }
 
-// What it knew when the file began: it has seen the file before, if there is one.
+// The interpreter's state at the beginning of the file: it has read the file before it, if there is one.
 Interpreter Recorder::InterpreterFor(const RunRow& run) const {
   Interpreter interpreter(channels_, run.continues, keys_);
   if (!run.continues.empty() && directory_.Bytes(run.continues)) {
@@ -219,7 +220,7 @@ void Recorder::Open(std::int64_t now_us, const std::string& continues) {
   try {
     database().BeginRun(file, now_us, continues);
   } catch (const DatabaseError&) {
-    directory_.Remove(file);  // empty, and no run knows it
+    directory_.Remove(file);  // it is empty and belongs to no run
     throw;
   }
   if (log_ && log_->pending_bytes() > 0) log->TakeOver(*log_);
@@ -261,7 +262,7 @@ void Recorder::KeepTasks() const {
     }
 }
 
-// A reload may bring other transitions with the same task file, which only the version tells.
+// A reload may change the transitions without the task file; then only the version changes.
 void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
   if (task_path_.empty() || event.channel != channels_.status) return;
   const auto heartbeat = ReadHeartbeat(event.message());
@@ -286,7 +287,7 @@ void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
   }
 }
 
-// Those that no log names any more. A run that was not ended may lack rows, and with them what it needs.
+// Removes the tasks that no log names any more. A run that was not ended may lack rows, so its tasks are kept.
 void Recorder::ForgetTasksOf(const std::string& log) {
   std::set<std::string> forgotten = database().ConfigDigests(log);
   for (const RunRow& run : database().Runs()) {
@@ -302,7 +303,7 @@ void Recorder::Rotate(std::int64_t now_us) {
   if (!retry_.IsOver(now_us)) return;
   const std::string before = log_file_;
   const bool flushed = Flush(now_us);
-  if (is_log_lost_ || log_file_ != before) return;  // it was gone
+  if (is_log_lost_ || log_file_ != before) return;  // the file had disappeared
   const std::string ended = log_file_;
   const bool whole = !rows_lost_;
   std::int64_t events = 0;
@@ -312,7 +313,7 @@ void Recorder::Rotate(std::int64_t now_us) {
     Open(now_us, ended);
     earlier_files_[ended] = events;
     if (whole) database().EndRun(ended, now_us);
-    WatchDisk(now_us);  // the ended file may go for the quota
+    WatchDisk(now_us);  // the ended file may now be deleted for the quota
     rotation_problem_.clear();
   } catch (const BadInput& error) {
     rotation_problem_ = std::string("no new log file: ") + error.what();
@@ -321,7 +322,7 @@ void Recorder::Rotate(std::int64_t now_us) {
 }
 
 void Recorder::Tick(std::int64_t now_us) {
-  // Where the quota has no room even this file may have to go, and only one that has ended may.
+  // If the quota has no room, even this file may have to be deleted, and only an ended file may be.
   if ((age_.IsOver(now_us) || pause_ == "quota" || needs_new_file_) && log_->next_number() > 0) Rotate(now_us);
   if (flush_.IsOver(now_us) || log_->pending_bytes() > kMaxBufferBytes) Flush(now_us);
 }
@@ -341,7 +342,7 @@ void Recorder::Take(LogEvent event, std::int64_t now_us) {
   summary_.Add(event);
 }
 
-// The counts go on, so that what the pause costs is not taken for a loss of the bus.
+// The counts continue, so that losses by the pause are not counted as losses of the bus.
 void Recorder::Miss(LogEvent event) {
   Rows missed;
   interpreter_.Observe(event, missed);
@@ -376,7 +377,7 @@ void Recorder::MakeGaps(std::int64_t now_us) {
   gaps_.Start(now_us);
 }
 
-// Whoever has deleted or moved what is being written, the descriptors still work: only the path tells.
+// After a file was deleted or moved, its descriptor still works, so only the path shows the change.
 void Recorder::WatchFiles(std::int64_t now_us) {
   WatchDatabase(now_us);
   if (!is_log_lost_) {
@@ -408,7 +409,7 @@ void Recorder::GiveUpLog(FilePlace place, std::int64_t now_us) {
   spdlog::error("{} {} while it was written: {} confirmed events are gone", log_path_, DescribePlace(place), events);
 }
 
-// Those for the quota are not among them.
+// Files that were deleted for the quota do not count.
 std::int64_t Recorder::CountEarlierFilesGone(std::int64_t now_us) {
   std::int64_t gone = 0;
   std::erase_if(earlier_files_, [&](const auto& entry) {
@@ -491,7 +492,7 @@ bool Recorder::Flush(std::int64_t now_us) {
   const auto begun = std::chrono::steady_clock::now();
   flush_.Start(now_us);
   WatchFiles(now_us);
-  // With nothing to write there is nothing to learn of the disk: a failure lasts until something has been written.
+  // An empty flush does not test the disk, so a failure lasts until a flush has written something.
   const bool learns = log_->pending_bytes() > 0 || !pause_.empty();
   const bool flushed = FlushLog(now_us);
   WatchDisk(now_us);
@@ -571,7 +572,7 @@ void Recorder::End(std::int64_t now_us) {
     MakeGaps(now_us);
     Flush(now_us);
   }
-  // A run with rows missing stays open, so that the next start makes them again from the log.
+  // A run with missing rows is not ended, so that the next start makes them again from the log.
   if (flushed_rows_.empty() && !rows_lost_) try {
       database().EndRun(log_file_, now_us);
     } catch (const DatabaseError& error) {
@@ -579,7 +580,7 @@ void Recorder::End(std::int64_t now_us) {
     }
 }
 
-// A pause ends with an eighth to spare, so that it does not end and begin with every flush.
+// A pause ends with a margin of an eighth, so that it does not end and begin at every flush.
 void Recorder::WatchDisk(std::int64_t now_us) {
   free_bytes_ = free_space_(directory_.path());
   if (scan_.IsOver(now_us)) {
@@ -600,7 +601,7 @@ bool Recorder::HasRoom(std::int64_t bytes) const {
   return !options_.quota_mb || log_bytes() + bytes <= BytesOf(*options_.quota_mb);
 }
 
-// Deletes the oldest ended logs until there is room, and none if all of them together would not make it.
+// Deletes the oldest ended logs until there is room. Deletes none if all of them together would not make enough room.
 bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
   if (HasRoom(bytes)) return true;
   other_bytes_ = directory_.LogBytes(log_file_);

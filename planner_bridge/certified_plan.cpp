@@ -32,8 +32,8 @@ class PlanSearch final {
 
  private:
   // Adds one progress part from `start`, with a braking tail in place of the old one. False if no such plan is
-  // certified; then found_ is as before. The tube only widens on its way, so what one part has learned holds for the
-  // next.
+  // certified; then found_ does not change. The tube only widens along the plan, so the lessons of one part hold for
+  // the next.
   bool Extend(const Eigen::VectorXd& start) {
     for (int attempt = 0; attempt < config_.planner.candidates; ++attempt) {
       const PlanRequest request{start, lessons_.clearance(),

@@ -14,7 +14,7 @@
 namespace forereach {
 namespace {
 
-// Tails stay this far inside the domain's bounds, so that rounding does not take a control across one.
+// Tails keep this distance from the domain's bounds, so that rounding does not move a control across a bound.
 constexpr double kShareOfBound = 0.95;
 
 // Where a state that is zero but for one coordinate goes to in another.
@@ -26,7 +26,7 @@ double StepResponse(const NominalModel& model, std::size_t from, std::size_t to)
   return next[to];
 }
 
-// What both signs of a coordinate may reach.
+// The largest magnitude that the bounds allow for both signs of a coordinate.
 double Reach(const Box& box, int k) { return std::min(-box.lower()(k), box.upper()(k)); }
 
 /** Jerk-limited deceleration to v = a = 0, while the wheels go to a bend, stay there for half of the time and then

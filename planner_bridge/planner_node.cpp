@@ -78,7 +78,7 @@ bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) cons
          Judge(state.utime, now_us, config_.gate).freshness != Freshness::kFuture;
 }
 
-// True for a state that comes neither late nor again.
+// True for a state that is neither late nor repeated.
 bool PlannerNode::TakeOrder(const robot_state_t& state, std::int64_t now_us) {
   const StreamPosition position{state.sequence, state.utime};
   const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(config_.gate.max_ahead_ms));
@@ -114,7 +114,7 @@ bool PlannerNode::NextPlanIsDue(const robot_state_t& state) const {
          state.executing_step + config_.planner.lead_steps >= plan->second.progress_steps;
 }
 
-// From the measured state through the controls that are still to be applied before the start.
+// Simulates from the measured state through the controls that will be applied before the start.
 std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& state) const {
   const std::size_t n = static_cast<std::size_t>(state.num_states);
   Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
@@ -214,7 +214,7 @@ void PlannerNode::Learn(const decision_t& decision) {
   plans_.erase(decision.plan_id);
   auto& counts = decision.outcome == decision_t::REJECTED ? rejected_ : abstained_;
   ++counts[std::string(CauseName(decision.cause))];
-  // No candidate can pass before the world has changed.
+  // No candidate can be certified until the certifier's state changes.
   if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_NO_OBSTACLES ||
       decision.cause == decision_t::CAUSE_FAULT || decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE)
     return EndRound(false);

@@ -148,7 +148,7 @@ Json ToJson(const Policy::Scaling& scaling) {
   return {{"offset", ToJson(scaling.offset)}, {"scale", ToJson(scaling.scale)}};
 }
 
-// A line for each row of numbers, so that a changed policy can be looked at.
+// Writes one line for each row of numbers, so that changes of a policy are readable.
 std::string Lines(const Policy& policy) {
   Json head{{"format", kFormat},
             {"version", kVersion},

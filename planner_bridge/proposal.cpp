@@ -315,13 +315,13 @@ bool Planner::Search::Propagate(const double* from, const double* u, double* to)
   return inside;
 }
 
-// What the robot should drive at, a distance from the goal: slowly enough there not to miss it.
+// The speed to drive at a distance from the goal. It decreases towards the goal, so that the robot does not miss it.
 double Planner::Search::SpeedAt(double distance) const {
   const double cruise = planner_.options_.cruise_speed;
   return std::clamp(distance / kArrivalTime, kArrivalSpeed * cruise, cruise);
 }
 
-// Down the navigation field a little ahead, give or take a turn, and somewhat more slowly than would be best.
+// Follows the descent of the navigation field a short distance ahead, with a random turn and a random lower speed.
 void Planner::Search::Hint(const double* s, double turn, double slower, double* u) const {
   const Eigen::VectorXd position = Position(StateOf(s));
   const Eigen::VectorXd descent = field_.Descent(position + kLookAhead * Drift(StateOf(s)));
@@ -338,7 +338,7 @@ Eigen::VectorXd Planner::Search::Drift(std::span<const double> x) const {
   return Position({next.data(), n_}) - Position(x);
 }
 
-// What driving straight at the goal would gain, accelerating up to the speed that is right there.
+// The distance that driving straight at the goal would gain, with acceleration up to the desired speed.
 double Planner::Search::IdealGain() const {
   const double dt = planner_.motion_->dt();
   double speed = planner_.motion_->Speed({start_.data(), n_}), gain = 0;
@@ -391,7 +391,7 @@ bool Planner::Search::TailIsAllowed(std::span<const double> x, const Ambition& a
   return !ambition.room || HasRoom(position, direction);
 }
 
-// Whether a robot that came to rest here may still drive on: one that cannot reverse would be there to stay.
+// Whether a robot at rest here can drive on. A robot that cannot reverse could otherwise not leave the place.
 bool Planner::Search::HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const {
   for (double ahead = 1; ahead <= kRoomAhead; ++ahead)
     if (!Clear(position + ahead * direction)) return false;

@@ -13,7 +13,7 @@
 namespace forereach {
 namespace {
 
-constexpr std::size_t kMostExpected = 8;  // tasks that were read and under which no plan has come
+constexpr std::size_t kMostExpected = 8;  // reloaded tasks without a plan yet
 constexpr int kMaxPlanStates = 16, kMaxPlanInputs = 8, kMaxPlanSteps = 128;
 
 [[gnu::format(printf, 1, 2)]] std::string Sentence(const char* format, ...) {
@@ -202,7 +202,8 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   RequireDomain(options_.domain, options_);
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
-  // A plan expires and its plan_id has to be new, so one from before the guard began does no more harm than a late one.
+  // A plan expires and its plan_id has to be new, so a plan from before the guard's start does no more harm than a late
+  // one.
   authenticator_.emplace(*options_.keys, options_.bus_name, Speakers{{options_.channel, Role::kCertifier}}, 0);
 }
 
@@ -220,7 +221,7 @@ void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std:
   expected_.push_back({config_digest, model_digest, std::move(domain)});
 }
 
-// Takes the signature off.
+// Checks and removes the signature.
 GuardVerdict Guard::Authenticated(Bytes& bytes) {
   if (!authenticator_) return {};
   const auto [authenticity, message] = authenticator_->Check(options_.channel, bytes);

@@ -22,8 +22,8 @@ void IssuedPlans::TolerateFrom(std::int64_t steady_us) {
   tolerates_until_us_ = std::max(tolerates_until_us_, steady_us + LongestLife(kMaxSteps));
 }
 
-// It begins before it expires, by a clock that may be behind by the age of a fresh message; then it runs all its steps;
-// and the last of its states may be as late again.
+// A plan begins before it expires, by a clock that may be behind by the age of a fresh message. Then it runs all its
+// steps, and the message with its last state may be delayed by the same time.
 std::int64_t IssuedPlans::LongestLife(int num_steps) const {
   return lifetime_us_ + 2 * delay_us_ + num_steps * step_us_;
 }
@@ -55,7 +55,7 @@ std::optional<IssuedPlans::Stranger> IssuedPlans::Judge(const robot_state_t& sta
                   "the robot executes plan " + std::to_string(state.executing_plan_id) + ", " + why};
 }
 
-// Whether it began in time is judged once, by the first state that is heard: afterwards a clock may be set.
+// Whether it began in time is decided once, by the first received state, because a clock may be set later.
 std::string IssuedPlans::WhyNot(Issued& issued, const robot_state_t& state) const {
   if (state.executing_step < 0 || state.executing_step >= issued.num_steps)
     return "step " + std::to_string(state.executing_step) + " of " + std::to_string(issued.num_steps);

@@ -47,7 +47,7 @@ void ObstaclesInForce::NoteOrder(std::int64_t sequence, std::int64_t now_us) {
   const bool follows_the_last_taken = !last || sequence - 1 == last->sequence;
   state_.next = sequence == INT64_MAX ? sequence : sequence + 1;
   if (sequence == 0) {
-    // While the last message is fresh this may be a second sender, which knows a part only.
+    // While the last message is fresh, this may be a second sender, which knows only a part of the obstacles.
     state_.unconfirmed = last && FreshnessOfLast(now_us) == Freshness::kFresh ? 1 : 0;
   } else if (sequence == next || follows_the_last_taken) {
     state_.unconfirmed = std::max(state_.unconfirmed - 1, 0);
@@ -81,7 +81,7 @@ std::string ObstaclesInForce::WhyUnknown(std::int64_t now_us) const {
   return {};
 }
 
-// By how long a message counts. @pre there is one.
+// The freshness of the last message. @pre there is one.
 Freshness ObstaclesInForce::FreshnessOfLast(std::int64_t now_us) const {
   return FreshnessOf(state_.order.newest()->utime, now_us, Microseconds(options_.obstacles_timeout_ms),
                      Microseconds(options_.max_ahead_ms));

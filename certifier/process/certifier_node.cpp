@@ -98,8 +98,7 @@ CertifierNode::~CertifierNode() {
 void CertifierNode::OnStatus(const Received& received) {
   const auto status = Decoded<certifier_status_v3_t>(received.bytes);
   if (!status || status->instance == charge_.self().instance) return;
-  // Clocks that disagree must not hide two certifiers from each other; a log that somebody plays must not look like
-  // one.
+  // Two certifiers must see each other even if their clocks disagree. Messages of a replayed log must not count.
   if (FreshnessOf(status->utime, received.utime, kClocksApartUs, kClocksApartUs) != Freshness::kFresh)
     return Refuse(channels_.status, "a heartbeat from another time");
   LookAtCharge();
@@ -110,18 +109,18 @@ void CertifierNode::OnStatus(const Received& received) {
   if (is_in_charge()) reporter_.HurryToOthers();
 }
 
-// What the one in charge says counts for this one if it takes over.
+// Notes the fault and the contradictions of the certifier in charge, for the case that this one takes over.
 void CertifierNode::Heed(const certifier_status_v3_t& status) {
   fault_of_other_.reset();
   if (status.fault != 0) fault_of_other_ = Watch::Fault{status.fault, status.fault_utime, GetText(status.message)};
-  // Without a fault it is in error where data contradict its declaration, or where it cannot store a fault.
+  // Without a fault, ERROR means that data contradict its declaration or that it cannot store a fault.
   const bool is_false = status.fault == fault_t::DECLARATION_FALSIFIED ||
                         (status.fault == 0 && status.level == certifier_status_v3_t::ERROR &&
                          status.latch != certifier_status_v3_t::LATCH_UNWRITABLE);
   if (is_false) contradictions_.AddReported(GetDigest(status.model_digest), GetDigest(status.declaration_digest));
 }
 
-// A datagram that says FAULT may be the last that the one in charge sends.
+// A FAULT message may be the last one that the certifier in charge sends.
 void CertifierNode::OnFault(const Received& received) {
   if (is_in_charge()) return;  // its own
   const auto fault = Decoded<fault_t>(received.bytes);
@@ -129,7 +128,8 @@ void CertifierNode::OnFault(const Received& received) {
   fault_of_other_ = Watch::Fault{fault->cause, fault->utime, GetText(fault->message)};
 }
 
-// Before a message is acted on: a process that was paused may have been replaced since, and hears what piled up first.
+// Called before a message is processed: a paused process may have been replaced, and it receives the queued messages
+// first.
 void CertifierNode::LookAtCharge() {
   const Charge::State before = charge_.state();
   charge_.Advance(clocks_.steady());
@@ -169,7 +169,8 @@ void CertifierNode::TakeCharge() {
   fault_of_other_.reset();
 }
 
-// What was learned and heard while it was in charge it forgets: another has been since. A contradiction it keeps.
+// Forgets learned transitions and received messages, because another certifier has been in charge since. Keeps
+// contradictions.
 void CertifierNode::StandBy() {
   spdlog::warn("{}", WhyNotInCharge());
   LeaveWaiting();
@@ -194,12 +195,12 @@ void CertifierNode::OnCandidate(const Received& received) {
   ++reporter_.counts.left_to_other;
 }
 
-// ---- What changes the grounds of decisions.
+// ---- Messages that change the inputs of decisions.
 
 void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
   ++reporter_.counts.refused;
   const std::int64_t now = clocks_.steady();
-  if (now < next_warning_us_) return;  // whoever floods the bus does not flood the log, nor wait for its reader
+  if (now < next_warning_us_) return;  // a flood of messages must not flood the log
   next_warning_us_ = now + kHeartbeatUs;
   spdlog::warn("{}: refused: {} ({} messages in all)", channel, why, reporter_.counts.refused);
 }
@@ -241,7 +242,7 @@ void CertifierNode::OnTransition(const Received& received) {
   if (!has_begun_) return;
   const auto transition = Decoded<transition_t>(received.bytes);
   if (transition) last_transition_ = *transition;
-  if (gate_->options().learns) Learn(received.bytes);  // first: a false declaration is why a slice is left
+  if (gate_->options().learns) Learn(received.bytes);  // first, because a false declaration explains a left slice
   if (!transition || !is_in_charge()) return;
   if (const auto departure = conformance_.Check(*transition)) Fail(SliceLeft(*departure));
 }
@@ -314,9 +315,9 @@ void CertifierNode::SendFault() {
 void CertifierNode::Tick(std::int64_t now_us) {
   LookAtCharge();
   LookForObstacles(now_us);
-  if (reporter_.IsFirst() && is_in_charge()) Heartbeat(now_us);  // says that nothing has been decided or learned yet
+  if (reporter_.IsFirst() && is_in_charge()) Heartbeat(now_us);  // reports the state before the first decision
   if (const auto fault = watch_.Advance(now_us, clocks_.steady())) {
-    // By a clock that was set back a plan may begin later than it could.
+    // After the clock was set back, a plan may start later than allowed.
     if (fault->cause == fault_t::CLOCK_JUMP) issued_.TolerateFrom(clocks_.steady());
     Announce(PlainFault(fault->cause, fault->why).fault, *fault);
   }
@@ -335,11 +336,11 @@ void CertifierNode::AnswerWaiting() {
   const auto most = static_cast<std::size_t>(gate_->options().queue);
   for (int i = 1; queue_.size() > most; ++i) {
     Answer(queue_.TakeOldest(), true);
-    if (i % kAtOnce == 0) AnswerDue();  // a flood takes longer to answer than the kept ones have
+    if (i % kAtOnce == 0) AnswerDue();  // answering a flood takes longer than the waiting candidates have
   }
 }
 
-// Those for which another decision would take too long: while their start has not passed.
+// Answers the candidates that would be too late after another decision, while their start has not passed.
 void CertifierNode::AnswerDue() {
   const std::int64_t earliest = gate_->EarliestStart(clocks_.wall());
   for (const CandidateQueue::Candidate& due : queue_.TakeStartingBefore(earliest)) Answer(due, false);
@@ -407,7 +408,7 @@ void CertifierNode::TakeReload() {
 void CertifierNode::Heartbeat(std::int64_t now_us) {
   latch_.Check();
   const certifier_status_v3_t status = reporter_.Report(*gate_, now_us, clocks_.steady());
-  // The fault comes first, for a robot that has just begun.
+  // The fault is sent first, for a robot that has just started.
   if (latch_.IsDue(clocks_.steady())) SendFault();
   sender_.Send(channels_.status, status);
 }

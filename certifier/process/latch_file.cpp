@@ -29,7 +29,7 @@ constexpr const char* kNewName = "latch.json.new";
 
 bool IsAnswer(ssize_t result) { return result >= 0 || errno != EINTR; }
 
-// All of it, from the file's beginning.
+// Reads the whole file from its beginning.
 bool WriteAll(int file, const std::string& text) {
   std::size_t written = 0;
   while (written < text.size()) {
@@ -97,7 +97,7 @@ LatchFile::Content ContentFrom(const Json& json) {
   return content;
 }
 
-// Of the file's size.
+// Text of exactly the file's size.
 std::string TextOf(const LatchFile::Content& content) {
   const Json inner = ToJson(content);
   std::string text =
@@ -179,7 +179,7 @@ std::optional<LatchFile::Content> LatchFile::Read() {
   } catch (const BadInput& error) {
     return Fail(error.what()), std::nullopt;
   }
-  // Reading does not wait for whoever is at the other end of a pipe, and follows no link.
+  // Opening does not wait for the other end of a pipe, and follows no link.
   const int file = ::openat(lock_, kName, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (file < 0 && errno == ENOENT) {
     may_write_ = true;
@@ -256,7 +256,7 @@ bool LatchFile::Put(const Content& content) {
   if (!may_write_) return false;
   const std::string text = TextOf(content);
   if (content.contradictions.size() > kMostContradictions || text.size() != kBytes) {
-    // What cannot be stored must not look like "no fault" to the next start.
+    // A fault that cannot be stored must not look like "no fault" at the next start.
     if (file_ >= 0 && !holds_fault_) emptied_ = ::ftruncate(file_, 0) == 0;
     return Fail(path() + ": holds at most " + std::to_string(kMostContradictions) +
                 " contradictions; once a declaration is true, delete the file");
