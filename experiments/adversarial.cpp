@@ -34,7 +34,7 @@ Cell TrueCell(double lambda) {
   return cell;
 }
 
-// What was declared of the knee, whatever the target.
+// The declaration of the knee, for every target.
 Cell KeptCell(double lambda) {
   Cell cell = TrueCell(lambda);
   cell.declared = {"kept", PointMassSystem().deployed};
@@ -54,7 +54,7 @@ std::vector<Cell> FamilyCells(const Scope& scope) {
   return cells;
 }
 
-// The largest entry of what is read off the data, as a part of the deployed matrix's.
+// The largest entry of the estimate from the data, relative to the deployed matrix's.
 Estimate EstimatedPart(const Scope& scope, double lambda) {
   const System& system = Escaping(lambda);
   const Declaration kept{PointMassSystem().deployed, Eigen::VectorXd::Zero(system.num_states())};

@@ -1,4 +1,4 @@
-// ForeReach beside the other methods: coverage where there are no data, recall where there are.
+// ForeReach compared with the other methods: coverage without data near the plan, recall with data.
 #include <cmath>
 #include <map>
 #include <string>
@@ -101,7 +101,7 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
     for (const int observations : Sizes(scope)) {
       const Cell cell = With(method, PaperCell(BicycleSystem(), observations, 0, 0));
       recall = OverSeeds(scope, results, cell, Group::kC, Recall).mean.value_or(0);
-      // No complete tube, no coverage: such a method says nothing, and is shown at 1.
+      // Without a complete tube there is no coverage; such a method is shown at 1.
       points += DataLine({OverSeeds(scope, results, cell, Group::kB, Coverage).mean.value_or(1), recall,
                           0.6 + 0.2 * std::log2(observations / 25.0)});
     }

@@ -1,5 +1,5 @@
-// What changes with the declared L: too small, over parameter boxes, its norm beside the whole dynamics', and the
-// paper's own certified matrices.
+// The effect of the declared L: too small, over parameter boxes, its norm compared with the whole dynamics', and the
+// paper's certified matrices.
 #include <cmath>
 #include <cstdio>
 #include <map>

@@ -1,4 +1,4 @@
-// How much of the nominal model a certifier can lose: recall as less of it is known.
+// Degradation of the nominal model: recall as a smaller part of the model is known.
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kReference = 0.5;  // the paper's "common reference level"
 
-// The parts lacking, in per cent. The paper has 49 cells in 4D and 60 in 6D, and does not say which.
+// The missing parts, in per cent. The paper has 49 cells in 4D and 60 in 6D, and does not state them.
 std::vector<double> PercentsOf(const Scope& scope) {
   return scope.quick ? std::vector<double>{5, 90} : std::vector<double>{0, 2, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90};
 }

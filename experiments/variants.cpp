@@ -17,7 +17,7 @@
 namespace forereach::experiments {
 namespace {
 
-// The nominal model with one more parameter: the part of it that is known.
+// The nominal model with one more parameter: its known part.
 template <class Equations>
 struct Partly {
   static constexpr int kStates = Equations::kStates, kInputs = Equations::kInputs;

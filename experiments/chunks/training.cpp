@@ -58,7 +58,7 @@ Policy::Layer LayerOf(const Layer& layer, Eigen::Index width, Eigen::Index heigh
           Eigen::Map<const Eigen::VectorXf>(numbers + width * height, height).unaryExpr(&Written)};
 }
 
-// The library draws first weights from std::rand, which is not the same everywhere: draws them anew, by Glorot and
+// The library draws initial weights from std::rand, which differs between systems. Draws them again, by Glorot and
 // Bengio, with biases of zero.
 void DrawWeights(Network& network, const Sample& sample, std::uint64_t seed) {
   static_cast<void>(network(sample));  // allocates

@@ -84,7 +84,7 @@ Eigen::MatrixXd CpSls::CovarianceAt(const Eigen::VectorXd& weights) const {
   Eigen::MatrixXd covariance = residuals_.transpose() * share.asDiagonal() * residuals_;
   if (!full) covariance = Eigen::MatrixXd(covariance.diagonal().asDiagonal());
   const double mean_variance = covariance.trace() / static_cast<double>(covariance.rows());
-  // The smallest normal number stands in where all residuals are zero.
+  // If all residuals are zero, the smallest normal number is used.
   covariance.diagonal().array() += kRidge * mean_variance + std::numeric_limits<double>::min();
   return covariance;
 }
