@@ -1,4 +1,4 @@
-// Key files: public keys are read out of what MakeKeys writes, and of nothing else.
+// Key files: public keys are read only from files that MakeKeys can write.
 #include "bus/keys.h"
 #include "fuzz/fuzz.h"
 

@@ -1,4 +1,4 @@
-// `forereach declare`: its matrix, its cover, and what --check says of covers whole and tampered with.
+// `forereach declare`: its matrix, its cover, and the results of --check for valid and altered covers.
 #include <filesystem>
 #include <fstream>
 #include <regex>

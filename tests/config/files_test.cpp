@@ -1,4 +1,4 @@
-// What people name as a file: read if it is one, refused at once if it is anything else; and reloads that never end.
+// Input files: regular files are read, others are refused at once; and reloads that never end.
 #include "certifier/task/files.h"
 
 #include <sys/socket.h>

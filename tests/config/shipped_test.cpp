@@ -1,4 +1,4 @@
-// The tasks in config/ do what they say, and its README says what the code does.
+// The tasks in config/ have the described outcomes, and the README there agrees with the code.
 #include <filesystem>
 #include <fstream>
 #include <sstream>

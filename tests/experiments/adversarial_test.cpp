@@ -1,4 +1,4 @@
-// The adversarial family: what a declaration is worth that is true, kept, or estimated where nothing shows.
+// The adversarial family: the value of a true declaration, a kept one, and one estimated from uninformative data.
 #include <algorithm>
 #include <string>
 #include <vector>

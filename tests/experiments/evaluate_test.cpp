@@ -1,4 +1,4 @@
-// One plan under one method: the certifier's own answers, and a judge of coverage that sees what is not covered.
+// One plan under one method: the certifier's own answers, and a coverage test that detects missing coverage.
 #include "experiments/evaluate.h"
 
 #include <memory>

@@ -1,4 +1,4 @@
-// The extremal residuals are admissible, and every tube of the certifier contains what they do.
+// The extremal residuals are admissible, and every tube of the certifier contains their rollouts.
 #include "experiments/limits/extremal.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Slope estimates by hand, and that what no sample shows no estimator sees.
+// Slope estimates by hand; no estimator finds a slope that no sample shows.
 #include "experiments/methods/slopes.h"
 
 #include <cmath>
