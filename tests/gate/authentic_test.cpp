@@ -142,9 +142,12 @@ TEST(Authentic, ACounterIsTakenOnce) {
   EXPECT_EQ(judge(second), Authenticity::kAuthentic);
   EXPECT_EQ(judge(second), Authenticity::kReplayed);
   EXPECT_EQ(judge(first), Authenticity::kReplayed) << "older ones are not fresh any more";
+  const auto third = sign(signer, kBegun + 2);
+  EXPECT_EQ(judge(third), Authenticity::kAuthentic);
+  EXPECT_EQ(judge(third), Authenticity::kReplayed) << "nor is a later one, once it was taken";
   EXPECT_EQ(judge(sign(other, kBegun + 1)), Authenticity::kAuthentic) << "each sender for itself";
   EXPECT_EQ(judge(sign(signer, 0)), Authenticity::kAuthentic) << "a clock set back does not stop it";
-  EXPECT_EQ(authenticator.refusals().replayed, 2);
+  EXPECT_EQ(authenticator.refusals().replayed, 3);
 }
 
 TEST(Authentic, NothingFromBeforeTheReceiverBegan) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <stdexcept>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -164,6 +165,20 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
   EXPECT_EQ(status.by_outcome[decision_t::REJECTED], 20);
   EXPECT_EQ(certificates, 10);
   ExpectDigestsOf(config_, status);
+}
+
+TEST_F(GateAnswerTest, AnErrorAfterTheProofLeavesNoCertificate) {
+  int calls = 0;
+  const Gate::Clock fails_after_the_proof = [&] {
+    if (++calls > 1) throw std::runtime_error("the clock is gone");
+    return kNow;
+  };
+  const GateAnswer answer = gate_.Decide(Encode(Candidate(1)), fails_after_the_proof);
+  EXPECT_EQ(calls, 2);
+  EXPECT_FALSE(answer.certified);
+  EXPECT_EQ(answer.decision.outcome, decision_t::REJECTED);
+  EXPECT_EQ(answer.decision.cause, decision_t::CAUSE_INTERNAL_ERROR);
+  EXPECT_EQ(gate_.Status(kNow).by_outcome[decision_t::CERTIFIED], 0);
 }
 
 TEST_F(GateAnswerTest, WhatWasUsedBeforeAReloadIsUsedAfterIt) {

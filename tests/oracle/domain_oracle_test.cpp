@@ -149,7 +149,10 @@ TEST(FindExit, AgainstABallNoSetOutsideIsFoundInside) {
       ASSERT_EQ(exit.index, 1);
       ASSERT_EQ(exit.bound, ball.radius);
       ASSERT_GE(Rational(exit.value) * Rational(exit.value), square);
-      ASSERT_GT(square, bound * (1 - Rational(0x1p-45))) << "found outside";
+      const Rational nearly = radius - Rational(0x1p-44) * (radius + 16);  // the ends of the box are rounded
+      if (nearly > 0) {
+        ASSERT_GT(square, nearly * nearly) << "found outside";
+      }
       outside += square > bound;
     }
   }

@@ -8,6 +8,7 @@
 #include "certifier/dynamics/models.h"
 #include "tests/oracle/random.h"
 #include "tests/verifier/record.h"
+#include "verifier/containment.h"
 #include "verifier/equations.h"
 #include "verifier/tube.h"
 
@@ -123,6 +124,19 @@ TEST(SplitRemainder, HoldsAllOverTheSlice) {
       }
     }
   }
+}
+
+TEST(Containment, AColumnThatNothingCoversIsSeen) {
+  const auto is_inside = [](const std::vector<std::vector<Real>>& columns, const Eigen::MatrixXd& generators) {
+    return IsInside({{Real(), Real()}, columns}, Eigen::Vector2d::Zero(), generators).answer == Answer::kYes;
+  };
+  const std::vector<Real> diagonal{1.0, 1.0}, across{1.0, -1.0}, axis{0.5, 0.0};
+  const Eigen::MatrixXd both{{1, 1}, {1, -1}}, one{{1}, {1}}, with_axis{{1, 0.5}, {1, 0}};
+  EXPECT_TRUE(is_inside({diagonal, across}, both));
+  EXPECT_FALSE(is_inside({diagonal, across}, one));
+  EXPECT_TRUE(is_inside({diagonal, axis}, with_axis));
+  EXPECT_FALSE(is_inside({diagonal, axis}, one));
+  EXPECT_FALSE(is_inside({diagonal, across, axis}, with_axis));
 }
 
 TEST(HandMade, APlanThatDoesNotEndStandingIsRefuted) {
