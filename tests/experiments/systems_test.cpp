@@ -1,4 +1,4 @@
-// The paper's two systems: the deployed declarations hold of them and smaller ones do not, and data are what they say.
+// The paper's two systems: the deployed declarations are valid, smaller ones are not, and the data have the right form.
 #include "experiments/systems.h"
 
 #include <cmath>

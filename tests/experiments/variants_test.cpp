@@ -1,4 +1,4 @@
-// Variants: the same target, split in another way; their declarations bound the slopes of what they leave.
+// Variants: the same target, split in another way; their declarations bound the slopes of the rest.
 #include "experiments/variants.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Signed messages: what is refused, and that nothing but the message, its speaker and its freshness decides.
+// Signed messages: which are refused, and that only the message, its role and its freshness decide.
 #include "bus/authentic.h"
 
 #include <limits>

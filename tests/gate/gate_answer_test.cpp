@@ -1,4 +1,4 @@
-// What the gate says of a candidate it has admitted: outcomes, witnesses, digests, slices, counts.
+// The gate's answer to an admitted candidate: outcomes, witnesses, digests, slices, counts.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-// Key files: who can read them, what is in them, and what is said of those that cannot be used.
+// Key files: their readers, their content, and the errors of files that cannot be used.
 #include "bus/keys.h"
 
 #include <csignal>

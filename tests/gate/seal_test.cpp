@@ -1,4 +1,4 @@
-// The seal of a certified plan: what it is made of, and that nothing in the message can change without breaking it.
+// The seal of a certified plan: its parts, and that every change of the message breaks it.
 #include "lcmtypes/seal.h"
 
 #include <cmath>

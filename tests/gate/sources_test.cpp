@@ -1,4 +1,4 @@
-// Which plan_ids a source has used, who is forgotten, what was lost.
+// The used plan_ids of a source, the forgotten sources, and the number of lost candidates.
 #include "certifier/gate/sources.h"
 
 #include <limits>

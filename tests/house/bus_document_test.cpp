@@ -1,4 +1,4 @@
-// docs/bus.md says something of every message, field, constant and channel.
+// docs/bus.md documents every message, field, constant and channel.
 #include <filesystem>
 #include <fstream>
 #include <iterator>

@@ -1,4 +1,4 @@
-// What the logger writes is deleted, moved, replaced or cut under it: it says so, counts what is lost, and goes on.
+// The logger's files are deleted, moved, replaced or cut: it reports this, counts the losses, and continues.
 #include <filesystem>
 
 #include <gmock/gmock.h>

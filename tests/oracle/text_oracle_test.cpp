@@ -1,4 +1,4 @@
-// Numbers as people read them, against exact rationals: what is printed lies on the side that keeps it true.
+// Printed numbers against exact rationals: they lie on the side that keeps them true.
 #include <gtest/gtest.h>
 
 #include <cmath>

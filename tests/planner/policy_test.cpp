@@ -1,4 +1,4 @@
-// Policy files, what a policy computes of them, and what it is told of the world.
+// Policy files, the output of a policy, and its inputs.
 #include "planner_bridge/policy.h"
 
 #include <cmath>

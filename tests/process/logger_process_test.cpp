@@ -1,4 +1,4 @@
-// forereach-logger as a process: what is on the bus is in its files when it ends.
+// forereach-logger as a process: its files contain the messages of the bus when it ends.
 #include <filesystem>
 #include <string>
 

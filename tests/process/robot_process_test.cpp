@@ -1,4 +1,4 @@
-// forereach-robot-sim as a process: it moves for a certified plan and for nothing else.
+// forereach-robot-sim as a process: it moves only for a certified plan.
 #include <algorithm>
 #include <string>
 

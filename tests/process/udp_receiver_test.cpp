@@ -1,4 +1,4 @@
-// What comes to the socket: by group, port and kind; what is counted; what it costs in memory.
+// Datagrams at the socket: by group, port and kind; their counts; their cost in memory.
 #include "bus/udp_receiver.h"
 
 #include <algorithm>

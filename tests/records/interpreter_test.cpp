@@ -1,4 +1,4 @@
-// Sequence numbers: what is missing, what is late or comes twice, and what has begun anew.
+// Sequence numbers: missing, late and repeated messages, and restarts.
 #include "records/interpreter.h"
 
 #include <limits>

@@ -1,4 +1,4 @@
-// The tasks of a logger's runs lie beside its logs: those of reloads too, and no longer than a log needs them.
+// The tasks of a logger's runs are kept next to its logs, including those of reloads, as long as a log needs them.
 #include "records/kept_tasks.h"
 
 #include <fstream>

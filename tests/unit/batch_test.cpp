@@ -1,4 +1,4 @@
-// A batch says of each plan what a call on its own says, whatever the number of threads.
+// A batch gives the same decisions as single calls, for every number of threads.
 #include "certifier/certify/batch.h"
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// A certifier that learns as it goes says what one says that knew all from the beginning.
+// A certifier that learns transitions gives the same answers as one that had them from the start.
 #include <cmath>
 #include <memory>
 #include <random>

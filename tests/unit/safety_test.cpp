@@ -1,4 +1,4 @@
-// Obstacles and projections: what is refused, and the distances shown to people.
+// Obstacles and projections: refused arguments, and the distances shown to people.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Distances known by hand: what is exactly so far away is confirmed, a last bit more is not.
+// Distances known by hand: exactly this distance is confirmed, one last bit more is not.
 #include <cmath>
 
 #include <gtest/gtest.h>
