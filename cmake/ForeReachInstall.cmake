@@ -1,23 +1,25 @@
 # `cmake --install`: programs, headers, task files, and a CMake package: find_package(ForeReach), then link
-# ForeReach::certifier, and ForeReach::guard on the robot.
+# ForeReach::certifier, and on the robot ForeReach::supervisor, or ForeReach::guard alone.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS forereach forereach-certifier forereach-planner forereach-logger forereach-robot-sim)
 
 set_target_properties(forereach_certifier PROPERTIES EXPORT_NAME certifier)
 set_target_properties(forereach_guard PROPERTIES EXPORT_NAME guard)
+set_target_properties(forereach_supervisor PROPERTIES EXPORT_NAME supervisor)
 set_target_properties(forereach_lcmtypes PROPERTIES EXPORT_NAME lcmtypes)
 set_target_properties(forereach_signing PROPERTIES EXPORT_NAME signing)
-install(TARGETS forereach_options forereach_certifier forereach_lcmtypes forereach_signing forereach_guard EXPORT ForeReachTargets)
+install(TARGETS forereach_options forereach_certifier forereach_lcmtypes forereach_signing forereach_guard
+  forereach_supervisor EXPORT ForeReachTargets)
 install(EXPORT ForeReachTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
 
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/forereach)
 foreach(floor numerics sets dynamics residual safety reach declare certify)
   install(DIRECTORY certifier/${floor} DESTINATION ${headers}/certifier FILES_MATCHING PATTERN "*.h")
 endforeach()
-install(FILES lcmtypes/bad_input.h lcmtypes/codec.h lcmtypes/names.h lcmtypes/seal.h DESTINATION ${headers}/lcmtypes)
+install(FILES lcmtypes/bad_input.h lcmtypes/codec.h lcmtypes/freshness.h lcmtypes/names.h lcmtypes/seal.h DESTINATION ${headers}/lcmtypes)
 install(FILES bus/authentic.h bus/keys.h DESTINATION ${headers}/bus)
-install(FILES robot/guard.h DESTINATION ${headers}/robot)
+install(FILES robot/guard.h robot/supervisor.h DESTINATION ${headers}/robot)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/generated/forereach DESTINATION ${headers}/messages)
 install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach/lcmtypes FILES_MATCHING PATTERN "*.lcm")
 install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach)

@@ -105,11 +105,11 @@ struct GuardDomain {
 };
 
 struct GuardOptions {
-  int num_states = 0;                   ///< 1..16
-  int num_inputs = 0;                   ///< 1..8
-  std::int64_t step_us = 0;             ///< Time between two step boundaries, microseconds, positive.
-  std::optional<Digest> config_digest;  ///< If set, plans certified under another configuration are refused.
-  std::optional<Digest> model_digest;   ///< If set, plans certified for another model are refused.
+  int num_states = 0;                        ///< 1..16
+  int num_inputs = 0;                        ///< 1..8
+  std::int64_t step_us = 0;                  ///< Time between two step boundaries, microseconds, positive.
+  std::optional<Digest> config_digest = {};  ///< If set, plans certified under another configuration are refused.
+  std::optional<Digest> model_digest = {};   ///< If set, plans certified for another model are refused.
   /** From LoadKeys(PATH, Role::kRobot). If set, plans without a signature by the certifier of these keys, for
   `bus_name` and `channel`, are refused (bus/authentic.h). */
   std::optional<KeyRing> keys = {};

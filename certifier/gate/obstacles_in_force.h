@@ -23,7 +23,7 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 #include <string>
 #include <vector>
 
-#include "certifier/gate/freshness.h"
+#include "lcmtypes/freshness.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/task/config.h"
 #include "lcmtypes/codec.h"

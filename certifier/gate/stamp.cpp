@@ -2,33 +2,17 @@
 
 #include <cmath>
 
-#include "certifier/numerics/text.h"
-
 namespace forereach {
 
 Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options) {
-  const Freshness freshness =
-      FreshnessOf(utime, now_us, Microseconds(options.max_age_ms), Microseconds(options.max_ahead_ms));
-  switch (freshness) {
-    case Freshness::kStale:
-      return {freshness,
-              "stamped " + Milliseconds(now_us, utime) + " ago, at most " + ToText(options.max_age_ms) + " ms allowed"};
-    case Freshness::kFuture:
-      return {freshness, "stamped " + Milliseconds(utime, now_us) + " ahead, at most " + ToText(options.max_ahead_ms) +
-                             " ms allowed"};
-    case Freshness::kFresh: break;
-  }
-  return {freshness, ""};
+  const std::int64_t max_age = Microseconds(options.max_age_ms), max_ahead = Microseconds(options.max_ahead_ms);
+  return {FreshnessOf(utime, now_us, max_age, max_ahead), WhyNotFresh(utime, now_us, max_age, max_ahead)};
 }
 
 bool IsNotAfter(std::int64_t utime, std::int64_t then_us, std::int64_t now_us, const GateOptions& options) {
-  return utime <= then_us && Judge(then_us, now_us, options).freshness != Freshness::kFuture;
+  return IsNotAfter(utime, then_us, now_us, Microseconds(options.max_ahead_ms));
 }
 
 std::int64_t Microseconds(double milliseconds) { return std::llround(milliseconds * 1e3); }
-
-std::string Milliseconds(std::int64_t later_us, std::int64_t earlier_us) {
-  return ToText(std::round((static_cast<double>(later_us) - static_cast<double>(earlier_us)) / 1e3)) + " ms";
-}
 
 }  // namespace forereach

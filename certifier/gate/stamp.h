@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "certifier/gate/freshness.h"
 #include "certifier/task/config.h"
+#include "lcmtypes/freshness.h"
 
 namespace forereach {
 
@@ -18,15 +18,11 @@ struct Stamp {
  */
 [[nodiscard]] Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options);
 
-/** Whether a fresh message with the stamp `utime` is not later than an event at `then_us`. False if the order is
-unknown, because the clock was set back after the event and `then_us` lies in the future. */
+/** IsNotAfter of lcmtypes/freshness.h, with the task's max_ahead. */
 [[nodiscard]] bool IsNotAfter(std::int64_t utime, std::int64_t then_us, std::int64_t now_us,
                               const GateOptions& options);
 
 /** Milliseconds as microseconds, rounded to the nearest. */
 [[nodiscard]] std::int64_t Microseconds(double milliseconds);
-
-/** The difference of two times in microseconds as text, to the nearest millisecond: "12 ms". */
-[[nodiscard]] std::string Milliseconds(std::int64_t later_us, std::int64_t earlier_us);
 
 }  // namespace forereach

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "certifier/gate/freshness.h"
+#include "lcmtypes/freshness.h"
 #include "certifier/gate/gate.h"
 #include "forereach/transition_t.hpp"
 #include "tests/gate/small_task.h"

@@ -133,9 +133,10 @@ TEST_F(IncludesTest, ThePartsOfTheHouse) {
   ExpectRefused();
 }
 
-TEST_F(IncludesTest, TheGuardIncludesLcmtypesOnly) {
-  for (const char* include : {"\"certifier/sets/box.h\"", "\"robot/target.h\"", "<Eigen/Core>", "<spdlog/spdlog.h>"})
-    Refuse("robot/guard.cpp", include, "the guard may include lcmtypes and bus only");
+TEST_F(IncludesTest, GuardAndSupervisorIncludeLcmtypesAndBusOnly) {
+  for (const char* file : {"robot/guard.cpp", "robot/supervisor.h"})
+    for (const char* include : {"\"certifier/sets/box.h\"", "\"robot/target.h\"", "<Eigen/Core>", "<spdlog/spdlog.h>"})
+      Refuse(file, include, "guard and supervisor may include lcmtypes and bus only");
   ExpectRefused();
 }
 

@@ -94,6 +94,21 @@ TEST(GuardAccept, EachTaskThatWasReadAgainMayBeTheOneInForce) {
   EXPECT_EQ(cause(13, "second"), GuardCause::kConfigDigest);
 }
 
+TEST(GuardAccept, APlanOfTheNewestTaskInvalidatesAllOlderOnesAtOnce) {
+  Guard guard(TwoStates());
+  const auto cause = [&](std::int64_t plan_id, const char* config) {
+    certified_plan_t certified = SmallPlan(plan_id);
+    SetDigest(certified.config_digest, DigestOf(config));
+    return guard.Accept(Sealed(certified), kNow).cause;
+  };
+  guard.Expect(DigestOf("second"), DigestOf("model"));
+  guard.Expect(DigestOf("third"), DigestOf("model"));
+  EXPECT_EQ(cause(10, "third"), GuardCause::kNone);
+  EXPECT_EQ(cause(11, "second"), GuardCause::kConfigDigest) << "no plan of it has come, and none may any more";
+  EXPECT_EQ(cause(12, "config"), GuardCause::kConfigDigest);
+  EXPECT_EQ(cause(13, "third"), GuardCause::kNone);
+}
+
 TEST(GuardAccept, RefusesAFlippedBitAnywhere) {
   const std::vector<std::uint8_t> good = Sealed(SmallPlan());
   Guard guard(TwoStates());

@@ -1,0 +1,191 @@
+#include "robot/supervisor.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "lcmtypes/freshness.h"
+#include "lcmtypes/names.h"
+
+namespace forereach {
+namespace {
+
+// What a message has room for. A state of another size than the task's does not get past the guard.
+template <std::size_t N>
+std::int16_t SetValues(double (&field)[N], std::span<const double> values) {
+  const std::size_t count = std::min(values.size(), N);
+  std::copy_n(values.begin(), count, field);
+  return static_cast<std::int16_t>(count);
+}
+
+}  // namespace
+
+Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
+    : options_(std::move(options)), robot_(robot), guard_(options_.guard) {
+  if (!options_.guard.keys) return;
+  // Nothing recorded earlier releases the robot: a command has to be fresh, and later than what halted it.
+  authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
+                         Speakers{{options_.fault, Role::kCertifier}, {options_.command, Role::kOperator}}, 0);
+}
+
+// Without its trailer.
+std::optional<Bytes> Supervisor::Authentic(const std::string& channel, Bytes message) {
+  if (!authenticator_) return message;
+  const auto [authenticity, content] = authenticator_->Check(channel, message);
+  return authenticity == Authenticity::kAuthentic ? std::optional(content) : std::nullopt;
+}
+
+void Supervisor::OnCertified(Bytes message, std::int64_t now_us) {
+  const GuardVerdict verdict = guard_.Accept(message, now_us);
+  if (!verdict.ok()) return SendRefusal(now_us, verdict);
+  ++counts_.accepted;
+  SendEvent(now_us, execution_event_t::ACCEPTED, verdict.plan_id, -1, 0, "the plan waits for its start");
+}
+
+void Supervisor::OnFault(Bytes message, std::int64_t now_us) {
+  const std::optional<Bytes> authentic = Authentic(options_.fault, message);
+  const auto fault = authentic ? Decoded<fault_t>(*authentic) : std::nullopt;
+  if (!fault || !StopsTheRobot(fault->cause)) return;
+  // The certifier repeats a fault until it hears the reset, which the robot may have heard before.
+  if (IsNotAfter(fault->utime, reset_utime_, now_us, options_.max_ahead_us)) return;
+  halted_utime_ = fault->utime;
+  if (guard_.halted()) return;
+  const std::int64_t plan_id = PlanId();
+  const int step = Step();
+  if (IsExecuting()) Hold();
+  guard_.Halt();
+  SendEvent(now_us, execution_event_t::HALTED, plan_id, step, 0, "emergency stop: " + GetText(fault->message));
+}
+
+std::string Supervisor::OnCommand(Bytes message, std::int64_t now_us) {
+  const std::optional<Bytes> authentic = Authentic(options_.command, message);
+  if (!authentic) return "the operator has not signed it";
+  const auto command = Decoded<command_t>(*authentic);
+  if (!command) return "";
+  if (std::string why = WhyNotFresh(command->utime, now_us, options_.max_age_us, options_.max_ahead_us); !why.empty())
+    return why;
+  if (command->kind == command_t::RELOAD) robot_.Reload();
+  if (command->kind != command_t::RESET) return "";
+  if (guard_.halted() && IsNotAfter(command->utime, halted_utime_, now_us, options_.max_ahead_us))
+    return "a reset from before the robot was halted";
+  reset_utime_ = std::min(command->utime, now_us);  // a clock that is ahead clears no fault to come
+  if (!guard_.halted()) return "";
+  guard_.Reset();
+  SendEvent(now_us, execution_event_t::RESET, -1, -1, 0, GetText(command->source) + " lets it go on");
+  return "";
+}
+
+std::span<const double> Supervisor::Boundary(std::int64_t utime, std::int64_t now_us, bool ends) {
+  FinishStep(utime, now_us);
+  if (!ends) StartPending(utime, now_us);
+  if (IsExecuting()) ContinuePlan(utime);
+  SendState(utime, ends);
+  ++counts_.boundaries;
+  is_under_way_ = IsExecuting();
+  step_began_at_.assign(robot_.state().begin(), robot_.state().end());
+  return control();
+}
+
+void Supervisor::FinishStep(std::int64_t utime, std::int64_t now_us) {
+  if (!std::exchange(is_under_way_, false) || !IsExecuting()) return;
+  const std::int64_t plan_id = PlanId();
+  SendTransition(utime - options_.guard.step_us);
+  ++step_;
+  const GuardVerdict verdict = guard_.Check(step_, robot_.state());
+  if (verdict.ok()) {
+    ++counts_.steps_inside;
+    return SendEvent(utime, execution_event_t::STEP_INSIDE, plan_id, step_, 0, "inside the certified slice");
+  }
+  SendEvent(utime, execution_event_t::STEP_OUTSIDE, plan_id, step_, verdict.value, "emergency stop: " + verdict.message,
+            verdict.coordinate);
+  halted_utime_ = now_us;
+  Hold();
+}
+
+void Supervisor::StartPending(std::int64_t utime, std::int64_t now_us) {
+  if (guard_.pending() == nullptr) return;
+  const GuardVerdict verdict = guard_.TryStart(utime, now_us, robot_.state());
+  if (verdict.cause == GuardCause::kTooEarly) return;
+  if (!verdict.ok()) return SendRefusal(utime, verdict);
+  step_ = 0;
+  ++counts_.started;
+  SendEvent(utime, execution_event_t::STARTED, verdict.plan_id, 0, 0,
+            std::to_string(guard_.executing()->plan.num_steps) + " steps");
+}
+
+void Supervisor::ContinuePlan(std::int64_t utime) {
+  const candidate_plan_t& plan = guard_.executing()->plan;
+  if (step_ == plan.num_steps) {
+    SendEvent(utime, execution_event_t::STANDING, plan.plan_id, step_, 0, "the plan is finished: holding still");
+    Hold();
+  } else if (step_ == plan.progress_steps) {
+    SendEvent(utime, execution_event_t::TAIL_BEGUN, plan.plan_id, step_, 0, "no newer certificate: braking");
+  }
+}
+
+void Supervisor::Hold() {
+  guard_.Finish();
+  robot_.Hold();
+}
+
+void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain) {
+  guard_.Expect(config_digest, model_digest, std::move(domain));
+}
+
+void Supervisor::Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) {
+  SendEvent(utime, kind, PlanId(), Step(), value, text);
+}
+
+std::span<const double> Supervisor::control() const {
+  if (!IsExecuting() || step_ == guard_.executing()->plan.num_steps) return {};
+  const candidate_plan_t& plan = guard_.executing()->plan;
+  return {plan.control[step_], static_cast<std::size_t>(plan.num_inputs)};
+}
+
+std::int64_t Supervisor::PlanId() const { return IsExecuting() ? guard_.executing()->plan.plan_id : -1; }
+
+void Supervisor::SendState(std::int64_t utime, bool ends) {
+  robot_state_t message{};
+  message.utime = utime;
+  message.sequence = counts_.boundaries;
+  message.executing_plan_id = PlanId();
+  message.executing_step = static_cast<std::int16_t>(Step());
+  message.mode = IsExecuting() ? robot_state_t::EXECUTING : ends ? robot_state_t::FINISHED : robot_state_t::STANDING;
+  message.num_states = SetValues(message.state, robot_.state());
+  Send(options_.robot_state, message);
+}
+
+void Supervisor::SendTransition(std::int64_t utime) {
+  transition_t message{};
+  message.utime = utime;
+  message.sequence = counts_.steps++;
+  message.num_states = SetValues(message.state, step_began_at_);
+  message.num_inputs = SetValues(message.input, control());
+  SetValues(message.next_state, robot_.state());
+  Send(options_.transition, message);
+}
+
+void Supervisor::SendRefusal(std::int64_t utime, const GuardVerdict& verdict) {
+  const std::string cause(GuardCauseName(verdict.cause));
+  ++counts_.refused[cause];
+  SendEvent(utime, execution_event_t::REFUSED, verdict.plan_id, verdict.step, verdict.value,
+            cause + ": " + verdict.message, verdict.coordinate);
+}
+
+void Supervisor::SendEvent(std::int64_t utime, std::int16_t kind, std::int64_t plan_id, int step, double value,
+                           std::string_view text, int coordinate) {
+  execution_event_t message{};
+  message.utime = utime;
+  message.sequence = events_++;
+  message.plan_id = plan_id;
+  message.kind = kind;
+  message.step = static_cast<std::int16_t>(step);
+  message.coordinate = static_cast<std::int16_t>(coordinate);
+  message.num_states = SetValues(message.state, robot_.state());
+  message.value = value;
+  SetText(message.message, text);
+  Send(options_.event, message);
+}
+
+}  // namespace forereach

@@ -1,0 +1,281 @@
+#include "robot/supervisor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "tests/keys.h"
+#include "tests/robot/sealed_plan.h"
+
+namespace forereach {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs;
+
+enum : std::int16_t {
+  kAccepted = execution_event_t::ACCEPTED,
+  kRefused = execution_event_t::REFUSED,
+  kStarted = execution_event_t::STARTED,
+  kInside = execution_event_t::STEP_INSIDE,
+  kOutside = execution_event_t::STEP_OUTSIDE,
+  kTailBegun = execution_event_t::TAIL_BEGUN,
+  kStanding = execution_event_t::STANDING,
+  kHalted = execution_event_t::HALTED,
+  kReset = execution_event_t::RESET
+};
+
+SupervisorOptions TwoStates() {
+  SupervisorOptions options;
+  options.guard.num_states = 2;
+  options.guard.num_inputs = 1;
+  options.guard.step_us = kStep;
+  options.guard.config_digest = DigestOf("config");
+  options.guard.model_digest = DigestOf("model");
+  return options;
+}
+
+// A robot whose state the test sets, and its supervisor. Boundary j lies at kStart + j * kStep.
+class SupervisorTest : public testing::Test, protected Supervisor::Robot {
+ protected:
+  std::span<const double> state() const override { return state_; }
+  void Hold() override { ++holds_; }
+  void Reload() override { ++reloads_; }
+  void Send(const std::string& channel, Bytes message) override {
+    if (channel == "EXECUTION_EVENT") events_.push_back(*Decoded<execution_event_t>(message));
+    if (channel == "ROBOT_STATE") states_.push_back(*Decoded<robot_state_t>(message));
+    if (channel == "TRANSITION") transitions_.push_back(*Decoded<transition_t>(message));
+  }
+
+  static std::int64_t At(int boundary) { return kStart + boundary * kStep; }
+  void Accept(const certified_plan_t& plan, int boundary) {
+    supervisor_.OnCertified(Sealed(plan), At(boundary) - 1000);
+  }
+  std::span<const double> Boundary(int j) { return supervisor_.Boundary(At(j), At(j)); }
+  void Fault(std::int64_t utime, std::int64_t now_us, std::int16_t cause = fault_t::SLICE_LEFT) {
+    fault_t fault{};
+    fault.utime = utime;
+    fault.cause = cause;
+    supervisor_.OnFault(Encode(fault), now_us);
+  }
+  std::string Command(std::int16_t kind, std::int64_t utime, std::int64_t now_us) {
+    command_t command{};
+    command.kind = kind;
+    command.utime = utime;
+    return supervisor_.OnCommand(Encode(command), now_us);
+  }
+  std::string ResetAt(std::int64_t utime, std::int64_t now_us) { return Command(command_t::RESET, utime, now_us); }
+  std::vector<std::int16_t> Events() const {
+    std::vector<std::int16_t> kinds;
+    for (const execution_event_t& event : events_) kinds.push_back(event.kind);
+    return kinds;
+  }
+
+  std::vector<double> state_{1, -2};
+  int holds_ = 0, reloads_ = 0;
+  std::vector<execution_event_t> events_;
+  std::vector<robot_state_t> states_;
+  std::vector<transition_t> transitions_;
+  Supervisor supervisor_{TwoStates(), *this};
+};
+
+TEST_F(SupervisorTest, APlanIsExecutedToItsEndThenTheRobotHolds) {
+  certified_plan_t plan = SmallPlan();
+  for (int t = 0; t < 3; ++t) plan.plan.control[t][0] = 10 + t;
+  EXPECT_TRUE(Boundary(-1).empty());
+  Accept(plan, 0);
+  for (int j = 0; j < 3; ++j) {
+    state_[0] = 1 + j;
+    EXPECT_THAT(Boundary(j), ElementsAre(10 + j));
+  }
+  EXPECT_EQ(holds_, 0);
+  EXPECT_TRUE(Boundary(3).empty());
+  EXPECT_EQ(holds_, 1);
+  EXPECT_TRUE(Boundary(4).empty());
+  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kInside, kTailBegun, kInside, kInside, kStanding));
+  ASSERT_EQ(states_.size(), 6u);
+  EXPECT_EQ(states_[1].mode, robot_state_t::EXECUTING);
+  EXPECT_EQ(states_[4].mode, robot_state_t::STANDING);
+  ASSERT_EQ(transitions_.size(), 3u);
+  EXPECT_EQ(transitions_[1].utime, At(1));
+  EXPECT_EQ(transitions_[1].state[0], 2);
+  EXPECT_EQ(transitions_[1].input[0], 11);
+  EXPECT_EQ(transitions_[1].next_state[0], 3);
+}
+
+TEST_F(SupervisorTest, HoldsAtRestUntilACertifiedPlanStarts) {
+  for (int j = -3; j < 0; ++j) EXPECT_TRUE(Boundary(j).empty());
+  EXPECT_THAT(Events(), IsEmpty());
+  EXPECT_THAT(transitions_, IsEmpty());
+  for (const robot_state_t& state : states_) EXPECT_EQ(state.mode, robot_state_t::STANDING);
+}
+
+TEST_F(SupervisorTest, ARunThatEndsStartsNothingAndReportsFinished) {
+  Accept(SmallPlan(), 0);
+  EXPECT_TRUE(supervisor_.Boundary(At(0), At(0), true).empty());
+  EXPECT_EQ(states_[0].mode, robot_state_t::FINISHED);
+  EXPECT_EQ(supervisor_.counts().started, 0);
+}
+
+TEST_F(SupervisorTest, AStepOutsideItsSliceStopsTheRobotUntilAReset) {
+  Accept(SmallPlan(), 0);
+  Boundary(0);
+  state_[1] = 6;
+  EXPECT_TRUE(Boundary(1).empty());
+  EXPECT_EQ(holds_, 1);
+  EXPECT_TRUE(supervisor_.halted());
+  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kOutside));
+  EXPECT_THAT(ResetAt(At(1), At(1) + 10), HasSubstr("before the robot was halted"));
+  EXPECT_EQ(ResetAt(At(1) + 1, At(1) + 10), "");
+  EXPECT_FALSE(supervisor_.halted());
+}
+
+TEST_F(SupervisorTest, AFaultStopsAnExecutingRobotAtOnce) {
+  Accept(SmallPlan(), 0);
+  Boundary(0);
+  Fault(At(0) + 5, At(0) + 10, fault_t::ROBOT_STATE_LOST);
+  EXPECT_FALSE(supervisor_.control().empty()) << "that fault does not invalidate the certificate";
+  Fault(At(0) + 5, At(0) + 10);
+  EXPECT_EQ(holds_, 1);
+  EXPECT_TRUE(supervisor_.control().empty());
+  EXPECT_TRUE(Boundary(1).empty());
+  EXPECT_THAT(transitions_, IsEmpty()) << "the step was not executed as planned";
+  Accept(SmallPlan(8), 1);
+  EXPECT_EQ(events_.back().kind, kRefused);
+  EXPECT_EQ(supervisor_.counts().refused.at("halted"), 1);
+}
+
+TEST_F(SupervisorTest, ASecondFaultWhileHaltedNeedsAResetOfItsOwn) {
+  Fault(At(0), At(0));
+  Fault(At(2), At(2));
+  EXPECT_THAT(Events(), ElementsAre(kHalted)) << "it is halted already";
+  EXPECT_THAT(ResetAt(At(1), At(3)), HasSubstr("before the robot was halted")) << "nobody has seen the second fault";
+  EXPECT_TRUE(supervisor_.halted());
+  EXPECT_EQ(ResetAt(At(2) + 1, At(3)), "");
+  EXPECT_THAT(Events(), ElementsAre(kHalted, kReset));
+}
+
+TEST_F(SupervisorTest, AResetOlderThanTheFaultIsRefusedAndARepeatedFaultIgnored) {
+  Fault(At(1), At(1));
+  EXPECT_NE(ResetAt(At(1) - 1, At(2)), "");
+  EXPECT_NE(ResetAt(At(1), At(2)), "");
+  EXPECT_EQ(ResetAt(At(1) + 1, At(2)), "");
+  Fault(At(1), At(3));
+  EXPECT_FALSE(supervisor_.halted()) << "the certifier had not heard the reset";
+  Fault(At(1) + 2, At(3));
+  EXPECT_TRUE(supervisor_.halted());
+}
+
+TEST_F(SupervisorTest, ACommandHasToBeFresh) {
+  Fault(At(0), At(0));
+  const std::int64_t now = At(100);
+  EXPECT_EQ(ResetAt(now - 500'001, now), "stamped 500 ms ago, at most 500 ms allowed");
+  EXPECT_EQ(ResetAt(now + 50'001, now), "stamped 50 ms ahead, at most 50 ms allowed");
+  EXPECT_TRUE(supervisor_.halted());
+  EXPECT_EQ(ResetAt(now - 500'000, now), "");
+}
+
+TEST_F(SupervisorTest, AResetFromAClockAheadClearsNoLaterFault) {
+  EXPECT_EQ(ResetAt(At(0) + 50'000, At(0)), "");
+  Fault(At(0) + 1, At(1));
+  EXPECT_TRUE(supervisor_.halted());
+}
+
+TEST_F(SupervisorTest, AReloadWhileExecutingDoesNotDisturbThePlan) {
+  Accept(SmallPlan(), 0);
+  Boundary(0);
+  EXPECT_EQ(Command(command_t::RELOAD, At(0), At(0)), "");
+  EXPECT_EQ(reloads_, 1);
+  supervisor_.Expect(DigestOf("another config"), DigestOf("model"));
+  EXPECT_FALSE(Boundary(1).empty());
+  EXPECT_EQ(holds_, 0);
+
+  certified_plan_t next = SmallPlan(8);
+  next.plan.start_utime = At(2);
+  next.expires_utime = At(3);
+  SetDigest(next.config_digest, DigestOf("another config"));
+  Accept(next, 2);
+  EXPECT_FALSE(Boundary(2).empty());
+  EXPECT_EQ(states_.back().executing_plan_id, 8);
+}
+
+TEST_F(SupervisorTest, ExpectingANewTaskInvalidatesOlderOnesOnceItsFirstPlanCame) {
+  supervisor_.Expect(DigestOf("second"), DigestOf("model"));
+  supervisor_.Expect(DigestOf("third"), DigestOf("model"));
+  const auto kind = [&](std::int64_t plan_id, const char* config) {
+    certified_plan_t plan = SmallPlan(plan_id);
+    SetDigest(plan.config_digest, DigestOf(config));
+    Accept(plan, 0);
+    return events_.back().kind;
+  };
+  EXPECT_EQ(kind(8, "config"), kAccepted);
+  EXPECT_EQ(kind(9, "third"), kAccepted);
+  EXPECT_EQ(kind(10, "second"), kRefused);
+  EXPECT_EQ(kind(11, "config"), kRefused);
+  EXPECT_EQ(kind(12, "third"), kAccepted);
+}
+
+TEST_F(SupervisorTest, APlanThatExpiresWhileTheRobotIsHeldUpIsRefused) {
+  for (const bool expired : {false, true}) {
+    certified_plan_t plan = SmallPlan(expired ? 9 : 8);
+    plan.plan.start_utime = At(expired ? 10 : 0);
+    plan.expires_utime = At(expired ? 11 : 1);
+    Accept(plan, expired ? 10 : 0);
+    const int j = expired ? 10 : 0;
+    EXPECT_EQ(supervisor_.Boundary(At(j), plan.expires_utime + expired).empty(), expired);
+    for (int more = 1; more <= 3; ++more) Boundary(j + more);
+  }
+  EXPECT_EQ(supervisor_.counts().refused.at("expired"), 1);
+  EXPECT_EQ(supervisor_.counts().started, 1);
+}
+
+TEST_F(SupervisorTest, FinishStepIsPartOfBoundaryAndIsDoneOnce) {
+  Accept(SmallPlan(), 0);
+  Boundary(0);
+  supervisor_.FinishStep(At(1), At(1));
+  supervisor_.FinishStep(At(1), At(1));
+  Boundary(1);
+  EXPECT_EQ(supervisor_.counts().steps, 1);
+  EXPECT_EQ(supervisor_.counts().steps_inside, 1);
+}
+
+TEST_F(SupervisorTest, BytesThatAreNoMessageDoNothing) {
+  const std::vector<std::uint8_t> bytes{1, 2, 3};
+  supervisor_.OnFault(bytes, At(0));
+  EXPECT_EQ(supervisor_.OnCommand(bytes, At(0)), "");
+  EXPECT_THAT(Events(), IsEmpty());
+  supervisor_.OnCertified(bytes, At(0));
+  EXPECT_THAT(Events(), ElementsAre(kRefused));
+}
+
+TEST_F(SupervisorTest, WithKeysFaultsAreTheCertifiersAndCommandsTheOperators) {
+  SupervisorOptions options = TwoStates();
+  options.guard.keys = TestKeys();
+  options.guard.bus_name = "memq";
+  Supervisor supervisor(options, *this);
+  Signer signer(TestKeys(), "memq");
+  fault_t fault{};
+  fault.utime = At(1);
+  fault.cause = fault_t::SLICE_LEFT;
+  supervisor.OnFault(Encode(fault), At(1));
+  supervisor.OnFault(signer.Sign(Role::kOperator, "FAULT", Encode(fault), At(1)), At(1));
+  EXPECT_FALSE(supervisor.halted());
+  supervisor.OnFault(signer.Sign(Role::kCertifier, "FAULT", Encode(fault), At(1)), At(1));
+  EXPECT_TRUE(supervisor.halted());
+
+  command_t reset{};
+  reset.kind = command_t::RESET;
+  reset.utime = At(2);
+  EXPECT_NE(supervisor.OnCommand(Encode(reset), At(2)), "");
+  EXPECT_NE(supervisor.OnCommand(signer.Sign(Role::kCertifier, "COMMAND", Encode(reset), At(2)), At(2)), "");
+  EXPECT_TRUE(supervisor.halted());
+  EXPECT_EQ(supervisor.OnCommand(signer.Sign(Role::kOperator, "COMMAND", Encode(reset), At(2)), At(2)), "");
+  EXPECT_FALSE(supervisor.halted());
+}
+
+}  // namespace
+}  // namespace forereach
