@@ -23,10 +23,10 @@ A reload keeps the received obstacles. The class uses no bus and no clock. docs/
 #include <string>
 #include <vector>
 
-#include "lcmtypes/freshness.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/task/config.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/freshness.h"
 #include "lcmtypes/stream_order.h"
 
 namespace forereach {

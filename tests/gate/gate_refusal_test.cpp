@@ -7,9 +7,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "lcmtypes/freshness.h"
 #include "certifier/gate/gate.h"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/freshness.h"
 #include "tests/gate/small_task.h"
 
 namespace forereach {
