@@ -42,7 +42,7 @@ class IncludesTest : public testing::Test {
     Write("certifier/gate/gate.h", "#include \"certifier/sets/box.h\"\n#include \"lcmtypes/codec.h\"\n");
     Write("certifier/process/node.h", "#include \"certifier/gate/gate.h\"\n#include <spdlog/spdlog.h>\n");
     Write("lcmtypes/codec.h", "#include <cstdint>\n");
-    Write("bus/bus.cpp", "#include \"forereach/decision_t.hpp\"\n#include <lcm/lcm-cpp.hpp>\n");
+    Write("bus/bus.cpp", "#include \"lcmtypes/codec.h\"\n#include <lcm/lcm-cpp.hpp>\n");
     Write("robot/guard.h", "#include \"forereach/certified_plan_t.hpp\"\n#include \"lcmtypes/codec.h\"\n");
     Write("robot/guard.cpp", "#include \"robot/guard.h\"\n");
     Write("planner_bridge/planner.cpp", "#include <ompl/util/RandomNumbers.h>\n#include \"certifier/sets/box.h\"\n");
