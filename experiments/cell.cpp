@@ -25,14 +25,11 @@ char LetterOf(Outcome outcome) {
 // The sum over the steps whose query is known, the one that D ended the tube at included.
 CpSlsBudget CountBudget(const CpSls& method, const Answer& answer, const Scenario& scenario, PlanBudgets& budgets) {
   const auto inputs = static_cast<std::size_t>(scenario.controls.rows());
-  const int known = std::min(answer.length + 1, static_cast<int>(scenario.controls.cols()));
+  const int known = std::min(answer.tube.length() + 1, static_cast<int>(scenario.controls.cols()));
   CpSlsBudget sum;
   double least_mass = kInfinity;
   for (int t = 0; t < known; ++t) {
-    const auto step = static_cast<std::size_t>(t);
-    const QuerySet query{answer.slices[step],
-                         {scenario.controls.col(t).data(), inputs},
-                         {answer.steps[step].half_width.data(), static_cast<std::size_t>(answer.slices[step].dim())}};
+    const QuerySet query{answer.tube.slice(t), {scenario.controls.col(t).data(), inputs}, answer.tube.half_width(t)};
     const CpSlsBudget budget = method.Budget(query);
     sum += budget;
     least_mass = std::min(least_mass, budget.mass);
@@ -49,9 +46,10 @@ void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollo
   const bool safe = rollouts.StayClearOf(scenario.obstacle);
   ++tally.plans;
   tally.safe += safe;
-  tally.answers += is_vacuous && answer.outcome == Outcome::kCertified ? 'V' : LetterOf(answer.outcome);
-  tally.areas.push_back(answer.IsComplete() ? ProjectedArea(answer.slices.back()) : -1);
-  if (answer.outcome == Outcome::kFalsified) {
+  tally.answers +=
+      is_vacuous && answer.decision.outcome == Outcome::kCertified ? 'V' : LetterOf(answer.decision.outcome);
+  tally.areas.push_back(answer.IsComplete() ? ProjectedArea(answer.tube.slice(answer.tube.length())) : -1);
+  if (answer.decision.outcome == Outcome::kFalsified) {
     ++tally.falsified;
     return;
   }
@@ -59,8 +57,8 @@ void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollo
   const bool covered = cover == Membership::kInside;
   tally.undecided += cover == Membership::kUndecided;
   (answer.IsComplete() ? tally.covered : tally.prefix_covered) += covered;
-  const auto step = static_cast<std::size_t>(std::max(answer.step, 0));
-  switch (answer.outcome) {
+  const auto step = static_cast<std::size_t>(std::max(answer.decision.step, 0));
+  switch (answer.decision.outcome) {
     case Outcome::kCertified:
       if (is_vacuous) {
         ++tally.vacuous;
@@ -116,7 +114,7 @@ CellResult RunCell(const Cell& cell, const Effort& effort) {
       const Scenario scenario = MakeScenario(system, kGroups[g], cell.seed, i);
       const Rollouts rollouts(system, scenario, std::min(effort.rollouts, system.rollouts));
       if (falsified)
-        answer.outcome = Outcome::kFalsified;
+        answer.decision.outcome = Outcome::kFalsified;
       else
         evaluator.Certify(scenario, answer);
       const bool is_vacuous = budgeted && CountBudget(*budgeted, answer, scenario, tally.budgets).IsVacuous();

@@ -37,7 +37,7 @@ Panel FindPanel(const System& system, Group group) {
     Panel panel{system, group, scenario, {}, {}, Rollouts(system, scenario, kRolloutsShown)};
     ours.Certify(scenario, panel.ours);
     global.Certify(scenario, panel.global);
-    const Outcome wanted = (group == Group::kB ? panel.global : panel.ours).outcome;
+    const Outcome wanted = (group == Group::kB ? panel.global : panel.ours).decision.outcome;
     if (wanted == Outcome::kCertified || i + 2 >= kMostScenarios) return panel;
   }
 }
@@ -61,9 +61,9 @@ std::vector<Table> GeometryTables(const Scope&, const Results&) {
     const auto row = [&](const char* what, bool is_so) {
       table.rows.push_back({panel.name() + ": " + what, {}, Exactly(is_so), 0, ""});
     };
-    row("global calibration certifies", panel.global.outcome == Outcome::kCertified);
+    row("global calibration certifies", panel.global.decision.outcome == Outcome::kCertified);
     row("its tube contains the target", Cover(panel.global, panel.target) == Membership::kInside);
-    row("ForeReach certifies", panel.ours.outcome == Outcome::kCertified);
+    row("ForeReach certifies", panel.ours.decision.outcome == Outcome::kCertified);
     row("its tube, as far as it goes, contains the target", Cover(panel.ours, panel.target) == Membership::kInside);
     row("the target stays clear of the obstacle", panel.target.StayClearOf(panel.scenario.obstacle));
   }
@@ -72,8 +72,8 @@ std::vector<Table> GeometryTables(const Scope&, const Results&) {
 
 std::string Slices(const Answer& answer) {
   std::string lines;
-  for (int t = 0; t <= answer.length; ++t) {
-    const Zonotope& slice = answer.slices[static_cast<std::size_t>(t)];
+  for (int t = 0; t <= answer.tube.length(); ++t) {
+    const Zonotope& slice = answer.tube.slice(t);
     const std::vector<Eigen::Vector2d> corners =
         Outline(Zonotope(slice.CenterVector().head(2), slice.GeneratorMatrix().topRows(2)));
     for (const Eigen::Vector2d& corner : corners) lines += DataLine({corner.x(), corner.y()});

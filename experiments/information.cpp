@@ -131,11 +131,13 @@ struct Inner {
 
 // Outside is proven; a state on the very edge, as corners are, may stay undecided.
 bool MissesOne(const Answer& answer, const std::vector<Eigen::MatrixXd>& states) {
-  for (std::size_t t = 0; t < states.size(); ++t)
-    for (Eigen::Index i = 0; i < states[t].cols(); ++i)
-      if (Locate(answer.slices[t], {states[t].col(i).data(), static_cast<std::size_t>(states[t].rows())}) ==
+  for (int t = 0; t <= answer.tube.length(); ++t) {
+    const Eigen::MatrixXd& reached = states[static_cast<std::size_t>(t)];
+    for (Eigen::Index i = 0; i < reached.cols(); ++i)
+      if (Locate(answer.tube.slice(t), {reached.col(i).data(), static_cast<std::size_t>(reached.rows())}) ==
           Membership::kOutside)
         return true;
+  }
   return false;
 }
 
@@ -155,7 +157,7 @@ Inner InnerBounds(const System& system, int observations, int seed, int plans) {
     const Plan plan{scenario.controls.data(), system.num_inputs(), system.horizon, system.num_inputs()};
     const std::vector<Eigen::MatrixXd> states =
         ExtremalRollouts(*system.model, extremal, plan, CornersOf(scenario.center, system.initial_half_width));
-    const Zonotope& last = answer.slices.back();
+    const Zonotope& last = answer.tube.slice(answer.tube.length());
     const Zonotope projected(last.CenterVector().head(2), last.GeneratorMatrix().topRows(2));
     inner.share_sum += HalfSpread(system.projection(), states.back()) / RadiusUpper(projected);
     inner.escapes += MissesOne(answer, states);

@@ -15,34 +15,41 @@ void RequireThat(bool good, const std::string& what) {
   if (!good) throw std::invalid_argument(what);
 }
 
+// What every certifier reads of a problem.
 const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   RequireExactArithmetic();
   RequireThat(problem && problem->model, "problem: no model");
-  const int n = problem->model->num_states(), variables = problem->model->num_variables();
+  const int n = problem->model->num_states();
   problem->domain.Validate(n, problem->model->num_inputs());
-  problem->declaration.Validate(n, variables);
   // A successor adds up to 2 n columns before it is reduced, a projection up to p.
   const int highest_order = (kMaxGenerators - std::max(2 * n, kMaxSafetyDim)) / n;
   RequireThat(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
               "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
                   std::to_string(highest_order) + "] for " + std::to_string(n) + " states");
-  RequireThat(problem->transitions.z.cols() == variables || problem->transitions.size() == 0,
-              "transitions: " + std::to_string(problem->transitions.z.cols()) + " columns, must be " +
-                  std::to_string(variables));
   for (const RestBound& bound : problem->rest)
     RequireThat(0 <= bound.coordinate && bound.coordinate < n && bound.tolerance >= 0 && bound.tolerance < kInfinity,
                 "rest: coordinate " + std::to_string(bound.coordinate) + " within " + std::to_string(bound.tolerance) +
                     " is no state of the model, or negative or not finite");
-  for (int i = 0; i < problem->transitions.size(); ++i) {
-    const Eigen::VectorXd z = problem->transitions.z.row(i);
-    RequireThat(problem->domain.Contains({z.data(), static_cast<std::size_t>(z.size())}),
+  return *problem;
+}
+
+// What the envelope is made of.
+void ValidateObservations(const Problem& problem) {
+  const int variables = problem.model->num_variables();
+  problem.declaration.Validate(problem.model->num_states(), variables);
+  RequireThat(problem.transitions.z.cols() == variables || problem.transitions.size() == 0,
+              "transitions: " + std::to_string(problem.transitions.z.cols()) + " columns, must be " +
+                  std::to_string(variables));
+  for (int i = 0; i < problem.transitions.size(); ++i) {
+    const Eigen::VectorXd z = problem.transitions.z.row(i);
+    RequireThat(problem.domain.Contains({z.data(), static_cast<std::size_t>(z.size())}),
                 "transition " + std::to_string(i) + ": lies outside the certification domain");
   }
-  return *problem;
 }
 
 // The domain's box over z = (x, u) envelops every query.
 ObservationStore MakeStore(const Problem& problem) {
+  ValidateObservations(problem);
   const auto [lower, upper] = problem.domain.Corners();
   StoreOptions options;
   options.max_observations = static_cast<std::size_t>(problem.max_observations);
@@ -97,12 +104,19 @@ Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
 
 }  // namespace
 
+Certifier::Observed::Observed(const Problem& problem) : store(MakeStore(problem)), known(store.snapshot()) {}
+
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
     : problem_((Validated(problem), std::move(problem))),
       projection_(problem_->projection, problem_->model->num_states()),
-      store_(MakeStore(*problem_)),
-      known_(store_.snapshot()),
-      propagator_(*problem_->model, problem_->domain, known_, problem_->zonotope_order, problem_->method) {}
+      observed_(std::in_place, *problem_),
+      violation_(observed_->known.violation()),
+      propagator_(*problem_->model, problem_->domain, observed_->known, problem_->zonotope_order, problem_->method) {}
+
+Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
+    : problem_((Validated(problem), std::move(problem))),
+      projection_(problem_->projection, problem_->model->num_states()),
+      propagator_(*problem_->model, problem_->domain, residual, problem_->zonotope_order, problem_->method) {}
 
 Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
   Observations observed;
@@ -110,8 +124,10 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
   const auto entries = [](const Eigen::MatrixXd& one_row) {
     return std::span<const double>(one_row.data(), static_cast<std::size_t>(one_row.size()));
   };
-  if (store_.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0) return Learned::kOutsideDomain;
-  known_ = store_.snapshot();
+  if (observed_->store.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0)
+    return Learned::kOutsideDomain;
+  observed_->known = observed_->store.snapshot();
+  violation_ = observed_->known.violation();
   return Learned::kAdded;
 }
 
@@ -159,7 +175,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   tube.length_ = 0;
   tube.slices_[0].Assign(initial_set);
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
-  if (violation()) return Falsified(*violation());
+  if (violation_) return Falsified(*violation_);
   Decision decision = Propagate(plan, tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeSafety(obstacles, tube);

@@ -1,8 +1,9 @@
 /** Algorithm 1 of the paper: certifies a plan, or abstains with a cause and a witness.
 
-The constructor computes everything that does not depend on the plan: the residuals of the observations, the pairwise
-test and the envelope's tables. Certify then allocates nothing, takes no lock, logs nothing and throws nothing. Learn
-adds later observations between two calls of Certify. */
+The residual is bounded by the set-membership envelope of the problem's observations, or by a ResidualEnclosure that the
+caller supplies. The constructor computes everything that does not depend on the plan: the residuals of the
+observations, the pairwise test and the envelope's tables. Certify then allocates nothing, takes no lock, logs nothing
+and throws nothing. Learn adds later observations between two calls of Certify. */
 #pragma once
 
 #include <optional>
@@ -12,6 +13,7 @@ adds later observations between two calls of Certify. */
 #include "certifier/certify/learned.h"
 #include "certifier/certify/problem.h"
 #include "certifier/reach/propagator.h"
+#include "certifier/residual/enclosure.h"
 #include "certifier/residual/observation_store.h"
 #include "certifier/safety/projection.h"
 #include "certifier/safety/separation.h"
@@ -27,27 +29,33 @@ class Certifier final {
   Cost: about O(N log N) for a sparse L; the pairwise test of a dense L can take O(N^2). */
   explicit Certifier(std::shared_ptr<const Problem> problem);
 
+  /** Certifies with the bounds of `residual`: a certificate is as sound as they are. The problem's declaration,
+  transitions and limits on observations are not read. There are no observations and there is no violation.
+  @param residual must outlive the certifier. Errors as above, for the other parts of the problem. */
+  Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual);
+
   [[nodiscard]] const Problem& problem() const { return *problem_; }
   [[nodiscard]] const Projection& projection() const { return projection_; }
   /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Learned
   observations are numbered after those of the problem. */
-  [[nodiscard]] const std::optional<Violation>& violation() const { return known_.violation(); }
+  [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
   /** The two observations of violation(). @pre violation() has a value. */
-  [[nodiscard]] Observations Contradiction() const { return known_.Contradiction(); }
-  [[nodiscard]] std::size_t num_observations() const { return known_.size(); }
+  [[nodiscard]] Observations Contradiction() const { return observed_->known.Contradiction(); }
+  [[nodiscard]] std::size_t num_observations() const { return observed_ ? observed_->known.size() : 0; }
   /** True if some row of L has too many nonzero columns for the exact set-to-sample distance. */
-  [[nodiscard]] bool uses_hull_distance() const { return known_.uses_hull_distance(); }
+  [[nodiscard]] bool uses_hull_distance() const { return observed_ && observed_->known.uses_hull_distance(); }
 
   using Learned = forereach::Learned;
   /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
   noise bound. Do not call it while Certify runs. Cost: about a microsecond; if Compact has not been called for 256
-  transitions, it also builds an index. */
+  transitions, it also builds an index. @pre the residual is
+  not bounded by a supplied ResidualEnclosure; so for num_unindexed and Compact. */
   Learned Learn(std::span<const double> z, std::span<const double> next);
   /** Number of learned transitions that are not in the index yet. */
-  [[nodiscard]] int num_unindexed() const { return store_.tail_size(); }
+  [[nodiscard]] int num_unindexed() const { return observed_->store.tail_size(); }
   /** Builds an index that includes them. It may run in its own thread at any time; the next Learn uses the new index.
    */
-  void Compact() { store_.Compact(); }
+  void Compact() { observed_->store.Compact(); }
 
   /** The proven distance between P X_t of a tube and an obstacle: the larger of the bounds by interval hulls and by the
   best direction. @pre 0 <= t <= tube.length(). */
@@ -90,10 +98,17 @@ class Certifier final {
   [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
   [[nodiscard]] Decision JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept;
 
+  struct Observed {
+    explicit Observed(const Problem& problem);
+
+    ObservationStore store;
+    ObservationStore::Snapshot known;
+  };
+
   std::shared_ptr<const Problem> problem_;
   Projection projection_;
-  ObservationStore store_;
-  ObservationStore::Snapshot known_;  // propagator_ refers to it
+  std::optional<Observed> observed_;  // none where an enclosure was given; propagator_ refers to it
+  std::optional<Violation> violation_;
   Propagator propagator_;
 };
 

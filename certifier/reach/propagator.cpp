@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "certifier/residual/lipschitz_row.h"
+
 namespace forereach {
 namespace {
 
@@ -123,6 +125,32 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
       });
 }
 
+// Adds slope * (x - c), x in the slice, to an image whose center is left alone: A G to the generators, and to the slack
+// |A| s and what rounding took, a sum of n products and one number in each entry.
+[[gnu::noinline]] void AddSlope(const ResidualBounds& bounds, const Zonotope& slice, Zonotope& next,
+                                ImageSums& sums) noexcept {
+  const int n = slice.dim();
+  for (int k = 0; k < n; ++k) {
+    const auto& slope = bounds.slope[static_cast<std::size_t>(k)];
+    double* row = next.mutable_row(k);
+    double magnitude = 0, slack = next.slack(k), spread = 0;
+    for (int j = 0; j < slice.num_generators(); ++j) {
+      magnitude = AddUp(magnitude, std::abs(row[j]));
+      for (int l = 0; l < n; ++l) {
+        const double part = slope[static_cast<std::size_t>(l)] * slice.generator(l, j);
+        magnitude = AddUp(magnitude, NextUp(std::abs(part)));
+        row[j] += part;
+      }
+      spread += std::abs(row[j]);
+    }
+    for (int l = 0; l < n; ++l)
+      slack = AddUp(slack, MulUp(std::abs(slope[static_cast<std::size_t>(l)]), slice.slack(l)));
+    next.mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
+    sums.row[static_cast<std::size_t>(k)] = spread;
+  }
+  ScoreColumns(next, sums.scores);
+}
+
 // Why the successor could not be joined.
 [[gnu::noinline]] StepResult Failed(const StepRecord& record, const Zonotope& next,
                                     const double* next_half_width) noexcept {
@@ -193,9 +221,11 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   };
   if (!HoldsForFirst(n, is_finite)) return Failed(record.remainder);
 
+  record.envelope.has_slope = false;
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums);
+  if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
   std::array<double, kMaxStates> residual_half_width;
   if (!Join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);

@@ -1,5 +1,5 @@
-/** What the certifier needs to know of the residual: an interval per coordinate that contains every admissible value
-over a query set. */
+/** What the certifier needs to know of the residual: bounds per coordinate on every admissible value over a query set.
+The joint between the tube (reach/propagator.h) and any method that bounds a residual. */
 #pragma once
 
 #include <array>
@@ -11,10 +11,14 @@ over a query set. */
 
 namespace forereach {
 
-/** lower <= r_k(z) <= upper for every admissible residual r and every z in the query set. */
+/** For every admissible residual r and every z = (x, u) in the query set, whose center is (c, u):
+    lower_k <= r_k(z) - slope_k . (x - c) <= upper_k,   k = 0 .. n-1, in units of state k.
+The slope is zero unless has_slope is set: the bounds are then plain intervals, and `slope` is not read. */
 struct ResidualBounds {
   std::array<double, kMaxStates> lower, upper;
   bool capped;  ///< True if a limit on the work was met: sound, and perhaps wider than the observations allow.
+  bool has_slope = false;
+  std::array<std::array<double, kMaxStates>, kMaxStates> slope;  ///< n rows of n entries, finite.
 };
 
 /** Z_t = X_t x {u_t}, with what the step knows of it already. */
@@ -28,8 +32,9 @@ class ResidualEnclosure {
  public:
   virtual ~ResidualEnclosure() = default;
 
-  /** @pre the hull of the query lies in the certification domain. A coordinate whose lower bound exceeds its upper
-  bound proves that no admissible residual exists. */
+  /** Sets lower, upper and capped, and with a slope has_slope and slope. A coordinate whose lower bound exceeds its
+  upper bound proves that no admissible residual exists. Called in every step: no heap, lock or exception.
+  @pre the hull of the query lies in the certification domain, and bounds.has_slope is false. */
   virtual void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept = 0;
 };
 

@@ -24,8 +24,8 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
     row.floor = std::ranges::max(entries.floors);
     row.negated_ceiling = -std::ranges::min(entries.ceilings);
     uses_hull_distance_ |= row.distance.columns().size() > static_cast<std::size_t>(kMaxExactColumns);
-    constant_.lower[static_cast<std::size_t>(k)] = row.floor;
-    constant_.upper[static_cast<std::size_t>(k)] = -row.negated_ceiling;
+    constant_lower_[static_cast<std::size_t>(k)] = row.floor;
+    constant_upper_[static_cast<std::size_t>(k)] = -row.negated_ceiling;
     if (row.distance.is_constant()) continue;
     active_.push_back(k);
     BoundErrors(row, entries, observations, domain_lower, domain_upper);
@@ -146,7 +146,9 @@ void LipschitzEnvelope::Enclose(const QuerySet& set, const EnvelopeTail& tail, i
 
 void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail, int count,
                                    ResidualBounds& bounds) const noexcept {
-  bounds = constant_;
+  bounds.lower = constant_lower_;
+  bounds.upper = constant_upper_;
+  bounds.capped = false;
   if (tail)
     for (int k = 0; k < num_states(); ++k) {
       if (!row(k).is_constant()) continue;

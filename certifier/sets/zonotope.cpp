@@ -123,10 +123,8 @@ void Zonotope::Assign(const Zonotope& other) noexcept {
   for (int k = 0; k < dim_; ++k) std::ranges::copy(other.padded_row(k), mutable_row(k));
 }
 
-namespace {
-
 // By plain arithmetic: it only chooses what to keep.
-FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
+void ScoreColumns(const Zonotope& set, ColumnScores& scores) noexcept {
   ColumnScores::Writer writer(scores);
   for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
     Lanes sum = AllLanes(0), largest = AllLanes(0);
@@ -139,6 +137,8 @@ FOREREACH_INLINE void ScoreAll(const Zonotope& set, ColumnScores& scores) {
   }
   writer.Finish(static_cast<std::size_t>(set.num_generators()));
 }
+
+namespace {
 
 // Four lists of eight numbers, one in each lane.
 using Lists = std::array<Lanes, 8>;
@@ -326,13 +326,6 @@ void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* fi
                      int order) noexcept {
   const auto append = active_instruction_set == InstructionSet::kAvx2 ? AppendAndReduceAvx2 : AppendAndReduceBaseline;
   append(set, scores, first, second, order);
-}
-
-void ReduceOrder(Zonotope& set, int order) noexcept {
-  constexpr std::array<double, kMaxStates> kNone{};
-  ColumnScores scores;
-  ScoreAll(set, scores);
-  AppendAndReduce(set, scores, kNone.data(), kNone.data(), order);
 }
 
 }  // namespace forereach

@@ -153,6 +153,9 @@ class ColumnScores {
   alignas(32) std::array<double, (kMaxGenerators + kBlock - 1) / kBlock * kBlock> scores_;
 };
 
+/** Computes the scores of all columns of the set. Cost O(n m). */
+void ScoreColumns(const Zonotope& set, ColumnScores& scores) noexcept;
+
 /** Appends the nonzero generators among first_k e_k, then among second_k e_k, and reduces the order by Girard's method,
 Eq. (order-reduction). If the set then has more than order * n generators, it keeps the (order - 1) * n columns of
 largest |g|_1 - |g|_inf and encloses the others in a box, rounded outward. Of columns whose scores agree to 45 bits, the
@@ -162,9 +165,6 @@ generators.
 Cost O(n m + m^2) for m generators. */
 void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second,
                      int order) noexcept;
-
-/** Reduces the order only. */
-void ReduceOrder(Zonotope& set, int order) noexcept;
 
 }  // namespace forereach
 

@@ -65,11 +65,11 @@ TEST(Evaluator, AnswersAsTheCertifierDoes) {
         const Decision decision =
             certifier.Certify(plan, Zonotope::FromBox(s.center, system->initial_half_width), {&obstacle, 1}, tube);
         evaluator.Certify(s, answer);
-        EXPECT_EQ(answer.outcome, decision.outcome) << system->name << " " << NameOf(group) << i;
-        EXPECT_EQ(answer.step, decision.step);
-        ASSERT_EQ(answer.length, tube.length());
+        EXPECT_EQ(answer.decision.outcome, decision.outcome) << system->name << " " << NameOf(group) << i;
+        EXPECT_EQ(answer.decision.step, decision.step);
+        ASSERT_EQ(answer.tube.length(), tube.length());
         for (int k = 0; k < system->num_states(); ++k)
-          EXPECT_EQ(answer.slices[static_cast<std::size_t>(answer.length)].HalfWidthUpper(k),
+          EXPECT_EQ(answer.tube.slice(answer.tube.length()).HalfWidthUpper(k),
                     tube.slice(tube.length()).HalfWidthUpper(k));
         ++outcomes[static_cast<int>(decision.outcome)];
       }
@@ -132,9 +132,9 @@ TEST(Evaluator, LeavesTheDomainWhereTheResidualMayTakeItThere) {
   const Evaluator evaluator(system, wild, 5);
   Answer answer;
   evaluator.Certify(MakeScenario(system, Group::kC, 0, 0), answer);
-  EXPECT_EQ(answer.outcome, Outcome::kDomain);
-  EXPECT_EQ(answer.step, 1);  // delta reaches beyond 0.48 after one step
-  EXPECT_EQ(answer.length, 1);
+  EXPECT_EQ(answer.decision.outcome, Outcome::kDomain);
+  EXPECT_EQ(answer.decision.step, 1);  // delta reaches beyond 0.48 after one step
+  EXPECT_EQ(answer.tube.length(), 1);
 }
 
 TEST(Evaluator, OrderOneMakesBoxes) {
@@ -144,11 +144,13 @@ TEST(Evaluator, OrderOneMakesBoxes) {
   const Scenario s = MakeScenario(BicycleSystem(), Group::kC, 0, 0);
   boxes.Certify(s, box);
   zonotopes.Certify(s, zonotope);
-  for (const Zonotope& slice : box.slices) {
-    const Eigen::MatrixXd generators = slice.GeneratorMatrix();
+  ASSERT_EQ(box.tube.length(), BicycleSystem().horizon);
+  for (int t = 0; t <= box.tube.length(); ++t) {
+    const Eigen::MatrixXd generators = box.tube.slice(t).GeneratorMatrix();
     for (Eigen::Index j = 0; j < generators.cols(); ++j) EXPECT_EQ((generators.col(j).array() != 0).count(), 1);
   }
-  EXPECT_LT(ProjectedArea(zonotope.slices.back()), 0.9 * ProjectedArea(box.slices.back()));
+  EXPECT_LT(ProjectedArea(zonotope.tube.slice(zonotope.tube.length())),
+            0.9 * ProjectedArea(box.tube.slice(box.tube.length())));
 }
 
 TEST(ProjectedArea, OfABoxAndAHexagon) {
