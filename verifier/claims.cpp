@@ -3,13 +3,12 @@
 #include <cmath>
 #include <string>
 
+#include "certifier/numerics/size.h"
 #include "verifier/containment.h"
 #include "verifier/separation.h"
 
 namespace forereach::verifier {
 namespace {
-
-std::size_t Index(Eigen::Index k) { return static_cast<std::size_t>(k); }
 
 // Keeps the first claim that fails. Words are made for that one only.
 class Claims {
@@ -45,9 +44,9 @@ class SliceCheck {
   SliceCheck(const Problem& problem, const Certificate& certificate, const Tube& tube, int t)
       : problem_(problem),
         certificate_(certificate),
-        slice_(tube.slices[Index(t)]),
-        step_(t < static_cast<int>(tube.steps.size()) ? &tube.steps[Index(t)] : nullptr),
-        recorded_(certificate.slices.empty() ? nothing_ : certificate.slices[Index(t)]),
+        slice_(tube.slices[ToSize(t)]),
+        step_(t < static_cast<int>(tube.steps.size()) ? &tube.steps[ToSize(t)] : nullptr),
+        recorded_(certificate.slices.empty() ? nothing_ : certificate.slices[ToSize(t)]),
         claims_(t, failure_) {}
 
   [[nodiscard]] std::optional<Failure> Run() {
@@ -60,10 +59,10 @@ class SliceCheck {
   }
 
  private:
-  [[nodiscard]] const std::string& name(int k) const { return problem_.model->state_names()[Index(k)]; }
+  [[nodiscard]] const std::string& name(int k) const { return problem_.model->state_names()[ToSize(k)]; }
 
   void CheckHull(int k) {
-    const Real &c = slice_.center[Index(k)], r = slice_.HalfWidth(k), lower = c - r, upper = c + r, scale = abs(c) + r;
+    const Real &c = slice_.center[ToSize(k)], r = slice_.HalfWidth(k), lower = c - r, upper = c + r, scale = abs(c) + r;
     const auto contains = [&](const char* which, const Real& below, const Real& above) {
       const auto what = [&] { return std::string(which) + " contains " + name(k) + " of the slice"; };
       claims_.AtMost(below, lower, scale, what);
@@ -86,7 +85,7 @@ class SliceCheck {
     const Containment inside = IsInside(slice_, recorded_.center, recorded_.generators);
     if (inside.answer == Answer::kYes) return;
     const int k = inside.coordinate;
-    const Real scale = k < 0 ? inside.bound : abs(slice_.center[Index(k)]) + slice_.HalfWidth(k);
+    const Real scale = k < 0 ? inside.bound : abs(slice_.center[ToSize(k)]) + slice_.HalfWidth(k);
     claims_.Judge(inside.answer, inside.found, inside.bound, scale, "at most", [&] {
       return k < 0 ? "the set that the recorded generators span contains the slice"
                    : "the set that the recorded generators span contains the slice, by " + name(k) +
@@ -95,7 +94,7 @@ class SliceCheck {
   }
 
   void CheckStep(int k) {
-    const auto i = Index(k);
+    const auto i = ToSize(k);
     if (recorded_.envelope_lower.size() > 0) {
       const auto& [lower, upper] = step_->envelope[i];
       const Real scale = abs(lower) + abs(upper);
@@ -118,7 +117,7 @@ class SliceCheck {
     for (const RestBound& bound : problem_.rest) {
       if (failure_) return;
       const int k = bound.coordinate;
-      const Real most(bound.tolerance), &c = slice_.center[Index(k)], r = slice_.HalfWidth(k);
+      const Real most(bound.tolerance), &c = slice_.center[ToSize(k)], r = slice_.HalfWidth(k);
       const auto stands = [&](const char* which, const Real& lower, const Real& upper) {
         const auto what = [&] { return "the plan ends standing: " + name(k) + " of " + which; };
         claims_.AtMost(upper, most, most, what);

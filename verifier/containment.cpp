@@ -6,17 +6,17 @@
 #include <optional>
 #include <vector>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach::verifier {
 namespace {
-
-std::size_t Index(Eigen::Index k) { return static_cast<std::size_t>(k); }
 
 // The coordinate of a column's only entry that is not zero, -1 if it has several or none.
 template <class Column, class IsZero>
 int AxisOf(const Column& column, int dim, const IsZero& is_zero) {
   int axis = -1;
   for (int k = 0; k < dim; ++k) {
-    if (is_zero(column[Index(k)])) continue;
+    if (is_zero(column[ToSize(k)])) continue;
     if (axis >= 0) return -1;
     axis = k;
   }
@@ -26,15 +26,15 @@ int AxisOf(const Column& column, int dim, const IsZero& is_zero) {
 class Search {
  public:
   Search(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators)
-      : inner_(inner), center_(center), generators_(generators), taken_(Index(generators.cols())) {
+      : inner_(inner), center_(center), generators_(generators), taken_(ToSize(generators.cols())) {
     for (const auto& column : inner.columns) {
       Eigen::VectorXd& rounded = rounded_.emplace_back(inner.dim());
-      for (int k = 0; k < inner.dim(); ++k) rounded[k] = column[Index(k)].ToDouble();
+      for (int k = 0; k < inner.dim(); ++k) rounded[k] = column[ToSize(k)].ToDouble();
     }
     pairs_.resize(rounded_.size());
     for (Eigen::Index i = 0; i < generators.cols(); ++i) {
       axis_.push_back(AxisOf(generators.col(i), inner.dim(), [](double g) { return g == 0; }));
-      taken_[Index(i)] = axis_.back() >= 0;  // those make up for the rest
+      taken_[ToSize(i)] = axis_.back() >= 0;  // those make up for the rest
     }
   }
 
@@ -57,7 +57,7 @@ class Search {
     Eigen::Index i = 0;
     for (std::size_t j = 0; j < rounded_.size(); ++j) {
       if (IsAlongAnAxis(j)) continue;
-      while (i < generators_.cols() && axis_[Index(i)] >= 0) ++i;
+      while (i < generators_.cols() && axis_[ToSize(i)] >= 0) ++i;
       if (i == generators_.cols()) return false;
       const double gamma = rounded_[j].dot(generators_.col(i)) < 0 ? -1 : 1;
       const double rest = (rounded_[j] - gamma * generators_.col(i)).lpNorm<1>();
@@ -99,7 +99,7 @@ class Search {
     const Eigen::VectorXd& d = rounded_[j];
     double least = worst * d.lpNorm<1>();
     for (Eigen::Index i = 0; i < generators_.cols(); ++i) {
-      if (taken_[Index(i)]) continue;
+      if (taken_[ToSize(i)]) continue;
       const auto g = generators_.col(i);
       const double along = d.dot(g);
       const double gamma = whole ? (along < 0 ? -1 : 1) : std::clamp(along / g.squaredNorm(), -1.0, 1.0);
@@ -108,7 +108,7 @@ class Search {
       least = rest;
       pairs_[j] = Pair{i, gamma, rest / d.lpNorm<1>()};
     }
-    if (pairs_[j]) taken_[Index(pairs_[j]->generator)] = true;
+    if (pairs_[j]) taken_[ToSize(pairs_[j]->generator)] = true;
   }
 
   // The gamma of a pair, |gamma| <= 1 for certain.
@@ -117,7 +117,7 @@ class Search {
     if (std::abs(gamma) < 1 || rest <= line) return gamma;
     Eigen::Index k = 0;
     generators_.col(generator).cwiseAbs().maxCoeff(&k);
-    const Real share = (inner_.columns[j][Index(k)] / Real(generators_(k, generator))).middle();
+    const Real share = (inner_.columns[j][ToSize(k)] / Real(generators_(k, generator))).middle();
     return CertainlyAtMost(abs(share), 1.0) ? share : Real(gamma);
   }
 
@@ -131,9 +131,9 @@ class Search {
   }
 
   [[nodiscard]] std::optional<Containment> Uncovered(int k, const std::vector<Real>& gamma) const {
-    Real need = abs(inner_.center[Index(k)] - Real(center_[k])), room;
+    Real need = abs(inner_.center[ToSize(k)] - Real(center_[k])), room;
     for (std::size_t j = 0; j < pairs_.size(); ++j) {
-      const Real& d = inner_.columns[j][Index(k)];
+      const Real& d = inner_.columns[j][ToSize(k)];
       if (!pairs_[j]) {
         if (!d.IsZero()) need += abs(d);
         continue;
@@ -142,7 +142,7 @@ class Search {
       if (g != 0 || !d.IsZero()) need += abs(d - gamma[j] * Real(g));
     }
     for (Eigen::Index i = 0; i < generators_.cols(); ++i)
-      if (axis_[Index(i)] == k) room += Real(std::abs(generators_(k, i)));
+      if (axis_[ToSize(i)] == k) room += Real(std::abs(generators_(k, i)));
     if (CertainlyAtMost(need, room)) return std::nullopt;
     return Containment{Answer::kUnknown, k, need, room};
   }
@@ -157,11 +157,11 @@ class Search {
           const double a = 1 / half_width[i], b = sign / half_width[k];
           if (!std::isfinite(a) || !std::isfinite(b)) continue;
           const Real along_i(a), along_k(b);
-          const Real away = along_i * (inner_.center[Index(i)] - Real(center_[i])) +
-                            along_k * (inner_.center[Index(k)] - Real(center_[k]));
+          const Real away = along_i * (inner_.center[ToSize(i)] - Real(center_[i])) +
+                            along_k * (inner_.center[ToSize(k)] - Real(center_[k]));
           Real reach = abs(away), bound;
           for (const auto& column : inner_.columns)
-            reach += abs(along_i * column[Index(i)] + along_k * column[Index(k)]);
+            reach += abs(along_i * column[ToSize(i)] + along_k * column[ToSize(k)]);
           for (const auto g : generators_.colwise()) bound += abs(along_i * Real(g[i]) + along_k * Real(g[k]));
           if (CertainlyBelow(bound, reach)) return Containment{Answer::kNo, -1, reach, bound};
         }

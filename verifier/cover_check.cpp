@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach::verifier {
 namespace {
 
@@ -18,8 +20,6 @@ using Box = std::vector<Real>;
 
 bool IsPoint(const Real& range) { return CertainlyAtMost(range.upper(), range.lower()); }
 Real Width(const Real& range) { return range.upper() - range.lower(); }
-
-std::size_t Place(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
 std::string Text(const Real& x) { return x.text(); }
 
@@ -34,10 +34,10 @@ class ClaimCheck {
     while (!open.empty()) {
       const auto [index, box] = std::move(open.back());
       open.pop_back();
-      const Cover::Node& node = claim_.cover.nodes[static_cast<std::size_t>(index)];
+      const Cover::Node& node = claim_.cover.nodes[ToSize(index)];
       if (node.argument >= 0) {
         if (const std::string fault = FaultOf(node, index, box); !fault.empty()) return {Answer::kNo, fault};
-        const auto argument = static_cast<std::size_t>(node.argument);
+        const auto argument = ToSize(node.argument);
         const Real at(node.number);
         open.emplace_back(node.below, box).second[argument] = Real::FromTo(box[argument].lower(), at);
         open.emplace_back(node.above, box).second[argument] = Real::FromTo(at, box[argument].upper());
@@ -56,7 +56,7 @@ class ClaimCheck {
     if (node.argument >= static_cast<int>(box.size())) return "a cut across an argument that there is not";
     const auto is_part = [&](int part) { return index < part && part < size; };
     if (!is_part(node.below) || !is_part(node.above)) return "a part of the domain is missing";
-    const Real& range = box[static_cast<std::size_t>(node.argument)];
+    const Real& range = box[ToSize(node.argument)];
     if (!std::isfinite(node.number) || !CertainlyAtMost(range.lower(), node.number) ||
         !CertainlyAtMost(node.number, range.upper()))
       return "a cut at " + Text(node.number) + ", outside of its box from " + Text(range.lower()) + " to " +
@@ -83,7 +83,7 @@ class ClaimCheck {
     for (const Box& near : {trial.point, box})
       if (const auto witness = CounterExample(bound, near)) return *witness;
     if (cuts == 0 || trial.cut < 0) return {Answer::kUnknown, "a box's bound " + Text(bound) + " could not be shown"};
-    const auto argument = static_cast<std::size_t>(trial.cut);
+    const auto argument = ToSize(trial.cut);
     const Real middle = box[argument].middle();
     Box half = box;
     half[argument] = Real::FromTo(box[argument].lower(), middle);
@@ -165,13 +165,13 @@ class ClaimCheck {
   [[nodiscard]] Real ValueOver(const Domain::Inequality& inequality, const Box& box) const {
     Real sum(0.0);
     for (Eigen::Index l = 0; l < inequality.coefficients.size(); ++l)
-      sum += Real(inequality.coefficients[l]) * box[Place(l)];
+      sum += Real(inequality.coefficients[l]) * box[ToSize(l)];
     return sum;
   }
   [[nodiscard]] Real SquaredDistanceOver(const Domain::Ball& ball, const Box& box) const {
     Real sum(0.0);
     for (std::size_t i = 0; i < ball.coordinates.size(); ++i)
-      sum += sqr(box[Place(ball.coordinates[i])] - Real(ball.center[static_cast<Eigen::Index>(i)]));
+      sum += sqr(box[ToSize(ball.coordinates[i])] - Real(ball.center[static_cast<Eigen::Index>(i)]));
     return sum;
   }
 

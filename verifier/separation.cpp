@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach::verifier {
 namespace {
 
@@ -249,11 +251,11 @@ class Search {
 
 ProjectedSlice::ProjectedSlice(const Slice& slice, const Eigen::MatrixXd& projection) {
   const auto image = [&](const std::vector<Real>& x) {
-    RealVector y(static_cast<std::size_t>(projection.rows()));
+    RealVector y(ToSize(projection.rows()));
     for (Eigen::Index k = 0; k < projection.rows(); ++k)
       for (Eigen::Index l = 0; l < projection.cols(); ++l)
-        if (const Real& entry = x[static_cast<std::size_t>(l)]; projection(k, l) != 0 && !entry.IsZero())
-          y[static_cast<std::size_t>(k)] += projection(k, l) == 1 ? entry : Real(projection(k, l)) * entry;
+        if (const Real& entry = x[ToSize(l)]; projection(k, l) != 0 && !entry.IsZero())
+          y[ToSize(k)] += projection(k, l) == 1 ? entry : Real(projection(k, l)) * entry;
     return y;
   };
   center_ = image(slice.center);
@@ -278,8 +280,7 @@ Real ProjectedSlice::Radius() const {
   const auto p = static_cast<Eigen::Index>(center_.size());
   Eigen::MatrixXd rough = Eigen::MatrixXd::Zero(3, static_cast<Eigen::Index>(generators_.size()));
   for (Eigen::Index j = 0; j < rough.cols(); ++j)
-    for (Eigen::Index k = 0; k < p; ++k)
-      rough(k, j) = generators_[static_cast<std::size_t>(j)][static_cast<std::size_t>(k)].ToDouble(-exponent);
+    for (Eigen::Index k = 0; k < p; ++k) rough(k, j) = generators_[ToSize(j)][ToSize(k)].ToDouble(-exponent);
   Eigen::VectorXd best = Eigen::VectorXd::Ones(rough.cols()), signs;
   double longest = -1;
   for (Eigen::Index j = 0; j < rough.cols(); ++j) {

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach::verifier {
 namespace {
 
@@ -13,8 +15,6 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMaxExactColumns = 12;
 // Observations that contradict each other by less than this part of their operands may not do so in doubles.
 constexpr double kSeenInDoubles = 0x1p-40;
-
-std::size_t Index(int k) { return static_cast<std::size_t>(k); }
 
 Real Around(const Real& center, const Real& radius) { return Real::FromTo(center - radius, center + radius); }
 
@@ -25,8 +25,8 @@ bool IsZeroColumn(const std::vector<Real>& column) {
 }
 
 std::vector<Real> Axis(int dim, int k, const Real& length) {
-  std::vector<Real> column(Index(dim));
-  column[Index(k)] = length;
+  std::vector<Real> column(ToSize(dim));
+  column[ToSize(k)] = length;
   return column;
 }
 
@@ -99,7 +99,7 @@ double CostOfBoxing(const std::vector<Real>& column, const std::vector<double>& 
 double CostOfConfusing(const Slice& slice, const Score& last, const Score& first, double remainder_rounding) {
   if (last.value.IsZero() && first.value.IsZero()) return 0;
   std::vector<double> size;
-  for (int k = 0; k < slice.dim(); ++k) size.push_back((abs(slice.center[Index(k)]) + slice.HalfWidth(k)).ToDouble());
+  for (int k = 0; k < slice.dim(); ++k) size.push_back((abs(slice.center[ToSize(k)]) + slice.HalfWidth(k)).ToDouble());
   const double rounding = std::max(0x1p-48 * *std::ranges::max_element(size), remainder_rounding);
   if (std::abs(last.rounded - first.rounded) > last.error + first.error + rounding) return 0;
   return std::max(CostOfBoxing(slice.columns[last.column], size), CostOfBoxing(slice.columns[first.column], size));
@@ -108,9 +108,9 @@ double CostOfConfusing(const Slice& slice, const Score& last, const Score& first
 // Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
 // what it may have cost the certifier, in doubles, to go another way.
 double Reduce(Slice& slice, int order, double remainder_rounding) {
-  const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
+  const auto n = ToSize(slice.dim()), kept = ToSize(order - 1) * n;
   const double tiny = std::ranges::any_of(slice.columns, MayUnderflow) ? 1 : 0;
-  if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return tiny;
+  if (slice.columns.size() <= ToSize(order) * n) return tiny;
   std::vector<Score> scores = Ranking(slice);
   const double close = kept > 0 ? CostOfConfusing(slice, scores[kept - 1], scores[kept], remainder_rounding) : 0;
   const auto rest = scores.begin() + static_cast<std::ptrdiff_t>(kept);
@@ -120,7 +120,7 @@ double Reduce(Slice& slice, int order, double remainder_rounding) {
     reduced.columns.push_back(std::move(slice.columns[score->column]));
   for (int k = 0; k < slice.dim(); ++k) {
     Real sum;
-    for (auto score = rest; score != scores.end(); ++score) sum += abs(slice.columns[score->column][Index(k)]);
+    for (auto score = rest; score != scores.end(); ++score) sum += abs(slice.columns[score->column][ToSize(k)]);
     if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
   }
   slice = std::move(reduced);
@@ -130,13 +130,13 @@ double Reduce(Slice& slice, int order, double remainder_rounding) {
 // As Reduce, by the choice that a record shows: the (order - 1) n columns nearest to its first. False if it has fewer.
 // Any choice gives a set that contains the slice.
 bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded) {
-  const auto n = Index(slice.dim()), kept = static_cast<std::size_t>(order - 1) * n;
-  if (slice.columns.size() <= static_cast<std::size_t>(order) * n) return true;
+  const auto n = ToSize(slice.dim()), kept = ToSize(order - 1) * n;
+  if (slice.columns.size() <= ToSize(order) * n) return true;
   if (recorded.cols() < static_cast<Eigen::Index>(kept)) return false;
   std::vector<Eigen::VectorXd> rounded;
   for (const auto& column : slice.columns) {
     rounded.emplace_back(slice.dim());
-    for (int k = 0; k < slice.dim(); ++k) rounded.back()[k] = column[Index(k)].ToDouble();
+    for (int k = 0; k < slice.dim(); ++k) rounded.back()[k] = column[ToSize(k)].ToDouble();
   }
   std::vector<bool> taken(slice.columns.size());
   Slice reduced{slice.center, {}};
@@ -156,7 +156,7 @@ bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded) {
   for (int k = 0; k < slice.dim(); ++k) {
     Real sum;
     for (std::size_t j = 0; j < taken.size(); ++j)
-      if (!taken[j]) sum += abs(slice.columns[j][Index(k)]);
+      if (!taken[j]) sum += abs(slice.columns[j][ToSize(k)]);
     if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
   }
   slice = std::move(reduced);
@@ -166,11 +166,11 @@ bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded) {
 // d_i d_l over the slice: at most r_i r_l in size, and within a quarter of the squares of the half-widths of
 // d_i / r_i + d_l / r_l and of their difference, times r_i r_l.
 Bounds MixedProduct(const Slice& slice, const std::vector<Real>& r, int i, int l, Method method) {
-  const Real product = r[Index(i)] * r[Index(l)];
+  const Real product = r[ToSize(i)] * r[ToSize(l)];
   if (method == Method::kPaper || product.IsZero()) return {-product, product};
   Real plus, minus;
   for (const auto& column : slice.columns) {
-    const Real a = column[Index(i)] * r[Index(l)], b = column[Index(l)] * r[Index(i)];
+    const Real a = column[ToSize(i)] * r[ToSize(l)], b = column[ToSize(l)] * r[ToSize(i)];
     plus += abs(a + b);
     minus += abs(a - b);
   }
@@ -224,34 +224,34 @@ Bounds DiagonalRange(const Real& h, const Real& r) {
 // less.
 Bounds CentredRange(const RemainderTerm& term, const Slice& slice, const std::vector<Real>& r) {
   const SecondDerivative& entry = *term.entry;
-  if (entry.row == entry.column) return DiagonalRange(entry.value, r[Index(entry.row)]);
+  if (entry.row == entry.column) return DiagonalRange(entry.value, r[ToSize(entry.row)]);
   Bounds range = Times(entry.value, MixedProduct(slice, r, entry.row, entry.column, Method::kCentred));
   if (term.diagonal == nullptr) return range;
   const int shared = term.diagonal->row, other = shared == entry.row ? entry.column : entry.row;
   const Real& curve = term.diagonal->value;
-  const Bounds square = DiagonalRange(curve, r[Index(shared)]);
-  const Real slope = entry.value.magnitude() * r[Index(other)];
-  return {max(range.lower + square.lower, -Peak(-curve.lower(), slope, r[Index(shared)])),
-          min(range.upper + square.upper, Peak(curve.upper(), slope, r[Index(shared)]))};
+  const Bounds square = DiagonalRange(curve, r[ToSize(shared)]);
+  const Real slope = entry.value.magnitude() * r[ToSize(other)];
+  return {max(range.lower + square.lower, -Peak(-curve.lower(), slope, r[ToSize(shared)])),
+          min(range.upper + square.upper, Peak(curve.upper(), slope, r[ToSize(shared)]))};
 }
 
 // The remainder's bounds, with every second derivative over a box in `hessian` and half-widths r.
 std::vector<Bounds> RemainderOver(const std::vector<SecondDerivative>& hessian, const Slice& slice,
                                   const std::vector<Real>& r, int n, Method method) {
-  std::vector<Bounds> bounds(Index(n));
+  std::vector<Bounds> bounds(ToSize(n));
   if (method == Method::kPaper) {
     for (const SecondDerivative& entry : hessian) {
       const Real once = entry.row == entry.column ? Real(0.5) : Real(1.0);  // off the diagonal (i, j) and (j, i) count
-      const Real most = once * r[Index(entry.row)] * r[Index(entry.column)] * entry.value.magnitude();
-      bounds[Index(entry.output)].lower -= most;
-      bounds[Index(entry.output)].upper += most;
+      const Real most = once * r[ToSize(entry.row)] * r[ToSize(entry.column)] * entry.value.magnitude();
+      bounds[ToSize(entry.output)].lower -= most;
+      bounds[ToSize(entry.output)].upper += most;
     }
     return bounds;
   }
   for (const RemainderTerm& term : TermsOf(hessian)) {
     const Bounds range = CentredRange(term, slice, r);
-    bounds[Index(term.entry->output)].lower += range.lower;
-    bounds[Index(term.entry->output)].upper += range.upper;
+    bounds[ToSize(term.entry->output)].lower += range.lower;
+    bounds[ToSize(term.entry->output)].upper += range.upper;
   }
   return bounds;
 }
@@ -265,7 +265,7 @@ bool AllFinite(const std::vector<SecondDerivative>& hessian) {
 Real Slice::HalfWidth(int k) const {
   Real sum;
   for (const auto& column : columns)
-    if (!column[Index(k)].IsZero()) sum += abs(column[Index(k)]);
+    if (!column[ToSize(k)].IsZero()) sum += abs(column[ToSize(k)]);
   return sum;
 }
 
@@ -309,13 +309,13 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
       const Real allowed = Real(UlpOf(x_next)) + Real(problem.declaration.noise_bound[k]);
-      const Real observed = Real(x_next) - nominal[static_cast<std::size_t>(k)];
+      const Real observed = Real(x_next) - nominal[ToSize(k)];
       row.push_back({observed - allowed, observed + allowed});
     }
     std::vector<Real>& sizes = sizes_.emplace_back();
     for (const double x_next : data.x_next.row(i)) sizes.push_back(abs(Real(x_next)));
     for (const auto& [output, variable, value] : equations.First(z))
-      sizes[Index(output)] += abs(value * z[Index(variable)]);
+      sizes[ToSize(output)] += abs(value * z[ToSize(variable)]);
   }
 }
 
@@ -370,24 +370,24 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
   next.center = equations_.Value(query.center);
   const std::vector<FirstDerivative> jacobian = equations_.First(query.center);
   for (const auto& column : query.slice.columns) {
-    std::vector<Real> image(Index(n));
+    std::vector<Real> image(ToSize(n));
     for (const auto& [output, variable, value] : jacobian)
-      if (variable < n && !column[Index(variable)].IsZero()) image[Index(output)] += value * column[Index(variable)];
+      if (variable < n && !column[ToSize(variable)].IsZero()) image[ToSize(output)] += value * column[ToSize(variable)];
     if (!IsZeroColumn(image)) next.columns.push_back(std::move(image));
   }
   const Real half(0.5);
   for (int k = 0; k < n; ++k) {  // diag(q)
-    const auto& [lower, upper] = step.remainder[Index(k)];
-    next.center[Index(k)] += half * (lower + upper);
+    const auto& [lower, upper] = step.remainder[ToSize(k)];
+    next.center[ToSize(k)] += half * (lower + upper);
     if (const Real q = half * (upper - lower); !q.IsZero()) next.columns.push_back(Axis(n, k, q));
   }
   for (int k = 0; k < n; ++k) {  // diag(h)
-    const auto& [lower, upper] = step.envelope[Index(k)];
+    const auto& [lower, upper] = step.envelope[ToSize(k)];
     // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
-    next.center[Index(k)] += half * (lower + upper);
+    next.center[ToSize(k)] += half * (lower + upper);
     if (const Real h = half * abs(upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
-    if (!next.center[Index(k)].IsFinite()) return no_bound("the successor");
+    if (!next.center[ToSize(k)].IsFinite()) return no_bound("the successor");
   }
   const bool followed = options.follow && tube.slices.size() < options.follow->size() &&
                         ReduceAs(next, problem_.zonotope_order, (*options.follow)[tube.slices.size()]);
@@ -414,9 +414,9 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
   for (int l = 0; l < static_cast<int>(query.hull.size()); ++l) {
     const Real lower(l < n ? domain.state.lower()[l] : domain.input.lower()[l - n]);
     const Real upper(l < n ? domain.state.upper()[l] : domain.input.upper()[l - n]);
-    const Real &center = query.center[Index(l)], &r = query.half_width[Index(l)];
+    const Real &center = query.center[ToSize(l)], &r = query.half_width[ToSize(l)];
     const std::string name =
-        l < n ? problem_.model->state_names()[Index(l)] : problem_.model->input_names()[Index(l - n)];
+        l < n ? problem_.model->state_names()[ToSize(l)] : problem_.model->input_names()[ToSize(l - n)];
     if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes)
       return refuse(name, center - r, lower, a, "at least ");
     if (const Answer a = IsAtMost(center + r, upper); a != Answer::kYes) return refuse(name, center + r, upper, a);
@@ -435,7 +435,7 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
     const auto& [coordinates, center, radius] = domain.balls[i];
     Real square;
     for (std::size_t c = 0; c < coordinates.size(); ++c) {
-      const auto l = Index(coordinates[c]);
+      const auto l = ToSize(coordinates[c]);
       square += sqr(abs(query.center[l] - Real(center[static_cast<Eigen::Index>(c)])) + query.half_width[l]);
     }
     if (const Answer a = IsAtMost(square, sqr(Real(radius))); a != Answer::kYes)
@@ -478,8 +478,8 @@ struct TubeMaker::Row {
       if (declaration.lipschitz(k, l) > 0) {
         columns.push_back(l);
         slopes.push_back(declaration.lipschitz(k, l));
-        center.push_back(set.center[Index(l)].ToDouble());
-        scale += slopes.back() * (std::abs(center.back()) + set.half_width[Index(l)].ToDouble());
+        center.push_back(set.center[ToSize(l)].ToDouble());
+        scale += slopes.back() * (std::abs(center.back()) + set.half_width[ToSize(l)].ToDouble());
       }
     exact = columns.size() <= kMaxExactColumns;
     patterns = exact && !columns.empty() ? std::size_t{1} << (columns.size() - 1) : 1;  // s and -s give the same
@@ -487,7 +487,7 @@ struct TubeMaker::Row {
     std::vector<std::vector<double>> generators;
     for (const auto& column : set.slice.columns) {
       std::vector<double>& entries = generators.emplace_back();
-      for (const int l : columns) entries.push_back(l < set.slice.dim() ? column[Index(l)].ToDouble() : 0);
+      for (const int l : columns) entries.push_back(l < set.slice.dim() ? column[ToSize(l)].ToDouble() : 0);
     }
     for (std::size_t s = 0; s < patterns; ++s) {
       double sum = 0;
@@ -507,13 +507,13 @@ struct TubeMaker::Row {
     if (exact_spread[s]) return *exact_spread[s];
     Real sum;
     if (!exact)
-      for (std::size_t l = 0; l < columns.size(); ++l) sum += Real(slopes[l]) * query.half_width[Index(columns[l])];
+      for (std::size_t l = 0; l < columns.size(); ++l) sum += Real(slopes[l]) * query.half_width[ToSize(columns[l])];
     if (exact)
       for (const auto& column : query.slice.columns) {
         Real along;
         for (std::size_t l = 0; l < columns.size(); ++l)
-          if (columns[l] < query.slice.dim() && !column[Index(columns[l])].IsZero())
-            along += Real(Sign(s, l) * slopes[l]) * column[Index(columns[l])];
+          if (columns[l] < query.slice.dim() && !column[ToSize(columns[l])].IsZero())
+            along += Real(Sign(s, l) * slopes[l]) * column[ToSize(columns[l])];
         sum += abs(along);
       }
     exact_spread[s] = sum;
@@ -553,7 +553,7 @@ struct TubeMaker::Row {
       if (trusted && rough[s] < largest - 0x1p-38 * total) continue;
       Real sum;
       for (std::size_t l = 0; l < columns.size(); ++l) {
-        const Real away = Real(slopes[l]) * (query.center[Index(columns[l])] - Real(z(i, columns[l])));
+        const Real away = Real(slopes[l]) * (query.center[ToSize(columns[l])] - Real(z(i, columns[l])));
         sum += exact ? Real(Sign(s, l)) * away : abs(away);
       }
       distance = max(distance, abs(sum) + Spread(s));
@@ -573,7 +573,7 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
   double highest = -kNone, lowest = kNone;
   bool trusted = true;
   for (const int i : rows) {
-    const Bounds& residual = residuals_[Index(i)][Index(k)];
+    const Bounds& residual = residuals_[ToSize(i)][ToSize(k)];
     const double distance = row.Roughly(z, i), below = residual.lower.ToDouble(), above = residual.upper.ToDouble();
     lower.push_back(below - distance);
     upper.push_back(above + distance);
@@ -590,9 +590,9 @@ TubeMaker::Known TubeMaker::Envelope(const Query& query, int k, const KnownRows&
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (trusted && lower[i] + slack[i] < highest && upper[i] - slack[i] > lowest) continue;
     const Real distance = row.Distance(z, rows[i]);
-    const Bounds& residual = residuals_[Index(rows[i])][Index(k)];
+    const Bounds& residual = residuals_[ToSize(rows[i])][ToSize(k)];
     add(bounds, {residual.lower - distance, residual.upper + distance});
-    const Real doubt = Real(kSeenInDoubles) * (sizes_[Index(rows[i])][Index(k)] + Real(row.ScaleAt(z, rows[i])));
+    const Real doubt = Real(kSeenInDoubles) * (sizes_[ToSize(rows[i])][ToSize(k)] + Real(row.ScaleAt(z, rows[i])));
     add(doubtful, {residual.lower - distance - doubt, residual.upper + distance + doubt});
   }
   return {*bounds, CertainlyBelow(doubtful->upper, doubtful->lower)};

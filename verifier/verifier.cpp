@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "certifier/numerics/size.h"
 #include "verifier/claims.h"
 
 namespace forereach::verifier {
@@ -32,7 +33,7 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
   for (const Obstacle& obstacle : certificate.obstacles)
     if (obstacle.dim() != problem.projection.rows()) return misfit("the obstacles fit the projection");
   if (certificate.slices.empty()) return std::nullopt;
-  const auto steps = static_cast<std::size_t>(certificate.controls.cols());
+  const auto steps = ToSize(certificate.controls.cols());
   if (certificate.slices.size() != steps + 1)
     return Failure{static_cast<int>(certificate.slices.size()), "the record has a slice for every step",
                    std::to_string(certificate.slices.size()), std::to_string(steps + 1)};

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "certifier/numerics/arithmetic.h"
+#include "certifier/numerics/size.h"
 #include "certifier/safety/separation.h"
 
 namespace forereach {
@@ -42,7 +43,7 @@ void ValidateObservations(const Problem& problem) {
                   std::to_string(variables));
   for (int i = 0; i < problem.transitions.size(); ++i) {
     const Eigen::VectorXd z = problem.transitions.z.row(i);
-    RequireThat(problem.domain.Contains({z.data(), static_cast<std::size_t>(z.size())}),
+    RequireThat(problem.domain.Contains({z.data(), ToSize(z.size())}),
                 "transition " + std::to_string(i) + ": lies outside the certification domain");
   }
 }
@@ -52,8 +53,9 @@ ObservationStore MakeStore(const Problem& problem) {
   ValidateObservations(problem);
   const auto [lower, upper] = problem.domain.Corners();
   StoreOptions options;
-  options.max_observations = static_cast<std::size_t>(problem.max_observations);
+  options.max_observations = ToSize(problem.max_observations);
   options.envelope.max_leaf_visits = problem.max_leaf_visits;
+  options.envelope.instructions = problem.instructions;
   return ObservationStore(problem.declaration, Observe(*problem.model, problem.transitions), lower, upper, options);
 }
 
@@ -88,7 +90,7 @@ Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
       decision.threshold = result.exit.bound;
       return decision;
     case StepResult::Status::kInconsistent: {
-      const auto k = static_cast<std::size_t>(result.coordinate);
+      const auto k = ToSize(result.coordinate);
       decision = Falsified(step, result.coordinate);
       decision.margin = record.envelope.lower[k];
       decision.threshold = record.envelope.upper[k];
@@ -111,12 +113,14 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       projection_(problem_->projection, problem_->model->num_states()),
       observed_(std::in_place, *problem_),
       violation_(observed_->known.violation()),
-      propagator_(*problem_->model, problem_->domain, observed_->known, problem_->zonotope_order, problem_->method) {}
+      propagator_(*problem_->model, problem_->domain, observed_->known, problem_->zonotope_order, problem_->method,
+                  problem_->instructions) {}
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
     : problem_((Validated(problem), std::move(problem))),
       projection_(problem_->projection, problem_->model->num_states()),
-      propagator_(*problem_->model, problem_->domain, residual, problem_->zonotope_order, problem_->method) {}
+      propagator_(*problem_->model, problem_->domain, residual, problem_->zonotope_order, problem_->method,
+                  problem_->instructions) {}
 
 Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
   Observations observed;
@@ -185,7 +189,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
 
 Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
   for (int t = 0; t < plan.num_steps; ++t) {
-    const auto i = static_cast<std::size_t>(t);
+    const auto i = ToSize(t);
     StepRecord& record = tube.steps_[i];
     const StepResult result = propagator_.Step(tube.slices_[i], plan.input(t), record, tube.slices_[i + 1],
                                                tube.steps_[i + 1].half_width.data());
@@ -251,7 +255,7 @@ Separation Certifier::BetterOf(const Separation& by_hulls, const Tube& tube, int
                                const Obstacle& obstacle) const noexcept {
   Zonotope projected;
   projection_.Enclose(tube.slice(t), tube.half_width(t), projected);
-  const Separation best = Separate(projected, obstacle);
+  const Separation best = Separate(projected, obstacle, problem_->instructions);
   return best.distance > by_hulls.distance ? best : by_hulls;
 }
 
@@ -261,13 +265,13 @@ Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube&
   Closest by_hull, closest;
   double next_by_hull = kInfinity;  // the second smallest clearance by hulls
   const auto separate = [&](int t, int o, const Separation& by_hulls) {
-    return BetterOf(by_hulls, tube, t, obstacles[static_cast<std::size_t>(o)]);
+    return BetterOf(by_hulls, tube, t, obstacles[ToSize(o)]);
   };
   const int count = static_cast<int>(obstacles.size());
   for (int t = 0; t <= tube.length(); ++t) {
     const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
     for (int o = 0; o < count; ++o) {
-      const Separation by_hulls = SeparateHulls(hull, obstacles[static_cast<std::size_t>(o)]);
+      const Separation by_hulls = SeparateHulls(hull, obstacles[ToSize(o)]);
       if (by_hulls.IsProven()) {
         const double clearance = by_hulls.clearance();
         next_by_hull = std::min(next_by_hull, std::max(clearance, by_hull.clearance));
@@ -284,7 +288,7 @@ Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube&
   for (int t = 0; t <= tube.length() && next_by_hull < closest.clearance; ++t) {
     const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
     for (int o = 0; o < count; ++o) {
-      const Separation by_hulls = SeparateHulls(hull, obstacles[static_cast<std::size_t>(o)]);
+      const Separation by_hulls = SeparateHulls(hull, obstacles[ToSize(o)]);
       if (!by_hulls.IsProven() || by_hulls.clearance() >= closest.clearance) continue;
       if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o, by_hulls), t, o);
     }

@@ -8,6 +8,7 @@
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/sets/zonotope.h"
@@ -50,7 +51,7 @@ struct Plan {
   int stride = 0;  ///< Doubles from one step to the next, at least num_inputs.
 
   [[nodiscard]] std::span<const double> input(int t) const {
-    return {controls + static_cast<std::ptrdiff_t>(t) * stride, static_cast<std::size_t>(num_inputs)};
+    return {controls + static_cast<std::ptrdiff_t>(t) * stride, ToSize(num_inputs)};
   }
 };
 
@@ -62,17 +63,17 @@ class Tube final {
 
   /** Upper bounds on the half-widths of the hull of X_t, t <= length(). */
   [[nodiscard]] std::span<const double> half_width(int t) const {
-    return {step(t).half_width.data(), static_cast<std::size_t>(slice(t).dim())};
+    return {step(t).half_width.data(), ToSize(slice(t).dim())};
   }
   /** An interval that contains coordinate k of every point of X_t, rounded outward. Cost O(1). */
   [[nodiscard]] Interval hull(int t, int k) const {
-    const double center = slice(t).center(k), r = half_width(t)[static_cast<std::size_t>(k)];
+    const double center = slice(t).center(k), r = half_width(t)[ToSize(k)];
     return {SubDown(center, r), AddUp(center, r)};
   }
   /** Number of completed steps; X_0 .. X_length() are valid. */
   [[nodiscard]] int length() const { return length_; }
-  [[nodiscard]] const Zonotope& slice(int t) const { return slices_[static_cast<std::size_t>(t)]; }
-  [[nodiscard]] const StepRecord& step(int t) const { return steps_[static_cast<std::size_t>(t)]; }
+  [[nodiscard]] const Zonotope& slice(int t) const { return slices_[ToSize(t)]; }
+  [[nodiscard]] const StepRecord& step(int t) const { return steps_[ToSize(t)]; }
 
  private:
   friend class Certifier;

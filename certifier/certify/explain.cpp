@@ -1,5 +1,6 @@
 #include "certifier/certify/explain.h"
 
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -8,8 +9,7 @@ namespace {
 std::string VariableName(const NominalModel& model, int index) {
   const int n = model.num_states();
   if (index < 0 || index >= model.num_variables()) return "coordinate " + std::to_string(index);
-  return index < n ? model.state_names()[static_cast<std::size_t>(index)]
-                   : model.input_names()[static_cast<std::size_t>(index - n)];
+  return index < n ? model.state_names()[ToSize(index)] : model.input_names()[ToSize(index - n)];
 }
 
 std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {

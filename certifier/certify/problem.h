@@ -7,6 +7,7 @@
 
 #include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/model.h"
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/reach/domain.h"
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/transitions.h"
@@ -32,7 +33,8 @@ struct Problem {
   int max_leaf_visits = 512;                  ///< EnvelopeOptions: bounds the work of one search
   int max_observations = 10'000'000;  ///< Above this number, observations that never attain the envelope are removed
   int zonotope_order = 5;             ///< rho: at most rho * n generators after reduction
-  std::vector<RestBound> rest;        ///< X_T of a certified plan satisfies all of these; empty: no condition
+  InstructionSet instructions = BestInstructionSet();  ///< Changes the computing time only, not a bit of the result
+  std::vector<RestBound> rest;  ///< X_T of a certified plan satisfies all of these; empty: no condition
 };
 
 }  // namespace forereach

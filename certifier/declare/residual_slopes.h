@@ -11,6 +11,7 @@ the residual's equations, which are a template over the scalar type (dynamics/re
 #include "certifier/dynamics/jet.h"
 #include "certifier/dynamics/occurrence.h"
 #include "certifier/dynamics/parametric_residual.h"
+#include "certifier/numerics/size.h"
 
 namespace forereach {
 
@@ -58,25 +59,23 @@ class EquationsSlopes final : public ResidualSlopes {
       : ResidualSlopes(Residual::kName, kStates, kVariables,
                        {Residual::kParameterNames.begin(), Residual::kParameterNames.end()}) {
     std::array<Occurrence, kVariables + kParameters> w;
-    for (int i = 0; i < kVariables + kParameters; ++i) w[static_cast<std::size_t>(i)] = Occurrence::Argument(i);
+    for (int i = 0; i < kVariables + kParameters; ++i) w[ToSize(i)] = Occurrence::Argument(i);
     Call<Occurrence>(w, occurrence_);
   }
 
-  [[nodiscard]] bool Occurs(int row, int argument) const override {
-    return occurrence_[static_cast<std::size_t>(row)].Of(argument);
-  }
+  [[nodiscard]] bool Occurs(int row, int argument) const override { return occurrence_[ToSize(row)].Of(argument); }
 
   [[nodiscard]] Jet Enclose(int row, int column, std::span<const Interval> w,
                             std::span<const int> active) const override {
     std::array<Jet, kVariables + kParameters> jets;
     for (std::size_t i = 0; i < jets.size(); ++i) jets[i] = Jet(w[i]);
     for (std::size_t i = 0; i < active.size(); ++i) {
-      const auto argument = static_cast<std::size_t>(active[i]);
+      const auto argument = ToSize(active[i]);
       jets[argument] = Jet::Argument(w[argument], static_cast<int>(i), active[i] == column);
     }
     std::array<Jet, kStates> residual;
     Call<Jet>(jets, residual);
-    return residual[static_cast<std::size_t>(row)];
+    return residual[ToSize(row)];
   }
 
  private:

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "certifier/numerics/arithmetic.h"
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -17,15 +18,13 @@ using Arguments = std::vector<Interval>;
 
 constexpr std::size_t kBetweenReports = 256;
 
-std::size_t Place(int i) { return static_cast<std::size_t>(i); }
-
 // ---- Where a box lies to the domain's inequalities and balls.
 
 double SmallestValue(const Domain::Inequality& inequality, const Arguments& box) {
   double smallest = 0;
   for (Eigen::Index l = 0; l < inequality.coefficients.size(); ++l) {
     const double c = inequality.coefficients[l];
-    const Interval& z = box[static_cast<std::size_t>(l)];
+    const Interval& z = box[ToSize(l)];
     if (c != 0) smallest = AddDown(smallest, MulDown(c, c > 0 ? z.lower : z.upper));
   }
   return smallest;
@@ -34,7 +33,7 @@ double SmallestValue(const Domain::Inequality& inequality, const Arguments& box)
 double SmallestSquaredDistance(const Domain::Ball& ball, const Arguments& box) {
   double smallest = 0;
   for (std::size_t i = 0; i < ball.coordinates.size(); ++i) {
-    const Interval& z = box[Place(ball.coordinates[i])];
+    const Interval& z = box[ToSize(ball.coordinates[i])];
     const double c = ball.center[static_cast<Eigen::Index>(i)];
     const double away = std::max({0.0, SubDown(z.lower, c), SubDown(c, z.upper)});
     smallest = AddDown(smallest, MulDown(away, away));
@@ -58,11 +57,11 @@ void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z)
     for (const auto& [coordinates, center, radius] : domain.balls) {
       double square = 0;
       for (std::size_t i = 0; i < coordinates.size(); ++i)
-        square += std::pow(z[Place(coordinates[i])] - center[static_cast<Eigen::Index>(i)], 2);
+        square += std::pow(z[ToSize(coordinates[i])] - center[static_cast<Eigen::Index>(i)], 2);
       const double scale = std::min(1.0, kInward * radius / std::sqrt(square));
       for (std::size_t i = 0; i < coordinates.size(); ++i) {
         const double c = center[static_cast<Eigen::Index>(i)];
-        z[Place(coordinates[i])] = c + scale * (z[Place(coordinates[i])] - c);
+        z[ToSize(coordinates[i])] = c + scale * (z[ToSize(coordinates[i])] - c);
       }
     }
     for (const auto& [coefficients, bound] : domain.inequalities) {
@@ -107,13 +106,14 @@ class Search {
     result_.column = column;
     root_.insert(root_.end(), parameters.begin(), parameters.end());
     for (int i = 0; i < slopes.num_arguments(); ++i)
-      if (slopes.Occurs(row, i) && (i == column || root_[Place(i)].lower < root_[Place(i)].upper)) active_.push_back(i);
+      if (slopes.Occurs(row, i) && (i == column || root_[ToSize(i)].lower < root_[ToSize(i)].upper))
+        active_.push_back(i);
     constrained_.resize(root_.size());
     for (const auto& ball : domain.balls)
-      for (const int l : ball.coordinates) constrained_[Place(l)] = true;
+      for (const int l : ball.coordinates) constrained_[ToSize(l)] = true;
     for (const auto& inequality : domain.inequalities)
       for (Eigen::Index l = 0; l < inequality.coefficients.size(); ++l)
-        if (inequality.coefficients[l] != 0) constrained_[static_cast<std::size_t>(l)] = true;
+        if (inequality.coefficients[l] != 0) constrained_[ToSize(l)] = true;
   }
 
   SlopeBound Run(const SlopeProgress& progress) {
@@ -150,11 +150,11 @@ class Search {
   }
 
   void Bisect(const Part& part) {
-    const std::size_t argument = Place(part.cut);
+    const std::size_t argument = ToSize(part.cut);
     const double at = part.box[argument].Middle();
     std::vector<Cover::Node>& nodes = result_.cover.nodes;
     const int below = static_cast<int>(nodes.size());
-    nodes[Place(part.node)] = {part.cut, false, at, below, below + 1};
+    nodes[ToSize(part.node)] = {part.cut, false, at, below, below + 1};
     nodes.resize(nodes.size() + 2);
     Arguments half = part.box;
     half[argument].upper = at;
@@ -165,14 +165,14 @@ class Search {
 
   // Bounds a box, which then is a leaf until it is cut. @param bound holds already.
   void Add(int node, double bound, const Arguments& box) {
-    Cover::Node& leaf = result_.cover.nodes[Place(node)];
+    Cover::Node& leaf = result_.cover.nodes[ToSize(node)];
     if (LiesOutside(domain_, box)) {
       leaf.outside = true;
       return;
     }
     ++result_.boxes;
     const bool inside =
-        FindExit(domain_, std::span(box).first(Place(slopes_.num_variables()))).kind == DomainExit::Kind::kNone;
+        FindExit(domain_, std::span(box).first(ToSize(slopes_.num_variables()))).kind == DomainExit::Kind::kNone;
     cut_ = -1;
     cut_score_ = 0;
     leaf.number = std::min(bound, std::max(SignedBound(box, inside, 1), SignedBound(box, inside, -1)));
@@ -209,13 +209,13 @@ class Search {
     bool moved = false;
     for (std::size_t i = 0; i < active_.size(); ++i) {
       const Interval rise = sign > 0 ? rises[i] : -rises[i];
-      Interval& range = rest[Place(active_[i])];
+      Interval& range = rest[ToSize(active_[i])];
       if (!(range.lower < range.upper) || (rise.lower < 0 && rise.upper > 0)) continue;
       range = rise.lower >= 0 ? range.upper : range.lower;
       moved = true;
       // The better end may lie outside the domain: then cutting helps all the same.
-      if (!inside && constrained_[Place(active_[i])])
-        Prefer(active_[i], Product(rise.Magnitude(), Width(box[Place(active_[i])])), box, cut_, cut_score_);
+      if (!inside && constrained_[ToSize(active_[i])])
+        Prefer(active_[i], Product(rise.Magnitude(), Width(box[ToSize(active_[i])])), box, cut_, cut_score_);
     }
     return moved;
   }
@@ -226,10 +226,10 @@ class Search {
     std::vector<double> point = Middle(rest);
     double excess = 0;
     for (std::size_t i = 0; i < active_.size(); ++i) {
-      const Interval& range = rest[Place(active_[i])];
+      const Interval& range = rest[ToSize(active_[i])];
       if (!(range.lower < range.upper)) continue;
       const Interval rise = sign > 0 ? rises[i] : -rises[i];
-      double& w = point[Place(active_[i])];
+      double& w = point[ToSize(active_[i])];
       const double share = rise.upper / (rise.upper - rise.lower);
       const double best = range.lower + share * (range.upper - range.lower);
       w = range.Contains(best) ? best : range.Middle();  // the sum may overflow
@@ -245,7 +245,7 @@ class Search {
     const Interval there = Signed(point, sign);
     if (there.upper > result_.lower) {
       std::vector<double> counted = point;
-      const auto z = std::span(counted).first(Place(slopes_.num_variables()));
+      const auto z = std::span(counted).first(ToSize(slopes_.num_variables()));
       if (inside || domain_.Contains(z)) {
         Count(counted, there);
       } else {
@@ -273,13 +273,13 @@ class Search {
     int best = -1;
     double best_score = 0;
     for (int i = 0; i < static_cast<int>(box.size()); ++i)
-      if (std::ranges::count(active_, i) > 0 || (!inside && constrained_[Place(i)]))
-        Prefer(i, ShareOf(box[Place(i)], root_[Place(i)]), box, best, best_score);
+      if (std::ranges::count(active_, i) > 0 || (!inside && constrained_[ToSize(i)]))
+        Prefer(i, ShareOf(box[ToSize(i)], root_[ToSize(i)]), box, best, best_score);
     return best;
   }
 
   static void Prefer(int argument, double score, const Arguments& box, int& best, double& best_score) {
-    const Interval& range = box[Place(argument)];
+    const Interval& range = box[ToSize(argument)];
     const double middle = range.Middle();
     if (!(score > best_score && range.lower < middle && middle < range.upper)) return;
     best = argument;

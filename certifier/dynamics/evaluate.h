@@ -8,6 +8,7 @@ certify step uses expand.h instead. */
 
 #include "certifier/dynamics/program.h"
 #include "certifier/numerics/interval.h"
+#include "certifier/numerics/size.h"
 
 FOREREACH_ARITHMETIC_BEGIN
 
@@ -31,13 +32,13 @@ template <class T>
 void Evaluate(const Program& program, const std::array<bool, Program::kMaxOperations>& needed,
               std::span<const double> parameters, std::span<const T> z, NodeValues<T>& values) noexcept {
   using std::sin, std::cos, std::tan;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(program.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(program.size); ++i) {
     if (!needed[i]) continue;
     const Operation& node = program.nodes[i];
-    const auto operand = [&](short j) -> const T& { return values[static_cast<std::size_t>(j)]; };
+    const auto operand = [&](short j) -> const T& { return values[ToSize(j)]; };
     switch (node.op) {
-      case Op::kVariable: values[i] = z[static_cast<std::size_t>(node.a)]; break;
-      case Op::kParameter: values[i] = T(parameters[static_cast<std::size_t>(node.a)]); break;
+      case Op::kVariable: values[i] = z[ToSize(node.a)]; break;
+      case Op::kParameter: values[i] = T(parameters[ToSize(node.a)]); break;
       case Op::kConstant: values[i] = T(node.constant); break;
       case Op::kAdd: values[i] = operand(node.a) + operand(node.b); break;
       case Op::kSubtract: values[i] = operand(node.a) - operand(node.b); break;

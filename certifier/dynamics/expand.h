@@ -9,7 +9,9 @@ box. */
 #include <utility>
 
 #include "certifier/dynamics/expansion.h"
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/numerics/lanes.h"
+#include "certifier/numerics/size.h"
 
 FOREREACH_ARITHMETIC_BEGIN
 
@@ -119,7 +121,7 @@ template <const Program& kProgram, std::size_t I>
 inline void EvaluateOverBox(const double* parameters, const PlainInterval* box, const double* v, PlainInterval* w) {
   constexpr Operation n = kProgram.nodes[I];
   // Sine and cosine of one argument share their ends: the first of them that is needed sets both.
-  constexpr bool kSecondOfPair = n.op == Op::kCos && kProgram.over_box[static_cast<std::size_t>(n.b < 0 ? 0 : n.b)];
+  constexpr bool kSecondOfPair = n.op == Op::kCos && kProgram.over_box[ToSize(n.b < 0 ? 0 : n.b)];
   if constexpr (kProgram.over_box[I] && !kSecondOfPair) {
     if constexpr (n.op == Op::kVariable) w[I] = box[n.a];
     if constexpr (n.op == Op::kParameter) w[I] = {parameters[n.a], parameters[n.a]};
@@ -159,7 +161,7 @@ FOREREACH_INLINE void ForEachConstant(Visit visit) {
 
 template <const Program& kProgram>
 FOREREACH_INLINE void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
-  constexpr auto kSize = static_cast<std::size_t>(kProgram.size);
+  constexpr auto kSize = ToSize(kProgram.size);
   std::array<double, kSize> v;
   std::array<PlainInterval, kSize> w;
   ForEachConstant<kSize>([&](auto i)
@@ -176,25 +178,13 @@ FOREREACH_INLINE void Expand(const double* parameters, const double* z, const Pl
   });
 }
 
-template <const Program& kProgram>
-FOREREACH_AVX2 void ExpandAvx2(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
-  Expand<kProgram>(parameters, z, box, out);
-}
-template <const Program& kProgram>
-FOREREACH_FLATTEN void ExpandBaseline(const double* parameters, const double* z, const PlainInterval* box,
-                                      Expansion& out) {
-  Expand<kProgram>(parameters, z, box, out);
-}
-
 }  // namespace internal
 
 /** @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4. */
 template <const Program& kProgram>
 inline void Expand(std::span<const double> parameters, std::span<const double> z, std::span<const PlainInterval> box,
-                   Expansion& out) noexcept {
-  const auto expand = active_instruction_set == InstructionSet::kAvx2 ? internal::ExpandAvx2<kProgram>
-                                                                      : internal::ExpandBaseline<kProgram>;
-  expand(parameters.data(), z.data(), box.data(), out);
+                   Expansion& out, InstructionSet instructions = BestInstructionSet()) noexcept {
+  Dispatch<&internal::Expand<kProgram>>(instructions, parameters.data(), z.data(), box.data(), out);
 }
 
 }  // namespace forereach

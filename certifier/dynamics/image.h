@@ -9,7 +9,9 @@ that is known at compile time. One pass over the generators, four at a time, als
 
 #include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/rounding.h"
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/numerics/lanes.h"
+#include "certifier/numerics/size.h"
 #include "certifier/sets/zonotope.h"
 
 FOREREACH_ARITHMETIC_BEGIN
@@ -26,7 +28,7 @@ template <const Program& kProgram>
 constexpr RowSpan RowOf(int k) {
   RowSpan row;
   for (int e = 0; e < kProgram.num_first; ++e) {
-    const Program::First& entry = kProgram.jacobian[static_cast<std::size_t>(e)];
+    const Program::First& entry = kProgram.jacobian[ToSize(e)];
     if (entry.row != k || entry.column >= kProgram.states) continue;
     if (row.count++ == 0) row.first = e;
   }
@@ -45,7 +47,7 @@ FOREREACH_INLINE Lanes Weighted(const Lanes* columns, const Lanes* factors) {
 template <const Program& kProgram, std::size_t K>
 FOREREACH_INLINE Lanes RowImage(const Lanes* columns, const Lanes* factors) {
   constexpr RowSpan kRow = RowOf<kProgram>(static_cast<int>(K));
-  constexpr auto kFirst = static_cast<std::size_t>(kRow.first);
+  constexpr auto kFirst = ToSize(kRow.first);
   if constexpr (kRow.count == 0) {
     return AllLanes(0);
   } else {
@@ -53,7 +55,7 @@ FOREREACH_INLINE Lanes RowImage(const Lanes* columns, const Lanes* factors) {
     [&]<std::size_t... E>(std::index_sequence<E...>) __attribute__((always_inline)) {
       ((sum += Weighted<kProgram, kFirst + 1 + E>(columns, factors)), ...);
     }
-    (std::make_index_sequence<static_cast<std::size_t>(kRow.count - 1)>());
+    (std::make_index_sequence<ToSize(kRow.count - 1)>());
     return sum;
   }
 }
@@ -69,8 +71,7 @@ template <const Program& kProgram, std::size_t... K>
 FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice, Zonotope& next, ImageSums& sums,
                               std::index_sequence<K...>) {
   std::array<Lanes, Program::kMaxFirst> factors;
-  for (std::size_t e = 0; e < static_cast<std::size_t>(kProgram.num_first); ++e)
-    factors[e] = AllLanes(expansion.jacobian[e]);
+  for (std::size_t e = 0; e < ToSize(kProgram.num_first); ++e) factors[e] = AllLanes(expansion.jacobian[e]);
   Lanes row_sums[sizeof...(K)] = {(static_cast<void>(K), AllLanes(0))...};
   ColumnScores::Writer scores(sums.scores);
   const std::size_t size = slice.padded_size();
@@ -88,7 +89,7 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
     (row(std::integral_constant<std::size_t, K>()), ...);
     scores.Add(j, column_sum, largest);
   }
-  scores.Finish(static_cast<std::size_t>(slice.num_generators()));
+  scores.Finish(ToSize(slice.num_generators()));
   StoreSums(row_sums, sums.row.data());
 }
 
@@ -99,39 +100,32 @@ FOREREACH_INLINE double RowSlack(const Expansion& expansion, const StepError& er
   constexpr RowSpan kRow = RowOf<kProgram>(static_cast<int>(K));
   double slack = error.image[K];
   const auto add = [&]<std::size_t E>(std::integral_constant<std::size_t, E>) __attribute__((always_inline)) {
-    constexpr Program::First entry = kProgram.jacobian[static_cast<std::size_t>(kRow.first) + E];
+    constexpr Program::First entry = kProgram.jacobian[ToSize(kRow.first) + E];
     const double s = slice.slack(entry.column);
     if constexpr (kProgram.IsOne(entry.node))
       slack += s;
     else
-      slack += std::abs(expansion.jacobian[static_cast<std::size_t>(kRow.first) + E]) * s;
+      slack += std::abs(expansion.jacobian[ToSize(kRow.first) + E]) * s;
   };
   [&]<std::size_t... E>(std::index_sequence<E...>) __attribute__((always_inline)) {
     (add(std::integral_constant<std::size_t, E>()), ...);
   }
-  (std::make_index_sequence<static_cast<std::size_t>(kRow.count)>());
+  (std::make_index_sequence<ToSize(kRow.count)>());
   return slack;
 }
 
 template <const Program& kProgram, std::size_t... K>
-FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
-                          ImageSums& sums, std::index_sequence<K...> rows) {
+FOREREACH_INLINE void MapAndSum(const Expansion& expansion, const StepError& error, const Zonotope& slice,
+                                Zonotope& next, ImageSums& sums, std::index_sequence<K...> rows) {
   next.Reset(slice.dim(), slice.num_generators());
   MapRows<kProgram>(expansion, slice, next, sums, rows);
   StoreAll({RowSlack<kProgram, K>(expansion, error, slice)...}, next.mutable_slacks());
 }
 
 template <const Program& kProgram>
-FOREREACH_AVX2 void MapAvx2(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
-                            ImageSums& sums) noexcept {
-  Map<kProgram>(expansion, error, slice, next, sums,
-                std::make_index_sequence<static_cast<std::size_t>(kProgram.states)>());
-}
-template <const Program& kProgram>
-FOREREACH_FLATTEN void MapBaseline(const Expansion& expansion, const StepError& error, const Zonotope& slice,
-                                   Zonotope& next, ImageSums& sums) noexcept {
-  Map<kProgram>(expansion, error, slice, next, sums,
-                std::make_index_sequence<static_cast<std::size_t>(kProgram.states)>());
+FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
+                          ImageSums& sums) {
+  MapAndSum<kProgram>(expansion, error, slice, next, sums, std::make_index_sequence<ToSize(kProgram.states)>());
 }
 
 }  // namespace internal
@@ -141,11 +135,8 @@ slice's slack: a bound, but for a relative 2^-44, on what this leaves out, for e
 for: |J' (G b + diag(s) b') - fl(J G) b| <= slack,   |b|_inf <= 1, |b'|_inf <= 1. The center of `next` is left alone. */
 template <const Program& kProgram>
 void MapGenerators(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
-                   ImageSums& sums) noexcept {
-  if (active_instruction_set == InstructionSet::kAvx2)
-    internal::MapAvx2<kProgram>(expansion, error, slice, next, sums);
-  else
-    internal::MapBaseline<kProgram>(expansion, error, slice, next, sums);
+                   ImageSums& sums, InstructionSet instructions = BestInstructionSet()) noexcept {
+  Dispatch<&internal::Map<kProgram>>(instructions, expansion, error, slice, next, sums);
 }
 
 }  // namespace forereach

@@ -23,7 +23,7 @@ Jet Composed(const Jet& a, const DerivativeRanges& f) {
   result.size = a.size;
   result.slope = Times(f.first, a.slope);
   const Interval bend = Times(f.second, a.slope);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(a.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(a.size); ++i) {
     result.gradient[i] = Times(f.first, a.gradient[i]);
     result.curvature[i] = Plus(Times(bend, a.gradient[i]), Times(f.first, a.curvature[i]));
   }
@@ -35,7 +35,7 @@ Jet Either(const Jet& a, const Jet& b, const Interval& value) {
   Jet result(value);
   result.size = std::max(a.size, b.size);
   result.slope = Join(a.slope, b.slope);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(result.size); ++i) {
     result.gradient[i] = Join(a.gradient[i], b.gradient[i]);
     result.curvature[i] = Interval::Entire();
   }
@@ -48,7 +48,7 @@ Jet operator+(const Jet& a, const Jet& b) {
   Jet result(a.value + b.value);
   result.size = std::max(a.size, b.size);
   result.slope = Plus(a.slope, b.slope);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(result.size); ++i) {
     result.gradient[i] = Plus(a.gradient[i], b.gradient[i]);
     result.curvature[i] = Plus(a.curvature[i], b.curvature[i]);
   }
@@ -59,7 +59,7 @@ Jet operator-(const Jet& a) {
   Jet result(-a.value);
   result.size = a.size;
   result.slope = -a.slope;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(a.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(a.size); ++i) {
     result.gradient[i] = -a.gradient[i];
     result.curvature[i] = -a.curvature[i];
   }
@@ -73,7 +73,7 @@ Jet operator*(const Jet& a, const Jet& b) {
   Jet result(Times(a.value, b.value));
   result.size = std::max(a.size, b.size);
   result.slope = Plus(Times(a.value, b.slope), Times(a.slope, b.value));
-  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(result.size); ++i) {
     result.gradient[i] = Plus(Times(a.value, b.gradient[i]), Times(a.gradient[i], b.value));
     result.curvature[i] = Plus(Plus(Times(a.value, b.curvature[i]), Times(a.curvature[i], b.value)),
                                Plus(Times(a.gradient[i], b.slope), Times(a.slope, b.gradient[i])));
@@ -86,7 +86,7 @@ Jet operator/(const Jet& a, const Jet& b) {
   Jet q(Over(a.value, b.value));
   q.size = std::max(a.size, b.size);
   q.slope = Over(Plus(a.slope, -Times(q.value, b.slope)), b.value);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(q.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(q.size); ++i) {
     q.gradient[i] = Over(Plus(a.gradient[i], -Times(q.value, b.gradient[i])), b.value);
     const Interval rest =
         Plus(Plus(Times(q.gradient[i], b.slope), Times(q.slope, b.gradient[i])), Times(q.value, b.curvature[i]));
@@ -150,7 +150,7 @@ Jet Softplus(const Jet& x, const Jet& temperature) {
   // d f_x and d f_t along the coordinate
   const Interval bend_x = Plus(Times(f.by_xx, x.slope), Times(f.by_xt, temperature.slope));
   const Interval bend_t = Plus(Times(f.by_xt, x.slope), Times(f.by_tt, temperature.slope));
-  for (std::size_t i = 0; i < static_cast<std::size_t>(result.size); ++i) {
+  for (std::size_t i = 0; i < ToSize(result.size); ++i) {
     const Interval &dx = x.gradient[i], &dt = temperature.gradient[i];
     result.gradient[i] = Plus(Times(f.by_x, dx), Times(f.by_temperature, dt));
     result.curvature[i] = Plus(Plus(Times(bend_x, dx), Times(bend_t, dt)),

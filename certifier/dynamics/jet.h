@@ -9,6 +9,7 @@ there, so `slope` cannot be expanded by the mean-value form. */
 #include <array>
 
 #include "certifier/numerics/interval.h"
+#include "certifier/numerics/size.h"
 
 namespace forereach {
 
@@ -29,7 +30,7 @@ struct Jet {
   [[nodiscard]] static Jet Argument(const Interval& range, int index, bool is_coordinate) {
     Jet jet(range);
     jet.slope = is_coordinate ? 1.0 : 0.0;
-    jet.gradient[static_cast<std::size_t>(index)] = 1.0;
+    jet.gradient[ToSize(index)] = 1.0;
     jet.size = index + 1;
     return jet;
   }

@@ -17,8 +17,7 @@ void NominalModel::Evaluate(std::span<const double> z, std::span<double> next) c
   std::ranges::copy(z, wide.begin());
   NodeValues<long double> values;
   forereach::Evaluate<long double>(program_, program_.at_point, parameters_, {wide.data(), z.size()}, values);
-  for (std::size_t k = 0; k < next.size(); ++k)
-    next[k] = static_cast<double>(values[static_cast<std::size_t>(program_.value[k])]);
+  for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(values[ToSize(program_.value[k])]);
 }
 
 void NominalModel::Linearize(std::span<const double> z, Linearization& out) const noexcept {
@@ -26,12 +25,11 @@ void NominalModel::Linearize(std::span<const double> z, Linearization& out) cons
   std::ranges::copy(z, point.begin());
   NodeValues<Interval> values;
   forereach::Evaluate<Interval>(program_, program_.at_point, parameters_, {point.data(), z.size()}, values);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(num_states()); ++k)
-    out.value[k] = values[static_cast<std::size_t>(program_.value[k])];
+  for (std::size_t k = 0; k < ToSize(num_states()); ++k) out.value[k] = values[ToSize(program_.value[k])];
   out.count = program_.num_first;
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program_.num_first); ++e) {
+  for (std::size_t e = 0; e < ToSize(program_.num_first); ++e) {
     const Program::First& entry = program_.jacobian[e];
-    out.entries[e] = {entry.row, entry.column, values[static_cast<std::size_t>(entry.node)]};
+    out.entries[e] = {entry.row, entry.column, values[ToSize(entry.node)]};
   }
 }
 
@@ -39,9 +37,9 @@ void NominalModel::EncloseHessian(std::span<const Interval> box, HessianEnclosur
   NodeValues<Interval> values;
   forereach::Evaluate<Interval>(program_, program_.over_box, parameters_, box, values);
   out.count = program_.num_second;
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program_.num_second); ++e) {
+  for (std::size_t e = 0; e < ToSize(program_.num_second); ++e) {
     const Program::Second& entry = program_.hessian[e];
-    out.entries[e] = {entry.output, entry.row, entry.column, values[static_cast<std::size_t>(entry.node)]};
+    out.entries[e] = {entry.output, entry.row, entry.column, values[ToSize(entry.node)]};
   }
 }
 

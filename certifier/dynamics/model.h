@@ -12,8 +12,10 @@ d_z = states + inputs entries. */
 #include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/program.h"
 #include "certifier/dynamics/rounding.h"
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/sets/linear_map.h"
 
 namespace forereach {
@@ -25,9 +27,7 @@ struct Linearization {
   std::array<MatrixEntry, Program::kMaxFirst> entries;
   int count = 0;
 
-  [[nodiscard]] std::span<const MatrixEntry> jacobian() const {
-    return {entries.data(), static_cast<std::size_t>(count)};
-  }
+  [[nodiscard]] std::span<const MatrixEntry> jacobian() const { return {entries.data(), ToSize(count)}; }
 };
 
 /** Enclosures of the Hessians of all f0_k over a box. The matrices are symmetric; only entries with row <= column are
@@ -80,17 +80,20 @@ class NominalModel {
   void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept;
 
   /** Sets value, Jacobian and Hessian ranges in plain arithmetic, for the certify step. rounding.h bounds the error.
-  @param z the center c of the box, d_z entries. @param box d_z intervals that contain c. */
-  virtual void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out) const noexcept = 0;
+  @param z the center c of the box, d_z entries. @param box d_z intervals that contain c.
+  @param instructions changes the computing time only, here and in the two functions below. */
+  virtual void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out,
+                      InstructionSet instructions = BestInstructionSet()) const noexcept = 0;
 
   /** Encloses the Taylor remainder of the expansion; see remainder.h. */
   virtual void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width,
-                                const PlainInterval* hessian, const double* error, Remainder& out) const noexcept = 0;
+                                const PlainInterval* hessian, const double* error, Remainder& out,
+                                InstructionSet instructions = BestInstructionSet()) const noexcept = 0;
 
   /** Sets the generators and the slack of `next` to the image of the slice under the expansion's Jacobian; see image.h.
    */
   virtual void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
-                   ImageSums& sums) const noexcept = 0;
+                   ImageSums& sums, InstructionSet instructions = BestInstructionSet()) const noexcept = 0;
 
  private:
   const Program& program_;

@@ -12,6 +12,7 @@ straight-line code. */
 #include <stdexcept>
 
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 
 namespace forereach {
 
@@ -65,7 +66,7 @@ struct Program {
   std::array<bool, kMaxOperations> at_point{}, over_box{};
   ///@}
 
-  [[nodiscard]] constexpr const Operation& node(int i) const { return nodes[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] constexpr const Operation& node(int i) const { return nodes[ToSize(i)]; }
   [[nodiscard]] constexpr bool IsOne(int i) const { return node(i).op == Op::kConstant && node(i).constant == 1; }
 
   /** The index of the node with this operation. It adds a node unless an equal one exists. */
@@ -73,7 +74,7 @@ struct Program {
     for (int i = 0; i < size; ++i)
       if (node(i) == wanted) return static_cast<short>(i);
     if (size == kMaxOperations) throw std::length_error("program: too many operations");
-    nodes[static_cast<std::size_t>(size)] = wanted;
+    nodes[ToSize(size)] = wanted;
     return static_cast<short>(size++);
   }
   constexpr short Constant(double value_of) { return Add({Op::kConstant, -1, -1, value_of}); }
@@ -195,27 +196,27 @@ class Differentiation {
 constexpr void MarkOperands(const Program& program, std::array<bool, Program::kMaxOperations>& needed) {
   for (int i = program.size - 1; i >= 0; --i) {
     const Operation& n = program.node(i);
-    if (!needed[static_cast<std::size_t>(i)] || n.op == Op::kVariable || n.op == Op::kParameter) continue;
-    if (n.a >= 0) needed[static_cast<std::size_t>(n.a)] = true;
+    if (!needed[ToSize(i)] || n.op == Op::kVariable || n.op == Op::kParameter) continue;
+    if (n.a >= 0) needed[ToSize(n.a)] = true;
     const bool has_second = n.op == Op::kAdd || n.op == Op::kSubtract || n.op == Op::kMultiply || n.op == Op::kDivide;
-    if (has_second) needed[static_cast<std::size_t>(n.b)] = true;
+    if (has_second) needed[ToSize(n.b)] = true;
   }
 }
 
 constexpr void MarkTrigonometryAtPoint(Program& program) {
   for (int i = 0; i < program.size; ++i) {
     const Operation& n = program.node(i);
-    const auto at = [&](int j) -> bool& { return program.at_point[static_cast<std::size_t>(j)]; };
-    if (program.over_box[static_cast<std::size_t>(i)]) {
+    const auto at = [&](int j) -> bool& { return program.at_point[ToSize(j)]; };
+    if (program.over_box[ToSize(i)]) {
       if (n.op == Op::kSin) at(i) = at(i + 1) = true;
       if (n.op == Op::kCos) at(i) = at(i - 1) = true;
       if (n.op == Op::kTan) at(i) = true;
     }
   }
   for (int i = 0; i < program.size; ++i)  // a tangent at a point is sine over cosine
-    if (program.node(i).op == Op::kTan && program.at_point[static_cast<std::size_t>(i)]) {
-      program.at_point[static_cast<std::size_t>(program.node(i).b)] = true;
-      program.at_point[static_cast<std::size_t>(program.node(i).b + 1)] = true;
+    if (program.node(i).op == Op::kTan && program.at_point[ToSize(i)]) {
+      program.at_point[ToSize(program.node(i).b)] = true;
+      program.at_point[ToSize(program.node(i).b + 1)] = true;
     }
 }
 
@@ -226,19 +227,16 @@ constexpr void Differentiate(Program& program) {
   internal::Differentiation d(program);
   for (short k = 0; k < program.states; ++k)
     for (short l = 0; l < program.variables; ++l) {
-      const short node = d.Of(program.value[static_cast<std::size_t>(k)], l);
+      const short node = d.Of(program.value[ToSize(k)], l);
       if (node < 0) continue;
-      program.jacobian[static_cast<std::size_t>(program.num_first++)] = {k, l, node};
+      program.jacobian[ToSize(program.num_first++)] = {k, l, node};
       for (short i = 0; i <= l; ++i)
         if (const short second = d.OfSlope(node, i); second >= 0)
-          program.hessian[static_cast<std::size_t>(program.num_second++)] = {k, i, l, second};
+          program.hessian[ToSize(program.num_second++)] = {k, i, l, second};
     }
-  for (int k = 0; k < program.states; ++k)
-    program.at_point[static_cast<std::size_t>(program.value[static_cast<std::size_t>(k)])] = true;
-  for (int e = 0; e < program.num_first; ++e)
-    program.at_point[static_cast<std::size_t>(program.jacobian[static_cast<std::size_t>(e)].node)] = true;
-  for (int e = 0; e < program.num_second; ++e)
-    program.over_box[static_cast<std::size_t>(program.hessian[static_cast<std::size_t>(e)].node)] = true;
+  for (int k = 0; k < program.states; ++k) program.at_point[ToSize(program.value[ToSize(k)])] = true;
+  for (int e = 0; e < program.num_first; ++e) program.at_point[ToSize(program.jacobian[ToSize(e)].node)] = true;
+  for (int e = 0; e < program.num_second; ++e) program.over_box[ToSize(program.hessian[ToSize(e)].node)] = true;
   internal::MarkOperands(program, program.over_box);
   internal::MarkTrigonometryAtPoint(program);
   internal::MarkOperands(program, program.at_point);
@@ -253,8 +251,7 @@ template <class Equations>
   std::array<Symbol, Equations::kStates + Equations::kInputs> z;
   std::array<Symbol, Equations::kStates> next;
   std::array<Symbol, Equations::kParameterNames.size()> parameters;
-  for (short l = 0; l < program.variables; ++l)
-    z[static_cast<std::size_t>(l)] = {&program, program.Add({Op::kVariable, l, -1})};
+  for (short l = 0; l < program.variables; ++l) z[ToSize(l)] = {&program, program.Add({Op::kVariable, l, -1})};
   for (std::size_t p = 0; p < parameters.size(); ++p)
     parameters[p] = {&program, program.Add({Op::kParameter, static_cast<short>(p), -1})};
   Equations::template Step<Symbol>(parameters, z, next);

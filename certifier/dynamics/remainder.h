@@ -10,7 +10,9 @@ all H in the interval Hessian over its hull. As straight-line code for a program
 #include "certifier/dynamics/expand.h"
 #include "certifier/dynamics/expansion.h"
 #include "certifier/numerics/directed.h"
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/numerics/lanes.h"
+#include "certifier/numerics/size.h"
 #include "certifier/sets/zonotope.h"
 
 FOREREACH_ARITHMETIC_BEGIN
@@ -44,10 +46,9 @@ struct RemainderTerms {
 
   constexpr explicit RemainderTerms(const Program& program) {
     for (int e = 0; e < program.num_second; ++e) {
-      const Program::Second& entry = program.hessian[static_cast<std::size_t>(e)];
+      const Program::Second& entry = program.hessian[ToSize(e)];
       if (entry.row >= program.states || entry.column >= program.states) continue;
-      single[num_single++] = {static_cast<std::size_t>(entry.output), static_cast<std::size_t>(entry.row),
-                              static_cast<std::size_t>(entry.column), static_cast<std::size_t>(e)};
+      single[num_single++] = {ToSize(entry.output), ToSize(entry.row), ToSize(entry.column), ToSize(e)};
     }
     for (std::size_t i = 0; i < num_single; ++i)
       if (const auto& [output, first, second, entry] = single[i]; first != second)
@@ -92,7 +93,7 @@ inline double Size(const PlainInterval& x) { return std::max(std::abs(x.lower), 
 template <const Program& kProgram>
 FOREREACH_INLINE void EncloseSizes(const double* half_width, const PlainInterval* hessian, const double* error,
                                    Remainder& out) {
-  constexpr auto kStates = static_cast<std::size_t>(kProgram.states);
+  constexpr auto kStates = ToSize(kProgram.states);
   double sums[kStates] = {};
   ForEachConstant<kRemainderTerms<kProgram>.num_single>([&](auto i) __attribute__((always_inline)) {
     constexpr RemainderTerms::Single kTerm = kRemainderTerms<kProgram>.single[i];
@@ -201,7 +202,7 @@ FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainIn
 template <const Program& kProgram>
 FOREREACH_INLINE void EncloseCentred(const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
                                      const double* error, Remainder& out) {
-  constexpr auto kStates = static_cast<std::size_t>(kProgram.states);
+  constexpr auto kStates = ToSize(kProgram.states);
   constexpr std::size_t kTerms = kRemainderTerms<kProgram>.num_joined;
   const ProductEnds<kProgram> products = EncloseProducts<kProgram>(slice, half_width);
   double lower[kStates] = {}, upper[kStates] = {}, rounding[kStates] = {};
@@ -227,21 +228,11 @@ FOREREACH_INLINE void EncloseCentred(const Zonotope& slice, const double* half_w
 template <const Program& kProgram>
 FOREREACH_INLINE void EncloseBy(Method method, const Zonotope& slice, const double* half_width,
                                 const PlainInterval* hessian, const double* error, Remainder& out) {
-  if (method == Method::kPaper)
-    EncloseSizes<kProgram>(half_width, hessian, error, out);
-  else
-    EncloseCentred<kProgram>(slice, half_width, hessian, error, out);
-}
-
-template <const Program& kProgram>
-FOREREACH_AVX2 void EncloseRemainderAvx2(Method method, const Zonotope& slice, const double* half_width,
-                                         const PlainInterval* hessian, const double* error, Remainder& out) {
-  EncloseBy<kProgram>(method, slice, half_width, hessian, error, out);
-}
-template <const Program& kProgram>
-FOREREACH_FLATTEN void EncloseRemainderBaseline(Method method, const Zonotope& slice, const double* half_width,
-                                                const PlainInterval* hessian, const double* error, Remainder& out) {
-  EncloseBy<kProgram>(method, slice, half_width, hessian, error, out);
+  switch (method) {
+    case Method::kPaper: return EncloseSizes<kProgram>(half_width, hessian, error, out);
+    case Method::kCentred: return EncloseCentred<kProgram>(slice, half_width, hessian, error, out);
+  }
+  out.half_width.fill(kInfinity);  // no method: no bound
 }
 
 }  // namespace internal
@@ -251,10 +242,9 @@ FOREREACH_FLATTEN void EncloseRemainderBaseline(Method method, const Zonotope& s
 Rounding is included. An entry that is not finite gives a half-width that is not. Cost O(second derivatives * m). */
 template <const Program& kProgram>
 void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
-                      const double* error, Remainder& out) noexcept {
-  const auto enclose = active_instruction_set == InstructionSet::kAvx2 ? internal::EncloseRemainderAvx2<kProgram>
-                                                                       : internal::EncloseRemainderBaseline<kProgram>;
-  enclose(method, slice, half_width, hessian, error, out);
+                      const double* error, Remainder& out,
+                      InstructionSet instructions = BestInstructionSet()) noexcept {
+  Dispatch<&internal::EncloseBy<kProgram>>(instructions, method, slice, half_width, hessian, error, out);
 }
 
 }  // namespace forereach

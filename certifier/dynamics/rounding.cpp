@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "certifier/dynamics/evaluate.h"
+#include "certifier/numerics/size.h"
 
 namespace forereach {
 namespace {
@@ -30,19 +31,19 @@ class Analysis {
     std::array<bool, Program::kMaxOperations> all;
     all.fill(true);
     Evaluate<Interval>(program, all, parameters, domain, range_);
-    for (int i = 0; i < program.size; ++i) error_[static_cast<std::size_t>(i)] = ErrorOf(program.node(i));
+    for (int i = 0; i < program.size; ++i) error_[ToSize(i)] = ErrorOf(program.node(i));
   }
 
-  [[nodiscard]] const Error& error(int node) const { return error_[static_cast<std::size_t>(node)]; }
+  [[nodiscard]] const Error& error(int node) const { return error_[ToSize(node)]; }
   /** The largest exact absolute value over the domain. */
-  [[nodiscard]] double Size(int node) const { return range_[static_cast<std::size_t>(node)].Magnitude(); }
+  [[nodiscard]] double Size(int node) const { return range_[ToSize(node)].Magnitude(); }
 
  private:
   [[nodiscard]] Error ErrorOf(const Operation& n) const {
     const double infinity = kInfinity;
     switch (n.op) {
       case Op::kVariable:  // the ends of a hull, center +- half-width, are rounded
-        return {0, Rounding(range_[static_cast<std::size_t>(n.a)].Magnitude())};
+        return {0, Rounding(range_[ToSize(n.a)].Magnitude())};
       case Op::kParameter:
       case Op::kConstant: return {};
       case Op::kNegate: return error(n.a);
@@ -70,7 +71,7 @@ class Analysis {
         return {AddUp(error(n.a).point, 0x1p-50), AddUp(AddUp(error(n.a).box, Rounding(4 * Size(n.a))), 0x1p-46)};
       }
       case Op::kTan: {
-        const double t = range_[static_cast<std::size_t>(&n - program_.nodes.data())].Magnitude();
+        const double t = range_[ToSize(&n - program_.nodes.data())].Magnitude();
         // The slope bounds the effect of the angle's error only if that error is small.
         if (!(Size(n.a) <= 0x1p20 && t < 0x1p10 && error(n.a).point <= 0x1p-30 && error(n.a).box <= 0x1p-30))
           return {infinity, infinity};
@@ -96,7 +97,7 @@ class Analysis {
 
   // |a~ / b~ - a / b| <= (a + |a / b| b) / |b~|, with the plain quotient made of two roundings.
   [[nodiscard]] double Quotient(int numerator, double a, int denominator, double b) const {
-    const Interval& divisor = range_[static_cast<std::size_t>(denominator)];
+    const Interval& divisor = range_[ToSize(denominator)];
     if (divisor.Contains(0)) return kInfinity;
     const double smallest = SubDown(std::min(std::abs(divisor.lower), std::abs(divisor.upper)), b);
     if (!(smallest > 0)) return kInfinity;
@@ -117,13 +118,13 @@ ExpansionError BoundExpansionError(const Program& program, std::span<const doubl
                                    std::span<const Interval> domain) {
   const Analysis analysis(program, parameters, domain);
   ExpansionError error;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(program.states); ++k)
+  for (std::size_t k = 0; k < ToSize(program.states); ++k)
     error.value[k] = FiniteOrInfinity(analysis.error(program.value[k]).point);
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
+  for (std::size_t e = 0; e < ToSize(program.num_first); ++e) {
     error.jacobian[e] = FiniteOrInfinity(analysis.error(program.jacobian[e].node).point);
     error.jacobian_size[e] = AddUp(analysis.Size(program.jacobian[e].node), error.jacobian[e]);
   }
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e)
+  for (std::size_t e = 0; e < ToSize(program.num_second); ++e)
     error.hessian[e] = FiniteOrInfinity(analysis.error(program.hessian[e].node).box);
   return error;
 }
@@ -135,25 +136,23 @@ StepError BoundStepError(const Program& program, const ExpansionError& error,
   std::array<int, kMaxStates> entries{};
   std::array<bool, kMaxStates> copies{};
   const auto is_state = [&](const Program::First& entry) { return entry.column < program.states; };
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
+  for (std::size_t e = 0; e < ToSize(program.num_first); ++e) {
     const Program::First& entry = program.jacobian[e];
     if (!is_state(entry)) continue;
-    const auto k = static_cast<std::size_t>(entry.row);
+    const auto k = ToSize(entry.row);
     copies[k] = entries[k]++ == 0 && program.IsOne(entry.node);
   }
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
+  for (std::size_t e = 0; e < ToSize(program.num_first); ++e) {
     const Program::First& entry = program.jacobian[e];
-    const auto k = static_cast<std::size_t>(entry.row);
+    const auto k = ToSize(entry.row);
     if (!is_state(entry) || copies[k]) continue;
     const double gamma = (2.0 * entries[k] + 2) * kUnitRoundoff;
     const double off = AddUp(error.jacobian[e], MulUp(gamma, error.jacobian_size[e]));
-    step.image[k] =
-        AddUp(AddUp(step.image[k], MulUp(off, half_width[static_cast<std::size_t>(entry.column)])), kUnderflow);
+    step.image[k] = AddUp(AddUp(step.image[k], MulUp(off, half_width[ToSize(entry.column)])), kUnderflow);
   }
-  for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_second); ++e) {
+  for (std::size_t e = 0; e < ToSize(program.num_second); ++e) {
     const Program::Second& entry = program.hessian[e];
-    const double product =
-        MulUp(half_width[static_cast<std::size_t>(entry.row)], half_width[static_cast<std::size_t>(entry.column)]);
+    const double product = MulUp(half_width[ToSize(entry.row)], half_width[ToSize(entry.column)]);
     step.remainder[e] = MulUp(1 + 0x1p-44, AddUp(MulUp(error.hessian[e], product), kUnderflow));
   }
   return step;

@@ -1,17 +1,19 @@
-/** Four doubles at a time, by the compiler's vectors: the same bits on every instruction set, since only +, -, *, /,
-max, abs and comparisons are used and sums are always taken in the same order.
+/** Lanes, four doubles at a time, and packs of eight: the same bits on every machine. Only +, -, *, /, max, min, |.|
+and comparisons are used, each lane by itself, and sums are always taken in the same order: what the instruction set
+(instruction_set.h) changes is the time.
 
-How a vector is passed by value depends on the instruction set of the two functions. A hot function is compiled for AVX2
-beside its baseline (simd.h), so a vector never enters or leaves a function that may not be inlined: functions and
-lambdas that take or return one are marked FOREREACH_INLINE, which also holds without optimisation, and one vector is
-seen as another by Bits and FromBits, where std::bit_cast would be a call. */
+How a vector is passed by value depends on the instruction set of the two functions. A vector of four therefore never
+enters or leaves a function that may not be inlined: functions and lambdas that take or return one are marked
+FOREREACH_INLINE, which also holds without optimisation, and one vector is seen as another by Bits and FromBits, where
+std::bit_cast would be a call. A pack is a class, and is passed in memory. */
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
-#include "certifier/numerics/simd.h"
+#include "certifier/numerics/compilation.h"
 
 FOREREACH_ARITHMETIC_BEGIN
 
@@ -124,8 +126,67 @@ FOREREACH_INLINE bool HoldsForFirst(std::size_t n, Test test) {
   return BitsOf(fails) == 0;
 }
 
-/** What the hot functions outside of classes run on: the best there is, unless a test chooses. */
-extern InstructionSet active_instruction_set;
+inline constexpr std::size_t kPackSize = 8;
+
+/** Eight doubles, in memory and in registers. */
+struct alignas(64) Pack {
+  Lanes low, high;
+
+  // As memory: one double is read or written, the others are left alone.
+  [[nodiscard]] double at(std::size_t lane) const { return reinterpret_cast<const double*>(this)[lane]; }
+  void set(std::size_t lane, double value) { reinterpret_cast<double*>(this)[lane] = value; }
+};
+
+/** One number in all eight, at half the registers. */
+struct Same {
+  Lanes all;
+  [[gnu::always_inline]] operator Pack() const { return {all, all}; }  // NOLINT: it is one
+};
+
+FOREREACH_INLINE Same Fill(double x) { return {AllLanes(x)}; }
+FOREREACH_INLINE Pack LoadPack(const Pack& p) { return {p.low, p.high}; }
+/** From any address of eight doubles. */
+FOREREACH_INLINE Pack LoadPack(const double* p) { return {LoadLanes(p), LoadLanes(p + kLaneCount)}; }
+
+/** The first `count` of eight doubles, zero behind them. @pre eight can be read. */
+FOREREACH_INLINE Pack LoadFirst(const double* p, std::size_t count) {
+  const auto n = static_cast<std::int64_t>(count);
+  const LaneMask all{n, n, n, n};
+  return {FromBits(Bits(LoadLanes(p)) & (LaneMask{0, 1, 2, 3} < all)),
+          FromBits(Bits(LoadLanes(p + kLaneCount)) & (LaneMask{4, 5, 6, 7} < all))};
+}
+
+FOREREACH_INLINE Pack operator+(const Pack& a, const Pack& b) { return {a.low + b.low, a.high + b.high}; }
+FOREREACH_INLINE Pack operator-(const Pack& a, const Pack& b) { return {a.low - b.low, a.high - b.high}; }
+FOREREACH_INLINE Pack operator*(const Pack& a, const Pack& b) { return {a.low * b.low, a.high * b.high}; }
+FOREREACH_INLINE Pack Abs(const Pack& a) { return {Abs(a.low), Abs(a.high)}; }
+FOREREACH_INLINE Pack Min(const Pack& a, const Pack& b) { return {Min(a.low, b.low), Min(a.high, b.high)}; }
+FOREREACH_INLINE Pack Max(const Pack& a, const Pack& b) { return {Max(a.low, b.low), Max(a.high, b.high)}; }
+FOREREACH_INLINE double Max(double a, double b) { return a > b ? a : b; }
+
+/** The largest of eight. */
+FOREREACH_INLINE double MaxLane(const Pack& a) {
+  const Lanes m = Max(a.low, a.high);
+  return Max(Max(m[0], m[2]), Max(m[1], m[3]));
+}
+
+/** The sum of eight, each added three times at most. */
+FOREREACH_INLINE double SumLanes(const Pack& a) { return Sum(a.low + a.high); }
+
+/** Puts the number of its lane into the last three bits of each, finite, double: an error of seven units in the last
+place at most, for which TaggedLane of the largest gives its lane. */
+FOREREACH_INLINE Pack TagLanes(const Pack& a) {
+  const LaneMask rest = ~LaneMask{7, 7, 7, 7};
+  return {FromBits((Bits(a.low) & rest) | LaneMask{0, 1, 2, 3}),
+          FromBits((Bits(a.high) & rest) | LaneMask{4, 5, 6, 7})};
+}
+FOREREACH_INLINE std::size_t TaggedLane(double value) { return std::bit_cast<std::uint64_t>(value) & 7; }
+
+/** a with the lanes that hold `value` set to `other`. */
+FOREREACH_INLINE Pack Replace(const Pack& a, double value, double other) {
+  const Lanes v = AllLanes(value), o = AllLanes(other);
+  return {a.low == v ? o : a.low, a.high == v ? o : a.high};
+}
 
 }  // namespace forereach
 

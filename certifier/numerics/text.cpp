@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach {
 namespace {
 
@@ -23,7 +25,7 @@ Decimal Exact(double x) {
       std::to_chars(text.data(), text.data() + text.size(), std::abs(x), std::chars_format::scientific, kAllDigits - 1)
           .ptr;
   const char* exponent = std::find(text.data(), text.data() + text.size(), 'e') + 1;
-  Decimal decimal{text[0] + std::string(text.data() + 2, static_cast<std::size_t>(exponent - text.data()) - 3), 0};
+  Decimal decimal{text[0] + std::string(text.data() + 2, ToSize(exponent - text.data()) - 3), 0};
   std::from_chars(exponent + (*exponent == '+'), end, decimal.point);
   ++decimal.point;
   return decimal;
@@ -55,15 +57,15 @@ std::string Written(const Decimal& decimal, int digits) {
     return kept.substr(0, 1) + (size > 1 ? "." + kept.substr(1) : "") + (point < 1 ? "e-" : "e+") +
            (exponent.size() < 2 ? "0" : "") + exponent;
   }
-  if (point <= 0) return "0." + std::string(static_cast<std::size_t>(-point), '0') + kept;
-  if (size <= point) return kept + std::string(static_cast<std::size_t>(point - size), '0');
-  return kept.substr(0, static_cast<std::size_t>(point)) + "." + kept.substr(static_cast<std::size_t>(point));
+  if (point <= 0) return "0." + std::string(ToSize(-point), '0') + kept;
+  if (size <= point) return kept + std::string(ToSize(point - size), '0');
+  return kept.substr(0, ToSize(point)) + "." + kept.substr(ToSize(point));
 }
 
 std::string Rounded(double x, int digits, bool up) {
   if (!std::isfinite(x) || x == 0) return ToText(x == 0 ? 0 : x);
   Decimal decimal = Exact(x);
-  Shorten(decimal, static_cast<std::size_t>(std::clamp(digits, 1, 700)), up == (x > 0));
+  Shorten(decimal, ToSize(std::clamp(digits, 1, 700)), up == (x > 0));
   return (x < 0 ? "-" : "") + Written(decimal, digits);
 }
 

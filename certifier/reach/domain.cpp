@@ -7,6 +7,7 @@
 #include <string>
 
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -34,8 +35,7 @@ double LargestValue(const Domain::Inequality& inequality, std::span<const Interv
 double LargestSquaredDistance(const Domain::Ball& ball, std::span<const Interval> box) {
   double largest = 0;
   for (std::size_t i = 0; i < ball.coordinates.size(); ++i) {
-    const double away =
-        box[static_cast<std::size_t>(ball.coordinates[i])].DistanceUpper(ball.center[static_cast<Eigen::Index>(i)]);
+    const double away = box[ToSize(ball.coordinates[i])].DistanceUpper(ball.center[static_cast<Eigen::Index>(i)]);
     largest = AddUp(largest, MulUp(away, away));
   }
   return largest;
@@ -94,8 +94,8 @@ bool Domain::Contains(std::span<const double> z) const noexcept {
 
 DomainTest::DomainTest(const Domain& domain)
     : domain_(domain),
-      num_states_(static_cast<std::size_t>(domain.state.dim())),
-      size_(num_states_ + static_cast<std::size_t>(domain.input.dim())),
+      num_states_(ToSize(domain.state.dim())),
+      size_(num_states_ + ToSize(domain.input.dim())),
       is_box_(domain.inequalities.empty() && domain.balls.empty()) {
   std::ranges::copy(domain.state.lower(), state_lower_.begin());
   std::ranges::copy(domain.state.upper(), state_upper_.begin());
@@ -118,7 +118,7 @@ bool DomainTest::MeetsConstraintsWell(const double* center, const double* half_w
   for (const auto& [coordinates, ball_center, radius] : domain_.balls) {
     double square = 0;
     for (std::size_t i = 0; i < coordinates.size(); ++i) {
-      const auto l = static_cast<std::size_t>(coordinates[i]);
+      const auto l = ToSize(coordinates[i]);
       const double middle = ball_center[static_cast<Eigen::Index>(i)];
       const double reach =
           std::abs(center[l] - middle) + half_width[l] + RoundingError(kMargin, std::abs(center[l]) + std::abs(middle));
@@ -144,7 +144,7 @@ DomainExit DomainTest::FindExitOf(const double* center, const double* half_width
 DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept {
   using Kind = DomainExit::Kind;
   for (int l = 0; l < static_cast<int>(box.size()); ++l) {
-    const Interval& z = box[static_cast<std::size_t>(l)];
+    const Interval& z = box[ToSize(l)];
     const double lower = BoxLower(domain, l), upper = BoxUpper(domain, l);
     if (!(lower <= z.lower)) return {Kind::kLower, l, z.lower, lower};
     if (!(z.upper <= upper)) return {Kind::kUpper, l, z.upper, upper};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "certifier/numerics/size.h"
 #include "certifier/residual/lipschitz_row.h"
 
 namespace forereach {
@@ -24,13 +25,17 @@ bool IsNegligible(const StepError& error) {
 }  // namespace
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
-                       int zonotope_order, Method method)
-    : model_(model), domain_(domain), residual_(residual), order_(zonotope_order), method_(method) {
+                       int zonotope_order, Method method, InstructionSet instructions)
+    : model_(model),
+      domain_(domain),
+      residual_(residual),
+      order_(zonotope_order),
+      method_(method),
+      instructions_(instructions) {
   const std::vector<Interval> box = domain.Ranges();
   // The hull of every slice that passes the domain check has at most half the domain's width.
   std::vector<double> half_width(box.size(), 0.0);
-  for (std::size_t l = 0; l < static_cast<std::size_t>(domain.state.dim()); ++l)
-    half_width[l] = box[l].HalfWidthUpper();
+  for (std::size_t l = 0; l < ToSize(domain.state.dim()); ++l) half_width[l] = box[l].HalfWidthUpper();
   error_ = BoundStepError(model.program(), BoundExpansionError(model.program(), model.parameters(), box), half_width);
   plain_ = IsNegligible(error_);
 }
@@ -49,11 +54,11 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
                                    Expansion& expansion, ExpansionError& error) const noexcept {
   Linearization nominal;
   model_.Linearize(center, nominal);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(model_.num_states()); ++k) {
+  for (std::size_t k = 0; k < ToSize(model_.num_states()); ++k) {
     expansion.value[k] = nominal.value[k].Middle();
     error.value[k] = nominal.value[k].DistanceUpper(expansion.value[k]);
   }
-  for (std::size_t e = 0; e < static_cast<std::size_t>(nominal.count); ++e) {
+  for (std::size_t e = 0; e < ToSize(nominal.count); ++e) {
     expansion.jacobian[e] = nominal.entries[e].value.Middle();
     error.jacobian[e] = nominal.entries[e].value.DistanceUpper(expansion.jacobian[e]);
     error.jacobian_size[e] = std::abs(expansion.jacobian[e]);
@@ -62,17 +67,11 @@ void Propagator::ExpandByIntervals(std::span<const double> center, std::span<con
   std::array<Interval, kMaxVariables> box;
   for (std::size_t l = 0; l < hull.size(); ++l) box[l] = Interval(NextDown(hull[l].lower), NextUp(hull[l].upper));
   model_.EncloseHessian({box.data(), hull.size()}, hessian);
-  for (std::size_t e = 0; e < static_cast<std::size_t>(hessian.count); ++e) {
+  for (std::size_t e = 0; e < ToSize(hessian.count); ++e) {
     const Interval& range = hessian.entries[e].second_derivative;
     expansion.hessian[e] = {range.lower, range.upper};
     error.hessian[e] = 0;
   }
-}
-
-StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
-                            double* next_half_width) const noexcept {
-  return active_instruction_set == InstructionSet::kAvx2 ? StepAvx2(slice, input, record, next, next_half_width)
-                                                         : StepBaseline(slice, input, record, next, next_half_width);
 }
 
 namespace {
@@ -83,7 +82,7 @@ struct Surroundings {
   std::array<PlainInterval, kMaxVariables> hull;
 
   FOREREACH_INLINE Surroundings(const Zonotope& slice, const double* half_width, std::span<const double> input) {
-    const auto n = static_cast<std::size_t>(slice.dim());
+    const auto n = ToSize(slice.dim());
     for (std::size_t k = 0; k < n; k += kLaneCount) {
       const Lanes c = LoadLanes(slice.centers() + k), r = LoadLanes(half_width + k), lower = c - r, upper = c + r;
       StoreLanes(c, &center[k]);
@@ -104,7 +103,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
                            double* next_half_width) noexcept {
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
   return HoldsForFirst(
-      static_cast<std::size_t>(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
+      ToSize(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
         const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
         const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
         const Lanes half = (upper - lower) * AllLanes(0.5);
@@ -131,22 +130,21 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
                                 ImageSums& sums) noexcept {
   const int n = slice.dim();
   for (int k = 0; k < n; ++k) {
-    const auto& slope = bounds.slope[static_cast<std::size_t>(k)];
+    const auto& slope = bounds.slope[ToSize(k)];
     double* row = next.mutable_row(k);
     double magnitude = 0, slack = next.slack(k), spread = 0;
     for (int j = 0; j < slice.num_generators(); ++j) {
       magnitude = AddUp(magnitude, std::abs(row[j]));
       for (int l = 0; l < n; ++l) {
-        const double part = slope[static_cast<std::size_t>(l)] * slice.generator(l, j);
+        const double part = slope[ToSize(l)] * slice.generator(l, j);
         magnitude = AddUp(magnitude, NextUp(std::abs(part)));
         row[j] += part;
       }
       spread += std::abs(row[j]);
     }
-    for (int l = 0; l < n; ++l)
-      slack = AddUp(slack, MulUp(std::abs(slope[static_cast<std::size_t>(l)]), slice.slack(l)));
+    for (int l = 0; l < n; ++l) slack = AddUp(slack, MulUp(std::abs(slope[ToSize(l)]), slice.slack(l)));
     next.mutable_slack(k) = AddUp(slack, PlainErrorUpper(magnitude, n + 2, n * slice.num_generators()));
-    sums.row[static_cast<std::size_t>(k)] = spread;
+    sums.row[ToSize(k)] = spread;
   }
   ScoreColumns(next, sums.scores);
 }
@@ -156,7 +154,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
                                     const double* next_half_width) noexcept {
   using Status = StepResult::Status;
   for (int k = 0; k < next.dim(); ++k) {
-    const auto i = static_cast<std::size_t>(k);
+    const auto i = ToSize(k);
     if (record.envelope.lower[i] > record.envelope.upper[i]) return {Status::kInconsistent, {}, k};
     if (!(std::abs(next.center(k)) + next_half_width[i] < kInfinity)) return {Status::kNoFiniteEnclosure, {}, k};
   }
@@ -171,14 +169,9 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
 
 }  // namespace
 
-FOREREACH_AVX2 StepResult Propagator::StepAvx2(const Zonotope& slice, std::span<const double> input, StepRecord& record,
-                                               Zonotope& next, double* next_half_width) const noexcept {
-  return StepInline(slice, input, record, next, next_half_width);
-}
-FOREREACH_FLATTEN StepResult Propagator::StepBaseline(const Zonotope& slice, std::span<const double> input,
-                                                      StepRecord& record, Zonotope& next,
-                                                      double* next_half_width) const noexcept {
-  return StepInline(slice, input, record, next, next_half_width);
+StepResult Propagator::Step(const Zonotope& slice, std::span<const double> input, StepRecord& record, Zonotope& next,
+                            double* next_half_width) const noexcept {
+  return Dispatch<&Propagator::StepInline>(instructions_, *this, slice, input, record, next, next_half_width);
 }
 
 StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
@@ -188,12 +181,12 @@ StepResult Propagator::StepInline(const Zonotope& slice, std::span<const double>
       exit.kind != DomainExit::Kind::kNone)
     return {StepResult::Status::kDomainExit, exit, -1};
   const Surroundings around(slice, half_width, input);
-  const std::size_t variables = static_cast<std::size_t>(slice.dim()) + input.size();
+  const std::size_t variables = ToSize(slice.dim()) + input.size();
   const std::span<const double> center(around.center.data(), variables);
   const std::span<const PlainInterval> hull(around.hull.data(), variables);
   if (!plain_) return StepByIntervals(slice, input, center, hull, record, next, next_half_width);
   Expansion expansion;
-  model_.Expand(center, hull, expansion);
+  model_.Expand(center, hull, expansion, instructions_);
   return Advance(slice, input, expansion, error_, record, next, next_half_width);
 }
 
@@ -212,10 +205,10 @@ StepResult Propagator::StepByIntervals(const Zonotope& slice, std::span<const do
 StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> input, const Expansion& expansion,
                                const StepError& error, StepRecord& record, Zonotope& next,
                                double* next_half_width) const noexcept {
-  const auto n = static_cast<std::size_t>(slice.dim());
+  const auto n = ToSize(slice.dim());
   const double* half_width = record.half_width.data();
   model_.EncloseRemainder(method_, slice, half_width, expansion.hessian.data(), error.remainder.data(),
-                          record.remainder);
+                          record.remainder, instructions_);
   const auto is_finite = [&](std::size_t k) __attribute__((always_inline)) {
     return Abs(LoadLanes(&record.remainder.half_width[k])) < AllLanes(kInfinity);
   };
@@ -224,12 +217,13 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   record.envelope.has_slope = false;
   residual_.Enclose({slice, input, {half_width, n}}, record.envelope);
   ImageSums sums;
-  model_.Map(expansion, error, slice, next, sums);
+  model_.Map(expansion, error, slice, next, sums, instructions_);
   if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
   std::array<double, kMaxStates> residual_half_width;
   if (!Join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
-  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), residual_half_width.data(), order_);
+  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), residual_half_width.data(), order_,
+                  instructions_);
   return {};
 }
 

@@ -2,10 +2,10 @@
 
     X_{t+1} = red < f0(c) + rho + mu, [(J + A) G, diag(q), diag(h)] > + [-s', s'],
 
-with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder over Box(Z_t), and mu, h and A the middle,
-half-width and slope of the residual's bounds. The slope is zero for the residual envelope, Eq. (set-envelope). The paper
-has rho = 0; docs/mathematics.md defines it. The slack s' contains |J + A| s of the previous slack and all rounding
-errors, including those of f0(c), J and (J + A) G. */
+with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder over Box(Z_t), and mu, h and A the
+middle, half-width and slope of the residual's bounds. The slope is zero for the residual envelope, Eq. (set-envelope).
+The paper has rho = 0; docs/mathematics.md defines it. The slack s' contains |J + A| s of the previous slack and all
+rounding errors, including those of f0(c), J and (J + A) G. */
 #pragma once
 
 #include <array>
@@ -14,6 +14,7 @@ errors, including those of f0(c), J and (J + A) G. */
 #include "certifier/dynamics/expansion.h"
 #include "certifier/dynamics/model.h"
 #include "certifier/dynamics/rounding.h"
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/reach/domain.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/sets/zonotope.h"
@@ -43,9 +44,10 @@ struct StepResult {
 class Propagator final {
  public:
   /** @param model, domain, residual must outlive this object. @param zonotope_order rho of Eq. (order-reduction): a
-  slice has at most zonotope_order * n generators after a step. @param method bounds the remainder. */
+  slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
+  @param instructions changes the computing time only. */
   Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual, int zonotope_order,
-             Method method);
+             Method method, InstructionSet instructions = BestInstructionSet());
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.
@@ -66,14 +68,10 @@ class Propagator final {
                                                           std::span<const double> center,
                                                           std::span<const PlainInterval> hull, StepRecord& record,
                                                           Zonotope& next, double* next_half_width) const noexcept;
-  // The step without model, envelope and reduction; compiled once for each instruction set.
+  // The step without model, envelope and reduction.
   [[nodiscard]] FOREREACH_INLINE StepResult StepInline(const Zonotope& slice, std::span<const double> input,
                                                        StepRecord& record, Zonotope& next,
                                                        double* next_half_width) const noexcept;
-  [[nodiscard]] StepResult StepAvx2(const Zonotope& slice, std::span<const double> input, StepRecord& record,
-                                    Zonotope& next, double* next_half_width) const noexcept;
-  [[nodiscard]] StepResult StepBaseline(const Zonotope& slice, std::span<const double> input, StepRecord& record,
-                                        Zonotope& next, double* next_half_width) const noexcept;
   [[nodiscard]] FOREREACH_INLINE StepResult Advance(const Zonotope& slice, std::span<const double> input,
                                                     const Expansion& expansion, const StepError& error,
                                                     StepRecord& record, Zonotope& next,
@@ -83,6 +81,7 @@ class Propagator final {
   const ResidualEnclosure& residual_;
   int order_;
   Method method_;
+  InstructionSet instructions_;
   StepError error_;
   bool plain_;
 };

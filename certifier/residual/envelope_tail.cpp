@@ -6,19 +6,17 @@
 
 namespace forereach {
 
-using simd::kLanes;
-
 EnvelopeTail::EnvelopeTail(const Declaration& declaration, const LipschitzEnvelope& envelope, int capacity)
     : envelope_(envelope), noise_bound_(declaration.noise_bound), capacity_(capacity) {
-  const auto entries = static_cast<std::size_t>(capacity), blocks = (entries + kLanes - 1) / kLanes;
+  const auto entries = ToSize(capacity), blocks = (entries + kPackSize - 1) / kPackSize;
   for (int k = 0; k < envelope.num_states(); ++k)
-    rows_.push_back({std::vector<simd::Pack>(blocks * (envelope.row(k).num_coordinates() + 2)),
-                     std::vector<double>(entries), std::vector<double>(entries)});
+    rows_.push_back({std::vector<Pack>(blocks * (envelope.row(k).num_coordinates() + 2)), std::vector<double>(entries),
+                     std::vector<double>(entries)});
 }
 
 bool EnvelopeTail::Covers(std::span<const double> lower, std::span<const double> upper) const {
   for (int k = 0; k < envelope_.num_states(); ++k) {
-    const auto i = static_cast<std::size_t>(k);
+    const auto i = ToSize(k);
     const double magnitude = AddUp(std::max(std::abs(lower[i]), std::abs(upper[i])), noise_bound_[k]);
     if (!envelope_.row(k).is_constant() && !(magnitude <= envelope_.value_limit(k))) return false;
   }
@@ -26,16 +24,16 @@ bool EnvelopeTail::Covers(std::span<const double> lower, std::span<const double>
 }
 
 void EnvelopeTail::Append(std::span<const double> z, std::span<const double> lower, std::span<const double> upper) {
-  const auto entry = static_cast<std::size_t>(size_.load(std::memory_order_relaxed)), lane = entry % kLanes;
+  const auto entry = ToSize(size_.load(std::memory_order_relaxed)), lane = entry % kPackSize;
   std::array<double, kMaxVariables> coordinates;
   for (int k = 0; k < envelope_.num_states(); ++k) {
     const LipschitzRow& distance = envelope_.row(k);
-    Row& row = rows_[static_cast<std::size_t>(k)];
-    const double floor = SubDown(lower[static_cast<std::size_t>(k)], noise_bound_[k]);
-    const double negated_ceiling = -AddUp(upper[static_cast<std::size_t>(k)], noise_bound_[k]);
+    Row& row = rows_[ToSize(k)];
+    const double floor = SubDown(lower[ToSize(k)], noise_bound_[k]);
+    const double negated_ceiling = -AddUp(upper[ToSize(k)], noise_bound_[k]);
     const std::size_t columns = distance.num_coordinates();
-    simd::Pack* block = row.blocks.data() + entry / kLanes * (columns + 2);
-    distance.Map([&](int l) { return z[static_cast<std::size_t>(l)]; }, coordinates.data());
+    Pack* block = row.blocks.data() + entry / kPackSize * (columns + 2);
+    distance.Map([&](int l) { return z[ToSize(l)]; }, coordinates.data());
     for (std::size_t c = 0; c < columns; ++c) block[c].set(lane, coordinates[c]);
     block[columns].set(lane, floor);
     block[columns + 1].set(lane, negated_ceiling);
@@ -47,12 +45,11 @@ void EnvelopeTail::Append(std::span<const double> z, std::span<const double> low
 }
 
 double EnvelopeTail::HighestFloor(int k, int count) const {
-  return count == 0 ? -kInfinity : rows_[static_cast<std::size_t>(k)].floors[static_cast<std::size_t>(count - 1)];
+  return count == 0 ? -kInfinity : rows_[ToSize(k)].floors[ToSize(count - 1)];
 }
 
 double EnvelopeTail::HighestNegatedCeiling(int k, int count) const {
-  return count == 0 ? -kInfinity
-                    : rows_[static_cast<std::size_t>(k)].negated_ceilings[static_cast<std::size_t>(count - 1)];
+  return count == 0 ? -kInfinity : rows_[ToSize(k)].negated_ceilings[ToSize(count - 1)];
 }
 
 }  // namespace forereach

@@ -9,7 +9,8 @@ before the size was, and nothing is ever written to them again. */
 #include <span>
 #include <vector>
 
-#include "certifier/numerics/simd.h"
+#include "certifier/numerics/lanes.h"
+#include "certifier/numerics/size.h"
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/lipschitz_envelope.h"
 
@@ -33,14 +34,14 @@ class EnvelopeTail final {
   void Append(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
   /** Blocks of row k, laid out as those of an ObservationIndex; the lanes behind the size are not to be read. */
-  [[nodiscard]] const simd::Pack* blocks(int k) const { return rows_[static_cast<std::size_t>(k)].blocks.data(); }
+  [[nodiscard]] const Pack* blocks(int k) const { return rows_[ToSize(k)].blocks.data(); }
   /** The highest floor and the highest negated ceiling of coordinate k over the first `count` entries. */
   [[nodiscard]] double HighestFloor(int k, int count) const;
   [[nodiscard]] double HighestNegatedCeiling(int k, int count) const;
 
  private:
   struct Row {
-    std::vector<simd::Pack> blocks;
+    std::vector<Pack> blocks;
     std::vector<double> floors, negated_ceilings;  // the highest of the first 1, 2, ... entries
   };
 

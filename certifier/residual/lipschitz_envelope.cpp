@@ -23,9 +23,9 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
     const ObservationIndex::Entries entries = EntriesOf(row.distance, declaration, observations, k);
     row.floor = std::ranges::max(entries.floors);
     row.negated_ceiling = -std::ranges::min(entries.ceilings);
-    uses_hull_distance_ |= row.distance.columns().size() > static_cast<std::size_t>(kMaxExactColumns);
-    constant_lower_[static_cast<std::size_t>(k)] = row.floor;
-    constant_upper_[static_cast<std::size_t>(k)] = -row.negated_ceiling;
+    uses_hull_distance_ |= row.distance.columns().size() > ToSize(kMaxExactColumns);
+    constant_lower_[ToSize(k)] = row.floor;
+    constant_upper_[ToSize(k)] = -row.negated_ceiling;
     if (row.distance.is_constant()) continue;
     active_.push_back(k);
     BoundErrors(row, entries, observations, domain_lower, domain_upper);
@@ -41,7 +41,7 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
   for (const double x : entries.floors) values = std::max(values, std::abs(x));
   for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
   for (const LipschitzRow::Column& column : row.distance.columns()) {
-    const auto l = static_cast<std::size_t>(column.variable);
+    const auto l = ToSize(column.variable);
     const double farthest = std::max({observations.z.col(column.variable).cwiseAbs().maxCoeff(),
                                       std::abs(domain_lower[l]), std::abs(domain_upper[l])});
     const double width = Interval(domain_lower[l], domain_upper[l]).HalfWidthUpper();
@@ -59,8 +59,6 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
 
 using internal::Budget;
 using internal::Sides;
-using simd::kLanes;
-using simd::Pack;
 
 struct LipschitzEnvelope::Search {
   const Row& row;
@@ -82,20 +80,20 @@ struct LipschitzEnvelope::Search {
   }
 
   static Sides Highest(const Sides& a, const Sides& b) {
-    return {simd::Max(a.floor, b.floor), simd::Max(a.negated_ceiling, b.negated_ceiling)};
+    return {Max(a.floor, b.floor), Max(a.negated_ceiling, b.negated_ceiling)};
   }
 
   // The last block may be written to while it is read: only the lanes that count are.
   template <class Metric>
   [[nodiscard]] Sides ScanTail(const Metric& metric) const {
-    const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kLanes,
-                      rest = tail_count % kLanes;
+    const std::size_t coordinates = row.distance.num_coordinates(), full = tail_count / kPackSize,
+                      rest = tail_count % kPackSize;
     Sides best{-kInfinity, -kInfinity};
     if (full > 0) best = ScanBlocks(metric, tail, full, coordinates, budget);
     if (rest == 0) return best;
     std::array<Pack, kMaxVariables + 2> last;
     for (std::size_t p = 0; p < coordinates + 2; ++p) {
-      last[p] = simd::Fill(p < coordinates ? 0 : -kInfinity);
+      last[p] = Fill(p < coordinates ? 0 : -kInfinity);
       for (std::size_t lane = 0; lane < rest; ++lane) last[p].set(lane, tail[full * (coordinates + 2) + p].at(lane));
     }
     return Highest(best, ScanBlocks(metric, last.data(), 1, coordinates, budget));
@@ -104,24 +102,18 @@ struct LipschitzEnvelope::Search {
   // The boxes of a tree say little in many coordinates, and an entry that is refined costs more than a block.
   template <class Metric>
   [[nodiscard]] std::size_t MaxFlatBlocks() const {
-    const auto most = static_cast<std::size_t>(options.max_flat_blocks);
+    const auto most = ToSize(options.max_flat_blocks);
     return Metric::kRefines ? std::min(4 * most, internal::kMaxRefinedBlocks) : most;
   }
 
   // One function for each metric and instruction set, so that each has the registers to itself.
   template <class Metric, class... More>
-  FOREREACH_FLATTEN [[gnu::noinline]] Sides RunBaseline(const QuerySet& set, const More&... more) const {
+  FOREREACH_INLINE Sides RunWith(const QuerySet& set, const More&... more) const {
     return Run(Metric(row.distance, set, more...));
   }
-  template <class Metric, class... More>
-  FOREREACH_AVX2 [[gnu::noinline]] Sides RunAvx2(const QuerySet& set, const More&... more) const {
-    return Run(Metric(row.distance, set, more...));
-  }
-
   template <class Metric, class... More>
   [[nodiscard]] Sides With(const QuerySet& set, const More&... more) const {
-    return options.instructions == InstructionSet::kAvx2 ? RunAvx2<Metric>(set, more...)
-                                                         : RunBaseline<Metric>(set, more...);
+    return Dispatch<&Search::RunWith<Metric, More...>>(options.instructions, *this, set, more...);
   }
 
   [[nodiscard]] Sides Best(const QuerySet& set) const {
@@ -130,7 +122,7 @@ struct LipschitzEnvelope::Search {
     if (columns == 1) return With<internal::PatternMetric<1>>(set, margin);
     if (columns == 2) return With<internal::PatternMetric<2>>(set, margin);
     if (columns == 3) return With<internal::PatternMetric<3>>(set, margin);
-    if (columns > static_cast<std::size_t>(kMaxExactColumns)) return With<internal::HullMetric>(set, margin);
+    if (columns > ToSize(kMaxExactColumns)) return With<internal::HullMetric>(set, margin);
     return With<internal::SignMetric>(set, margin, std::span<const double>(row.component_errors));
   }
 };
@@ -152,17 +144,17 @@ void LipschitzEnvelope::EncloseAll(const QuerySet& set, const EnvelopeTail* tail
   if (tail)
     for (int k = 0; k < num_states(); ++k) {
       if (!row(k).is_constant()) continue;
-      const auto i = static_cast<std::size_t>(k);
+      const auto i = ToSize(k);
       bounds.lower[i] = std::max(bounds.lower[i], tail->HighestFloor(k, count));
       bounds.upper[i] = std::min(bounds.upper[i], -tail->HighestNegatedCeiling(k, count));
     }
   for (const int k : active_) {
-    const auto i = static_cast<std::size_t>(k);
+    const auto i = ToSize(k);
     const Row& row = rows_[i];
     Budget budget{options_.max_leaf_visits, kPatternsPerLeaf * options_.max_leaf_visits};
     Sides best{-kInfinity, -kInfinity};
     if (std::isfinite(row.error))
-      best = Search{row, options_, budget, tail ? tail->blocks(k) : nullptr, static_cast<std::size_t>(count)}.Best(set);
+      best = Search{row, options_, budget, tail ? tail->blocks(k) : nullptr, ToSize(count)}.Best(set);
     bounds.lower[i] = best.floor - row.error;
     bounds.upper[i] = -(best.negated_ceiling - row.error);
     bounds.capped |= budget.capped;

@@ -19,7 +19,8 @@ Work. Any subset of the observations gives a sound envelope, so a search may sto
 #include <span>
 #include <vector>
 
-#include "certifier/numerics/simd.h"
+#include "certifier/numerics/instruction_set.h"
+#include "certifier/numerics/size.h"
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/residual/lipschitz_row.h"
@@ -65,14 +66,14 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   void Enclose(const QuerySet& set, const EnvelopeTail& tail, int count, ResidualBounds& bounds) const noexcept;
 
   [[nodiscard]] int num_states() const { return static_cast<int>(rows_.size()); }
-  [[nodiscard]] const LipschitzRow& row(int k) const { return rows_[static_cast<std::size_t>(k)].distance; }
+  [[nodiscard]] const LipschitzRow& row(int k) const { return rows_[ToSize(k)].distance; }
   /** Without entries for a constant row. */
-  [[nodiscard]] const ObservationIndex& index(int k) const { return rows_[static_cast<std::size_t>(k)].index; }
+  [[nodiscard]] const ObservationIndex& index(int k) const { return rows_[ToSize(k)].index; }
   /** The highest floor and the lowest ceiling of coordinate k over all observations. */
-  [[nodiscard]] double highest_floor(int k) const { return rows_[static_cast<std::size_t>(k)].floor; }
-  [[nodiscard]] double lowest_ceiling(int k) const { return -rows_[static_cast<std::size_t>(k)].negated_ceiling; }
+  [[nodiscard]] double highest_floor(int k) const { return rows_[ToSize(k)].floor; }
+  [[nodiscard]] double lowest_ceiling(int k) const { return -rows_[ToSize(k)].negated_ceiling; }
   /** The largest |floor| and |ceiling| for which E_k holds. */
-  [[nodiscard]] double value_limit(int k) const { return rows_[static_cast<std::size_t>(k)].value_limit; }
+  [[nodiscard]] double value_limit(int k) const { return rows_[ToSize(k)].value_limit; }
 
   [[nodiscard]] bool uses_hull_distance() const { return uses_hull_distance_; }
 

@@ -10,7 +10,8 @@ lipschitz_envelope.cpp only: every function is to be inlined into an entry point
 #include <bit>
 #include <span>
 
-#include "certifier/numerics/simd.h"
+#include "certifier/numerics/lanes.h"
+#include "certifier/numerics/size.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/residual/lipschitz_row.h"
 
@@ -19,12 +20,8 @@ lipschitz_envelope.cpp only: every function is to be inlined into an entry point
 
 namespace forereach::internal {
 
-using simd::kLanes;
-using simd::Pack;
-using simd::Same;
-
-inline constexpr std::size_t kMaxChunks = kMaxGenerators / kLanes;
-static_assert(kMaxGenerators % kLanes == 0, "the last eight of a row can be read");
+inline constexpr std::size_t kMaxChunks = kMaxGenerators / kPackSize;
+static_assert(kMaxGenerators % kPackSize == 0, "the last eight of a row can be read");
 alignas(64) inline constexpr std::array<double, kMaxGenerators> kNoGenerators{};
 
 /** One variable of Z_t = <c, G> + [-s, s] x {u}: an input has neither generators nor slack. */
@@ -35,9 +32,9 @@ struct Variable {
   Variable(const QuerySet& set, int l) {
     const int n = set.slice.dim();
     const bool is_state = l < n;
-    center = is_state ? set.slice.center(l) : set.input[static_cast<std::size_t>(l - n)];
+    center = is_state ? set.slice.center(l) : set.input[ToSize(l - n)];
     slack = is_state ? set.slice.slack(l) : 0;
-    half_width = is_state ? set.half_width[static_cast<std::size_t>(l)] : 0;
+    half_width = is_state ? set.half_width[ToSize(l)] : 0;
     generators = is_state ? set.slice.row(l).data() : kNoGenerators.data();
   }
 };
@@ -45,11 +42,11 @@ struct Variable {
 /** Eight generators of a row at a time; those after the last are zero. */
 class Chunks {
  public:
-  explicit Chunks(const Zonotope& slice) : generators_(static_cast<std::size_t>(slice.num_generators())) {}
-  [[nodiscard]] std::size_t size() const { return (generators_ + kLanes - 1) / kLanes; }
+  explicit Chunks(const Zonotope& slice) : generators_(ToSize(slice.num_generators())) {}
+  [[nodiscard]] std::size_t size() const { return (generators_ + kPackSize - 1) / kPackSize; }
   [[nodiscard]] Pack Get(const double* row, std::size_t chunk) const {
-    const std::size_t first = chunk * kLanes;
-    return first + kLanes <= generators_ ? simd::Load(row + first) : simd::LoadFirst(row + first, generators_ - first);
+    const std::size_t first = chunk * kPackSize;
+    return first + kPackSize <= generators_ ? LoadPack(row + first) : LoadFirst(row + first, generators_ - first);
   }
 
  private:
@@ -58,7 +55,7 @@ class Chunks {
 
 /** How far x is from each of eight intervals. */
 inline Pack Gap(const Pack& lowest, const Pack& highest, const Pack& x) {
-  return Max(Max(lowest - x, x - highest), simd::Fill(0));
+  return Max(Max(lowest - x, x - highest), Fill(0));
 }
 
 /** Rows with one to three columns: D_i = max_s (|A_s - alpha_is| + w_s), A_s = sum_l s_l L_kl c_l and
@@ -79,11 +76,11 @@ class PatternMetric {
       const Variable variable(set, column.variable);
       weighted[l] = column.slope * variable.center;
       slack += column.slope * variable.slack;
-      slope[l] = simd::Fill(column.slope);
+      slope[l] = Fill(column.slope);
       generators[l] = variable.generators;
     }
     std::array<Pack, kPatterns> spread;
-    spread.fill(simd::Fill(0));
+    spread.fill(Fill(0));
     const Chunks chunks(set.slice);
     for (std::size_t j = 0; j < chunks.size(); ++j) {
       std::array<Pack, kColumns> term;
@@ -94,29 +91,29 @@ class PatternMetric {
     double farthest = 0;
     for (std::size_t s = 0; s < kPatterns; ++s) {
       const double center = Signed(s, weighted), extra = SumLanes(spread[s]) + slack - common_;
-      center_[s] = simd::Fill(center);
-      extra_[s] = simd::Fill(extra);
-      from_below_[s] = simd::Fill(center - extra + margin);
-      from_above_[s] = simd::Fill(-center - extra + margin);
-      farthest = simd::Max(farthest, extra);
+      center_[s] = Fill(center);
+      extra_[s] = Fill(extra);
+      from_below_[s] = Fill(center - extra + margin);
+      from_above_[s] = Fill(-center - extra + margin);
+      farthest = Max(farthest, extra);
     }
-    anywhere_ = simd::Fill(margin - farthest);
+    anywhere_ = Fill(margin - farthest);
   }
 
   [[nodiscard]] double common() const { return common_; }
 
   [[nodiscard]] Pack Block(const Pack* block) const {
-    Pack distance = Abs(center_[0] - simd::Load(block[0]));
+    Pack distance = Abs(center_[0] - LoadPack(block[0]));
     for (std::size_t s = 1; s < kPatterns; ++s)
-      distance = Max(distance, Abs(center_[s] - simd::Load(block[s])) + extra_[s]);
+      distance = Max(distance, Abs(center_[s] - LoadPack(block[s])) + extra_[s]);
     return distance;
   }
 
   [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
     node += side * (2 * kPatterns + 1);
-    Pack bound = simd::Load(node[2 * kPatterns]) + anywhere_;
+    Pack bound = LoadPack(node[2 * kPatterns]) + anywhere_;
     for (std::size_t s = 0; s < kPatterns; ++s)
-      bound = Min(bound, Min(simd::Load(node[2 * s]) + from_below_[s], simd::Load(node[2 * s + 1]) + from_above_[s]));
+      bound = Min(bound, Min(LoadPack(node[2 * s]) + from_below_[s], LoadPack(node[2 * s + 1]) + from_above_[s]));
     return bound;
   }
 
@@ -143,7 +140,7 @@ class CenterDistance {
   CenterDistance(const LipschitzRow& row, const QuerySet& set) : columns_(row.columns().size()) {
     for (std::size_t l = 0; l < columns_; ++l) {
       const LipschitzRow::Column& column = row.columns()[l];
-      center_[l] = simd::Fill(column.slope * Variable(set, column.variable).center);
+      center_[l] = Fill(column.slope * Variable(set, column.variable).center);
     }
   }
 
@@ -154,16 +151,16 @@ class CenterDistance {
   }
 
   [[nodiscard]] Pack Block(const Pack* block) const {
-    Pack distance = Abs(center_[0] - simd::Load(block[0]));
-    for (std::size_t l = 1; l < columns_; ++l) distance = distance + Abs(center_[l] - simd::Load(block[l]));
+    Pack distance = Abs(center_[0] - LoadPack(block[0]));
+    for (std::size_t l = 1; l < columns_; ++l) distance = distance + Abs(center_[l] - LoadPack(block[l]));
     return distance;
   }
 
   /** v_i - d_i at most, but for rounding. */
   [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
-    Pack bound = simd::Load(node[side]);
+    Pack bound = LoadPack(node[side]);
     for (std::size_t l = 0; l < columns_; ++l)
-      bound = bound - Gap(simd::Load(node[2 + 2 * l]), simd::Load(node[3 + 2 * l]), center_[l]);
+      bound = bound - Gap(LoadPack(node[2 + 2 * l]), LoadPack(node[3 + 2 * l]), center_[l]);
     return bound;
   }
 
@@ -178,7 +175,7 @@ class HullMetric : public CenterDistance {
   static constexpr bool kRefines = false;
 
   HullMetric(const LipschitzRow& row, const QuerySet& set, double margin)
-      : CenterDistance(row, set), margin_(simd::Fill(margin)) {
+      : CenterDistance(row, set), margin_(Fill(margin)) {
     for (const LipschitzRow::Column& column : row.columns())
       common_ += column.slope * Variable(set, column.variable).half_width;
   }
@@ -211,9 +208,9 @@ class SignMetric : public CenterDistance {
       hull_ += reach_[l];
       slack_ += column.slope * variable.slack;
       for (std::size_t j = 0; j < chunks_; ++j)
-        weighted_[l][j] = simd::Fill(column.slope) * chunks.Get(variable.generators, j);
+        weighted_[l][j] = Fill(column.slope) * chunks.Get(variable.generators, j);
     }
-    least_ = simd::Fill(LeastSpread() + slack_ - margin);
+    least_ = Fill(LeastSpread() + slack_ - margin);
   }
 
   [[nodiscard]] double common() const { return 0; }
@@ -227,7 +224,7 @@ class SignMetric : public CenterDistance {
   [[nodiscard]] double Refine(const Pack* block, std::size_t lane, int& patterns, bool& capped) const {
     Signs signs;
     signs.sums[0] = 0;
-    for (std::size_t j = 0; j < chunks_; ++j) signs.along[0][j] = simd::Fill(0);
+    for (std::size_t j = 0; j < chunks_; ++j) signs.along[0][j] = Fill(0);
     std::size_t free = 0, fixed = 0;
     for (std::size_t l = 0; l < columns(); ++l) {
       const double component = Component(block, lane, l);
@@ -250,8 +247,8 @@ class SignMetric : public CenterDistance {
  private:
   // Depth t holds the sums over the fixed columns and the first t free ones, under the pattern being tried.
   struct Signs {
-    std::array<std::size_t, kMaxColumns> free;
-    std::array<double, kMaxColumns> components;
+    std::array<std::size_t, kMaxColumns> free{};
+    std::array<double, kMaxColumns> components{};
     std::array<double, kMaxColumns + 1> sums;
     std::array<std::array<Pack, kMaxChunks>, kMaxColumns + 1> along;
   };
@@ -259,7 +256,7 @@ class SignMetric : public CenterDistance {
   // Without a branch: signs are as good as random, and a product with one is exact.
   void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, double sign) const {
     signs.sums[to] = signs.sums[from] + sign * component;
-    const Same same = simd::Fill(sign);
+    const Same same = Fill(sign);
     for (std::size_t j = 0; j < chunks_; ++j) signs.along[to][j] = signs.along[from][j] + same * weighted_[l][j];
   }
 
@@ -267,27 +264,27 @@ class SignMetric : public CenterDistance {
   double Farthest(Signs& signs, std::size_t free) const {
     double farthest = 0;
     for (std::size_t pattern = 0; pattern < std::size_t{1} << free; ++pattern) {
-      const auto same = pattern == 0 ? 0 : free - 1 - static_cast<std::size_t>(std::countr_zero(pattern));
+      const auto same = pattern == 0 ? 0 : free - 1 - ToSize(std::countr_zero(pattern));
       for (std::size_t t = same; t < free; ++t)
         Extend(signs, t, t + 1, signs.free[t], signs.components[t], pattern >> (free - 1 - t) & 1 ? -1 : 1);
-      Pack spread = simd::Fill(0);
+      Pack spread = Fill(0);
       for (std::size_t j = 0; j < chunks_; ++j) spread = spread + Abs(signs.along[free][j]);
-      farthest = simd::Max(farthest, std::abs(signs.sums[free]) + (SumLanes(spread) + slack_));
+      farthest = Max(farthest, std::abs(signs.sums[free]) + (SumLanes(spread) + slack_));
     }
     return farthest;
   }
 
   // |sum_l s_l g_l| >= 2 max_l |g_l| - sum_l |g_l|, for each generator.
   double LeastSpread() const {
-    Pack least = simd::Fill(0);
+    Pack least = Fill(0);
     for (std::size_t j = 0; j < chunks_; ++j) {
-      Pack sum = simd::Fill(0), largest = simd::Fill(0);
+      Pack sum = Fill(0), largest = Fill(0);
       for (std::size_t l = 0; l < columns(); ++l) {
         const Pack term = Abs(weighted_[l][j]);
         sum = sum + term;
         largest = Max(largest, term);
       }
-      least = least + Max(largest + largest - sum, simd::Fill(0));
+      least = least + Max(largest + largest - sum, Fill(0));
     }
     return SumLanes(least);
   }

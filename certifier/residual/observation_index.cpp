@@ -6,14 +6,11 @@
 
 namespace forereach {
 
-using simd::kLanes;
-using simd::Pack;
-
 namespace {
 
 constexpr double kMinusInfinity = -std::numeric_limits<double>::infinity();
 constexpr double kNothing = -std::numeric_limits<double>::max();
-constexpr std::size_t kFanout = kLanes;
+constexpr std::size_t kFanout = kPackSize;
 
 }  // namespace
 
@@ -82,10 +79,10 @@ class ObservationIndex::Builder {
   void StoreBlocks() {
     const std::size_t blocks = index_.num_leaves() * kLeafBlocks, k = entries_.num_coordinates;
     index_.blocks_.assign(blocks * index_.block_packs(), Pack{});
-    index_.ids_.assign(blocks * kLanes, kNone);
-    for (std::size_t i = 0; i < blocks * kLanes; ++i) {
-      Pack* block = index_.blocks_.data() + i / kLanes * index_.block_packs();
-      const std::size_t lane = i % kLanes;
+    index_.ids_.assign(blocks * kPackSize, kNone);
+    for (std::size_t i = 0; i < blocks * kPackSize; ++i) {
+      Pack* block = index_.blocks_.data() + i / kPackSize * index_.block_packs();
+      const std::size_t lane = i % kPackSize;
       const bool used = i < count_;
       const std::uint32_t id = used ? keys_[i].id : kNone;
       index_.ids_[i] = id;
@@ -99,8 +96,8 @@ class ObservationIndex::Builder {
   void StoreLowestLevel() {
     StartLevel(index_.num_leaves());
     for (std::size_t i = 0; i < count_; ++i) {
-      const Pack* block = index_.block(i / kLanes);
-      const std::size_t k = entries_.num_coordinates, lane = i % kLanes, leaf = i / kLeafSize;
+      const Pack* block = index_.block(i / kPackSize);
+      const std::size_t k = entries_.num_coordinates, lane = i % kPackSize, leaf = i / kLeafSize;
       for (std::size_t side = 0; side < 2; ++side) Raise(leaf, MaxOf(side), block[k + side].at(lane));
       for (std::size_t c = 0; c < k; ++c) {
         const double alpha = block[c].at(lane);
@@ -123,13 +120,13 @@ class ObservationIndex::Builder {
     StartLevel(nodes);
     for (std::size_t i = 0; i < nodes; ++i)
       for (std::size_t p = 0; p < index_.node_packs(); ++p)
-        Raise(i, p, simd::MaxLane(index_.nodes_[(below + i) * index_.node_packs() + p]));
+        Raise(i, p, MaxLane(index_.nodes_[(below + i) * index_.node_packs() + p]));
   }
 
   void StartLevel(std::size_t children) {
     level_ = index_.nodes_.size() / index_.node_packs();
     index_.levels_.push_back(level_);
-    index_.nodes_.resize((level_ + (children + kFanout - 1) / kFanout) * index_.node_packs(), simd::Fill(kNothing));
+    index_.nodes_.resize((level_ + (children + kFanout - 1) / kFanout) * index_.node_packs(), Fill(kNothing));
   }
 
   // Child i of the level being stored has at least `value` in pack p.
@@ -148,7 +145,7 @@ class ObservationIndex::Builder {
   void TurnLowestOver() {
     if (index_.shape_ != Shape::kBoxed) return;
     for (std::size_t first = 0; first < index_.nodes_.size(); first += index_.node_packs())
-      for (std::size_t lane = 0; lane < kLanes; ++lane)
+      for (std::size_t lane = 0; lane < kPackSize; ++lane)
         for (std::size_t c = 0; c < entries_.num_coordinates; ++c) {
           Pack& lowest = index_.nodes_[first + 2 + 2 * c];
           Pack& highest = index_.nodes_[first + 3 + 2 * c];
@@ -172,7 +169,7 @@ ObservationIndex::ObservationIndex(const Entries& entries)
 
 ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
                                     const Observations& observations, int coordinate) {
-  const auto count = static_cast<std::size_t>(observations.size());
+  const auto count = ToSize(observations.size());
   const double sigma = declaration.noise_bound[coordinate];
   using Shape = ObservationIndex::Shape;
   ObservationIndex::Entries entries{row.has_patterns() ? Shape::kLifted : Shape::kBoxed,
@@ -182,7 +179,7 @@ ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& 
                                     {}};
   for (int i = 0; i < observations.size(); ++i) {
     row.Map([&](int l) { return observations.z(i, l); },
-            entries.coordinates.data() + static_cast<std::size_t>(i) * row.num_coordinates());
+            entries.coordinates.data() + ToSize(i) * row.num_coordinates());
     entries.floors.push_back(SubDown(observations.lower(i, coordinate), sigma));
     entries.ceilings.push_back(AddUp(observations.upper(i, coordinate), sigma));
   }

@@ -16,7 +16,8 @@ tree; set-up O(K N log N), half a second for 10^6 entries in two coordinates. */
 #include <span>
 #include <vector>
 
-#include "certifier/numerics/simd.h"
+#include "certifier/numerics/lanes.h"
+#include "certifier/numerics/size.h"
 #include "certifier/residual/lipschitz_row.h"
 #include "certifier/residual/observations.h"
 
@@ -28,7 +29,7 @@ class ObservationIndex final {
   /** Levels of nodes over 2^32 entries. */
   static constexpr int kMaxHeight = 10;
   static constexpr std::size_t kLeafBlocks = 4;
-  static constexpr std::size_t kLeafSize = kLeafBlocks * simd::kLanes;
+  static constexpr std::size_t kLeafSize = kLeafBlocks * kPackSize;
 
   enum class Shape { kLifted, kBoxed };
 
@@ -47,26 +48,26 @@ class ObservationIndex final {
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t num_coordinates() const { return num_coordinates_; }
   /** Blocks with an entry. */
-  [[nodiscard]] std::size_t num_blocks() const { return (size_ + simd::kLanes - 1) / simd::kLanes; }
+  [[nodiscard]] std::size_t num_blocks() const { return (size_ + kPackSize - 1) / kPackSize; }
   [[nodiscard]] std::size_t num_leaves() const { return (size_ + kLeafSize - 1) / kLeafSize; }
   /** Levels of nodes, at least one. The highest has one node. */
   [[nodiscard]] int height() const { return static_cast<int>(levels_.size()); }
 
   /** K packs of coordinates, then one of values for each side. A lane without an entry has the value minus infinity; so
   have the blocks that fill up the last leaf. */
-  [[nodiscard]] const simd::Pack* block(std::size_t b) const { return blocks_.data() + b * block_packs(); }
-  [[nodiscard]] const simd::Pack* leaf(std::size_t i) const { return block(i * kLeafBlocks); }
+  [[nodiscard]] const Pack* block(std::size_t b) const { return blocks_.data() + b * block_packs(); }
+  [[nodiscard]] const Pack* leaf(std::size_t i) const { return block(i * kLeafBlocks); }
   [[nodiscard]] std::size_t block_packs() const { return num_coordinates_ + 2; }
   /** Eight ids, kNone in a lane without an entry. */
-  [[nodiscard]] const std::uint32_t* ids(std::size_t b) const { return ids_.data() + b * simd::kLanes; }
+  [[nodiscard]] const std::uint32_t* ids(std::size_t b) const { return ids_.data() + b * kPackSize; }
 
   /** Node i of level 1..height(), its packs with a lane for each child. Its children are 8 i .. 8 i + 7 of the level
   below; below level 1 are the leaves.
   Lifted: for each side, max (v - alpha_c) and max (v + alpha_c) of each c, then max v. Boxed: max v of each side, then
   the lowest and the highest alpha_c of each c. A child that is not there has the largest negative double for every
   maximum. */
-  [[nodiscard]] const simd::Pack* node(int level, std::size_t i) const {
-    return nodes_.data() + (levels_[static_cast<std::size_t>(level - 1)] + i) * node_packs();
+  [[nodiscard]] const Pack* node(int level, std::size_t i) const {
+    return nodes_.data() + (levels_[ToSize(level - 1)] + i) * node_packs();
   }
   [[nodiscard]] std::size_t node_packs() const {
     return shape_ == Shape::kLifted ? 4 * num_coordinates_ + 2 : 2 * num_coordinates_ + 2;
@@ -78,7 +79,7 @@ class ObservationIndex final {
 
   Shape shape_ = Shape::kBoxed;
   std::size_t size_ = 0, num_coordinates_ = 0;
-  std::vector<simd::Pack> blocks_, nodes_;
+  std::vector<Pack> blocks_, nodes_;
   std::vector<std::uint32_t> ids_;
   std::vector<std::size_t> levels_;  // the first node of each level
 };

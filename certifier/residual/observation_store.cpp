@@ -5,13 +5,14 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "certifier/numerics/size.h"
 #include "certifier/residual/pairs.h"
 #include "certifier/residual/retention.h"
 
 namespace forereach {
 namespace {
 
-std::span<const double> View(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
+std::span<const double> View(const Eigen::VectorXd& x) { return {x.data(), ToSize(x.size())}; }
 
 void SetRow(Eigen::MatrixXd& matrix, int row, std::span<const double> values) {
   matrix.row(row) = Eigen::Map<const Eigen::RowVectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
@@ -62,11 +63,11 @@ struct ObservationStore::Generation {
         tail_observations{Eigen::MatrixXd(options.tail_capacity, observations.z.cols()),
                           Eigen::MatrixXd(options.tail_capacity, observations.num_states()),
                           Eigen::MatrixXd(options.tail_capacity, observations.num_states())},
-        tail_ids(static_cast<std::size_t>(options.tail_capacity)) {
+        tail_ids(ToSize(options.tail_capacity)) {
     for (int k = 0; k < envelope.num_states(); ++k) {
       double locations = 0;
       for (const LipschitzRow::Column& column : envelope.row(k).columns()) {
-        const auto l = static_cast<std::size_t>(column.variable);
+        const auto l = ToSize(column.variable);
         const double farthest = std::max(
             {observations.z.col(column.variable).cwiseAbs().maxCoeff(), std::abs(lower[l]), std::abs(upper[l])});
         locations = AddUp(locations, MulUp(column.slope, farthest));
@@ -92,7 +93,7 @@ struct ObservationStore::Generation {
 
   void Append(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper) {
     const int row = tail.size();
-    tail_ids[static_cast<std::size_t>(row)] = id;
+    tail_ids[ToSize(row)] = id;
     SetRow(tail_observations.z, row, z);
     SetRow(tail_observations.lower, row, lower);
     SetRow(tail_observations.upper, row, upper);
@@ -104,9 +105,7 @@ void ObservationStore::Snapshot::Enclose(const QuerySet& query, ResidualBounds& 
   generation_->envelope.Enclose(query, generation_->tail, tail_size_, bounds);
 }
 
-std::size_t ObservationStore::Snapshot::size() const {
-  return generation_->ids.size() + static_cast<std::size_t>(tail_size_);
-}
+std::size_t ObservationStore::Snapshot::size() const { return generation_->ids.size() + ToSize(tail_size_); }
 
 Observations ObservationStore::Snapshot::Contradiction() const {
   const Known all = generation_->All(tail_size_);
@@ -134,7 +133,7 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
     throw std::invalid_argument("observation store: max_observations must be at least 1");
   options_.envelope.value_headroom = kValueHeadroom;
   next_id_ = observations.size();
-  std::vector<int> ids(static_cast<std::size_t>(next_id_));
+  std::vector<int> ids(ToSize(next_id_));
   std::iota(ids.begin(), ids.end(), 0);
   // Where not all are kept, the contradiction has to be known before: Build then keeps all.
   const bool keeps_all = ids.size() <= options_.max_observations;
@@ -174,7 +173,7 @@ std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Known know
   if (known.ids.size() > options_.max_observations && !Violated()) {
     const std::vector<int> kept = MostUseful(declaration_, known.observations, options_.max_observations);
     known.observations = Select(known.observations, kept);
-    for (std::size_t i = 0; i < kept.size(); ++i) known.ids[i] = known.ids[static_cast<std::size_t>(kept[i])];
+    for (std::size_t i = 0; i < kept.size(); ++i) known.ids[i] = known.ids[ToSize(kept[i])];
     known.ids.resize(kept.size());
   }
   return std::make_shared<Generation>(declaration_, std::move(known.observations), std::move(known.ids), domain_lower_,
@@ -201,7 +200,7 @@ void ObservationStore::Compact() {
       fresh = Build(old->All(size));
       break;
     }
-    fresh->Append(old->tail_ids[static_cast<std::size_t>(i)], View(z), View(lower), View(upper));
+    fresh->Append(old->tail_ids[ToSize(i)], View(z), View(lower), View(upper));
   }
   Swap(std::move(fresh));
 }
@@ -233,14 +232,14 @@ class ObservationStore::Newcomer {
 
   // The index by its tree, the tail block by block.
   bool TestRow(int k) {
-    const double margin = generation_.margins[static_cast<std::size_t>(k)];
+    const double margin = generation_.margins[ToSize(k)];
     if (!std::isfinite(margin) || !generation_.tail.Covers(lower_, upper_)) return TestAll(k);
     const Point point = PointIn(k);
     const PairSearch search(generation_.envelope.index(k), margin, store_.options_.envelope.instructions);
     if (search.AnyPartner(point, [&](std::uint32_t j) { return TestIndexed(static_cast<int>(j), k); })) return true;
     std::vector<std::uint32_t> partners;
     PairSearch::Suspects(point, generation_.envelope.row(k), generation_.tail.blocks(k),
-                         static_cast<std::size_t>(generation_.tail.size()), margin, partners);
+                         ToSize(generation_.tail.size()), margin, partners);
     return std::ranges::any_of(partners, [&](std::uint32_t j) { return TestInTail(static_cast<int>(j), k); });
   }
 
@@ -262,18 +261,18 @@ class ObservationStore::Newcomer {
     SetRow(two.upper, 1, upper_);
     found_ = TestPair(store_.declaration_, two, 0, 1, k);
     if (!found_) return false;
-    found_->first = ids[static_cast<std::size_t>(j)];
+    found_->first = ids[ToSize(j)];
     found_->second = id_;
     return true;
   }
 
   using Point = PairSearch::Point;
   [[nodiscard]] Point PointIn(int k) const {
-    const auto i = static_cast<std::size_t>(k);
+    const auto i = ToSize(k);
     const double sigma = store_.declaration_.noise_bound[k];
     const LipschitzRow& row = generation_.envelope.row(k);
     Point point{std::vector<double>(row.num_coordinates()), SubDown(lower_[i], sigma), -AddUp(upper_[i], sigma)};
-    row.Map([&](int l) { return z_[static_cast<std::size_t>(l)]; }, point.coordinates.data());
+    row.Map([&](int l) { return z_[ToSize(l)]; }, point.coordinates.data());
     return point;
   }
 
@@ -331,7 +330,7 @@ bool ObservationStore::Remove(int id) {
   const auto tail_end = current_->tail_ids.begin() + current_->tail.size();
   const bool known = std::ranges::find(current_->ids, id) != current_->ids.end() ||
                      std::find(current_->tail_ids.begin(), tail_end, id) != tail_end;
-  if (!known || current_->ids.size() + static_cast<std::size_t>(current_->tail.size()) == 1) return false;
+  if (!known || current_->ids.size() + ToSize(current_->tail.size()) == 1) return false;
   Known others = current_->All(current_->tail.size());
   others.Remove(id);
   std::shared_ptr<Generation> fresh = Build(std::move(others));
@@ -339,8 +338,8 @@ bool ObservationStore::Remove(int id) {
   if (violation && (violation->first == id || violation->second == id)) {
     violation = FindViolation(declaration_, fresh->observations);
     if (violation) {
-      violation->first = fresh->ids[static_cast<std::size_t>(violation->first)];
-      violation->second = fresh->ids[static_cast<std::size_t>(violation->second)];
+      violation->first = fresh->ids[ToSize(violation->first)];
+      violation->second = fresh->ids[ToSize(violation->second)];
     }
   }
   const std::lock_guard lock(current_lock_);

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach {
 namespace {
 
@@ -27,10 +29,10 @@ Observations Observe(const NominalModel& model, const Transitions& transitions) 
   for (int i = 0; i < count; ++i) {
     const Eigen::VectorXd z = transitions.z.row(i);
     if (!z.allFinite() || !transitions.x_next.row(i).allFinite()) Refuse(i, "not finite");
-    model.Linearize({z.data(), static_cast<std::size_t>(z.size())}, nominal);
+    model.Linearize({z.data(), ToSize(z.size())}, nominal);
     for (int k = 0; k < n; ++k) {
       const double x_next = transitions.x_next(i, k), ulp = UlpOf(x_next);
-      const Interval residual = Interval(x_next) + Interval(-ulp, ulp) - nominal.value[static_cast<std::size_t>(k)];
+      const Interval residual = Interval(x_next) + Interval(-ulp, ulp) - nominal.value[ToSize(k)];
       if (!residual.IsFinite()) Refuse(i, "the nominal model has no finite value there");
       observations.lower(i, k) = residual.lower;
       observations.upper(i, k) = residual.upper;

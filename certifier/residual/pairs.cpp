@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <array>
 
+#include "certifier/numerics/size.h"
+
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace forereach {
 
-using simd::kLanes;
-using simd::Pack;
-
-// For the inside of the two entry points of each function, as search.h.
+// For the inside of Dispatch, as search.h.
 struct PairSearch::Kernel {
   const ObservationIndex& index;
   double margin;
@@ -23,20 +22,20 @@ struct PairSearch::Kernel {
       const std::size_t side = 2 * k + 1;
       return Max(OneWay(group, node + side), OneWay(group + side, node));
     }
-    Pack excess = Max(simd::Fill(group[0]) + simd::Load(node[1]), simd::Fill(group[1]) + simd::Load(node[0]));
+    Pack excess = Max(Fill(group[0]) + LoadPack(node[1]), Fill(group[1]) + LoadPack(node[0]));
     for (std::size_t c = 1; c <= k; ++c) {
-      const Pack before = simd::Load(node[2 * c]) - simd::Fill(group[2 * c + 1]);
-      const Pack behind = simd::Fill(group[2 * c]) - simd::Load(node[2 * c + 1]);
-      excess = excess - Max(Max(before, behind), simd::Fill(0));
+      const Pack before = LoadPack(node[2 * c]) - Fill(group[2 * c + 1]);
+      const Pack behind = Fill(group[2 * c]) - LoadPack(node[2 * c + 1]);
+      excess = excess - Max(Max(before, behind), Fill(0));
     }
     return excess;
   }
 
   Pack OneWay(const double* group, const Pack* node) const {
-    Pack most = simd::Fill(group[2 * k]) + simd::Load(node[2 * k]);
+    Pack most = Fill(group[2 * k]) + LoadPack(node[2 * k]);
     for (std::size_t c = 0; c < k; ++c)
-      most = Min(most, Min(simd::Fill(group[2 * c]) + simd::Load(node[2 * c + 1]),
-                           simd::Fill(group[2 * c + 1]) + simd::Load(node[2 * c])));
+      most = Min(most,
+                 Min(Fill(group[2 * c]) + LoadPack(node[2 * c + 1]), Fill(group[2 * c + 1]) + LoadPack(node[2 * c])));
     return most;
   }
 
@@ -50,14 +49,14 @@ struct PairSearch::Kernel {
 
   static Pack ExcessOf(const double* coordinates, double floor, double negated_ceiling, const Pack* block,
                        std::size_t k, bool lifted) {
-    return Max(simd::Fill(floor) + simd::Load(block[k + 1]), simd::Fill(negated_ceiling) + simd::Load(block[k])) -
+    return Max(Fill(floor) + LoadPack(block[k + 1]), Fill(negated_ceiling) + LoadPack(block[k])) -
            DistanceOf(coordinates, block, k, lifted);
   }
 
   static Pack DistanceOf(const double* coordinates, const Pack* block, std::size_t k, bool lifted) {
-    Pack distance = simd::Fill(0);
+    Pack distance = Fill(0);
     for (std::size_t c = 0; c < k; ++c) {
-      const Pack along = Abs(simd::Fill(coordinates[c]) - simd::Load(block[c]));
+      const Pack along = Abs(Fill(coordinates[c]) - LoadPack(block[c]));
       distance = lifted ? Max(distance, along) : distance + along;
     }
     return distance;
@@ -71,18 +70,18 @@ struct PairSearch::Kernel {
     };
     std::array<Level, ObservationIndex::kMaxHeight + 1> levels;
     const auto enter = [&](int level, std::size_t i) {
-      levels[static_cast<std::size_t>(level)] = {Excess(group, index.node(level, i)), i * kLanes, (i + 1) * kLanes};
+      levels[ToSize(level)] = {Excess(group, index.node(level, i)), i * kPackSize, (i + 1) * kPackSize};
     };
     const int top = index.height();
     enter(top, 0);
     for (int level = top; level <= top;) {
-      Level& at = levels[static_cast<std::size_t>(level)];
+      Level& at = levels[ToSize(level)];
       if (at.child == at.end) {
         ++level;
         continue;
       }
       const std::size_t child = at.child++, last_leaf = ((child + 1) << (3 * (level - 1))) - 1;
-      if (last_leaf < first || !(at.excess.at(child % kLanes) > -margin)) continue;
+      if (last_leaf < first || !(at.excess.at(child % kPackSize) > -margin)) continue;
       if (level > 1)
         enter(--level, child);
       else
@@ -100,12 +99,12 @@ struct PairSearch::Kernel {
       const Pack* block = index.block(own);
       const Pack excess = ToGroup(block, group);
       if (!(MaxLane(excess) > -margin)) continue;
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      for (std::size_t lane = 0; lane < kPackSize; ++lane) {
         if (!(excess.at(lane) > -margin)) continue;
         for (std::size_t c = 0; c < k; ++c) coordinates[c] = block[c].at(lane);
         const std::uint32_t id = index.ids(own)[lane];
         Partners(coordinates.data(), block[k].at(lane), block[k + 1].at(lane), other,
-                 leaf == other ? own * kLanes + lane + 1 : 0,
+                 leaf == other ? own * kPackSize + lane + 1 : 0,
                  [&](std::uint32_t partner) { pairs.emplace_back(id, partner); });
       }
     }
@@ -113,23 +112,21 @@ struct PairSearch::Kernel {
 
   // The most by which each entry of a block may exceed its distance to a group.
   Pack ToGroup(const Pack* block, const double* group) const {
-    const Pack floor = simd::Load(block[k]), ceiling = simd::Load(block[k + 1]);
+    const Pack floor = LoadPack(block[k]), ceiling = LoadPack(block[k + 1]);
     if (lifted) {
       const double* other = group + 2 * k + 1;
-      Pack up = floor + simd::Fill(other[2 * k]), down = ceiling + simd::Fill(group[2 * k]);
+      Pack up = floor + Fill(other[2 * k]), down = ceiling + Fill(group[2 * k]);
       for (std::size_t c = 0; c < k; ++c) {
-        const Pack alpha = simd::Load(block[c]);
-        up = Min(up, Min(floor - alpha + simd::Fill(other[2 * c + 1]), floor + alpha + simd::Fill(other[2 * c])));
-        down =
-            Min(down, Min(ceiling - alpha + simd::Fill(group[2 * c + 1]), ceiling + alpha + simd::Fill(group[2 * c])));
+        const Pack alpha = LoadPack(block[c]);
+        up = Min(up, Min(floor - alpha + Fill(other[2 * c + 1]), floor + alpha + Fill(other[2 * c])));
+        down = Min(down, Min(ceiling - alpha + Fill(group[2 * c + 1]), ceiling + alpha + Fill(group[2 * c])));
       }
       return Max(up, down);
     }
-    Pack excess = Max(floor + simd::Fill(group[1]), ceiling + simd::Fill(group[0]));
+    Pack excess = Max(floor + Fill(group[1]), ceiling + Fill(group[0]));
     for (std::size_t c = 0; c < k; ++c) {
-      const Pack alpha = simd::Load(block[c]);
-      excess =
-          excess - Max(Max(simd::Fill(group[2 * c + 2]) - alpha, alpha - simd::Fill(group[2 * c + 3])), simd::Fill(0));
+      const Pack alpha = LoadPack(block[c]);
+      excess = excess - Max(Max(Fill(group[2 * c + 2]) - alpha, alpha - Fill(group[2 * c + 3])), Fill(0));
     }
     return excess;
   }
@@ -139,11 +136,11 @@ struct PairSearch::Kernel {
   void Partners(const double* coordinates, double floor, double negated_ceiling, std::size_t leaf, std::size_t from,
                 const Take& take) const {
     for (std::size_t b = leaf * ObservationIndex::kLeafBlocks; b < (leaf + 1) * ObservationIndex::kLeafBlocks; ++b) {
-      if ((b + 1) * kLanes <= from) continue;
+      if ((b + 1) * kPackSize <= from) continue;
       const Pack excess = Excess(coordinates, floor, negated_ceiling, index.block(b));
       if (!(MaxLane(excess) > -margin)) continue;
-      for (std::size_t lane = 0; lane < kLanes; ++lane)
-        if (excess.at(lane) > -margin && b * kLanes + lane >= from) take(index.ids(b)[lane]);
+      for (std::size_t lane = 0; lane < kPackSize; ++lane)
+        if (excess.at(lane) > -margin && b * kPackSize + lane >= from) take(index.ids(b)[lane]);
     }
   }
 
@@ -157,29 +154,29 @@ struct PairSearch::Kernel {
     int level = top + 1;
     for (std::size_t child = 0;;) {
       if (level > 1) {
-        const auto at = static_cast<std::size_t>(--level);
-        bounds[at] = simd::TagLanes(Max(OneSide(group, index.node(level, child), side), simd::Fill(-kMaxDouble)));
-        first[at] = child * kLanes;
+        const auto at = ToSize(--level);
+        bounds[at] = TagLanes(Max(OneSide(group, index.node(level, child), side), Fill(-kMaxDouble)));
+        first[at] = child * kPackSize;
       } else {
         for (std::size_t b = child * ObservationIndex::kLeafBlocks; b < (child + 1) * ObservationIndex::kLeafBlocks;
              ++b)
           BestOther(point, own, b, side, self, best);
       }
       double next;
-      while (!((next = MaxLane(bounds[static_cast<std::size_t>(level)])) >= best.value) || next == -kMaxDouble)
+      while (!((next = MaxLane(bounds[ToSize(level)])) >= best.value) || next == -kMaxDouble)
         if (++level > top) return best;
-      const auto at = static_cast<std::size_t>(level);
+      const auto at = ToSize(level);
       bounds[at] = Replace(bounds[at], next, -kMaxDouble);
-      child = first[at] + simd::TaggedLane(next);
+      child = first[at] + TaggedLane(next);
     }
   }
 
   void BestOther(const Point& point, double own, std::size_t b, std::size_t side, std::uint32_t self,
                  Other& best) const {
     const Pack* block = index.block(b);
-    const Pack values = simd::Load(block[k + side]) - Distance(point.coordinates.data(), block);
+    const Pack values = LoadPack(block[k + side]) - Distance(point.coordinates.data(), block);
     if (!(MaxLane(values) > best.value)) return;
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    for (std::size_t lane = 0; lane < kPackSize; ++lane) {
       const std::uint32_t id = index.ids(b)[lane];
       const bool same = values.at(lane) == own && block[k + side].at(lane) == own && id > self;
       if (id != self && !same && values.at(lane) > best.value) best = {values.at(lane), id};
@@ -188,16 +185,16 @@ struct PairSearch::Kernel {
 
   // v_j - d at most, between a group with v = 0 and each child.
   Pack OneSide(const double* group, const Pack* node, std::size_t side) const {
-    if (lifted) return OneWay(group, node + side * (2 * k + 1)) + simd::Fill(margin);
-    Pack most = simd::Load(node[side]) + simd::Fill(margin);
+    if (lifted) return OneWay(group, node + side * (2 * k + 1)) + Fill(margin);
+    Pack most = LoadPack(node[side]) + Fill(margin);
     for (std::size_t c = 1; c <= k; ++c)
-      most = most - Max(Max(simd::Load(node[2 * c]) - simd::Fill(group[2 * c + 1]),
-                            simd::Fill(group[2 * c]) - simd::Load(node[2 * c + 1])),
-                        simd::Fill(0));
+      most = most -
+             Max(Max(LoadPack(node[2 * c]) - Fill(group[2 * c + 1]), Fill(group[2 * c]) - LoadPack(node[2 * c + 1])),
+                 Fill(0));
     return most;
   }
 
-  void Partners(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
+  void PartnersOf(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
     Partners(point.coordinates.data(), point.floor, point.negated_ceiling, leaf, 0,
              [&](std::uint32_t partner) { partners.push_back(partner); });
   }
@@ -206,59 +203,37 @@ struct PairSearch::Kernel {
                        double margin, std::vector<std::uint32_t>& partners) {
     const std::size_t k = row.num_coordinates();
     const bool lifted = row.has_patterns();
-    for (std::size_t first = 0; first < count; first += kLanes, blocks += k + 2) {
+    for (std::size_t first = 0; first < count; first += kPackSize, blocks += k + 2) {
       const Pack excess = ExcessOf(point.coordinates.data(), point.floor, point.negated_ceiling, blocks, k, lifted);
       if (!(MaxLane(excess) > -margin)) continue;
-      for (std::size_t lane = 0; lane < std::min(kLanes, count - first); ++lane)
+      for (std::size_t lane = 0; lane < std::min(kPackSize, count - first); ++lane)
         if (excess.at(lane) > -margin) partners.push_back(static_cast<std::uint32_t>(first + lane));
     }
-  }
-
-  FOREREACH_AVX2 static void PartnersAvx2(const Kernel& kernel, const Point& point, std::size_t leaf,
-                                          std::vector<std::uint32_t>& partners) {
-    kernel.Partners(point, leaf, partners);
-  }
-  FOREREACH_AVX2 static void InBlocksAvx2(const Point& point, const LipschitzRow& row, const Pack* blocks,
-                                          std::size_t count, double margin, std::vector<std::uint32_t>& partners) {
-    InBlocks(point, row, blocks, count, margin, partners);
-  }
-  FOREREACH_AVX2 static void LeavesAvx2(const Kernel& kernel, const double* group, std::size_t first,
-                                        std::vector<std::size_t>& leaves) {
-    kernel.Leaves(group, first, leaves);
-  }
-  FOREREACH_AVX2 static void SuspectsAvx2(const Kernel& kernel, std::size_t leaf, std::size_t other,
-                                          const double* group,
-                                          std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
-    kernel.Suspects(leaf, other, group, pairs);
   }
 };
 
 void PairSearch::Leaves(const std::vector<double>& group, std::size_t first, std::vector<std::size_t>& leaves) const {
   const Kernel kernel{index_, margin_};
-  if (instructions_ == InstructionSet::kAvx2) return Kernel::LeavesAvx2(kernel, group.data(), first, leaves);
-  kernel.Leaves(group.data(), first, leaves);
+  Dispatch<&Kernel::Leaves>(instructions_, kernel, group.data(), first, leaves);
 }
 
 void PairSearch::Suspects(std::size_t leaf, std::size_t other,
                           std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) const {
   const Kernel kernel{index_, margin_};
   const std::vector<double> group = GroupOf(other);
-  if (instructions_ == InstructionSet::kAvx2) return Kernel::SuspectsAvx2(kernel, leaf, other, group.data(), pairs);
-  kernel.Suspects(leaf, other, group.data(), pairs);
+  Dispatch<&Kernel::Suspects>(instructions_, kernel, leaf, other, group.data(), pairs);
 }
 
 void PairSearch::Suspects(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
   partners.clear();
   const Kernel kernel{index_, margin_};
-  if (instructions_ == InstructionSet::kAvx2) return Kernel::PartnersAvx2(kernel, point, leaf, partners);
-  kernel.Partners(point, leaf, partners);
+  Dispatch<&Kernel::PartnersOf>(instructions_, kernel, point, leaf, partners);
 }
 
-void PairSearch::Suspects(const Point& point, const LipschitzRow& row, const simd::Pack* blocks, std::size_t count,
+void PairSearch::Suspects(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
                           double margin, std::vector<std::uint32_t>& partners) {
   partners.clear();
-  const bool avx2 = BestInstructionSet() == InstructionSet::kAvx2;
-  (avx2 ? Kernel::InBlocksAvx2 : Kernel::InBlocks)(point, row, blocks, count, margin, partners);
+  Dispatch<&Kernel::InBlocks>(BestInstructionSet(), point, row, blocks, count, margin, partners);
 }
 
 PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, std::uint32_t self) const {
@@ -268,8 +243,8 @@ PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, st
 
 std::vector<double> PairSearch::GroupOf(std::size_t leaf) const {
   std::vector<double> group(index_.node_packs());
-  const Pack* node = index_.node(1, leaf / kLanes);
-  for (std::size_t p = 0; p < group.size(); ++p) group[p] = node[p].at(leaf % kLanes);
+  const Pack* node = index_.node(1, leaf / kPackSize);
+  for (std::size_t p = 0; p < group.size(); ++p) group[p] = node[p].at(leaf % kPackSize);
   return group;
 }
 
@@ -297,7 +272,7 @@ double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& ent
 }
 
 PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i) {
-  const auto at = static_cast<std::size_t>(i);
+  const auto at = ToSize(i);
   const double* coordinates = entries.coordinates.data() + at * entries.num_coordinates;
   return {{coordinates, coordinates + entries.num_coordinates}, entries.floors[at], -entries.ceilings[at]};
 }

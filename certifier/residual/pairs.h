@@ -9,6 +9,7 @@ leaves may hold a pair. */
 #include <utility>
 #include <vector>
 
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/residual/lipschitz_row.h"
 #include "certifier/residual/observation_index.h"
 
@@ -36,7 +37,7 @@ class PairSearch final {
   bool AnyPartner(const Point& point, const Test& test) const;
 
   /** Suspects of a point among the first `count` entries of blocks that lie in the order of their numbers. */
-  static void Suspects(const Point& point, const LipschitzRow& row, const simd::Pack* blocks, std::size_t count,
+  static void Suspects(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
                        double margin, std::vector<std::uint32_t>& partners);
 
   /** The entry other than `self` that says most about the point on one side: the largest v_j - d(point, j), v the floor

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "certifier/numerics/size.h"
 #include "certifier/residual/pairs.h"
 
 namespace forereach {
@@ -56,7 +57,7 @@ void TakeRow(Gains& gains, const Declaration& declaration, const Observations& o
   const PairSearch search(index, std::isfinite(margin) ? margin : 0);
   for (std::size_t b = 0; b < index.num_blocks();
        ++b)  // in the order of the index, whose neighbours need the same leaves
-    for (std::size_t lane = 0; lane < simd::kLanes; ++lane) {
+    for (std::size_t lane = 0; lane < kPackSize; ++lane) {
       const std::uint32_t id = index.ids(b)[lane];
       if (id == kNone) continue;
       const PairSearch::Point point = PointOf(entries, static_cast<int>(id));
@@ -69,7 +70,7 @@ void TakeRow(Gains& gains, const Declaration& declaration, const Observations& o
 }
 
 Gains GainsOf(const Declaration& declaration, const Observations& observations) {
-  const auto count = static_cast<std::size_t>(observations.size());
+  const auto count = ToSize(observations.size());
   Gains gains{std::vector<double>(count), std::vector<std::vector<std::uint32_t>>(count)};
   for (int k = 0; k < observations.num_states(); ++k) TakeRow(gains, declaration, observations, k);
   return gains;
@@ -105,11 +106,11 @@ Observations Select(const Observations& o, const std::vector<int>& indices) {
 }
 
 std::vector<int> MostUseful(const Declaration& declaration, const Observations& observations, std::size_t most) {
-  std::vector<int> kept(static_cast<std::size_t>(observations.size()));
+  std::vector<int> kept(ToSize(observations.size()));
   std::iota(kept.begin(), kept.end(), 0);
   while (kept.size() > most) {
     std::vector<int> again = OneRound(GainsOf(declaration, Select(observations, kept)), most);
-    for (int& i : again) i = kept[static_cast<std::size_t>(i)];
+    for (int& i : again) i = kept[ToSize(i)];
     kept = std::move(again);  // at least the first in the order went
   }
   return kept;

@@ -3,6 +3,7 @@ all blocks, or goes down the tree and leaves out what cannot beat the best so fa
 bit, in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metric.h. */
 #pragma once
 
+#include "certifier/numerics/size.h"
 #include "certifier/residual/metric.h"
 #include "certifier/residual/observation_index.h"
 
@@ -30,14 +31,14 @@ template <class Metric>
 double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best,
                    Budget& budget) {
   if constexpr (!Metric::kRefines) {
-    return simd::Max(best, MaxLane(optimistic));
+    return Max(best, MaxLane(optimistic));
   } else {
-    for (Pack left = TagLanes(Max(optimistic, simd::Fill(-kMaxDouble)));;) {
+    for (Pack left = TagLanes(Max(optimistic, Fill(-kMaxDouble)));;) {
       const double next = MaxLane(left);
       if (!(next > best)) return best;
-      const std::size_t lane = simd::TaggedLane(next);
+      const std::size_t lane = TaggedLane(next);
       left = Replace(left, next, -kMaxDouble);
-      best = simd::Max(best, values.at(lane) - metric.Refine(block, lane, budget.patterns, budget.capped));
+      best = Max(best, values.at(lane) - metric.Refine(block, lane, budget.patterns, budget.capped));
     }
   }
 }
@@ -45,11 +46,11 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
 /** All of `count` blocks in a row. */
 template <class Metric>
 Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget&) {
-  Pack floors = simd::Fill(-kInfinity), ceilings = simd::Fill(-kInfinity);
+  Pack floors = Fill(-kInfinity), ceilings = Fill(-kInfinity);
   for (const Pack* end = block + count * (coordinates + 2); block != end; block += coordinates + 2) {
     const Pack distance = metric.Block(block);
-    floors = Max(simd::Load(block[coordinates]) - distance, floors);
-    ceilings = Max(simd::Load(block[coordinates + 1]) - distance, ceilings);
+    floors = Max(LoadPack(block[coordinates]) - distance, floors);
+    ceilings = Max(LoadPack(block[coordinates + 1]) - distance, ceilings);
   }
   return {MaxLane(floors), MaxLane(ceilings)};
 }
@@ -66,10 +67,10 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
     const Pack* block = blocks + b * (coordinates + 2);
     const Pack distance = metric.Block(block);
     for (std::size_t side = 0; side < 2; ++side) {
-      optimistic[side][b] = simd::Load(block[coordinates + side]) - distance;
+      optimistic[side][b] = LoadPack(block[coordinates + side]) - distance;
       highest[side][b] = MaxLane(optimistic[side][b]);
       first[side] = highest[side][b] > top[side] ? b : first[side];
-      top[side] = simd::Max(highest[side][b], top[side]);
+      top[side] = Max(highest[side][b], top[side]);
     }
   }
   std::array<double, 2> best{-kInfinity, -kInfinity};
@@ -89,15 +90,15 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
 template <class Metric>
 double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best,
                   Budget& budget) {
-  Pack highest = simd::Fill(-kInfinity);
+  Pack highest = Fill(-kInfinity);
   for (std::size_t b = 0; b < ObservationIndex::kLeafBlocks; ++b, block += coordinates + 2) {
-    const Pack values = simd::Load(block[coordinates + side]), optimistic = values - metric.Block(block);
+    const Pack values = LoadPack(block[coordinates + side]), optimistic = values - metric.Block(block);
     if constexpr (Metric::kRefines)
       best = BestOfBlock(metric, block, values, optimistic, best, budget);
     else
       highest = Max(optimistic, highest);
   }
-  return simd::Max(best, MaxLane(highest));
+  return Max(best, MaxLane(highest));
 }
 
 /** One side of an index, depth first, the most promising child first. In steps, so that two descents share the time
@@ -113,21 +114,21 @@ class Descent {
   when nothing is left to see, or nothing may be. */
   bool Step(Budget& budget) {
     if (level_ > 1) {
-      Level& at = levels_[static_cast<std::size_t>(--level_)];
+      Level& at = levels_[ToSize(--level_)];
       at.bounds = TagLanes(metric_.Node(index_.node(level_, child_), side_));
-      at.first_child = child_ * kLanes;
+      at.first_child = child_ * kPackSize;
     } else {
       best_ = BestOfLeaf(metric_, index_.leaf(child_), index_.num_coordinates(), side_, best_, budget);
       --leaves_;
     }
     double next;
-    while (!((next = MaxLane(levels_[static_cast<std::size_t>(level_)].bounds)) > best_))
+    while (!((next = MaxLane(levels_[ToSize(level_)].bounds)) > best_))
       if (++level_ > index_.height()) return false;
     budget.capped |= leaves_ == 0;
     if (leaves_ == 0) return false;
-    Level& at = levels_[static_cast<std::size_t>(level_)];
+    Level& at = levels_[ToSize(level_)];
     at.bounds = Replace(at.bounds, next, -kMaxDouble);
-    child_ = at.first_child + simd::TaggedLane(next);
+    child_ = at.first_child + TaggedLane(next);
     Prefetch();
     return true;
   }

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach {
 
 Projection::Projection(const Eigen::MatrixXd& matrix, int num_states) : dim_(static_cast<int>(matrix.rows())) {
@@ -22,13 +24,13 @@ Hull Projection::EncloseHull(const Zonotope& slice, std::span<const double> half
   Hull hull{};
   std::array<double, kMaxSafetyDim> size{};
   for (const MatrixEntry& entry : entries_) {
-    const auto k = static_cast<std::size_t>(entry.row), l = static_cast<std::size_t>(entry.column);
+    const auto k = ToSize(entry.row), l = ToSize(entry.column);
     const double weight = entry.value.lower, middle = weight * slice.center(entry.column);
     hull.center[k] += middle;
     hull.half_width[k] += std::abs(weight) * half_width[l];
     size[k] += std::abs(middle) + std::abs(weight) * half_width[l];
   }
-  for (std::size_t k = 0; k < static_cast<std::size_t>(dim_); ++k)
+  for (std::size_t k = 0; k < ToSize(dim_); ++k)
     hull.half_width[k] += RoundingError(kMargin, size[k]) + std::numeric_limits<double>::min();
   return hull;
 }

@@ -6,6 +6,8 @@
 
 #include <Eigen/Geometry>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach {
 namespace {
 
@@ -14,7 +16,7 @@ using Vector = Eigen::Vector3d;  // unused coordinates are zero
 // The dual bound along a direction of unit length up to rounding, in plain arithmetic less a margin above its rounding.
 double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
   constexpr double kMargin = 0x1p-45, kTiny = 0x1p-1000;
-  const auto p = static_cast<std::size_t>(slice.dim());
+  const auto p = ToSize(slice.dim());
   double core = kInfinity, size = kTiny;
   for (const Vector& point : obstacle.hull()) core = std::min(core, d.dot(point));
   alignas(32) std::array<double, kMaxGenerators> along;
@@ -44,7 +46,7 @@ double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const
 
 // The dual bound along d, rounded against us.
 [[gnu::noinline]] double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
-  const auto p = static_cast<std::size_t>(slice.dim());
+  const auto p = ToSize(slice.dim());
   double core = kInfinity;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     core = obstacle.offset();
@@ -140,7 +142,7 @@ class Search {
       const std::span<const double> row = slice_.row(k);
       for (std::size_t j = 0; j < row.size(); ++j) along[j] += d[k] * row[j];
     }
-    for (std::size_t j = 0; j < static_cast<std::size_t>(slice_.num_generators()); ++j) value -= std::abs(along[j]);
+    for (std::size_t j = 0; j < ToSize(slice_.num_generators()); ++j) value -= std::abs(along[j]);
     Keep(d, value);
   }
 
@@ -237,7 +239,7 @@ Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
 
 Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
   constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
-  const auto p = static_cast<std::size_t>(obstacle.dim());
+  const auto p = ToSize(obstacle.dim());
   double square = 0;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     const Eigen::VectorXd& normal = obstacle.points()[0];
@@ -273,18 +275,10 @@ FOREREACH_INLINE Separation SeparateInline(const Zonotope& slice, const Obstacle
   return {DistanceLower(slice, obstacle, direction), obstacle.radius()};
 }
 
-FOREREACH_AVX2 Separation SeparateAvx2(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  return SeparateInline(slice, obstacle);
-}
-FOREREACH_FLATTEN Separation SeparateBaseline(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  return SeparateInline(slice, obstacle);
-}
-
 }  // namespace
 
-Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  return active_instruction_set == InstructionSet::kAvx2 ? SeparateAvx2(slice, obstacle)
-                                                         : SeparateBaseline(slice, obstacle);
+Separation Separate(const Zonotope& slice, const Obstacle& obstacle, InstructionSet instructions) noexcept {
+  return Dispatch<&SeparateInline>(instructions, slice, obstacle);
 }
 
 }  // namespace forereach

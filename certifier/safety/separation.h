@@ -9,6 +9,7 @@ the reported distance is valid for every d. The paper's test R_t < m_t, Eq. (saf
 
 #include <array>
 
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/sets/zonotope.h"
 
@@ -38,7 +39,8 @@ struct Hull {
 rounding. For p = 3 the search tries the normals of faces and of pairs of edges, and so proves every separation that
 exists, up to rounding. Cost for m generators: for p <= 2, O(m) if a few directions suffice and O(m^2) if these prove
 nothing; for p = 3, O(m^3).
-@pre slice.dim() == obstacle.dim() */
-[[nodiscard]] Separation Separate(const Zonotope& slice, const Obstacle& obstacle) noexcept;
+@param instructions changes the computing time only. @pre slice.dim() == obstacle.dim() */
+[[nodiscard]] Separation Separate(const Zonotope& slice, const Obstacle& obstacle,
+                                  InstructionSet instructions = BestInstructionSet()) noexcept;
 
 }  // namespace forereach

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach {
 
 namespace {
@@ -10,7 +12,7 @@ namespace {
 // Sets the generators of `image` to fl(mid(M) G) and raises error[k] by a bound on what this leaves out.
 void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
                    int rows, Zonotope& image, std::span<double> error) noexcept {
-  const auto m = static_cast<std::size_t>(set.num_generators());
+  const auto m = ToSize(set.num_generators());
   image.Reset(rows, set.num_generators());
   for (int k = 0; k < rows; ++k) std::fill_n(image.mutable_row(k), image.padded_size(), 0.0);
 
@@ -19,8 +21,8 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
   std::array<bool, kMaxStates> copies{};
   for (const MatrixEntry& entry : matrix) {
     if (entry.column >= set.dim()) continue;
-    const auto k = static_cast<std::size_t>(entry.row);
-    const double half_width = half_widths[static_cast<std::size_t>(entry.column)], weight = entry.value.Middle();
+    const auto k = ToSize(entry.row);
+    const double half_width = half_widths[ToSize(entry.column)], weight = entry.value.Middle();
     const std::span<const double> from = set.row(entry.column);
     double* to = image.mutable_row(entry.row);
     for (std::size_t j = 0; j < m; ++j) to[j] += weight * from[j];
@@ -30,7 +32,7 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
     magnitude[k] = AddUp(magnitude[k], MulUp(std::abs(weight), half_width));
     copies[k] = terms[k]++ == 0 && std::abs(weight) == 1;
   }
-  for (std::size_t k = 0; k < static_cast<std::size_t>(rows); ++k) {
+  for (std::size_t k = 0; k < ToSize(rows); ++k) {
     if (copies[k] || magnitude[k] == 0) continue;
     const double underflow = static_cast<double>(m) * terms[k] * std::numeric_limits<double>::denorm_min();
     error[k] = AddUp(error[k], AddUp(DotErrorUpper(magnitude[k], terms[k]), underflow));
@@ -46,12 +48,11 @@ void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set
 
   std::array<Interval, kMaxStates> center;
   center.fill(Interval(0));
-  for (const MatrixEntry& entry : matrix)
-    center[static_cast<std::size_t>(entry.row)] += entry.value * Interval(set.center(entry.column));
+  for (const MatrixEntry& entry : matrix) center[ToSize(entry.row)] += entry.value * Interval(set.center(entry.column));
   for (int k = 0; k < rows; ++k) {
-    const Interval& value = center[static_cast<std::size_t>(k)];
+    const Interval& value = center[ToSize(k)];
     image.mutable_center(k) = value.Middle();
-    image.mutable_slack(k) = AddUp(error[static_cast<std::size_t>(k)], value.DistanceUpper(image.center(k)));
+    image.mutable_slack(k) = AddUp(error[ToSize(k)], value.DistanceUpper(image.center(k)));
   }
 }
 

@@ -93,7 +93,7 @@ double Zonotope::SupportUpper(std::span<const double> direction) const noexcept 
   double magnitude = 0, slack_along = 0;
   alignas(32) std::array<double, kMaxGenerators> along{};
   for (int k = 0; k < dim_; ++k) {
-    const double d = direction[static_cast<std::size_t>(k)];
+    const double d = direction[ToSize(k)];
     if (d == 0) continue;
     value += Interval(d) * Interval(center(k));
     magnitude = AddUp(magnitude, MulUp(std::abs(d), HalfWidthUpper(k)));
@@ -135,7 +135,7 @@ void ScoreColumns(const Zonotope& set, ColumnScores& scores) noexcept {
     }
     writer.Add(j, sum, largest);
   }
-  writer.Finish(static_cast<std::size_t>(set.num_generators()));
+  writer.Finish(ToSize(set.num_generators()));
 }
 
 namespace {
@@ -226,7 +226,7 @@ FOREREACH_INLINE void DropFromRows(Zonotope& set, std::size_t k, const double* s
       sums[i] += FromBits(Bits(four) & absolute);
       StoreLanes(packing(four), row + to);
     }
-    to += kLaneCount - static_cast<std::size_t>(std::popcount(bits));
+    to += kLaneCount - ToSize(std::popcount(bits));
   }
   for (std::size_t i = 0; i < kRows; i += kLaneCount) {
     const Lanes sum = SumEach(sums[i], sums[i + 1], sums[i + 2], sums[i + 3]);
@@ -238,7 +238,7 @@ FOREREACH_INLINE void DropFromRows(Zonotope& set, std::size_t k, const double* s
 FOREREACH_INLINE void Drop(Zonotope& set, std::size_t drop, const double* scores, const Lanes& inflation,
                            Lengths& boxed) {
   constexpr std::size_t kMaxRows = 8;
-  const auto count = static_cast<std::size_t>(set.num_generators()), n = static_cast<std::size_t>(set.dim());
+  const auto count = ToSize(set.num_generators()), n = ToSize(set.dim());
   const Lanes largest = AllLanes(drop <= 8 ? Smallest(scores, count, drop) : SmallestOfMany(scores, count, drop));
   std::size_t k = 0;
   for (; k + kMaxRows < n; k += kMaxRows) DropFromRows<kMaxRows>(set, k, scores, largest, inflation, boxed);
@@ -267,7 +267,7 @@ struct Axes {
         --stay;
         continue;
       }
-      const auto k = static_cast<std::size_t>(std::countr_zero(rest));
+      const auto k = ToSize(std::countr_zero(rest));
       boxed[k] += lengths[k];
       which ^= 1u << k;
     }
@@ -285,7 +285,7 @@ struct Axes {
 
 FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& scores, const double* first,
                                            const double* second, int order) {
-  const auto n = static_cast<std::size_t>(set.dim());
+  const auto n = ToSize(set.dim());
   const int count = set.num_generators(), most = order * set.dim(), keep = most - set.dim();
   Axes early = Axes::Nonzero(first, n), late = Axes::Nonzero(second, n);
   const int axes = early.size() + late.size();
@@ -303,7 +303,7 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& sc
   if (stay < axes) late.Box(early.Box(stay, boxed), boxed);
   const Lanes inflation = AllLanes(1 + (2.0 * count + 8) * kUnitRoundoff);
   if (left < count)
-    Drop(set, static_cast<std::size_t>(count - left), scores.data(), inflation, boxed);
+    Drop(set, ToSize(count - left), scores.data(), inflation, boxed);
   else
     for (std::size_t k = 0; k < n; k += kLaneCount) StoreLanes(LoadLanes(&boxed[k]) * inflation, &boxed[k]);
   const Axes box = Axes::Nonzero(boxed.data(), n);
@@ -311,21 +311,11 @@ FOREREACH_INLINE void AppendAndReduceLanes(Zonotope& set, const ColumnScores& sc
   box.Write(set, late.Write(set, early.Write(set, left)));
 }
 
-FOREREACH_AVX2 void AppendAndReduceAvx2(Zonotope& set, const ColumnScores& scores, const double* first,
-                                        const double* second, int order) {
-  AppendAndReduceLanes(set, scores, first, second, order);
-}
-FOREREACH_FLATTEN void AppendAndReduceBaseline(Zonotope& set, const ColumnScores& scores, const double* first,
-                                               const double* second, int order) {
-  AppendAndReduceLanes(set, scores, first, second, order);
-}
-
 }  // namespace
 
-void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second,
-                     int order) noexcept {
-  const auto append = active_instruction_set == InstructionSet::kAvx2 ? AppendAndReduceAvx2 : AppendAndReduceBaseline;
-  append(set, scores, first, second, order);
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second, int order,
+                     InstructionSet instructions) noexcept {
+  Dispatch<&AppendAndReduceLanes>(instructions, set, scores, first, second, order);
 }
 
 }  // namespace forereach

@@ -15,9 +15,11 @@ kLaneCount, so a sum over generators reads four consecutive doubles at a time. *
 #include <cstdint>
 #include <span>
 
+#include "certifier/numerics/instruction_set.h"
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/sets/box.h"
 #include "certifier/sets/eigen.h"
 
@@ -43,14 +45,12 @@ class Zonotope final {
 
   [[nodiscard]] int dim() const { return dim_; }
   [[nodiscard]] int num_generators() const { return num_generators_; }
-  [[nodiscard]] double center(int k) const { return center_[static_cast<std::size_t>(k)]; }
-  [[nodiscard]] std::span<const double> center() const { return {center_.data(), static_cast<std::size_t>(dim_)}; }
-  [[nodiscard]] double generator(int k, int j) const { return row(k)[static_cast<std::size_t>(j)]; }
+  [[nodiscard]] double center(int k) const { return center_[ToSize(k)]; }
+  [[nodiscard]] std::span<const double> center() const { return {center_.data(), ToSize(dim_)}; }
+  [[nodiscard]] double generator(int k, int j) const { return row(k)[ToSize(j)]; }
   /** Coordinate k of every generator. */
-  [[nodiscard]] std::span<const double> row(int k) const {
-    return {rows_[static_cast<std::size_t>(k)].data(), static_cast<std::size_t>(num_generators_)};
-  }
-  [[nodiscard]] double slack(int k) const { return slack_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] std::span<const double> row(int k) const { return {rows_[ToSize(k)].data(), ToSize(num_generators_)}; }
+  [[nodiscard]] double slack(int k) const { return slack_[ToSize(k)]; }
   [[nodiscard]] Eigen::VectorXd CenterVector() const;
   /** All generators as columns: the columns of G, then s_k e_k for each k with s_k > 0. */
   [[nodiscard]] Eigen::MatrixXd GeneratorMatrix() const;
@@ -64,11 +64,9 @@ class Zonotope final {
   [[nodiscard]] double SupportUpper(std::span<const double> direction) const noexcept;
 
   /** The row with its padding of zeros. */
-  [[nodiscard]] std::span<const double> padded_row(int k) const {
-    return {rows_[static_cast<std::size_t>(k)].data(), padded_size()};
-  }
+  [[nodiscard]] std::span<const double> padded_row(int k) const { return {rows_[ToSize(k)].data(), padded_size()}; }
   /** num_generators() rounded up to a multiple of kLaneCount. */
-  [[nodiscard]] std::size_t padded_size() const { return PaddedToLanes(static_cast<std::size_t>(num_generators_)); }
+  [[nodiscard]] std::size_t padded_size() const { return PaddedToLanes(ToSize(num_generators_)); }
 
   /** @name In-place construction, for kernels that own the set. These functions check nothing. */
   ///@{
@@ -80,8 +78,8 @@ class Zonotope final {
   /** Keeps the first `kept` columns and sets the columns after them, up to `num_generators`, to zero. */
   FOREREACH_INLINE void Resize(int kept, int num_generators) noexcept {
     num_generators_ = num_generators;
-    const std::size_t rest = static_cast<std::size_t>(kept) % kLaneCount, end = padded_size();
-    std::size_t j = static_cast<std::size_t>(kept) - rest;
+    const std::size_t rest = ToSize(kept) % kLaneCount, end = padded_size();
+    std::size_t j = ToSize(kept) - rest;
     if (rest > 0) {
       for (int k = 0; k < dim_; ++k) StoreLanes(FirstLanes(LoadLanes(mutable_row(k) + j), rest, 0), mutable_row(k) + j);
       j += kLaneCount;
@@ -91,14 +89,14 @@ class Zonotope final {
   }
   /** Copies only the entries in use of another set: about 2 kB of the 15 kB of the whole value. */
   void Assign(const Zonotope& other) noexcept;
-  [[nodiscard]] double& mutable_slack(int k) { return slack_[static_cast<std::size_t>(k)]; }
-  [[nodiscard]] double& mutable_center(int k) { return center_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] double& mutable_slack(int k) { return slack_[ToSize(k)]; }
+  [[nodiscard]] double& mutable_center(int k) { return center_[ToSize(k)]; }
   /** Arrays of kMaxStates entries; the first dim() are in use. */
   [[nodiscard]] const double* centers() const { return center_.data(); }
   [[nodiscard]] const double* slacks() const { return slack_.data(); }
   [[nodiscard]] double* mutable_slacks() { return slack_.data(); }
   [[nodiscard]] double* mutable_centers() { return center_.data(); }
-  [[nodiscard]] double* mutable_row(int k) { return rows_[static_cast<std::size_t>(k)].data(); }
+  [[nodiscard]] double* mutable_row(int k) { return rows_[ToSize(k)].data(); }
   /** Appends the generator length * e_k unless length is zero. */
   void AppendAxis(int k, double length) noexcept;
   ///@}
@@ -162,9 +160,10 @@ largest |g|_1 - |g|_inf and encloses the others in a box, rounded outward. Of co
 earlier one is kept. Zero columns are removed. The slack does not change. The result contains the set with all
 generators.
 @param scores those of the set's columns. @param first, second n lengths; kMaxStates entries must be readable.
+@param instructions changes the computing time only.
 Cost O(n m + m^2) for m generators. */
-void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second,
-                     int order) noexcept;
+void AppendAndReduce(Zonotope& set, const ColumnScores& scores, const double* first, const double* second, int order,
+                     InstructionSet instructions = BestInstructionSet()) noexcept;
 
 }  // namespace forereach
 

@@ -9,6 +9,7 @@
 #include "certifier/sets/zonotope.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
+#include "tests/oracle/reduce_order.h"
 
 namespace forereach {
 namespace {

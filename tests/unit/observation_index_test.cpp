@@ -175,7 +175,7 @@ TEST(ObservationIndex, HoldsEveryObservationOnce) {
       const std::size_t k = index.num_coordinates();
       std::set<std::uint32_t> seen;
       for (std::size_t b = 0; b < index.num_leaves() * ObservationIndex::kLeafBlocks; ++b)
-        for (std::size_t lane = 0; lane < simd::kLanes; ++lane) {
+        for (std::size_t lane = 0; lane < kPackSize; ++lane) {
           const std::uint32_t id = index.ids(b)[lane];
           if (id == ObservationIndex::kNone) {
             ASSERT_EQ(index.block(b)[k].at(lane), -kInfinity);

@@ -12,6 +12,7 @@
 #include "certifier/sets/zonogon.h"
 #include "certifier/sets/zonotope.h"
 #include "tests/oracle/random.h"
+#include "tests/oracle/reduce_order.h"
 
 namespace forereach {
 namespace {
