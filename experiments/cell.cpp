@@ -1,6 +1,7 @@
 #include "experiments/cell.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 #include "certifier/numerics/text.h"
@@ -18,8 +19,10 @@ char LetterOf(Outcome outcome) {
     case Outcome::kCertified: return 'C';
     case Outcome::kDomain: return 'D';
     case Outcome::kFalsified: return 'F';
-    default: return 'S';
+    case Outcome::kSafety: return 'S';
+    case Outcome::kNone: break;
   }
+  throw std::logic_error("a plan was not decided");
 }
 
 // The sum over the steps whose query is known, the one that D ended the tube at included.
@@ -71,7 +74,12 @@ void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollo
       ++tally.domain;
       ++tally.domain_steps[step];
       return;
-    default: ++tally.safety; ++tally.safety_steps[step];
+    case Outcome::kSafety:
+      ++tally.safety;
+      ++tally.safety_steps[step];
+      return;
+    case Outcome::kFalsified:  // counted above
+    case Outcome::kNone: return;
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "experiments/chunks/blocks.h"
@@ -51,13 +53,16 @@ Eigen::MatrixXd DrawPoints(const Box& region, int seed, int count, std::uint64_t
 }
 
 Eigen::MatrixXd PointsOf(const System& system, Layout layout, int seed, int count) {
+  const auto drawn = [&](const Box& region) {
+    return DrawPoints(region, seed, count, static_cast<std::uint64_t>(system.num_states()));
+  };
   switch (layout) {
     case Layout::kFixedGrid: return GridPoints(count);
     case Layout::kPolicyCorridor: return PolicyPoints(seed, count);
-    default: break;
+    case Layout::kCorridor: return drawn(system.data_region);
+    case Layout::kBelowKnee: return drawn(system.quiet_region);
   }
-  return DrawPoints(layout == Layout::kCorridor ? system.data_region : system.quiet_region, seed, count,
-                    static_cast<std::uint64_t>(system.num_states()));
+  throw std::invalid_argument("layout: " + std::to_string(static_cast<int>(layout)) + " is unknown");
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
+#include <string>
 
 #include "certifier/numerics/size.h"
 #include "verifier/claims.h"
@@ -52,7 +54,11 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
 }  // namespace
 
 Method MethodOf(const Problem& problem) {
-  return problem.method == forereach::Method::kPaper ? Method::kPaper : Method::kCentred;
+  switch (problem.method) {
+    case forereach::Method::kPaper: return Method::kPaper;
+    case forereach::Method::kCentred: return Method::kCentred;
+  }
+  throw std::invalid_argument("problem: method " + std::to_string(static_cast<int>(problem.method)) + " is unknown");
 }
 
 Verifier::Verifier(std::shared_ptr<const Problem> problem, Method method)

@@ -96,12 +96,14 @@ Decision Stopped(const StepResult& result, int step, const StepRecord& record) {
       decision.threshold = record.envelope.upper[k];
       return decision;
     }
-    default:
+    case StepResult::Status::kNoFiniteEnclosure:
+    case StepResult::Status::kDone:  // of a step that was not stopped: not to be certified
       decision.cause = Cause::kNoFiniteEnclosure;
       decision.coordinate = result.coordinate;
       decision.margin = decision.threshold = kInfinity;
       return decision;
   }
+  return decision;
 }
 
 }  // namespace
@@ -126,7 +128,7 @@ Learned Certifier::Learn(std::span<const double> z, std::span<const double> next
   Observations observed;
   if (const Learned learned = Observe(*problem_, z, next, observed); learned != Learned::kAdded) return learned;
   const auto entries = [](const Eigen::MatrixXd& one_row) {
-    return std::span<const double>(one_row.data(), static_cast<std::size_t>(one_row.size()));
+    return std::span<const double>(one_row.data(), ToSize(one_row.size()));
   };
   if (observed_->store.Insert(z, entries(observed.lower), entries(observed.upper)).id < 0)
     return Learned::kOutsideDomain;
@@ -179,7 +181,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   tube.length_ = 0;
   tube.slices_[0].Assign(initial_set);
   Propagator::HalfWidths(initial_set, tube.steps_[0].half_width.data());
-  if (violation_) return Falsified(*violation_);
+  if (violation()) return Falsified(*violation());
   Decision decision = Propagate(plan, tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeSafety(obstacles, tube);

@@ -48,8 +48,8 @@ class Certifier final {
   using Learned = forereach::Learned;
   /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
   noise bound. Do not call it while Certify runs. Cost: about a microsecond; if Compact has not been called for 256
-  transitions, it also builds an index. @pre the residual is
-  not bounded by a supplied ResidualEnclosure; so for num_unindexed and Compact. */
+  transitions, it also builds an index.
+  @pre no ResidualEnclosure was supplied. The same holds for num_unindexed and Compact. */
   Learned Learn(std::span<const double> z, std::span<const double> next);
   /** Number of learned transitions that are not in the index yet. */
   [[nodiscard]] int num_unindexed() const { return observed_->store.tail_size(); }

@@ -23,9 +23,11 @@ std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {
     case Kind::kUpper: return VariableName(model, exit.index) + " reaches " + value + ", above its bound " + bound;
     case Kind::kInequality:
       return "inequality " + std::to_string(exit.index) + " reaches " + value + ", above its bound " + bound;
-    default:
+    case Kind::kBall:
       return "ball " + std::to_string(exit.index) + ": distance reaches " + value + ", above its radius " + bound;
+    case Kind::kNone: break;
   }
+  return "no constraint of the domain is violated";
 }
 
 std::string ExplainFalsified(const Decision& decision, const NominalModel& model) {

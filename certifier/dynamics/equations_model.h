@@ -25,17 +25,18 @@ class EquationsModel final : public NominalModel {
                       List<std::string>(Equations::kInputNames), List<std::string>(Equations::kParameterNames)}) {}
 
   void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out,
-              InstructionSet instructions) const noexcept override {
+              InstructionSet instructions = BestInstructionSet()) const noexcept override {
     forereach::Expand<kProgram>(parameters(), z, box, out, instructions);
   }
 
   void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
-                        const double* error, Remainder& out, InstructionSet instructions) const noexcept override {
+                        const double* error, Remainder& out,
+                        InstructionSet instructions = BestInstructionSet()) const noexcept override {
     forereach::EncloseRemainder<kProgram>(method, slice, half_width, hessian, error, out, instructions);
   }
 
   void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next, ImageSums& sums,
-           InstructionSet instructions) const noexcept override {
+           InstructionSet instructions = BestInstructionSet()) const noexcept override {
     MapGenerators<kProgram>(expansion, error, slice, next, sums, instructions);
   }
 

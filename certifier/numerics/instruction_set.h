@@ -2,7 +2,8 @@
 
 A hot function is written once. `Dispatch<f>(instructions, arguments...)` calls it, in machine code of the baseline or
 of AVX2: all that f calls is inlined into the two. What f computes is the same to the last bit (lanes.h), so the choice
-changes the time alone. */
+changes the time alone. Where f calls functions that are not FOREREACH_INLINE, f is not either: g++ would not inline
+those any more. */
 #pragma once
 
 #include <utility>

@@ -108,7 +108,7 @@ struct LipschitzEnvelope::Search {
 
   // One function for each metric and instruction set, so that each has the registers to itself.
   template <class Metric, class... More>
-  FOREREACH_INLINE Sides RunWith(const QuerySet& set, const More&... more) const {
+  [[nodiscard]] Sides RunWith(const QuerySet& set, const More&... more) const {
     return Run(Metric(row.distance, set, more...));
   }
   template <class Metric, class... More>

@@ -247,8 +247,8 @@ class SignMetric : public CenterDistance {
  private:
   // Depth t holds the sums over the fixed columns and the first t free ones, under the pattern being tried.
   struct Signs {
-    std::array<std::size_t, kMaxColumns> free{};
-    std::array<double, kMaxColumns> components{};
+    std::array<std::size_t, kMaxColumns> free;
+    std::array<double, kMaxColumns> components;
     std::array<double, kMaxColumns + 1> sums;
     std::array<std::array<Pack, kMaxChunks>, kMaxColumns + 1> along;
   };

@@ -119,11 +119,13 @@ double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
       const double inside = outside.maxCoeff();
       return inside < 0 ? inside : outside.max(0).matrix().norm();
     }
-    case Obstacle::Kind::kPolygon: break;
+    case Obstacle::Kind::kPolygon: {
+      std::vector<Eigen::Vector2d> offsets;
+      for (const Eigen::VectorXd& vertex : obstacle.points()) offsets.emplace_back(vertex - y);
+      return HullDistance(offsets);
+    }
   }
-  std::vector<Eigen::Vector2d> offsets;
-  for (const Eigen::VectorXd& vertex : obstacle.points()) offsets.emplace_back(vertex - y);
-  return HullDistance(offsets);
+  throw std::logic_error("obstacle: kind " + std::to_string(static_cast<int>(obstacle.kind())) + " is unknown");
 }
 
 }  // namespace forereach

@@ -231,7 +231,8 @@ Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
       return search.best();
     }
     case 2: return BestPlanar(slice, obstacle);
-    default: return BestSpatial(slice, obstacle);
+    case 3: return BestSpatial(slice, obstacle);
+    default: return Vector::Zero();  // proves nothing
   }
 }
 

@@ -1,0 +1,87 @@
+// A certifier over an enclosure of the residual that the caller supplies.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/dynamics/models.h"
+
+namespace forereach {
+namespace {
+
+// r(x) in slope * (x - c) +- width in the velocities, zero in the positions.
+class Velocities final : public ResidualEnclosure {
+ public:
+  Velocities(double slope, double width) : slope_(slope), width_(width) {}
+  void Enclose(const QuerySet&, ResidualBounds& bounds) const noexcept override {
+    for (std::size_t k = 0; k < 4; ++k) {
+      bounds.upper[k] = k < 2 ? 0 : width_;
+      bounds.lower[k] = -bounds.upper[k];
+    }
+    bounds.capped = false;
+    bounds.has_slope = slope_ != 0;
+    if (!bounds.has_slope) return;
+    for (std::size_t k = 0; k < 4; ++k) bounds.slope[k].fill(0);
+    for (std::size_t k = 2; k < 4; ++k) bounds.slope[k][k] = slope_;
+  }
+
+ private:
+  double slope_, width_;
+};
+
+std::shared_ptr<const Problem> PointMassProblem() {
+  auto problem = std::make_shared<Problem>();
+  problem->model = MakePointMass(0.125);
+  problem->domain.state = Box(Eigen::Vector4d::Constant(-10), Eigen::Vector4d::Constant(10));
+  problem->domain.input = Box(Eigen::Vector2d::Constant(-1), Eigen::Vector2d::Constant(1));
+  problem->projection = Eigen::MatrixXd::Identity(2, 4);
+  return problem;
+}
+
+class GivenEnclosure : public testing::Test {
+ protected:
+  Decision Certify(const ResidualEnclosure& residual) {
+    const Certifier certifier(PointMassProblem(), residual);
+    EXPECT_EQ(certifier.num_observations(), 0u);
+    EXPECT_FALSE(certifier.uses_hull_distance());
+    EXPECT_FALSE(certifier.violation());
+    return certifier.Certify({controls_.data(), 2, 8, 2}, start_, {&obstacle_, 1}, tube_);
+  }
+
+  const Eigen::MatrixXd controls_ = Eigen::MatrixXd::Zero(2, 8);
+  const Zonotope start_ = Zonotope::FromBox(Eigen::Vector4d(0, 0, 1, 0), Eigen::Vector4d::Constant(0.0625));
+  const Obstacle obstacle_ = Obstacle::Circle(Eigen::Vector2d(0, 3), 1);
+  Tube tube_;
+};
+
+TEST_F(GivenEnclosure, BoundsTheTube) {
+  EXPECT_EQ(Certify(Velocities(0, 0)).outcome, Outcome::kCertified);
+  const double without = tube_.hull(8, 2).upper;
+  EXPECT_EQ(Certify(Velocities(0, 0.125)).outcome, Outcome::kCertified);
+  EXPECT_NEAR(tube_.hull(8, 2).upper, without + 8 * 0.125, 1e-12);
+  EXPECT_EQ(Certify(Velocities(0, 1)).outcome, Outcome::kSafety);
+}
+
+TEST_F(GivenEnclosure, ASlopeContractsWhatAnIntervalCannot) {
+  EXPECT_EQ(Certify(Velocities(-0.5, 0)).outcome, Outcome::kCertified);
+  for (int t = 0; t <= 8; ++t) EXPECT_NEAR(tube_.half_width(t)[2], 0.0625 * std::pow(0.5, t), 1e-12);
+  EXPECT_EQ(Certify(Velocities(2, 0)).outcome, Outcome::kDomain);  // threefold in each step
+}
+
+TEST_F(GivenEnclosure, InvertedBoundsProveThatNoResidualIsAdmissible) {
+  const Decision decision = Certify(Velocities(0, -1));
+  EXPECT_EQ(decision.outcome, Outcome::kFalsified);
+  EXPECT_EQ(decision.step, 0);
+  EXPECT_EQ(decision.coordinate, 2);
+}
+
+TEST_F(GivenEnclosure, ASlopeThatIsNotFiniteIsNoBound) {
+  const Decision decision = Certify(Velocities(std::numeric_limits<double>::quiet_NaN(), 0));
+  EXPECT_EQ(decision.outcome, Outcome::kDomain);
+  EXPECT_EQ(decision.cause, Cause::kNoFiniteEnclosure);
+}
+
+}  // namespace
+}  // namespace forereach
