@@ -1,27 +1,31 @@
 #include <iostream>
 
 #include "cli/commands.h"
+#include "cli/key_options.h"
 #include "records/report.h"
 
 namespace forereach {
 
 Command ReportCommand() {
   const auto options = std::make_shared<ReportOptions>();
-  return {.name = "report",
-          .purpose = "Sum up a recorded log, and draw it",
-          .footer = "Example:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo",
-          .options = {{.name = "logs", .variable = &options->logs, .type = "LOG", .help = kLogs, .required = true},
-                      {.name = "--config", .variable = &options->config, .type = "FILE", .help = kTaskOfLogs},
-                      {.name = "--picture",
-                       .variable = &options->picture,
-                       .type = "FILE",
-                       .help = "Obstacles, tubes and driven path: a .svg, .png or .pdf file; without an ending a .svg "
-                               "and a .png"},
-                      JsonFlag(options->json)},
-          .run = [options] {
-            Report(*options, std::cout);
-            return 0;
-          }};
+  Command command{
+      .name = "report",
+      .purpose = "Sum up a recorded log, and draw it",
+      .footer = "Example:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo",
+      .options = {{.name = "logs", .variable = &options->logs, .type = "LOG", .help = kLogs, .required = true},
+                  {.name = "--config", .variable = &options->config, .type = "FILE", .help = kTaskOfLogs},
+                  {.name = "--picture",
+                   .variable = &options->picture,
+                   .type = "FILE",
+                   .help = "Obstacles, tubes and driven path: a .svg, .png or .pdf file; without an ending a .svg "
+                           "and a .png"},
+                  JsonFlag(options->json)},
+      .run = [options] {
+        Report(*options, std::cout);
+        return 0;
+      }};
+  AddKeyOptions(command.options, options->key);
+  return command;
 }
 
 }  // namespace forereach

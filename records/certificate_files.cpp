@@ -2,34 +2,28 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "certifier/certify/explain.h"
-#include "certifier/gate/obstacles_in_force.h"
-#include "certifier/gate/transition_message.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/files.h"
+#include "certifier/task/grounds.h"
 #include "certifier/task/json_file.h"
-#include "certifier/task/key.h"
-#include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_t.hpp"
-#include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "records/database.h"
-#include "records/event_log.h"
-#include "records/log_authenticator.h"
 #include "records/log_directory.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
-#include "records/restarts.h"
+#include "records/timeline.h"
 
 namespace forereach {
 namespace {
@@ -63,101 +57,29 @@ CertificateFile FromDecision(const std::string& path, const Json& document, cons
 
 // ---- An event log.
 
-// The obstacles that were in force, one version after the other, in the order of the log.
-class ObstacleHistory {
- public:
-  explicit ObstacleHistory(const Config& config) : config_(config), versions_{ObstaclesInForce(config)} {}
-
-  void Restart() { versions_.emplace_back(config_); }
-
-  void Reload() {
-    ObstaclesInForce after(config_);
-    after.Inherit(versions_.back());
-    versions_.push_back(std::move(after));
+// The task's problem with all learned transitions behind its own.
+std::shared_ptr<const Problem> WithLearned(const Config& task, const std::vector<ExecutedTransition>& learned) {
+  auto problem = std::make_shared<Problem>(*task.problem);
+  Transitions& all = problem->transitions;
+  const int base = all.size();
+  all.z.conservativeResize(base + std::ssize(learned), Eigen::NoChange);
+  all.x_next.conservativeResize(base + std::ssize(learned), Eigen::NoChange);
+  for (Eigen::Index i = 0; i < std::ssize(learned); ++i) {
+    const ExecutedTransition& row = learned[static_cast<std::size_t>(i)];
+    all.z.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.z.data(), std::ssize(row.z));
+    all.x_next.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.next.data(), std::ssize(row.next));
   }
+  return problem;
+}
 
-  // As the gate takes them.
-  void Update(const LogEvent& event) {
-    ObstaclesInForce after = versions_.back();
-    if (!after.Update(event.message(), event.utime).empty()) return;
-    if (after.digest() == versions_.back().digest())  // the whole set is sent again and again
-      versions_.back() = std::move(after);
-    else
-      versions_.push_back(std::move(after));
-  }
+verifier::KnownRows KnownRowsOf(const Basis& basis) {
+  const int base = basis.task->problem->transitions.size();
+  return {base, base + static_cast<int>(basis.learned_begin), base + static_cast<int>(basis.learned_end)};
+}
 
-  [[nodiscard]] std::size_t now() const { return versions_.size() - 1; }
-
-  // The version of that digest that was in force some time since `first`; without one, that which was at `first`.
-  [[nodiscard]] std::size_t Find(std::size_t first, const Digest& digest) const {
-    for (std::size_t i = first; i < versions_.size(); ++i)
-      if (versions_[i].digest() == digest) return i;
-    return first;
-  }
-
-  [[nodiscard]] const ObstaclesInForce& version(std::size_t i) const { return versions_[i]; }
-
- private:
-  const Config& config_;
-  std::vector<ObstaclesInForce> versions_;
-};
-
-// The transitions that were learned on the way, and what the certifier knew at each digest of its observations.
-class LearnedHistory {
- public:
-  explicit LearnedHistory(const Config& config) : config_(config), digest_(config.observations_digest) { Note(); }
-
-  // The certifier knows the file's transitions only, again.
-  void Restart() {
-    begin_ = rows_.size();
-    digest_ = config_.observations_digest;
-    Note();
-  }
-
-  // As the gate takes them.
-  void Learn(const LogEvent& event) {
-    const auto message = Decoded<transition_t>(event.message());
-    if (!config_.gate.learns || !message) return;
-    ExecutedTransition transition = FromMessage(*message, *config_.problem);
-    if (!transition.refusal.empty()) return;
-    rows_.push_back(std::move(transition));
-    digest_ = ChainedDigest(digest_, event.message());
-    Note();
-  }
-
-  // @param digest in hexadecimal.
-  [[nodiscard]] std::optional<verifier::KnownRows> Find(const std::string& digest) const {
-    const auto known = known_.find(digest);
-    return known == known_.end() ? std::nullopt : std::optional(known->second);
-  }
-
-  // The task's problem with all of them behind its own transitions.
-  [[nodiscard]] std::shared_ptr<const Problem> WithAll() const {
-    auto problem = std::make_shared<Problem>(*config_.problem);
-    Transitions& all = problem->transitions;
-    const int base = all.size();
-    all.z.conservativeResize(base + std::ssize(rows_), Eigen::NoChange);
-    all.x_next.conservativeResize(base + std::ssize(rows_), Eigen::NoChange);
-    for (Eigen::Index i = 0; i < std::ssize(rows_); ++i) {
-      const ExecutedTransition& row = rows_[static_cast<std::size_t>(i)];
-      all.z.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.z.data(), std::ssize(row.z));
-      all.x_next.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.next.data(), std::ssize(row.next));
-    }
-    return problem;
-  }
-
- private:
-  void Note() {
-    const int base = config_.problem->transitions.size();
-    known_[ToHex(digest_)] = {base, base + static_cast<int>(begin_), base + static_cast<int>(rows_.size())};
-  }
-
-  const Config& config_;
-  std::vector<ExecutedTransition> rows_;
-  std::size_t begin_ = 0;  // of those learned since the certifier began
-  Digest digest_;
-  std::map<std::string, verifier::KnownRows> known_;
-};
+RecordedCertificate DamagedLog(const std::string& log, std::int64_t places) {
+  return {log, {}, "the log is damaged in " + std::to_string(places) + " places", {}};
+}
 
 verifier::Certificate CertificateOf(const certified_plan_t& certified, const std::vector<Obstacle>& obstacles) {
   const candidate_plan_t& plan = certified.plan;
@@ -177,166 +99,134 @@ verifier::Certificate CertificateOf(const certified_plan_t& certified, const std
   return certificate;
 }
 
-// Which decisions are judged under a task: those of its config digest, and under the first task those of digests
-// without one.
-struct Share {
-  const Digest& digest;
-  const std::set<Digest>& all;
-  bool is_first;
-
-  [[nodiscard]] bool Has(const Digest& other) const { return other == digest || (is_first && !all.contains(other)); }
-};
-
-class LogReading {
+// Collects the certificates of a timeline, a file for each task.
+class CertificateReader final : public TimelineUser {
  public:
-  // Adds what it finds to `file`; names the file of each certificate if `names` says so.
-  LogReading(const std::vector<std::string>& logs, bool names, const Share& share, LearnedHistory& learned,
-             CertificateFile& file)
-      : config_(file.config),
-        share_(share),
-        authenticator_(config_.bus, PublicKeysOf(config_.bus)),
-        obstacles_(config_),
-        learned_(learned),
-        certificates_(file.certificates),
-        passed_over_(file.passed_over) {
-    const LogDamage damage = ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
-      log_ = names ? std::filesystem::path(log).filename().string() + " " : "";
-      Take(event);
-    });
-    if (damage.places > 0 && share.is_first)
-      certificates_.push_back({logs[0], {}, "the log is damaged in " + std::to_string(damage.places) + " places", {}});
+  void AddTask(const Config& task) { static_cast<void>(FileOf(task)); }
+
+  void OnDecision(const RecordedDecision& recorded) override {
+    const decision_t& decision = recorded.decision;
+    const Digest plan = GetDigest(decision.plan_digest);
+    // A candidate that comes twice is rejected the second time: the certificate is the first's.
+    if (decision.outcome == decision_t::CERTIFIED) decisions_.push_back(decision);
+    Outcome& outcome = outcomes_.try_emplace(plan, Outcome{decision_t::REJECTED, recorded.basis.task}).first->second;
+    if (outcome.outcome != decision_t::CERTIFIED) outcome = {decision.outcome, recorded.basis.task};
+  }
+
+  void OnCertified(const RecordedPlan& recorded) override {
+    const certified_plan_t& certified = recorded.certified;
+    const Config& task = *recorded.basis.task;
+    CertificateFile& file = FileOf(task);
+    RecordedCertificate& certificate = file.certificates.emplace_back();
+    certificate.name = recorded.event;
+    if (!HasSizes(certified.plan, *task.problem->model)) {
+      certificate.missing = "not of this task's sizes";
+      return;
+    }
+    certificate.name += ", plan " + std::to_string(certified.plan.plan_id) + " of " + GetText(certified.plan.source);
+    certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
+    certificate.certificate.known = KnownRowsOf(recorded.basis);
+    for (const SealFault& fault : FindSealFaults(certified))
+      certificate.mismatches.push_back({Altered(fault.field), fault.expected, fault.found});
+    CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(certified));
+    if (!recorded.has_candidate)
+      certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
+    of_plan_.insert({DigestOf(Encode(certified.plan)), {&file, file.certificates.size() - 1, certified}});
+  }
+
+  // Holds decisions and certified plans of the logs read since the last call against each other.
+  // @param rows of a database, or null.
+  void EndRun(const Config& first_task, const std::vector<DecisionRow>* rows) {
     for (const decision_t& decision : decisions_)
       for (auto [plan, end] = of_plan_.equal_range(GetDigest(decision.plan_digest)); plan != end; ++plan)
         CheckDecision(decision, plan->second);
-    for (const auto& [digest, outcome] : outcomes_)
-      if (outcome == decision_t::CERTIFIED && plans_.count(digest) == 0)
-        certificates_.push_back(
+    for (const auto& [digest, outcome] : outcomes_) {
+      CertificateFile& file = FileOf(*outcome.task);
+      if (outcome.outcome != decision_t::CERTIFIED)
+        ++file.not_certificates;
+      else if (!of_plan_.contains(digest))
+        file.certificates.push_back(
             {"plan with digest " + ToHex(digest), {}, "decided as certified, but the log has no certified plan", {}});
-    file.not_certificates += static_cast<std::size_t>(
-        std::ranges::count_if(outcomes_, [](const auto& o) { return o.second != decision_t::CERTIFIED; }));
-    if (share.is_first) passed_over_.not_authentic += authenticator_.refusals();
+    }
+    if (rows) CheckRows(*rows, FileOf(first_task).certificates);
+    decisions_.clear();
+    outcomes_.clear();
+    of_plan_.clear();
   }
 
-  [[nodiscard]] const std::map<Digest, std::int16_t>& outcomes() const { return outcomes_; }
-  [[nodiscard]] const std::set<Digest>& plans() const { return plans_; }
+  // @param task in the order in which they were added.
+  std::vector<CertificateFile> Finish(const Timeline& timeline) {
+    for (const auto& [task, i] : file_of_) {
+      files_[i].config = *task;
+      files_[i].config.problem = WithLearned(*task, timeline.learned(*task));
+    }
+    files_.front().passed_over = timeline.passed_over();
+    return {std::make_move_iterator(files_.begin()), std::make_move_iterator(files_.end())};
+  }
 
  private:
-  void Take(const LogEvent& event) {
-    if (!authenticator_.IsAuthentic(event)) return;
-    if (event.channel == config_.bus.obstacles) {
-      obstacles_.Update(event);
-    } else if (event.channel == config_.bus.transition) {
-      learned_.Learn(event);
-    } else if (event.channel == config_.bus.status) {
-      TakeStatus(event);
-    } else if (event.channel == config_.bus.candidate) {
-      in_force_.insert_or_assign(DigestOf(event.message()), obstacles_.now());
-    } else if (event.channel == config_.bus.decision) {
-      TakeDecision(event);
-    } else if (event.channel == config_.bus.certified) {
-      TakeCertified(event);
-    }
-  }
-
-  // A certifier that was started again has the task's obstacles again.
-  void NoticeRestart(std::int64_t sequence, std::int64_t& last) {
-    if (sequence < last) obstacles_.Restart();
-    last = sequence;
-  }
-
-  void TakeStatus(const LogEvent& event) {
-    const Restarts::Kind kind = restarts_.Notice(event.message());
-    if (kind == Restarts::Kind::kNone) return;
-    learned_.Restart();
-    if (kind == Restarts::Kind::kReload) obstacles_.Reload();
-  }
-
-  void TakeDecision(const LogEvent& event) {
-    const auto decision = Decoded<decision_t>(event.message());
-    if (!decision) return;
-    NoticeRestart(decision->sequence, last_decision_);
-    if (!share_.Has(GetDigest(decision->config_digest))) return;
-    // A candidate that comes twice is rejected the second time: the certificate is the first's.
-    if (decision->outcome == decision_t::CERTIFIED) decisions_.push_back(*decision);
-    std::int16_t& outcome = outcomes_[GetDigest(decision->plan_digest)];
-    if (outcome != decision_t::CERTIFIED) outcome = decision->outcome;
-  }
-
-  void TakeCertified(const LogEvent& event) {
-    const auto certified = Decoded<certified_plan_t>(event.message());
-    if (!certified) {
-      passed_over_.undecodable += share_.is_first;
-      return;
-    }
-    if (!share_.Has(GetDigest(certified->config_digest))) {
-      NoticeRestart(certified->sequence, last_certified_);
-      return;
-    }
-    RecordedCertificate certificate;
-    certificate.name = log_ + "event " + std::to_string(event.number);
-    if (!HasSizes(certified->plan)) {
-      certificate.missing = "not of this task's sizes";
-      certificates_.push_back(std::move(certificate));
-      return;
-    }
-    NoticeRestart(certified->sequence, last_certified_);
-    certificate.name += ", plan " + std::to_string(certified->plan.plan_id) + " of " + GetText(certified->plan.source);
-    CheckDigests(*certified, certificate);
-    of_plan_.insert({DigestOf(Encode(certified->plan)), {certificates_.size(), *certified}});
-    certificates_.push_back(std::move(certificate));
-  }
-
-  [[nodiscard]] bool HasSizes(const candidate_plan_t& plan) const {
-    const NominalModel& model = *config_.problem->model;
-    return plan.num_states == model.num_states() && plan.num_inputs == model.num_inputs() && 1 <= plan.num_steps &&
-           plan.num_steps <= kMaxSteps;
-  }
-
-  void CheckDigests(const certified_plan_t& certified, RecordedCertificate& certificate) {
-    const Digest plan = DigestOf(Encode(certified.plan));
-    plans_.insert(plan);
-    const auto sent = in_force_.find(plan);
-    const Digest named = GetDigest(certified.obstacles_digest);
-    const auto& version = obstacles_.version(obstacles_.Find(sent == in_force_.end() ? 0 : sent->second, named));
-    certificate.certificate = CertificateOf(certified, version.all());
-    const auto compare = [&](const char* what, const char* name, const Digest& expected, const Digest& found) {
-      Compare(certificate, std::string(what) + name, ToHex(expected), ToHex(found));
-    };
-    for (const SealFault& fault : FindSealFaults(certified))
-      certificate.mismatches.push_back({Altered(fault.field), fault.expected, fault.found});
-    compare(kOtherInput, "config", config_.digest, GetDigest(certified.config_digest));
-    compare(kOtherInput, "model", config_.model_digest, GetDigest(certified.model_digest));
-    compare(kOtherInput, "declaration", config_.declaration_digest, GetDigest(certified.declaration_digest));
-    if (const auto known = learned_.Find(ToHex(GetDigest(certified.observations_digest))))
-      certificate.certificate.known = *known;
-    else
-      compare(kOtherInput, "observations", config_.observations_digest, GetDigest(certified.observations_digest));
-    compare(kOtherInput, "obstacles in force", version.digest(), named);
-    if (sent == in_force_.end())
-      certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
-  }
-
+  struct Outcome {
+    std::int16_t outcome;
+    const Config* task;
+  };
   struct Plan {
+    CertificateFile* file;
     std::size_t certificate;  // its place
     certified_plan_t certified;
   };
 
+  CertificateFile& FileOf(const Config& task) {
+    const auto [found, is_new] = file_of_.try_emplace(&task, files_.size());
+    return is_new ? files_.emplace_back() : files_[found->second];
+  }
+
+  static bool HasSizes(const candidate_plan_t& plan, const NominalModel& model) {
+    return plan.num_states == model.num_states() && plan.num_inputs == model.num_inputs() && 1 <= plan.num_steps &&
+           plan.num_steps <= kMaxSteps;
+  }
+
+  static void CompareGrounds(RecordedCertificate& certificate, const Grounds& expected, const Grounds& found) {
+    for (const auto& [name, digest] : kGrounds)
+      Compare(certificate, std::string(kOtherInput) + name + (digest == &Grounds::obstacles ? " in force" : ""),
+              ToHex(expected.*digest), ToHex(found.*digest));
+  }
+
+  // The rows of a database say what the log says.
+  void CheckRows(const std::vector<DecisionRow>& rows, std::vector<RecordedCertificate>& certificates) const {
+    std::map<std::string, const decision_t*> certified;
+    for (const decision_t& decision : decisions_) certified[ToHex(GetDigest(decision.plan_digest))] = &decision;
+    for (const DecisionRow& row : rows) {
+      if (row.outcome != OutcomeName(decision_t::CERTIFIED)) continue;
+      RecordedCertificate certificate;
+      certificate.name = row.event.log_file + " event " + std::to_string(row.event.event_number) + " in the database";
+      const auto decision = certified.find(row.plan_digest);
+      if (decision == certified.end()) {
+        certificate.missing = "the log has no such certificate";
+      } else {
+        const Grounds grounds = GroundsOf(*decision->second);
+        for (std::size_t i = 0; i < kGrounds.size(); ++i)
+          Compare(certificate, std::string(kOtherInput) + kGrounds[i].name, ToHex(grounds.*kGrounds[i].member),
+                  row.grounds[i]);
+        if (!certificate.mismatches.empty()) certificate.missing = "the row disagrees with the log";
+        certified.erase(decision);
+      }
+      if (!certificate.missing.empty()) certificates.push_back(std::move(certificate));
+    }
+    for (const auto& [digest, decision] : certified)
+      certificates.push_back({"plan with digest " + digest, {}, "certified in the log, but not in the database", {}});
+  }
+
   // The decision that goes with a certified plan: it names the same inputs, and its numbers and its sentence follow
   // from a clearance that the verifier then derives for every slice.
   void CheckDecision(const decision_t& decision, const Plan& plan) {
-    RecordedCertificate& certificate = certificates_[plan.certificate];
+    RecordedCertificate& certificate = plan.file->certificates[plan.certificate];
     const auto compare = [&](const std::string& field, const std::string& expected, const std::string& found) {
       Compare(certificate, Altered("its decision's " + field), expected, found);
     };
-    const auto compare_digest = [&](const char* field, const auto& expected, const auto& found) {
-      compare(field, ToHex(GetDigest(expected)), ToHex(GetDigest(found)));
-    };
     const certified_plan_t& certified = plan.certified;
-    compare_digest("config_digest", certified.config_digest, decision.config_digest);
-    compare_digest("model_digest", certified.model_digest, decision.model_digest);
-    compare_digest("declaration_digest", certified.declaration_digest, decision.declaration_digest);
-    compare_digest("observations_digest", certified.observations_digest, decision.observations_digest);
-    compare_digest("obstacles_digest", certified.obstacles_digest, decision.obstacles_digest);
+    const Grounds expected = GroundsOf(certified), found = GroundsOf(decision);
+    for (const auto& [name, digest] : kGrounds)
+      compare(std::string(name) + "_digest", ToHex(expected.*digest), ToHex(found.*digest));
     compare("plan_id", std::to_string(certified.plan.plan_id), std::to_string(decision.plan_id));
     compare("source", GetText(certified.plan.source), GetText(decision.source));
     compare("candidate_utime", std::to_string(certified.plan.utime), std::to_string(decision.candidate_utime));
@@ -388,71 +278,26 @@ class LogReading {
             found);
   }
 
-  const Config& config_;
-  const Share share_;
-  LogAuthenticator authenticator_;
-  ObstacleHistory obstacles_;
-  LearnedHistory& learned_;
-  Restarts restarts_;
-  std::vector<RecordedCertificate>& certificates_;
-  PassedOver& passed_over_;
-  std::string log_;
-  std::map<Digest, std::size_t> in_force_;  // when a candidate was sent
-  std::map<Digest, std::int16_t> outcomes_;
-  std::set<Digest> plans_;
-  std::vector<decision_t> decisions_;  // those that say CERTIFIED
+  std::deque<CertificateFile> files_;             // references to them stay
+  std::map<const Config*, std::size_t> file_of_;  // its place
+  std::map<Digest, Outcome> outcomes_;            // by plan
+  std::vector<decision_t> decisions_;             // those that say CERTIFIED
   std::multimap<Digest, Plan> of_plan_;
-  std::int64_t last_decision_ = -1, last_certified_ = -1;
 };
 
-std::set<Digest> DigestsOf(const std::vector<Config>& tasks) {
-  std::set<Digest> digests;
-  for (const Config& task : tasks) digests.insert(task.digest);
-  return digests;
-}
-
-std::vector<CertificateFile> FromLogs(const std::vector<std::string>& logs, std::vector<Config> tasks) {
-  const std::set<Digest> digests = DigestsOf(tasks);
-  std::vector<CertificateFile> files;
-  for (Config& task : tasks) {
-    CertificateFile& file = files.emplace_back();
-    file.config = std::move(task);
-    LearnedHistory learned(file.config);
-    const LogReading reading(logs, logs.size() > 1, {file.config.digest, digests, files.size() == 1}, learned, file);
-    file.config.problem = learned.WithAll();
-  }
+std::vector<CertificateFile> FromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
+  CertificateReader reader;
+  for (const Config& task : tasks) reader.AddTask(task);
+  Timeline timeline(PointersTo(tasks), reader);
+  timeline.Read(logs, logs.size() > 1);
+  reader.EndRun(tasks.front(), nullptr);
+  std::vector<CertificateFile> files = reader.Finish(timeline);
+  if (timeline.damage().places > 0)
+    files.front().certificates.push_back(DamagedLog(logs.front(), timeline.damage().places));
   return files;
 }
 
 // ---- A decision database: its logs lie beside it, and its rows have to say what they say.
-
-void CheckRows(const std::vector<DecisionRow>& rows, const LogReading& log, const Share& share,
-               const std::set<std::string>& tasks, const LearnedHistory& learned, const Config& config,
-               std::vector<RecordedCertificate>& certificates) {
-  std::set<std::string> certified;
-  for (const auto& [digest, outcome] : log.outcomes())
-    if (outcome == decision_t::CERTIFIED) certified.insert(ToHex(digest));
-  for (const DecisionRow& row : rows) {
-    if (row.outcome != OutcomeName(decision_t::CERTIFIED)) continue;
-    if (row.config_digest != ToHex(share.digest) && (!share.is_first || tasks.contains(row.config_digest))) continue;
-    RecordedCertificate certificate;
-    certificate.name = row.event.log_file + " event " + std::to_string(row.event.event_number) + " in the database";
-    if (certified.erase(row.plan_digest) == 0) certificate.missing = "the log has no such certificate";
-    Compare(certificate, std::string(kOtherInput) + "config", ToHex(config.digest), row.config_digest);
-    Compare(certificate, std::string(kOtherInput) + "model", ToHex(config.model_digest), row.model_digest);
-    Compare(certificate, std::string(kOtherInput) + "declaration", ToHex(config.declaration_digest),
-            row.declaration_digest);
-    if (!learned.Find(row.observations_digest))
-      Compare(certificate, std::string(kOtherInput) + "observations", ToHex(config.observations_digest),
-              row.observations_digest);
-    if (!certificate.missing.empty() || !certificate.mismatches.empty()) {
-      if (certificate.missing.empty()) certificate.missing = "the row disagrees with the log";
-      certificates.push_back(std::move(certificate));
-    }
-  }
-  for (const std::string& digest : certified)
-    certificates.push_back({"plan with digest " + digest, {}, "certified in the log, but not in the database", {}});
-}
 
 // Of the files of one run; what is amiss in one of them is for the reading to say.
 LogSurvey SurveyChain(const std::vector<std::string>& logs) {
@@ -479,74 +324,91 @@ std::vector<std::vector<RunRow>> Chains(Database& database) {
   return chains;
 }
 
-// What is read under one task, whichever run it is of.
-struct Group {
-  CertificateFile file;
-  std::unique_ptr<LearnedHistory> learned;
+// The logs of a run that are beside the database, and their rows.
+struct RunOnDisk {
+  std::vector<std::string> logs;
+  std::vector<DecisionRow> rows;
 };
 
-std::vector<CertificateFile> FromDatabase(const std::string& path, const std::string& config_path, const LogKey& key) {
-  const std::string directory = std::filesystem::path(path).parent_path().string();
-  std::optional<Digest> given;
-  if (!config_path.empty()) given = LoadConfig(config_path).digest;
-  std::vector<std::unique_ptr<Group>> groups;
-  std::vector<RecordedCertificate> without_task;
-  std::string why_none = path + ": no run in it has a log with decisions";
-  const auto group_of = [&](const Config& task) -> Group& {
-    for (const auto& group : groups)
-      if (group->file.config.digest == task.digest &&
-          group->file.config.observations_digest == task.observations_digest)
-        return *group;
-    Group& group = *groups.emplace_back(std::make_unique<Group>());
-    group.file.config = task;
-    group.learned = std::make_unique<LearnedHistory>(group.file.config);
-    return group;
-  };
-  Database database(path);
-  for (const std::vector<RunRow>& chain : Chains(database)) {
-    std::vector<std::string> logs;
-    std::vector<DecisionRow> rows;
+class DatabaseReading {
+ public:
+  DatabaseReading(const std::string& path, const std::string& config_path, const LogKey& key)
+      : path_(path), config_path_(config_path), key_(key), why_none_(path + ": no run in it has a log with decisions") {
+    if (!config_path.empty()) given_ = LoadConfig(config_path).digest;
+    Database database(path);
+    for (const std::vector<RunRow>& chain : Chains(database)) ReadRun(Find(database, chain));
+  }
+
+  std::vector<CertificateFile> Finish() {
+    if (!timeline_) throw ConfigError(why_none_);
+    std::vector<CertificateFile> files = reader_.Finish(*timeline_);
+    std::ranges::move(without_task_, std::back_inserter(files.front().certificates));
+    return files;
+  }
+
+ private:
+  RunOnDisk Find(Database& database, const std::vector<RunRow>& chain) {
+    RunOnDisk found;
     for (const RunRow& run : chain) {
-      const std::string log = (std::filesystem::path(path).parent_path() / run.log_file).string();
+      const std::string log = (std::filesystem::path(path_).parent_path() / run.log_file).string();
       if (std::filesystem::exists(log)) {
-        logs.push_back(log);
-        std::ranges::move(database.Read(run.log_file).decisions, std::back_inserter(rows));
+        found.logs.push_back(log);
+        std::ranges::move(database.Read(run.log_file).decisions, std::back_inserter(found.rows));
       } else {
         const char* why =
             run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not in the database's directory";
-        without_task.push_back({run.log_file, {}, why, {}});
-        why_none = path + ": " + run.log_file + ": " + why;
+        without_task_.push_back({run.log_file, {}, why, {}});
+        why_none_ = path_ + ": " + run.log_file + ": " + why;
       }
     }
-    const LogSurvey survey = SurveyChain(logs);
-    if (survey.order.empty() && rows.empty()) continue;
-    std::vector<Config> tasks;
+    return found;
+  }
+
+  void ReadRun(const RunOnDisk& run) {
+    const LogSurvey survey = SurveyChain(run.logs);
+    if (survey.order.empty() && run.rows.empty()) return;
+    std::vector<const Config*> tasks;
     try {
-      tasks = TasksOf(survey, logs.front(), directory, given && survey.configs.contains(*given) ? config_path : "");
-      key.Override(tasks, config_path);
+      tasks = TasksOfRun(survey, run.logs.front());
     } catch (const ConfigError& error) {
-      without_task.push_back({logs.front(), {}, why_none = error.what(), {}});
-      continue;
+      without_task_.push_back({run.logs.front(), {}, why_none_ = error.what(), {}});
+      return;
     }
-    const std::set<Digest> digests = DigestsOf(tasks);
-    std::set<std::string> digests_in_hex;
-    for (const Digest& digest : digests) digests_in_hex.insert(ToHex(digest));
-    for (const Config& task : tasks) {
-      Group& group = group_of(task);
-      const Share share{task.digest, digests, &task == &tasks.front()};
-      const LogReading reading(logs, true, share, *group.learned, group.file);
-      CheckRows(rows, reading, share, digests_in_hex, *group.learned, group.file.config, group.file.certificates);
+    if (timeline_)
+      timeline_->SetTasks(tasks);
+    else
+      timeline_.emplace(tasks, reader_);
+    for (const Config* task : tasks) reader_.AddTask(*task);
+    const std::int64_t damage = timeline_->damage().places;
+    timeline_->Read(run.logs, true);
+    reader_.EndRun(*tasks.front(), &run.rows);
+    if (timeline_->damage().places > damage)
+      without_task_.push_back(DamagedLog(run.logs.front(), timeline_->damage().places - damage));
+  }
+
+  // The same task of several runs is kept once.
+  std::vector<const Config*> TasksOfRun(const LogSurvey& survey, const std::string& log) {
+    std::vector<Config> found = TasksOf(survey, log, std::filesystem::path(path_).parent_path().string(),
+                                        given_ && survey.configs.contains(*given_) ? config_path_ : "");
+    key_.Override(found, config_path_);
+    std::vector<const Config*> tasks;
+    for (Config& task : found) {
+      const auto same =
+          std::ranges::find_if(tasks_, [&](const Config& known) { return GroundsOf(known) == GroundsOf(task); });
+      tasks.push_back(same != tasks_.end() ? &*same : &tasks_.emplace_back(std::move(task)));
     }
+    return tasks;
   }
-  if (groups.empty()) throw ConfigError(why_none);
-  std::vector<CertificateFile> files;
-  for (const auto& group : groups) {
-    group->file.config.problem = group->learned->WithAll();
-    files.push_back(std::move(group->file));
-  }
-  std::ranges::move(without_task, std::back_inserter(files.front().certificates));
-  return files;
-}
+
+  const std::string path_, config_path_;
+  const LogKey key_;
+  std::optional<Digest> given_;
+  std::string why_none_;  // for an error where no run can be read
+  std::deque<Config> tasks_;
+  CertificateReader reader_;
+  std::optional<Timeline> timeline_;
+  std::vector<RecordedCertificate> without_task_;
+};
 
 // ---- Which of the three.
 
@@ -567,7 +429,7 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const
   }
   try {
     switch (KindOf(path)) {
-      case FileKind::kDatabase: return FromDatabase(path, config_path, key);
+      case FileKind::kDatabase: return DatabaseReading(path, config_path, key).Finish();
       case FileKind::kJson:
         return {FromDecision(path, ParseJson<Json>(ReadWhole(path, kLargestJsonFile)), config_path)};
       case FileKind::kOther:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,6 +10,7 @@
 #include "lcmtypes/printable.h"
 #include "records/database.h"
 #include "records/event_log.h"
+#include "records/kept_tasks.h"
 #include "records/log_directory.h"
 #include "records/log_survey.h"
 
@@ -35,6 +37,9 @@ LogCheck Check(Database& database, const LogDirectory& directory, const RunRow& 
   LogCheck check;
   check.log_file = run.log_file;
   check.ended = run.end_utime.has_value();
+  const KeptTasks kept(directory.path());
+  for (const std::string& task : database.ConfigDigests(run.log_file))
+    std::ranges::move(kept.FindDamage(task), std::back_inserter(check.damaged_tasks));
   const std::vector<LogReference> references = database.References(run.log_file);
   std::vector<Seen> seen(references.size(), Seen::kNot);
   if (directory.Bytes(run.log_file)) {
@@ -83,7 +88,7 @@ void List(std::string& text, const std::vector<std::int64_t>& events, const char
 
 bool LogCheck::whole_log() const {
   if (log != Log::kThere) return log == Log::kDeleted;
-  return changed.empty() && missing.empty() && corruptions == 0 && (cut_bytes == 0 || !ended);
+  return changed.empty() && missing.empty() && damaged_tasks.empty() && corruptions == 0 && (cut_bytes == 0 || !ended);
 }
 
 std::vector<LogCheck> CheckLogs(const std::string& path) {
@@ -116,6 +121,7 @@ std::string ToText(const std::vector<LogCheck>& checks) {
     if (check.log != LogCheck::Log::kThere) continue;
     List(text, check.changed, "changed");
     List(text, check.missing, "missing");
+    for (const std::string& damage : check.damaged_tasks) text += fmt::format("  task: {}\n", Printable(damage));
   }
   const auto faults = std::ranges::count_if(checks, [](const LogCheck& check) { return !check.whole_log(); });
   return text + fmt::format("{} logs, {} not as recorded\n", checks.size(), faults);
@@ -135,6 +141,7 @@ nlohmann::json ToJson(const std::vector<LogCheck>& checks) {
                     {"unchecked", check.unchecked},
                     {"changed", check.changed},
                     {"missing", check.missing},
+                    {"damaged_tasks", check.damaged_tasks},
                     {"damage", {{"places", check.corruptions}, {"bytes", check.skipped_bytes}}},
                     {"cut_bytes", check.cut_bytes}});
   return list;

@@ -24,6 +24,8 @@ struct LogCheck {
   std::int64_t corruptions = 0, skipped_bytes = 0;  ///< Damaged places of the log, and the bytes in them.
   std::int64_t cut_bytes = 0;                       ///< Behind the last whole record.
 
+  std::vector<std::string> damaged_tasks;  ///< One sentence each, of the kept tasks that its decisions name.
+
   /** Nothing is changed, missing but for the quota, or damaged. */
   [[nodiscard]] bool whole_log() const;
 };

@@ -98,6 +98,9 @@ class Database::Statement final {
     sqlite3_bind_text(statement_, ++column_, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT);
   }
   void BindNext(const std::vector<double>& value) { BindNext(nlohmann::json(value).dump()); }
+  void BindNext(const std::array<std::string, kGrounds.size()>& values) {
+    for (const std::string& value : values) BindNext(value);
+  }
   template <class Value>
   void BindNext(const std::optional<Value>& value) {
     if (value) return BindNext(*value);
@@ -114,6 +117,9 @@ class Database::Statement final {
   void ReadNext(std::string& value) {
     const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column_));
     value.assign(text ? text : "", static_cast<std::size_t>(sqlite3_column_bytes(statement_, column_++)));
+  }
+  void ReadNext(std::array<std::string, kGrounds.size()>& values) {
+    for (std::string& value : values) ReadNext(value);
   }
   void ReadNext(std::vector<double>& value) {
     std::string text;
@@ -227,8 +233,7 @@ int Database::Insert(const DecisionRow& row) {
       ->Bind(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime, row.sequence, row.source,
              row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle, row.first_observation,
              row.second_observation, row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
-             row.plan_digest, row.config_digest, row.model_digest, row.declaration_digest, row.observations_digest,
-             row.obstacles_digest, row.event.digest)
+             row.plan_digest, row.grounds, row.event.digest)
       .Run();
 }
 
@@ -346,8 +351,7 @@ Rows Database::Read(const std::string& log_file) {
     decisions.Read(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime, row.sequence, row.source,
                    row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle, row.first_observation,
                    row.second_observation, row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
-                   row.plan_digest, row.config_digest, row.model_digest, row.declaration_digest,
-                   row.observations_digest, row.obstacles_digest, row.event.digest);
+                   row.plan_digest, row.grounds, row.event.digest);
   }
   Statement events(handle_.get(),
                    "SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number");

@@ -1,6 +1,7 @@
 #include "records/interpreter.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
@@ -18,12 +19,12 @@ namespace forereach {
 namespace {
 
 // By which a sender's clock may be ahead.
-constexpr std::int64_t kApartUs = 1'000'000;
+constexpr std::int64_t kMaxAheadUs = 1'000'000;
 
 template <class Message>
-std::optional<Position> PositionOf(Bytes bytes) {
+std::optional<StreamPosition> PositionOf(Bytes bytes) {
   const auto message = Decoded<Message>(bytes);
-  return message ? std::optional(Position{message->sequence, message->utime}) : std::nullopt;
+  return message ? std::optional(StreamPosition{message->sequence, message->utime}) : std::nullopt;
 }
 
 DecisionRow MakeRow(const decision_t& decision, LogReference event) {
@@ -46,11 +47,8 @@ DecisionRow MakeRow(const decision_t& decision, LogReference event) {
   row.threshold = decision.threshold;
   row.elapsed_us = decision.elapsed_us;
   row.plan_digest = ToHex(GetDigest(decision.plan_digest));
-  row.config_digest = ToHex(GetDigest(decision.config_digest));
-  row.model_digest = ToHex(GetDigest(decision.model_digest));
-  row.declaration_digest = ToHex(GetDigest(decision.declaration_digest));
-  row.observations_digest = ToHex(GetDigest(decision.observations_digest));
-  row.obstacles_digest = ToHex(GetDigest(decision.obstacles_digest));
+  const Grounds grounds = GroundsOf(decision);
+  for (std::size_t i = 0; i < kGrounds.size(); ++i) row.grounds[i] = ToHex(grounds.*kGrounds[i].member);
   return row;
 }
 
@@ -74,12 +72,12 @@ EventRow MakeRow(const execution_event_t& event, LogReference reference) {
 Interpreter::Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys)
     : channels_(std::move(channels)), log_file_(std::move(log_file)), authenticator_(channels_, std::move(keys)) {}
 
-std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
+std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std::string& channel, Bytes bytes) const {
   const Stream plain{channel, ""};
   if (channel == channels_.candidate) {
     const auto candidate = Decoded<candidate_plan_t>(bytes);
     if (!candidate) return {plain, std::nullopt};
-    return {Stream{channel, GetText(candidate->source)}, Position{candidate->sequence, candidate->utime}};
+    return {Stream{channel, GetText(candidate->source)}, StreamPosition{candidate->sequence, candidate->utime}};
   }
   if (channel == channels_.decision) return {plain, PositionOf<decision_t>(bytes)};
   if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
@@ -88,7 +86,7 @@ std::pair<Stream, std::optional<Position>> Interpreter::Identify(const std::stri
   if (channel == channels_.status) {
     const auto heartbeat = ReadHeartbeat(bytes);
     if (!heartbeat || !heartbeat->in_charge) return {plain, std::nullopt};  // a second certifier counts for itself
-    return {plain, Position{heartbeat->sequence, heartbeat->utime}};
+    return {plain, StreamPosition{heartbeat->sequence, heartbeat->utime}};
   }
   if (channel == channels_.fault) return {plain, PositionOf<fault_t>(bytes)};
   if (channel == channels_.event) return {plain, PositionOf<execution_event_t>(bytes)};
@@ -105,8 +103,7 @@ void Interpreter::Observe(const LogEvent& event, Rows& rows) {
     rows.gaps.push_back(std::move(*gap));
   }
   if (event.channel == channels_.candidate) {
-    candidates_.emplace_back(DigestOf(event.message()), event.utime);
-    if (candidates_.size() > kMaxCandidates) candidates_.pop_front();
+    candidates_.Add(DigestOf(event.message()), event.utime);
   } else if (event.channel == channels_.decision) {
     if (const auto decision = Decoded<decision_t>(event.message())) {
       DecisionRow row = MakeRow(*decision, reference());
@@ -124,28 +121,20 @@ void Interpreter::Forgive(const Stream& stream, std::int64_t lost) {
   if (found != streams_.end()) found->second.forgiven += lost;
 }
 
-// 0 is a new beginning whatever its stamp, for the sender's clock may have been set back; but not the last 0 once more.
-bool Interpreter::Count::IsLateOrRepeated(const Position& behind) const {
-  return behind.sequence == 0 ? begun_utime == behind.utime : behind.utime <= newest_utime;
-}
-
 std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
-  auto [stream, position] = Identify(event.channel, event.message());
+  const auto [stream, position] = Identify(event.channel, event.message());
   if (!position || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return std::nullopt;
   Count& count = streams_[stream];
-  if (count.last == position) return std::nullopt;  // the same once more, however stamped
-  count.last = position;
-  // Else a stamp far ahead would be the newest for ever.
-  position->utime = std::min(position->utime, std::min(event.utime, INT64_MAX - kApartUs) + kApartUs);
-  const std::int64_t got = position->sequence, expected = count.next.value_or(got), forgiven = count.forgiven;
-  if (got < expected && count.IsLateOrRepeated(*position)) return std::nullopt;
-  count.newest_utime = count.next && got >= expected ? std::max(count.newest_utime, position->utime) : position->utime;
-  count.next = got < INT64_MAX ? got + 1 : got;
-  count.forgiven = 0;
-  if (got == 0) count.begun_utime = position->utime;
-  if (got == expected) return std::nullopt;
+  const std::optional<StreamPosition> newest = count.order.newest();
+  const std::int64_t horizon = StreamOrder::Horizon(event.utime, kMaxAheadUs);
+  const Succession succession = count.order.Compare(*position, horizon);
+  if (succession == Succession::kLate || succession == Succession::kRepeated) return std::nullopt;
+  count.order.Take(*position, horizon);
+  const std::int64_t got = position->sequence, forgiven = std::exchange(count.forgiven, 0);
+  if (!newest) return std::nullopt;
+  const std::int64_t expected = newest->sequence < INT64_MAX ? newest->sequence + 1 : INT64_MAX;
   GapRow gap{{}, stream.channel, stream.source, expected, got, 0, event.utime, "restart"};
-  if (got > expected) {
+  if (succession == Succession::kNewer) {
     gap.lost = expected < 0 ? 0 : std::max<std::int64_t>(got - expected - forgiven, 0);
     gap.reason = "bus";
     if (gap.lost == 0) return std::nullopt;
@@ -156,11 +145,8 @@ std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
 }
 
 double Interpreter::LatencyUs(const Digest& plan, std::int64_t utime) {
-  const auto found = std::ranges::find(candidates_, plan, &std::pair<Digest, std::int64_t>::first);
-  if (found == candidates_.end()) return kUnknown;
-  const auto latency = static_cast<double>(utime - found->second);
-  candidates_.erase(found);
-  return latency;
+  const std::optional<std::int64_t> received = candidates_.Take(plan);
+  return received ? static_cast<double>(utime - *received) : kUnknown;
 }
 
 }  // namespace forereach

@@ -1,16 +1,14 @@
 /** Turns what the bus carried, in the order of the log, into database rows. No file, no SQL, no clock: the same events
 give the same rows, live and when a log is read again.
 
-Sequence numbers. A message ahead of its stream's count makes a gap "bus". One behind it is late or repeated and makes
-none, unless its sender has begun anew: then its stamp is later than all of the stream, or its sequence is 0. A late
-message that a gap has counted as lost stays counted.
+**Sequence numbers** (StreamOrder). A message ahead of its stream's count makes a gap "bus". A late or repeated one
+makes none. A sender that restarted makes a gap "restart". A late message that a gap has counted as lost stays counted.
 
 With a key, messages that are not authentic (log_authenticator.h) make no rows and do not count. */
 #pragma once
 
 #include <compare>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,9 +17,11 @@ With a key, messages that are not authentic (log_authenticator.h) make no rows a
 #include "bus/authentic.h"
 #include "certifier/task/config.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
 #include "records/log_authenticator.h"
 #include "records/rows.h"
+#include "records/undecided.h"
 
 namespace forereach {
 
@@ -31,19 +31,14 @@ struct Stream {
   auto operator<=>(const Stream&) const = default;
 };
 
-/** A message's own sequence and utime. */
-struct Position {
-  std::int64_t sequence, utime;
-  friend bool operator==(const Position&, const Position&) = default;
-};
-
 class Interpreter final {
  public:
   /** @param keys as LogAuthenticator's. */
   Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys = {});
 
   /** The stream of a message, and its place in it if it is one of a type that counts them. */
-  [[nodiscard]] std::pair<Stream, std::optional<Position>> Identify(const std::string& channel, Bytes bytes) const;
+  [[nodiscard]] std::pair<Stream, std::optional<StreamPosition>> Identify(const std::string& channel,
+                                                                          Bytes bytes) const;
 
   /** The next event is the first of another file, which goes on where this one ends. */
   void Continue(std::string log_file) { log_file_ = std::move(log_file); }
@@ -62,12 +57,8 @@ class Interpreter final {
   static constexpr std::size_t kMaxCandidates = 1024;  // undecided
 
   struct Count {
-    std::optional<std::int64_t> next;
-    std::int64_t forgiven = 0, newest_utime = 0;
-    std::optional<std::int64_t> begun_utime;  // of the last message 0
-    std::optional<Position> last;             // as it was heard
-
-    [[nodiscard]] bool IsLateOrRepeated(const Position& behind) const;
+    StreamOrder order;
+    std::int64_t forgiven = 0;
   };
 
   [[nodiscard]] std::optional<GapRow> CheckSequence(const LogEvent& event);  // without its event
@@ -77,7 +68,7 @@ class Interpreter final {
   std::string log_file_;
   LogAuthenticator authenticator_;
   std::map<Stream, Count> streams_;
-  std::deque<std::pair<Digest, std::int64_t>> candidates_;  // received and not yet decided
+  Undecided<std::int64_t> candidates_{kMaxCandidates};  // when each was received
 };
 
 }  // namespace forereach

@@ -145,7 +145,12 @@ std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Diges
                       (versions.empty() ? "none" : "several") +
                       "; copy the right one to where the task file has it, and "
                       "name the task with --config");
-  const std::string transitions = TransitionsFileOf(directory, versions.front());
+  return Load(ToHex(digest), versions.front());
+}
+
+Config KeptTasks::Load(const std::string& digest, const std::string& version) const {
+  const std::string directory = path_ + "/" + digest, task = directory + "/" + kTask;
+  const std::string transitions = TransitionsFileOf(directory, version);
   NamedFiles instead{transitions, {}};
   for (const std::string& policy : DigestsOfNames(directory, kPolicy, "")) {
     instead.policy = PolicyFileOf(directory, policy);
@@ -153,12 +158,27 @@ std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Diges
       throw ConfigError(instead.policy + ": is damaged: its digest is not its name's");
   }
   Config config = LoadConfig(task, instead);
-  if (config.digest != digest)
+  if (ToHex(config.digest) != digest)
     throw ConfigError(task + ": is damaged: its digest is " + ToHex(config.digest) + ", not its directory's");
-  if (ToHex(config.observations_digest) != versions.front())
+  if (ToHex(config.observations_digest) != version)
     throw ConfigError(transitions + ": is damaged: its digest is " + ToHex(config.observations_digest) +
                       ", not its name's");
   return config;
+}
+
+std::vector<std::string> KeptTasks::FindDamage(const std::string& digest) const {
+  const std::string directory = path_ + "/" + digest, task = directory + "/" + kTask;
+  std::error_code no_path;
+  if (!IsDigest(digest) || !fs::exists(task, no_path)) return {};
+  const std::vector<std::string> versions = DigestsOfNames(directory, kTransitions, kTransitionsEnding);
+  if (versions.empty()) return {task + ": its transitions are not kept next to it"};
+  std::vector<std::string> damage;
+  for (const std::string& version : versions) try {
+      static_cast<void>(Load(digest, version));
+    } catch (const BadInput& error) {
+      damage.emplace_back(error.what());
+    }
+  return damage;
 }
 
 void KeptTasks::Remove(const std::string& digest) const {

@@ -13,6 +13,7 @@ its digest. Keys are not kept. */
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "certifier/task/config.h"
 
@@ -45,10 +46,17 @@ class KeptTasks final {
   is among `observations`. @throws ConfigError if what is kept is damaged, or cannot be told which version it was. */
   [[nodiscard]] std::optional<Config> Find(const Digest& digest, const std::set<Digest>& observations) const;
 
+  /** What is damaged of the kept task of this config digest, in hexadecimal, one sentence for each version of its
+  transitions; nothing if it is whole or is not kept. */
+  [[nodiscard]] std::vector<std::string> FindDamage(const std::string& digest) const;
+
   /** Deletes the task of this config digest, in hexadecimal; anything else is ignored. */
   void Remove(const std::string& digest) const;
 
  private:
+  /** @param digest, version in hexadecimal, of the task file and of its transitions. @throws ConfigError. */
+  [[nodiscard]] Config Load(const std::string& digest, const std::string& version) const;
+
   std::string path_;
 };
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <ostream>
 #include <set>
@@ -16,71 +16,71 @@
 #include "certifier/certify/batch.h"
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/gate/obstacles_in_force.h"
-#include "certifier/gate/transition_message.h"
 #include "certifier/sets/zonogon.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
-#include "records/event_log.h"
 #include "records/json_text.h"
 #include "records/log_tasks.h"
+#include "records/timeline.h"
 
 namespace forereach {
 namespace {
 
-constexpr std::size_t kMaxUndecided = 1024;
 constexpr std::size_t kBatch = 256;
 
-class PictureMaker final {
+class PictureMaker final : public TimelineUser {
  public:
-  /** @param tasks nothing: every decision is of this config. Else those that other makers draw, and the digests of
-  others still are this one's if it `counts_unknown`. */
-  explicit PictureMaker(const Config& config, const std::vector<Config>* tasks = nullptr, bool counts_unknown = true)
-      : digest_(config.digest),
-        tasks_(tasks),
-        counts_unknown_(counts_unknown),
-        channels_(config.bus),
-        certifier_(config.problem),
-        obstacles_(config),
-        learns_(config.gate.learns) {
-    if (certifier_.projection().dim() != 2)
-      throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}",
-                                     certifier_.projection().dim()));
-    const std::vector<double>& goal = config.planner.goal;
-    if (goal.size() == 2) result_.picture.goal = Picture::Circle{{goal[0], goal[1]}, config.planner.goal_radius};
+  explicit PictureMaker(const std::vector<Config>& tasks) : last_(tasks.back()), channels_(tasks.front().bus) {
+    for (const Config& task : tasks)
+      if (const auto dim = task.problem->projection.rows(); dim != 2)
+        throw PictureError(fmt::format("picture: the safety coordinates have to be planar, not of dimension {}", dim));
+    const std::vector<double>& goal = last_.planner.goal;
+    if (goal.size() == 2) result_.picture.goal = Picture::Circle{{goal[0], goal[1]}, last_.planner.goal_radius};
   }
 
-  void Add(const LogEvent& event) {
-    if (event.channel == channels_.candidate) {
-      candidates_.emplace_back(DigestOf(event.message()),
-                               std::vector<std::uint8_t>(event.message().begin(), event.message().end()));
-      if (candidates_.size() > kMaxUndecided) candidates_.pop_front();
-    } else if (event.channel == channels_.decision) {
-      if (const auto decision = Decoded<decision_t>(event.message())) AddDecision(*decision);
-    } else if (event.channel == channels_.obstacles) {
-      ObstaclesInForce after = obstacles_;
-      if (!after.Update(event.message(), event.utime).empty()) return;  // as the gate, but for the time between both
-      if (after.digest() != obstacles_.digest()) CertifyAgain();
-      obstacles_ = std::move(after);
-    } else if (event.channel == channels_.transition) {
-      if (const auto transition = Decoded<transition_t>(event.message()); transition && learns_) Learn(*transition);
-    } else if (event.channel == channels_.robot_state) {
+  void OnStart(const Config& task) override {
+    CertifyAgain();
+    certifier_ = std::make_unique<Certifier>(task.problem);
+  }
+  void OnReload(const Config& task) override { OnStart(task); }
+  void OnObstacles(Bytes, std::int64_t) override { CertifyAgain(); }
+  void OnTransition(const ExecutedTransition& transition, Bytes) override {
+    CertifyAgain();
+    static_cast<void>(certifier_->Learn(transition.z, transition.next));
+  }
+
+  void OnDecision(const RecordedDecision& recorded) override {
+    const decision_t& decision = recorded.decision;
+    const bool is_drawn = decision.outcome == decision_t::CERTIFIED || decision.outcome == decision_t::ABSTAIN_SAFETY;
+    if (!recorded.candidate || !is_drawn) return;
+    const auto candidate = Decoded<candidate_plan_t>(recorded.candidate->bytes);
+    if (!candidate) return;
+    if (!recorded.is_of_known_task) {
+      ++result_.disagreements;
+      return;
+    }
+    obstacles_ = recorded.basis.obstacles;
+    decided_.push_back({*candidate, decision.outcome, decision.step});
+    if (decided_.size() >= kBatch) CertifyAgain();
+  }
+
+  void OnEvent(const LogEvent& event) override {
+    if (event.channel == channels_.robot_state) {
       if (const auto state = Decoded<robot_state_t>(event.message())) AddState(*state);
     } else if (event.channel == channels_.event) {
       if (const auto execution = Decoded<execution_event_t>(event.message())) AddExecution(*execution);
     }
   }
 
-  LogPicture Finish() {
+  LogPicture Finish(const Timeline& timeline) {
     CertifyAgain();
     Picture& picture = result_.picture;
     for (auto& [plan_id, tube] : tubes_)
       for (std::size_t t = 0; t < tube.size(); ++t)
         (executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed : picture.certified)
             .push_back(std::move(tube[t]));
-    for (const Obstacle& obstacle : obstacles_.all()) AddObstacle(obstacle);
+    for (const Obstacle& obstacle : timeline.logged_obstacles()) AddObstacle(obstacle);
     return std::move(result_);
   }
 
@@ -89,32 +89,6 @@ class PictureMaker final {
     candidate_plan_t candidate;
     int outcome, step;
   };
-
-  void AddDecision(const decision_t& decision) {
-    const auto found = std::ranges::find(candidates_, GetDigest(decision.plan_digest),
-                                         &std::pair<Digest, std::vector<std::uint8_t>>::first);
-    if (found == candidates_.end()) return;
-    const auto candidate = Decoded<candidate_plan_t>(found->second);
-    candidates_.erase(found);
-    if (!IsMine(GetDigest(decision.config_digest))) return;
-    const bool certified = decision.outcome == decision_t::CERTIFIED;
-    if (!candidate || (!certified && decision.outcome != decision_t::ABSTAIN_SAFETY)) return;
-    decided_.push_back({*candidate, decision.outcome, decision.step});
-    if (decided_.size() >= kBatch) CertifyAgain();
-  }
-
-  [[nodiscard]] bool IsMine(const Digest& digest) const {
-    if (!tasks_ || digest == digest_) return true;
-    return counts_unknown_ && std::ranges::find(*tasks_, digest, &Config::digest) == tasks_->end();
-  }
-
-  // As the gate did, so that what comes after is decided on with it.
-  void Learn(const transition_t& message) {
-    const ExecutedTransition transition = FromMessage(message, certifier_.problem());
-    if (!transition.refusal.empty()) return;
-    CertifyAgain();
-    static_cast<void>(certifier_.Learn(transition.z, transition.next));
-  }
 
   // All that were decided on under the obstacles in force; leaves out those whose answer is not the recorded one.
   void CertifyAgain() {
@@ -125,7 +99,7 @@ class PictureMaker final {
     for (const Decided& decided : decided_) try {
         const Zonotope initial_set = InitialSetOf(decided.candidate);
         const Plan plan = PlanOf(decided.candidate);
-        certifier_.Require(plan, initial_set, obstacles_.all());
+        certifier_->Require(plan, initial_set, *obstacles_);
         plans.push_back(plan);
         initial_sets.push_back(initial_set);
         asked.push_back(&decided);
@@ -138,7 +112,7 @@ class PictureMaker final {
         outlines[i] = Outlines(tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
     };
     const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
-    (void)CertifyAll(certifier_, plans, initial_sets, obstacles_.all(), threads, draw);
+    (void)CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads, draw);
     for (std::size_t i = 0; i < asked.size(); ++i) {
       if (outlines[i].empty())
         ++result_.disagreements;
@@ -154,15 +128,15 @@ class PictureMaker final {
     std::vector<Picture::Polygon> outlines;
     Zonotope projected;
     for (int t = 0; t <= std::min(last_step, tube.length()); ++t) {
-      certifier_.projection().Enclose(tube.slice(t), tube.half_width(t), projected);
+      certifier_->projection().Enclose(tube.slice(t), tube.half_width(t), projected);
       outlines.push_back(Outline(projected));
     }
     return outlines;
   }
 
   std::optional<Eigen::Vector2d> PositionOf(const double* state, int num_states) const {
-    if (num_states != certifier_.problem().model->num_states()) return std::nullopt;
-    return certifier_.problem().projection * Eigen::Map<const Eigen::VectorXd>(state, num_states);
+    if (num_states != last_.problem->model->num_states()) return std::nullopt;
+    return last_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state, num_states);
   }
 
   void AddState(const robot_state_t& message) {
@@ -213,17 +187,13 @@ class PictureMaker final {
     return hull;
   }
 
-  const Digest digest_;
-  const std::vector<Config>* tasks_;
-  const bool counts_unknown_;
-  BusOptions channels_;
-  Certifier certifier_;
-  ObstaclesInForce obstacles_;
-  const bool learns_;
-  std::vector<Decided> decided_;  // under the obstacles in force, and not yet certified again
-  std::deque<std::pair<Digest, std::vector<std::uint8_t>>> candidates_;  // received and not yet decided
-  std::map<std::int64_t, std::vector<Picture::Polygon>> tubes_;          // of certified plans, by plan_id
-  std::set<std::pair<std::int64_t, int>> executed_;                      // plan_id and step
+  const Config& last_;  // task
+  const BusOptions channels_;
+  std::unique_ptr<Certifier> certifier_;  // as the one of the log was when it decided on those below
+  std::vector<Decided> decided_;          // under the obstacles below, and not yet certified again
+  std::shared_ptr<const std::vector<Obstacle>> obstacles_;
+  std::map<std::int64_t, std::vector<Picture::Polygon>> tubes_;  // of certified plans, by plan_id
+  std::set<std::pair<std::int64_t, int>> executed_;              // plan_id and step
   bool arrived_ = false;
   LogPicture result_;
 };
@@ -265,33 +235,21 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
 }  // namespace
 
 LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config) {
-  PictureMaker maker(config);
-  ForEachEvent(logs, [&maker](const LogEvent& event, const std::string&) { maker.Add(event); });
-  return maker.Finish();
+  return PictureFromLogs(logs, std::vector<Config>{config});
 }
 
 LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
-  if (tasks.size() == 1) return PictureFromLogs(logs, tasks.front());
-  LogPicture all;
-  for (const Config& task : tasks) {
-    const bool is_last = &task == &tasks.back();
-    PictureMaker maker(task, &tasks, is_last);
-    ForEachEvent(logs, [&maker](const LogEvent& event, const std::string&) { maker.Add(event); });
-    LogPicture drawn = maker.Finish();
-    const auto add = [](auto& to, auto& from) { to.insert(to.begin(), from.begin(), from.end()); };
-    add(drawn.picture.certified, all.picture.certified);
-    add(drawn.picture.executed, all.picture.executed);
-    add(drawn.picture.abstained, all.picture.abstained);
-    drawn.disagreements += all.disagreements;
-    all = std::move(drawn);
-  }
-  return all;
+  PictureMaker maker(tasks);
+  Timeline timeline(PointersTo(tasks), maker);
+  timeline.Read(logs, false);
+  return maker.Finish(timeline);
 }
 
 void Report(const ReportOptions& options, std::ostream& out) {
   const std::vector<std::string> files =
       options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
-  const std::vector<Config> tasks = TasksOf(options.logs, options.config);
+  std::vector<Config> tasks = TasksOf(options.logs, options.config);
+  options.key.Override(tasks, options.config);
   const Config& config = tasks.back();
   const Summary summary = SummarizeLogs(options.logs, config);
   LogPicture drawn;

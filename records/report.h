@@ -33,6 +33,7 @@ struct ReportOptions {
   std::string picture;            ///< As PictureFiles takes it; none if empty.
   bool json = false;
   int width = 1200, height = 800;  ///< Pixels.
+  LogKey key = {};                 ///< With a key only authentic messages count.
 };
 
 /** Prints the summary of logs to `out`, as text or as one JSON document, and writes its picture.

@@ -1,10 +1,13 @@
 /** What the database holds of a log, without SQL: made by the interpreter, written and read by the database. */
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
+
+#include "lcmtypes/grounds.h"
 
 #include "lcmtypes/stream_order.h"
 
@@ -28,7 +31,8 @@ struct DecisionRow {
   double margin = kUnknown, threshold = kUnknown, elapsed_us = kUnknown;
   /** From the candidate's receipt to the decision's, both at the logger; unknown without a candidate in the log. */
   double latency_us = kUnknown;
-  std::string plan_digest, config_digest, model_digest, declaration_digest, observations_digest, obstacles_digest;
+  std::string plan_digest;
+  std::array<std::string, kGrounds.size()> grounds;  ///< In the order of kGrounds.
 };
 
 /** An execution_event_t in words. */

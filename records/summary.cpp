@@ -8,6 +8,8 @@
 
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/printable.h"
+#include "records/log_authenticator.h"
+#include "records/timeline.h"
 
 namespace forereach {
 namespace {
@@ -75,6 +77,8 @@ std::string ToText(const Summary& summary) {
   line("senders restarted", std::to_string(summary.restarts));
   if (summary.corruptions > 0)
     line("damage in the log", fmt::format("{} places, {} bytes skipped", summary.corruptions, summary.skipped_bytes));
+  if (const std::string refused = DescribeRefusals(summary.passed_over.not_authentic); !refused.empty())
+    line("not authentic", refused + ", passed over");
   line("duration", fmt::format("{:.1f} s", summary.duration_s));
   return text;
 }
@@ -101,6 +105,7 @@ nlohmann::json ToJson(const Summary& summary) {
   json["backlog"] = summary.backlog;
   json["restarts"] = summary.restarts;
   json["damage"] = {{"places", summary.corruptions}, {"bytes", summary.skipped_bytes}};
+  json["passed_over"] = ToJson(summary.passed_over);
   json["duration_s"] = summary.duration_s;
   return json;
 }
@@ -186,6 +191,8 @@ void SummaryBuilder::Add(const LogDamage& damage) {
   summary_.skipped_bytes += damage.bytes;
 }
 
+void SummaryBuilder::Add(const PassedOver& passed_over) { summary_.passed_over = passed_over; }
+
 Summary SummaryBuilder::Finish() const {
   Summary summary = summary_;
   if (summary.proposed == 0) summary.proposed = summary.decided;
@@ -201,22 +208,37 @@ Summary SummaryBuilder::Finish() const {
   return summary;
 }
 
-Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config) {
-  Interpreter interpreter(config.bus, "");
-  SummaryBuilder builder(config);
-  builder.Add(ForEachEvent(logs, [&](const LogEvent& event, const std::string&) {
-    Rows rows;
-    interpreter.Observe(event, rows);
-    builder.Add(event);
-    builder.Add(rows);
-  }));
-  return builder.Finish();
-}
+namespace {
 
-Summary SummarizeDatabase(Database& database, const std::string& log_file, const Config& config) {
-  SummaryBuilder builder(config);
-  builder.Add(database.Read(log_file));
-  return builder.Finish();
+class Summarizer final : public TimelineUser {
+ public:
+  explicit Summarizer(const Config& config) : interpreter_(config.bus, ""), builder_(config) {}
+
+  void OnEvent(const LogEvent& event) override {
+    Rows rows;
+    interpreter_.Observe(event, rows);
+    builder_.Add(event);
+    builder_.Add(rows);
+  }
+
+  Summary Finish(const Timeline& timeline) {
+    builder_.Add(timeline.damage());
+    builder_.Add(timeline.passed_over());
+    return builder_.Finish();
+  }
+
+ private:
+  Interpreter interpreter_;  // the timeline has looked at the key
+  SummaryBuilder builder_;
+};
+
+}  // namespace
+
+Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config) {
+  Summarizer summarizer(config);
+  Timeline timeline({&config}, summarizer);
+  timeline.Read(logs, false);
+  return summarizer.Finish(timeline);
 }
 
 }  // namespace forereach

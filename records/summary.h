@@ -14,6 +14,7 @@
 #include "records/database.h"
 #include "records/event_log.h"
 #include "records/interpreter.h"
+#include "records/log_trust.h"
 
 namespace forereach {
 
@@ -49,6 +50,7 @@ struct Summary {
   std::int64_t backlog = 0;                         ///< Discarded by the bus before the logger took them, see rows.h.
   std::int64_t restarts = 0;                        ///< Restarts of senders.
   std::int64_t corruptions = 0, skipped_bytes = 0;  ///< Damaged places of the log, and the bytes in them.
+  PassedOver passed_over;                           ///< Messages of the log that count for nothing above.
 };
 
 /** Aligned lines for a person, each ended by a newline. */
@@ -70,6 +72,7 @@ class SummaryBuilder final {
   void Add(const GapRow& row);
   void Add(const Rows& rows);
   void Add(const LogDamage& damage);
+  void Add(const PassedOver& passed_over);
 
   [[nodiscard]] Summary Finish() const;
 
@@ -95,10 +98,8 @@ class SummaryBuilder final {
   std::vector<double> state_;
 };
 
-/** Of logs that follow one another, as the files of one run do. @throws LogError if one cannot be read. Damage is
-passed over and counted. Cost: linear in the logs. */
+/** Of logs that follow one another, as the files of one run do. With bus.key only authentic messages count. Damage is
+passed over and counted. Cost: linear in the logs. @throws LogError if a log cannot be read, KeyError if the key cannot.
+*/
 [[nodiscard]] Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config);
-/** Of one log file's rows, or of all for an empty name. @throws DatabaseError. */
-[[nodiscard]] Summary SummarizeDatabase(Database& database, const std::string& log_file, const Config& config);
-
 }  // namespace forereach

@@ -1,10 +1,14 @@
 #include "records/check.h"
 
+#include <algorithm>
+#include <cctype>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "records/database.h"
 #include "records/interpreter.h"
+#include "records/kept_tasks.h"
 #include "tests/records/logs.h"
 
 namespace forereach {
@@ -107,6 +111,30 @@ TEST_F(CheckTest, WithoutADatabaseItSaysSoAndMakesNone) {
   EXPECT_THROW((void)CheckLogs(empty.path()), BadInput);
   EXPECT_THROW((void)CheckLogs(empty / "none"), BadInput);
   EXPECT_FALSE(std::filesystem::exists(empty / "none"));
+}
+
+TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
+  const Config task = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  KeptTasks(scratch_.path()).Keep(CopyTask(task));
+  Rows rows;
+  DecisionRow& row = rows.decisions.emplace_back();
+  row.event = {"a.lcmlog", 0, ""};
+  row.grounds[0] = ToHex(task.digest);
+  ASSERT_EQ(database_.Write(rows, "a.lcmlog", 5), 1);
+  EXPECT_TRUE(Check().whole_log());
+  const std::string transitions =
+      KeptTasks(scratch_.path()).PathOf(task.digest) + "/transitions-" + ToHex(task.observations_digest) + ".csv";
+  std::vector<std::uint8_t> bytes = ReadBytes(transitions);
+  const auto header_end = std::ranges::find(bytes, '\n');
+  const auto digit = std::find_if(header_end, bytes.end(), [](std::uint8_t byte) { return std::isdigit(byte); });
+  ASSERT_NE(digit, bytes.end());
+  *digit = *digit == '1' ? '2' : '1';
+  WriteBytes(transitions, bytes);
+  const LogCheck check = Check();
+  EXPECT_FALSE(check.whole_log());
+  ASSERT_EQ(check.damaged_tasks.size(), 1u);
+  EXPECT_THAT(ToText({check}), HasSubstr("  task: "));
+  EXPECT_EQ(ToJson({check})[0]["damaged_tasks"].size(), 1u);
 }
 
 }  // namespace

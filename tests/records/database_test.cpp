@@ -203,7 +203,7 @@ TEST(Database, BringsVersion1UpToDate) {
   const Rows rows = database.Read();
   ASSERT_EQ(rows.decisions.size(), 1u);
   EXPECT_EQ(rows.decisions[0].plan_id, 5);
-  EXPECT_EQ(rows.decisions[0].obstacles_digest, "os");
+  EXPECT_EQ(rows.decisions[0].grounds[4], "os");
   EXPECT_EQ(rows.decisions[0].event.digest, "") << "nobody knows it any more";
   ASSERT_EQ(rows.events.size(), 1u);
   EXPECT_EQ(rows.events[0].state, std::vector<double>{1});

@@ -1,0 +1,259 @@
+#include "records/timeline.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "certifier/task/grounds.h"
+#include "certifier/task/key.h"
+#include "lcmtypes/heartbeat.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kMaxAheadUs = 1'000'000;  // by which a sender's clock may be ahead of the logger's
+
+// How many entries at the front of `ahead` were taken before a decision: see "Grounds".
+template <class Ahead, class DigestOfEntry>
+std::ptrdiff_t CountTaken(const Ahead& ahead, const Digest& now, const Digest& named, std::int64_t candidate_place,
+                          DigestOfEntry digest_of) {
+  if (now == named) return 0;
+  const auto same = std::ranges::find(ahead, named, digest_of);
+  if (same != ahead.end()) return same - ahead.begin() + 1;
+  return std::ranges::count_if(ahead, [&](const auto& entry) { return entry.place < candidate_place; });
+}
+
+}  // namespace
+
+std::vector<const Config*> PointersTo(const std::vector<Config>& tasks) {
+  std::vector<const Config*> pointers;
+  for (const Config& task : tasks) pointers.push_back(&task);
+  return pointers;
+}
+
+Timeline::Timeline(std::vector<const Config*> tasks, TimelineUser& user)
+    : user_(user),
+      channels_(tasks.front()->bus),
+      authenticator_(channels_, PublicKeysOf(channels_)),
+      now_(tasks.front()),
+      logged_obstacles_(*now_) {
+  SetTasks(std::move(tasks));
+}
+
+void Timeline::SetTasks(std::vector<const Config*> tasks) {
+  tasks_ = std::move(tasks);
+  for (const Config* task : tasks_) learned_.try_emplace(task);
+  if (std::ranges::find(tasks_, now_) != tasks_.end()) return;
+  now_ = tasks_.front();
+  has_begun_ = false;
+}
+
+void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
+  if (!has_begun_) Start();
+  const LogDamage damage = ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
+    const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
+    Take(event, file + "event " + std::to_string(event.number));
+  });
+  damage_.places += damage.places;
+  damage_.bytes += damage.bytes;
+}
+
+void Timeline::Take(const LogEvent& event, const std::string& name) {
+  if (!authenticator_.IsAuthentic(event)) return;
+  ++place_;
+  user_.OnEvent(event);
+  if (event.channel == channels_.candidate) {
+    ++candidates_;
+    undecided_.Add(DigestOf(event.message()), {{event.message().begin(), event.message().end()}, name, place_});
+  } else if (event.channel == channels_.decision) {
+    TakeDecision(event, name);
+  } else if (event.channel == channels_.certified) {
+    TakeCertified(event, name);
+  } else if (event.channel == channels_.status) {
+    TakeStatus(event);
+  } else if (event.channel == channels_.obstacles) {
+    TakeObstacles(event);
+  } else if (event.channel == channels_.transition) {
+    TakeTransition(event);
+  }
+}
+
+// ---- Starts and reloads.
+
+Timeline::Told Timeline::Heed(Count& count, const StreamPosition& message, const LogEvent& event) {
+  const std::int64_t horizon = StreamOrder::Horizon(event.utime, kMaxAheadUs);
+  const bool is_first = !count.order.newest();
+  const Succession succession = count.order.Compare(message, horizon);
+  if (succession == Succession::kLate || succession == Succession::kRepeated) return Told::kOld;
+  count.order.Take(message, horizon);
+  if (is_first) count.starts = starts_;
+  if (succession == Succession::kNewer) return Told::kGoesOn;
+  const bool was_told = count.starts < starts_;
+  if (!was_told) ++starts_;
+  count.starts = starts_;
+  return was_told ? Told::kFollows : Told::kStarts;
+}
+
+void Timeline::TakeStatus(const LogEvent& event) {
+  const auto status = ReadHeartbeat(event.message());
+  if (!status || !status->in_charge) return;
+  const bool is_first = !heartbeats_.order.newest();
+  Told told = Heed(heartbeats_, {status->sequence, status->utime}, event);
+  if (told == Told::kOld) return;
+  if (is_first && status->sequence == 0 && starts_ == 0) {
+    heartbeats_.starts = ++starts_;
+    told = Told::kStarts;
+  }
+  const bool is_reload =
+      std::exchange(version_, status->version) != status->version && !is_first && told == Told::kGoesOn;
+  if (told != Told::kStarts && !is_reload) return;
+  const bool is_known = std::exchange(reloaded_ahead_, false) && now_->digest == status->config_digest;
+  if (const Config* task = TaskOf(status->config_digest)) now_ = task;
+  if (told == Told::kStarts)
+    Start();
+  else if (!is_known)
+    Reload();
+}
+
+const Config* Timeline::TaskOf(const Digest& config) const {
+  if (tasks_.size() == 1) return tasks_.front();
+  const auto found = std::ranges::find(tasks_, config, [](const Config* task) { return task->digest; });
+  return found == tasks_.end() ? nullptr : *found;
+}
+
+void Timeline::Start() {
+  has_begun_ = true;
+  obstacles_ahead_.clear();
+  transitions_ahead_.clear();
+  logged_obstacles_ = ObstaclesInForce(*now_);
+  obstacles_digest_ = logged_obstacles_.digest();
+  obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
+  logged_observations_ = observations_digest_ = now_->observations_digest;
+  learned_begin_ = learned_.at(now_).size();
+  user_.OnStart(*now_);
+}
+
+void Timeline::Reload() {
+  while (!obstacles_ahead_.empty()) TakeNextObstacles();
+  transitions_ahead_.clear();
+  ObstaclesInForce after(*now_);
+  after.Inherit(logged_obstacles_);
+  logged_obstacles_ = std::move(after);
+  obstacles_digest_ = logged_obstacles_.digest();
+  obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
+  logged_observations_ = observations_digest_ = now_->observations_digest;
+  learned_begin_ = learned_.at(now_).size();
+  user_.OnReload(*now_);
+}
+
+// A decision may tell of a reload before a heartbeat does.
+void Timeline::FollowReload(const Config& task) {
+  if (&task == now_) return;
+  now_ = &task;
+  Reload();
+  reloaded_ahead_ = true;
+}
+
+// ---- What the certifier has heard.
+
+void Timeline::TakeObstacles(const LogEvent& event) {
+  ObstaclesInForce after = logged_obstacles_;
+  if (!after.Update(event.message(), event.utime).empty()) return;
+  const bool is_another_set = after.digest() != logged_obstacles_.digest();  // one set is sent again and again
+  logged_obstacles_ = std::move(after);
+  if (!is_another_set) return;
+  obstacles_ahead_.push_back(
+      {place_, event.utime, {event.message().begin(), event.message().end()}, logged_obstacles_});
+}
+
+void Timeline::TakeTransition(const LogEvent& event) {
+  const auto message = Decoded<transition_t>(event.message());
+  if (!now_->gate.learns || !message) return;
+  ExecutedTransition transition = FromMessage(*message, *now_->problem);
+  if (!transition.refusal.empty()) return;
+  logged_observations_ = ChainedDigest(logged_observations_, event.message());
+  transitions_ahead_.push_back(
+      {place_, std::move(transition), {event.message().begin(), event.message().end()}, logged_observations_});
+}
+
+void Timeline::TakeNextObstacles() {
+  const ObstaclesChange change = std::move(obstacles_ahead_.front());
+  obstacles_ahead_.pop_front();
+  obstacles_digest_ = change.after.digest();
+  obstacles_ = std::make_shared<const std::vector<Obstacle>>(change.after.all());
+  user_.OnObstacles(change.bytes, change.utime);
+}
+
+void Timeline::LearnNext() {
+  Transition next = std::move(transitions_ahead_.front());
+  transitions_ahead_.pop_front();
+  observations_digest_ = next.after;
+  user_.OnTransition(next.transition, next.bytes);
+  learned_.at(now_).push_back(std::move(next.transition));
+}
+
+// ---- Decisions.
+
+Basis Timeline::Current() const {
+  Grounds grounds = GroundsOf(*now_);
+  grounds.observations = observations_digest_;
+  grounds.obstacles = obstacles_digest_;
+  return {now_, grounds, obstacles_, learned_begin_, learned_.at(now_).size()};
+}
+
+Basis Timeline::Advance(const Grounds& named, std::int64_t candidate_place) {
+  for (auto left = CountTaken(obstacles_ahead_, obstacles_digest_, named.obstacles, candidate_place,
+                              [](const ObstaclesChange& change) { return change.after.digest(); });
+       left > 0; --left)
+    TakeNextObstacles();
+  for (auto left = CountTaken(transitions_ahead_, observations_digest_, named.observations, candidate_place,
+                              &Transition::after);
+       left > 0; --left)
+    LearnNext();
+  return Current();
+}
+
+void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
+  const auto decision = Decoded<decision_t>(event.message());
+  if (!decision) return;
+  if (Heed(decisions_, {decision->sequence, decision->utime}, event) == Told::kStarts) Start();
+  const Digest plan = GetDigest(decision->plan_digest);
+  RecordedDecision recorded{*decision, name, undecided_.Take(plan), true, {}};
+  const Config* task = TaskOf(GetDigest(decision->config_digest));
+  recorded.is_of_known_task = task != nullptr;
+  if (task) FollowReload(*task);
+  recorded.basis =
+      task ? Advance(GroundsOf(*decision), recorded.candidate ? recorded.candidate->place : -1) : Current();
+  if (recorded.candidate && decision->outcome == decision_t::CERTIFIED)
+    decided_.insert_or_assign(plan, Decided{recorded.basis, true});
+  else
+    decided_.try_emplace(plan, Decided{recorded.basis, recorded.candidate.has_value()});
+  user_.OnDecision(recorded);
+}
+
+void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
+  const auto certified = Decoded<certified_plan_t>(event.message());
+  if (!certified) {
+    ++undecodable_;
+    return;
+  }
+  if (Heed(certified_, {certified->sequence, certified->utime}, event) == Told::kStarts) Start();
+  const Digest plan = DigestOf(Encode(certified->plan));
+  const Grounds named = GroundsOf(*certified);
+  const Config* task = TaskOf(named.config);
+  RecordedPlan recorded{*certified, name, false, task != nullptr, {}};
+  const RecordedCandidate* const waiting = undecided_.Find(plan);
+  const auto decided = decided_.find(plan);
+  recorded.has_candidate = waiting || (decided != decided_.end() && decided->second.has_candidate);
+  if (decided != decided_.end() && !waiting) {
+    recorded.basis = decided->second.basis;
+  } else if (task) {
+    FollowReload(*task);
+    recorded.basis = Advance(named, waiting ? waiting->place : -1);
+  } else {
+    recorded.basis = Current();
+  }
+  user_.OnCertified(recorded);
+}
+
+}  // namespace forereach

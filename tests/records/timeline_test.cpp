@@ -1,0 +1,265 @@
+// A recorded run is read in one way: verify, replay, report and the timeline itself agree on the grounds of decisions.
+#include "records/timeline.h"
+
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/gate.h"
+#include "certifier/gate/obstacle_message.h"
+#include "certifier/task/grounds.h"
+#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/logger_status_t.hpp"
+#include "lcmtypes/names.h"
+#include "records/certificate_files.h"
+#include "records/replay.h"
+#include "records/report.h"
+#include "tests/records/logs.h"
+#include "tests/records/signed_log.h"
+
+namespace forereach {
+namespace {
+
+using testing::IsEmpty;
+
+constexpr std::int64_t kStart = 1'700'000'000'000'000;
+const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+class TimelineTest : public testing::Test {
+ protected:
+  TimelineTest() : config_(LoadConfig(kConfig)), gate_(std::make_unique<Gate>(config_)) {
+    EventLogReader reader(kLog);
+    LogEvent event;
+    while (reader.Next(event) == LogStatus::kEvent) {
+      const auto certified = Decoded<certified_plan_t>(event.data);
+      if (!certified) continue;
+      candidate_ = certified->plan;
+      break;
+    }
+    NextFile();
+  }
+
+  void NextFile() {
+    logs_.push_back(scratch_ / ("events-" + std::to_string(logs_.size()) + ".lcmlog"));
+    writer_ = std::make_unique<EventLogWriter>(logs_.back());
+    logger_status_t status{};  // files of one run have the logger's heartbeats in order
+    status.utime = now_;
+    status.sequence = std::ssize(logs_);
+    Append(config_.bus.logger_status, status);
+  }
+
+  template <class Message>
+  void Append(const std::string& channel, const Message& message) {
+    writer_->Append(now_, channel, Encode(message));
+    ASSERT_TRUE(writer_->Flush());
+  }
+
+  void Heartbeat(std::int64_t sequence, std::int64_t version) {
+    certifier_status_v3_t status{};
+    status.utime = ++now_;
+    status.sequence = sequence;
+    status.version = version;
+    SetDigest(status.config_digest, config_.digest);
+    Append(config_.bus.status, status);
+  }
+
+  // @param is_heard the certifier receives them too.
+  void Obstacles(double x, bool is_heard = true) {
+    obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 1)});
+    message.utime = ++now_;
+    message.sequence = obstacles_++;
+    if (is_heard) {
+      EXPECT_EQ(gate_->UpdateObstacles(Encode(message), now_), "");
+    }
+    Append(config_.bus.obstacles, message);
+  }
+
+  // One of the task's own transitions is seen again.
+  void Transition() {
+    const Transitions& known = config_.problem->transitions;
+    const int n = config_.problem->model->num_states(), m = config_.problem->model->num_inputs();
+    transition_t message{};
+    message.utime = ++now_;
+    message.sequence = transitions_++;
+    message.num_states = static_cast<std::int16_t>(n);
+    message.num_inputs = static_cast<std::int16_t>(m);
+    for (int k = 0; k < n; ++k) message.state[k] = known.z(0, k), message.next_state[k] = known.x_next(0, k);
+    for (int k = 0; k < m; ++k) message.input[k] = known.z(0, n + k);
+    EXPECT_EQ(gate_->Learn(Encode(message)), "");
+    Append(config_.bus.transition, message);
+  }
+
+  // A candidate, its certified plan and its decision, in the order in which the certifier sends them.
+  void Certify() {
+    candidate_.utime = ++now_;
+    candidate_.start_utime = now_ + 100'000;
+    ++candidate_.plan_id;
+    ++candidate_.sequence;
+    Append(config_.bus.candidate, candidate_);
+    const GateAnswer answer = gate_->Decide(Encode(candidate_), ++now_);
+    ASSERT_TRUE(answer.certified) << GetText(answer.decision.message);
+    Append(config_.bus.certified, *answer.certified);
+    Append(config_.bus.decision, answer.decision);
+    ++certified_;
+  }
+
+  void Restart() {
+    gate_ = std::make_unique<Gate>(config_);
+    Heartbeat(0, 1);
+  }
+
+  void Reload(std::int64_t sequence, std::int64_t version) {
+    auto after = std::make_unique<Gate>(config_);
+    after->Inherit(*gate_);
+    gate_ = std::move(after);
+    Heartbeat(sequence, version);
+  }
+
+  // Each user of the timeline finds the grounds that each decision names.
+  void ExpectAllAgree() {
+    class Comparer final : public TimelineUser {
+     public:
+      void OnDecision(const RecordedDecision& recorded) override {
+        ++decisions;
+        EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.decision)) << recorded.event;
+      }
+      void OnCertified(const RecordedPlan& recorded) override {
+        ++plans;
+        EXPECT_TRUE(recorded.has_candidate);
+        EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.certified)) << recorded.event;
+      }
+      int decisions = 0, plans = 0;
+    } comparer;
+    Timeline timeline({&config_}, comparer);
+    timeline.Read(logs_, true);
+    EXPECT_EQ(comparer.decisions, certified_);
+    EXPECT_EQ(comparer.plans, certified_);
+
+    const ReplayResult replayed = Replay(logs_, config_);
+    EXPECT_THAT(replayed.differences, IsEmpty());
+    EXPECT_EQ(replayed.agreed, certified_);
+
+    const CertificateFile file = ReadLogs(logs_, kConfig);
+    ASSERT_EQ(std::ssize(file.certificates), certified_);
+    const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
+    for (const RecordedCertificate& certificate : file.certificates) {
+      EXPECT_THAT(certificate.mismatches, IsEmpty()) << certificate.name << ": " << certificate.mismatches[0].what;
+      EXPECT_EQ(certificate.missing, "");
+      EXPECT_EQ(verifier.Verify(certificate.certificate).status, verifier::Status::kConfirmed) << certificate.name;
+    }
+    EXPECT_EQ(PictureFromLogs(logs_, config_).disagreements, 0);
+  }
+
+  ScratchDirectory scratch_;
+  const Config config_;
+  std::unique_ptr<Gate> gate_;
+  std::vector<std::string> logs_;
+  std::unique_ptr<EventLogWriter> writer_;
+  candidate_plan_t candidate_{};
+  std::int64_t now_ = kStart, obstacles_ = 0, transitions_ = 0;
+  int certified_ = 0;
+};
+
+TEST_F(TimelineTest, ObstaclesThatCameBeforeARestartAreForgottenAlsoWhereNothingWasDecidedBefore) {
+  Heartbeat(7, 1);
+  Obstacles(80);
+  Restart();
+  Certify();
+  ExpectAllAgree();
+}
+
+TEST_F(TimelineTest, AStartThatADecisionTellsOf) {
+  Heartbeat(7, 1);
+  Certify();
+  Certify();
+  Obstacles(80);
+  Certify();
+  gate_ = std::make_unique<Gate>(config_);  // its first heartbeats are lost
+  Certify();
+  Obstacles(60);
+  Certify();
+  Heartbeat(3, 1);
+  Certify();
+  ExpectAllAgree();
+}
+
+TEST_F(TimelineTest, ARunWithSeveralFilesRestartsAndReloads) {
+  Restart();
+  Obstacles(80);
+  Transition();
+  Certify();
+  Reload(1, 2);
+  Certify();
+  Transition();
+  NextFile();
+  Certify();
+  Obstacles(60);
+  Certify();
+  Restart();
+  Certify();
+  Transition();
+  Transition();
+  Obstacles(70);
+  NextFile();
+  Certify();
+  Reload(1, 2);
+  Certify();
+  ExpectAllAgree();
+}
+
+// The log has a message before the decision; the certifier receives it only afterwards.
+TEST_F(TimelineTest, ADecisionWithoutTheLatestObstacles) {
+  Restart();
+  Obstacles(80);
+  Certify();
+  Obstacles(60, false);
+  Certify();
+  Obstacles(70);
+  Certify();
+  ExpectAllAgree();
+}
+
+TEST(ReportWithAKey, ForgedDecisionsArePassedOver) {
+  const ScratchDirectory scratch;
+  const auto [key, honest] = SignedLog(scratch, kLog);
+  const std::string log = scratch / "forged.lcmlog";
+  {
+    EventLogReader reader(honest);
+    EventLogWriter writer(log);
+    bool is_forged = false;
+    for (LogEvent event; reader.Next(event) == LogStatus::kEvent;) {
+      writer.Append(event.utime, event.channel, event.data);
+      auto decision = Decoded<decision_t>(event.message());
+      if (!decision || is_forged) continue;
+      is_forged = true;
+      decision->outcome = decision_t::CERTIFIED;
+      writer.Append(event.utime, event.channel, Encode(*decision));
+    }
+    ASSERT_TRUE(writer.Flush());
+  }
+  const auto report = [&](const std::string& of, const LogKey& by) {
+    std::ostringstream out;
+    ReportOptions options;
+    options.logs = {of};
+    options.config = kConfig;
+    options.json = true;
+    options.key = by;
+    Report(options, out);
+    return nlohmann::json::parse(out.str());
+  };
+  const nlohmann::json recorded = report(kLog, {}), judged = report(log, {key}), believed = report(log, {"", true});
+  EXPECT_EQ(judged["plans"], recorded["plans"]);
+  EXPECT_EQ(judged["messages"], recorded["messages"]);
+  EXPECT_EQ(judged["passed_over"]["not_authentic"]["unsigned"], kUnsigned + 1);
+  EXPECT_EQ(judged["passed_over"]["not_authentic"]["forged"], kForged);
+  EXPECT_EQ(believed["plans"]["decided"], recorded["plans"]["decided"].get<int>() + 1);
+  EXPECT_EQ(believed["passed_over"]["not_authentic"]["unsigned"], 0);
+}
+
+}  // namespace
+}  // namespace forereach
