@@ -220,7 +220,12 @@ TEST(FindExit, NumbersThatAreNoneAreOutside) {
   domain.inequalities = {{Eigen::VectorXd::Ones(kSize), 100}};
   domain.balls = {{{0, 2}, Eigen::Vector2d::Zero(), 50}};
   for (const DomainExit& exit : FindExits(domain, query)) ASSERT_EQ(exit.kind, Kind::kNone);
-  for (std::size_t l = 0; l < kSize; ++l)
+  for (std::size_t l = 0; l < kSize; ++l) {
+    std::vector<Interval> half_known = query.Box();
+    half_known[l].upper = std::nan("");
+    EXPECT_EQ(FindExit(domain, half_known).kind, Kind::kUpper);
+    half_known[l] = {std::nan(""), 0};
+    EXPECT_EQ(FindExit(domain, half_known).kind, Kind::kLower);
     for (const double bad : {std::nan(""), kInfinity, -kInfinity}) {
       Query broken = query;
       broken.center[l] = bad;
@@ -230,6 +235,7 @@ TEST(FindExit, NumbersThatAreNoneAreOutside) {
       broken.half_width[l] = std::abs(bad);
       for (const DomainExit& exit : FindExits(domain, broken)) EXPECT_NE(exit.kind, Kind::kNone);
     }
+  }
 }
 
 }  // namespace

@@ -121,6 +121,24 @@ TEST(FindViolation, DecidesAtTheLastBit) {
   }
 }
 
+// The difference is as large as it may be: however the bound of many terms is rounded, it is no contradiction.
+TEST(TestPair, NoRoundingOfTheBoundMakesAContradiction) {
+  Random random(617);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 5000; ++trial) {
+    const int variables = random.Integer(1, 8);
+    Declaration declaration{random.Matrix(1, variables).cwiseAbs(), random.Vector(1, 1e-3).cwiseAbs()};
+    Observations two{random.Matrix(2, variables), Eigen::MatrixXd::Zero(2, 1), Eigen::MatrixXd::Zero(2, 1)};
+    Rational bound = 2 * Rational(declaration.noise_bound[0]);
+    for (int l = 0; l < variables; ++l)
+      bound += Rational(declaration.lipschitz(0, l)) * abs(Rational(two.z(0, l)) - Rational(two.z(1, l)));
+    two.lower(0, 0) = two.upper(0, 0) = exact::Floor(bound);
+    ASSERT_FALSE(TestPair(declaration, two, 0, 1, 0)) << "trial " << trial;
+    two.lower(0, 0) = two.upper(0, 0) = exact::Ceiling(bound) * (1 + 0x1p-47);
+    ASSERT_TRUE(TestPair(declaration, two, 0, 1, 0)) << "trial " << trial;
+  }
+}
+
 TEST(FindViolation, ConstantCoordinatesDecideAtTheLastBit) {
   EXPECT_FALSE([] {
     const Sample s = TwoPoints(0, 5, 0.5, 0.25);
