@@ -2,6 +2,7 @@
 #include <iostream>
 
 #include "cli/commands.h"
+#include "cli/offline.h"
 #include "records/check.h"
 #include "records/json_text.h"
 
@@ -23,11 +24,8 @@ int RunCheckLog(const Options& options) {
 
 Command CheckLogCommand() {
   const auto options = std::make_shared<Options>();
-  return {.name = "check-log",
-          .purpose =
-              "Hold a logger's directory against itself: exit 0 if every event that a row of the database comes "
-              "from is in its log unchanged and no log is damaged or unknown to it, else 1; logs deleted for "
-              "the quota are no fault",
+  return {.name = kCheckLog.name,
+          .purpose = kCheckLog.purpose,
           .footer = "Example:\n  forereach check-log run/log",
           .options = {{.name = "directory",
                        .variable = &options->directory,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "command_line/command_line.h"
 
@@ -39,5 +40,8 @@ inline constexpr const char* kTaskOfLogs =
 [[nodiscard]] Command ResetCommand();
 [[nodiscard]] Command ReloadCommand();
 [[nodiscard]] Command KeygenCommand();
+
+/** Runs the one of the commands that the command line chooses. @return the program's exit code. */
+[[nodiscard]] int RunCommands(std::vector<Command> commands, int argc, char** argv);
 
 }  // namespace forereach

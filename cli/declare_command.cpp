@@ -14,6 +14,7 @@
 #include "certifier/numerics/text.h"
 #include "cli/commands.h"
 #include "cli/cover_file.h"
+#include "cli/offline.h"
 #include "cli/progress.h"
 
 namespace forereach {
@@ -290,11 +291,8 @@ int CheckCover(const Options& options) {
 Command DeclareCommand() {
   const auto options = std::make_shared<Options>();
   return {
-      .name = "declare",
-      .purpose =
-          "Bound how fast an analytic residual changes, over the whole domain and all its parameters: a "
-          "declaration that is proved. Exit 0 if every bound is within --gap of a point found, 1 if --max-boxes "
-          "came first, 2 bad input",
+      .name = kDeclare.name,
+      .purpose = kDeclare.purpose,
       .footer =
           "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
           "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"

@@ -1,24 +1,39 @@
-#include <algorithm>
-#include <optional>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
 #include <string>
+#include <utility>
+#include <vector>
 
-#include "certifier/task/process.h"
+#include <unistd.h>
+
 #include "cli/commands.h"
+#include "cli/offline.h"
+
+namespace forereach {
+namespace {
+
+// Becomes forereach-offline; returns only if that cannot be started.
+int RunOffline(char** argv) {
+  const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / FOREREACH_OFFLINE;
+  execv(program.c_str(), argv);
+  std::cerr << "forereach: " << program.lexically_normal().string() << ": " << std::strerror(errno) << std::endl;
+  return 1;
+}
+
+}  // namespace
+}  // namespace forereach
 
 int main(int argc, char** argv) {
   using namespace forereach;
-  std::string chosen;
-  const Command program{
-      .name = "forereach",
-      .purpose = "ForeReach certifies planned control sequences before a robot executes them.",
-      .footer =
-          "Try:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv\n"
-          "  forereach doctor\n  forereach certify --help",
-      .commands = {CertifyCommand(), PlanCommand(), DeclareCommand(), VerifyCommand(), ReplayCommand(), ReportCommand(),
-                   CheckLogCommand(), RunCommand(), ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(),
-                   ResetCommand(), ReloadCommand(), KeygenCommand()},
-      .chosen = &chosen};
-  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
-  SetUpLog("forereach");
-  return Guarded("forereach", std::ranges::find(program.commands, chosen, &Command::name)->run);
+  std::vector<Command> commands{CertifyCommand()};
+  for (const OfflineCommand& each : kOfflineCommands) {
+    if (argc > 1 && std::string(argv[1]) == each.name) return RunOffline(argv);
+    commands.push_back({.name = each.name, .purpose = each.purpose, .run = [argv] { return RunOffline(argv); }});
+  }
+  for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), ResetCommand(),
+                                   ReloadCommand(), KeygenCommand()})
+    commands.push_back(std::move(each));
+  return RunCommands(std::move(commands), argc, argv);
 }

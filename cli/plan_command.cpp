@@ -8,6 +8,7 @@
 #include "certifier/certify/explain.h"
 #include "certifier/task/config.h"
 #include "cli/commands.h"
+#include "cli/offline.h"
 #include "planner_bridge/certified_plan.h"
 
 namespace forereach {
@@ -81,10 +82,8 @@ int MakePlan(const Options& options) {
 
 Command PlanCommand() {
   const auto options = std::make_shared<Options>();
-  return {.name = "plan",
-          .purpose =
-              "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a CSV file, 1 if "
-              "none was found, 2 bad input",
+  return {.name = kPlan.name,
+          .purpose = kPlan.purpose,
           .footer =
               "The task's planner proposes, the task's certifier decides on each candidate. The plan that is "
               "written is certified\n"

@@ -2,6 +2,7 @@
 
 #include "cli/commands.h"
 #include "cli/key_options.h"
+#include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "records/json_text.h"
 #include "records/log_tasks.h"
@@ -53,8 +54,8 @@ int RunReplay(const Options& options) {
 Command ReplayCommand() {
   const auto options = std::make_shared<Options>();
   Command command{
-      .name = "replay",
-      .purpose = "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1",
+      .name = kReplay.name,
+      .purpose = kReplay.purpose,
       .footer =
           "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config "

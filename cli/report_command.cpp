@@ -2,6 +2,7 @@
 
 #include "cli/commands.h"
 #include "cli/key_options.h"
+#include "cli/offline.h"
 #include "records/report.h"
 
 namespace forereach {
@@ -9,8 +10,8 @@ namespace forereach {
 Command ReportCommand() {
   const auto options = std::make_shared<ReportOptions>();
   Command command{
-      .name = "report",
-      .purpose = "Sum up a recorded log, and draw it",
+      .name = kReport.name,
+      .purpose = kReport.purpose,
       .footer = "Example:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo",
       .options = {{.name = "logs", .variable = &options->logs, .type = "LOG", .help = kLogs, .required = true},
                   {.name = "--config", .variable = &options->config, .type = "FILE", .help = kTaskOfLogs},

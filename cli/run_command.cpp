@@ -5,6 +5,7 @@
 #include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
+#include "cli/offline.h"
 #include "logger/logger_node.h"
 #include "planner_bridge/planner_node.h"
 #include "robot/sim_node.h"
@@ -58,10 +59,8 @@ int Run(const Options& options) {
 
 Command RunCommand() {
   const auto options = std::make_shared<Options>();
-  return {.name = "run",
-          .purpose =
-              "Planner, certifier, robot and logger in this one process, on LCM's in-memory bus and a simulated "
-              "clock",
+  return {.name = kRun.name,
+          .purpose = kRun.purpose,
           .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
           .options = {ConfigOption(options->config),
                       {.name = "--directory",

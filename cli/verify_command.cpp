@@ -10,6 +10,7 @@
 #include "certifier/numerics/parallel.h"
 #include "cli/commands.h"
 #include "cli/key_options.h"
+#include "cli/offline.h"
 #include "cli/progress.h"
 #include "lcmtypes/printable.h"
 #include "records/certificate_files.h"
@@ -170,11 +171,8 @@ int Verify(const Options& options) {
 Command VerifyCommand() {
   const auto options = std::make_shared<Options>();
   Command command{
-      .name = "verify",
-      .purpose =
-          "Derive recorded certificates anew, in high precision and with code of its own: exit 0 if there are "
-          "any and all are confirmed, 1 with the first that is not and the first step of it that fails, 2 bad "
-          "input",
+      .name = kVerify.name,
+      .purpose = kVerify.purpose,
       .footer =
           "Each certificate is held against the digests of its inputs, then against a tube derived anew from these: "
           "every\n"

@@ -1,31 +1,19 @@
-# Debian 12's packages, each in docs/dependencies.md. LCM, libsodium, SQLite and cairo have no CMake package,
-# MPFI not even a pkg-config file.
+# Debian 12's packages that more than one directory uses, each in docs/dependencies.md. The others are found where they are
+# used, so that nothing is needed for what is not built.
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(spdlog REQUIRED)
-find_package(dlib REQUIRED)
-pkg_check_modules(LCM REQUIRED IMPORTED_TARGET GLOBAL lcm)
-pkg_check_modules(SODIUM REQUIRED IMPORTED_TARGET GLOBAL libsodium)
-pkg_check_modules(SQLITE REQUIRED IMPORTED_TARGET GLOBAL sqlite3)
-pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET GLOBAL cairo cairo-svg cairo-png)
-pkg_check_modules(CLP REQUIRED IMPORTED_TARGET GLOBAL clp)
-pkg_check_modules(OMPL REQUIRED IMPORTED_TARGET GLOBAL ompl)
-pkg_check_modules(MPFR REQUIRED IMPORTED_TARGET GLOBAL mpfr gmp)
-find_program(LCM_GEN lcm-gen REQUIRED)
 
-# Headers of others are not ours to warn about.
-foreach(target PkgConfig::LCM PkgConfig::SODIUM PkgConfig::SQLITE PkgConfig::CAIRO PkgConfig::CLP PkgConfig::OMPL)
-  get_target_property(directories ${target} INTERFACE_INCLUDE_DIRECTORIES)
+# forereach_pkg_config(NAME module...): the target PkgConfig::NAME, of a package that has no CMake package. Headers of
+# others are not ours to warn about.
+function(forereach_pkg_config name)
+  pkg_check_modules(${name} REQUIRED IMPORTED_TARGET GLOBAL ${ARGN})
+  get_target_property(directories PkgConfig::${name} INTERFACE_INCLUDE_DIRECTORIES)
   if(directories)
-    set_target_properties(${target} PROPERTIES INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${directories}")
+    set_target_properties(PkgConfig::${name} PROPERTIES INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${directories}")
   endif()
-endforeach()
-
-find_path(MPFI_INCLUDE_DIR mpfi.h REQUIRED)
-find_library(MPFI_LIBRARY mpfi REQUIRED)
-add_library(forereach_mpfi INTERFACE IMPORTED GLOBAL)
-target_include_directories(forereach_mpfi SYSTEM INTERFACE ${MPFI_INCLUDE_DIR})
-target_link_libraries(forereach_mpfi INTERFACE ${MPFI_LIBRARY} PkgConfig::MPFR)
+endfunction()
+forereach_pkg_config(LCM lcm)
+forereach_pkg_config(SODIUM libsodium)

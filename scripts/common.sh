@@ -3,17 +3,45 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 
-say() { printf '\n\033[1m== %s\033[0m\n' "$*"; }
+say() { printf '\n\033[1m== %s\033[0m  (%s)\n' "$*" "$(minutes_and_seconds $SECONDS)"; }
+
+# Since the script began, or of as many seconds.
+minutes_and_seconds() { printf '%d:%02d' $(($1 / 60)) $(($1 % 60)); }
+
+# progress WHAT LOG COMMAND...: runs COMMAND with its output in LOG, and shows one line: WHAT, the last "[n/m]" of the output,
+# and for how long. On a terminal the line is written over each second, elsewhere a new one comes each half minute. If the
+# command fails, shows its output and ends the script.
+progress() {
+  local what=$1 log=$2; shift 2
+  mkdir -p "$(dirname "$log")"
+  "$@" 2>&1 | tee "$log" | show_progress "$what" || { echo; grep -v '^\[[0-9]*/[0-9]*\]' "$log" | tail -n 200; exit 1; } >&2
+}
+show_progress() {
+  local begin=$SECONDS next=$SECONDS line count='' end=$'\n' period=30
+  [[ -t 1 ]] && end=$'\r' period=1
+  while true; do
+    if read -r -t 1 line; then
+      [[ $line =~ ^\[([0-9]+)/([0-9]+)\] ]] && count=" ${BASH_REMATCH[1]} of ${BASH_REMATCH[2]}"
+    else
+      (($? > 128)) || break  # more than 128: nothing came for a second
+    fi
+    ((SECONDS < next)) && continue
+    next=$((SECONDS + period))
+    printf '%s%s, %s   %s' "$what" "$count" "$(minutes_and_seconds $((SECONDS - begin)))" "$end"
+  done
+  printf '%s%s, %s   \n' "$what" "$count" "$(minutes_and_seconds $((SECONDS - begin)))"
+}
 
 # as_root COMMAND...: fails without a word if there is neither root nor sudo that asks nothing.
 as_root() {
   if [[ $(id -u) == 0 ]]; then "$@"; elif command -v sudo >/dev/null; then sudo "$@"; else return 126; fi
 }
 
-# install_packages [FILE...]: those that the files list, by default scripts/packages.txt.
+# install_packages [NAME...]: those of scripts/packages.txt and of scripts/packages-NAME.txt.
 install_packages() {
-  local wanted missing=()
-  mapfile -t wanted < <(grep -hv '^#' "${@:-scripts/packages.txt}")
+  local wanted missing=() files=("${@/#/scripts/packages-}")
+  files=("${files[@]/%/.txt}")
+  mapfile -t wanted < <(sed -s '/^#/d' scripts/packages.txt "${files[@]}" | sort -u)
   for package in "${wanted[@]}"; do
     [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || missing+=("$package")
   done
@@ -21,16 +49,20 @@ install_packages() {
   say "Installing ${#missing[@]} Debian packages"
   local list="apt-get install -y --no-install-recommends ${missing[*]}"
   as_root true || { echo "This needs root. As root, run:  $list" >&2; exit 1; }
-  as_root apt-get update -q
-  as_root env DEBIAN_FRONTEND=noninteractive $list
+  progress "fetching the list of packages" build/apt.log as_root apt-get update -q
+  progress "installing" build/apt.log as_root env DEBIAN_FRONTEND=noninteractive $list
 }
 
-# build PRESET [TARGET...]
+# build PRESET [-DOPTION...] [TARGET...]
 build() {
-  local preset=$1; shift
+  local preset=$1 options=() targets=(); shift
+  for argument; do if [[ $argument == -D* ]]; then options+=("$argument"); else targets+=("$argument"); fi; done
   say "Building ($preset)"
-  cmake --preset "$preset" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON >/dev/null
-  cmake --build --preset "$preset" ${1:+--target "$@"}
+  progress "configuring" "build/$preset/configure.log" cmake --preset "$preset" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON "${options[@]}"
+  progress "building" "build/$preset/build.log" cmake --build --preset "$preset" ${targets[0]:+--target "${targets[@]}"}
 }
+
+# For a build of the programs alone.
+programs_only=(-DFOREREACH_TESTS=OFF -DFOREREACH_EXPERIMENTS=OFF)
 
 bus_is_ready() { "$root/scripts/ready-bus" --check; }

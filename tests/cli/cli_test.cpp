@@ -285,6 +285,15 @@ std::vector<std::string> ExamplesOf(const std::string& help) {
   return examples;
 }
 
+// What a robot's machine runs does not load what only plans, reads or draws.
+TEST(Program, CommandsForARunningSystemLoadNoLibraryOfTheOthers) {
+  const Output libraries = Forereach("--version && ldd '" FOREREACH_PROGRAM "'");
+  ASSERT_EQ(libraries.code, 0) << libraries.text;
+  EXPECT_THAT(libraries.text, testing::HasSubstr("liblcm"));
+  for (const char* library : {"libompl", "libcairo", "libmpfi", "libsqlite3"})
+    EXPECT_THAT(libraries.text, testing::Not(testing::HasSubstr(library)));
+}
+
 // Each example is run as it stands, in a directory that has the repository's config/ and a recorded log under the name
 // that the examples use, too. Not run: what needs a bus, and declare's covers, which take long and have tests of their
 // own.

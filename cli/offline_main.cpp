@@ -1,0 +1,9 @@
+/** forereach-offline: started by `forereach` with the same arguments. */
+#include "cli/commands.h"
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  return RunCommands({PlanCommand(), DeclareCommand(), VerifyCommand(), ReplayCommand(), ReportCommand(),
+                      CheckLogCommand(), RunCommand()},
+                     argc, argv);
+}
