@@ -215,16 +215,17 @@ Command BusCommand(const std::string& name, const std::string& purpose, const st
 }  // namespace
 
 Command StatusCommand() {
-  return BusCommand("status", "Show the certifier's heartbeat: exit 0 if it would certify now, else 1", ShowStatus);
+  return BusCommand("status", "Show the certifier's heartbeat: exit 0 if it would certify now, otherwise 1",
+                    ShowStatus);
 }
 
 Command ResetCommand() {
-  return BusCommand("reset", "Clear a fault that the certifier and the robot have latched",
+  return BusCommand("reset", "Clear the latched fault of the certifier and the robot",
                     [](const Options& options) { return Send(options, command_t::RESET); });
 }
 
 Command ReloadCommand() {
-  return BusCommand("reload", "Have the certifier read its task file again, whole or not at all",
+  return BusCommand("reload", "Make the certifier read its task file again, completely or not at all",
                     [](const Options& options) { return Send(options, command_t::RELOAD); });
 }
 
@@ -233,29 +234,28 @@ Command KeygenCommand() {
     std::string robot, directory;
   };
   const auto options = std::make_shared<Options>();
-  return {
-      .name = "keygen",
-      .purpose = "Make the keys of one robot: a directory with one key file for each role",
-      .footer =
-          "Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or name it under "
-          "bus.key in the task file. On another machine a process needs its own role's file alone, as in\n"
-          "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub holds no secret: report, "
-          "replay and verify judge logs by it.",
-      .options = {{.name = "--robot",
-                   .variable = &options->robot,
-                   .type = "NAME",
-                   .help = "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature",
-                   .required = true},
-                  {.name = "directory",
-                   .variable = &options->directory,
-                   .type = "DIR",
-                   .help = "The new directory",
-                   .required = true}},
-      .run = [options] {
-        MakeKeys(options->robot, options->directory);
-        std::cout << options->directory << std::endl;
-        return 0;
-      }};
+  return {.name = "keygen",
+          .purpose = "Make the keys of one robot: a directory with one key file for each role",
+          .footer =
+              "Example:\n  forereach keygen --robot alpha keys\nThen give --key keys to every process, or set bus.key "
+              "in the task file. On another machine a process needs only its own role's file, as in\n"
+              "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub contains no secret; "
+              "report, replay and verify check logs with it.",
+          .options = {{.name = "--robot",
+                       .variable = &options->robot,
+                       .type = "NAME",
+                       .help = "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature",
+                       .required = true},
+                      {.name = "directory",
+                       .variable = &options->directory,
+                       .type = "DIR",
+                       .help = "The new directory",
+                       .required = true}},
+          .run = [options] {
+            MakeKeys(options->robot, options->directory);
+            std::cout << options->directory << std::endl;
+            return 0;
+          }};
 }
 
 }  // namespace forereach

@@ -66,9 +66,9 @@ Command CertifyCommand() {
                   {.name = "--plan",
                    .variable = &options->plan,
                    .type = "FILE.csv",
-                   .help = "Controls, one row a step (CSV with a header)",
+                   .help = "Controls, one row for each step (CSV with a header)",
                    .required = true},
-                  JsonFlag(options->json, "One JSON document on standard output, and nothing else there")},
+                  JsonFlag(options->json, "Print one JSON document on standard output, and nothing else")},
       .run = [options] { return Certify(*options); }};
 }
 

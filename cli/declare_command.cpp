@@ -99,7 +99,7 @@ void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, 
           " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, or raise --max-boxes "
           "if the box is wide");
     if (std::ranges::all_of(bound.cover.nodes, [](const auto& node) { return node.outside || node.argument >= 0; }))
-      throw ConfigError(config.path + ": domain: its inequalities and balls leave no point of its box");
+      throw ConfigError(config.path + ": domain: no point of its box satisfies its inequalities and balls");
   }
 }
 
@@ -224,7 +224,7 @@ std::vector<Finding> CheckRecord(const CoverFile& file, const Config& config, co
     findings.push_back({verifier::Answer::kNo, std::move(entry), std::move(what)});
   };
   if (file.cover_digest != ToHex(CoverDigest(file.claims)))
-    refute("", "the cover was altered after it was made: its digest is another");
+    refute("", "the cover was altered after it was made: its digest differs");
   if (file.residual_digest != ToHex(ResidualDigest(config)))
     refute("", "the cover was made for another domain, residual or parameters than the task's");
   const std::vector<std::string> names = ArgumentNames(config);
@@ -290,41 +290,40 @@ int CheckCover(const Options& options) {
 
 Command DeclareCommand() {
   const auto options = std::make_shared<Options>();
-  return {
-      .name = kDeclare.name,
-      .purpose = kDeclare.purpose,
-      .footer =
-          "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
-          "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
-          "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
-          "found.\n"
-          "The last line of the output goes into the task file.\n\n"
-          "Examples:\n"
-          "  forereach declare --config config/bicycle.yaml\n"
-          "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
-          "  forereach declare --config config/point_mass.yaml --check cover.json",
-      .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
-                  {.name = "--gap",
-                   .variable = &options->search.gap,
-                   .help = "Ends when no bound is above the largest slope found by more than this part",
-                   .range = Between{1e-12, 1e3}},
-                  {.name = "--max-boxes",
-                   .variable = &options->search.max_boxes,
-                   .help = "Ends here too, for each bound; what it has then holds",
-                   .range = Between{1, 100'000'000}},
-                  {.name = "--cover",
-                   .variable = &options->cover,
-                   .type = "FILE.json",
-                   .help = "Where to leave the proof: the boxes, and a bound for each"},
-                  {.name = "--check",
-                   .variable = &options->check,
-                   .type = "FILE.json",
-                   .help = "Check such a file instead, in 128 bits and with formulas of its own: exit 0 confirmed, 1 "
-                           "not",
-                   .excludes = "--cover"},
-                  JobsOption(options->jobs),
-                  JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
-      .run = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); }};
+  return {.name = kDeclare.name,
+          .purpose = kDeclare.purpose,
+          .footer =
+              "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
+              "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
+              "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
+              "found.\n"
+              "Copy the last line of the output into the task file.\n\n"
+              "Examples:\n"
+              "  forereach declare --config config/bicycle.yaml\n"
+              "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
+              "  forereach declare --config config/point_mass.yaml --check cover.json",
+          .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
+                      {.name = "--gap",
+                       .variable = &options->search.gap,
+                       .help = "Stop when no bound exceeds the largest slope found by more than this fraction",
+                       .range = Between{1e-12, 1e3}},
+                      {.name = "--max-boxes",
+                       .variable = &options->search.max_boxes,
+                       .help = "Stop after this many boxes for each bound; the bound found by then is valid",
+                       .range = Between{1, 100'000'000}},
+                      {.name = "--cover",
+                       .variable = &options->cover,
+                       .type = "FILE.json",
+                       .help = "The file for the proof: the boxes, and a bound for each"},
+                      {.name = "--check",
+                       .variable = &options->check,
+                       .type = "FILE.json",
+                       .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
+                               "confirmed, 1 not confirmed",
+                       .excludes = "--cover"},
+                      JobsOption(options->jobs),
+                      JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
+          .run = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); }};
 }
 
 }  // namespace forereach

@@ -81,16 +81,16 @@ Command ObstaclesCommand() {
   Command command{
       .name = "obstacles",
       .purpose =
-          "Send a task file's obstacles on the bus, again and again, until SIGTERM: stands in for perception. "
-          "SIGHUP reads the file again",
+          "Send a task file's obstacles on the bus repeatedly until SIGTERM, in place of perception. SIGHUP reads the "
+          "file again",
       .footer =
-          "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nA certifier whose task says "
-          "gate.obstacles: bus certifies nothing before it has heard them, nor when they have fallen silent.",
-      .options = {ConfigOption(options->config, "Task file (YAML) that has the obstacles and names the bus"),
+          "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nWith gate.obstacles: bus, a "
+          "certifier certifies nothing before it receives obstacles, and nothing after they stop.",
+      .options = {ConfigOption(options->config, "Task file (YAML) with the obstacles and the bus"),
                   {.name = "--period-ms",
                    .variable = &options->period_ms,
                    .type = "MS",
-                   .help = "From one message to the next; by default a quarter of gate.obstacles_timeout_ms",
+                   .help = "Time from one message to the next; by default a quarter of gate.obstacles_timeout_ms",
                    .range = Between{1, kMaxPeriodMs}}},
       .run = [options] { return Send(*options); }};
   options->bus.AddTo(command.options);

@@ -85,19 +85,19 @@ Command PlanCommand() {
   return {.name = kPlan.name,
           .purpose = kPlan.purpose,
           .footer =
-              "The task's planner proposes, the task's certifier decides on each candidate. The plan that is "
-              "written is certified\n"
-              "and ends in a stop. It goes as far towards the goal as a plan could be certified.\n\n"
+              "The task's planner proposes, and the task's certifier decides on each candidate. The written plan is "
+              "certified\n"
+              "and ends in a stop. It is the longest plan towards the goal that could be certified.\n\n"
               "Example:\n  forereach plan --config config/demo.yaml --out plan.csv",
           .options = {ConfigOption(options->config),
                       {.name = "--out",
                        .variable = &options->out,
                        .type = "FILE.csv",
-                       .help = "Where to write the controls",
+                       .help = "The file for the controls",
                        .required = true},
                       {.name = "--seed",
                        .variable = &options->seed,
-                       .help = "The same seed gives the same plan",
+                       .help = "Equal seeds give equal plans",
                        .range = Between{0, std::numeric_limits<std::uint32_t>::max()}}},
           .run = [options] { return MakePlan(*options); }};
 }

@@ -64,7 +64,7 @@ Command ReplayCommand() {
                   {.name = "--config", .variable = &options->config, .type = "FILE", .help = kTaskOfLogs},
                   {.name = "--other-task",
                    .variable = &options->other_task,
-                   .help = "Put it through the gate of another task, the one of --config: what would it have decided?",
+                   .help = "Replay it through the gate of another task, given by --config, and show its decisions",
                    .needs = "--config"},
                   JsonFlag(options->json)},
       .run = [options] { return RunReplay(*options); }};

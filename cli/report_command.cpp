@@ -18,8 +18,9 @@ Command ReportCommand() {
                   {.name = "--picture",
                    .variable = &options->picture,
                    .type = "FILE",
-                   .help = "Obstacles, tubes and driven path: a .svg, .png or .pdf file; without an ending a .svg "
-                           "and a .png"},
+                   .help =
+                       "Draw obstacles, tubes and driven path into a .svg, .png or .pdf file; without an ending a .svg "
+                       "and a .png"},
                   JsonFlag(options->json)},
       .run = [options] {
         Report(*options, std::cout);

@@ -66,7 +66,7 @@ Command RunCommand() {
                       {.name = "--directory",
                        .variable = &options->directory,
                        .type = "DIR",
-                       .help = "Where the logger writes"},
+                       .help = "The logger's directory"},
                       {.name = "--key",
                        .variable = &options->key,
                        .type = "DIR",

@@ -117,17 +117,18 @@ void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts
 
 // The meaning of "confirmed".
 std::string Extent(const CertificateFile& file) {
-  if (file.certificates.empty()) return "  checked: nothing, for there are no certificates";
+  if (file.certificates.empty()) return "  checked: nothing, because there are no certificates";
   if (file.of_decision)
-    return "  checked: every field of the decision but elapsed_us and capped: digests against the task and its data; "
+    return "  checked: every field of the decision except elapsed_us and capped: digests against the task and its "
+           "data; "
            "hull,\n"
-           "  generators, envelope, remainder, radius and clearance of each slice against a tube derived anew; the "
+           "  generators, envelope, remainder, radius and clearance of each slice against a rederived tube; the "
            "witness\n"
            "  and the sentence against the clearances";
-  return "  checked: of each certified plan its digests, its candidate, the obstacles in force, the hull of each slice "
-         "against\n"
-         "  a tube derived anew, and that this keeps clear of every obstacle; of its decision, where the log has it, "
-         "inputs,\n"
+  return "  checked: for each certified plan its digests, its candidate, the obstacles in force, the hull of each "
+         "slice "
+         "against\n  a rederived tube, and the clearance of this tube from every obstacle; of its decision, if the log "
+         "has it, inputs,\n"
          "  witness, margin and sentence. Not checked: times, sequence numbers, elapsed_us, which step is the closest";
 }
 
@@ -174,9 +175,8 @@ Command VerifyCommand() {
       .name = kVerify.name,
       .purpose = kVerify.purpose,
       .footer =
-          "Each certificate is held against the digests of its inputs, then against a tube derived anew from these: "
-          "every\n"
-          "recorded number has to cover what was derived, and the derived tube has to keep clear of every obstacle.\n"
+          "Each certificate is compared with the digests of its inputs, then with a tube rederived from them: every\n"
+          "recorded set has to contain the derived one, and the derived tube has to stay clear of every obstacle.\n"
           "Abstentions claim nothing and are not verified.\n\n"
           "Examples:\n"
           "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv > "
@@ -184,20 +184,21 @@ Command VerifyCommand() {
           "  forereach verify decision.json\n"
           "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach verify run/log",
-      .options = {{.name = "files",
-                   .variable = &options->files,
-                   .type = "DECISION|LOG|DATABASE|DIRECTORY",
-                   .help = "What holds the certificates: a decision (the output of certify --json), an LCM event log "
-                           "(several if the run was recorded in several, in their order), or a decision database with "
-                           "its logs beside it, or the directory of both",
-                   .required = true},
-                  {.name = "--config",
-                   .variable = &options->config,
-                   .type = "FILE",
-                   .help = "The task file they were made with; by default the one that a decision names, or that the "
-                           "logger kept beside a log, in tasks/"},
-                  JobsOption(options->jobs),
-                  JsonFlag(options->json)},
+      .options =
+          {{.name = "files",
+            .variable = &options->files,
+            .type = "DECISION|LOG|DATABASE|DIRECTORY",
+            .help =
+                "The certificates: a decision (the output of certify --json), an LCM event log (all logs of the run, "
+                "in their order), a decision database with its logs in the same directory, or the directory of both",
+            .required = true},
+           {.name = "--config",
+            .variable = &options->config,
+            .type = "FILE",
+            .help = "The task file of the certificates; by default the one that a decision names, or that the logger "
+                    "kept next to a log, in tasks/"},
+           JobsOption(options->jobs),
+           JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};
   AddKeyOptions(command.options, options->key);
   return command;

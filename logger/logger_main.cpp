@@ -26,5 +26,5 @@ int main(int argc, char** argv) {
                     {{.name = "--directory",
                       .variable = &directory,
                       .type = "DIR",
-                      .help = "Where to write; by default the task file's logger.directory"}});
+                      .help = "The directory of the logs; by default the task file's logger.directory"}});
 }

@@ -127,7 +127,7 @@ TEST_F(DeclareTest, ADomainWithoutAPointIsBadInput) {
                                              "domain:\n  inequalities:\n    - {coefficients: {v: 1}, bound: -1}\n");
   const Output output = Declare();
   EXPECT_EQ(output.code, 2);
-  EXPECT_THAT(output.text, HasSubstr("leave no point"));
+  EXPECT_THAT(output.text, HasSubstr("no point of its box satisfies"));
 }
 
 TEST_F(DeclareTest, CoverIsConfirmed) {
