@@ -7,6 +7,7 @@
 #include "certifier/certify/explain.h"
 #include "certifier/safety/separation.h"
 #include "certifier/sets/zonogon.h"
+#include "certifier/task/grounds.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -137,12 +138,9 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   document["inputs"] = InputsJson(result.controls, config);
   document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles);
   document["digests"] = {{"plan", ToHex(PlanDigest(result.controls, config.initial_set))},
-                         {"tube", ToHex(TubeDigest(document["tube"]))},
-                         {"config", ToHex(config.digest)},
-                         {"model", ToHex(config.model_digest)},
-                         {"declaration", ToHex(config.declaration_digest)},
-                         {"observations", ToHex(config.observations_digest)},
-                         {"obstacles", ToHex(config.obstacles_digest)}};
+                         {"tube", ToHex(TubeDigest(document["tube"]))}};
+  const Grounds grounds = GroundsOf(config);
+  for (const auto& [name, digest] : kGrounds) document["digests"][name] = ToHex(grounds.*digest);
   document["elapsed_us"] = result.elapsed_us;
   return document;
 }

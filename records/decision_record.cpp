@@ -7,6 +7,7 @@
 #include <set>
 
 #include "certifier/certify/explain.h"
+#include "certifier/task/grounds.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "records/decision_json.h"
@@ -169,14 +170,10 @@ class Reading {
     const bool is_box = (set.lower.array() <= set.upper.array()).all();
     const std::string plan =
         is_box ? ToHex(PlanDigest(record_.certificate.controls, Box(set.lower, set.upper))) : "one of a box";
-    const std::array<std::array<std::string, 3>, 7> expected{
-        {{kAltered, "tube", ToHex(TubeDigest(document_["tube"].json()))},
-         {kAltered, "plan", plan},
-         {kOtherInput, "config", ToHex(config_.digest)},
-         {kOtherInput, "model", ToHex(config_.model_digest)},
-         {kOtherInput, "declaration", ToHex(config_.declaration_digest)},
-         {kOtherInput, "observations", ToHex(config_.observations_digest)},
-         {kOtherInput, "obstacles", ToHex(config_.obstacles_digest)}}};
+    std::vector<std::array<std::string, 3>> expected{{kAltered, "tube", ToHex(TubeDigest(document_["tube"].json()))},
+                                                     {kAltered, "plan", plan}};
+    const Grounds grounds = GroundsOf(config_);
+    for (const auto& [name, digest] : kGrounds) expected.push_back({kOtherInput, name, ToHex(grounds.*digest)});
     std::set<std::string> keys;
     for (const auto& [what, name, digest] : expected) {
       keys.insert(name);
