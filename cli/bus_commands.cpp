@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/authentic.h"
+#include "bus/bus_options.h"
 #include "bus/keys.h"
-#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "forereach/certifier_status_v3_t.hpp"

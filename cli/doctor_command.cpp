@@ -18,8 +18,8 @@
 #include <nlohmann/json.hpp>
 
 #include "bus/bus.h"
+#include "bus/bus_options.h"
 #include "bus/udp_receiver.h"
-#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 

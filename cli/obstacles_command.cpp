@@ -4,9 +4,9 @@
 #include <utility>
 
 #include <spdlog/spdlog.h>
+#include "bus/bus_options.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 

@@ -1,8 +1,8 @@
 #include <iostream>
 
+#include "bus/bus_options.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
-#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "cli/offline.h"

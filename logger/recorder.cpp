@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "certifier/task/key.h"
+#include "bus/bus_options.h"
 #include "lcmtypes/heartbeat.h"
 
 namespace forereach {

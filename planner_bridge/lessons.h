@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 #include "certifier/certify/decision.h"
-#include "certifier/task/config.h"
+#include "planner_bridge/planner_options.h"
 
 namespace forereach {
 

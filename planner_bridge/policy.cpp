@@ -10,7 +10,7 @@
 
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/text.h"
-#include "certifier/task/config.h"
+#include "certifier/task/config_error.h"
 #include "certifier/task/files.h"
 #include "certifier/task/json_file.h"
 

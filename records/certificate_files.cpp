@@ -12,6 +12,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "bus/bus_options.h"
 #include "certifier/certify/explain.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/files.h"

@@ -7,7 +7,7 @@ accepts the messages that the robot's processes accepted, and skips the others. 
 #include <utility>
 
 #include "bus/authentic.h"
-#include "certifier/task/config.h"
+#include "bus/bus_options.h"
 #include "records/event_log.h"
 
 namespace forereach {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "bus/bus_options.h"
 #include "certifier/gate/gate.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"

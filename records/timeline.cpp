@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "certifier/task/grounds.h"
-#include "certifier/task/key.h"
+#include "bus/bus_options.h"
 #include "lcmtypes/heartbeat.h"
 
 namespace forereach {

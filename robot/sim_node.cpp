@@ -7,9 +7,9 @@
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
+#include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/numerics/text.h"
-#include "certifier/task/key.h"
 #include "forereach/execution_event_t.hpp"
 
 namespace forereach {

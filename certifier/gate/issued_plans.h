@@ -12,7 +12,7 @@ as long as such a plan may be executing. */
 #include <optional>
 #include <string>
 
-#include "certifier/task/config.h"
+#include "certifier/task/gate_options.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
 

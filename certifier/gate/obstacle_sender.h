@@ -13,7 +13,7 @@ A bus has one sender. A restarted sender begins at sequence 0, which receivers a
 #include <vector>
 
 #include "certifier/safety/obstacle.h"
-#include "certifier/task/config.h"
+#include "certifier/task/gate_options.h"
 #include "forereach/obstacles_t.hpp"
 
 namespace forereach {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "certifier/task/config.h"
+#include "certifier/task/gate_options.h"
 #include "lcmtypes/freshness.h"
 
 namespace forereach {

@@ -2,9 +2,9 @@
 #include <string>
 #include <utility>
 
+#include "bus/realtime.h"
 #include "certifier/process/certifier_node.h"
 #include "certifier/process/latch_file.h"
-#include "certifier/process/realtime.h"
 #include "certifier/task/process.h"
 
 int main(int argc, char** argv) {

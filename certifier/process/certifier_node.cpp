@@ -11,9 +11,9 @@
 #include <sys/resource.h>
 #include <nlohmann/json.hpp>
 
+#include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/process/faults.h"
-#include "certifier/task/key.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {

@@ -5,7 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "certifier/task/key.h"
+#include "bus/bus_options.h"
 
 namespace forereach {
 namespace {

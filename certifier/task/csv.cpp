@@ -7,7 +7,7 @@
 #include <system_error>
 
 #include "certifier/numerics/text.h"
-#include "certifier/task/config.h"
+#include "certifier/task/config_error.h"
 #include "certifier/task/files.h"
 #include "certifier/task/number.h"
 #include "command_line/nearest.h"

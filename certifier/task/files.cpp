@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "certifier/task/config.h"
+#include "certifier/task/config_error.h"
 
 namespace forereach {
 namespace {

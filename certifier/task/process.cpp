@@ -10,7 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "bus/authentic_bus.h"
-#include "certifier/task/key.h"
+#include "bus/bus_options.h"
 #include "certifier/task/reloading.h"
 #include "lcmtypes/printable.h"
 

@@ -133,6 +133,17 @@ TEST_F(IncludesTest, ThePartsOfTheHouse) {
   ExpectRefused();
 }
 
+TEST_F(IncludesTest, OptionsArePlainAndForTheTasksReader) {
+  for (const char* include : {"\"certifier/sets/box.h\"", "\"lcmtypes/codec.h\"", "<Eigen/Core>"})
+    Refuse("robot/robot_options.h", include, "options may include the standard library only");
+  Refuse("certifier/gate/bad.cpp", "\"robot/robot_options.h\"", "certifier may not include robot");
+  ExpectRefused();
+  std::ofstream(root_ / "robot/robot_options.h") << "#include <string>\n";
+  std::ofstream(root_ / "certifier/gate/bad.cpp") << "";
+  Write("certifier/task/config.h", "#include \"robot/robot_options.h\"\n");
+  EXPECT_EQ(CheckIncludes(root_.string()).exit_code, 0);
+}
+
 TEST_F(IncludesTest, GuardAndSupervisorIncludeLcmtypesAndBusOnly) {
   for (const char* file : {"robot/guard.cpp", "robot/supervisor.h"})
     for (const char* include : {"\"certifier/sets/box.h\"", "\"robot/target.h\"", "<Eigen/Core>", "<spdlog/spdlog.h>"})

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "bus/bus_options.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
-#include "certifier/task/key.h"
 #include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"

@@ -1,4 +1,4 @@
-#include "certifier/process/realtime.h"
+#include "bus/realtime.h"
 
 #include <cerrno>
 #include <cstring>
@@ -8,6 +8,8 @@
 #include <sched.h>
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
+
+#include "lcmtypes/bad_input.h"
 
 namespace forereach {
 

@@ -1,4 +1,4 @@
-#include "certifier/task/key.h"
+#include "bus/bus_options.h"
 
 #include <algorithm>
 

@@ -1,0 +1,63 @@
+/** Where a task's messages go, who speaks on which channel, and the keys of its bus. */
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "bus/authentic.h"
+#include "bus/keys.h"
+
+namespace forereach {
+
+struct BusOptions {
+  std::string url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string candidate = "PLAN_CANDIDATE";
+  std::string decision = "PLAN_DECISION";
+  std::string certified = "PLAN_CERTIFIED";
+  std::string robot_state = "ROBOT_STATE";
+  std::string obstacles = "OBSTACLES";
+  std::string transition = "TRANSITION";
+  std::string status = "CERTIFIER_STATUS";
+  std::string event = "EXECUTION_EVENT";
+  std::string logger_status = "LOGGER_STATUS";
+  std::string fault = "FAULT";
+  std::string command = "COMMAND";
+  std::string name;             ///< Of the bus, in every signature; empty: address and port of `url`.
+  std::string key;              ///< Path of a directory of keys or of a key file; empty: messages are not signed.
+  bool key_is_given = false;    ///< On the command line, so the task file does not say which.
+  std::optional<KeyRing> keys;  ///< What `key` held when the process started; nothing: not read yet, or none.
+
+  /** The role that speaks on each channel where there are keys. */
+  [[nodiscard]] Speakers speakers() const {
+    return {{decision, Role::kCertifier}, {certified, Role::kCertifier}, {status, Role::kCertifier},
+            {fault, Role::kCertifier},    {candidate, Role::kPlanner},   {obstacles, Role::kPerception},
+            {robot_state, Role::kRobot},  {transition, Role::kRobot},    {event, Role::kRobot},
+            {command, Role::kOperator},   {logger_status, Role::kLogger}};
+  }
+
+  /** `name`, or address and port of `url`: "239.255.76.67:7667"; "memq" for memq. @throws BusError if `url` is none. */
+  [[nodiscard]] std::string bus_name() const;
+
+  friend bool operator==(const BusOptions&, const BusOptions&) = default;
+};
+
+/** What every process says where its task has no key. */
+inline constexpr const char* kUnsignedWarning = "UNSIGNED: anyone on this network can move this robot";
+
+/** The keys for a program that speaks as `role`: those already read, or what bus.key names; nothing if it names none.
+@throws KeyError if they cannot be used. */
+[[nodiscard]] std::optional<KeyRing> KeysOf(const BusOptions& options, Role role);
+/** The same for one program that is all processes. */
+[[nodiscard]] std::optional<KeyRing> AllKeysOf(const BusOptions& options);
+/** The same for a reader of logs. */
+[[nodiscard]] std::optional<KeyRing> PublicKeysOf(const BusOptions& options);
+
+/** The options with these keys in them. */
+[[nodiscard]] BusOptions WithKeys(BusOptions options, Role role);
+
+/** Why a task file that was read again cannot take the place of the one that a process began with: another key, none,
+or other content of the same. Empty if it can. Reads the keys of `read_again`. @param role that the process speaks as.
+*/
+[[nodiscard]] std::string WhyKeyCannotChange(const BusOptions& in_force, const BusOptions& read_again, Role role);
+
+}  // namespace forereach
