@@ -6,10 +6,12 @@
 #include <sstream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "certifier/declare/slope_bound.h"
+#include "certifier/dynamics/residuals.h"
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
 #include "cli/commands.h"
@@ -29,15 +31,23 @@ struct Options {
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
+// A residual of the model, as a task file may write it. Empty if there is none.
+std::string ExampleFor(const NominalModel& model) {
+  const std::pair<const char*, const char*> examples[] = {
+      {HeadingSaturation::Nominal::kName, "heading_saturation, friction: [0.8, 1.0]"},
+      {VelocityKnee::Nominal::kName, "velocity_knee, damping: [0.38, 0.42]"}};
+  for (const auto& [name, example] : examples)
+    if (model.name() == name) return std::string("; for example  residual: {name: ") + example + "}";
+  return "";
+}
+
 Config LoadWithResidual(const std::string& path) {
   Config config = LoadConfig(path, TransitionsFile::kIgnore);
   if (!config.residual)
     throw ConfigError(path +
                       ":1: residual: missing: its equations by name, with a number or [least, largest] for each "
-                      "parameter that is not the paper's; for example  residual: {name: " +
-                      (config.problem->model->name() == "point_mass" ? "velocity_knee, damping: [0.38, 0.42]"
-                                                                     : "heading_saturation, friction: [0.8, 1.0]") +
-                      "}");
+                      "parameter that is not the paper's" +
+                      ExampleFor(*config.problem->model));
   return config;
 }
 

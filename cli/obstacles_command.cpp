@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <spdlog/spdlog.h>
+
 #include "bus/bus_options.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"

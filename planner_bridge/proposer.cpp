@@ -9,9 +9,11 @@
 namespace forereach {
 
 std::unique_ptr<Proposer> MakeProposer(const Config& config) {
-  if (config.planner.source == "policy")
+  const std::string& source = config.planner.source;
+  if (source == "policy")
     return std::make_unique<PolicyProposer>(config.problem, config.planner, LoadPolicy(config.planner.policy));
-  return std::make_unique<Planner>(config.problem, config.planner, config.obstacles);
+  if (source == "ompl") return std::make_unique<Planner>(config.problem, config.planner, config.obstacles);
+  throw std::invalid_argument("planner.source: " + source + " is not ompl or policy");
 }
 
 void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options) {

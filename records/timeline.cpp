@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "certifier/task/grounds.h"
 #include "bus/bus_options.h"
+#include "certifier/task/grounds.h"
 #include "lcmtypes/heartbeat.h"
 
 namespace forereach {

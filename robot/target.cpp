@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
@@ -50,28 +52,8 @@ class ResidualTarget final : public Target {
   Residual residual_;
 };
 
-struct Parameter {
-  const char* name;
-  double* value;
-};
-
 [[noreturn]] void Fail(const Config& config, const std::string& what) {
   throw ConfigError(config.path + ": robot." + what);
-}
-
-// The first `required` parameters have no default.
-void ReadParameters(const Config& config, const std::vector<Parameter>& parameters, std::size_t required) {
-  const auto& given = config.robot.residual_parameters;
-  for (const auto& [name, value] : given) {
-    const auto same_name = [&name = name](const Parameter& parameter) { return name == parameter.name; };
-    const auto parameter = std::find_if(parameters.begin(), parameters.end(), same_name);
-    if (parameter == parameters.end()) Fail(config, "residual: " + config.robot.residual + " has no parameter " + name);
-    if (!std::isfinite(value)) Fail(config, "residual: parameter " + name + " is not finite");
-    *parameter->value = value;
-  }
-  for (std::size_t i = 0; i < required; ++i)
-    if (!given.contains(parameters[i].name))
-      Fail(config, "residual: " + config.robot.residual + " needs the parameter " + parameters[i].name);
 }
 
 // A target of another step or wheelbase would differ from the nominal model by more than the residual it names.
@@ -82,33 +64,37 @@ void RequireSameModel(const Config& config, const NominalModel& expected) {
                      model.description());
 }
 
-std::unique_ptr<Target> MakeHeadingSaturation(const Config& config) {
-  HeadingSaturation r{};
-  ReadParameters(config,
-                 {{"dt", &r.dt},
-                  {"wheelbase", &r.wheelbase},
-                  {"understeer", &r.understeer},
-                  {"friction", &r.friction},
-                  {"gravity", &r.gravity},
-                  {"gate_temperature", &r.gate_temperature}},
-                 2);
-  RequireSameModel(config, *MakeKinematicBicycle(r.dt, r.wheelbase));
-  return std::make_unique<ResidualTarget<KinematicBicycle, HeadingSaturation>>(KinematicBicycle{r.dt, r.wheelbase}, r);
+std::shared_ptr<const NominalModel> ModelOf(const PointMass& model) { return MakePointMass(model.dt); }
+std::shared_ptr<const NominalModel> ModelOf(const KinematicBicycle& model) {
+  return MakeKinematicBicycle(model.dt, model.wheelbase);
 }
 
-std::unique_ptr<Target> MakeVelocityKnee(const Config& config) {
-  VelocityKnee r{};
-  ReadParameters(config,
-                 {{"dt", &r.dt},
-                  {"damping", &r.damping},
-                  {"cross", &r.cross},
-                  {"knee", &r.knee},
-                  {"softplus_temperature", &r.softplus_temperature},
-                  {"regularizer", &r.regularizer},
-                  {"smoothing", &r.smoothing}},
-                 1);
-  RequireSameModel(config, *MakePointMass(r.dt));
-  return std::make_unique<ResidualTarget<PointMass, VelocityKnee>>(PointMass{r.dt}, r);
+// Parameters that are not given have the residual's own defaults, but for the first, which are the nominal model's.
+template <class Residual>
+auto Parameters(const Config& config) {
+  const auto& given = config.robot.residual_parameters;
+  auto values = Residual{}.parameters();
+  for (const auto& [name, value] : given) {
+    const auto* const known = std::ranges::find(Residual::kParameterNames, name);
+    if (known == Residual::kParameterNames.end())
+      Fail(config, "residual: " + config.robot.residual + " has no parameter " + name);
+    if (!std::isfinite(value)) Fail(config, "residual: parameter " + name + " is not finite");
+    values[static_cast<std::size_t>(known - Residual::kParameterNames.begin())] = value;
+  }
+  for (const char* name : Residual::Nominal::kParameterNames)
+    if (!given.contains(name)) Fail(config, "residual: " + config.robot.residual + " needs the parameter " + name);
+  return values;
+}
+
+template <class Residual>
+std::unique_ptr<Target> MakeResidualTarget(const Config& config) {
+  using Nominal = typename Residual::Nominal;
+  const auto values = Parameters<Residual>(config);
+  const auto residual = std::apply([](auto... all) { return Residual{all...}; }, values);
+  const auto nominal = [&]<std::size_t... i>(std::index_sequence<i...>) { return Nominal{values[i]...}; }
+  (std::make_index_sequence<Nominal::kParameterNames.size()>());
+  RequireSameModel(config, *ModelOf(nominal));
+  return std::make_unique<ResidualTarget<Nominal, Residual>>(nominal, residual);
 }
 
 // std::uniform_real_distribution differs between libraries; this does not.
@@ -158,8 +144,8 @@ std::vector<double> SampleInside(const Domain& domain, const Bounds& bounds, std
 
 std::unique_ptr<Target> MakeTarget(const Config& config) {
   const std::string& residual = config.robot.residual;
-  if (residual == HeadingSaturation::kName) return MakeHeadingSaturation(config);
-  if (residual == VelocityKnee::kName) return MakeVelocityKnee(config);
+  if (residual == HeadingSaturation::kName) return MakeResidualTarget<HeadingSaturation>(config);
+  if (residual == VelocityKnee::kName) return MakeResidualTarget<VelocityKnee>(config);
   if (residual == "none") return std::make_unique<NominalTarget>(config.problem->model);
   Fail(config, "residual: " + residual + " is not none, heading_saturation or velocity_knee");
 }

@@ -12,7 +12,8 @@
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
-#include "certifier/task/config.h"
+#include "certifier/task/config_error.h"
+#include "certifier/task/draft.h"
 #include "certifier/task/files.h"
 #include "certifier/task/number.h"
 #include "command_line/nearest.h"
@@ -161,13 +162,19 @@ std::string Correction(const std::string& token, const Key& row) {
 
 class Checker {
  public:
-  Checker(const std::string& path, const SchemaScope& scope, Values& values)
-      : path_(path), scope_(scope), values_(values) {}
+  Checker(const std::string& path, const SchemaScope& scope, const Document::Visitor& visit, Values& values)
+      : path_(path), scope_(scope), visit_(visit), values_(values) {}
 
   // `pattern` is the path in the schema, `key` the same with names and indices filled in.
   void Check(const YAML::Node& node, const std::string& pattern, const std::string& key) {
     const Key& row = RowFor(node, pattern, key);
     values_.insert_or_assign(key, node);
+    CheckValue(node, row, pattern, key);
+    visit_(row, key);
+  }
+
+ private:
+  void CheckValue(const YAML::Node& node, const Key& row, const std::string& pattern, const std::string& key) {
     switch (row.type) {
       case Type::kMap: return CheckMap(node, pattern, key);
       case Type::kList:
@@ -188,7 +195,11 @@ class Checker {
     }
   }
 
- private:
+  struct Child {
+    std::string key;
+    YAML::Node value;
+  };
+
   static std::string Index(std::size_t i) { return std::string("[") + std::to_string(i) + "]"; }
 
   [[noreturn]] void Fail(const YAML::Node& node, const std::string& key, const std::string& what) const {
@@ -214,7 +225,8 @@ class Checker {
   void CheckMap(const YAML::Node& node, const std::string& pattern, const std::string& key) {
     const YAML::Node name = node["name"];
     const std::string kind = name && name.IsScalar() ? name.Scalar() : "";
-    std::map<std::string, int> seen;  // the line of each
+    std::map<std::string, int> seen;            // the line of each
+    std::multimap<const Key*, Child> children;  // in the schema's order, since its rows are in one array
     for (const auto& entry : node) {
       if (!entry.first.IsScalar()) Fail(entry.first, key, Shown(entry.first) + " is not a key");
       const std::string word = entry.first.Scalar(), child = Below(key, word);
@@ -224,12 +236,13 @@ class Checker {
         Fail(entry.first, child,
              "stands twice, first in line " + std::to_string(first->second) + "; delete one of them");
       if (!row.only.empty() && row.only != kind) Fail(entry.first, child, "is for " + row.only + ", not for " + kind);
-      Check(entry.second, row.path, child);
+      children.emplace(&row, Child{child, entry.second});
     }
     for (const Key& row : Schema())
       if (row.required && IsChild(row, pattern) && (row.only.empty() || row.only == kind) &&
           !seen.contains(std::string(Leaf(row.path))) && !Leaf(row.path).starts_with('<'))
         Fail(node, Below(key, Leaf(row.path)), "missing: " + row.meaning);
+    for (const auto& [row, child] : children) Check(child.value, row->path, child.key);
   }
 
   const Key& ChildRow(const YAML::Node& entry, const std::string& pattern, const std::string& key) const {
@@ -327,6 +340,7 @@ class Checker {
 
   const std::string& path_;
   const SchemaScope& scope_;
+  const Document::Visitor& visit_;
   Values& values_;
 };
 
@@ -394,12 +408,6 @@ struct Document::Tree {
   }
 };
 
-std::vector<std::string> SchemaScope::variables() const {
-  std::vector<std::string> all = states;
-  all.insert(all.end(), inputs.begin(), inputs.end());
-  return all;
-}
-
 Document::Document(const std::string& path)
     : path_(path),
       text_(ReadWhole(path, kLargestTaskFile)),
@@ -407,14 +415,11 @@ Document::Document(const std::string& path)
 
 Document::~Document() = default;
 
-void Document::Check(const SchemaScope& scope) {
-  tree_->values.clear();
-  Checker(path_, scope, tree_->values).Check(tree_->root, "", "");
+void Document::Check(const SchemaScope& scope, const Visitor& visit) {
+  Checker(path_, scope, visit, tree_->values).Check(tree_->root, "", "");
 }
 
 bool Document::Has(std::string_view key) const { return tree_->Find(key) != nullptr; }
-
-bool Document::IsList(std::string_view key) const { return tree_->Get(key).IsSequence(); }
 
 int Document::Count(std::string_view key) const {
   const YAML::Node* node = tree_->Find(key);
@@ -429,10 +434,6 @@ std::vector<std::string> Document::KeysOf(std::string_view key) const {
 }
 
 double Document::Number(std::string_view key) const { return ParseNumber(tree_->Get(key).Scalar()).value; }
-
-int Document::Integer(std::string_view key) const {
-  return static_cast<int>(ParseInteger(tree_->Get(key).Scalar()).value);
-}
 
 std::string Document::Text(std::string_view key) const { return tree_->Get(key).Scalar(); }
 
@@ -450,23 +451,20 @@ std::vector<std::string> Document::Names(std::string_view key) const {
   return names;
 }
 
-void Document::Read(std::string_view key, double& value) const {
-  if (Has(key)) value = Number(key);
-}
+void Document::Read(std::string_view key, double& value) const { value = Number(key); }
 
 void Document::Read(std::string_view key, int& value) const {
-  if (Has(key)) value = Integer(key);
+  value = static_cast<int>(ParseInteger(tree_->Get(key).Scalar()).value);
 }
 
-void Document::Read(std::string_view key, std::string& value) const {
-  if (Has(key)) value = Text(key);
-}
+void Document::Read(std::string_view key, std::string& value) const { value = Text(key); }
 
 void Document::Read(std::string_view key, std::vector<double>& value) const {
-  if (!Has(key)) return;
   const Eigen::VectorXd vector = Vector(key);
   value.assign(vector.begin(), vector.end());
 }
+
+void Document::Read(std::string_view key, std::optional<double>& value) const { value = Number(key); }
 
 std::string Document::Place(std::string_view key) const {
   std::string_view known = key;

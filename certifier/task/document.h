@@ -1,7 +1,9 @@
-/** A YAML file and the places in it: checked against the schema as a whole, then read by key. */
+/** A YAML file and the places in it, checked against the schema. */
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,13 +14,7 @@
 
 namespace forereach {
 
-/** What names and sizes in the schema stand for. Where it is not known yet, everything fits. */
-struct SchemaScope {
-  std::vector<std::string> states, inputs;
-  int safety_dim = 0;
-
-  [[nodiscard]] std::vector<std::string> variables() const;
-};
+struct SchemaScope;
 
 class Document final {
  public:
@@ -26,17 +22,19 @@ class Document final {
   explicit Document(const std::string& path);
   ~Document();
 
-  /** Checks everything against the schema. Keys may be read afterwards.
+  /** Called with each value that is good, by its row and key, after everything inside it. */
+  using Visitor = std::function<void(const Key& row, const std::string& key)>;
+  /** Checks everything against the schema in one pass. A map's keys are checked before its values, and its values in
+  the schema's order. Keys that were visited may be read, also by the visitor.
+  @param scope is looked at again for each value, so the visitor may fill it.
   @throws ConfigError naming file, line, key, value and bound of the first thing that is wrong. */
-  void Check(const SchemaScope& scope);
+  void Check(const SchemaScope& scope, const Visitor& visit);
 
   [[nodiscard]] const std::string& path() const { return path_; }
   /** The file's bytes. */
   [[nodiscard]] const std::string& text() const { return text_; }
 
   [[nodiscard]] bool Has(std::string_view key) const;
-  /** True if the value is a list (a map, a single value otherwise). */
-  [[nodiscard]] bool IsList(std::string_view key) const;
   /** How many entries a list has, 0 if it is absent. */
   [[nodiscard]] int Count(std::string_view key) const;
   /** The keys of a map in the file's order, none if it is absent. */
@@ -44,17 +42,17 @@ class Document final {
 
   // The value at a key that is present and has this type in the schema.
   [[nodiscard]] double Number(std::string_view key) const;
-  [[nodiscard]] int Integer(std::string_view key) const;
   [[nodiscard]] std::string Text(std::string_view key) const;
   [[nodiscard]] Eigen::VectorXd Vector(std::string_view key) const;
   [[nodiscard]] std::vector<Eigen::VectorXd> Vectors(std::string_view key) const;
   [[nodiscard]] std::vector<std::string> Names(std::string_view key) const;
 
-  // The same, but `value` keeps what it has if the key is absent.
+  // The same, by the type of the member that takes it.
   void Read(std::string_view key, double& value) const;
   void Read(std::string_view key, int& value) const;
   void Read(std::string_view key, std::string& value) const;
   void Read(std::string_view key, std::vector<double>& value) const;
+  void Read(std::string_view key, std::optional<double>& value) const;
 
   /** "file:line: key: ": the place of a key, or of the map it is missing from. */
   [[nodiscard]] std::string Place(std::string_view key) const;
