@@ -124,9 +124,9 @@ void RequireObstaclesSource(const Config& config) {
   if (config.gate.obstacles != ObstaclesSource::kUnsaid) return;
   throw ConfigError(
       config.path +
-      ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those that OBSTACLES says on "
-      "the bus; nothing is certified before they are heard, nor while they are silent. `task`: the obstacles "
-      "of this file are all there are");
+      ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those of the last OBSTACLES message; "
+      "nothing is certified before the first message or while there are none. `task`: the obstacles are those of this "
+      "file");
 }
 
 Transitions LoadTransitions(const std::string& path, const NominalModel& model) {

@@ -43,7 +43,7 @@ std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<
     if (column == columns.end())
       FailAt(path, 1, "unknown column '" + std::string(field) + "'; the columns are " + Joined(columns));
     const Eigen::Index index = column - columns.begin();
-    if (std::find(order.begin(), order.end(), index) != order.end()) FailAt(path, 1, *column + ": stands twice");
+    if (std::find(order.begin(), order.end(), index) != order.end()) FailAt(path, 1, *column + ": duplicate column");
     order.push_back(index);
   }
   for (std::size_t j = 0; j < columns.size(); ++j)

@@ -234,7 +234,7 @@ class Checker {
       const auto [first, is_new] = seen.emplace(word, LineOf(entry.first.Mark()));
       if (!is_new)
         Fail(entry.first, child,
-             "stands twice, first in line " + std::to_string(first->second) + "; delete one of them");
+             "duplicate key, first in line " + std::to_string(first->second) + "; delete one of them");
       if (!row.only.empty() && row.only != kind) Fail(entry.first, child, "is for " + row.only + ", not for " + kind);
       children.emplace(&row, Child{child, entry.second});
     }
@@ -319,7 +319,7 @@ class Checker {
     for (std::size_t i = 0; i < node.size(); ++i) {
       if (!node[i].IsScalar()) Fail(node[i], key + Index(i), Shown(node[i]) + " is not a name");
       const std::string& name = node[i].Scalar();
-      if (Contains(seen, name)) Fail(node[i], key + Index(i), name + " stands twice");
+      if (Contains(seen, name)) Fail(node[i], key + Index(i), "duplicate name " + name);
       if (!known.empty() && !Contains(known, name))
         Fail(node[i], key + Index(i), name + " is not a coordinate; " + Suggestion(name, known));
       seen.push_back(name);

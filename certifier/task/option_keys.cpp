@@ -34,43 +34,41 @@ std::vector<Key> GateKeys() {
       gate.Number("certificate_lifetime_ms", "ms", UpTo(kHourMs), &GateOptions::certificate_lifetime_ms,
                   "Execution has to begin within this time of the certificate."),
       gate.Number("decision_budget_ms", "ms", Between(0, kHourMs), &GateOptions::decision_budget_ms,
-                  "The most a decision may take, its way to the robot included: a candidate that starts sooner is "
-                  "abstained from unread."),
+                  "The time budget of a decision, including its transport to the robot. A candidate that starts sooner "
+                  "is answered ABSTAIN_DEADLINE without being certified."),
       gate.Integer("queue", Between(1, 65536), &GateOptions::queue,
-                   "Candidates that wait at most; beyond it the oldest is rejected."),
+                   "The largest number of waiting candidates. Above it the oldest is rejected."),
       gate.Word<bool>("mode", {{"enforce", false}, {"shadow", true}}, &GateOptions::shadow,
-                      "shadow: decide and count as ever, but certify nothing: what would be certified is rejected as "
-                      "shadow."),
+                      "shadow: decide and count as usual, but certify nothing. A plan that would be certified is "
+                      "rejected with cause shadow."),
       gate.Word<bool>("arming", {{"robot_state", true}, {"none", false}}, &GateOptions::needs_robot_state,
-                      "robot_state: certify only once the robot's state is heard, and latch a fault when it is lost. "
-                      "none: for a certifier without a robot."),
+                      "robot_state: certify only while the robot's state is received, and latch a fault when it is "
+                      "lost. none: for a certifier without a robot."),
       gate.Number("robot_timeout_ms", "ms", UpTo(kHourMs), &GateOptions::robot_timeout_ms,
                   "The robot's state counts as lost after this time without one."),
       gate.Number("max_clock_jump_ms", "ms", UpTo(kHourMs), &GateOptions::max_clock_jump_ms,
-                  "A wall clock that moves by more than this against the time that has passed latches a fault."),
-      Optional(
-          gate.Word<Source>(
-              "obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
-              "bus: the obstacles are task.obstacles and, besides, those that OBSTACLES says; nothing is certified "
-              "before it is heard, nor while it is silent. task: task.obstacles are all, OBSTACLES is refused. "
-              "forereach-certifier and `forereach run` do not start without this key."),
-          "not said"),
-      gate.Number(
-          "obstacles_timeout_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_timeout_ms,
-          "With `obstacles: bus`: the obstacles heard are no longer known this long after their stamp. Send the "
-          "whole set at least every third of it."),
+                  "If the wall clock moves by more than this relative to the monotonic clock, a fault is latched."),
+      Optional(gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
+                                 "bus: the obstacles are task.obstacles and those of the last OBSTACLES message; "
+                                 "nothing is certified before the first message or while there are none. task: the "
+                                 "obstacles are task.obstacles, and OBSTACLES is refused. "
+                                 "forereach-certifier and `forereach run` do not start without this key."),
+               "not said"),
+      gate.Number("obstacles_timeout_ms", "ms", UpTo(kHourMs), &GateOptions::obstacles_timeout_ms,
+                  "With `obstacles: bus`: the obstacles become unknown this long after the stamp of the last message. "
+                  "Send the whole set at least three times in this period."),
       gate.Word<bool>("learn", {{"executed", true}, {"none", false}}, &GateOptions::learns,
-                      "executed: transitions that the robot reports add to the observations while it drives; "
-                      "declaration.noise_bound has to cover their errors. none: the file's transitions are all."),
+                      "executed: transitions that the robot reports are added to the observations while it drives; "
+                      "declaration.noise_bound has to cover their errors. none: only the file's transitions are used."),
       Optional(Word("gate.require_stop", {"true", "false"},
-                    "true: only plans that provably end standing, by task.rest, are certified. false: a plan may end "
-                    "moving.",
+                    "true: only plans that provably end at rest, by task.rest, are certified. false: a plan may end in "
+                    "motion.",
                     ReadRequireStop),
-               "true with task.rest, else false"),
+               "true with task.rest, otherwise false"),
       gate.File("state", &GateOptions::state,
-                "The directory, relative to this file, in which a latched fault and what contradicts a declaration "
-                "outlive the certifier; `--state` takes precedence. Each robot needs one of its own, on a disk that "
-                "outlives a restart of the machine."),
+                "The directory, relative to this file, that stores a latched fault and the transitions that contradict "
+                "a declaration across restarts. `--state` takes precedence. Each robot needs its own directory, on a "
+                "disk that keeps its content when the machine restarts."),
   };
 }
 
@@ -79,13 +77,13 @@ std::vector<Key> RealtimeKeys() {
       "realtime", [](TaskDraft& draft) -> RealtimeOptions& { return draft.config.realtime; });
   using Lock = RealtimeOptions::Lock;
   return {
-      Optional(Map("realtime", "What the certifier asks of the operating system."), "all defaults"),
+      Optional(Map("realtime", "Real-time options of the certifier."), "all defaults"),
       realtime.Word<Lock>("lock_memory", {{"no", Lock::kNo}, {"try", Lock::kTry}, {"require", Lock::kRequire}},
                           &RealtimeOptions::lock_memory,
-                          "Keep its memory from being swapped out. try: go on where it is not allowed, and say so."),
+                          "Keep its memory from being swapped out. try: continue with a warning if it is not allowed."),
       realtime.Integer("fifo_priority", Between(0, 99), &RealtimeOptions::fifo_priority,
-                       "Priority under SCHED_FIFO; 0 leaves the scheduler as it is. Where it is not allowed the "
-                       "certifier does not start."),
+                       "Priority under SCHED_FIFO; 0 does not change the scheduler. If the priority is not allowed, "
+                       "the certifier does not start."),
   };
 }
 
@@ -100,13 +98,13 @@ constexpr std::array kChannels{
     ChannelRow{"decision", &BusOptions::decision, "decision_t, one for each candidate."},
     ChannelRow{"certified", &BusOptions::certified, "certified_plan_t, what a robot may execute."},
     ChannelRow{"robot_state", &BusOptions::robot_state, "robot_state_t, from the robot."},
-    ChannelRow{"obstacles", &BusOptions::obstacles, "obstacles_t, all obstacles that are seen, again and again."},
+    ChannelRow{"obstacles", &BusOptions::obstacles, "obstacles_t, all perceived obstacles, sent repeatedly."},
     ChannelRow{"transition", &BusOptions::transition, "transition_t, executed steps."},
     ChannelRow{"status", &BusOptions::status, "certifier_status_v3_t, the certifier's heartbeat."},
-    ChannelRow{"event", &BusOptions::event, "execution_event_t, what the robot's guard does."},
+    ChannelRow{"event", &BusOptions::event, "execution_event_t, events of the robot's guard."},
     ChannelRow{"logger_status", &BusOptions::logger_status, "logger_status_t, the logger's heartbeat."},
     ChannelRow{"fault", &BusOptions::fault, "fault_t, why the certifier has stopped certifying."},
-    ChannelRow{"command", &BusOptions::command, "command_t, from a person: reset, reload."},
+    ChannelRow{"command", &BusOptions::command, "command_t, from an operator: reset, reload."},
 };
 
 void RequireDifferentChannels(const Document& file, const std::string& key, TaskDraft& draft) {
@@ -121,20 +119,19 @@ std::vector<Key> BusKeys() {
   const OptionRows<BusOptions> channels("bus.channels",
                                         [](TaskDraft& draft) -> BusOptions& { return draft.config.bus; });
   std::vector<Key> keys{
-      Optional(Map("bus", "Where messages go."), "all defaults"),
+      Optional(Map("bus", "The bus and its channels."), "all defaults"),
       bus.Text("url", &BusOptions::url,
-               "Where the bus is, as LCM writes it: multicast group and port, options `ttl` and `recv_buf_size`. "
+               "Address of the bus in LCM's form: multicast group and port, options `ttl` and `recv_buf_size`. "
                "`--lcm-url` takes precedence."),
       Optional(bus.Text("name", &BusOptions::name,
-                        "Name of the bus, which is part of every signature: what is signed for one bus is refused on "
-                        "another. All processes of a robot need the same."),
+                        "Name of the bus, which is part of every signature: a message signed for one bus is refused on "
+                        "another. All processes of a robot need the same name."),
                "address and port of the URL"),
-      Optional(
-          bus.File("key", &BusOptions::key,
-                   "Directory of keys, or one role's key file, relative to this file: every message is then "
-                   "signed by the role that speaks on its channel, and refused otherwise. `forereach keygen` makes "
-                   "it; `--key` takes precedence."),
-          "none, nothing is signed"),
+      Optional(bus.File("key", &BusOptions::key,
+                        "Directory of keys, or one role's key file, relative to this file. With it, every message has "
+                        "to be signed by the role that owns its channel. `forereach keygen` makes the directory; "
+                        "`--key` takes precedence."),
+               "none, nothing is signed"),
       Optional(Map("bus.channels", "Names of the channels, all different.", RequireDifferentChannels), "all defaults"),
   };
   for (const ChannelRow& channel : kChannels)
@@ -157,17 +154,17 @@ std::vector<Key> PlannerKeys() {
   const OptionRows<PlannerOptions> planner("planner",
                                            [](TaskDraft& draft) -> PlannerOptions& { return draft.config.planner; });
   return {
-      Optional(Map("planner", "How candidates are made.", CheckPlanner), "all defaults"),
+      Optional(Map("planner", "The planner.", CheckPlanner), "all defaults"),
       planner.OneOf("source", {"ompl", "policy"}, &PlannerOptions::source,
-                    "ompl: searched for, clear of the obstacles. policy: blocks of a learned policy of the bicycle, "
-                    "which knows of no obstacles; algorithm, clearances and seed do not concern it, progress_steps may "
-                    "not be more than a block has, and it drives at most 10 m/s."),
+                    "ompl: a search around the obstacles. policy: blocks of a learned policy of the bicycle, which "
+                    "ignores obstacles; algorithm, clearances and seed have no effect, progress_steps is at most the "
+                    "length of a block, and the speed is at most 10 m/s."),
       planner.File("policy", &PlannerOptions::policy,
                    "The policy's file, relative to this one; required for `source: policy`."),
       planner.OneOf("algorithm", {"kpiece", "est", "pdst", "rrt", "sst"}, &PlannerOptions::algorithm,
                     "The OMPL control planner."),
       Optional(planner.Vector("goal", "m", kReal, Size::kSafety, &PlannerOptions::goal,
-                              "Where the robot is to go, in the safety coordinates."),
+                              "The robot's goal, in the safety coordinates."),
                "no goal"),
       planner.Number("goal_radius", "m", kPositive, &PlannerOptions::goal_radius,
                      "Within this distance the goal is reached."),
@@ -182,12 +179,13 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("lead_steps", Between(1, kMaxSteps), &PlannerOptions::lead_steps,
                       "A candidate starts this many steps after the state it was planned from."),
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates,
-                      "Candidates for one start at most."),
-      planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "Speed it aims at."),
+                      "The largest number of candidates for one start."),
+      planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
       planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking, "Deceleration of the braking tail."),
       planner.Number("time_limit_ms", "ms", UpTo(kHourMs), &PlannerOptions::time_limit_ms,
-                     "For one query of the planner."),
-      planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed, "Of the planner's random numbers."),
+                     "The time limit of one query of the planner."),
+      planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed,
+                      "The seed of the planner's random numbers."),
       Optional(planner.Vector("initial_half_width", "of the state", kNotNegative, Size::kStates,
                               &PlannerOptions::initial_half_width, "Half the width of each candidate's X0."),
                "as task.initial_set"),
@@ -198,14 +196,13 @@ std::vector<Key> RobotKeys() {
   const OptionRows<RobotOptions> robot("robot", [](TaskDraft& draft) -> RobotOptions& { return draft.config.robot; });
   return {
       Optional(Map("robot", "The simulated robot."), "all defaults"),
-      Optional(robot.Vector("start", "of the state", kReal, Size::kStates, &RobotOptions::start,
-                            "Its state when a run begins."),
+      Optional(robot.Vector("start", "of the state", kReal, Size::kStates, &RobotOptions::start, "Its initial state."),
                "the center of task.initial_set"),
-      robot.Number(
-          "step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
-          "Wall-clock time of one step of the model. The certifier expects that no step of a plan takes longer "
-          "than this or model.dt."),
-      robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s, "The run ends then, goal or not."),
+      robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
+                   "Wall-clock time of one step of the model. The certifier assumes that no step of a plan takes "
+                   "longer than this or model.dt."),
+      robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
+                   "The run ends after this time, even if the goal is not reached."),
       robot.OneOf("residual", {"none"}, &RobotOptions::residual, "none: the robot is the nominal model."),
   };
 }
@@ -221,27 +218,28 @@ std::vector<Key> LoggerKeys() {
   const OptionRows<LoggerOptions> logger("logger",
                                          [](TaskDraft& draft) -> LoggerOptions& { return draft.config.logger; });
   return {
-      Optional(Map("logger", "What is recorded.", CheckLogger), "all defaults"),
+      Optional(Map("logger", "The logger.", CheckLogger), "all defaults"),
       logger.File("directory", &LoggerOptions::directory,
-                  "Where the event log and the database go, relative to this file."),
+                  "The directory of the event logs and the database, relative to this file."),
       logger.Integer("queue", Between(1, 1000000), &LoggerOptions::queue,
-                     "Messages held for writing at most; what is beyond is counted as a gap."),
+                     "The largest number of messages that wait for writing. Messages above it are counted as a gap."),
       logger.Number("flush_ms", "ms", UpTo(60000), &LoggerOptions::flush_ms,
-                    "A killed logger loses at most this much."),
+                    "The period of flushes. A killed logger loses at most the messages of this period."),
       logger.Number("rotate_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::rotate_mb,
-                    "A log file that would grow beyond this is ended and a new one begun."),
+                    "A log file ends, and a new one begins, before it exceeds this size."),
       logger.Number("rotate_minutes", "min", UpTo(1e6), &LoggerOptions::rotate_minutes,
-                    "So is one that has been written to for this long."),
+                    "A log file ends, and a new one begins, after this time."),
       Optional(logger.Number("quota_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::quota_mb,
-                             "All log files of the directory together, at least rotate_mb: beyond it the oldest ended "
-                             "ones are deleted, and where that does not help recording pauses."),
+                             "The largest size of all log files in the directory together, at least rotate_mb. Above "
+                             "it the oldest ended files are deleted; if that is not enough, recording pauses."),
                "none is deleted"),
-      logger.Number("min_free_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::min_free_mb,
-                    "With less free on the disk recording pauses; it resumes by itself once an eighth more is free."),
+      logger.Number(
+          "min_free_mb", "MB", UpTo(kMaxMegabytes), &LoggerOptions::min_free_mb,
+          "If less is free on the disk, recording pauses. It resumes automatically when an eighth more is free."),
       logger.Number("unsigned_kb_per_s", "kB/s", UpTo(1e6), &LoggerOptions::unsigned_kb_per_s,
-                    "With keys: of messages that nobody signed (refused ones, as evidence, and those on channels that "
-                    "are not ForeReach's) so much at most is recorded; the rest is counted. Each counts as 1 kB more "
-                    "than it has."),
+                    "With keys: the largest rate at which unsigned messages are recorded. These are refused messages, "
+                    "kept as evidence, and messages on channels that do not belong to ForeReach. The others are "
+                    "counted. Each message counts as its size plus 1 kB."),
   };
 }
 

@@ -56,7 +56,7 @@ void ReadModel(const Document& file, const std::string& key, TaskDraft& draft) {
 std::vector<Key> ModelKeys() {
   return {
       Required(Map("model", "The nominal model f0.", ReadModel)),
-      Required(Word("model.name", NamesIn(Models()), "Which equations.")),
+      Required(Word("model.name", NamesIn(Models()), "The equations.")),
       Required(Number("model.dt", "s", UpTo(60), "The time from one control to the next.")),
       OnlyFor(KinematicBicycle::kName,
               Required(Number("model.wheelbase", "m", UpTo(1000), "Distance between the axles."))),
@@ -88,7 +88,8 @@ void ReadInequality(const Document& file, const std::string& key, TaskDraft& dra
 std::vector<Key> DomainKeys() {
   return {
       Required(
-          Map("domain", "Z_cert, where declaration and model hold. A plan whose tube leaves it is not certified.")),
+          Map("domain",
+              "Z_cert: the set on which declaration and model hold. A plan whose tube leaves it is not certified.")),
       Required(Map("domain.state", "The box of states.",
                    [](const Document& file, const std::string& key, TaskDraft& draft) {
                      draft.problem.domain.state = ReadBox(file, key);
@@ -114,7 +115,7 @@ std::vector<Key> DomainKeys() {
       Required(Number("domain.balls[].radius", "of the coordinates", kNotNegative, "The largest distance.")),
       Optional(List("domain.inequalities", Between(0, 1000), "Further bounds: a weighted sum of coordinates."), "[]"),
       Map("domain.inequalities[]", "One inequality: sum of coefficient times coordinate <= bound.", ReadInequality),
-      Required(Map("domain.inequalities[].coefficients", "By name; the others are zero, not all may be.")),
+      Required(Map("domain.inequalities[].coefficients", "By name. The others are zero; at least one is not zero.")),
       Number("domain.inequalities[].coefficients.<variable>", "", kReal, "The coefficient of this coordinate."),
       Required(Number("domain.inequalities[].bound", "of the sum", kReal, "The largest admissible value of the sum.")),
   };
@@ -140,19 +141,19 @@ void ReadLipschitzMatrix(const Document& file, const std::string& key, TaskDraft
 
 std::vector<Key> DeclarationKeys() {
   return {
-      Required(Map("declaration", "What is known of the residual besides the transitions.")),
+      Required(Map("declaration", "The declared bounds on the residual.")),
       Required(Map("declaration.lipschitz",
                    "L by names: |r_k(z) - r_k(z')| <= sum over l of L_kl |z_l - z'_l|. What is not named is zero.",
                    ReadLipschitzByNames)),
       Map("declaration.lipschitz.<state>", "Row k: the residual of this state."),
       Number("declaration.lipschitz.<state>.<variable>", "of the state per that of the coordinate", kNotNegative,
-             "L_kl: how fast it may change with this coordinate."),
+             "L_kl: the largest change of the residual per unit of this coordinate."),
       Required(Vectors("declaration.lipschitz", "of the state per that of the coordinate", kNotNegative,
                        Between(1, kMaxStates), Size::kVariables,
                        "L as a matrix: one row for each state, one entry for each state and input.",
                        ReadLipschitzMatrix)),
       Required(Vector("declaration.noise_bound", "of the state", kNotNegative, Size::kStates,
-                      "sigma: the largest error of a recorded successor, beyond its last bit.",
+                      "sigma: the largest error of a recorded successor, in addition to its last bit.",
                       [](const Document& file, const std::string& key, TaskDraft& draft) {
                         draft.problem.declaration.noise_bound = file.Vector(key);
                       })),
@@ -232,31 +233,32 @@ void RequireOneKind(const Document& file, const std::string& key, TaskDraft&) {
 
 std::vector<Key> TaskKeys() {
   return {
-      Required(Map("task", "What is to be certified.")),
-      Required(Map("task.initial_set", "X0, the states a plan may start from. A candidate on the bus brings its own.",
+      Required(Map("task", "The certification task.")),
+      Required(Map("task.initial_set", "X0, the set of initial states. A candidate on the bus has its own.",
                    ReadInitialSet)),
       Required(Vector("task.initial_set.center", "of the state", kReal, Size::kStates, "Its middle.")),
       Required(Vector("task.initial_set.half_width", "of the state", kNotNegative, Size::kStates, "Half its width.")),
       Map("task.rest",
-          "What standing is: the absolute value of each state named here is at most its bound. A plan that may "
-          "end otherwise is abstained from (D, no_stop), unless gate.require_stop is false.",
+          "Definition of rest: the absolute value of each state named here is at most its bound. A plan that may end "
+          "outside these bounds gets abstention D (no_stop), unless gate.require_stop is false.",
           ReadRest),
       Number("task.rest.<state>", "of the state", kNotNegative,
-             "Its bound, on all of the last slice: small enough that the robot's hold mode takes up the rest."),
+             "Its bound, which has to hold for the whole last slice. Choose it so small that the robot's hold mode can "
+             "stop the remaining motion."),
       Required(Names("task.projection", Between(1, kMaxSafetyDim), Size::kStates,
-                     "P: the 1 to 3 states that obstacles are given in, in metres.", ReadProjectionByNames)),
+                     "P: the 1 to 3 states that are the coordinates of obstacles, in metres.", ReadProjectionByNames)),
       Required(Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
                        "P as a matrix: 1 to 3 rows, one entry for each state.", ReadProjectionMatrix)),
-      Required(
-          List("task.obstacles", Between(0, kMaxObstacles),
-               "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those on the bus count besides.")),
+      Required(List(
+          "task.obstacles", Between(0, kMaxObstacles),
+          "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those received on the bus count too.")),
       Map("task.obstacles[]", "One of circle, box, polygon and half_plane.", RequireOneKind),
       ObstacleKind("circle", "A disc; the projection has to have 2 rows.", ReadCircle),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
       Required(Number("task.obstacles[].circle.radius", "m", kNotNegative, "Its radius.")),
       ObstacleKind("box", "An axis-aligned box.", ReadAxisBox),
-      Required(Vector("task.obstacles[].box.lower", "m", kReal, Size::kSafety, "Its least corner.")),
-      Required(Vector("task.obstacles[].box.upper", "m", kReal, Size::kSafety, "Its largest corner.")),
+      Required(Vector("task.obstacles[].box.lower", "m", kReal, Size::kSafety, "Its lower corner.")),
+      Required(Vector("task.obstacles[].box.upper", "m", kReal, Size::kSafety, "Its upper corner.")),
       ObstacleKind("polygon", "The convex hull of points; the projection has to have 2 rows.", ReadPolygon),
       Required(Vectors("task.obstacles[].polygon.vertices", "m", kReal, Between(3, kMaxObstaclePoints), Size::kSafety,
                        "The points, in any order.")),
@@ -278,20 +280,23 @@ void CheckOrder(const Document& file, const std::string&, TaskDraft& draft) {
 std::vector<Key> CertifierKeys() {
   const OptionRows<Problem> certifier("certifier", [](TaskDraft& draft) -> Problem& { return draft.problem; });
   return {
-      Optional(Map("certifier", "How it certifies.", CheckOrder), "all defaults"),
+      Optional(Map("certifier", "Options of the certifier.", CheckOrder), "all defaults"),
       certifier.Word<Method>(
           "method", {{"centred", Method::kCentred}, {"paper", Method::kPaper}}, &Problem::method,
-          "paper: Algorithm 1 of the paper, with this project's conventions, unchanged for good. centred: the "
+          "paper: Algorithm 1 of the paper, with this project's conventions; it will not change. centred: the "
           "same with a tighter bound on the nominal model's remainder."),
-      certifier.Integer("zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
-                        "rho: a slice has at most rho generators a state. (rho + 2) times the number of states may not "
-                        "exceed " +
-                            std::to_string(kMaxGenerators) + "."),
-      certifier.Integer("max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
-                        "Groups of 32 observations that one search for the tightest may look at. Any of them give a "
-                        "sound bound; a decision whose search met this cap says so."),
+      certifier.Integer(
+          "zonotope_order", Between(1, kMaxGenerators), &Problem::zonotope_order,
+          "rho: a slice has at most rho generators for each state. (rho + 2) times the number of states may not "
+          "exceed " +
+              std::to_string(kMaxGenerators) + "."),
+      certifier.Integer(
+          "max_leaf_visits", Between(1, 1 << 20), &Problem::max_leaf_visits,
+          "The number of groups of 32 observations that one search for the tightest bound may visit. Every subset of "
+          "the observations gives a sound bound. A decision whose search reached this cap says so."),
       certifier.Integer("max_observations", Between(1, 100'000'000), &Problem::max_observations,
-                        "Observations kept at most: beyond it those go that never attain the envelope."),
+                        "The largest number of stored observations. Above it, observations that never attain the "
+                        "envelope are removed."),
   };
 }
 

@@ -35,15 +35,15 @@ const std::vector<Residual>& Residuals() {
   static const std::vector<Residual> residuals{
       Make<HeadingSaturation>({
           {"understeer", "", kReal, "Fraction of the heading rate lost in full saturation."},
-          {"friction", "", kNotNegative, "Friction coefficient; saturation sets in at friction times gravity."},
+          {"friction", "", kNotNegative, "Friction coefficient; saturation begins at friction times gravity."},
           {"gravity", "m/s^2", kPositive, "Gravity."},
-          {"gate_temperature", "s^2/m", kPositive, "How fast it sets in."},
+          {"gate_temperature", "s^2/m", kPositive, "How fast the saturation begins."},
       }),
       Make<VelocityKnee>({
           {"damping", "1/s", kReal, "Drag along the velocity."},
           {"cross", "1/s", kReal, "Force across the velocity."},
-          {"knee", "m/s", kNotNegative, "The speed above which they act."},
-          {"softplus_temperature", "m/s", kPositive, "How fast they set in."},
+          {"knee", "m/s", kNotNegative, "The speed above which drag and lateral force act."},
+          {"softplus_temperature", "m/s", kPositive, "How fast drag and lateral force begin."},
           {"regularizer", "m/s", kPositive, "Keeps the gain finite at rest."},
           {"smoothing", "m^2/s^2", kPositive, "Makes the speed differentiable at rest."},
       }),
@@ -135,13 +135,13 @@ void ReadRobotParameter(const Document& file, const std::string& key, TaskDraft&
 std::vector<Key> ResidualKeys() {
   std::vector<Key> keys{
       Map("residual",
-          "Equations of the residual with parameters known within intervals: `forereach declare` makes the "
-          "declaration from them. The certifier does not read it."),
+          "Equations of the residual with intervals for its parameters. `forereach declare` derives the declaration "
+          "from them. The certifier does not read this key."),
       Required(Word("residual.name", ResidualNames(), ModelsOfResiduals(), ReadResidual)),
   };
   for (const Key& number : ParameterKeys("residual", ReadExactParameter)) {
     keys.push_back(number);
-    Key range = Vector(number.path, number.unit, number.range, Key::Size::kAny, "Its least and its largest value.",
+    Key range = Vector(number.path, number.unit, number.range, Key::Size::kAny, "Its smallest and largest value.",
                        ReadParameterRange);
     range.count = Between(2, 2);
     range.only = number.only;
@@ -154,7 +154,7 @@ std::vector<Key> RobotResidualKeys() {
   std::vector<std::string_view> names = ResidualNames();
   names.insert(names.begin(), "none");
   std::vector<Key> keys{
-      Optional(Map("robot.residual", "How the real robot differs from the nominal model."), "none"),
+      Optional(Map("robot.residual", "The difference between the real robot and the nominal model."), "none"),
       Required(Word("robot.residual.name", names, ModelsOfResiduals(), ReadRobotResidual)),
   };
   std::ranges::move(ParameterKeys("robot.residual", ReadRobotParameter), std::back_inserter(keys));

@@ -89,11 +89,12 @@ std::string Range::text() const {
 std::string SchemaMarkdown() {
   std::string text =
       "## Keys\n\n"
-      "A dot goes one map down, `[]` stands for every entry of a list, `<state>` for a state's name, `<variable>` for "
-      "a\n"
-      "state's or an input's. Lists of numbers stand in the model's order. A range with `(` or `)` does not contain "
-      "its\n"
-      "end. Where the default is empty the key may be left out and nothing takes its place.\n\n"
+      "A dot leads one map down. `[]` means every entry of a list, `<state>` the name of a state, `<variable>` the "
+      "name of a\n"
+      "state or an input. Lists of numbers are in the model's order. A range with `(` or `)` does not contain its end. "
+      "If the\n"
+      "default is empty, the key may be left out and has no value.\n"
+      "\n"
       "| Key | Type | Unit | Range | Default | Meaning |\n"
       "| --- | --- | --- | --- | --- | --- |\n";
   for (const Key& key : Schema()) {

@@ -54,7 +54,7 @@ TEST_F(CsvTest, ErrorsNameLineColumnAndValue) {
 
 TEST_F(CsvTest, ErrorsInTheHeader) {
   EXPECT_EQ(Error("a,c\n"), "t.csv:1: unknown column 'c'; the columns are a, b");
-  EXPECT_EQ(Error("a,b,a\n"), "t.csv:1: a: stands twice");
+  EXPECT_EQ(Error("a,b,a\n"), "t.csv:1: a: duplicate column");
   EXPECT_EQ(Error("b\n"), "t.csv:1: a: the column is missing");
   EXPECT_EQ(Error(""), "t.csv:1: the file is empty; it has to begin with the header a, b");
   EXPECT_EQ(Error("1,2\n"), "t.csv:1: unknown column '1'; the columns are a, b");

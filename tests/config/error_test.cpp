@@ -84,9 +84,9 @@ TEST_F(ErrorTest, MissingKeys) {
 
 TEST_F(ErrorTest, DoubleKeys) {
   EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"),
-            "task.yaml:9: declaration.lipschitz.vx.vx: stands twice, first in line 9; delete one of them");
+            "task.yaml:9: declaration.lipschitz.vx.vx: duplicate key, first in line 9; delete one of them");
   EXPECT_EQ(ErrorAfter("transitions: other.csv\n"),
-            "task.yaml:19: transitions: stands twice, first in line 12; delete one of them");
+            "task.yaml:19: transitions: duplicate key, first in line 12; delete one of them");
 }
 
 TEST_F(ErrorTest, SizesThatDoNotFit) {
@@ -232,7 +232,7 @@ TEST_F(ErrorTest, WordsThatAreNotKnown) {
             "task.yaml:17: task.projection[1]: pz is not a coordinate; did you mean px?");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, ax]"),
             "task.yaml:17: task.projection[1]: ax is not a coordinate; did you mean px?");
-  EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, px]"), "task.yaml:17: task.projection[1]: px stands twice");
+  EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, px]"), "task.yaml:17: task.projection[1]: duplicate name px");
   EXPECT_EQ(ErrorAfter("bus: {channels: {status: 'A.*'}}\n"),
             "task.yaml:19: bus.channels.status: A.* is not 1 to 63 letters, digits and underscores");
   EXPECT_EQ(ErrorAfter("bus: {channels: {status: PLAN_DECISION}}\n"),
