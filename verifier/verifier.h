@@ -60,9 +60,8 @@ class Verifier final {
   products of doubles are exact. Cost: about 0.1 s for 50 steps, 400 observations and 10 obstacles. */
   [[nodiscard]] Verdict Verify(const Certificate& certificate) const;
 
-  /** The tube alone, for display and tests. @pre knows_model(). */
+  /** The tube alone, for display and tests. @pre the verifier has the model's equations. */
   [[nodiscard]] Tube Derive(const Certificate& certificate) const;
-  [[nodiscard]] bool knows_model() const { return equations_ != nullptr; }
 
  private:
   [[nodiscard]] std::optional<Failure> Check(const TubeMaker& maker, const Certificate& certificate) const;

@@ -34,14 +34,6 @@ struct ObservationStore::Known {
     SetRow(observations.upper, row, upper);
     ids.push_back(id);
   }
-
-  void Remove(int id) {
-    std::vector<int> others;
-    for (std::size_t i = 0; i < ids.size(); ++i)
-      if (ids[i] != id) others.push_back(static_cast<int>(i));
-    observations = Select(observations, others);
-    std::erase(ids, id);
-  }
 };
 
 // An index and its tail. Entries of the tail below its size do not change any more, and neither does the index.
@@ -322,30 +314,6 @@ ObservationStore::Insertion ObservationStore::Enlist(std::span<const double> z, 
     if (!violation_) violation_ = insertion.violation;
   }
   return insertion;
-}
-
-bool ObservationStore::Remove(int id) {
-  const std::lock_guard compacting(compacting_);
-  const std::lock_guard writing(writing_);
-  const auto tail_end = current_->tail_ids.begin() + current_->tail.size();
-  const bool known = std::ranges::find(current_->ids, id) != current_->ids.end() ||
-                     std::find(current_->tail_ids.begin(), tail_end, id) != tail_end;
-  if (!known || current_->ids.size() + ToSize(current_->tail.size()) == 1) return false;
-  Known others = current_->All(current_->tail.size());
-  others.Remove(id);
-  std::shared_ptr<Generation> fresh = Build(std::move(others));
-  std::optional<Violation> violation = violation_;
-  if (violation && (violation->first == id || violation->second == id)) {
-    violation = FindViolation(declaration_, fresh->observations);
-    if (violation) {
-      violation->first = fresh->ids[ToSize(violation->first)];
-      violation->second = fresh->ids[ToSize(violation->second)];
-    }
-  }
-  const std::lock_guard lock(current_lock_);
-  current_.swap(fresh);
-  violation_ = violation;
-  return true;
 }
 
 }  // namespace forereach

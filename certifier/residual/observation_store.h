@@ -76,10 +76,6 @@ class ObservationStore final {
   tail is full it compacts first, which takes as long as building an index. */
   Insertion Insert(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
-  /** Forgets an observation; false if there is none of that id, or it is the last. A violation it took part in is
-  looked for anew among the others. Costs a new index. Snapshots taken before still know it. */
-  bool Remove(int id);
-
   /** Puts the tail into the index and keeps to the budget. May run beside Insert, in a thread of its own. */
   void Compact();
 

@@ -9,7 +9,6 @@
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
-#include "forereach/certifier_status_t.hpp"
 #include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
@@ -34,7 +33,6 @@ struct Contract {
 const std::map<std::string, Contract> kContracts = {
     {"candidate_plan_t", {0xf2f7b43087501fe8, 8536}},
     {"certified_plan_t", {0x7bf4494f969b9eeb, 41808}},
-    {"certifier_status_t", {0x553e2b8fcb2c6ae3, 248}},
     {"decision_t", {0x6c785a9e0911c4e6, 466}},
     {"execution_event_t", {0x4742c25e0eefd377, 336}},
     {"obstacle_t", {0x29158dc0270b76d4, 406}},
@@ -63,9 +61,9 @@ class MessageTest : public testing::Test {
   std::mt19937 random_{seed_};
 };
 
-using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_t, certifier_status_v2_t,
-                                certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t,
-                                logger_status_t, obstacle_t, obstacles_t, robot_state_t, transition_t>;
+using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_v2_t, certifier_status_v3_t,
+                                command_t, decision_t, execution_event_t, fault_t, logger_status_t, obstacle_t,
+                                obstacles_t, robot_state_t, transition_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {

@@ -159,7 +159,6 @@ TEST(ObservationStore, ASnapshotStaysAsItWas) {
   ObservationStore store = StoreOf(samples, Options(16));
   const auto before = store.snapshot();
   for (int i = 0; i < 100; ++i) Insert(store, Observe(random));
-  ASSERT_TRUE(store.Remove(3));
   EXPECT_EQ(before.size(), 20u);
   ExpectSame(before, EnvelopeOf(samples), random);
 }
@@ -201,41 +200,7 @@ TEST(ObservationStore, FindsTheContradictionWhereverItIs) {
     store.Compact();
     ASSERT_TRUE(store.snapshot().violation()) << "forgotten";
     ASSERT_TRUE(FindViolation(MakeDeclaration(), store.snapshot().Contradiction()));
-    ASSERT_TRUE(store.Remove(insertion.id));
-    ASSERT_FALSE(store.snapshot().violation());
-    samples.pop_back();
-    ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
   }
-}
-
-TEST(ObservationStore, RemovesFromTheIndexAndFromTheTail) {
-  Random random(803);
-  SCOPED_TRACE(random.trace());
-  std::vector<Sample> samples = Observe(random, 25);
-  ObservationStore store = StoreOf(samples);
-  std::vector<int> ids;
-  for (int i = 0; i < 25; ++i) ids.push_back(i);
-  for (int i = 0; i < 25; ++i) {
-    samples.push_back(Observe(random));
-    ids.push_back(Insert(store, samples.back()).id);
-  }
-  EXPECT_FALSE(store.Remove(50));
-  EXPECT_FALSE(store.Remove(-1));
-  while (ids.size() > 1) {
-    const int at = random.Below(static_cast<int>(ids.size()));
-    ASSERT_TRUE(store.Remove(ids[static_cast<std::size_t>(at)]));
-    ASSERT_FALSE(store.Remove(ids[static_cast<std::size_t>(at)])) << "is gone already";
-    ids.erase(ids.begin() + at);
-    samples.erase(samples.begin() + at);
-    ExpectSame(store.snapshot(), EnvelopeOf(samples), random);
-    samples.push_back(Observe(random));
-    ids.push_back(Insert(store, samples.back()).id);
-    ASSERT_TRUE(store.Remove(ids.back()));
-    ids.pop_back();
-    samples.pop_back();
-    if (HasFatalFailure()) return;
-  }
-  EXPECT_FALSE(store.Remove(ids.front())) << "the last one stays";
 }
 
 TEST(ObservationStore, TakesValuesFarAboveThoseItBeganWith) {
