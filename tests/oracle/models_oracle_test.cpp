@@ -545,6 +545,12 @@ TEST(ExpansionError, BoundsProductsAndQuotientsOfDifferencesThatCancel) {
   for (std::size_t k = 0; k < 3; ++k) EXPECT_GT(worst[k], 0.05) << "the bound of " << Differences::kStateNames[k];
 }
 
+TEST(ExpansionError, IsInfiniteWhereADivisorMayBeZero) {
+  const EquationsModel<Differences> model{Differences{}};
+  const std::vector<Interval> domain{{1, 2}, {1, 2}, {-1, 2}, {0, 1}};
+  EXPECT_EQ(BoundExpansionError(model.program(), model.parameters(), domain).value[2], kInfinity);
+}
+
 TEST(ExpansionError, IsInfiniteWhereTheDomainHoldsAPole) {
   const auto model = MakeKinematicBicycle(kDt, kWheelbase);
   std::vector<Interval> domain(8, Interval(-1, 1));
