@@ -4,7 +4,8 @@ the place to follow. */
 
 namespace forereach::bench {
 
-/** Registers "stage/<name>/<scenario>/N" for what depends on the number of observations, and at N = 400 the rest. */
+/** Registers "stage/<name>/<scenario>/N" for stages that depend on the number of observations, and the others at N =
+ * 400. */
 void RegisterStages(int observations);
 
 }  // namespace forereach::bench

@@ -1,4 +1,4 @@
-/** The certify step compiled without its rounding bounds, to measure what they cost. It proves nothing. */
+/** The certify step compiled without its rounding bounds, to measure their cost. It proves nothing. */
 #pragma once
 
 namespace benchmark {

@@ -12,7 +12,7 @@
 
 namespace forereach::experiments {
 
-/** A declared L, and what it is called in tables. The valid ones bound the slopes of r*. */
+/** A declared L with its name in tables. The valid ones bound the slopes of r*. */
 struct NamedLipschitz {
   std::string name;  ///< "deployed", ...: letters, digits, '.', '-' and '_'
   Eigen::MatrixXd matrix;

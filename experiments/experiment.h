@@ -22,7 +22,7 @@ struct Scope {
   [[nodiscard]] std::vector<int> SizesOf(const System& system) const;
 };
 
-/** Finished cells by what they are. */
+/** Finished cells, by their key. */
 class Results final {
  public:
   Results(const std::vector<Cell>& cells, const std::vector<CellResult>& results);
@@ -71,7 +71,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 /** A count as a figure. */
 [[nodiscard]] inline Estimate Exactly(double value) { return {value, 0, 1}; }
 
-/** @name The experiments, by what they vary. */
+/** @name The experiments, by the quantity that they vary. */
 ///@{
 [[nodiscard]] Experiment MainResults();
 [[nodiscard]] Experiment RecallByN();

@@ -1,5 +1,5 @@
 /** Random numbers that are the same with every standard library, unlike std::*_distribution's. One generator for each
-thing that is drawn, keyed by what it is drawn for: nothing depends on the order in which things are drawn. */
+thing that is drawn, keyed by its use, so results do not depend on the order of the draws. */
 #pragma once
 
 #include <algorithm>

@@ -17,7 +17,7 @@ struct RunOptions {
   unsigned threads = 1;
   std::filesystem::path directory;  ///< Results; see RunDirectory
   std::filesystem::path report;     ///< The report in Markdown; empty: directory/report.md
-  std::string command;              ///< What the report says it was made by
+  std::string command;              ///< The command that the report names as its origin
 };
 
 /** Every cell of the experiments that is not finished is run, then written:

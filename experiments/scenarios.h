@@ -63,7 +63,7 @@ smaller count are the first of a larger, but for a grid, and noise does not move
 @param noise_scale to each entry of a successor an error N(0, s^2), cut at NoiseBound(s), is added. */
 [[nodiscard]] Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale);
 
-/** sigma_k = 3 s: what is declared of noise of scale s, and where it is cut. A Gaussian has no bound. */
+/** sigma_k = 3 s: the declared bound on noise of scale s, at which the noise is truncated. A Gaussian has no bound. */
 [[nodiscard]] inline double NoiseBound(double scale) { return 3 * scale; }
 
 }  // namespace forereach::experiments

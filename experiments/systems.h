@@ -1,4 +1,4 @@
-/** The paper's two systems: what the certifier is told of each, and the truth that it is not told.
+/** The paper's two systems: the certifier's inputs for each, and the true system, which the certifier does not know.
 
 Model, residual, step, horizon and the deployed declaration are the paper's. Domain extents, data regions and the sizes
 of X0 are not in its text; they are ours. */

@@ -1,4 +1,4 @@
-/** Our figures beside the paper's. */
+/** Tables of our figures and the paper's. */
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@ struct PaperValue {
 
 /** Those of paper_values.h. @throws std::invalid_argument for an unknown key. */
 [[nodiscard]] const PaperValue& Paper(std::string_view key);
-/** The same for what the paper does not always print. */
+/** The same for values that the paper does not always print. */
 [[nodiscard]] std::optional<PaperValue> PaperOrNone(std::string_view key);
 
 /** Mean and sample standard deviation over seeds; no value where no seed has one. */

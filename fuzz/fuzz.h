@@ -87,7 +87,7 @@ inline double AnyNumber(FuzzedDataProvider& input) {
   return input.ConsumeBool() ? OddNumber(input) : input.ConsumeIntegral<std::int8_t>() / 16.0;
 }
 
-/** Around `middle` by up to `reach`, next to the ends of what it can be, or any. */
+/** A number within `reach` of `middle`, next to the ends of its range, or any number. */
 inline std::int64_t AnyInteger(FuzzedDataProvider& input, std::int64_t middle, std::int64_t reach) {
   switch (input.ConsumeIntegralInRange(0, 4)) {
     case 0: return middle;
@@ -106,7 +106,7 @@ inline std::int16_t AnySmall(FuzzedDataProvider& input, std::int16_t largest) {
                              : input.ConsumeIntegralInRange<std::int16_t>(-1, largest);
 }
 
-/** How many things are odd: none half of the time, else up to seven. */
+/** The number of anomalies: zero half of the time, otherwise up to seven. */
 inline int NumOdd(FuzzedDataProvider& input) { return input.ConsumeIntegralInRange(0, 15) - 8; }
 
 /** Of any values, and up to so many. */
@@ -129,7 +129,7 @@ inline void Damage(FuzzedDataProvider& input, std::vector<std::uint8_t>& bytes) 
     bytes.resize(input.ConsumeIntegralInRange<std::size_t>(0, bytes.size() + 8));
 }
 
-/** A message of this type that was damaged on its way, or something else altogether. */
+/** A damaged message of this type, or random bytes. */
 template <class Message>
 std::vector<std::uint8_t> Damaged(FuzzedDataProvider& input, const Message& message) {
   if (input.ConsumeIntegralInRange(0, 31) == 31) return AnyBytes(input, 64);

@@ -12,7 +12,7 @@ extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, st
 
 namespace forereach {
 
-/** One of the last inputs that went deep; nothing if none did. */
+/** One of the last inputs that went deep; nothing if there is none. */
 Bytes DeepInput(std::size_t which);
 
 /** For LLVMFuzzerCustomMutator. Half of the time an input that went deep is what is changed, for what is refused is

@@ -2,7 +2,7 @@
 
 Whatever is not a proof is an abstention or a rejection: bytes that are no candidate, one that is stale, stamped ahead
 of the clock, too late for its own start or to be decided on before it, a repetition, of wrong size or not finite, and
-any error inside. Whether the world is fit for certificates at all is for others to say (watch.h): they call Refuse. */
+any error inside. `Watch` decides whether certifying is allowed at all (watch.h); if not, the caller calls Refuse. */
 #pragma once
 
 #include <cstdint>

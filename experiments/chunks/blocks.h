@@ -1,4 +1,4 @@
-/** The plans that a policy makes, what they are certified against, and where they are observed.
+/** The plans of a policy, with the obstacles of their certification and the places of their observations.
 
 The nominal model, target, declaration, domain, initial-set widths and obstacle are the bicycle's; the horizon is a
 block's, 20 steps. Ours are:

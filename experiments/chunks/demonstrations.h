@@ -1,4 +1,4 @@
-/** What the policy is taught: errands, and what the expert does on them.
+/** The training data of the policy: errands, and the expert's actions on them.
 
 The paper says: an expert tracks a feasible nominal reference, straight for group A, arced for B and C; 12 inputs, 20
 steps of 2 controls. The rest is ours:
@@ -20,7 +20,7 @@ namespace forereach::experiments {
 
 inline constexpr int kBlockSteps = 20;
 
-/** Where a policy is asked to act, and what it is to follow. */
+/** A state in which a policy acts, with the reference that it follows. */
 struct Errand {
   Eigen::VectorXd state;
   Reference reference;

@@ -1,4 +1,4 @@
-/** Behaviour cloning: a network that does as the expert did, by least squares. The only place that sees dlib. */
+/** Behaviour cloning: fits a network to the expert's actions by least squares. Only this code uses dlib. */
 #pragma once
 
 #include <cstdint>

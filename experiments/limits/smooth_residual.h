@@ -1,5 +1,5 @@
-/** A smooth residual r0 with what the information limits ask of it: its values, its Jacobian, and how large it and its
-first two derivatives get. */
+/** A smooth residual r0 with the quantities of the information limits: its values, its Jacobian, and bounds on it and
+its first two derivatives get. */
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-/** The affine declaration: r(z) = M z + b, with nothing else known. Its consistency set, Eq. (affine-consistency-set),
+/** The affine declaration: r(z) = M z + b without further bounds. Its consistency set, Eq. (affine-consistency-set),
     A = {(M, b) : |r~_ik - (M z_i + b)_k| <= sigma_k for all i, k},
 is a polytope for each coordinate k; the declaration is refuted where it is empty, and bounded where the regressors have
 full rank. Linear programs over it by Clp. */

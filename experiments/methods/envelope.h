@@ -1,4 +1,4 @@
-/** ForeReach's own residual bound, and what it loses when one number stands for its matrix. */
+/** ForeReach's residual bound, and the same bound with one number in place of its matrix. */
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ Claims: contains r_k(z) for every z of the query, if the declaration holds. Soun
 /** The scalar-envelope ablation: L_kl is replaced by lambda = max_kl L_kl for every k and l, the one number for which
 |r_k(z) - r_k(z')| <= lambda |z - z'|_1 follows from the declaration for all k. The paper says only that the bound is
 "collapsed to a single scalar"; the 1-norm is ours, the one its declaration is written in.
-Claims: what ForeReach claims, for a class that contains its class. Sound, and wider. */
+Claims: the same as ForeReach, for a larger class. Sound, and wider. */
 [[nodiscard]] std::unique_ptr<ResidualEnclosure> MakeScalarEnvelope(const Setting& setting);
 
 }  // namespace forereach::experiments

@@ -1,6 +1,6 @@
 /** Gaussian-process bands: posterior mean +- k posterior standard deviations (Rasmussen & Williams 2006).
 
-The paper gives k = 2 and 3 and nothing else. Ours, the textbook's defaults:
+The paper gives only k = 2 and k = 3. The other settings are textbook defaults:
 - one process for each coordinate k with columns in L, over the coordinates of z that L names; zero mean and unit
   variance after both z and r~ are scaled by mean and standard deviation of the sample;
 - squared-exponential kernel with a length-scale for each coordinate, Eq. (5.1), and a noise variance;
@@ -77,7 +77,7 @@ class GaussianProcessBand final : public ResidualEnclosure {
 
  private:
   struct Row {
-    double lower, upper;  // of a constant coordinate; else what recording adds
+    double lower, upper;  // constant coordinate: its range; otherwise: the recording error
     double mean, scale;
     std::unique_ptr<const GaussianProcess> process{};
   };
