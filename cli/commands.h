@@ -12,7 +12,7 @@ namespace forereach {
 inline constexpr const char* kLogs = "LCM event log; several if the run was recorded in several, in their order";
 /** The help text for --config. */
 inline constexpr const char* kTaskOfLogs =
-    "The task file it was recorded with; by default the one that the logger kept beside the log, in tasks/";
+    "The task file of the recording; by default the one that the logger kept next to the log, in tasks/";
 
 // Options that several commands share.
 [[nodiscard]] inline Option ConfigOption(std::string& path, const char* help = "Task file (YAML)") {

@@ -14,21 +14,21 @@ inline constexpr OfflineCommand kPlan{"plan",
                                       "CSV file, 1 if none was found, 2 bad input"};
 inline constexpr OfflineCommand kDeclare{
     "declare",
-    "Bound how fast an analytic residual changes, over the whole domain and all its parameters: a declaration that is "
-    "proved. Exit 0 if every bound is within --gap of a point found, 1 if --max-boxes came first, 2 bad input"};
+    "Prove a declaration: bound the slopes of an analytic residual over the whole domain and all its parameters. Exit "
+    "0 if every bound is within --gap of a slope that was found, 1 if --max-boxes was reached first, 2 bad input"};
 inline constexpr OfflineCommand kVerify{
     "verify",
-    "Derive recorded certificates anew, in high precision and with code of its own: exit 0 if there are any and all "
-    "are confirmed, 1 with the first that is not and the first step of it that fails, 2 bad input"};
+    "Verify recorded certificates in high precision, with an independent implementation: exit 0 if there are "
+    "certificates and all are confirmed, 1 with the first that is not and its first failing step, 2 bad input"};
 inline constexpr OfflineCommand kReplay{
-    "replay", "Put a recorded log through the same gate again: exit 0 if every decision is the recorded one, else 1"};
-inline constexpr OfflineCommand kReport{"report", "Sum up a recorded log, and draw it"};
+    "replay", "Replay a recorded log through the gate: exit 0 if every decision equals the recorded one, otherwise 1"};
+inline constexpr OfflineCommand kReport{"report", "Summarise a recorded log, and draw it"};
 inline constexpr OfflineCommand kCheckLog{
     "check-log",
-    "Hold a logger's directory against itself: exit 0 if every event that a row of the database comes from is in its "
-    "log unchanged and no log is damaged or unknown to it, else 1; logs deleted for the quota are no fault"};
+    "Check a logger's directory for consistency: exit 0 if the event of every row of the database is unchanged in its "
+    "log and no log is damaged or unknown to the database, otherwise 1; logs deleted for the quota are not errors"};
 inline constexpr OfflineCommand kRun{
-    "run", "Planner, certifier, robot and logger in this one process, on LCM's in-memory bus and a simulated clock"};
+    "run", "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock"};
 
 inline constexpr OfflineCommand kOfflineCommands[] = {kPlan, kDeclare, kVerify, kReplay, kReport, kCheckLog, kRun};
 

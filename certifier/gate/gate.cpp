@@ -41,7 +41,9 @@ void Gate::Inherit(const Gate& before) {
   counts_.learned = 0;
 }
 
-GateAnswer Gate::Decide(Bytes candidate, const Clock& clock) noexcept { return Answer(candidate, clock, std::nullopt); }
+GateAnswer Gate::Decide(Bytes candidate, const TimeSource& clock) noexcept {
+  return Answer(candidate, clock, std::nullopt);
+}
 
 GateAnswer Gate::Decide(Bytes candidate, std::int64_t now_us) noexcept {
   return Answer(
@@ -54,7 +56,7 @@ GateAnswer Gate::Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause
       candidate, [now_us] { return now_us; }, Rejection{cause, why, outcome});
 }
 
-GateAnswer Gate::Answer(Bytes bytes, const Clock& clock, std::optional<Rejection> from_outside) noexcept {
+GateAnswer Gate::Answer(Bytes bytes, const TimeSource& clock, std::optional<Rejection> from_outside) noexcept {
   GateAnswer answer;
   decision_t& decision = answer.decision;
   const std::int64_t now_us = clock();

@@ -33,7 +33,7 @@ struct GateAnswer {
 class Gate final {
  public:
   /** Microseconds since the Unix epoch. */
-  using Clock = std::function<std::int64_t()>;
+  using TimeSource = std::function<std::int64_t()>;
 
   /** @throws std::invalid_argument as Certifier does. */
   explicit Gate(const Config& config);
@@ -49,7 +49,7 @@ class Gate final {
   /** Decides on one candidate. Never throws: an exception becomes a rejection. Both messages are complete but for
   elapsed_us, which the caller measures. The clock is read twice: before, which is the decision's utime, and after: a
   certificate that took longer than its budget is withdrawn. */
-  [[nodiscard]] GateAnswer Decide(Bytes candidate, const Clock& clock) noexcept;
+  [[nodiscard]] GateAnswer Decide(Bytes candidate, const TimeSource& clock) noexcept;
   /** The same at a moment, microseconds since the Unix epoch, as if it took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
@@ -96,7 +96,8 @@ class Gate final {
     std::int16_t outcome = decision_t::REJECTED;
   };
 
-  [[nodiscard]] GateAnswer Answer(Bytes candidate, const Clock& clock, std::optional<Rejection> from_outside) noexcept;
+  [[nodiscard]] GateAnswer Answer(Bytes candidate, const TimeSource& clock,
+                                  std::optional<Rejection> from_outside) noexcept;
   [[nodiscard]] std::optional<Rejection> Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
                                                std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const;

@@ -383,7 +383,7 @@ void CertifierNode::CompactIfDue() {
   if (gate_->certifier().num_unindexed() < kUnindexedAtMost) return;
   if (gate_->certifier().num_observations() <= kIndexedAtOnce) return gate_->Compact();
   if (compaction_.valid() && !IsReady(compaction_)) return;
-  compaction_ = Beside([gate = gate_.get()] { gate->Compact(); });
+  compaction_ = RunInThread([gate = gate_.get()] { gate->Compact(); });
 }
 
 void CertifierNode::Reload() {

@@ -198,10 +198,10 @@ void ObservationStore::Compact() {
 }
 
 // One new observation against those of a generation.
-class ObservationStore::Newcomer {
+class ObservationStore::PartnerSearch {
  public:
-  Newcomer(const ObservationStore& store, std::span<const double> z, std::span<const double> lower,
-           std::span<const double> upper, int id)
+  PartnerSearch(const ObservationStore& store, std::span<const double> z, std::span<const double> lower,
+                std::span<const double> upper, int id)
       : store_(store), generation_(*store.current_), z_(z), lower_(lower), upper_(upper), id_(id) {}
 
   std::optional<Violation> FindPartner() {
@@ -308,7 +308,7 @@ ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, 
 ObservationStore::Insertion ObservationStore::Enlist(std::span<const double> z, std::span<const double> lower,
                                                      std::span<const double> upper) {
   const int id = next_id_++;
-  Insertion insertion{id, Newcomer(*this, z, lower, upper, id).FindPartner()};
+  Insertion insertion{id, PartnerSearch(*this, z, lower, upper, id).FindPartner()};
   if (insertion.violation) {
     const std::lock_guard lock(current_lock_);
     if (!violation_) violation_ = insertion.violation;

@@ -1,9 +1,9 @@
-/** Observations that grow while they are used.
+/** A set of observations that can grow while other threads query it.
 
-One thread at a time inserts, removes and compacts; any number take snapshots and query them, and none of these ever
-waits for an index to be built. New observations go into a tail beside the index, which queries scan in full; Compact
-makes a new index of both, off to the side, and swaps it in. A snapshot is what was known when it was taken: it stays
-valid, and answers the same, for as long as it is held.
+One thread at a time inserts and compacts. Any number of threads take snapshots and query them, and no query waits for
+the construction of an index. New observations are appended to a tail, which queries scan completely; Compact builds a
+new index of index and tail and replaces the old one. A snapshot contains the observations at its creation: it stays
+valid, and gives the same answers, as long as it exists.
 
 Every set of observations gives a sound envelope, so nothing here can make a bound wrong: not the tail's limit, not the
 budget, not a removal. */
@@ -34,7 +34,7 @@ class ObservationStore final {
  private:
   struct Known;
   struct Generation;
-  class Newcomer;
+  class PartnerSearch;
 
  public:
   /** EnvelopeOptions::value_headroom: a learned residual beyond this times the largest known costs a new index. */

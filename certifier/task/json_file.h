@@ -24,7 +24,7 @@ template <class Json>
     if (event == Event::object_start) keys.emplace_back();
     if (event == Event::object_end) keys.pop_back();
     if (event == Event::key && !keys.back().insert(value.template get<std::string>()).second)
-      throw Json::other_error::create(501, "the key " + value.dump() + " stands twice", nullptr);
+      throw Json::other_error::create(501, "duplicate key " + value.dump(), nullptr);
     return true;
   });
 }

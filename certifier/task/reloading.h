@@ -1,4 +1,4 @@
-/** Work beside a node's own: reloads, which read files and may never end, and work on memory, which does. */
+/** Background work of a node: reloads, which read files and may never end, and work on memory, which always ends. */
 #pragma once
 
 #include <atomic>
@@ -22,43 +22,44 @@ template <class Result>
   return work.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
 }
 
-/** The work in a thread of its own; not valid where the machine has none to give. The future's destructor waits for it:
-only for work that ends. */
+/** Runs the work in its own thread. The future is not valid if no thread can be started. Its destructor waits for the
+work, so use it only for work that ends. */
 template <class Work>
-[[nodiscard]] std::future<std::invoke_result_t<Work>> Beside(Work work) try {
+[[nodiscard]] std::future<std::invoke_result_t<Work>> RunInThread(Work work) try {
   return std::async(std::launch::async, std::move(work));
 } catch (const std::system_error&) {
   return {};
 }
 
-/** How many threads of reloads have not ended, in the whole process. While there are any, they may use static objects:
-the process then ends by std::_Exit. */
+/** The number of reload threads in the process that have not ended. They may use static objects, so if there are any,
+the process ends by std::_Exit. */
 inline std::atomic<int> reloads_under_way = 0;
 
-/** Reads in a thread of its own that nobody waits for: one that reads from a mount that stalls may never end. One reads
-at a time; where it has not ended after `patience` it is stalled, and another may begin beside it, of at most kMost.
-Where a newer result was taken an older one is dropped. */
+/** Reads in its own thread, for which no other thread waits: a read from a stalled mount may never end. One thread
+reads at a time. If it has not ended after `patience`, it counts as stalled, and another may start, up to kMost at once.
+If a newer result was taken, older results are discarded. */
 template <class Result>
 class Reloading final {
  public:
-  using Clock = std::chrono::steady_clock;
+  using SteadyClock = std::chrono::steady_clock;
   static constexpr std::size_t kMost = 2;
 
-  /** @param read runs in a thread of its own, up to kMost times at once; it owns whatever it uses, since this object
-  and its owner may be gone before it ends. */
-  explicit Reloading(std::function<Result()> read, Clock::duration patience = std::chrono::seconds(10))
+  /** @param read runs in its own thread, up to kMost times at once. It has to own the objects that it uses, because
+  this object and its owner may be destroyed before it ends. */
+  explicit Reloading(std::function<Result()> read, SteadyClock::duration patience = std::chrono::seconds(10))
       : read_(std::move(read)), patience_(patience) {}
 
-  /** Reads, or reads once more after what is under way: that may have read before what it is asked for was written.
-  False where kMost are stalled: it is read once one of them has ended. */
+  /** Starts a read, or another one after the running read, which may have read an older version of the file. False if
+  kMost reads are stalled; the read then starts when one of them has ended. */
   [[nodiscard]] bool Ask() {
     again_ = true;
     BeginIfDue();
     return !again_ || attempts_.size() < kMost || !IsStalled(*attempts_.back());
   }
 
-  /** What was read, once, the newest first. Does not wait. To be called again and again: it begins what is due.
-  @throws what `read` threw. */
+  /** The newest result that was not taken yet, if any. It does not wait. Call it repeatedly, because it also starts
+  pending reads.
+  @throws the exception of `read`. */
   [[nodiscard]] std::optional<Result> Take() {
     std::shared_ptr<Attempt> newest;
     for (auto at = attempts_.end(); at != attempts_.begin();) {
@@ -87,7 +88,7 @@ class Reloading final {
     std::optional<Result> result;
     std::exception_ptr error;
     std::atomic<bool> ended = false;
-    const Clock::time_point begun = Clock::now();
+    const SteadyClock::time_point begun = SteadyClock::now();
     bool dropped = false,
          told = false;  // a newer one was taken; it was told that this one is stalled. Of the node alone
 
@@ -101,7 +102,9 @@ class Reloading final {
     }
   };
 
-  bool IsStalled(const Attempt& attempt) const { return !attempt.ended && Clock::now() - attempt.begun > patience_; }
+  bool IsStalled(const Attempt& attempt) const {
+    return !attempt.ended && SteadyClock::now() - attempt.begun > patience_;
+  }
 
   // A machine without another thread to give is asked again the next time.
   void BeginIfDue() {
@@ -123,7 +126,7 @@ class Reloading final {
   }
 
   const std::function<Result()> read_;
-  const Clock::duration patience_;
+  const SteadyClock::duration patience_;
   std::list<std::shared_ptr<Attempt>> attempts_;  // the newest at the back
   bool again_ = false;
 };
