@@ -10,9 +10,16 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 
 find_program(CCACHE ccache)
-if(CCACHE)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+if(CCACHE)  # without this, it keeps no file that was compiled with a precompiled header
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
 endif()
+
+# Precompiled headers, of g++ alone: clang's do not survive a cache. They hold no header of ours.
+if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON)
+endif()
+set(standard_headers <algorithm> <array> <cmath> <cstdint> <filesystem> <fstream> <functional> <iostream> <limits> <map>
+  <memory> <optional> <set> <sstream> <stdexcept> <string> <thread> <variant> <vector>)
 
 add_library(forereach_options INTERFACE)
 add_library(ForeReach::options ALIAS forereach_options)
