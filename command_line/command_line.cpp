@@ -126,10 +126,10 @@ void AddOptions(CLI::App& app, const std::vector<Option>& options) {
 void Add(CLI::App& app, const Command& command) {
   app.footer(command.footer);
   AddOptions(app, command.options);
+  if (!command.options.empty()) app.fallthrough();  // inherited by the commands that are added after it
   for (const Command& each : command.commands) Add(*app.add_subcommand(each.name, each.purpose), each);
   if (command.commands.empty()) return;
   app.require_subcommand(1);
-  if (!command.options.empty()) app.fallthrough();
 }
 
 }  // namespace
