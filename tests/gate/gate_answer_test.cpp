@@ -169,7 +169,7 @@ TEST_F(GateAnswerTest, EveryCandidateIsAnsweredOnceAndCounted) {
 
 TEST_F(GateAnswerTest, AnErrorAfterTheProofLeavesNoCertificate) {
   int calls = 0;
-  const Gate::Clock fails_after_the_proof = [&] {
+  const Gate::TimeSource fails_after_the_proof = [&] {
     if (++calls > 1) throw std::runtime_error("the clock is gone");
     return kNow;
   };
