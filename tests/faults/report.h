@@ -27,12 +27,12 @@ inline void ReplaceBetween(const std::string& path, const std::string& name, con
 
 /** The option that says which page. */
 inline Option ReportOption(std::string& report) {
-  return {.name = "--report", .variable = &report, .help = "Where the table goes; empty: to standard output alone"};
+  return {.name = "--report", .variable = &report, .help = "Where the table goes; none: to standard output alone"};
 }
 
 inline void Publish(const std::string& report, const std::string& name, const std::string& table) {
   std::cout << table << std::flush;
-  if (!report.empty()) ReplaceBetween(report, name, table);
+  if (report != "none") ReplaceBetween(report, name, table);
 }
 
 }  // namespace forereach
