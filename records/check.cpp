@@ -23,10 +23,10 @@ enum class Seen : std::uint8_t { kNot, kOther, kSame };
 
 void CheckEvents(EventLogReader& reader, const std::vector<LogReference>& references, std::vector<Seen>& seen) {
   ForEachEvent(reader, [&](const LogEvent& event) {
-    const auto rows = std::ranges::equal_range(references, event.number, {}, &LogReference::event_number);
-    if (rows.empty()) return;
+    auto row = std::ranges::lower_bound(references, event.number, {}, &LogReference::event_number);
+    if (row == references.end() || row->event_number != event.number) return;
     const std::string digest = ToHex(DigestOf(event));
-    for (auto row = rows.begin(); row != rows.end(); ++row) {
+    for (; row != references.end() && row->event_number == event.number; ++row) {
       Seen& found = seen[static_cast<std::size_t>(row - references.begin())];
       found = std::max(found, row->digest.empty() || row->digest == digest ? Seen::kSame : Seen::kOther);
     }

@@ -20,9 +20,10 @@ std::atomic<int> error_now = 0, calls_with_error = 0;
 
 extern "C" ssize_t recvmsg(int socket, msghdr* message, int flags) {
   static auto* const next = reinterpret_cast<ssize_t (*)(int, msghdr*, int)>(::dlsym(RTLD_NEXT, "recvmsg"));
-  if (error_now == 0) return next(socket, message, flags);
+  const int error = error_now;
+  if (error == 0) return next(socket, message, flags);
   ++calls_with_error;
-  errno = error_now;
+  errno = error;
   return -1;
 }
 
