@@ -238,11 +238,15 @@ class Checker {
       if (!row.only.empty() && row.only != kind) Fail(entry.first, child, "is for " + row.only + ", not for " + kind);
       children.emplace(&row, Child{child, entry.second});
     }
-    for (const auto& [row, child] : children) Check(child.value, row->path, child.key);
-    for (const Key& row : Schema())
-      if (row.required && IsChild(row, pattern) && (row.only.empty() || row.only == kind) &&
-          !seen.contains(std::string(Leaf(row.path))) && !Leaf(row.path).starts_with('<'))
+    // A row's reader relies on the rows before it.
+    for (const Key& row : Schema()) {
+      if (!IsChild(row, pattern)) continue;
+      if (row.required && (row.only.empty() || row.only == kind) && !seen.contains(std::string(Leaf(row.path))) &&
+          !Leaf(row.path).starts_with('<'))
         Fail(node, Below(key, Leaf(row.path)), "missing: " + row.meaning);
+      const auto [begin, end] = children.equal_range(&row);
+      for (auto child = begin; child != end; ++child) Check(child->second.value, row.path, child->second.key);
+    }
   }
 
   const Key& ChildRow(const YAML::Node& entry, const std::string& pattern, const std::string& key) const {

@@ -37,6 +37,12 @@ TEST_F(ErrorTest, UnknownKeys) {
   EXPECT_THAT(ErrorAfter("<<: {gate: {}}\n"), StartsWith("task.yaml:19: <<: unknown key"));
 }
 
+TEST_F(ErrorTest, ErrorsComeInTheSchemasOrder) {
+  EXPECT_THAT(files_.Error("model: {name: hovercraft}\n"), HasSubstr("model.name: hovercraft is not known"));
+  const std::string task = kTask, without_model = task.substr(task.find('\n') + 1);
+  EXPECT_THAT(files_.Error(without_model), HasSubstr("model: missing"));
+}
+
 TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
   EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0.15, \"a\\nb\\e[2J\": 1"),
             "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase");
