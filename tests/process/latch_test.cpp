@@ -5,6 +5,7 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -277,6 +278,26 @@ TEST_F(LatchTest, MoreContradictionsThanFitArmNobody) {
   EXPECT_FALSE(file.Put(content));
   EXPECT_FALSE(file.ready());
   EXPECT_THAT(file.why_not(), HasSubstr("holds at most 16 contradictions"));
+  const auto held = file.Read();
+  EXPECT_TRUE(held && held->fault) << "the fault that was stored before stays";
+}
+
+TEST_F(LatchTest, AFaultThatDoesNotFitIsNotForgottenByARestart) {
+  Begin();
+  SayState();
+  Falsify();
+  node_.reset();
+  {
+    LatchFile file(directory_);
+    LatchFile::Content content = file.Read().value();
+    const auto fault = std::exchange(content.fault, std::nullopt);
+    EXPECT_TRUE(file.Put(content) && file.Flush());
+    content.fault = fault;
+    content.contradictions.resize(LatchFile::kMostContradictions + 1, content.contradictions[0]);
+    EXPECT_FALSE(file.Put(content));
+  }
+  Begin();
+  ExpectNotArmed("has 0 bytes");
 }
 
 // The largest model there can be, with numbers of many digits.

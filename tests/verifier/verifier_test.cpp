@@ -139,6 +139,35 @@ TEST(Containment, AColumnThatNothingCoversIsSeen) {
   EXPECT_FALSE(is_inside({diagonal, across, axis}, with_axis));
 }
 
+TEST(Containment, ACenterMovesNoFurtherThanTheAxesHaveRoom) {
+  const auto answer = [](double x, double y, const std::vector<std::vector<Real>>& columns,
+                         const Eigen::MatrixXd& generators) {
+    return IsInside({{Real(x), Real(y)}, columns}, Eigen::Vector2d(1, 2), generators).answer;
+  };
+  const std::vector<Real> diagonal{1.0, 1.0}, axis{0.25, 0.0};
+  const Eigen::MatrixXd one{{1}, {1}}, with_axis{{1, 0.5}, {1, 0}};
+  for (const double sign : {-1, 1}) {
+    EXPECT_EQ(answer(1 + sign * 0.5, 2, {diagonal}, with_axis), Answer::kYes);
+    EXPECT_NE(answer(1 + sign * Up(0.5 + 0x1p-50), 2, {diagonal}, with_axis), Answer::kYes);
+    EXPECT_EQ(answer(1 + sign * 0.25, 2, {diagonal, axis}, with_axis), Answer::kYes);
+    EXPECT_NE(answer(1 + sign * 0.375, 2, {diagonal, axis}, with_axis), Answer::kYes);
+    EXPECT_NE(answer(1, 2 + sign * 0x1p-50, {diagonal}, with_axis), Answer::kYes);
+    EXPECT_EQ(answer(1 + sign * 0.5, 2 - sign * 0.5, {diagonal}, one), Answer::kNo) << "away from the segment";
+    EXPECT_EQ(answer(1 + sign * 3, 2 + sign * 3, {diagonal}, one), Answer::kNo) << "along the segment";
+  }
+}
+
+TEST(Containment, AGeneratorCoversOneColumnThatIsNoLonger) {
+  const auto is_inside = [](const std::vector<std::vector<Real>>& columns) {
+    return IsInside({{Real(), Real()}, columns}, Eigen::Vector2d::Zero(), Eigen::MatrixXd{{1}, {1}}).answer ==
+           Answer::kYes;
+  };
+  const std::vector<Real> same{1.0, 1.0}, opposite{-1.0, -1.0}, shorter{0.5, 0.5}, longer{1 + 0x1p-52, 1 + 0x1p-52};
+  EXPECT_TRUE(is_inside({same}) && is_inside({opposite}) && is_inside({shorter}));
+  EXPECT_FALSE(is_inside({longer}));
+  EXPECT_FALSE(is_inside({same, shorter}));
+}
+
 TEST(HandMade, APlanThatDoesNotEndStandingIsRefuted) {
   const auto within = [](int coordinate, double tolerance) {
     const auto problem = Halves();
