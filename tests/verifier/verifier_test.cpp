@@ -1,6 +1,8 @@
 // Certificates made by hand, true by a hair and false by a hair, and the certifier's own with one thing changed.
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -312,18 +314,24 @@ TEST(HandMade, AContradictionOfRoundingSizeWidensTheSlice) {
   ExpectRefuted(Judge(problem, certificate), 1, "hull contains px");
 }
 
-TEST(HandMade, CentredRemainderKnowsTheSign) {
+// A bicycle at v = 1 with theta within 1/4, for one step.
+std::pair<std::shared_ptr<Problem>, Certificate> Turning() {
   auto problem = Halves();
   problem->model = MakeKinematicBicycle(0.5, 1);
   problem->domain.state = Box(Eigen::VectorXd::Constant(6, -1.5), Eigen::VectorXd::Constant(6, 1.5));
   problem->declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
   problem->transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
   problem->projection = Eigen::MatrixXd::Identity(2, 6);
-  Certificate certificate;  // v = 1 and theta within 1/4: x+ = x + cos(theta)/2 lies below x + 1/2
+  Certificate certificate;
   certificate.initial_set = {{}, {}, Eigen::VectorXd::Zero(6), Eigen::VectorXd::Zero(6)};
   certificate.initial_set.center[3] = 1;
   certificate.initial_set.generators(2, 0) = 0.25;
   certificate.controls = Eigen::Vector2d(0, 0);
+  return {problem, certificate};
+}
+
+TEST(HandMade, CentredRemainderKnowsTheSign) {
+  const auto [problem, certificate] = Turning();  // x+ = x + cos(theta)/2 lies below x + 1/2
   const Tube paper = Verifier(problem, Method::kPaper).Derive(certificate);
   const Tube centred = Verifier(problem, Method::kCentred).Derive(certificate);
   // Here H = -cos(theta) / 2 in [-1/2, -cos(1/4)/2]: 1/2 r^2 H in [-1/64, 0].
@@ -332,6 +340,30 @@ TEST(HandMade, CentredRemainderKnowsTheSign) {
   EXPECT_DOUBLE_EQ(centred.steps[0].remainder[0].lower.ToDouble(), -1.0 / 64);
   EXPECT_DOUBLE_EQ(centred.slices[1].center[0].ToDouble(), 0.5 - 1.0 / 128);
   EXPECT_DOUBLE_EQ(paper.slices[1].center[0].ToDouble(), 0.5);
+}
+
+// The claim is true, but the certifier's rules do not show it, and no rounding explains the difference.
+TEST(HandMade, AClaimThatOnlyATighterRemainderShowsIsRefuted) {
+  auto [problem, certificate] = Turning();
+  const auto equations = EquationsOf(*problem->model);
+  for (const Method method : {Method::kPaper, Method::kCentred})
+    for (const bool split : {false, true}) {
+      const Tube tube = TubeMaker(*problem, *equations, method)
+                            .Make(certificate.initial_set, certificate.controls, {.split_remainder = split});
+      certificate.slices.assign(2, {});
+      for (std::size_t t = 0; t < 2; ++t) {
+        RecordedSlice& recorded = certificate.slices[t];
+        recorded.lower = recorded.upper = Eigen::VectorXd::Zero(6);
+        for (int k = 0; k < 6; ++k) {
+          const Real& center = tube.slices[t].center[static_cast<std::size_t>(k)];
+          const Real half_width = tube.slices[t].HalfWidth(k);
+          recorded.lower[k] = Down((center - half_width).ToDouble());
+          recorded.upper[k] = Up((center + half_width).ToDouble());
+        }
+      }
+      const Verdict verdict = Judge(problem, certificate, method);
+      split ? ExpectRefuted(verdict, 1, "hull contains y") : ExpectConfirmed(verdict);
+    }
 }
 
 TEST(HandMade, CloseChoicesOfTheReductionAreTold) {
