@@ -84,6 +84,23 @@ TEST_F(GateRefusalTest, StartsAfterItsCertificateWouldHaveExpired) {
   ExpectRefused(decision_t::CAUSE_FUTURE, [](auto& c) { c.start_utime = kMax; });
 }
 
+TEST_F(GateRefusalTest, StartsBeforeADecisionCanBeExpected) {
+  Config config = SmallTask();
+  config.gate.decision_budget_ms = 400;
+  Gate gate(config);
+  EXPECT_EQ(gate.EarliestStart(kNow), kNow + 400'000);
+  EXPECT_EQ(gate.EarliestStart(kMax - 1), kMax);
+  candidate_plan_t candidate = Candidate(1);
+  candidate.start_utime = kNow + 399'999;
+  const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
+  EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_DEADLINE);
+  EXPECT_EQ(decision.cause, decision_t::CAUSE_DEADLINE);
+  EXPECT_THAT(GetText(decision.message), HasSubstr("it starts in 399.999 ms, a decision may take 400 ms"));
+  candidate = Candidate(2);
+  candidate.start_utime = kNow + 400'000;
+  EXPECT_EQ(gate.Decide(Encode(candidate), kNow).decision.outcome, decision_t::CERTIFIED);
+}
+
 TEST_F(GateRefusalTest, LimitsInMillisecondsAreRoundedToTheNearestMicrosecond) {
   Config config = SmallTask();
   config.gate.max_age_ms = 1.001;  // times 1000, the double is just below 1001
