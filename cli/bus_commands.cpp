@@ -77,14 +77,6 @@ class CertifierConnection final {
   bool warned_ = false;
 };
 
-const char* LatchText(const certifier_status_v3_t& status) {
-  switch (status.latch) {
-    case certifier_status_v3_t::LATCH_WRITTEN: return "written";
-    case certifier_status_v3_t::LATCH_UNWRITABLE: return "unwritable";
-    default: return "none";
-  }
-}
-
 nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signed) {
   nlohmann::ordered_json by_outcome, by_cause;
   for (std::int16_t i = 0; i < 16; ++i)
@@ -95,7 +87,7 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signe
       {"level", LevelName(status.level)},
       {"state", StateName(status.state)},
       {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
-      {"latch", LatchText(status)},
+      {"latch", LatchName(status.latch)},
       {"message", GetText(status.message)},
       {"advice", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultAdvice(status.fault))},
       {"signed", is_signed},
@@ -115,7 +107,6 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signe
         {"utime", status.obstacles_utime == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_utime)},
         {"age_us", status.obstacles_age_us < 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_age_us)},
         {"lost", status.obstacles_lost}}},
-      {"latch", LatchName(status.latch)},
       {"unsigned", status.is_unsigned != 0},
       {"candidates_lost", status.candidates_lost},
       {"messages_refused", status.messages_refused},
@@ -241,16 +232,9 @@ Command KeygenCommand() {
               "in the task file. On another machine a process needs only its own role's file, as in\n"
               "  forereach-planner --config my_robot.yaml --key planner.key\nkeys/verify.pub contains no secret; "
               "report, replay and verify check logs with it.",
-          .options = {{.name = "--robot",
-                       .variable = &options->robot,
-                       .type = "NAME",
-                       .help = "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature",
-                       .required = true},
-                      {.name = "directory",
-                       .variable = &options->directory,
-                       .type = "DIR",
-                       .help = "The new directory",
-                       .required = true}},
+          .options = {Required({"--robot", &options->robot, "NAME",
+                                "The robot's name: letters, digits, '.', '_', '-'; it is part of every signature"}),
+                      Required({"directory", &options->directory, "DIR", "The new directory"})},
           .run = [options] {
             MakeKeys(options->robot, options->directory);
             std::cout << options->directory << std::endl;

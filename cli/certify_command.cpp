@@ -63,11 +63,8 @@ Command CertifyCommand() {
       .purpose = "Decide on one plan: exit 0 certificate, 1 abstention, 2 bad input",
       .footer = "Example:\n  forereach certify --config config/bicycle.yaml --plan config/plans/bicycle_certified.csv",
       .options = {ConfigOption(options->config),
-                  {.name = "--plan",
-                   .variable = &options->plan,
-                   .type = "FILE.csv",
-                   .help = "Controls, one row for each step (CSV with a header)",
-                   .required = true},
+                  Required(
+                      {"--plan", &options->plan, "FILE.csv", "Controls, one row for each step (CSV with a header)"}),
                   JsonFlag(options->json, "Print one JSON document on standard output, and nothing else")},
       .run = [options] { return Certify(*options); }};
 }

@@ -27,11 +27,7 @@ Command CheckLogCommand() {
   return {.name = kCheckLog.name,
           .purpose = kCheckLog.purpose,
           .footer = "Example:\n  forereach check-log run/log",
-          .options = {{.name = "directory",
-                       .variable = &options->directory,
-                       .type = "DIRECTORY",
-                       .help = "The logger's directory",
-                       .required = true},
+          .options = {Required({"directory", &options->directory, "DIRECTORY", "The logger's directory"}),
                       JsonFlag(options->json)},
           .run = [options] { return RunCheckLog(*options); }};
 }

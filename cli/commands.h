@@ -16,14 +16,12 @@ inline constexpr const char* kTaskOfLogs =
 
 // Options that several commands share.
 [[nodiscard]] inline Option ConfigOption(std::string& path, const char* help = "Task file (YAML)") {
-  return {.name = "--config", .variable = &path, .type = "FILE", .help = help, .required = true};
+  return Required({"--config", &path, "FILE", help});
 }
 [[nodiscard]] inline Option JsonFlag(bool& json, const char* help = "One JSON document on standard output") {
-  return {.name = "--json", .variable = &json, .help = help};
+  return {"--json", &json, "", help};
 }
-[[nodiscard]] inline Option JobsOption(unsigned& jobs) {
-  return {.name = "--jobs", .variable = &jobs, .help = "Threads", .range = Between{1, 256}};
-}
+[[nodiscard]] inline Option JobsOption(unsigned& jobs) { return {"--jobs", &jobs, "", "Threads", Between{1, 256}}; }
 
 [[nodiscard]] Command CertifyCommand();
 [[nodiscard]] Command PlanCommand();

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <chrono>
-#include <functional>
 #include <iomanip>
 #include <iostream>
 #include <sstream>
@@ -75,39 +74,41 @@ std::vector<SlopeBound> BoundAll(const Config& config, const Options& options) {
   return bounds;
 }
 
-bool IsFree(const Config& config, std::size_t parameter) {
-  return config.residual->parameters[parameter].lower < config.residual->parameters[parameter].upper;
-}
-
 constexpr int kDigits = 10;  // of a bound
 
-std::string BoxText(const std::vector<Interval>& box, const std::vector<std::string>& names,
-                    const std::function<bool(std::size_t)>& counts) {
-  std::string text;
-  for (std::size_t i = 0; i < box.size(); ++i)
-    if (counts(i))
-      text += (text.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(box[i].lower, kDigits) + ", " +
-              RoundedUp(box[i].upper, kDigits) + "]";
-  return text;
+// The arguments that the slopes of a row depend on and that are not parameters with one value.
+std::vector<std::size_t> FreeArguments(const ResidualSlopes& slopes, const Config& config, int row) {
+  const std::vector<ParametricResidual::Parameter>& parameters = config.residual->parameters;
+  const auto num_variables = static_cast<std::size_t>(config.problem->model->num_variables());
+  std::vector<std::size_t> free;
+  for (std::size_t i = 0; i < num_variables + parameters.size(); ++i)
+    if (slopes.Occurs(row, static_cast<int>(i)) &&
+        (i < num_variables || parameters[i - num_variables].lower < parameters[i - num_variables].upper))
+      free.push_back(i);
+  return free;
+}
+
+template <class Entry>
+std::string NameOf(const Entry& entry, const std::vector<std::string>& names) {
+  return names[static_cast<std::size_t>(entry.row)] + " by " + names[static_cast<std::size_t>(entry.column)];
 }
 
 // Rejects a slope without a finite bound. @throws std::runtime_error that names the slope and a box.
 void RequireFinite(const std::vector<SlopeBound>& bounds, const Config& config, const ResidualSlopes& slopes) {
   const std::vector<std::string> names = ArgumentNames(config);
-  const std::size_t parameters_begin = names.size() - config.residual->parameters.size();
   for (const SlopeBound& bound : bounds) {
-    if (!bound.unbounded.empty())
+    if (!bound.unbounded.empty()) {
+      std::string box;
+      for (const std::size_t i : FreeArguments(slopes, config, bound.row))
+        box += (box.empty() ? "" : ", ") + names[i] + " in [" + RoundedDown(bound.unbounded[i].lower, kDigits) + ", " +
+               RoundedUp(bound.unbounded[i].upper, kDigits) + "]";
       throw std::runtime_error(
-          "no finite bound for the slope of " + names[static_cast<std::size_t>(bound.row)] + " by " +
-          names[static_cast<std::size_t>(bound.column)] + ": " + config.residual->name + " has none over " +
-          BoxText(bound.unbounded, names,
-                  [&](std::size_t i) {
-                    return slopes.Occurs(bound.row, static_cast<int>(i)) &&
-                           (i < parameters_begin || IsFree(config, i - parameters_begin));
-                  }) +
-          ", found after " + std::to_string(bound.boxes) + " boxes; take this box out of `domain` in " + config.path +
+          "no finite bound for the slope of " + NameOf(bound, names) + ": " + config.residual->name +
+          " has none over " + box + ", found after " + std::to_string(bound.boxes) +
+          " boxes; take this box out of `domain` in " + config.path +
           " (narrow its bounds, or add an inequality or ball), narrow the residual's parameters, or raise --max-boxes "
           "if the box is wide");
+    }
     if (std::ranges::all_of(bound.cover.nodes, [](const auto& node) { return node.outside || node.argument >= 0; }))
       throw ConfigError(config.path + ": domain: no point of its box satisfies its inequalities and balls");
   }
@@ -180,7 +181,6 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
 void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
   const auto slopes = MakeResidualSlopes(config.residual->name);
   const std::vector<std::string> names = ArgumentNames(config);
-  const std::size_t parameters_begin = names.size() - config.residual->parameters.size();
   const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
   std::ostringstream text;
   text << std::left << "declare: " << config.residual->name << " over the domain, "
@@ -192,9 +192,8 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
     text << "  " << std::setw(8) << name(bound.row) << std::setw(8) << name(bound.column) << std::setw(18)
          << RoundedUp(bound.upper, kDigits) << std::setw(18) << RoundedDown(bound.lower, kDigits) << std::setw(10)
          << RoundedUp(bound.gap(), 2) << std::setw(9) << bound.boxes << std::setprecision(6);
-    for (std::size_t i = 0; i < bound.point.size(); ++i)
-      if (slopes->Occurs(bound.row, static_cast<int>(i)) &&
-          (i < parameters_begin || IsFree(config, i - parameters_begin)))
+    if (!bound.point.empty())
+      for (const std::size_t i : FreeArguments(*slopes, config, bound.row))
         text << " " << names[i] << " " << bound.point[i];
     text << "\n";
   }
@@ -260,9 +259,7 @@ std::vector<Finding> CheckClaims(const CoverFile& file, const Config& config, co
   ForEachInParallel(file.claims.size(), jobs, [&](std::size_t i, std::size_t) {
     const verifier::SlopeClaim& claim = file.claims[i];
     const verifier::CoverVerdict verdict = checker.Check(claim, [&] { progress.Advance(); });
-    findings[i] = {verdict.answer,
-                   names[static_cast<std::size_t>(claim.row)] + " by " + names[static_cast<std::size_t>(claim.column)],
-                   verdict.what};
+    findings[i] = {verdict.answer, NameOf(claim, names), verdict.what};
   });
   return findings;
 }
@@ -277,13 +274,10 @@ int CheckCover(const Options& options) {
 
   const bool refuted =
       std::ranges::any_of(findings, [](const Finding& finding) { return finding.answer == verifier::Answer::kNo; });
-  const std::string verdict = refuted ? "refuted" : findings.empty() ? "confirmed" : "cannot verify";
+  const std::string unknown = options.json ? "cannot_verify" : "cannot verify";
+  const std::string verdict = refuted ? "refuted" : findings.empty() ? "confirmed" : unknown;
   if (options.json) {
-    Json document{{"verdict", refuted            ? "refuted"
-                              : findings.empty() ? "confirmed"
-                                                 : "cannot_verify"},
-                  {"entries", file.claims.size()},
-                  {"failures", Json::array()}};
+    Json document{{"verdict", verdict}, {"entries", file.claims.size()}, {"failures", Json::array()}};
     for (const Finding& finding : findings)
       document["failures"].push_back({{"entry", finding.entry}, {"claim", finding.what}});
     std::cout << document.dump() << std::endl;
@@ -312,27 +306,21 @@ Command DeclareCommand() {
               "  forereach declare --config config/bicycle.yaml\n"
               "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
               "  forereach declare --config config/point_mass.yaml --check cover.json",
-          .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
-                      {.name = "--gap",
-                       .variable = &options->search.gap,
-                       .help = "Stop when no bound exceeds the largest slope found by more than this fraction",
-                       .range = Between{1e-12, 1e3}},
-                      {.name = "--max-boxes",
-                       .variable = &options->search.max_boxes,
-                       .help = "Stop after this many boxes for each bound; the bound found by then is valid",
-                       .range = Between{1, 100'000'000}},
-                      {.name = "--cover",
-                       .variable = &options->cover,
-                       .type = "FILE.json",
-                       .help = "The file for the proof: the boxes, and a bound for each"},
-                      {.name = "--check",
-                       .variable = &options->check,
-                       .type = "FILE.json",
-                       .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
-                               "confirmed, 1 not confirmed",
-                       .excludes = "--cover"},
-                      JobsOption(options->jobs),
-                      JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
+          .options =
+              {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
+               {"--gap", &options->search.gap, "",
+                "Stop when no bound exceeds the largest slope found by more than this fraction", Between{1e-12, 1e3}},
+               {"--max-boxes", &options->search.max_boxes, "",
+                "Stop after this many boxes for each bound; the bound found by then is valid", Between{1, 100'000'000}},
+               {"--cover", &options->cover, "FILE.json", "The file for the proof: the boxes, and a bound for each"},
+               {.name = "--check",
+                .variable = &options->check,
+                .type = "FILE.json",
+                .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
+                        "confirmed, 1 not confirmed",
+                .excludes = "--cover"},
+               JobsOption(options->jobs),
+               JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
           .run = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); }};
 }
 

@@ -193,10 +193,7 @@ Command DoctorCommand() {
   const auto options = std::make_shared<Options>();
   Command command{.name = "doctor",
                   .purpose = "Check the bus (route, buffers, a round trip), and print what to do",
-                  .options = {{.name = "--config",
-                               .variable = &options->config,
-                               .type = "FILE",
-                               .help = "A task file, to check its bus and its keys"},
+                  .options = {{"--config", &options->config, "FILE", "A task file, to check its bus and its keys"},
                               JsonFlag(options->json)},
                   .run = [options] {
                     BusOptions bus = options->config.empty()

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iostream>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -16,7 +17,13 @@ namespace {
 
 // Becomes forereach-offline; returns only if that cannot be started.
 int RunOffline(char** argv) {
-  const auto program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / FOREREACH_OFFLINE;
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (error) {
+    std::cerr << "forereach: /proc/self/exe: " << error.message() << std::endl;
+    return 1;
+  }
+  const std::filesystem::path program = self.parent_path() / FOREREACH_OFFLINE;
   execv(program.c_str(), argv);
   std::cerr << "forereach: " << program.lexically_normal().string() << ": " << std::strerror(errno) << std::endl;
   return 1;

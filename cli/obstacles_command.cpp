@@ -26,12 +26,12 @@ struct Options {
 class ObstaclesNode final : public Node {
  public:
   ObstaclesNode(const Config& config, Bus& bus, std::int64_t period_us)
-      : path_(config.path), channels_(config.bus), channel_(config.bus.obstacles), bus_(bus), sender_(period_us) {
+      : path_(config.path), channels_(config.bus), bus_(bus), sender_(period_us) {
     sender_.Set(config.obstacles);
   }
 
   void Tick(std::int64_t now_us) override {
-    if (const auto message = sender_.Due(now_us); message && !bus_.Publish(channel_, *message) && !warned_) {
+    if (const auto message = sender_.Due(now_us); message && !bus_.Publish(channels_.obstacles, *message) && !warned_) {
       warned_ = true;
       spdlog::warn("the bus refused a message; receivers see a gap");
     }
@@ -50,7 +50,6 @@ class ObstaclesNode final : public Node {
  private:
   const std::string path_;
   const BusOptions channels_;
-  const std::string channel_;
   Bus& bus_;
   ObstacleSender sender_;
   bool warned_ = false;
@@ -88,11 +87,9 @@ Command ObstaclesCommand() {
           "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nWith gate.obstacles: bus, a "
           "certifier certifies nothing before it receives obstacles, and nothing after they stop.",
       .options = {ConfigOption(options->config, "Task file (YAML) with the obstacles and the bus"),
-                  {.name = "--period-ms",
-                   .variable = &options->period_ms,
-                   .type = "MS",
-                   .help = "Time from one message to the next; by default a quarter of gate.obstacles_timeout_ms",
-                   .range = Between{1, kMaxPeriodMs}}},
+                  {"--period-ms", &options->period_ms, "MS",
+                   "Time from one message to the next; by default a quarter of gate.obstacles_timeout_ms",
+                   Between{1, kMaxPeriodMs}}},
       .run = [options] { return Send(*options); }};
   options->bus.AddTo(command.options);
   return command;

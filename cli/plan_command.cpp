@@ -3,7 +3,6 @@
 #include <iostream>
 #include <limits>
 #include <sstream>
-#include <stdexcept>
 
 #include "certifier/certify/explain.h"
 #include "certifier/task/config.h"
@@ -18,15 +17,6 @@ struct Options {
   std::string config, out;
   std::uint32_t seed = 1;
 };
-
-// A task for certifying may be unusable for planning: it may have no goal, or a model without Motion.
-std::unique_ptr<Proposer> ProposerOf(const Config& config) {
-  try {
-    return MakeProposer(config);
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(config.path + ": " + error.what());
-  }
-}
 
 // Quoted for a shell.
 std::string Quoted(const std::string& word) {
@@ -59,7 +49,7 @@ int ReportFailure(const Options& options, const Config& config, const CertifiedP
 
 int MakePlan(const Options& options) {
   const Config config = LoadConfig(options.config);
-  const auto proposer = ProposerOf(config);
+  const auto proposer = MakeProposer(config);
   const Certifier certifier(config.problem);
   const CertifiedPlan plan = FindCertifiedPlan(*proposer, certifier, config, options.seed);
   if (plan.controls.cols() == 0) return ReportFailure(options, config, plan);
@@ -90,15 +80,9 @@ Command PlanCommand() {
               "and ends in a stop. It is the longest plan towards the goal that could be certified.\n\n"
               "Example:\n  forereach plan --config config/demo.yaml --out plan.csv",
           .options = {ConfigOption(options->config),
-                      {.name = "--out",
-                       .variable = &options->out,
-                       .type = "FILE.csv",
-                       .help = "The file for the controls",
-                       .required = true},
-                      {.name = "--seed",
-                       .variable = &options->seed,
-                       .help = "Equal seeds give equal plans",
-                       .range = Between{0, std::numeric_limits<std::uint32_t>::max()}}},
+                      Required({"--out", &options->out, "FILE.csv", "The file for the controls"}),
+                      {"--seed", &options->seed, "", "Equal seeds give equal plans",
+                       Between{0, std::numeric_limits<std::uint32_t>::max()}}},
           .run = [options] { return MakePlan(*options); }};
 }
 

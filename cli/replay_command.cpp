@@ -60,8 +60,8 @@ Command ReplayCommand() {
           "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config "
           "config/demo.yaml",
-      .options = {{.name = "logs", .variable = &options->logs, .type = "LOG", .help = kLogs, .required = true},
-                  {.name = "--config", .variable = &options->config, .type = "FILE", .help = kTaskOfLogs},
+      .options = {Required({"logs", &options->logs, "LOG", kLogs}),
+                  {"--config", &options->config, "FILE", kTaskOfLogs},
                   {.name = "--other-task",
                    .variable = &options->other_task,
                    .help = "Replay it through the gate of another task, given by --config, and show its decisions",

@@ -13,14 +13,11 @@ Command ReportCommand() {
       .name = kReport.name,
       .purpose = kReport.purpose,
       .footer = "Example:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo",
-      .options = {{.name = "logs", .variable = &options->logs, .type = "LOG", .help = kLogs, .required = true},
-                  {.name = "--config", .variable = &options->config, .type = "FILE", .help = kTaskOfLogs},
-                  {.name = "--picture",
-                   .variable = &options->picture,
-                   .type = "FILE",
-                   .help =
-                       "Draw obstacles, tubes and driven path into a .svg, .png or .pdf file; without an ending a .svg "
-                       "and a .png"},
+      .options = {Required({"logs", &options->logs, "LOG", kLogs}),
+                  {"--config", &options->config, "FILE", kTaskOfLogs},
+                  {"--picture", &options->picture, "FILE",
+                   "Draw obstacles, tubes and driven path into a .svg, .png or .pdf file; without an ending a .svg "
+                   "and a .png"},
                   JsonFlag(options->json)},
       .run = [options] {
         Report(*options, std::cout);

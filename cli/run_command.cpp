@@ -63,14 +63,8 @@ Command RunCommand() {
           .purpose = kRun.purpose,
           .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
           .options = {ConfigOption(options->config),
-                      {.name = "--directory",
-                       .variable = &options->directory,
-                       .type = "DIR",
-                       .help = "The logger's directory"},
-                      {.name = "--key",
-                       .variable = &options->key,
-                       .type = "DIR",
-                       .help = "Directory of keys; by default the task file's bus.key"}},
+                      {"--directory", &options->directory, "DIR", "The logger's directory"},
+                      {"--key", &options->key, "DIR", "Directory of keys; by default the task file's bus.key"}},
           .run = [options] { return Run(*options); }};
 }
 

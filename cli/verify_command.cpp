@@ -53,18 +53,8 @@ std::vector<Verdict> VerifyAll(const CertificateFile& file, unsigned jobs) {
   return verdicts;
 }
 
-struct Summary {
-  std::size_t confirmed = 0, refuted = 0, cannot_verify = 0;
-};
-
-Summary Count(const std::vector<Verdict>& verdicts) {
-  Summary summary;
-  for (const Verdict& verdict : verdicts) {
-    summary.confirmed += verdict.status == Status::kConfirmed;
-    summary.refuted += verdict.status == Status::kRefuted;
-    summary.cannot_verify += verdict.status == Status::kCannotVerify;
-  }
-  return summary;
+std::ptrdiff_t Count(const std::vector<Verdict>& verdicts, Status status) {
+  return std::ranges::count(verdicts, status, &Verdict::status);
 }
 
 std::string DescribeVerdict(const RecordedCertificate& recorded, const Verdict& verdict) {
@@ -101,14 +91,14 @@ nlohmann::json ToJson(const RecordedCertificate& recorded, const Verdict& verdic
   return document;
 }
 
-void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts, const Summary& summary) {
+void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts) {
   nlohmann::json failures = nlohmann::json::array();
   for (std::size_t i = 0; i < verdicts.size(); ++i)
     if (verdicts[i].status != Status::kConfirmed) failures.push_back(ToJson(file.certificates[i], verdicts[i]));
   std::cout << JsonText({{"certificates", verdicts.size()},
-                         {"confirmed", summary.confirmed},
-                         {"refuted", summary.refuted},
-                         {"cannot_verify", summary.cannot_verify},
+                         {"confirmed", Count(verdicts, Status::kConfirmed)},
+                         {"refuted", Count(verdicts, Status::kRefuted)},
+                         {"cannot_verify", Count(verdicts, Status::kCannotVerify)},
                          {"not_certificates", file.not_certificates},
                          {"passed_over", ToJson(file.passed_over)},
                          {"failures", failures}})
@@ -132,14 +122,15 @@ std::string Extent(const CertificateFile& file) {
          "  witness, margin and sentence. Not checked: times, sequence numbers, elapsed_us, which step is the closest";
 }
 
-void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& verdicts, const Summary& summary) {
+void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& verdicts) {
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i].status == Status::kConfirmed) continue;
     std::cout << PrintableLines(DescribeVerdict(file.certificates[i], verdicts[i]));
     break;
   }
-  std::cout << "verify: " << verdicts.size() << " certificates, " << summary.confirmed << " confirmed, "
-            << summary.refuted << " refuted, " << summary.cannot_verify << " cannot be verified";
+  std::cout << "verify: " << verdicts.size() << " certificates, " << Count(verdicts, Status::kConfirmed)
+            << " confirmed, " << Count(verdicts, Status::kRefuted) << " refuted, "
+            << Count(verdicts, Status::kCannotVerify) << " cannot be verified";
   if (file.not_certificates > 0)
     std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
   std::cout << DescribePassedOver(file.passed_over) << "\n" << Extent(file) << std::endl;
@@ -159,12 +150,11 @@ int Verify(const Options& options) {
     file.passed_over.not_authentic += each.passed_over.not_authentic;
     file.passed_over.undecodable += each.passed_over.undecodable;
   }
-  const Summary summary = Count(verdicts);
   if (options.json)
-    PrintJson(file, verdicts, summary);
+    PrintJson(file, verdicts);
   else
-    PrintForPeople(file, verdicts, summary);
-  return summary.confirmed == verdicts.size() && !verdicts.empty() ? 0 : 1;
+    PrintForPeople(file, verdicts);
+  return Count(verdicts, Status::kConfirmed) == std::ssize(verdicts) && !verdicts.empty() ? 0 : 1;
 }
 
 }  // namespace
@@ -185,18 +175,13 @@ Command VerifyCommand() {
           "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach verify run/log",
       .options =
-          {{.name = "files",
-            .variable = &options->files,
-            .type = "DECISION|LOG|DATABASE|DIRECTORY",
-            .help =
+          {Required(
+               {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
                 "The certificates: a decision (the output of certify --json), an LCM event log (all logs of the run, "
-                "in their order), a decision database with its logs in the same directory, or the directory of both",
-            .required = true},
-           {.name = "--config",
-            .variable = &options->config,
-            .type = "FILE",
-            .help = "The task file of the certificates; by default the one that a decision names, or that the logger "
-                    "kept next to a log, in tasks/"},
+                "in their order), a decision database with its logs in the same directory, or the directory of both"}),
+           {"--config", &options->config, "FILE",
+            "The task file of the certificates; by default the one that a decision names, or that the logger "
+            "kept next to a log, in tasks/"},
            JobsOption(options->jobs),
            JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};

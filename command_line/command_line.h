@@ -22,16 +22,22 @@ struct Between {
   double lower = 0, upper = 0;
 };
 
+/** Most are {name, variable, type, help} or {name, variable, type, help, range}. */
 struct Option {
   std::string name{};   ///< "--config"; without dashes the name of a positional argument.
   Variable variable{};  ///< Has to live until the command line is parsed.
   std::string type{};   ///< What help shows for its value, as in FILE; by default the kind of number, or TEXT.
   std::string help{};
+  std::optional<Between> range{};  ///< Of a number.
   bool required = false;
-  std::optional<Between> range{};     ///< Of a number.
   std::vector<std::string> one_of{};  ///< The words that it may be; empty: any text.
   std::string needs{}, excludes{};    ///< The name of another option of this command.
 };
+
+[[nodiscard]] inline Option Required(Option option) {
+  option.required = true;
+  return option;
+}
 
 /** A program, or one of the commands of a program. */
 struct Command {

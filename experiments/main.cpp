@@ -55,30 +55,20 @@ int main(int argc, char** argv) {
       .name = "forereach-experiments",
       .purpose = "The paper's experiments, done again.",
       .footer = kFooter,
-      .options = {{.name = "--quick",
-                   .variable = &quick,
-                   .help = "2 seeds, 30 plans a group, 24 rollouts a plan, the smallest and largest N"},
-                  {.name = "--seeds",
-                   .variable = &seeds,
-                   .help = "how many seeds; the paper has 10",
-                   .range = Between{1, 1000}},
-                  {.name = "--threads",
-                   .variable = &options.threads,
-                   .help = "how many cells at once; results do not depend on it",
-                   .range = Between{1, 1024}},
-                  {.name = "--out",
-                   .variable = &directory,
-                   .help = "directory of results; default run/experiments, with --quick run/experiments-quick"},
-                  {.name = "--report",
-                   .variable = &report,
-                   .help = "where the report goes; default report.md in --out"}},
+      .options = {{"--quick", &quick, "", "2 seeds, 30 plans a group, 24 rollouts a plan, the smallest and largest N"},
+                  {"--seeds", &seeds, "", "how many seeds; the paper has 10", Between{1, 1000}},
+                  {"--threads", &options.threads, "", "how many cells at once; results do not depend on it",
+                   Between{1, 1024}},
+                  {"--out", &directory, "",
+                   "directory of results; default run/experiments, with --quick run/experiments-quick"},
+                  {"--report", &report, "", "where the report goes; default report.md in --out"}},
       .chosen = &name};
   for (const Experiment& experiment : Experiments())
     program.commands.push_back({.name = experiment.name, .purpose = experiment.about});
   program.commands.push_back({.name = "all", .purpose = "all of them, in this order"});
   program.commands.push_back({.name = "train",
                               .purpose = "make the policy that `chunks` asks for its plans",
-                              .options = {{.name = "--policy", .variable = &policy, .help = "where it goes"}}});
+                              .options = {{"--policy", &policy, "", "where it goes"}}});
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
   for (const Experiment& experiment : Experiments())

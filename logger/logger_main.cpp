@@ -22,9 +22,7 @@ int main(int argc, char** argv) {
       throw ConfigError(std::string("logger.directory: ") + error.what());
     }
   };
-  return RunProcess(argc, argv, description, make_node,
-                    {{.name = "--directory",
-                      .variable = &directory,
-                      .type = "DIR",
-                      .help = "The directory of the logs; by default the task file's logger.directory"}});
+  return RunProcess(
+      argc, argv, description, make_node,
+      {{"--directory", &directory, "DIR", "The directory of the logs; by default the task file's logger.directory"}});
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <ostream>
-#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
@@ -23,19 +22,6 @@ Eigen::VectorXd HalfWidth(const Config& config) {
   return Eigen::Map<const Eigen::VectorXd>(given.data(), n);
 }
 
-std::unique_ptr<Proposer> ProposerOf(const Config& config) try {
-  return MakeProposer(config);
-} catch (const std::invalid_argument& error) {
-  throw ConfigError(config.path + ": " + error.what());
-}
-
-template <class Map>
-nlohmann::ordered_json ByName(const Map& counts) {
-  nlohmann::ordered_json object = nlohmann::ordered_json::object();
-  for (const auto& [name, count] : counts) object[name] = count;
-  return object;
-}
-
 }  // namespace
 
 PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
@@ -45,7 +31,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       period_us_(Microseconds(config.robot.step_period_ms)),
       half_width_(HalfWidth(config)),
       residual_(config.problem),
-      proposer_(ProposerOf(config)),
+      proposer_(MakeProposer(config)),
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
@@ -60,17 +46,16 @@ void PlannerNode::Tick(std::int64_t now_us) {
 }
 
 void PlannerNode::OnRobotState(const Received& received) {
-  robot_state_t state;
-  if (Decode(received.bytes, state) != DecodeStatus::kOk || !IsUsable(state, received.utime) ||
-      !TakeOrder(state, received.utime)) {
+  const auto state = Decoded<robot_state_t>(received.bytes);
+  if (!state || !IsUsable(*state, received.utime) || !TakeOrder(*state, received.utime)) {
     ++ignored_;
     return;
   }
   if (finished_) return;
-  Follow(state);
+  Follow(*state);
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() &&
-      NextPlanIsDue(state))
-    BeginRound(state);
+      NextPlanIsDue(*state))
+    BeginRound(*state);
 }
 
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
@@ -192,18 +177,14 @@ candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Roun
 }
 
 void PlannerNode::OnDecision(const Received& received) {
-  decision_t decision;
-  if (Decode(received.bytes, decision) != DecodeStatus::kOk) {
-    ++ignored_;
-    return;
-  }
-  if (GetText(decision.source) != kSource || !round_ || round_->awaited_plan < 0 ||
-      decision.plan_id != round_->awaited_plan) {
+  const auto decision = Decoded<decision_t>(received.bytes);
+  if (!decision || GetText(decision->source) != kSource || !round_ || round_->awaited_plan < 0 ||
+      decision->plan_id != round_->awaited_plan) {
     ++ignored_;
     return;
   }
   round_->awaited_plan = -1;
-  Learn(decision);
+  Learn(*decision);
 }
 
 void PlannerNode::Learn(const decision_t& decision) {
@@ -234,18 +215,17 @@ void PlannerNode::OnObstacles(const Received& received) {
 void PlannerNode::Stop() { out_ << Summary() << std::endl; }
 
 std::string PlannerNode::Summary() const {
-  nlohmann::ordered_json summary;
-  summary["proposed"] = proposed_;
-  summary["certified"] = certified_;
-  summary["abstained"] = ByName(abstained_);
-  summary["rejected"] = ByName(rejected_);
-  summary["unanswered"] = unanswered_;
-  summary["rounds"] = rounds_;
-  summary["rounds_without_certificate"] = fruitless_rounds_;
-  summary["searches_without_result"] = fruitless_searches_;
-  summary["messages_ignored"] = ignored_;
-  summary["messages_not_sent"] = sender_.refused();
-  return summary.dump();
+  return nlohmann::ordered_json{{"proposed", proposed_},
+                                {"certified", certified_},
+                                {"abstained", abstained_},
+                                {"rejected", rejected_},
+                                {"unanswered", unanswered_},
+                                {"rounds", rounds_},
+                                {"rounds_without_certificate", fruitless_rounds_},
+                                {"searches_without_result", fruitless_searches_},
+                                {"messages_ignored", ignored_},
+                                {"messages_not_sent", sender_.refused()}}
+      .dump();
 }
 
 }  // namespace forereach

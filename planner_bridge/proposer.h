@@ -41,8 +41,8 @@ class Proposer {
   [[nodiscard]] virtual std::optional<Proposal> Propose(const PlanRequest& request) = 0;
 };
 
-/** Makes the proposer that planner.source names. @throws std::invalid_argument if the options do not match the problem,
-PolicyError if the policy cannot be used. */
+/** Makes the proposer that planner.source names. @throws ConfigError if the options do not match the problem, as of a
+task for certifying that has no goal; PolicyError if the policy cannot be used. */
 [[nodiscard]] std::unique_ptr<Proposer> MakeProposer(const Config& config);
 
 /** Checks goal and steps. @throws std::invalid_argument unless the goal has an entry for each safety coordinate, and

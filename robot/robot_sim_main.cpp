@@ -79,9 +79,7 @@ int RunWriteTransitions(int argc, char** argv) {
   std::string config_path;
   SampleOptions sample;
   std::vector<Option> options = Declared(sample);
-  options.insert(
-      options.begin(),
-      {.name = "--config", .variable = &config_path, .type = "FILE", .help = "The task file (YAML)", .required = true});
+  options.insert(options.begin(), Required({"--config", &config_path, "FILE", "The task file (YAML)"}));
   const Command program{.name = kName,
                         .purpose = "Writes transitions of the task file's target, uniform over its domain.",
                         .options = std::move(options)};

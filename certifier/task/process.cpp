@@ -104,12 +104,9 @@ std::unique_ptr<Bus> OpenBusOfAllRoles(const BusOptions& options, Clock clock) {
 }
 
 void BusArguments::AddTo(std::vector<Option>& options) {
+  options.push_back({"--lcm-url", &url, "URL", "The bus; by default the task file's bus.url"});
   options.push_back(
-      {.name = "--lcm-url", .variable = &url, .type = "URL", .help = "The bus; by default the task file's bus.url"});
-  options.push_back({.name = "--key",
-                     .variable = &key,
-                     .type = "PATH",
-                     .help = "Directory of keys, or this role's key file; by default the task file's bus.key"});
+      {"--key", &key, "PATH", "Directory of keys, or this role's key file; by default the task file's bus.key"});
 }
 
 void BusArguments::Override(BusOptions& options) const {
@@ -123,8 +120,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
                std::vector<Option> options) {
   std::string config_path;
   BusArguments bus_arguments;
-  std::vector<Option> common{
-      {.name = "--config", .variable = &config_path, .type = "FILE", .help = "The task file (YAML)", .required = true}};
+  std::vector<Option> common{Required({"--config", &config_path, "FILE", "The task file (YAML)"})};
   bus_arguments.AddTo(common);
   options.insert(options.begin(), common.begin(), common.end());
   const Command program{

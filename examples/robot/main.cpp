@@ -1,6 +1,5 @@
-// A robot that executes certified plans and nothing else: a point mass as in config/point_mass.yaml, on a bus without
-// keys. Your robot also sets guard.keys, config_digest, model_digest and domain (robot/guard.h), and signs what it
-// sends.
+// A robot that executes certified plans and nothing else: a point mass as in config/point_mass.yaml, without keys. Your
+// robot also sets guard.keys, config_digest, model_digest and domain (robot/guard.h), and signs its messages.
 //   robot [URL [BOUNDARIES]]      by default on the loopback bus, without end
 #include <chrono>
 #include <iostream>
@@ -44,7 +43,9 @@ int main(int argc, char** argv) {
   using Handler = void (*)(const ReceiveBuffer*, const std::string&, Supervisor*);
   const Handler certified = [](auto* m, auto&, auto* to) { to->OnCertified(BytesOf(m), Now()); };
   const Handler fault = [](auto* m, auto&, auto* to) { to->OnFault(BytesOf(m), Now()); };
-  const Handler command = [](auto* m, auto&, auto* to) { std::cerr << to->OnCommand(BytesOf(m), Now()); };
+  const Handler command = [](auto* m, auto&, auto* to) {
+    if (const std::string why = to->OnCommand(BytesOf(m), Now()); !why.empty()) std::cerr << why << '\n';
+  };
   for (const auto& [channel, handler] :
        {std::pair("PLAN_CERTIFIED", certified), {"FAULT", fault}, {"COMMAND", command}})
     lcm.subscribeFunction(channel, handler, &supervisor);
