@@ -9,15 +9,10 @@ namespace forereach::bench {
 
 Config MakeConfig(const Task& task) {
   Config config;
-  const NominalModel& model = *task.problem->model;
   config.problem = task.problem;
   config.obstacles = task.obstacles;
   config.gate.needs_robot_state = false;
-  config.digest = DigestOf(std::string_view("benchmark"));
-  config.model_digest = ModelDigest(model);
-  config.declaration_digest = DeclarationDigest(model, task.problem->declaration);
-  config.observations_digest = ObservationsDigest(model, task.problem->transitions);
-  config.obstacles_digest = ObstaclesDigest(task.obstacles);
+  config.grounds = GroundsOf(DigestOf(std::string_view("benchmark")), *task.problem, task.obstacles);
   return config;
 }
 

@@ -173,8 +173,8 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
           {"seconds", seconds},
           {"yaml", Yaml(bounds, names)},
           {"digests",
-           {{"config", ToHex(config.digest)},
-            {"model", ToHex(config.model_digest)},
+           {{"config", ToHex(config.grounds.config)},
+            {"model", ToHex(config.grounds.model)},
             {"residual", ToHex(ResidualDigest(config))}}}};
 }
 

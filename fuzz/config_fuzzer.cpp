@@ -9,7 +9,7 @@ bool forereach::Try(Bytes data) {
   return IsTaken([&] {
     const Config config = LoadConfig(path, TransitionsFile::kIgnore);
     const auto n = static_cast<std::size_t>(config.problem->model->num_states());
-    Require(config.digest == DigestOf(data));
+    Require(config.grounds.config == DigestOf(data));
     Require(config.initial_set.dim() == static_cast<Eigen::Index>(n) && config.robot.start.size() == n &&
             config.planner.initial_half_width.size() == n);
     for (const Obstacle& obstacle : config.obstacles) Require(obstacle.dim() == config.problem->projection.rows());

@@ -243,12 +243,12 @@ void Recorder::Open(std::int64_t now_us, const std::string& continues) {
 void Recorder::AddTask(const Config& config) {
   try {
     const bool is_known = std::ranges::any_of(tasks_, [&](const TaskCopy& task) {
-      return task.digest == config.digest && task.observations_digest == config.observations_digest;
+      return task.digest == config.grounds.config && task.observations_digest == config.grounds.observations;
     });
     if (is_known) return;
     if (tasks_.size() >= kMaxTasks) tasks_.erase(tasks_.begin());
     tasks_.push_back(CopyTask(config));
-    tasks_in_use_.insert(ToHex(config.digest));
+    tasks_in_use_.insert(ToHex(config.grounds.config));
   } catch (const BadInput& error) {
     spdlog::error("the task is not kept next to the log: {}", error.what());
   }
@@ -277,8 +277,8 @@ void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
   task_reading_.Start(now_us);
   try {
     const Config config = LoadConfig(task_path_);
-    if (config.digest != heard.first)
-      throw ConfigError(task_path_ + " is another, of config digest " + ToHex(config.digest));
+    if (config.grounds.config != heard.first)
+      throw ConfigError(task_path_ + " is another, of config digest " + ToHex(config.grounds.config));
     AddTask(config);
     KeepTasks();
   } catch (const BadInput& error) {

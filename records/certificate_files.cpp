@@ -16,7 +16,6 @@
 #include "certifier/certify/explain.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/files.h"
-#include "certifier/task/grounds.h"
 #include "certifier/task/json_file.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -335,7 +334,7 @@ class DatabaseReading {
  public:
   DatabaseReading(const std::string& path, const std::string& config_path, const LogKey& key)
       : path_(path), config_path_(config_path), key_(key), why_none_(path + ": no run in it has a log with decisions") {
-    if (!config_path.empty()) given_ = LoadConfig(config_path).digest;
+    if (!config_path.empty()) given_ = LoadConfig(config_path).grounds.config;
     Database database(path);
     for (const std::vector<RunRow>& chain : Chains(database)) ReadRun(Find(database, chain));
   }
@@ -395,7 +394,7 @@ class DatabaseReading {
     std::vector<const Config*> tasks;
     for (Config& task : found) {
       const auto same =
-          std::ranges::find_if(tasks_, [&](const Config& known) { return GroundsOf(known) == GroundsOf(task); });
+          std::ranges::find_if(tasks_, [&](const Config& known) { return known.grounds == task.grounds; });
       tasks.push_back(same != tasks_.end() ? &*same : &tasks_.emplace_back(std::move(task)));
     }
     return tasks;

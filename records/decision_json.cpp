@@ -7,7 +7,6 @@
 #include "certifier/certify/explain.h"
 #include "certifier/safety/separation.h"
 #include "certifier/sets/zonogon.h"
-#include "certifier/task/grounds.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -139,7 +138,7 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles);
   document["digests"] = {{"plan", ToHex(PlanDigest(result.controls, config.initial_set))},
                          {"tube", ToHex(TubeDigest(document["tube"]))}};
-  const Grounds grounds = GroundsOf(config);
+  const Grounds grounds = config.grounds;
   for (const auto& [name, digest] : kGrounds) document["digests"][name] = ToHex(grounds.*digest);
   document["elapsed_us"] = result.elapsed_us;
   return document;

@@ -7,7 +7,6 @@
 #include <set>
 
 #include "certifier/certify/explain.h"
-#include "certifier/task/grounds.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "records/decision_json.h"
@@ -172,7 +171,7 @@ class Reading {
         is_box ? ToHex(PlanDigest(record_.certificate.controls, Box(set.lower, set.upper))) : "one of a box";
     std::vector<std::array<std::string, 3>> expected{{kAltered, "tube", ToHex(TubeDigest(document_["tube"].json()))},
                                                      {kAltered, "plan", plan}};
-    const Grounds grounds = GroundsOf(config_);
+    const Grounds grounds = config_.grounds;
     for (const auto& [name, digest] : kGrounds) expected.push_back({kOtherInput, name, ToHex(grounds.*digest)});
     std::set<std::string> keys;
     for (const auto& [what, name, digest] : expected) {

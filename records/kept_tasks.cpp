@@ -100,8 +100,9 @@ std::string PolicyFileOf(const std::string& directory, const std::string& digest
 }  // namespace
 
 TaskCopy CopyTask(const Config& config) {
-  TaskCopy copy{config.digest, config.observations_digest, config.problem->model, BytesOf(config.path), {}, {}};
-  if (DigestOf(copy.task) != config.digest) throw ConfigError(config.path + ": has changed since it was read");
+  TaskCopy copy{
+      config.grounds.config, config.grounds.observations, config.problem->model, BytesOf(config.path), {}, {}};
+  if (DigestOf(copy.task) != config.grounds.config) throw ConfigError(config.path + ": has changed since it was read");
   const NamedFiles named = FilesNamedBy(config.path);
   copy.transitions = BytesOf(named.transitions);
   if (!named.policy.empty()) copy.policy = BytesOf(named.policy);
@@ -158,10 +159,10 @@ Config KeptTasks::Load(const std::string& digest, const std::string& version) co
       throw ConfigError(instead.policy + ": is damaged: its digest is not its name's");
   }
   Config config = LoadConfig(task, instead);
-  if (ToHex(config.digest) != digest)
-    throw ConfigError(task + ": is damaged: its digest is " + ToHex(config.digest) + ", not its directory's");
-  if (ToHex(config.observations_digest) != version)
-    throw ConfigError(transitions + ": is damaged: its digest is " + ToHex(config.observations_digest) +
+  if (ToHex(config.grounds.config) != digest)
+    throw ConfigError(task + ": is damaged: its digest is " + ToHex(config.grounds.config) + ", not its directory's");
+  if (ToHex(config.grounds.observations) != version)
+    throw ConfigError(transitions + ": is damaged: its digest is " + ToHex(config.grounds.observations) +
                       ", not its name's");
   return config;
 }

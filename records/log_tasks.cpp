@@ -36,13 +36,13 @@ std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, co
       throw ConfigError(logs + ": nothing in it was decided, so nothing names its task: name it with --config FILE");
     return {*task};
   }
-  if (task && !survey.configs.contains(task->digest))
+  if (task && !survey.configs.contains(task->grounds.config))
     throw ConfigError(given + ": is not the task that " + logs + " was recorded with: its config digest is " +
-                      ToHex(task->digest) + ", the log has " + DescribeTask(survey, kept) +
+                      ToHex(task->grounds.config) + ", the log has " + DescribeTask(survey, kept) +
                       "; a task that is kept is found without --config");
   std::vector<Config> tasks;
   for (const Digest& digest : survey.order)
-    if (task && task->digest == digest)
+    if (task && task->grounds.config == digest)
       tasks.push_back(*task);
     else if (auto found = kept.Find(digest, survey.configs.at(digest).observations))
       tasks.push_back(std::move(*found));

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "bus/bus_options.h"
-#include "certifier/task/grounds.h"
 #include "lcmtypes/heartbeat.h"
 
 namespace forereach {
@@ -107,7 +106,7 @@ void Timeline::TakeStatus(const LogEvent& event) {
   const bool is_reload =
       std::exchange(version_, status->version) != status->version && !is_first && told == Told::kGoesOn;
   if (told != Told::kStarts && !is_reload) return;
-  const bool is_known = std::exchange(reloaded_ahead_, false) && now_->digest == status->config_digest;
+  const bool is_known = std::exchange(reloaded_ahead_, false) && now_->grounds.config == status->config_digest;
   if (const Config* task = TaskOf(status->config_digest)) now_ = task;
   if (told == Told::kStarts)
     Start();
@@ -117,7 +116,7 @@ void Timeline::TakeStatus(const LogEvent& event) {
 
 const Config* Timeline::TaskOf(const Digest& config) const {
   if (tasks_.size() == 1) return tasks_.front();
-  const auto found = std::ranges::find(tasks_, config, [](const Config* task) { return task->digest; });
+  const auto found = std::ranges::find(tasks_, config, [](const Config* task) { return task->grounds.config; });
   return found == tasks_.end() ? nullptr : *found;
 }
 
@@ -128,7 +127,7 @@ void Timeline::Start() {
   logged_obstacles_ = ObstaclesInForce(*now_);
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
-  logged_observations_ = observations_digest_ = now_->observations_digest;
+  logged_observations_ = observations_digest_ = now_->grounds.observations;
   learned_begin_ = learned_.at(now_).size();
   user_.OnStart(*now_);
 }
@@ -141,7 +140,7 @@ void Timeline::Reload() {
   logged_obstacles_ = std::move(after);
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
-  logged_observations_ = observations_digest_ = now_->observations_digest;
+  logged_observations_ = observations_digest_ = now_->grounds.observations;
   learned_begin_ = learned_.at(now_).size();
   user_.OnReload(*now_);
 }
@@ -195,7 +194,7 @@ void Timeline::LearnNext() {
 // ---- Decisions.
 
 Basis Timeline::Current() const {
-  Grounds grounds = GroundsOf(*now_);
+  Grounds grounds = now_->grounds;
   grounds.observations = observations_digest_;
   grounds.obstacles = obstacles_digest_;
   return {now_, grounds, obstacles_, learned_begin_, learned_.at(now_).size()};

@@ -39,8 +39,8 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.num_states = config.problem->model->num_states();
   options.guard.num_inputs = config.problem->model->num_inputs();
   options.guard.step_us = Microseconds(config.robot.step_period_ms);
-  options.guard.config_digest = config.digest;
-  options.guard.model_digest = config.model_digest;
+  options.guard.config_digest = config.grounds.config;
+  options.guard.model_digest = config.grounds.model;
   options.guard.keys = KeysOf(config.bus, Role::kRobot);
   options.guard.bus_name = config.bus.bus_name();
   options.guard.channel = config.bus.certified;
@@ -116,7 +116,7 @@ void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
   if (reload_.TakeStall()) spdlog::error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
-  supervisor_.Expect(config->digest, config->model_digest, DomainOf(*config));
+  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config));
   spdlog::info("plans certified under {} as it is now are accepted", config_.path);
 }
 

@@ -25,10 +25,7 @@ static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
 Gate::Gate(const Config& config)
     : certifier_(config.problem),
       options_(config.gate),
-      config_digest_(config.digest),
-      model_digest_(config.model_digest),
-      declaration_digest_(config.declaration_digest),
-      observations_digest_(config.observations_digest),
+      grounds_(config.grounds),
       obstacles_(config),
       sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)) {}
 
@@ -66,7 +63,7 @@ GateAnswer Gate::Answer(Bytes bytes, const TimeSource& clock, std::optional<Reje
   decision.cause = decision_t::CAUSE_INTERNAL_ERROR;
   decision.step = decision.coordinate = decision.obstacle = -1;
   decision.first_observation = decision.second_observation = -1;
-  SetDigests(decision);
+  SetGrounds(decision, grounds());
   SetDigest(decision.plan_digest, DigestOf(bytes));
   try {
     candidate_plan_t candidate{};
@@ -232,7 +229,7 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
     }
   }
   std::ranges::copy(decision.plan_digest, certified.plan_digest);
-  SetDigests(certified);
+  SetGrounds(certified, grounds());
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
 }
 
@@ -251,7 +248,7 @@ std::string Gate::Learn(Bytes bytes) {
   if (!transition.refusal.empty()) return transition.refusal;
   if (const Learned learned = certifier_.Learn(transition.z, transition.next); learned != Learned::kAdded)
     return Explain(learned);
-  observations_digest_ = ChainedDigest(observations_digest_, bytes);
+  grounds_.observations = ChainedDigest(grounds_.observations, bytes);
   ++counts_.learned;
   return {};
 }
@@ -269,7 +266,7 @@ certifier_status_v3_t Gate::Status(std::int64_t now_us) const {
   status.obstacles_utime = obstacles_.stamp().value_or(0);
   status.obstacles_age_us = obstacles_.stamp() ? now_us - *obstacles_.stamp() : -1;
   status.obstacles_lost = obstacles_.lost();
-  SetDigests(status);
+  SetGrounds(status, grounds());
   return status;
 }
 
@@ -280,13 +277,10 @@ void Gate::Count(const decision_t& decision) {
   counts_.consecutive_failures = decision.outcome == decision_t::CERTIFIED ? 0 : counts_.consecutive_failures + 1;
 }
 
-template <class Message>
-void Gate::SetDigests(Message& message) const {
-  SetDigest(message.config_digest, config_digest_);
-  SetDigest(message.model_digest, model_digest_);
-  SetDigest(message.declaration_digest, declaration_digest_);
-  SetDigest(message.observations_digest, observations_digest_);
-  SetDigest(message.obstacles_digest, obstacles_.digest());
+Grounds Gate::grounds() const {
+  Grounds grounds = grounds_;
+  grounds.obstacles = obstacles_.digest();
+  return grounds;
 }
 
 }  // namespace forereach

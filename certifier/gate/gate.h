@@ -21,6 +21,7 @@ any error inside. `Watch` decides whether certifying is allowed at all (watch.h)
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/grounds.h"
 
 namespace forereach {
 
@@ -66,7 +67,7 @@ class Gate final {
   what is wrong with the message, or an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
-  /** Adds an executed transition to the observations, if the task has gate.learn, and chains observations_digest:
+  /** Adds an executed transition to the observations, if the task has gate.learn, and chains grounds().observations:
   BLAKE2b-256 of the digest before and the message's bytes. Returns which check refused it (certify/learned.h), and
   nothing has changed, or an empty text. certifier().violation() tells whether it falsifies the declaration. */
   [[nodiscard]] std::string Learn(Bytes transition);
@@ -83,11 +84,10 @@ class Gate final {
   /** Goes on where another gate stops: its counts, sources and the obstacles it has heard. */
   void Inherit(const Gate& before);
 
-  /** Counts so far and the digests in force; the rest is the caller's. */
+  /** Counts so far and the grounds in force; the rest is the caller's. */
   [[nodiscard]] certifier_status_v3_t Status(std::int64_t now_us) const;
-  [[nodiscard]] const Digest& model_digest() const { return model_digest_; }
-  [[nodiscard]] Digest observations_digest() const { return observations_digest_; }
-  [[nodiscard]] Digest obstacles_digest() const { return obstacles_.digest(); }
+  /** With everything heard and learned so far. */
+  [[nodiscard]] Grounds grounds() const;
 
  private:
   struct Rejection {
@@ -110,12 +110,9 @@ class Gate final {
   void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
   void Count(const decision_t& decision);
 
-  template <class Message>
-  void SetDigests(Message& message) const;
-
   Certifier certifier_;
   GateOptions options_;
-  Digest config_digest_, model_digest_, declaration_digest_, observations_digest_;
+  Grounds grounds_;  ///< But for the obstacles, which obstacles_ has.
   ObstaclesInForce obstacles_;
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;

@@ -254,7 +254,7 @@ void CertifierNode::Learn(Bytes transition) {
   const auto& violation = gate_->certifier().violation();
   if (was_falsified || !violation) return;
   if (!contradictions_.ContradictInForce())
-    contradictions_.Add({gate_->model_digest(), gate_->certifier().Contradiction()});
+    contradictions_.Add({gate_->grounds().model, gate_->certifier().Contradiction()});
   Fail(DeclarationFalsified(*violation));
   latch_.Store();  // also where another fault stays
 }

@@ -19,8 +19,8 @@ bool Contradicts(const Contradictions::Pair& one, const Digest& model, const Dec
 }  // namespace
 
 void Contradictions::Follow(const Config& config) {
-  model_ = config.model_digest;
-  declaration_digest_ = config.declaration_digest;
+  model_ = config.grounds.model;
+  declaration_digest_ = config.grounds.declaration;
   problem_ = config.problem;
   contradict_in_force_ = Contradict(config);
 }
@@ -41,12 +41,12 @@ void Contradictions::AddReported(const Digest& model, const Digest& declaration)
 
 bool Contradictions::Contradict(const Config& config) const {
   return WasReported(config) || std::ranges::any_of(pairs_, [&](const Pair& one) {
-           return Contradicts(one, config.model_digest, config.problem->declaration);
+           return Contradicts(one, config.grounds.model, config.problem->declaration);
          });
 }
 
 bool Contradictions::WasReported(const Config& config) const {
-  return std::ranges::find(reported_, std::pair(config.model_digest, config.declaration_digest)) != reported_.end();
+  return std::ranges::find(reported_, std::pair(config.grounds.model, config.grounds.declaration)) != reported_.end();
 }
 
 }  // namespace forereach

@@ -74,4 +74,10 @@ Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
   return bytes.digest();
 }
 
+Grounds GroundsOf(const Digest& config, const Problem& problem, const std::vector<Obstacle>& obstacles) {
+  const NominalModel& model = *problem.model;
+  return {config, ModelDigest(model), DeclarationDigest(model, problem.declaration),
+          ObservationsDigest(model, problem.transitions), ObstaclesDigest(obstacles)};
+}
+
 }  // namespace forereach

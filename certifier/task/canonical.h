@@ -14,6 +14,7 @@ bytes of the double, all little-endian; -0 is written as 0. Each string begins w
 
 #include "certifier/certify/problem.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/grounds.h"
 
 namespace forereach {
 
@@ -45,5 +46,8 @@ class CanonicalBytes final {
 
 /** Of the obstacles in their order, which a decision's witness refers to. */
 [[nodiscard]] Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles);
+
+/** Of a task with these, before anything is heard or learned. `config` is the digest of its file. */
+[[nodiscard]] Grounds GroundsOf(const Digest& config, const Problem& problem, const std::vector<Obstacle>& obstacles);
 
 }  // namespace forereach

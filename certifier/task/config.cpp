@@ -95,11 +95,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
   }
   config.path = path;
-  config.digest = DigestOf(file.text());
-  config.model_digest = ModelDigest(model);
-  config.declaration_digest = DeclarationDigest(model, problem.declaration);
-  config.observations_digest = ObservationsDigest(model, problem.transitions);
-  config.obstacles_digest = ObstaclesDigest(config.obstacles);
+  config.grounds = GroundsOf(DigestOf(file.text()), problem, config.obstacles);
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
   config.problem = std::make_shared<const Problem>(std::move(problem));
   return std::move(config);

@@ -22,11 +22,9 @@ namespace forereach {
 
 struct Config {
   std::string path;
-  Digest digest{};  ///< Of the file's bytes.
-  Digest model_digest{}, declaration_digest{}, observations_digest{};
+  Grounds grounds;  ///< Before anything is heard or learned.
   std::shared_ptr<const Problem> problem;
   std::vector<Obstacle> obstacles;
-  Digest obstacles_digest{};
   Box initial_set;                             ///< X0, rounded outward.
   std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds; dt and wheelbase are the model's.
   GateOptions gate;

@@ -120,7 +120,7 @@ TEST_F(KeptTaskTest, ADirectoryWithSeveralTasksVerifiesWhole) {
 }
 
 TEST_F(KeptTaskTest, AnotherTaskIsRefusedAndItsOwnIsNamed) {
-  const std::string digest = ToHex(LoadConfig(TaskOf("one")).digest), log = logs_->front();
+  const std::string digest = ToHex(LoadConfig(TaskOf("one")).grounds.config), log = logs_->front();
   for (const char* command : {"replay ", "report ", "verify "}) {
     ExpectRefused(command + log + " --config " + TaskOf("two"),
                   {TaskOf("two"), digest, *scratch_ / "log/tasks/" + digest});
@@ -144,13 +144,13 @@ TEST_F(KeptTaskTest, UnrelatedRunsAreRefused) {
 
 TEST_F(KeptTaskTest, ADamagedTaskIsNotUsed) {
   const Config task = LoadConfig(TaskOf("one"));
-  const std::string kept = "tasks/" + ToHex(task.digest);
+  const std::string kept = "tasks/" + ToHex(task.grounds.config);
   std::string copy = Copied();
   std::ofstream(copy + "/" + kept + "/task.yaml", std::ios::app) << "# more\n";
   ExpectRefused("replay " + In(copy, logs_->front()), {"is damaged", kept});
   fs::remove_all(copy);
   copy = Copied();
-  const std::string transitions = copy + "/" + kept + "/transitions-" + ToHex(task.observations_digest) + ".csv";
+  const std::string transitions = copy + "/" + kept + "/transitions-" + ToHex(task.grounds.observations) + ".csv";
   std::string text = Read(transitions);
   text.erase(text.rfind('\n', text.size() - 2) + 1);
   std::ofstream(transitions) << text;

@@ -16,19 +16,19 @@ using Eigen::Vector2d;
 
 TEST(ConfigDigest, IsOfTheFilesBytes) {
   const TaskFiles files;
-  EXPECT_EQ(files.Load().digest, DigestOf(std::string_view(kTask)));
-  EXPECT_NE(files.Load(std::string(kTask) + "\n").digest, files.Load().digest);
+  EXPECT_EQ(files.Load().grounds.config, DigestOf(std::string_view(kTask)));
+  EXPECT_NE(files.Load(std::string(kTask) + "\n").grounds.config, files.Load().grounds.config);
 }
 
 TEST(ObservationsDigest, DoesNotDependOnHowTheyAreWritten) {
   const TaskFiles files;
-  const Digest digest = files.Load().observations_digest;
+  const Digest digest = files.Load().grounds.observations;
   const std::string reordered =
       "vx_next, vy_next, px_next, py_next, ax, ay, vy, vx, py, px\r\n"
       "1.07, 0.0, 155e-3, 0, 5e-1, 0, 0, 1, 0, -0\r\n"
       "2, 0.42, 1.3, 2.07, 0, -0.5, 0.5, 2, 2, 1\r\n";
-  EXPECT_EQ(files.Load(kTask, reordered).observations_digest, digest);
-  EXPECT_EQ(files.Load(std::string(kTask) + "bus: {}\n").observations_digest, digest);
+  EXPECT_EQ(files.Load(kTask, reordered).grounds.observations, digest);
+  EXPECT_EQ(files.Load(std::string(kTask) + "bus: {}\n").grounds.observations, digest);
 }
 
 TEST(ObservationsDigest, ChangesWithEveryNumberAndWithTheOrderOfRows) {
@@ -52,15 +52,15 @@ TEST(ObservationsDigest, ChangesWithEveryNumberAndWithTheOrderOfRows) {
 
 TEST(DeclarationDigest, DoesNotDependOnHowItIsWritten) {
   const TaskFiles files;
-  const Digest digest = files.Load().declaration_digest;
+  const Digest digest = files.Load().grounds.declaration;
   const std::string by_names = "  lipschitz:\n    vx: {vx: 0.1, vy: 0.05}\n    vy: {vx: 0.05, vy: 0.1}\n";
   const auto with = [&](const std::string& lipschitz) {
-    return files.Load(Replaced(kTask, by_names, lipschitz)).declaration_digest;
+    return files.Load(Replaced(kTask, by_names, lipschitz)).grounds.declaration;
   };
   EXPECT_EQ(with("  lipschitz: {vy: {vy: 1e-1, vx: 5e-2}, vx: {vy: 0.0500, vx: 0.1, ax: 0}}\n"), digest);
   EXPECT_EQ(with("  lipschitz: [[0,0,0,0,0,0], [0,0,0,0,0,0], [0,0,0.1,0.05,0,0], [0,0,0.05,0.1,0,0]]\n"), digest);
   EXPECT_NE(with("  lipschitz: {vy: {vy: 0.1, vx: 0.05}, vx: {vy: 0.05, vx: 0.10000000000000002}}\n"), digest);
-  EXPECT_NE(files.Load(Replaced(kTask, "[0, 0, 0.01, 0.01]", "[0, 0, 0.01, 0.02]")).declaration_digest, digest);
+  EXPECT_NE(files.Load(Replaced(kTask, "[0, 0, 0.01, 0.01]", "[0, 0, 0.01, 0.02]")).grounds.declaration, digest);
 }
 
 TEST(ModelDigest, TellsModelsAndParametersApart) {
@@ -94,10 +94,10 @@ TEST(ObstaclesDigest, TellsObstaclesApart) {
 
 TEST(ObstaclesDigest, DoesNotDependOnHowTheyAreWritten) {
   const TaskFiles files;
-  const Digest digest = files.Load().obstacles_digest;
+  const Digest digest = files.Load().grounds.obstacles;
   EXPECT_EQ(digest, ObstaclesDigest({Obstacle::Circle(Vector2d(3, 2), 0.8)}));
   const auto with = [&](const std::string& list) {
-    return files.Load(Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]", list)).obstacles_digest;
+    return files.Load(Replaced(kTask, "[{circle: {center: [3, 2], radius: 0.8}}]", list)).grounds.obstacles;
   };
   EXPECT_EQ(with("\n    - circle:\n        radius: 8e-1\n        center: [3.0, +2]"), digest);
 }

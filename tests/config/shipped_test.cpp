@@ -61,9 +61,9 @@ TEST(Shipped, TransitionsAreThoseOfTheirCommands) {
                               MakeTransitions(*MakeTarget(config), *config.problem, 1, count, ranges));
   };
   const Config bicycle = LoadConfig(kDirectory + "bicycle.yaml");
-  EXPECT_EQ(bicycle.observations_digest, made(bicycle, 400, {{"v", 7.25, 15.75}, {"delta", 0, 0.45}}));
+  EXPECT_EQ(bicycle.grounds.observations, made(bicycle, 400, {{"v", 7.25, 15.75}, {"delta", 0, 0.45}}));
   const Config point_mass = LoadConfig(kDirectory + "point_mass.yaml");
-  EXPECT_EQ(point_mass.observations_digest, made(point_mass, 100, {{"vx", -0.5, 3.5}, {"vy", -0.8, 0.8}}));
+  EXPECT_EQ(point_mass.grounds.observations, made(point_mass, 100, {{"vx", -0.5, 3.5}, {"vy", -0.8, 0.8}}));
 }
 
 Decision Decide(const Config& config, const Eigen::MatrixXd& controls) {

@@ -691,7 +691,7 @@ class Campaign final {
   void ObstacleTries(const std::string& fault, const std::function<void(Row&, Rig&, int)>& hurt) {
     const Config world = LoadConfig(world_.Write("world.yaml", DemoTask()));
     Rig rig(DemoTaskOnTheBus(), {.seen = world.obstacles});
-    rig.witness().SetWorld(world.obstacles_digest);
+    rig.witness().SetWorld(world.grounds.obstacles);
     Row& row = Begin(fault, options_.others);
     told_unknown_ = 0;
     Tries(

@@ -53,11 +53,11 @@ TEST(GateNoStop, APlanThatEndsMovingIsAbstainedFrom) {
 
 template <class Message>
 void ExpectDigestsOf(const Config& config, const Message& message) {
-  EXPECT_EQ(GetDigest(message.config_digest), config.digest);
-  EXPECT_EQ(GetDigest(message.model_digest), config.model_digest);
-  EXPECT_EQ(GetDigest(message.declaration_digest), config.declaration_digest);
-  EXPECT_EQ(GetDigest(message.observations_digest), config.observations_digest);
-  EXPECT_EQ(GetDigest(message.obstacles_digest), config.obstacles_digest);
+  EXPECT_EQ(GetDigest(message.config_digest), config.grounds.config);
+  EXPECT_EQ(GetDigest(message.model_digest), config.grounds.model);
+  EXPECT_EQ(GetDigest(message.declaration_digest), config.grounds.declaration);
+  EXPECT_EQ(GetDigest(message.observations_digest), config.grounds.observations);
+  EXPECT_EQ(GetDigest(message.obstacles_digest), config.grounds.obstacles);
 }
 
 TEST_F(GateAnswerTest, Certificate) {
@@ -281,7 +281,7 @@ TEST(GateTransitionTest, ARefusedOneNamesTheCheckThatRefusedItAndChangesNothing)
     transition_t bad = good;
     change(bad);
     EXPECT_THAT(gate.Learn(Encode(bad)), testing::HasSubstr(why));
-    EXPECT_EQ(gate.observations_digest(), config.observations_digest);
+    EXPECT_EQ(gate.grounds().observations, config.grounds.observations);
   };
   expect_refused([](auto& t) { t.num_states = 5; }, "5 states and 2 inputs, the task has 4 and 2");
   expect_refused([](auto& t) { t.num_inputs = -1; }, "4 states and -1 inputs");
@@ -290,7 +290,7 @@ TEST(GateTransitionTest, ARefusedOneNamesTheCheckThatRefusedItAndChangesNothing)
   expect_refused([](auto& t) { t.state[0] = 20.5; }, "outside the certification domain");
   expect_refused([](auto& t) { t.input[1] = -3.5; }, "outside the certification domain");
   EXPECT_EQ(gate.Learn(Encode(good)), "");
-  EXPECT_NE(gate.observations_digest(), config.observations_digest);
+  EXPECT_NE(gate.grounds().observations, config.grounds.observations);
 }
 
 TEST(CandidateMessageTest, TheStartIsReadFromTheBytesAsADecoderReadsIt) {

@@ -103,12 +103,12 @@ TEST(GateOldLogsTest, WhereNothingIsSaidThoseHeardReplaceTheTasks) {
   Config config = SmallTask();
   config.gate.obstacles = ObstaclesSource::kUnsaid;
   Gate gate(config);
-  EXPECT_EQ(gate.obstacles_digest(), config.obstacles_digest);
+  EXPECT_EQ(gate.grounds().obstacles, config.grounds.obstacles);
   EXPECT_EQ(gate.UpdateObstacles(Encode(Message(kFarAway, 3)), kNow), "");
-  EXPECT_EQ(gate.obstacles_digest(), ObstaclesDigest(kFarAway));
+  EXPECT_EQ(gate.grounds().obstacles, ObstaclesDigest(kFarAway));
   EXPECT_NE(gate.UpdateObstacles({}, kNow), "");
   EXPECT_EQ(gate.UpdateObstacles(Encode(Message({}, 7)), kNow), "");
-  EXPECT_EQ(gate.obstacles_digest(), ObstaclesDigest({}));
+  EXPECT_EQ(gate.grounds().obstacles, ObstaclesDigest({}));
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
 }
 
@@ -116,7 +116,7 @@ TEST(GateTaskObstaclesTest, WhereTheTaskIsTheWorldTheBusIsNotHeard) {
   Gate gate(SmallTask());
   EXPECT_THAT(gate.UpdateObstacles(Encode(Message(kOnTheWay, 0)), kNow), HasSubstr("gate.obstacles is task"));
   EXPECT_THAT(gate.UpdateObstacles({}, kNow), HasSubstr("gate.obstacles is task"));
-  EXPECT_EQ(gate.obstacles_digest(), SmallTask().obstacles_digest);
+  EXPECT_EQ(gate.grounds().obstacles, SmallTask().grounds.obstacles);
   EXPECT_EQ(gate.WhyObstaclesUnknown(kNow + 3'600'000'000), "");
   const certifier_status_v3_t status = gate.Status(kNow);
   EXPECT_EQ(status.obstacles_source, certifier_status_v3_t::OBSTACLES_TASK);
@@ -263,7 +263,7 @@ TEST_F(GateObstaclesTest, ASenderThatBeganAnewIsTakenByItsStamp) {
   ExpectRefused(Encode(anew), "nor does its stamp");
   anew.utime = kNow + 1;
   EXPECT_EQ(Update(anew), "");
-  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(Both(of_task_, kOnTheWay)));
+  EXPECT_EQ(gate_.grounds().obstacles, ObstaclesDigest(Both(of_task_, kOnTheWay)));
   ExpectRefused(Encode(anew), "sequence 0 does not exceed the last, 0, nor does its stamp");
 }
 
@@ -274,7 +274,7 @@ TEST_F(GateObstaclesTest, AClockThatWasSetBackKeepsNobodyOut) {
   EXPECT_EQ(gate_.UpdateObstacles(Encode(before), later), "");
   EXPECT_NE(Why(), "");
   EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
-  EXPECT_EQ(gate_.obstacles_digest(), ObstaclesDigest(Both(of_task_, kOnTheWay)));
+  EXPECT_EQ(gate_.grounds().obstacles, ObstaclesDigest(Both(of_task_, kOnTheWay)));
   EXPECT_EQ(Why(), "");
 }
 
@@ -285,13 +285,13 @@ TEST_F(GateObstaclesTest, AReloadKeepsWhatWasHeardBesideTheTasks) {
     gate->Inherit(before);
     return gate;
   };
-  EXPECT_EQ(reloaded(gate_)->obstacles_digest(), ObstaclesDigest(of_task_)) << "nothing was heard";
+  EXPECT_EQ(reloaded(gate_)->grounds().obstacles, ObstaclesDigest(of_task_)) << "nothing was heard";
   EXPECT_EQ(reloaded(gate_)->WhyObstaclesUnknown(kNow), "none has been heard yet");
 
   EXPECT_EQ(Update(Message(kOnTheWay, 0)), "");
   const auto once = reloaded(gate_), twice = reloaded(*once);
   for (Gate* gate : {once.get(), twice.get()}) {
-    EXPECT_EQ(gate->obstacles_digest(), ObstaclesDigest(Both(of_task_, kOnTheWay)));
+    EXPECT_EQ(gate->grounds().obstacles, ObstaclesDigest(Both(of_task_, kOnTheWay)));
     EXPECT_EQ(gate->WhyObstaclesUnknown(kNow), "");
     EXPECT_NE(gate->WhyObstaclesUnknown(kNow + 1'000'001), "");
     const decision_t decision = gate->Decide(Encode(Candidate(next_plan_id_++)), kNow).decision;
@@ -300,7 +300,7 @@ TEST_F(GateObstaclesTest, AReloadKeepsWhatWasHeardBesideTheTasks) {
     EXPECT_NE(gate->UpdateObstacles(Encode(Message(kFarAway, 0)), kNow), "") << "as old as the one before";
   }
   EXPECT_EQ(once->UpdateObstacles(Encode(Message(kFarAway, 1)), kNow), "");
-  EXPECT_EQ(once->obstacles_digest(), ObstaclesDigest(Both(of_task_, kFarAway)));
+  EXPECT_EQ(once->grounds().obstacles, ObstaclesDigest(Both(of_task_, kFarAway)));
 
   ExpectRefused({}, "not an obstacles_t");
   EXPECT_NE(reloaded(gate_)->WhyObstaclesUnknown(kNow), "") << "a refused one is not forgotten either";

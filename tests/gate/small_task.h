@@ -37,13 +37,9 @@ inline Config SmallTask() {
 
   Config config;
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)};
-  config.digest = DigestOf(std::string_view("small task"));
   config.gate.needs_robot_state = false;
   config.gate.obstacles = ObstaclesSource::kTask;
-  config.model_digest = ModelDigest(*problem.model);
-  config.declaration_digest = DeclarationDigest(*problem.model, problem.declaration);
-  config.observations_digest = ObservationsDigest(*problem.model, problem.transitions);
-  config.obstacles_digest = ObstaclesDigest(config.obstacles);
+  config.grounds = GroundsOf(DigestOf(std::string_view("small task")), problem, config.obstacles);
   config.problem = std::make_shared<const Problem>(std::move(problem));
   return config;
 }

@@ -228,7 +228,7 @@ TEST_F(CertifierNodeTest, BeatsTwiceASecondWithItsCounts) {
     EXPECT_EQ(status_[i].level, certifier_status_v3_t::OK);
     EXPECT_EQ(status_[i].elapsed_p50_us > 0, !is_first);
     EXPECT_GE(status_[i].elapsed_p99_us, status_[i].elapsed_p50_us);
-    EXPECT_EQ(GetDigest(status_[i].config_digest), config_.digest);
+    EXPECT_EQ(GetDigest(status_[i].config_digest), config_.grounds.config);
   }
 }
 
@@ -1135,7 +1135,7 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
   Reload(*node);
   EXPECT_EQ(status_.failed_reloads, 1);
   EXPECT_EQ(status_.version, 1);
-  EXPECT_EQ(GetDigest(status_.config_digest), before.digest);
+  EXPECT_EQ(GetDigest(status_.config_digest), before.grounds.config);
   EXPECT_THAT(GetText(status_.message), testing::HasSubstr("nonsense"));
 
   for (const auto& [change, what] :
@@ -1168,7 +1168,7 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
   Copy([](const std::string& text) { return "# another\n" + text; });
   Reload(*node);
   EXPECT_EQ(status_.version, 2);
-  EXPECT_EQ(GetDigest(status_.config_digest), LoadConfig(path_).digest);
+  EXPECT_EQ(GetDigest(status_.config_digest), LoadConfig(path_).grounds.config);
   EXPECT_EQ(GetText(status_.message), "waits for the robot's state");
 }
 

@@ -127,7 +127,7 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   for (const certified_plan_t& plan : certified) {
     EXPECT_EQ(expected_.at(ToHex(DigestOf(Encode(plan.plan)))), "none");
     EXPECT_TRUE(FindSealFaults(plan).empty());
-    EXPECT_EQ(GetDigest(plan.config_digest), config_.digest);
+    EXPECT_EQ(GetDigest(plan.config_digest), config_.grounds.config);
   }
   EXPECT_TRUE(std::ranges::any_of(certified, [&](const auto& plan) { return Encode(plan.plan) == Encode(good); }));
 

@@ -245,7 +245,7 @@ TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
   Begin();
   SayState();
   EXPECT_EQ(Ask().outcome, decision_t::ABSTAIN_FALSIFIED) << "nor is it forgotten after another";
-  config_.model_digest = DigestOf(std::string_view("another model"));
+  config_.grounds.model = DigestOf(std::string_view("another model"));
   Begin();
   ExpectArmed();
 }

@@ -119,11 +119,11 @@ TEST_F(CheckTest, ADamagedKeptTaskIsSeen) {
   Rows rows;
   DecisionRow& row = rows.decisions.emplace_back();
   row.event = {"a.lcmlog", 0, ""};
-  row.grounds[0] = ToHex(task.digest);
+  row.grounds[0] = ToHex(task.grounds.config);
   ASSERT_EQ(database_.Write(rows, "a.lcmlog", 5), 1);
   EXPECT_TRUE(Check().whole_log());
-  const std::string transitions =
-      KeptTasks(scratch_.path()).PathOf(task.digest) + "/transitions-" + ToHex(task.observations_digest) + ".csv";
+  const std::string transitions = KeptTasks(scratch_.path()).PathOf(task.grounds.config) + "/transitions-" +
+                                  ToHex(task.grounds.observations) + ".csv";
   std::vector<std::uint8_t> bytes = ReadBytes(transitions);
   const auto header_end = std::ranges::find(bytes, '\n');
   const auto digit = std::find_if(header_end, bytes.end(), [](std::uint8_t byte) { return std::isdigit(byte); });

@@ -56,11 +56,11 @@ class KeptTest : public DiskTest {
 };
 
 TEST_F(KeptTest, AReloadedTaskIsKeptIfItIsTheOneThatTheHeartbeatNames) {
-  const Digest first = Task().digest;
+  const Digest first = Task().grounds.config;
   EXPECT_TRUE(IsKept(first));
   Heartbeat(first, 1);
   Write("# more\n");
-  const Digest second = Task().digest;
+  const Digest second = Task().grounds.config;
   Digest unknown = second;
   unknown[0] ^= 1;
   Heartbeat(unknown, 2);
@@ -75,19 +75,19 @@ TEST_F(KeptTest, ADeletedDirectoryGetsItsTasksAgain) {
   fs::remove_all(scratch_ / "log");
   fs::remove(scratch_ / "task.yaml");
   Feed(20);
-  EXPECT_TRUE(IsKept(config_.digest));
+  EXPECT_TRUE(IsKept(config_.grounds.config));
   Stop();
 }
 
 TEST_F(KeptTest, TheQuotaTakesATaskWithTheLastLogThatNeedsIt) {
-  const Digest first = config_.digest;
+  const Digest first = config_.grounds.config;
   Decide(first);
   Stop();
   Write("# more\n");
   config_.logger.rotate_mb = 0.02;
   config_.logger.quota_mb = 0.06;
   StartWithTask();
-  const Digest second = config_.digest;
+  const Digest second = config_.grounds.config;
   Decide(first);  // as of a certifier that has not reloaded yet
   EXPECT_TRUE(IsKept(first));
   const std::string needs = node_->recorder().log_path();

@@ -299,7 +299,7 @@ TEST_F(ReplayTest, WhatIsNoCertifiedPlanIsPassedOver) {
 
 TEST_F(ReplayTest, AnotherTaskIsNoticed) {
   Config config = LoadConfig(kConfig);
-  config.declaration_digest[0] ^= 1;
+  config.grounds.declaration[0] ^= 1;
   const ReplayResult result = Replay({kLog}, config);
   EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
 }

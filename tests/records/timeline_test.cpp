@@ -11,7 +11,6 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
-#include "certifier/task/grounds.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/names.h"
@@ -64,7 +63,7 @@ class TimelineTest : public testing::Test {
     status.utime = ++now_;
     status.sequence = sequence;
     status.version = version;
-    SetDigest(status.config_digest, config_.digest);
+    SetDigest(status.config_digest, config_.grounds.config);
     Append(config_.bus.status, status);
   }
 

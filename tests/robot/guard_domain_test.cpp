@@ -70,7 +70,7 @@ TEST(GuardDomainProperty, EveryHonestCertificatePasses) {
     problem.rest.clear();  // these short plans end at speed
     config.problem = std::make_shared<const Problem>(std::move(problem));
     const Domain& domain = config.problem->domain;
-    GuardOptions options{domain.state.dim(), domain.input.dim(), 40'000, config.digest, config.model_digest};
+    GuardOptions options{domain.state.dim(), domain.input.dim(), 40'000, config.grounds.config, config.grounds.model};
     options.domain = GuardDomain{Entries(domain.state.lower()), Entries(domain.state.upper()),
                                  Entries(domain.input.lower()), Entries(domain.input.upper())};
     Gate gate(config);

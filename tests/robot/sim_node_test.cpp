@@ -50,8 +50,8 @@ Config PointMassTask() {
   problem.domain.state = Box(Eigen::VectorXd::Constant(4, -1e3), Eigen::VectorXd::Constant(4, 1e3));
   problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
   config.problem = std::make_shared<const Problem>(problem);
-  config.digest = DigestOf("config");
-  config.model_digest = DigestOf("model");
+  config.grounds.config = DigestOf("config");
+  config.grounds.model = DigestOf("model");
   config.planner.goal = {100, 0};
   config.robot.start = {0, 0, 0, 0};
   config.robot.step_period_ms = 40;
@@ -83,8 +83,8 @@ certified_plan_t Plan(const Config& config, std::int64_t id, int start, const st
       certified.slice_upper[t][k] = 1e3;
     }
   }
-  SetDigest(certified.config_digest, config.digest);
-  SetDigest(certified.model_digest, config.model_digest);
+  SetDigest(certified.config_digest, config.grounds.config);
+  SetDigest(certified.model_digest, config.grounds.model);
   for (auto* digest : {&certified.declaration_digest, &certified.observations_digest, &certified.obstacles_digest})
     SetDigest(*digest, DigestOf("something"));
   return certified;

@@ -46,9 +46,9 @@ class VerifyDecision : public testing::Test {
   // As somebody would who knows how digests are made.
   void Reseal() { decision_["digests"]["tube"] = ToHex(TubeDigest(decision_["tube"])); }
   void Reseal(const Config& config) {
-    decision_["digests"]["config"] = ToHex(config.digest);
-    decision_["digests"]["declaration"] = ToHex(config.declaration_digest);
-    decision_["digests"]["obstacles"] = ToHex(config.obstacles_digest);
+    decision_["digests"]["config"] = ToHex(config.grounds.config);
+    decision_["digests"]["declaration"] = ToHex(config.grounds.declaration);
+    decision_["digests"]["obstacles"] = ToHex(config.grounds.obstacles);
   }
 
   void ExpectRefuted(std::initializer_list<const char*> texts) {
