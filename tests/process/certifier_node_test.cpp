@@ -1088,9 +1088,9 @@ TEST_F(ArmedNodeTest, CommandsThatAreStaleOrUnknownAreRefused) {
 class ReloadTest : public testing::Test {
  protected:
   void Write(const std::string& text) const { std::ofstream(path_) << text; }
-  void Copy(const std::function<std::string(std::string)>& edit) const {
+  void Copy(const std::function<std::string(std::string)>& edit, const std::string& shipped = "point_mass") const {
     std::ostringstream text;
-    text << std::ifstream(kShipped).rdbuf();
+    text << std::ifstream(FOREREACH_SOURCE_DIR "/config/" + shipped + ".yaml").rdbuf();
     Write(edit(std::regex_replace(text.str(), std::regex("data/"), FOREREACH_SOURCE_DIR "/config/data/")));
   }
   // Reads the file again and waits for what comes of it.
@@ -1118,7 +1118,6 @@ class ReloadTest : public testing::Test {
     return node;
   }
 
-  const std::string kShipped = FOREREACH_SOURCE_DIR "/config/point_mass.yaml";
   const ScratchDirectory scratch_;
   const std::string path_ = scratch_ / "task.yaml";
   const Clock clock_ = [] { return kNow; };
@@ -1170,6 +1169,23 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
   EXPECT_EQ(status_.version, 2);
   EXPECT_EQ(GetDigest(status_.config_digest), LoadConfig(path_).grounds.config);
   EXPECT_EQ(GetText(status_.message), "waits for the robot's state");
+}
+
+TEST_F(ReloadTest, TheSizesOfTheModelCannotChange) {
+  const auto node = Begin();
+  const auto expect_refused = [&](std::int64_t failed, const char* what) {
+    Reload(*node);
+    EXPECT_EQ(status_.failed_reloads, failed);
+    EXPECT_EQ(status_.version, 1);
+    EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what + std::string(" cannot change while")));
+  };
+  Copy([](const std::string& text) { return text; }, "bicycle");
+  expect_refused(1, "the number of states");
+  Copy([](const std::string& text) {
+    const std::string without_obstacles = std::regex_replace(text, std::regex("obstacles:\n.*\n"), "obstacles: []\n");
+    return std::regex_replace(without_obstacles, std::regex("projection: \\[px, py\\]"), "projection: [px]");
+  });
+  expect_refused(2, "the number of safety coordinates");
 }
 
 TEST_F(ReloadTest, TheKeyCannotChange) {
