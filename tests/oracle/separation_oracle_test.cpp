@@ -391,7 +391,6 @@ TEST(HalfSpaceSeparation, IsTheExactDistanceInEveryDimension) {
   }
 }
 
-// The normal of a generator whose squares underflow is no unit vector.
 // Hulls that reach to the boundary up to a few roundings.
 TEST(HalfSpaceSeparation, OfHullsNextToItIsNeverWronglyProven) {
   Random random(711);
@@ -423,6 +422,52 @@ TEST(HalfSpaceSeparation, OfHullsNextToItIsNeverWronglyProven) {
   EXPECT_GT(proven, 500);
 }
 
+// Boxes and circles a few roundings away from a hull, in one coordinate or several.
+TEST(HullSeparation, NextToAnObstacleIsNeverWronglyProven) {
+  Random random(712);
+  SCOPED_TRACE(random.trace());
+  const auto few = [&](double x, double sign) {  // roundings in the direction of sign
+    for (int i = random.Integer(0, 20); i > 0; --i) x = sign > 0 ? NextUp(x) : NextDown(x);
+    return random.Coin(0.3) ? x + sign * std::abs(x) * 1e-12 : x;
+  };
+  int proven = 0;
+  for (int trial = 0; trial < 10000; ++trial) {
+    const int p = random.Integer(1, 3);
+    forereach::Hull hull{};
+    Eigen::VectorXd lower(p), upper(p);
+    for (int k = 0; k < p; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const double center = hull.center[i] = random.Uniform(-1, 1) * std::ldexp(1, random.Integer(-10, 30));
+      const double half_width = hull.half_width[i] = random.Coin() ? 0 : random.Uniform(0, 1), sign = random.Sign();
+      const double side = random.Coin(0.3) ? center : few(center + sign * half_width, sign);
+      const double other = side + sign * (random.Coin() ? 0 : random.Uniform(0, 1));
+      lower[k] = std::min(side, other), upper[k] = std::max(side, other);
+    }
+    Rational square = 0;
+    const bool is_circle = p == 2 && random.Coin();
+    if (is_circle) upper = lower;
+    for (int k = 0; k < p; ++k) {
+      const Rational center(hull.center[static_cast<std::size_t>(k)]),
+          half_width(hull.half_width[static_cast<std::size_t>(k)]);
+      const Rational below = Rational(lower[k]) - center - half_width, above = center - half_width - Rational(upper[k]);
+      const Rational gap = std::max(Rational(0), std::max(below, above));
+      square += gap * gap;
+    }
+    const double radius = std::max(0.0, few(std::sqrt(square.get_d()), -1));
+    const Separation s =
+        SeparateHulls(hull, is_circle ? Obstacle::Circle(lower, radius) : Obstacle::AxisBox(lower, upper));
+    if (s.distance > 0) {
+      ASSERT_LE(Rational(s.distance) * Rational(s.distance), square) << "trial " << trial;
+    }
+    if (s.IsProven()) {
+      ASSERT_GT(square, Rational(s.threshold) * Rational(s.threshold)) << "trial " << trial;
+    }
+    proven += s.IsProven();
+  }
+  EXPECT_GT(proven, 500);
+}
+
+// The normal of a generator whose squares underflow is no unit vector.
 TEST(PlanarSeparation, TinyGeneratorsProveNothingWrong) {
   for (const double tiny : {1.22 * 0x1p-537, 0x1p-538, 0x1p-600, 0x1p-1074}) {
     const Zonotope slice(Eigen::Vector2d::Zero(), Eigen::Vector2d(tiny, 0));
