@@ -23,10 +23,10 @@ int RunReplay(const Options& options) {
   if (options.other_task) {
     static_cast<void>(SurveyRun(options.logs));
     tasks.push_back(LoadConfig(options.config));
+    options.key.Override(tasks, options.config);
   } else {
-    tasks = TasksOf(options.logs, options.config);
+    tasks = TasksOf(options.logs, options.config, options.key);
   }
-  options.key.Override(tasks, options.config);
   const ReplayResult result = Replay(options.logs, tasks);
   if (options.json) {
     std::cout << JsonText({{"candidates", result.candidates},

@@ -33,7 +33,7 @@ bool Try(Bytes data) {
   static MemoryFile file;
   const std::string& path = file.Write(data);
   bool verified = false;
-  return IsTaken([&] { verified = Verify(ReadCertificates(path, FOREREACH_FUZZ_TASK)); }) && verified;
+  return IsTaken([&] { verified = Verify(ReadAllCertificates(path, FOREREACH_FUZZ_TASK).front()); }) && verified;
 }
 
 }  // namespace forereach

@@ -17,7 +17,7 @@ std::int64_t ReadAll(const std::string& path, std::int64_t size) {
       ++events;
       bytes += RecordBytes(event);
     }
-    Require(reader.offset() == bytes + reader.skipped_bytes());
+    Require(reader.offset() == bytes + reader.damage().bytes);
   }
   Require(reader.size() == size && (status == LogStatus::kEnd) == (reader.offset() == size));
   return events;

@@ -20,12 +20,6 @@ constexpr std::size_t kMaxTasks = 16, kMaxTasksInUse = 256;
 constexpr int kEventsPerTransaction = 4096;
 constexpr double kScanUs = 1e6, kGapsUs = 10e6, kRetryUs = 1e6;
 
-template <class Row>
-void MoveTo(std::vector<Row>& to, std::vector<Row>& from) {
-  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
-  from.clear();
-}
-
 // Subtracts from a gap that is found again the losses that gaps without an event already contain. False if none are
 // left.
 bool IsMore(GapRow& gap, std::map<std::string, std::int64_t>& counted) {
@@ -50,12 +44,13 @@ const char* DescribePlace(FilePlace place) {
   }
 }
 
-// For gaps between events that are in no log.
-void WithoutEvents(std::vector<GapRow>& gaps) {
-  for (GapRow& gap : gaps) {
+// The rows of events that are in no log: gaps alone, without their event.
+Rows WithoutEvents(Rows rows) {
+  for (GapRow& gap : rows.gaps) {
     gap.event.event_number = -1;
     gap.event.digest.clear();
   }
+  return {{}, {}, std::move(rows.gaps)};
 }
 
 // The entry of the map for losses of this reason and stream. Once the map is full, all new streams share one entry.
@@ -116,8 +111,8 @@ Recorder::Recorder(const Config& config, FreeSpace free_space)
     if (!run.end_utime) Recover(run);
 }
 
-// The files are listed before the runs are read, so another logger's file has its run by then, or is locked. A file
-// without an event is left by a logger that was killed between making the file and recording its run.
+// The files are listed before the runs are read, so another logger's file has its run by then, or is locked. A logger
+// that is killed between creating a file and recording its run leaves a file without events.
 void Recorder::AdoptLogs() {
   const std::vector<std::string> logs = directory_.Logs();
   const std::vector<RunRow> runs = database_->Runs();
@@ -126,7 +121,7 @@ void Recorder::AdoptLogs() {
     try {
       const EventLogWriter locked(directory_.PathOf(log));
       const LogRecovery& found = locked.recovery();
-      if (found.events == 0 && found.cut_bytes == 0 && found.corruptions == 0)
+      if (found.events == 0 && found.cut_bytes == 0 && found.damage.places == 0)
         directory_.Remove(log);
       else
         database_->BeginRun(log, found.first_utime);
@@ -180,7 +175,7 @@ std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
   end_utime = std::max(end_utime, found.last_utime);
   return fmt::format(
       "{} events kept, a cut tail of {} bytes removed, {} damaged places of {} bytes left, {} rows written",
-      found.events, found.cut_bytes, found.corruptions, found.skipped_bytes, new_rows);
+      found.events, found.cut_bytes, found.damage.places, found.damage.bytes, new_rows);
 }
 
 // The interpreter's state at the beginning of the file: it has read the file before it, if there is one.
@@ -346,8 +341,7 @@ void Recorder::Take(LogEvent event, std::int64_t now_us) {
 void Recorder::Miss(LogEvent event) {
   Rows missed;
   interpreter_.Observe(event, missed);
-  WithoutEvents(missed.gaps);
-  MoveTo(rows_.gaps, missed.gaps);
+  std::ranges::move(WithoutEvents(std::move(missed)).gaps, std::back_inserter(rows_.gaps));
   CountLoss({event.channel, ""}, 1, event.utime, pause_);
 }
 
@@ -365,13 +359,8 @@ void Recorder::CountLoss(const Stream& stream, std::int64_t lost, std::int64_t u
 void Recorder::MakeGaps(std::int64_t now_us) {
   for (const auto& [key, loss] : losses_) {
     const auto& [reason, stream] = key;
-    GapRow& gap = rows_.gaps.emplace_back();
-    gap.event.log_file = log_file_;
-    gap.channel = stream.channel;
-    gap.source = stream.source;
-    gap.lost = loss.lost;
-    gap.utime = loss.first_utime;
-    gap.reason = reason;
+    rows_.gaps.push_back(
+        {{log_file_, -1, ""}, stream.channel, stream.source, -1, -1, loss.lost, loss.first_utime, reason});
   }
   losses_.clear();
   gaps_.Start(now_us);
@@ -445,9 +434,7 @@ void Recorder::StartAnew(std::int64_t now_us) {
     log_->Abandon();
     for (const auto& [channel, events] : std::exchange(unflushed_, {}))
       CountLoss({channel, ""}, events, now_us, "gone");
-    rows_.decisions.clear();
-    rows_.events.clear();
-    WithoutEvents(rows_.gaps);
+    rows_ = WithoutEvents(std::move(rows_));
     pause_ = "gone";
     anew_problem_ = std::string("the log is gone, and there is no new one: ") + error.what();
     anew_.Start(now_us);
@@ -502,9 +489,10 @@ bool Recorder::Flush(std::int64_t now_us) {
     failed_flushes_ = 0;
   if (!losses_.empty() && (recording() || gaps_.IsOver(now_us))) MakeGaps(now_us);
   summary_.Add(rows_);
-  MoveTo(flushed_rows_.decisions, rows_.decisions);
-  MoveTo(flushed_rows_.events, rows_.events);
-  MoveTo(flushed_rows_.gaps, rows_.gaps);
+  std::ranges::move(rows_.decisions, std::back_inserter(flushed_rows_.decisions));
+  std::ranges::move(rows_.events, std::back_inserter(flushed_rows_.events));
+  std::ranges::move(rows_.gaps, std::back_inserter(flushed_rows_.gaps));
+  rows_ = {};
   WriteRows();
   flush_us_ = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begun).count();
   worst_flush_us_ = std::max(worst_flush_us_, flush_us_);
@@ -514,12 +502,7 @@ bool Recorder::Flush(std::int64_t now_us) {
 
 bool Recorder::FlushLog(std::int64_t now_us) {
   const bool flushed = log_->Flush();
-  if (!flushed) {
-    // The log does not have these events, so no row may refer to them.
-    rows_.decisions.clear();
-    rows_.events.clear();
-    WithoutEvents(rows_.gaps);
-  }
+  if (!flushed) rows_ = WithoutEvents(std::move(rows_));
   for (const auto& [channel, events] : std::exchange(unflushed_, {}))
     if (flushed) {
       written_ += events;
@@ -531,13 +514,12 @@ bool Recorder::FlushLog(std::int64_t now_us) {
 }
 
 void Recorder::WriteRows() {
-  const std::size_t waiting = flushed_rows_.decisions.size() + flushed_rows_.events.size() + flushed_rows_.gaps.size();
-  if (waiting == 0) return;
+  if (flushed_rows_.empty()) return;
   const std::int64_t events = rows_lost_ ? 0 : log_->next_number();
   if (database_ && database_->Write(flushed_rows_, log_file_, events)) {
     flushed_rows_ = {};
     told_events_ = events;
-  } else if (waiting > kMaxWaitingRows) {
+  } else if (flushed_rows_.size() > kMaxWaitingRows) {
     rows_lost_ = true;
     flushed_rows_ = {{}, {}, MergedWithoutEvents(flushed_rows_.gaps)};
   }

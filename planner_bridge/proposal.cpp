@@ -24,6 +24,7 @@
 #include <ompl/util/RandomNumbers.h>
 
 #include "planner_bridge/navigation.h"
+#include "planner_bridge/reference.h"
 
 namespace forereach {
 namespace {
@@ -287,10 +288,8 @@ void Planner::Search::Step(std::span<const double> x, const double* u, std::span
 }
 
 bool Planner::Search::Allowed(std::span<const double> x) const {
-  for (std::size_t k = 0; k < n_; ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    if (!(lower_(i) <= x[k] && x[k] <= upper_(i))) return false;
-  }
+  const Eigen::Map<const Eigen::ArrayXd> state(x.data(), start_.size());
+  if (!((lower_.array() <= state).all() && (state <= upper_.array()).all())) return false;
   const double speed = planner_.motion_->Speed(x);
   if (!(least_speed_ <= speed && speed <= top_speed_)) return false;
   return Clear(Position(x));
@@ -401,14 +400,10 @@ bool Planner::Search::HasRoom(const Eigen::VectorXd& position, const Eigen::Vect
 std::unique_ptr<oc::SimpleSetup> Planner::Search::SetUp(const Ambition& ambition) {
   auto states = std::make_shared<ob::RealVectorStateSpace>(static_cast<unsigned>(n_ + 2));
   ob::RealVectorBounds bounds(static_cast<unsigned>(n_ + 2));
-  for (std::size_t k = 0; k < n_; ++k) {
-    bounds.setLow(static_cast<unsigned>(k), lower_(static_cast<Eigen::Index>(k)));
-    bounds.setHigh(static_cast<unsigned>(k), upper_(static_cast<Eigen::Index>(k)));
-  }
-  bounds.setLow(static_cast<unsigned>(n_), 0);
-  bounds.setHigh(static_cast<unsigned>(n_), planner_.options_.progress_steps);
-  bounds.setLow(static_cast<unsigned>(n_ + 1), 0);
-  bounds.setHigh(static_cast<unsigned>(n_ + 1), start_distance_);
+  std::copy(lower_.begin(), lower_.end(), bounds.low.begin());  // and 0, of steps and distance
+  std::copy(upper_.begin(), upper_.end(), bounds.high.begin());
+  bounds.high[n_] = planner_.options_.progress_steps;
+  bounds.high[n_ + 1] = start_distance_;
   states->setBounds(bounds);
   const double cell = std::max(gain_ / planner_.options_.progress_steps, 0.1);
   states->registerDefaultProjection(std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
@@ -459,14 +454,12 @@ std::optional<Proposal> Planner::Search::Assemble(oc::PathControl& path, const A
   const auto progress = static_cast<Eigen::Index>(path.getControlCount());
   Eigen::MatrixXd tail;
   if (!FindTail(StateOf(Values(path.getStates().back())), ambition, tail)) return std::nullopt;
-  Proposal proposal{Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()), static_cast<int>(progress),
-                    Eigen::MatrixXd(start_.size(), progress + tail.cols() + 1)};
+  Proposal proposal{
+      Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()), static_cast<int>(progress), {}};
   for (Eigen::Index t = 0; t < progress; ++t)
     std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, proposal.controls.col(t).data());
   proposal.controls.rightCols(tail.cols()) = tail;
-  proposal.states.col(0) = start_;
-  for (Eigen::Index t = 0; t < proposal.controls.cols(); ++t)
-    Step({proposal.states.col(t).data(), n_}, proposal.controls.col(t).data(), {proposal.states.col(t + 1).data(), n_});
+  proposal.states = Rollout(model_, start_, proposal.controls);
   return proposal;
 }
 

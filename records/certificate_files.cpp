@@ -30,15 +30,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-void Compare(RecordedCertificate& certificate, const std::string& what, const std::string& expected,
-             const std::string& found) {
-  if (expected != found) certificate.mismatches.push_back({what, expected, found});
-}
-
-constexpr const char* kOtherInput = "another input than the certificate was made of: digest of the ";
-
-std::string Altered(const std::string& what) { return "the record was altered after it was made: " + what; }
-
 // ---- A decision's document.
 
 CertificateFile FromDecision(const std::string& path, const Json& document, const std::string& config_path) {
@@ -50,8 +41,7 @@ CertificateFile FromDecision(const std::string& path, const Json& document, cons
     file.not_certificates = 1;
     return file;
   }
-  DecisionRecord record = ReadCertificate(path, document, file.config);
-  file.certificates.push_back({path, std::move(record.mismatches), "", std::move(record.certificate)});
+  file.certificates.push_back(ReadCertificate(path, document, file.config));
   return file;
 }
 
@@ -127,10 +117,9 @@ class CertificateReader final : public TimelineUser {
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.known = KnownRowsOf(recorded.basis);
     for (const SealFault& fault : FindSealFaults(certified))
-      certificate.mismatches.push_back({Altered(fault.field), fault.expected, fault.found});
+      certificate.mismatches.push_back({kAltered + fault.field, fault.expected, fault.found});
     CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(certified));
-    if (!recorded.has_candidate)
-      certificate.mismatches.push_back({"its candidate is in the log", "a candidate", "none"});
+    if (!recorded.has_candidate) certificate.Compare("its candidate is in the log", "a candidate", "none");
     of_plan_.insert({DigestOf(Encode(certified.plan)), {&file, file.certificates.size() - 1, certified}});
   }
 
@@ -185,10 +174,12 @@ class CertificateReader final : public TimelineUser {
            plan.num_steps <= kMaxSteps;
   }
 
+  static std::string DigestOfInput(const char* name) { return std::string(kOtherInput) + "digest of the " + name; }
+
   static void CompareGrounds(RecordedCertificate& certificate, const Grounds& expected, const Grounds& found) {
     for (const auto& [name, digest] : kGrounds)
-      Compare(certificate, std::string(kOtherInput) + name + (digest == &Grounds::obstacles ? " in force" : ""),
-              ToHex(expected.*digest), ToHex(found.*digest));
+      certificate.Compare(DigestOfInput(name) + (digest == &Grounds::obstacles ? " in force" : ""),
+                          ToHex(expected.*digest), ToHex(found.*digest));
   }
 
   // The rows of a database say what the log says.
@@ -205,8 +196,7 @@ class CertificateReader final : public TimelineUser {
       } else {
         const Grounds grounds = GroundsOf(*decision->second);
         for (std::size_t i = 0; i < kGrounds.size(); ++i)
-          Compare(certificate, std::string(kOtherInput) + kGrounds[i].name, ToHex(grounds.*kGrounds[i].member),
-                  row.grounds[i]);
+          certificate.Compare(DigestOfInput(kGrounds[i].name), ToHex(grounds.*kGrounds[i].member), row.grounds[i]);
         if (!certificate.mismatches.empty()) certificate.missing = "the row disagrees with the log";
         certified.erase(decision);
       }
@@ -221,7 +211,7 @@ class CertificateReader final : public TimelineUser {
   void CheckDecision(const decision_t& decision, const Plan& plan) {
     RecordedCertificate& certificate = plan.file->certificates[plan.certificate];
     const auto compare = [&](const std::string& field, const std::string& expected, const std::string& found) {
-      Compare(certificate, Altered("its decision's " + field), expected, found);
+      certificate.Compare(kAltered + ("its decision's " + field), expected, found);
     };
     const certified_plan_t& certified = plan.certified;
     const Grounds expected = GroundsOf(certified), found = GroundsOf(decision);
@@ -273,9 +263,10 @@ class CertificateReader final : public TimelineUser {
       const std::size_t at = sentence.find(down);
       if (at != std::string::npos && is(sentence.replace(at, down.size(), " " + std::string(nearest) + " m "))) return;
     }
-    Compare(certificate, Altered("its decision's message"),
-            ExplainCertificate(0, decision.obstacle, clearance) + (decision.obstacle < 0 ? "" : ", or another step"),
-            found);
+    certificate.Compare(
+        kAltered + std::string("its decision's message"),
+        ExplainCertificate(0, decision.obstacle, clearance) + (decision.obstacle < 0 ? "" : ", or another step"),
+        found);
   }
 
   std::deque<CertificateFile> files_;             // references to them stay
@@ -285,33 +276,7 @@ class CertificateReader final : public TimelineUser {
   std::multimap<Digest, Plan> of_plan_;
 };
 
-std::vector<CertificateFile> FromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
-  CertificateReader reader;
-  for (const Config& task : tasks) reader.AddTask(task);
-  Timeline timeline(PointersTo(tasks), reader);
-  timeline.Read(logs, logs.size() > 1);
-  reader.EndRun(tasks.front(), nullptr);
-  std::vector<CertificateFile> files = reader.Finish(timeline);
-  if (timeline.damage().places > 0)
-    files.front().certificates.push_back(DamagedLog(logs.front(), timeline.damage().places));
-  return files;
-}
-
 // ---- A decision database: its logs lie beside it, and its rows have to say what they say.
-
-// Of the files of one run; what is amiss in one of them is for the reading to say.
-LogSurvey SurveyChain(const std::vector<std::string>& logs) {
-  LogSurvey all;
-  for (const std::string& log : logs) {
-    LogSurvey one = Survey({log});
-    for (const Digest& digest : one.order) {
-      if (!all.configs.contains(digest)) all.order.push_back(digest);
-      all.configs[digest].decisions += one.configs[digest].decisions;
-      all.configs[digest].observations.merge(one.configs[digest].observations);
-    }
-  }
-  return all;
-}
 
 // The files of each run: what a file does not know, the one before does.
 std::vector<std::vector<RunRow>> Chains(Database& database) {
@@ -365,7 +330,7 @@ class DatabaseReading {
   }
 
   void ReadRun(const RunOnDisk& run) {
-    const LogSurvey survey = SurveyChain(run.logs);
+    const LogSurvey survey = Survey(run.logs, LogOrder::kAny);  // what is amiss in one is for the reading to say
     if (survey.order.empty() && run.rows.empty()) return;
     std::vector<const Config*> tasks;
     try {
@@ -410,14 +375,6 @@ class DatabaseReading {
   std::vector<RecordedCertificate> without_task_;
 };
 
-// ---- Which of the three.
-
-std::vector<Config> TasksFor(const std::vector<std::string>& logs, const std::string& config_path, const LogKey& key) {
-  std::vector<Config> tasks = TasksOf(logs, config_path);
-  key.Override(tasks, config_path);
-  return tasks;
-}
-
 }  // namespace
 
 std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const std::string& config_path,
@@ -435,7 +392,7 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const
       case FileKind::kOther:
         if (Survey({path}).events == 0) break;
         [[fallthrough]];
-      default: return FromLogs({path}, TasksFor({path}, config_path, key));
+      default: return ReadAllLogs({path}, config_path, key);
     }
   } catch (const Json::exception& error) {
     throw ConfigError(path + ": not a decision of `forereach certify --json`: " + error.what());
@@ -447,15 +404,16 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const
 
 std::vector<CertificateFile> ReadAllLogs(const std::vector<std::string>& logs, const std::string& config_path,
                                          const LogKey& key) {
-  return FromLogs(logs, TasksFor(logs, config_path, key));
-}
-
-CertificateFile ReadCertificates(const std::string& path, const std::string& config_path, const LogKey& key) {
-  return std::move(ReadAllCertificates(path, config_path, key).front());
-}
-
-CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path, const LogKey& key) {
-  return std::move(ReadAllLogs(logs, config_path, key).front());
+  const std::vector<Config> tasks = TasksOf(logs, config_path, key);
+  CertificateReader reader;
+  for (const Config& task : tasks) reader.AddTask(task);
+  Timeline timeline(PointersTo(tasks), reader);
+  timeline.Read(logs, logs.size() > 1);
+  reader.EndRun(tasks.front(), nullptr);
+  std::vector<CertificateFile> files = reader.Finish(timeline);
+  if (timeline.damage().places > 0)
+    files.front().certificates.push_back(DamagedLog(logs.front(), timeline.damage().places));
+  return files;
 }
 
 }  // namespace forereach

@@ -9,16 +9,8 @@ all that the verifier needs. Digests are held against the inputs here; the mathe
 #include "certifier/task/config.h"
 #include "records/decision_record.h"
 #include "records/log_trust.h"
-#include "verifier/verifier.h"
 
 namespace forereach {
-
-struct RecordedCertificate {
-  std::string name;                  ///< Which one, for a person.
-  std::vector<Mismatch> mismatches;  ///< Digests and the like that are wrong; the record was altered, or its inputs.
-  std::string missing;               ///< Why there is nothing to derive, or empty.
-  verifier::Certificate certificate;
-};
 
 struct CertificateFile {
   Config config;
@@ -41,11 +33,5 @@ it (records/log_tasks.h).
 /** Of event logs that follow one another, as the files of one run do. @throws BadInput likewise. */
 [[nodiscard]] std::vector<CertificateFile> ReadAllLogs(const std::vector<std::string>& logs,
                                                        const std::string& config_path, const LogKey& key = {});
-
-/** The same where one task alone is expected: the first group. */
-[[nodiscard]] CertificateFile ReadCertificates(const std::string& path, const std::string& config_path,
-                                               const LogKey& key = {});
-[[nodiscard]] CertificateFile ReadLogs(const std::vector<std::string>& logs, const std::string& config_path,
-                                       const LogKey& key = {});
 
 }  // namespace forereach

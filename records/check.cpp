@@ -9,7 +9,6 @@
 
 #include "lcmtypes/printable.h"
 #include "records/database.h"
-#include "records/event_log.h"
 #include "records/kept_tasks.h"
 #include "records/log_directory.h"
 #include "records/log_survey.h"
@@ -45,8 +44,7 @@ LogCheck Check(Database& database, const LogDirectory& directory, const RunRow& 
   if (directory.Bytes(run.log_file)) {
     EventLogReader reader(directory.PathOf(run.log_file));
     CheckEvents(reader, references, seen);
-    check.corruptions = reader.corruptions();
-    check.skipped_bytes = reader.skipped_bytes();
+    check.damage = reader.damage();
     check.cut_bytes = reader.size() - reader.offset();
   } else {
     check.log = run.log_deleted_utime ? LogCheck::Log::kDeleted : LogCheck::Log::kMissing;
@@ -71,7 +69,7 @@ std::string DescribeCheck(const LogCheck& check) {
   add(check.unchecked, "unchecked");
   add(std::ssize(check.changed), "changed");
   add(std::ssize(check.missing), "missing");
-  add(check.corruptions, "damaged places");
+  add(check.damage.places, "damaged places");
   add(check.cut_bytes, "bytes of a cut tail");
   return text + (check.ended ? "" : ", not ended");
 }
@@ -88,7 +86,8 @@ void List(std::string& text, const std::vector<std::int64_t>& events, const char
 
 bool LogCheck::whole_log() const {
   if (log != Log::kThere) return log == Log::kDeleted;
-  return changed.empty() && missing.empty() && damaged_tasks.empty() && corruptions == 0 && (cut_bytes == 0 || !ended);
+  return changed.empty() && missing.empty() && damaged_tasks.empty() && damage.places == 0 &&
+         (cut_bytes == 0 || !ended);
 }
 
 std::vector<LogCheck> CheckLogs(const std::string& path) {
@@ -106,10 +105,7 @@ std::vector<LogCheck> CheckLogs(const std::string& path) {
   for (const RunRow& run : database.Runs()) checks.push_back(Check(database, directory, run));
   for (const std::string& log : directory.Logs()) {
     if (std::ranges::find(checks, log, &LogCheck::log_file) != checks.end()) continue;
-    LogCheck& check = checks.emplace_back();
-    check.log_file = log;
-    check.log = LogCheck::Log::kUnknown;
-    check.ended = false;
+    checks.push_back({.log_file = log, .log = LogCheck::Log::kUnknown, .ended = false});
   }
   return checks;
 }
@@ -142,7 +138,7 @@ nlohmann::json ToJson(const std::vector<LogCheck>& checks) {
                     {"changed", check.changed},
                     {"missing", check.missing},
                     {"damaged_tasks", check.damaged_tasks},
-                    {"damage", {{"places", check.corruptions}, {"bytes", check.skipped_bytes}}},
+                    {"damage", {{"places", check.damage.places}, {"bytes", check.damage.bytes}}},
                     {"cut_bytes", check.cut_bytes}});
   return list;
 }

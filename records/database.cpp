@@ -3,6 +3,9 @@
 #include <array>
 #include <cerrno>
 #include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
 
 #include <sqlite3.h>
 #include <nlohmann/json.hpp>
@@ -47,6 +50,38 @@ constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
   ALTER TABLE gaps ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
 )sql"};
 
+// A column that is NULL where the number is -1.
+template <class Number>
+struct OrNull {
+  Number& number;
+};
+
+// The columns of a row, in the order of its table or query.
+auto ColumnsOf(auto& row) {
+  using Row = std::remove_const_t<std::remove_reference_t<decltype(row)>>;
+  if constexpr (std::is_same_v<Row, DecisionRow>)
+    return std::tie(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime, row.sequence,
+                    row.source, row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle,
+                    row.first_observation, row.second_observation, row.margin, row.threshold, row.elapsed_us,
+                    row.latency_us, row.message, row.plan_digest, row.grounds, row.event.digest);
+  else if constexpr (std::is_same_v<Row, EventRow>)
+    return std::tie(row.event.log_file, row.event.event_number, row.utime, row.sequence, row.plan_id, row.kind,
+                    row.step, row.coordinate, row.state, row.value, row.message, row.event.digest);
+  else if constexpr (std::is_same_v<Row, GapRow>)
+    return std::tuple_cat(std::tie(row.event.log_file), std::tuple(OrNull{row.event.event_number}),
+                          std::tie(row.channel, row.source), std::tuple(OrNull{row.expected}, OrNull{row.got}),
+                          std::tie(row.lost, row.utime, row.reason, row.event.digest));
+  else if constexpr (std::is_same_v<Row, RunRow>)
+    return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.schema, row.recovered, row.continues,
+                    row.log_deleted_utime);
+  else if constexpr (std::is_same_v<Row, LogReference>)
+    return std::tie(row.log_file, row.event_number, row.digest);
+  else if constexpr (std::is_same_v<Row, std::pair<std::string, std::int64_t>>)
+    return std::tie(row.first, row.second);
+  else
+    return std::tie(row);
+}
+
 }  // namespace
 
 /** A prepared statement. Bind takes values in order, Read gives columns in order. */
@@ -85,9 +120,9 @@ class Database::Statement final {
     return sqlite3_changes(handle_);
   }
 
-  template <class... Values>
-  void Read(Values&... values) {
-    (ReadNext(values), ...);
+  void Read(auto& row) {
+    auto columns = ColumnsOf(row);
+    std::apply([this](auto&... values) { (ReadNext(values), ...); }, columns);
   }
 
  private:
@@ -105,6 +140,11 @@ class Database::Statement final {
   void BindNext(const std::optional<Value>& value) {
     if (value) return BindNext(*value);
     sqlite3_bind_null(statement_, ++column_);
+  }
+
+  template <class Number>
+  void BindNext(OrNull<Number> value) {
+    BindNext(value.number < 0 ? std::nullopt : std::optional<std::int64_t>(value.number));
   }
 
   bool IsNull() const { return sqlite3_column_type(statement_, column_) == SQLITE_NULL; }
@@ -131,6 +171,11 @@ class Database::Statement final {
   void ReadNext(std::optional<std::int64_t>& value) {
     value = IsNull() ? std::nullopt : std::optional(sqlite3_column_int64(statement_, column_));
     ++column_;
+  }
+  void ReadNext(OrNull<std::int64_t>& value) {
+    std::optional<std::int64_t> number;
+    ReadNext(number);
+    value.number = number.value_or(-1);
   }
 
   sqlite3* handle_;
@@ -172,12 +217,7 @@ void Database::Execute(const char* sql) {
 
 void Database::Migrate() {
   Execute("BEGIN IMMEDIATE");
-  const auto number = [this](const char* sql) {
-    Statement statement(handle_.get(), sql);
-    std::int64_t value = 0;
-    if (statement.Bind().Step()) statement.Read(value);
-    return value;
-  };
+  const auto number = [this](const char* sql) { return Select<std::int64_t>(sql).at(0); };
   const std::int64_t version = number("PRAGMA user_version");
   if (version > kSchemaVersion)
     throw DatabaseError("schema version " + std::to_string(version) + ", this program knows versions up to " +
@@ -215,9 +255,9 @@ std::optional<int> Database::Write(const Rows& rows, const std::string& log_file
   int written = 0;
   try {
     Execute("BEGIN IMMEDIATE");
-    for (const DecisionRow& row : rows.decisions) written += Insert(row);
-    for (const EventRow& row : rows.events) written += Insert(row);
-    for (const GapRow& row : rows.gaps) written += Insert(row);
+    for (const DecisionRow& row : rows.decisions) written += Insert(*insert_decision_, row);
+    for (const EventRow& row : rows.events) written += Insert(*insert_event_, row);
+    for (const GapRow& row : rows.gaps) written += Insert(*insert_gap_, row);
     set_events_->Bind(events, log_file).Run();
     Execute("COMMIT");
     return written;
@@ -228,28 +268,16 @@ std::optional<int> Database::Write(const Rows& rows, const std::string& log_file
   }
 }
 
-int Database::Insert(const DecisionRow& row) {
-  return insert_decision_
-      ->Bind(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime, row.sequence, row.source,
-             row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle, row.first_observation,
-             row.second_observation, row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
-             row.plan_digest, row.grounds, row.event.digest)
-      .Run();
+int Database::Insert(Statement& insert, const auto& row) {
+  return std::apply([&](const auto&... values) { return insert.Bind(values...).Run(); }, ColumnsOf(row));
 }
 
-int Database::Insert(const EventRow& row) {
-  return insert_event_
-      ->Bind(row.event.log_file, row.event.event_number, row.utime, row.sequence, row.plan_id, row.kind, row.step,
-             row.coordinate, row.state, row.value, row.message, row.event.digest)
-      .Run();
-}
-
-int Database::Insert(const GapRow& row) {
-  const auto or_null = [](std::int64_t value) { return value < 0 ? std::nullopt : std::optional(value); };
-  return insert_gap_
-      ->Bind(row.event.log_file, or_null(row.event.event_number), row.channel, row.source, or_null(row.expected),
-             or_null(row.got), row.lost, row.utime, row.reason, row.event.digest)
-      .Run();
+template <class Row>
+std::vector<Row> Database::Select(const char* sql, const auto&... values) {
+  std::vector<Row> rows;
+  Statement select(handle_.get(), sql);
+  for (select.Bind(values...); select.Step();) select.Read(rows.emplace_back());
+  return rows;
 }
 
 template <class... Values>
@@ -278,64 +306,39 @@ void Database::MarkLogDeleted(const std::string& log_file, std::int64_t utime) {
 }
 
 std::vector<RunRow> Database::Runs() {
-  std::vector<RunRow> runs;
-  Statement select(handle_.get(), R"sql(SELECT log_file, start_utime, end_utime, events, schema, recovered, continues,
-      log_deleted_utime FROM runs ORDER BY rowid)sql");
-  for (select.Bind(); select.Step();) {
-    RunRow& run = runs.emplace_back();
-    select.Read(run.log_file, run.start_utime, run.end_utime, run.events, run.schema, run.recovered, run.continues,
-                run.log_deleted_utime);
+  const std::vector<RunRow> runs = Select<RunRow>(R"sql(SELECT log_file, start_utime, end_utime, events, schema,
+      recovered, continues, log_deleted_utime FROM runs ORDER BY rowid)sql");
+  for (const RunRow& run : runs)
     for (const std::string& file : {run.log_file, run.continues})
       if (file.find_first_of(std::string_view("/\0", 2)) != std::string::npos || file == "." || file == "..")
         throw DatabaseError("database: " + path_ + ": a run names a log that is not in its directory: " + file);
-  }
   return runs;
 }
 
 std::vector<LogReference> Database::References(const std::string& log_file) {
-  std::vector<LogReference> references;
-  Statement select(handle_.get(), R"sql(
-      SELECT event_number, event_digest FROM decisions WHERE log_file = ?1
-      UNION SELECT event_number, event_digest FROM execution_events WHERE log_file = ?1
-      UNION SELECT event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
-      ORDER BY event_number)sql");
-  for (select.Bind(log_file); select.Step();) {
-    LogReference& reference = references.emplace_back(LogReference{log_file, -1, {}});
-    select.Read(reference.event_number, reference.digest);
-  }
-  return references;
+  return Select<LogReference>(R"sql(
+      SELECT log_file, event_number, event_digest FROM decisions WHERE log_file = ?1
+      UNION SELECT log_file, event_number, event_digest FROM execution_events WHERE log_file = ?1
+      UNION SELECT log_file, event_number, event_digest FROM gaps WHERE log_file = ?1 AND event_number IS NOT NULL
+      ORDER BY event_number)sql",
+                              log_file);
 }
 
 std::set<std::string> Database::ConfigDigests(const std::string& log_file) {
-  std::set<std::string> digests;
-  Statement select(handle_.get(), "SELECT DISTINCT config_digest FROM decisions WHERE log_file = ?");
-  for (select.Bind(log_file); select.Step();) {
-    std::string digest;
-    select.Read(digest);
-    digests.insert(digest);
-  }
-  return digests;
+  const auto digests = Select<std::string>("SELECT DISTINCT config_digest FROM decisions WHERE log_file = ?", log_file);
+  return {digests.begin(), digests.end()};
 }
 
 std::set<std::int64_t> Database::EventsBehindGaps(const std::string& log_file) {
-  std::set<std::int64_t> events;
-  Statement select(handle_.get(), "SELECT event_number FROM gaps WHERE log_file = ? AND event_number IS NOT NULL");
-  for (select.Bind(log_file); select.Step();) {
-    std::int64_t number = 0;
-    select.Read(number);
-    events.insert(number);
-  }
-  return events;
+  const auto events =
+      Select<std::int64_t>("SELECT event_number FROM gaps WHERE log_file = ? AND event_number IS NOT NULL", log_file);
+  return {events.begin(), events.end()};
 }
 
 std::map<std::string, std::int64_t> Database::LossesWithoutEvents(const std::string& log_file) {
   std::map<std::string, std::int64_t> losses;
-  Statement select(handle_.get(),
-                   "SELECT channel, lost FROM gaps WHERE log_file = ? AND event_number IS NULL AND lost > 0");
-  for (select.Bind(log_file); select.Step();) {
-    std::string channel;
-    std::int64_t lost = 0;
-    select.Read(channel, lost);
+  for (const auto& [channel, lost] : Select<std::pair<std::string, std::int64_t>>(
+           "SELECT channel, lost FROM gaps WHERE log_file = ? AND event_number IS NULL AND lost > 0", log_file)) {
     std::int64_t& sum = losses[channel];
     sum = SumOfLost(sum, lost);
   }
@@ -343,31 +346,11 @@ std::map<std::string, std::int64_t> Database::LossesWithoutEvents(const std::str
 }
 
 Rows Database::Read(const std::string& log_file) {
-  Rows rows;
-  Statement decisions(handle_.get(),
-                      "SELECT * FROM decisions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number");
-  for (decisions.Bind(log_file); decisions.Step();) {
-    DecisionRow& row = rows.decisions.emplace_back();
-    decisions.Read(row.event.log_file, row.event.event_number, row.utime, row.candidate_utime, row.sequence, row.source,
-                   row.plan_id, row.outcome, row.cause, row.step, row.coordinate, row.obstacle, row.first_observation,
-                   row.second_observation, row.margin, row.threshold, row.elapsed_us, row.latency_us, row.message,
-                   row.plan_digest, row.grounds, row.event.digest);
-  }
-  Statement events(handle_.get(),
-                   "SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number");
-  for (events.Bind(log_file); events.Step();) {
-    EventRow& row = rows.events.emplace_back();
-    events.Read(row.event.log_file, row.event.event_number, row.utime, row.sequence, row.plan_id, row.kind, row.step,
-                row.coordinate, row.state, row.value, row.message, row.event.digest);
-  }
-  Statement gaps(handle_.get(), R"sql(SELECT log_file, ifnull(event_number, -1), channel, source, ifnull(expected, -1),
-      ifnull(got, -1), lost, utime, reason, event_digest FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid)sql");
-  for (gaps.Bind(log_file); gaps.Step();) {
-    GapRow& row = rows.gaps.emplace_back();
-    gaps.Read(row.event.log_file, row.event.event_number, row.channel, row.source, row.expected, row.got, row.lost,
-              row.utime, row.reason, row.event.digest);
-  }
-  return rows;
+  return {Select<DecisionRow>("SELECT * FROM decisions WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
+                              log_file),
+          Select<EventRow>("SELECT * FROM execution_events WHERE ?1 IN ('', log_file) ORDER BY log_file, event_number",
+                           log_file),
+          Select<GapRow>("SELECT * FROM gaps WHERE ?1 IN ('', log_file) ORDER BY rowid", log_file)};
 }
 
 }  // namespace forereach

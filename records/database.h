@@ -96,9 +96,9 @@ class Database final {
   template <class... Values>
   void RunDurably(const char* sql, const Values&... values);
   void Migrate();
-  int Insert(const DecisionRow& row);
-  int Insert(const EventRow& row);
-  int Insert(const GapRow& row);
+  int Insert(Statement& insert, const auto& row);
+  template <class Row>
+  std::vector<Row> Select(const char* sql, const auto&... values);
 
   std::string path_, problem_;
   std::map<std::string, FileIdentity> files_;  // of the database, by the end of their names; as they were first seen

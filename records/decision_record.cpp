@@ -87,12 +87,10 @@ class Field {
   const Json& value_;
 };
 
-constexpr const char* kAltered = "the record was altered after it was made: ";
-constexpr const char* kOtherInput = "another input than the certificate was made of: ";
-
 class Reading {
  public:
-  Reading(const Field& document, const Config& config) : document_(document), config_(config) {
+  Reading(const std::string& path, const Field& document, const Config& config)
+      : document_(document), config_(config), record_{path, {}, {}, {}} {
     document_.RequireKeys({"outcome", "cause", "step", "coordinate", "exit", "first_observation", "second_observation",
                            "obstacle", "closest_step", "margin", "threshold", "message", "capped", "inputs", "tube",
                            "digests", "elapsed_us"});
@@ -103,12 +101,9 @@ class Reading {
     CompareWitness();
   }
 
-  DecisionRecord Take() { return std::move(record_); }
+  RecordedCertificate Take() { return std::move(record_); }
 
  private:
-  void Compare(const std::string& what, const std::string& expected, const std::string& found) {
-    if (expected != found) record_.mismatches.push_back({what, expected, found});
-  }
   void Compare(const Field& field, const Json& expected) {
     if (field.json() == expected) return;
     record_.mismatches.push_back(
@@ -176,7 +171,7 @@ class Reading {
     std::set<std::string> keys;
     for (const auto& [what, name, digest] : expected) {
       keys.insert(name);
-      Compare(what + "digest of " + (what == kOtherInput ? "the " : "") + name, digest, digests[name].Text());
+      record_.Compare(what + "digest of " + (what == kOtherInput ? "the " : "") + name, digest, digests[name].Text());
     }
     digests.RequireKeys(keys);
   }
@@ -212,7 +207,7 @@ class Reading {
       Compare(threshold, Json(radius));
       const double claimed = SubDown(margin.Number(), radius);
       if (claimed != clearance)
-        Compare(kAltered + margin.name() + " less the radius", Json(clearance).dump(), Json(claimed).dump());
+        record_.Compare(kAltered + margin.name() + " less the radius", Json(clearance).dump(), Json(claimed).dump());
     }
     const std::string sentence = ExplainCertificate(step, obstacle, clearance);
     Compare(document_["message"], sentence + (document_["capped"].Bool() ? kCapped : ""));
@@ -220,7 +215,7 @@ class Reading {
 
   const Field& document_;
   const Config& config_;
-  DecisionRecord record_;
+  RecordedCertificate record_;
 };
 
 }  // namespace
@@ -242,8 +237,8 @@ bool IsCertificate(const std::string& path, const Json& document) {
   return true;
 }
 
-DecisionRecord ReadCertificate(const std::string& path, const Json& document, const Config& config) {
-  return Reading(Field(path, "", document), config).Take();
+RecordedCertificate ReadCertificate(const std::string& path, const Json& document, const Config& config) {
+  return Reading(path, Field(path, "", document), config).Take();
 }
 
 }  // namespace forereach

@@ -17,11 +17,19 @@ struct Mismatch {
   std::string what, expected, found;
 };
 
-/** A certificate as a document has it: what the verifier derives anew, and where the document contradicts itself or its
-task. */
-struct DecisionRecord {
+/** How the name of a mismatch begins. */
+inline constexpr const char* kAltered = "the record was altered after it was made: ";
+inline constexpr const char* kOtherInput = "another input than the certificate was made of: ";
+
+struct RecordedCertificate {
+  std::string name;                  ///< Which one, for a person.
+  std::vector<Mismatch> mismatches;  ///< Digests and the like that are wrong; the record was altered, or its inputs.
+  std::string missing;               ///< Why there is nothing to derive, or empty.
   verifier::Certificate certificate;
-  std::vector<Mismatch> mismatches;
+
+  void Compare(const std::string& what, const std::string& expected, const std::string& found) {
+    if (expected != found) mismatches.push_back({what, expected, found});
+  }
 };
 
 /** The task file that a document names: its absolute path where there is such a file, else the path as it was given.
@@ -33,7 +41,7 @@ struct DecisionRecord {
 
 /** @pre IsCertificate. @throws ConfigError naming file and field if one is missing, unknown, or not of its type or
 size. */
-[[nodiscard]] DecisionRecord ReadCertificate(const std::string& path, const nlohmann::json& document,
-                                             const Config& config);
+[[nodiscard]] RecordedCertificate ReadCertificate(const std::string& path, const nlohmann::json& document,
+                                                  const Config& config);
 
 }  // namespace forereach

@@ -5,12 +5,15 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 #include <utility>
 
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "certifier/task/files.h"
 
 namespace forereach {
 namespace {
@@ -33,16 +36,6 @@ void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t
 
 std::string Reason(const std::string& what, const std::string& path) {
   return what + path + ": " + std::strerror(errno);
-}
-
-// Has the disk confirm that a file is in its directory. EINVAL: this file system knows no such thing.
-bool ConfirmEntry(const std::string& path) {
-  const std::string parent = std::filesystem::path(path).parent_path().string();
-  const int directory = ::open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (directory < 0) return false;
-  const bool confirmed = ::fsync(directory) == 0 || errno == EINVAL;
-  ::close(directory);
-  return confirmed;
 }
 
 }  // namespace
@@ -145,8 +138,7 @@ LogStatus EventLogReader::Next(LogEvent& event) {
     next = FindRecord(offset_ + 1, size_);
     if (found == Found::kCut && next == size_) return LogStatus::kCutTail;
   }
-  ++corruptions_;
-  skipped_bytes_ += next - offset_;
+  damage_ = damage_ + LogDamage{1, next - offset_};
   offset_ = next;
   return LogStatus::kCorrupt;
 }
@@ -169,8 +161,7 @@ LogDamage ForEachEvent(const std::vector<std::string>& logs,
   for (const std::string& log : logs) {
     EventLogReader reader(log);
     ForEachEvent(reader, [&](const LogEvent& event) { visit(event, log); });
-    damage.places += reader.corruptions();
-    damage.bytes += reader.skipped_bytes();
+    damage = damage + reader.damage();
   }
   return damage;
 }
@@ -186,7 +177,8 @@ EventLogWriter::EventLogWriter(const std::string& path)
   if (file_ < 0) throw LogError(Reason("log: cannot write ", path));
   try {
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) throw LogError("log: " + path + " is being written by another process");
-    if (!ConfirmEntry(path)) throw LogError(Reason("log: cannot write ", path));
+    if (!ConfirmDirectory(std::filesystem::path(path).parent_path().string()))
+      throw LogError(Reason("log: cannot write ", path));
     Recover(path);
   } catch (...) {
     ::close(file_);
@@ -205,8 +197,7 @@ void EventLogWriter::Recover(const std::string& path) {
   });
   offset_ = reader.offset();
   recovery_.cut_bytes = reader.size() - offset_;
-  recovery_.corruptions = reader.corruptions();
-  recovery_.skipped_bytes = reader.skipped_bytes();
+  recovery_.damage = reader.damage();
   if (recovery_.cut_bytes > 0 && ::ftruncate(file_, offset_) != 0) throw LogError(Reason("log: cannot recover ", path));
 }
 
@@ -249,14 +240,9 @@ void EventLogWriter::Abandon() {
 bool EventLogWriter::Flush() {
   if (buffer_.empty()) return true;
   const std::int64_t end = offset_ + pending_bytes();
-  std::int64_t at = offset_;  // not the file's own position, which a failed write leaves anywhere
-  while (at < end) {
-    const ssize_t count = ::pwrite(file_, buffer_.data() + (at - offset_), static_cast<std::size_t>(end - at), at);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) break;
-    at += count;
-  }
-  const bool confirmed = at == end && (!is_torn_ || ::ftruncate(file_, end) == 0) && ::fdatasync(file_) == 0;
+  const std::string_view bytes(reinterpret_cast<const char*>(buffer_.data()), buffer_.size());
+  const bool confirmed =
+      WriteAt(file_, bytes, offset_) && (!is_torn_ || ::ftruncate(file_, end) == 0) && ::fdatasync(file_) == 0;
   const bool is_cut = !MarkStands();  // since the last look
   if (confirmed && !is_cut) {
     mark_.assign(buffer_.begin(), buffer_.begin() + kHeaderBytes);

@@ -20,6 +20,7 @@ damage. */
 #include "bus/authentic.h"
 #include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
+#include "lcmtypes/stream_order.h"
 
 namespace forereach {
 
@@ -39,6 +40,12 @@ struct LogEvent {
   [[nodiscard]] Bytes message() const { return WithoutSignature(data); }
 };
 
+/** The latest stamp that counts of the event's message (StreamOrder::Horizon): its sender's clock may be ahead of the
+logger's by a second. */
+[[nodiscard]] inline std::int64_t HorizonOf(const LogEvent& event) {
+  return StreamOrder::Horizon(event.utime, 1'000'000);
+}
+
 /** BLAKE2b-256 of the event's record in the file, so every changed bit changes the digest. */
 [[nodiscard]] Digest DigestOf(const LogEvent& event);
 /** Bytes of that record. */
@@ -52,6 +59,14 @@ enum class LogStatus {
   kEnd,      ///< The file ends behind a whole record.
   kCutTail,  ///< What is left is the beginning of one record: its writer was killed, or writes still.
   kCorrupt,  ///< Some bytes were not a record and have been skipped; the next call continues after them.
+};
+
+/** Damaged places of logs, and the bytes in them. */
+struct LogDamage {
+  std::int64_t places = 0, bytes = 0;
+  friend LogDamage operator+(const LogDamage& a, const LogDamage& b) {
+    return {a.places + b.places, a.bytes + b.bytes};
+  }
 };
 
 class EventLogReader final {
@@ -69,9 +84,8 @@ class EventLogReader final {
   /** Bytes from the beginning of the file to behind the last record or damage passed. */
   [[nodiscard]] std::int64_t offset() const { return offset_; }
   [[nodiscard]] std::int64_t size() const { return size_; }
-  /** Damaged places met so far, and the bytes skipped in them. */
-  [[nodiscard]] std::int64_t corruptions() const { return corruptions_; }
-  [[nodiscard]] std::int64_t skipped_bytes() const { return skipped_bytes_; }
+  /** Passed so far. */
+  [[nodiscard]] const LogDamage& damage() const { return damage_; }
 
  private:
   enum class Found { kWhole, kCut, kNothing };
@@ -87,17 +101,13 @@ class EventLogReader final {
 
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   std::int64_t position_ = 0;  // of file_, so that reading on needs no seek
-  std::int64_t offset_ = 0, size_ = 0, corruptions_ = 0, skipped_bytes_ = 0;
+  std::int64_t offset_ = 0, size_ = 0;
+  LogDamage damage_;
 };
 
 /** Calls `visit` for each event from where the reader stands to the end of the log; passes over damage, which the
 reader counts. */
 void ForEachEvent(EventLogReader& reader, const std::function<void(const LogEvent&)>& visit);
-
-/** Damaged places of logs, and the bytes in them. */
-struct LogDamage {
-  std::int64_t places = 0, bytes = 0;
-};
 
 /** Calls `visit` with each event of several logs that follow one another, as the files of one run do, and the log's
 path.
@@ -109,8 +119,7 @@ LogDamage ForEachEvent(const std::vector<std::string>& logs,
 struct LogRecovery {
   std::int64_t events = 0;                       ///< Whole records kept.
   std::int64_t cut_bytes = 0;                    ///< Of a cut tail, removed.
-  std::int64_t corruptions = 0;                  ///< Damaged places, left as they are.
-  std::int64_t skipped_bytes = 0;                ///< In them.
+  LogDamage damage;                              ///< Left as it is.
   std::int64_t first_utime = 0, last_utime = 0;  ///< Of the first and last whole record, 0 without one.
 };
 

@@ -18,9 +18,6 @@
 namespace forereach {
 namespace {
 
-// By which a sender's clock may be ahead.
-constexpr std::int64_t kMaxAheadUs = 1'000'000;
-
 template <class Message>
 std::optional<StreamPosition> PositionOf(Bytes bytes) {
   const auto message = Decoded<Message>(bytes);
@@ -126,7 +123,7 @@ std::optional<GapRow> Interpreter::CheckSequence(const LogEvent& event) {
   if (!position || (streams_.size() >= kMaxStreams && !streams_.contains(stream))) return std::nullopt;
   Count& count = streams_[stream];
   const std::optional<StreamPosition> newest = count.order.newest();
-  const std::int64_t horizon = StreamOrder::Horizon(event.utime, kMaxAheadUs);
+  const std::int64_t horizon = HorizonOf(event);
   const Succession succession = count.order.Compare(*position, horizon);
   if (succession == Succession::kLate || succession == Succession::kRepeated) return std::nullopt;
   count.order.Take(*position, horizon);

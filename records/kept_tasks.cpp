@@ -34,11 +34,7 @@ std::string BytesOf(const std::string& path) { return ReadWhole(path, kLargestFi
 }
 
 void Confirm(const std::string& directory) {
-  const int file = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (file < 0) FailToWrite(directory);
-  const bool confirmed = ::fsync(file) == 0 || errno == EINVAL;  // EINVAL: this file system knows no such thing
-  ::close(file);
-  if (!confirmed) FailToWrite(directory);
+  if (!ConfirmDirectory(directory)) FailToWrite(directory);
 }
 
 // The name of the temporary file next to `path`, before it is renamed.
@@ -48,14 +44,7 @@ class Part final {
     ::unlink(part_.c_str());  // of a logger that was killed
     const int file = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (file < 0) FailToWrite(part_);
-    std::size_t at = 0;
-    while (at < bytes.size()) {
-      const ssize_t count = ::write(file, bytes.data() + at, bytes.size() - at);
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) break;
-      at += static_cast<std::size_t>(count);
-    }
-    const bool whole = at == bytes.size() && ::fsync(file) == 0;
+    const bool whole = WriteAt(file, bytes, 0) && ::fsync(file) == 0;
     ::close(file);
     if (!whole) FailToWrite(part_);
   }

@@ -39,7 +39,7 @@ namespace fs = std::filesystem;
 
 class Surveyor final {
  public:
-  void Read(const std::string& log) {
+  void Read(const std::string& log, LogOrder order) {
     const FileKind kind = KindOf(log);
     if (kind != FileKind::kEventLog && kind != FileKind::kEmpty && kind != FileKind::kOther) RefuseAsLog(log, kind);
     const std::int64_t before = survey_.events;
@@ -48,7 +48,7 @@ class Surveyor final {
     EventLogReader reader(log);
     ForEachEvent(reader, [this](const LogEvent& event) { Take(event.message()); });
     if (kind == FileKind::kOther && survey_.events == before) RefuseAsLog(log, kind);  // else its beginning is damaged
-    RequireSameRun(log);
+    if (order == LogOrder::kOneRun) RequireSameRun(log);
     last_log_ = log;
   }
 
@@ -124,13 +124,13 @@ FileKind KindOf(const std::string& path) {
                                                                                     : FileKind::kOther;
 }
 
-LogSurvey Survey(const std::vector<std::string>& logs) {
+LogSurvey Survey(const std::vector<std::string>& logs, LogOrder order) {
   std::set<std::string> named;
   for (const std::string& log : logs)
     if (std::error_code error; !named.insert(fs::weakly_canonical(log, error).string()).second)
       throw LogError(log + ": is named twice");
   Surveyor surveyor;
-  for (const std::string& log : logs) surveyor.Read(log);
+  for (const std::string& log : logs) surveyor.Read(log, order);
   return surveyor.Finish();
 }
 

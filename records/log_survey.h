@@ -28,11 +28,14 @@ struct LogSurvey {
   std::vector<Digest> order;  ///< Of these, as they came first.
 };
 
-/** Reads logs that follow one another, as the files of one run do.
-@throws BadInput if a file is no event log, and says what it is; if a log is of another run than those before it: the
-heartbeats of the certifier or of the logger go on from file to file of one run, and where there are none nothing is
-known; if one is named twice. Cost: one pass over the logs. */
-[[nodiscard]] LogSurvey Survey(const std::vector<std::string>& logs);
+/** Whether logs have to follow one another, as the files of one run do. */
+enum class LogOrder { kOneRun, kAny };
+
+/** Reads logs.
+@throws BadInput if a file is no event log, and says what it is; if a log has to follow those before it and is of
+another run: the heartbeats of the certifier or of the logger go on from file to file of one run, and where there are
+none nothing is known; if one is named twice. Cost: one pass over the logs. */
+[[nodiscard]] LogSurvey Survey(const std::vector<std::string>& logs, LogOrder order = LogOrder::kOneRun);
 
 /** As Survey, but logs that hold neither a candidate nor a decision are bad input too. */
 [[nodiscard]] LogSurvey SurveyRun(const std::vector<std::string>& logs);

@@ -52,8 +52,11 @@ std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs, co
   return tasks;
 }
 
-std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given) {
-  return TasksOf(SurveyRun(logs), logs.front(), std::filesystem::path(logs.front()).parent_path().string(), given);
+std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given, const LogKey& key) {
+  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
+  std::vector<Config> tasks = TasksOf(SurveyRun(logs), logs.front(), directory, given);
+  key.Override(tasks, given);
+  return tasks;
 }
 
 }  // namespace forereach

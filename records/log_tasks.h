@@ -6,6 +6,7 @@
 
 #include "certifier/task/config.h"
 #include "records/log_survey.h"
+#include "records/log_trust.h"
 
 namespace forereach {
 
@@ -19,7 +20,9 @@ says which config digest the log was made with, and where that task is. */
 [[nodiscard]] std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs,
                                           const std::string& directory, const std::string& given);
 
-/** The same of logs that follow one another, after SurveyRun; kept tasks are looked for beside the first. */
-[[nodiscard]] std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given);
+/** The same of logs that follow one another, after SurveyRun; kept tasks are looked for beside the first. With the key
+that counts. @throws ConfigError also as LogKey::Override. */
+[[nodiscard]] std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given,
+                                          const LogKey& key);
 
 }  // namespace forereach

@@ -23,6 +23,7 @@ struct Color {
 };
 
 // Told apart with every common colour blindness (the set of Okabe and Ito), and by lightness in grey.
+constexpr Color kWhite{1, 1, 1};
 constexpr Color kInk{0.13, 0.13, 0.15};
 constexpr Color kFaintInk{0.45, 0.45, 0.48};
 constexpr Color kFrame{0.80, 0.80, 0.82};
@@ -91,10 +92,10 @@ class Painter final {
   }
 
   void Paint() {
-    cairo_select_font_face(cairo_, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    SelectFont(CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_line_join(cairo_, CAIRO_LINE_JOIN_ROUND);
     cairo_set_line_cap(cairo_, CAIRO_LINE_CAP_ROUND);
-    cairo_set_source_rgb(cairo_, 1, 1, 1);
+    SetColor(kWhite);
     cairo_paint(cairo_);
     PaintHeader();
     cairo_save(cairo_);
@@ -127,6 +128,13 @@ class Painter final {
     cairo_stroke(cairo_);
   }
 
+  void FillAndStroke(const Color& fill, double fill_alpha, const Color& line, double line_width,
+                     double line_alpha = 1) {
+    SetColor(fill, fill_alpha);
+    cairo_fill_preserve(cairo_);
+    Stroke(line, line_width, line_alpha);
+  }
+
   // Corners that lie closer together than the eye can tell are left out: a slice has up to two hundred.
   void Trace(const std::vector<Vector2d>& points) {
     Vector2d last{INFINITY, INFINITY};
@@ -144,10 +152,13 @@ class Painter final {
     cairo_close_path(cairo_);
   }
 
-  void TraceDisc(const Vector2d& center, double radius_px) {
-    const Vector2d pixel = ToPixels(center);
+  void TraceDisc(const Vector2d& pixel, double radius_px) {
     cairo_new_sub_path(cairo_);
     cairo_arc(cairo_, pixel.x(), pixel.y(), radius_px, 0, 2 * M_PI);
+  }
+
+  void SelectFont(cairo_font_weight_t weight) {
+    cairo_select_font_face(cairo_, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, weight);
   }
 
   double TextWidth(const std::string& text, double size) {
@@ -158,13 +169,12 @@ class Painter final {
   }
 
   void Write(const std::string& text, double x, double y, double size, const Color& color, bool bold = false) {
-    cairo_select_font_face(cairo_, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
-                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    SelectFont(bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(cairo_, size * unit_);
     SetColor(color);
     cairo_move_to(cairo_, x, y);
     cairo_show_text(cairo_, text.c_str());
-    cairo_select_font_face(cairo_, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    SelectFont(CAIRO_FONT_WEIGHT_NORMAL);
     cairo_new_path(cairo_);
   }
 
@@ -220,7 +230,7 @@ class Painter final {
   }
 
   void PaintObstacles() {
-    for (const auto& circle : picture_.circles) TraceDisc(circle.center, scale_ * circle.radius);
+    for (const auto& circle : picture_.circles) TraceDisc(ToPixels(circle.center), scale_ * circle.radius);
     for (const auto& polygon : picture_.polygons) TraceClosed(polygon);
     for (const auto& half_plane : picture_.half_planes) {
       // A rectangle with one edge on the line, larger than the frame.
@@ -231,25 +241,19 @@ class Painter final {
       TraceClosed({foot - far * along, foot + far * along, foot + far * along + far * normal,
                    foot - far * along + far * normal});
     }
-    SetColor(kObstacle, 0.88);
-    cairo_fill_preserve(cairo_);
-    Stroke(kInk, 0.8, 0.8);
+    FillAndStroke(kObstacle, 0.88, kInk, 0.8, 0.8);
   }
 
   void PaintGoal() {
     if (!picture_.goal) return;
-    TraceDisc(picture_.goal->center, std::max(scale_ * picture_.goal->radius, 3 * unit_));
-    SetColor(kGoal, 0.22);
-    cairo_fill_preserve(cairo_);
-    Stroke(kGoal, 2);
+    TraceDisc(ToPixels(picture_.goal->center), std::max(scale_ * picture_.goal->radius, 3 * unit_));
+    FillAndStroke(kGoal, 0.22, kGoal, 2);
   }
 
   void PaintStop(const Vector2d& pixel) {
     const double half = 4 * unit_;
     cairo_rectangle(cairo_, pixel.x() - half, pixel.y() - half, 2 * half, 2 * half);
-    cairo_set_source_rgb(cairo_, 1, 1, 1);
-    cairo_fill_preserve(cairo_);
-    Stroke(kInk, 1.6);
+    FillAndStroke(kWhite, 1, kInk, 1.6);
   }
 
   void PaintPath() {
@@ -257,20 +261,15 @@ class Painter final {
     Trace(picture_.path);
     Stroke(kInk, 2);
     for (const Vector2d& stop : picture_.stops) PaintStop(ToPixels(stop));
-    TraceDisc(picture_.path.front(), 6 * unit_);
-    cairo_set_source_rgb(cairo_, 1, 1, 1);
-    cairo_fill_preserve(cairo_);
-    Stroke(kInk, 2);
-    TraceDisc(picture_.path.back(), 4.5 * unit_);
+    PaintRing(ToPixels(picture_.path.front()), 6);
+    TraceDisc(ToPixels(picture_.path.back()), 4.5 * unit_);
     SetColor(kInk);
     cairo_fill(cairo_);
   }
 
   void PaintSwatch(double x, double y, const Color& color, double fill, double line) {
     cairo_rectangle(cairo_, x, y - 10 * unit_, 22 * unit_, 13 * unit_);
-    SetColor(color, fill);
-    cairo_fill_preserve(cairo_);
-    Stroke(color, 1.2, line);
+    FillAndStroke(color, fill, color, 1.2, line);
   }
 
   void PaintLine(double x, double y) {
@@ -295,18 +294,15 @@ class Painter final {
     entry(!picture_.abstained.empty(), "abstained (S)", [&] { PaintSwatch(x, y, kAbstained, 0, 1); });
     entry(obstacles, "obstacle", [&] { PaintSwatch(x, y, kObstacle, 0.88, 1); });
     entry(!picture_.path.empty(), "driven", [&] { PaintLine(x, y); });
-    entry(!picture_.path.empty(), "start", [&] { PaintRing(x + 11 * unit_, y - 4 * unit_); });
+    entry(!picture_.path.empty(), "start", [&] { PaintRing({x + 11 * unit_, y - 4 * unit_}, 5.5); });
     entry(!picture_.stops.empty(), "stop", [&] { PaintStop({x + 11 * unit_, y - 4 * unit_}); });
     entry(picture_.goal.has_value(), "goal", [&] { PaintSwatch(x, y, kGoal, 0.22, 1); });
     PaintScaleBar(y);
   }
 
-  void PaintRing(double x, double y) {
-    cairo_new_sub_path(cairo_);
-    cairo_arc(cairo_, x, y, 5.5 * unit_, 0, 2 * M_PI);
-    cairo_set_source_rgb(cairo_, 1, 1, 1);
-    cairo_fill_preserve(cairo_);
-    Stroke(kInk, 2);
+  void PaintRing(const Vector2d& pixel, double radius) {
+    TraceDisc(pixel, radius * unit_);
+    FillAndStroke(kWhite, 1, kInk, 2);
   }
 
   void PaintScaleBar(double y) {

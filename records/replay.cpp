@@ -108,10 +108,6 @@ class Replayer final : public TimelineUser {
 
 }  // namespace
 
-ReplayResult Replay(const std::vector<std::string>& logs, const Config& config) {
-  return Replay(logs, std::vector<Config>{config});
-}
-
 ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
   Replayer replayer;
   Timeline timeline(PointersTo(tasks), replayer);

@@ -26,13 +26,10 @@ struct ReplayResult {
 /** Feeds the candidates of logs that follow one another to a new gate, each at the time of its recorded decision and
 with the obstacles and executed transitions that the decision names by their digests, and compares what it says;
 certified plans have to be sealed (lcmtypes/seal.h). A certifier that was started again, or reloaded, within the logs
-begins with a new gate here too. With bus.key only authentic messages count.
+begins with a new gate here too. With bus.key only authentic messages count. Each decision is held against the task of
+its own config digest, and one of another digest differs; with one task alone each is held against that.
+@param tasks at least one; channels and key are those of the first.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
-[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const Config& config);
-
-/** As the other, each decision under the task of its own config digest. A decision of another digest than these
-differs; with one task alone it is held against that. @param tasks at least one; channels and key are those of the
-first. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
 
 }  // namespace forereach

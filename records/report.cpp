@@ -234,10 +234,6 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
 
 }  // namespace
 
-LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config) {
-  return PictureFromLogs(logs, std::vector<Config>{config});
-}
-
 LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
   PictureMaker maker(tasks);
   Timeline timeline(PointersTo(tasks), maker);
@@ -248,8 +244,7 @@ LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vect
 void Report(const ReportOptions& options, std::ostream& out) {
   const std::vector<std::string> files =
       options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
-  std::vector<Config> tasks = TasksOf(options.logs, options.config);
-  options.key.Override(tasks, options.config);
+  const std::vector<Config> tasks = TasksOf(options.logs, options.config, options.key);
   const Config& config = tasks.back();
   const Summary summary = SummarizeLogs(options.logs, config);
   LogPicture drawn;

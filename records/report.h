@@ -18,13 +18,14 @@ struct LogPicture {
   int disagreements = 0;
 };
 
-/** Certifies the candidates of logs that follow one another again, under the obstacles in force when each was decided,
-and collects what there is to draw: the tubes of certified plans and of abstentions S, the measured path, stops, goal,
-obstacles at the end. Without title and key numbers. Cost: one certify call a plan.
-@throws LogError if a log cannot be read, PictureError if the task's safety coordinates are not planar. */
-[[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const Config& config);
-/** The same, each plan under the task of its decision's config digest; plans of other digests are left out and counted.
-@param tasks at least one; path, goal and obstacles are those of the last. */
+/** Certifies the candidates of logs that follow one another again, under the task and the obstacles in force when each
+was decided, and collects what there is to draw: the tubes of certified plans and of abstentions S, the measured path,
+stops, goal, obstacles at the end. Without title and key numbers. Plans under other tasks are left out and counted.
+Cost: one certify call a plan.
+@param tasks at least one; path, goal and obstacles are those of the last. With one alone, decisions of any config
+digest count as its own. @throws LogError if a log cannot be read, PictureError if a task's safety coordinates are not
+planar.
+*/
 [[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
 
 struct ReportOptions {

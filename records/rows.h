@@ -66,7 +66,8 @@ struct Rows {
   std::vector<EventRow> events;
   std::vector<GapRow> gaps;
 
-  [[nodiscard]] bool empty() const { return decisions.empty() && events.empty() && gaps.empty(); }
+  [[nodiscard]] std::size_t size() const { return decisions.size() + events.size() + gaps.size(); }
+  [[nodiscard]] bool empty() const { return size() == 0; }
 };
 
 }  // namespace forereach

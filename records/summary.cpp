@@ -75,8 +75,8 @@ std::string ToText(const Summary& summary) {
   line("messages lost", std::to_string(Total(summary.lost)) + Listed(summary.lost));
   if (summary.backlog > 0) line("discarded by the bus", std::to_string(summary.backlog));
   line("senders restarted", std::to_string(summary.restarts));
-  if (summary.corruptions > 0)
-    line("damage in the log", fmt::format("{} places, {} bytes skipped", summary.corruptions, summary.skipped_bytes));
+  if (summary.damage.places > 0)
+    line("damage in the log", fmt::format("{} places, {} bytes skipped", summary.damage.places, summary.damage.bytes));
   if (const std::string refused = DescribeRefusals(summary.passed_over.not_authentic); !refused.empty())
     line("not authentic", refused + ", passed over");
   line("duration", fmt::format("{:.1f} s", summary.duration_s));
@@ -104,7 +104,7 @@ nlohmann::json ToJson(const Summary& summary) {
   json["lost"] = summary.lost;
   json["backlog"] = summary.backlog;
   json["restarts"] = summary.restarts;
-  json["damage"] = {{"places", summary.corruptions}, {"bytes", summary.skipped_bytes}};
+  json["damage"] = {{"places", summary.damage.places}, {"bytes", summary.damage.bytes}};
   json["passed_over"] = ToJson(summary.passed_over);
   json["duration_s"] = summary.duration_s;
   return json;
@@ -131,19 +131,15 @@ Quantiles SummaryBuilder::Samples::Get() const {
   return {NearestRank(copy, 0.5), NearestRank(copy, 0.99)};
 }
 
-void SummaryBuilder::SetTime(std::int64_t utime) {
-  if (!first_utime_) first_utime_ = utime;
-  last_utime_ = utime;
-}
-
 void SummaryBuilder::Add(const LogEvent& event) {
-  SetTime(event.utime);
+  if (!first_utime_) first_utime_ = event.utime;
+  last_utime_ = event.utime;
   auto& messages = summary_.messages;
   ++messages[messages.size() < Summary::kMaxChannels || messages.contains(event.channel) ? event.channel : "*"];
   if (event.channel == channels_.candidate) ++summary_.proposed;
   if (event.channel != channels_.robot_state) return;
   if (const auto state = Decoded<robot_state_t>(event.message()))
-    SetState({state->state, state->state + std::clamp<int>(state->num_states, 0, 16)});
+    state_.assign(state->state, state->state + std::clamp<int>(state->num_states, 0, 16));
 }
 
 void SummaryBuilder::Add(const DecisionRow& row) {
@@ -167,7 +163,7 @@ void SummaryBuilder::Add(const EventRow& row) {
     if (row.kind == "standing" || row.kind == "step_outside") ++summary_.stops;
   }
   if (row.kind == "contact") ++summary_.contacts;
-  if (!row.state.empty()) SetState(row.state);
+  if (!row.state.empty()) state_ = row.state;
 }
 
 void SummaryBuilder::Add(const GapRow& row) {
@@ -185,13 +181,6 @@ void SummaryBuilder::Add(const Rows& rows) {
   for (const EventRow& row : rows.events) Add(row);
   for (const GapRow& row : rows.gaps) Add(row);
 }
-
-void SummaryBuilder::Add(const LogDamage& damage) {
-  summary_.corruptions += damage.places;
-  summary_.skipped_bytes += damage.bytes;
-}
-
-void SummaryBuilder::Add(const PassedOver& passed_over) { summary_.passed_over = passed_over; }
 
 Summary SummaryBuilder::Finish() const {
   Summary summary = summary_;
@@ -222,9 +211,10 @@ class Summarizer final : public TimelineUser {
   }
 
   Summary Finish(const Timeline& timeline) {
-    builder_.Add(timeline.damage());
-    builder_.Add(timeline.passed_over());
-    return builder_.Finish();
+    Summary summary = builder_.Finish();
+    summary.damage = timeline.damage();
+    summary.passed_over = timeline.passed_over();
+    return summary;
   }
 
  private:

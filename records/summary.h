@@ -45,12 +45,12 @@ struct Summary {
   std::int64_t steps_inside = 0, steps_outside = 0;  ///< Of the slice certified for that step.
   /** Before the goal: braking tails begun, and times the robot came to stand, by a plan's end or a step outside. */
   std::int64_t tails = 0, stops = 0;
-  std::int64_t refused = 0;                         ///< Certified plans that the guard refused.
-  std::map<std::string, std::int64_t> lost;         ///< Messages missing, by reason.
-  std::int64_t backlog = 0;                         ///< Discarded by the bus before the logger took them, see rows.h.
-  std::int64_t restarts = 0;                        ///< Restarts of senders.
-  std::int64_t corruptions = 0, skipped_bytes = 0;  ///< Damaged places of the log, and the bytes in them.
-  PassedOver passed_over;                           ///< Messages of the log that count for nothing above.
+  std::int64_t refused = 0;                  ///< Certified plans that the guard refused.
+  std::map<std::string, std::int64_t> lost;  ///< Messages missing, by reason.
+  std::int64_t backlog = 0;                  ///< Discarded by the bus before the logger took them, see rows.h.
+  std::int64_t restarts = 0;                 ///< Restarts of senders.
+  LogDamage damage;                          ///< Of the log.
+  PassedOver passed_over;                    ///< Messages of the log that count for nothing above.
 };
 
 /** Aligned lines for a person, each ended by a newline. */
@@ -71,8 +71,6 @@ class SummaryBuilder final {
   void Add(const EventRow& row);
   void Add(const GapRow& row);
   void Add(const Rows& rows);
-  void Add(const LogDamage& damage);
-  void Add(const PassedOver& passed_over);
 
   [[nodiscard]] Summary Finish() const;
 
@@ -83,9 +81,6 @@ class SummaryBuilder final {
     void Add(double value);
     [[nodiscard]] Quantiles Get() const;
   };
-
-  void SetState(std::vector<double> state) { state_ = std::move(state); }
-  void SetTime(std::int64_t utime);
 
   BusOptions channels_;
   Eigen::MatrixXd projection_;

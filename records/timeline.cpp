@@ -10,8 +10,6 @@
 namespace forereach {
 namespace {
 
-constexpr std::int64_t kMaxAheadUs = 1'000'000;  // by which a sender's clock may be ahead of the logger's
-
 // How many entries at the front of `ahead` were taken before a decision: see "Grounds".
 template <class Ahead, class DigestOfEntry>
 std::ptrdiff_t CountTaken(const Ahead& ahead, const Digest& now, const Digest& named, std::int64_t candidate_place,
@@ -49,12 +47,10 @@ void Timeline::SetTasks(std::vector<const Config*> tasks) {
 
 void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
   if (!has_begun_) Start();
-  const LogDamage damage = ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
-    const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
-    Take(event, file + "event " + std::to_string(event.number));
-  });
-  damage_.places += damage.places;
-  damage_.bytes += damage.bytes;
+  damage_ = damage_ + ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
+              const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
+              Take(event, file + "event " + std::to_string(event.number));
+            });
 }
 
 void Timeline::Take(const LogEvent& event, const std::string& name) {
@@ -80,7 +76,7 @@ void Timeline::Take(const LogEvent& event, const std::string& name) {
 // ---- Starts and reloads.
 
 Timeline::Told Timeline::Heed(Count& count, const StreamPosition& message, const LogEvent& event) {
-  const std::int64_t horizon = StreamOrder::Horizon(event.utime, kMaxAheadUs);
+  const std::int64_t horizon = HorizonOf(event);
   const bool is_first = !count.order.newest();
   const Succession succession = count.order.Compare(message, horizon);
   if (succession == Succession::kLate || succession == Succession::kRepeated) return Told::kOld;
@@ -123,26 +119,26 @@ const Config* Timeline::TaskOf(const Digest& config) const {
 void Timeline::Start() {
   has_begun_ = true;
   obstacles_ahead_.clear();
-  transitions_ahead_.clear();
-  logged_obstacles_ = ObstaclesInForce(*now_);
-  obstacles_digest_ = logged_obstacles_.digest();
-  obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
-  logged_observations_ = observations_digest_ = now_->grounds.observations;
-  learned_begin_ = learned_.at(now_).size();
+  Follow(ObstaclesInForce(*now_));
   user_.OnStart(*now_);
 }
 
 void Timeline::Reload() {
   while (!obstacles_ahead_.empty()) TakeNextObstacles();
-  transitions_ahead_.clear();
   ObstaclesInForce after(*now_);
   after.Inherit(logged_obstacles_);
-  logged_obstacles_ = std::move(after);
+  Follow(std::move(after));
+  user_.OnReload(*now_);
+}
+
+// The task in force begins with these obstacles, and with nothing learned.
+void Timeline::Follow(ObstaclesInForce obstacles) {
+  transitions_ahead_.clear();
+  logged_obstacles_ = std::move(obstacles);
   obstacles_digest_ = logged_obstacles_.digest();
   obstacles_ = std::make_shared<const std::vector<Obstacle>>(logged_obstacles_.all());
   logged_observations_ = observations_digest_ = now_->grounds.observations;
   learned_begin_ = learned_.at(now_).size();
-  user_.OnReload(*now_);
 }
 
 // A decision may tell of a reload before a heartbeat does.

@@ -151,6 +151,7 @@ class Timeline final {
   [[nodiscard]] Told Heed(Count& count, const StreamPosition& message, const LogEvent& event);
   void Start();
   void Reload();
+  void Follow(ObstaclesInForce obstacles);
   void FollowReload(const Config& task);
   [[nodiscard]] const Config* TaskOf(const Digest& config) const;
 

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/numerics/limits.h"
+#include "certifier/task/files.h"
 #include "certifier/task/json_file.h"
 #include "lcmtypes/bad_input.h"
 
@@ -26,23 +27,6 @@ using Json = nlohmann::json;
 constexpr const char* kFormat = "forereach latch";
 constexpr int kVersion = 1;
 constexpr const char* kNewName = "latch.json.new";
-
-bool IsAnswer(ssize_t result) { return result >= 0 || errno != EINTR; }
-
-// Reads the whole file from its beginning.
-bool WriteAll(int file, const std::string& text) {
-  std::size_t written = 0;
-  while (written < text.size()) {
-    const ssize_t result = ::pwrite(file, text.data() + written, text.size() - written, static_cast<off_t>(written));
-    if (!IsAnswer(result)) continue;
-    if (result <= 0) {
-      if (result == 0) errno = EIO;
-      return false;
-    }
-    written += static_cast<std::size_t>(result);
-  }
-  return true;
-}
 
 bool IsSameFile(const struct stat& a, const struct stat& b) { return a.st_dev == b.st_dev && a.st_ino == b.st_ino; }
 
@@ -225,7 +209,7 @@ std::optional<LatchFile::Content> LatchFile::ReadFrom(int file) {
   std::size_t taken = 0;
   while (taken < text.size()) {
     const ssize_t result = ::pread(file, text.data() + taken, text.size() - taken, static_cast<off_t>(taken));
-    if (!IsAnswer(result)) continue;
+    if (result < 0 && errno == EINTR) continue;
     if (result < 0) return FailedTo("read"), std::nullopt;
     if (result == 0) break;
     taken += static_cast<std::size_t>(result);
@@ -243,7 +227,7 @@ bool LatchFile::Create(const std::string& text) {
   const int made = ::openat(lock_, kNewName, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (made < 0) return FailedTo("made");
   file_ = made;
-  if (WriteAll(made, text) && ::fsync(made) == 0 && ::renameat(lock_, kNewName, lock_, kName) == 0 &&
+  if (WriteAt(made, text, 0) && ::fsync(made) == 0 && ::renameat(lock_, kNewName, lock_, kName) == 0 &&
       ::fsync(lock_) == 0)
     return true;
   FailedTo("made");
@@ -261,7 +245,7 @@ bool LatchFile::Put(const Content& content) {
     return Fail(path() + ": holds at most " + std::to_string(kMostContradictions) +
                 " contradictions; once a declaration is true, delete the file");
   }
-  if (file_ < 0 ? Create(text) : WriteAll(file_, text)) {
+  if (file_ < 0 ? Create(text) : WriteAt(file_, text, 0)) {
     holds_fault_ = content.fault.has_value();
     emptied_ = false;
     return true;

@@ -84,4 +84,26 @@ std::string ReadBeginning(const std::string& path, std::size_t bytes) {
   return text;
 }
 
+bool WriteAt(int descriptor, std::string_view bytes, std::int64_t offset) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::pwrite(descriptor, bytes.data(), bytes.size(), offset);
+    if (count < 0 && errno == EINTR) continue;
+    if (count == 0) errno = EIO;
+    if (count <= 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(count));
+    offset += count;
+  }
+  return true;
+}
+
+bool ConfirmDirectory(const std::string& path) {
+  const int directory = ::open(path.empty() ? "." : path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory < 0) return false;
+  const bool confirmed = ::fsync(directory) == 0 || errno == EINVAL;  // EINVAL: this file system knows no such thing
+  const int cause = errno;
+  ::close(directory);
+  errno = cause;
+  return confirmed;
+}
+
 }  // namespace forereach

@@ -7,6 +7,7 @@ read from a mount that stalls still waits; whoever may not wait reads in a threa
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace forereach {
 
@@ -44,5 +45,11 @@ class InputFile final {
 
 /** Its first bytes, at most so many; the size of the file does not count. Same errors. */
 [[nodiscard]] std::string ReadBeginning(const std::string& path, std::size_t bytes);
+
+/** Writes all of `bytes` to an open file from `offset` on. False on failure; errno says why. */
+[[nodiscard]] bool WriteAt(int descriptor, std::string_view bytes, std::int64_t offset);
+
+/** Has the disk confirm the names of a directory's files. False on failure; errno says why. */
+[[nodiscard]] bool ConfirmDirectory(const std::string& path);
 
 }  // namespace forereach

@@ -2,8 +2,6 @@
 #include "experiments/run.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -11,11 +9,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <nlohmann/json.hpp>
 
 #include "experiments/run_directory.h"
 #include "tests/scratch.h"
+#include "tests/shell.h"
 
 namespace forereach::experiments {
 namespace {
@@ -214,36 +212,23 @@ TEST(Cell, KeysTellCellsApart) {
   }
 }
 
-struct Result {
-  int exit_code;
-  std::string output;  // standard output and error
-};
-
-Result Command(const std::string& arguments) {
-  std::FILE* pipe = popen((FOREREACH_EXPERIMENTS_PROGRAM " " + arguments + " 2>&1").c_str(), "r");
-  if (!pipe) return {-1, "cannot run the program"};
-  std::string output;
-  std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), size);
-  const int status = pclose(pipe);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
-}
+Output Command(const std::string& arguments) { return Shell(FOREREACH_EXPERIMENTS_PROGRAM " " + arguments + " 2>&1"); }
 
 TEST_F(RunTest, TheCommandTeachesRunsAndRefuses) {
-  const Result help = Command("--help");
-  EXPECT_EQ(help.exit_code, 0);
-  for (const Experiment& experiment : Experiments()) EXPECT_THAT(help.output, HasSubstr(experiment.name));
-  EXPECT_EQ(Command("").exit_code, 2);
-  EXPECT_EQ(Command("nothing").exit_code, 2);
-  EXPECT_EQ(Command("norms --seeds 0").exit_code, 2);
+  const Output help = Command("--help");
+  EXPECT_EQ(help.code, 0);
+  for (const Experiment& experiment : Experiments()) EXPECT_THAT(help.text, HasSubstr(experiment.name));
+  EXPECT_EQ(Command("").code, 2);
+  EXPECT_EQ(Command("nothing").code, 2);
+  EXPECT_EQ(Command("norms --seeds 0").code, 2);
 
   const std::string out = " --out " + (root_ / "run").string();
-  const Result norms = Command("norms" + out);
-  EXPECT_EQ(norms.exit_code, 0) << norms.output;
-  EXPECT_THAT(norms.output, HasSubstr("| bicycle | 11.368 | Norm ratios | 11.368 | 0.000 | same |"));
-  const Result quick = Command("norms --quick" + out);
-  EXPECT_EQ(quick.exit_code, 2);
-  EXPECT_THAT(quick.output, HasSubstr("run.json: scenarios: begun with 600, this run has 30"));
+  const Output norms = Command("norms" + out);
+  EXPECT_EQ(norms.code, 0) << norms.text;
+  EXPECT_THAT(norms.text, HasSubstr("| bicycle | 11.368 | Norm ratios | 11.368 | 0.000 | same |"));
+  const Output quick = Command("norms --quick" + out);
+  EXPECT_EQ(quick.code, 2);
+  EXPECT_THAT(quick.text, HasSubstr("run.json: scenarios: begun with 600, this run has 30"));
 }
 
 }  // namespace

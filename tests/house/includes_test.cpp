@@ -1,6 +1,4 @@
 // scripts/check-includes: the sources keep to the arrows, and the script sees when they do not.
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -10,27 +8,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include "tests/scratch.h"
+#include "tests/shell.h"
 
 namespace {
 
+using forereach::Output;
+using forereach::Shell;
 using testing::HasSubstr;
 
-struct Result {
-  int exit_code;
-  std::string output;  // standard output and error
-};
-
-Result CheckIncludes(const std::string& root) {
-  std::FILE* pipe = popen(("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' '" + root + "' 2>&1").c_str(), "r");
-  if (!pipe) return {-1, "cannot run the script"};
-  std::string output;
-  std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), size);
-  const int status = pclose(pipe);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
+Output CheckIncludes(const std::string& root) {
+  return Shell("'" FOREREACH_SOURCE_DIR "/scripts/check-includes' '" + root + "' 2>&1");
 }
 
 // A small house that keeps to the arrows, to which a test adds one thing.
@@ -65,9 +54,9 @@ class IncludesTest : public testing::Test {
     expected_.push_back(file + ":" + std::to_string(lines_[file]) + ": " + message);
   }
   void ExpectRefused() {
-    const Result result = CheckIncludes(root_.string());
-    EXPECT_EQ(result.exit_code, 1);
-    for (const std::string& message : expected_) EXPECT_THAT(result.output, HasSubstr(message));
+    const Output result = CheckIncludes(root_.string());
+    EXPECT_EQ(result.code, 1);
+    for (const std::string& message : expected_) EXPECT_THAT(result.text, HasSubstr(message));
   }
 
   const forereach::ScratchDirectory scratch_;
@@ -77,21 +66,21 @@ class IncludesTest : public testing::Test {
 };
 
 TEST_F(IncludesTest, TheSourcesKeepToTheArrows) {
-  const Result result = CheckIncludes(FOREREACH_SOURCE_DIR);
-  EXPECT_EQ(result.exit_code, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr(" 0 against the arrows"));
+  const Output result = CheckIncludes(FOREREACH_SOURCE_DIR);
+  EXPECT_EQ(result.code, 0) << result.text;
+  EXPECT_THAT(result.text, HasSubstr(" 0 against the arrows"));
 }
 
 TEST_F(IncludesTest, AHouseInOrderPasses) {
-  const Result result = CheckIncludes(root_.string());
-  EXPECT_EQ(result.exit_code, 0) << result.output;
-  EXPECT_THAT(result.output, HasSubstr("14 files, 23 includes, 0 against the arrows"));
+  const Output result = CheckIncludes(root_.string());
+  EXPECT_EQ(result.code, 0) << result.text;
+  EXPECT_THAT(result.text, HasSubstr("14 files, 23 includes, 0 against the arrows"));
 }
 
 TEST_F(IncludesTest, AnEmptyHouseIsAnErrorNotAPass) {
   std::filesystem::remove_all(root_);
   std::filesystem::create_directories(root_);
-  EXPECT_EQ(CheckIncludes(root_.string()).exit_code, 2);
+  EXPECT_EQ(CheckIncludes(root_.string()).code, 2);
 }
 
 TEST_F(IncludesTest, FloorsGoDownOnly) {
@@ -141,7 +130,7 @@ TEST_F(IncludesTest, OptionsArePlainAndForTheTasksReader) {
   std::ofstream(root_ / "robot/robot_options.h") << "#include <string>\n";
   std::ofstream(root_ / "certifier/gate/bad.cpp") << "";
   Write("certifier/task/config.h", "#include \"robot/robot_options.h\"\n");
-  EXPECT_EQ(CheckIncludes(root_.string()).exit_code, 0);
+  EXPECT_EQ(CheckIncludes(root_.string()).code, 0);
 }
 
 TEST_F(IncludesTest, GuardAndSupervisorIncludeLcmtypesAndBusOnly) {

@@ -1,6 +1,4 @@
 // scripts/mutants --check: the list of mutations fits the tree, and the script sees where one does not.
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -8,28 +6,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include "tests/scratch.h"
+#include "tests/shell.h"
 
 namespace {
 
+using forereach::Output;
+using forereach::Shell;
 using testing::HasSubstr;
 
-struct Result {
-  int exit_code;
-  std::string output;  // standard output and error
-};
-
-Result Check(const std::string& root) {
-  std::FILE* pipe =
-      popen(("'" FOREREACH_SOURCE_DIR "/scripts/mutants' --check --root '" + root + "' 2>&1").c_str(), "r");
-  if (!pipe) return {-1, "cannot run the script"};
-  std::string output;
-  std::array<char, 4096> buffer;
-  while (const std::size_t size = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), size);
-  const int status = pclose(pipe);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
+Output Check(const std::string& root) {
+  return Shell("'" FOREREACH_SOURCE_DIR "/scripts/mutants' --check --root '" + root + "' 2>&1");
 }
 
 // A small tree with one mutant, which fits.

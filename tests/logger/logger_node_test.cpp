@@ -269,7 +269,7 @@ TEST_F(LoggerNodeTest, GoesOnAfterAFullDisk) {
   const LogContents log = ReadLog(node.recorder().log_path());
   ASSERT_EQ(log.events.size(), 2u);
   EXPECT_EQ(log.events[1].number, 4);
-  EXPECT_EQ(log.corruptions, 0);
+  EXPECT_EQ(log.damage.places, 0);
   const Rows rows = ReadRows();
   EXPECT_EQ(rows.events.size(), 2u);
   ASSERT_EQ(rows.gaps.size(), 1u);
@@ -397,7 +397,7 @@ TEST_F(LoggerNodeTest, SurvivesAKill) {
       SCOPED_TRACE(run.log_file + ": " + run.recovered);
       const LogContents log = ReadLog(scratch_ / ("log/" + run.log_file));
       EXPECT_EQ(log.end, LogStatus::kEnd);
-      EXPECT_EQ(log.corruptions, 0);
+      EXPECT_EQ(log.damage.places, 0);
       events += std::ssize(log.events);
       std::vector<std::int64_t> decisions;
       for (std::size_t k = 0; k < log.events.size(); ++k) {

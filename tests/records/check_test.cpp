@@ -69,7 +69,7 @@ TEST_F(CheckTest, ACutTailAndDamageAreSaid) {
   WriteBytes(log_, bytes);
   const LogCheck check = Check();
   EXPECT_THAT(check.missing, ElementsAre(1, 4));
-  EXPECT_EQ(check.corruptions, 1);
+  EXPECT_EQ(check.damage.places, 1);
   EXPECT_EQ(check.cut_bytes, static_cast<std::int64_t>(kRecord) - 10);
   EXPECT_THAT(ToText({check}), HasSubstr("  missing: event 1, 4\n"));
   EXPECT_EQ(ToJson({check})[0]["missing"], (std::vector<int>{1, 4}));

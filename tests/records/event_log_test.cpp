@@ -45,7 +45,7 @@ TEST(EventLog, RoundTrip) {
   const LogContents contents = ReadLog(scratch / "log");
   ASSERT_EQ(contents.events.size(), 5u);
   EXPECT_EQ(contents.end, LogStatus::kEnd);
-  EXPECT_EQ(contents.corruptions, 0);
+  EXPECT_EQ(contents.damage.places, 0);
   for (int i = 0; i < 5; ++i) {
     const LogEvent& event = contents.events[static_cast<std::size_t>(i)];
     EXPECT_EQ(event.number, i);
@@ -124,12 +124,12 @@ TEST(EventLog, CutAtEveryByteOfTheLastRecord) {
     const LogContents contents = ReadLog(scratch / "cut");
     EXPECT_EQ(contents.events.size(), 4u);
     EXPECT_EQ(contents.end, size == last ? LogStatus::kEnd : LogStatus::kCutTail);
-    EXPECT_EQ(contents.corruptions, 0);
+    EXPECT_EQ(contents.damage.places, 0);
 
     EventLogWriter writer(scratch / "cut");
     EXPECT_EQ(writer.recovery().events, 4);
     EXPECT_EQ(writer.recovery().cut_bytes, static_cast<std::int64_t>(size - last));
-    EXPECT_EQ(writer.recovery().corruptions, 0);
+    EXPECT_EQ(writer.recovery().damage.places, 0);
     EXPECT_EQ(writer.recovery().last_utime, 1'000'003);
     EXPECT_EQ(writer.Append(7, "AFTER", {}), 4);
     ASSERT_TRUE(writer.Flush());
@@ -152,8 +152,8 @@ TEST_P(CorruptLength, LosesThatRecordOnly) {
     WriteBytes(scratch / "bad", bytes);
     const LogContents contents = ReadLog(scratch / "bad");
     EXPECT_EQ(contents.end, LogStatus::kEnd);
-    EXPECT_EQ(contents.corruptions, 1);
-    EXPECT_EQ(contents.skipped_bytes, kHeader + 9 + 20);
+    EXPECT_EQ(contents.damage.places, 1);
+    EXPECT_EQ(contents.damage.bytes, kHeader + 9 + 20);
     ASSERT_EQ(contents.events.size(), 4u);
     EXPECT_EQ(contents.events[2].number, 3);
     EXPECT_EQ(contents.events[3].number, 4);
@@ -179,7 +179,7 @@ TEST(EventLog, ResynchronisesBehindDamagedSyncWord) {
   ASSERT_EQ(reader.Next(event), LogStatus::kEvent);
   EXPECT_EQ(event.number, 4);
   EXPECT_EQ(reader.Next(event), LogStatus::kEnd);
-  EXPECT_EQ(reader.skipped_bytes(), static_cast<std::int64_t>(RecordOffset(4) - RecordOffset(3)));
+  EXPECT_EQ(reader.damage().bytes, static_cast<std::int64_t>(RecordOffset(4) - RecordOffset(3)));
 }
 
 TEST(EventLog, FindsASyncWordWhereverItLies) {
@@ -192,7 +192,7 @@ TEST(EventLog, FindsASyncWordWhereverItLies) {
     WriteBytes(scratch / "bad", bytes);
     const LogContents contents = ReadLog(scratch / "bad");
     ASSERT_EQ(contents.events.size(), 1u) << garbage;
-    ASSERT_EQ(contents.skipped_bytes, static_cast<std::int64_t>(garbage));
+    ASSERT_EQ(contents.damage.bytes, static_cast<std::int64_t>(garbage));
   }
 }
 
@@ -209,7 +209,7 @@ TEST(EventLog, BytesCutOutCostThatRecordOnly) {
     const LogContents contents = ReadLog(scratch / "log");
     ASSERT_EQ(contents.events.size(), 4u) << cut;
     EXPECT_EQ(contents.events[2].number, 3);
-    EXPECT_EQ(contents.corruptions, 1);
+    EXPECT_EQ(contents.damage.places, 1);
   }
 }
 
@@ -232,7 +232,7 @@ TEST(EventLog, RecoveryKeepsWhatFollowsDamage) {
   WriteBytes(scratch / "log", bytes);
   const EventLogWriter writer(scratch / "log");
   EXPECT_EQ(writer.recovery().events, 3);
-  EXPECT_EQ(writer.recovery().corruptions, 1);
+  EXPECT_EQ(writer.recovery().damage.places, 1);
   EXPECT_EQ(writer.recovery().cut_bytes, kHeader + 9 + 40 - 3);
   EXPECT_EQ(std::filesystem::file_size(scratch / "log"), RecordOffset(4));
   EXPECT_EQ(writer.next_number(), 4);
@@ -247,7 +247,7 @@ TEST(EventLog, RecoveryRemovesNoGarbage) {
   WriteBytes(scratch / "log", bytes);
   EventLogWriter writer(scratch / "log");
   EXPECT_EQ(writer.recovery().cut_bytes, 0);
-  EXPECT_EQ(writer.recovery().skipped_bytes, 100);
+  EXPECT_EQ(writer.recovery().damage.bytes, 100);
   writer.Append(9, "AFTER", {});
   ASSERT_TRUE(writer.Flush());
   const LogContents contents = ReadLog(scratch / "log");
@@ -310,7 +310,7 @@ TEST(EventLog, NothingConfirmedIsLostWhereTheFileCannotBePutBack) {
   EXPECT_EQ(contents.events[1].channel, "KEPT_3");
   EXPECT_EQ(contents.events[2].channel, "KEPT_5");
   EXPECT_EQ(contents.end, LogStatus::kEnd);
-  EXPECT_EQ(contents.corruptions, 0);
+  EXPECT_EQ(contents.damage.places, 0);
 }
 
 TEST(EventLog, RefusesWhatTheFormatCannotHold) {
@@ -356,11 +356,11 @@ TEST(EventLog, SurvivesMutation) {
     while ((status = reader.Next(event)) == LogStatus::kEvent || status == LogStatus::kCorrupt) {
       const std::int64_t record = kHeader + std::ssize(event.channel) + std::ssize(event.data);
       const std::int64_t expected =
-          status == LogStatus::kEvent ? passed + record : passed + reader.skipped_bytes() - skipped;
+          status == LogStatus::kEvent ? passed + record : passed + reader.damage().bytes - skipped;
       ASSERT_EQ(reader.offset(), expected);
       ASSERT_GT(reader.offset(), passed);
       passed = reader.offset();
-      skipped = reader.skipped_bytes();
+      skipped = reader.damage().bytes;
     }
     ASSERT_LE(passed, reader.size());
     ASSERT_EQ(status == LogStatus::kEnd, passed == reader.size());

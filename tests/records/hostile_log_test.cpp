@@ -245,7 +245,7 @@ TEST_F(HostileLog, ClaimsThatAreNotBelievedTakeNoMemory) {
   LogEvent event;
   const std::size_t before = peak_bytes = live_bytes;
   EXPECT_EQ(CountEvents(reader, event, [&] { ASSERT_EQ(event.data.capacity(), 0u); }), kRecords);
-  EXPECT_EQ(reader.corruptions(), kRecords + 1) << "the claims, and what is behind them";
+  EXPECT_EQ(reader.damage().places, kRecords + 1) << "the claims, and what is behind them";
   EXPECT_LE(peak_bytes - before, std::size_t{1} << 16);
 }
 
@@ -262,7 +262,7 @@ TEST_F(HostileLog, NestedClaimsTakeNoLongerThanTheirBytes) {
   WriteBytes(scratch_ / "nested", bytes);
   EventLogReader reader(scratch_ / "nested");
   ForEachEvent(reader, [](const LogEvent&) {});
-  EXPECT_GT(reader.corruptions(), 25'000);
+  EXPECT_GT(reader.damage().places, 25'000);
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ inline void WriteBytes(const std::string& path, const std::vector<std::uint8_t>&
 struct LogContents {
   std::vector<LogEvent> events;
   LogStatus end = LogStatus::kEnd;
-  std::int64_t corruptions = 0, skipped_bytes = 0;
+  LogDamage damage;
 };
 
 inline LogContents ReadLog(const std::string& path) {
@@ -40,8 +40,7 @@ inline LogContents ReadLog(const std::string& path) {
   LogEvent event;
   while ((contents.end = reader.Next(event)) == LogStatus::kEvent || contents.end == LogStatus::kCorrupt)
     if (contents.end == LogStatus::kEvent) contents.events.push_back(event);
-  contents.corruptions = reader.corruptions();
-  contents.skipped_bytes = reader.skipped_bytes();
+  contents.damage = reader.damage();
   return contents;
 }
 

@@ -39,7 +39,7 @@ void DecideAndLog(Gate& gate, const std::vector<std::uint8_t>& candidate, std::i
 
 // Each decision of the log is made again.
 void ExpectAgreed(const std::string& path, const Config& config, int decisions) {
-  const ReplayResult result = Replay({path}, config);
+  const ReplayResult result = Replay({path}, {config});
   EXPECT_EQ(result.agreed, decisions);
   EXPECT_THAT(result.differences, testing::IsEmpty());
 }
@@ -64,7 +64,7 @@ class ReplayTest : public testing::Test {
 
 TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
   const Config config = LoadConfig(kConfig);
-  const ReplayResult result = Replay({kLog}, config);
+  const ReplayResult result = Replay({kLog}, {config});
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
   EXPECT_EQ(result.agreed, result.candidates);
   EXPECT_GE(result.candidates, 10);
@@ -98,7 +98,7 @@ TEST_F(ReplayTest, ChangedOutcomeIsListed) {
     }
     return true;
   });
-  EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u);
+  EXPECT_EQ(Replay({path}, {LoadConfig(kConfig)}).differences.size(), 1u);
 }
 
 TEST_F(ReplayTest, MissingDecisionAndMissingCandidateAreListed) {
@@ -111,7 +111,7 @@ TEST_F(ReplayTest, MissingDecisionAndMissingCandidateAreListed) {
       dropped = true;
       return false;
     });
-    EXPECT_EQ(Replay({path}, LoadConfig(kConfig)).differences.size(), 1u) << drop_decision;
+    EXPECT_EQ(Replay({path}, {LoadConfig(kConfig)}).differences.size(), 1u) << drop_decision;
   }
 }
 
@@ -126,7 +126,7 @@ TEST_F(ReplayTest, ACertifiedPlanThatWasAlteredIsListed) {
       event.data = Encode(*certified);
       return true;
     });
-    const ReplayResult result = Replay({path}, LoadConfig(kConfig));
+    const ReplayResult result = Replay({path}, {LoadConfig(kConfig)});
     EXPECT_EQ(result.differences.size(), 1u);
     return result.differences.empty() ? std::string() : result.differences.front();
   };
@@ -150,11 +150,11 @@ TEST_F(ReplayTest, ARunInTwoFilesIsTheSameInTheirOrderOnly) {
     }));
   }
   const Config config = LoadConfig(kConfig);
-  const ReplayResult whole = Replay({kLog}, config), parts = Replay(logs, config);
+  const ReplayResult whole = Replay({kLog}, {config}), parts = Replay(logs, {config});
   EXPECT_TRUE(parts.differences.empty()) << parts.differences.front();
   EXPECT_EQ(parts.candidates, whole.candidates);
   EXPECT_EQ(parts.agreed, whole.agreed);
-  EXPECT_THAT(Replay({logs[1]}, config).differences, testing::Not(testing::IsEmpty()));
+  EXPECT_THAT(Replay({logs[1]}, {config}).differences, testing::Not(testing::IsEmpty()));
 }
 
 // A log may begin while the certifier runs: obstacles before its first heartbeat there are in force. They are not if
@@ -247,7 +247,7 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
     }
     EXPECT_TRUE(writer.Flush());
   }
-  const ReplayResult result = Replay({path}, config);
+  const ReplayResult result = Replay({path}, {config});
   EXPECT_TRUE(result.differences.empty()) << result.differences.front();
   EXPECT_EQ(result.agreed, decided);
   EXPECT_EQ(result.circumstances, 2);
@@ -257,11 +257,11 @@ TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   const ScratchDirectory scratch;
   const auto [key, log] = SignedLog(scratch, kLog);
   Config config = LoadConfig(kConfig);
-  const ReplayResult before = Replay({kLog}, config), believed = Replay({log}, config);
+  const ReplayResult before = Replay({kLog}, {config}), believed = Replay({log}, {config});
   EXPECT_EQ(believed.differences.size(), 4u) << "three undecided candidates, an altered certificate";
   EXPECT_EQ(DescribePassedOver(believed.passed_over), "");
   config.bus.key = key;
-  const ReplayResult result = Replay({log}, config);
+  const ReplayResult result = Replay({log}, {config});
   EXPECT_THAT(result.differences, testing::IsEmpty());
   EXPECT_EQ(result.agreed, before.agreed);
   EXPECT_EQ(result.candidates, before.candidates);
@@ -271,7 +271,7 @@ TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   EXPECT_EQ(DescribePassedOver(result.passed_over),
             "; not authentic and passed over: 5 (unsigned 2, forged 1, replayed 2)");
   config.bus.key = scratch / "none";
-  EXPECT_THROW((void)Replay({log}, config), KeyError);
+  EXPECT_THROW((void)Replay({log}, {config}), KeyError);
 }
 
 TEST_F(ReplayTest, ThroughTheCommandWithAKeyAndWithout) {
@@ -292,7 +292,7 @@ TEST_F(ReplayTest, WhatIsNoCertifiedPlanIsPassedOver) {
     event.data = {1, 2, 3};
     return true;
   });
-  const ReplayResult result = Replay({path}, LoadConfig(kConfig));
+  const ReplayResult result = Replay({path}, {LoadConfig(kConfig)});
   EXPECT_THAT(result.differences, testing::IsEmpty());
   EXPECT_EQ(DescribePassedOver(result.passed_over), "; no certified plan and passed over: 1");
 }
@@ -300,7 +300,7 @@ TEST_F(ReplayTest, WhatIsNoCertifiedPlanIsPassedOver) {
 TEST_F(ReplayTest, AnotherTaskIsNoticed) {
   Config config = LoadConfig(kConfig);
   config.grounds.declaration[0] ^= 1;
-  const ReplayResult result = Replay({kLog}, config);
+  const ReplayResult result = Replay({kLog}, {config});
   EXPECT_EQ(result.differences.size(), static_cast<std::size_t>(result.candidates));
 }
 

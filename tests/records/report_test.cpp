@@ -84,7 +84,7 @@ TEST_F(LogPictureTest, DrawsWhatHappened) {
   state.state[1] = 1.8;
   Append("ROBOT_STATE", state);
 
-  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, PointMassConfig());
+  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {PointMassConfig()});
   EXPECT_EQ(drawn.disagreements, 0);
   EXPECT_EQ(drawn.picture.executed.size(), 5u);
   EXPECT_EQ(drawn.picture.certified.size(), 6u);
@@ -116,7 +116,7 @@ TEST_F(LogPictureTest, TakesTheObstaclesInForce) {
   ahead.utime = now_ + 1 + 50'001;  // gate.max_ahead_ms is 50: the gate refused it
   Append("OBSTACLES", ahead);
   Decide(Drive(1, true), decision_t::CERTIFIED, -1);
-  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, PointMassConfig());
+  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {PointMassConfig()});
   EXPECT_EQ(drawn.disagreements, 0);
   EXPECT_TRUE(drawn.picture.circles.empty());
   ASSERT_EQ(drawn.picture.polygons.size(), 2u);
@@ -132,7 +132,7 @@ TEST_F(LogPictureTest, LeavesOutWhatItCannotConfirm) {
   candidate_plan_t wrong_size = Drive(2, false);
   wrong_size.num_states = 6;
   Decide(wrong_size, decision_t::CERTIFIED, -1);
-  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, PointMassConfig());
+  const LogPicture drawn = PictureFromLogs({scratch_ / "log"}, {PointMassConfig()});
   EXPECT_EQ(drawn.disagreements, 3);
   EXPECT_TRUE(drawn.picture.certified.empty());
   EXPECT_TRUE(drawn.picture.abstained.empty());
@@ -143,7 +143,7 @@ TEST_F(LogPictureTest, WantsAPlane) {
   auto line = std::make_shared<Problem>(*config.problem);
   line->projection = Eigen::MatrixXd::Identity(1, 4);
   config.problem = line;
-  EXPECT_THROW((void)PictureFromLogs({scratch_ / "log"}, config), PictureError);
+  EXPECT_THROW((void)PictureFromLogs({scratch_ / "log"}, {config}), PictureError);
 }
 
 TEST_F(LogPictureTest, TheReportSaysWhatIsWrong) {

@@ -154,8 +154,8 @@ TEST(Summary, PassesDamageAndCountsIt) {
   WriteBytes(scratch / "log", bytes);
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
   EXPECT_EQ(summary.proposed, 99);
-  EXPECT_EQ(summary.corruptions, 1);
-  EXPECT_GT(summary.skipped_bytes, 0);
+  EXPECT_EQ(summary.damage.places, 1);
+  EXPECT_GT(summary.damage.bytes, 0);
 }
 
 }  // namespace

@@ -14,9 +14,9 @@
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/names.h"
-#include "records/certificate_files.h"
 #include "records/replay.h"
 #include "records/report.h"
+#include "tests/records/certificates.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 
@@ -32,14 +32,7 @@ const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
 class TimelineTest : public testing::Test {
  protected:
   TimelineTest() : config_(LoadConfig(kConfig)), gate_(std::make_unique<Gate>(config_)) {
-    EventLogReader reader(kLog);
-    LogEvent event;
-    while (reader.Next(event) == LogStatus::kEvent) {
-      const auto certified = Decoded<certified_plan_t>(event.data);
-      if (!certified) continue;
-      candidate_ = certified->plan;
-      break;
-    }
+    candidate_ = FirstCertified(kLog);
     NextFile();
   }
 
@@ -139,7 +132,7 @@ class TimelineTest : public testing::Test {
     EXPECT_EQ(comparer.decisions, certified_);
     EXPECT_EQ(comparer.plans, certified_);
 
-    const ReplayResult replayed = Replay(logs_, config_);
+    const ReplayResult replayed = Replay(logs_, {config_});
     EXPECT_THAT(replayed.differences, IsEmpty());
     EXPECT_EQ(replayed.agreed, certified_);
 
@@ -151,7 +144,7 @@ class TimelineTest : public testing::Test {
       EXPECT_EQ(certificate.missing, "");
       EXPECT_EQ(verifier.Verify(certificate.certificate).status, verifier::Status::kConfirmed) << certificate.name;
     }
-    EXPECT_EQ(PictureFromLogs(logs_, config_).disagreements, 0);
+    EXPECT_EQ(PictureFromLogs(logs_, {config_}).disagreements, 0);
   }
 
   ScratchDirectory scratch_;

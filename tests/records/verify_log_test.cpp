@@ -15,8 +15,8 @@
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
-#include "records/certificate_files.h"
 #include "tests/cli/program.h"
+#include "tests/records/certificates.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 
@@ -196,14 +196,7 @@ TEST(VerifyLog, DamageIsNoticed) {
 class VerifyObstacles : public testing::Test {
  protected:
   VerifyObstacles() : config_(LoadConfig(kConfig)) {
-    EventLogReader reader(kLog);
-    LogEvent event;
-    while (reader.Next(event) == LogStatus::kEvent) {
-      const auto certified = Decoded<certified_plan_t>(event.data);
-      if (!certified) continue;
-      candidate_ = certified->plan;
-      break;
-    }
+    candidate_ = FirstCertified(kLog);
     candidate_.utime = kStart + 2;
     candidate_.start_utime = kStart + 100'000;
   }

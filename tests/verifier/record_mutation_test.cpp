@@ -12,9 +12,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "records/certificate_files.h"
 #include "records/decision_json.h"
 #include "tests/cli/program.h"
+#include "tests/records/certificates.h"
 #include "tests/scratch.h"
 
 namespace forereach {
