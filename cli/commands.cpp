@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "certifier/task/process.h"
+#include "bus/process.h"
 
 namespace forereach {
 

@@ -19,8 +19,9 @@
 
 #include "bus/bus.h"
 #include "bus/bus_options.h"
+#include "bus/process.h"
 #include "bus/udp_receiver.h"
-#include "certifier/task/process.h"
+#include "certifier/task/config.h"
 #include "cli/commands.h"
 
 namespace forereach {

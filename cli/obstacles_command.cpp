@@ -6,9 +6,10 @@
 #include <spdlog/spdlog.h>
 
 #include "bus/bus_options.h"
+#include "bus/process.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/task/process.h"
+#include "certifier/task/config.h"
 #include "cli/commands.h"
 
 namespace forereach {

@@ -1,9 +1,9 @@
 #include <iostream>
 
 #include "bus/bus_options.h"
+#include "bus/process.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/process/certifier_node.h"
-#include "certifier/task/process.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "logger/logger_node.h"

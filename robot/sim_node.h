@@ -25,8 +25,8 @@ it is now (Guard::Expect); the robot and its world stay. */
 #include <vector>
 
 #include "bus/node.h"
+#include "bus/reloading.h"
 #include "certifier/task/config.h"
-#include "certifier/task/reloading.h"
 #include "robot/supervisor.h"
 #include "robot/target.h"
 

@@ -3,7 +3,7 @@ force.
 
 A task is taken whole or not at all. It is refused if the file cannot be read, if it changes what cannot change while
 the certifier runs (keys, bus, channels, realtime options, source of obstacles, latch directory, sizes of the model), or
-if its declaration is known to be contradicted. The file is read in a thread of its own (task/reloading.h). */
+if its declaration is known to be contradicted. The file is read in a thread of its own (bus/reloading.h). */
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@ if its declaration is known to be contradicted. The file is read in a thread of 
 #include <optional>
 #include <string>
 
+#include "bus/reloading.h"
 #include "certifier/gate/gate.h"
 #include "certifier/process/contradictions.h"
 #include "certifier/task/config.h"
-#include "certifier/task/reloading.h"
 
 namespace forereach {
 

@@ -1,7 +1,7 @@
 /** Reading files that people name, so that no file can hang the process or fill its memory.
 
 Only regular files are read: a pipe, a socket, a device or a directory is an error, and opening one does not wait. A
-read from a mount that stalls still waits; whoever may not wait reads in a thread of its own (reloading.h). */
+read from a mount that stalls still waits; whoever may not wait reads in a thread of its own (bus/reloading.h). */
 #pragma once
 
 #include <cstddef>

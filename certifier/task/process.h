@@ -1,53 +1,31 @@
-/** What every ForeReach process does around its node: arguments, config, bus, clean end. */
+/** A process whose node is made of a task file. */
 #pragma once
 
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "bus/keys.h"
-#include "bus/node.h"
+#include "bus/process.h"
 #include "certifier/task/config.h"
-#include "command_line/command_line.h"
 
 namespace forereach {
 
-struct ProcessDescription {
-  std::string name;     ///< "forereach-certifier"
-  std::string purpose;  ///< What it does, in a sentence or two.
-  std::string example;  ///< A command line one can type.
-  Role role;            ///< That it speaks as.
-};
+using MakeTaskNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& bus)>;
 
-using MakeNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& bus)>;
-
-/** The bus of a task. Where the task has a key, it signs what this role sends and hands out authentic messages only.
-@throws BusError, KeyError. */
-[[nodiscard]] std::unique_ptr<Bus> OpenBus(const BusOptions& options, Role role, Clock clock = WallClockUs);
-/** The same for one program that speaks as every role. */
-[[nodiscard]] std::unique_ptr<Bus> OpenBusOfAllRoles(const BusOptions& options, Clock clock = WallClockUs);
-
-/** `--lcm-url URL` and `--key PATH`, which take precedence over the task file. */
-struct BusArguments {
-  std::string url, key;
-  void AddTo(std::vector<Option>& options);
-  void Override(BusOptions& options) const;
-};
-
-/** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key PATH` until it is done or gets SIGTERM or
-SIGINT.
-@param options a process's own options, if it has any.
-@return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other
-error. */
-int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
-               std::vector<Option> options = {});
-
-/** Logs go to standard error, under this name, from here on. Control characters in a line are escaped: it may name what
-others chose. */
-void SetUpLog(const std::string& name);
-
-/** Runs `body` and turns its exceptions into exit codes, after one line: 2 for BadInput, 1 for others. */
-int Guarded(const std::string& name, const std::function<int()>& body);
+/** RunProcess (bus/process.h) with LoadConfig. The node's `config.bus` has the command line's URL and key, and the
+ * keys.
+ */
+inline int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeTaskNode& make_node,
+                      std::vector<Option> options = {}) {
+  Config config;
+  const auto load = [&config](const std::string& path) -> BusOptions& {
+    config = LoadConfig(path);
+    return config.bus;
+  };
+  return RunProcess(
+      argc, argv, description, load, [&](Bus& bus) { return make_node(config, bus); }, std::move(options));
+}
 
 }  // namespace forereach

@@ -18,9 +18,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bus/reloading.h"
 #include "certifier/task/config.h"
 #include "certifier/task/csv.h"
-#include "certifier/task/reloading.h"
 #include "tests/config/task_files.h"
 
 namespace forereach {

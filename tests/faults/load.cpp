@@ -4,7 +4,7 @@
 #include <chrono>
 #include <stdexcept>
 
-#include "certifier/task/process.h"
+#include "bus/process.h"
 #include "forereach/decision_t.hpp"
 
 namespace forereach {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "bus/authentic_bus.h"
-#include "certifier/task/process.h"
+#include "bus/process.h"
 #include "forereach/command_t.hpp"
 #include "records/check.h"
 #include "records/event_log.h"

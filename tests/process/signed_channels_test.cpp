@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "bus/bus_options.h"
+#include "bus/process.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
-#include "certifier/task/process.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"

@@ -1,4 +1,4 @@
-#include "certifier/task/process.h"
+#include "bus/process.h"
 
 #include <cstdlib>
 #include <iostream>
@@ -10,8 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "bus/authentic_bus.h"
-#include "bus/bus_options.h"
-#include "certifier/task/reloading.h"
+#include "bus/reloading.h"
 #include "lcmtypes/printable.h"
 
 namespace forereach {
@@ -116,8 +115,8 @@ void BusArguments::Override(BusOptions& options) const {
   options.key_is_given = true;
 }
 
-int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeNode& make_node,
-               std::vector<Option> options) {
+int RunProcess(int argc, char** argv, const ProcessDescription& description, const LoadTask& load,
+               const MakeNode& make_node, std::vector<Option> options) {
   std::string config_path;
   BusArguments bus_arguments;
   std::vector<Option> common{Required({"--config", &config_path, "FILE", "The task file (YAML)"})};
@@ -132,15 +131,15 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   SetUpLog(description.name);
   CatchStopSignals();
   const int code = Guarded(description.name, [&] {
-    Config config = LoadConfig(config_path);
-    bus_arguments.Override(config.bus);
-    config.bus = WithKeys(std::move(config.bus), description.role);
-    const std::unique_ptr<Bus> bus = OpenBus(config.bus, description.role);
-    const std::unique_ptr<Node> node = make_node(config, *bus);
-    if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
-    spdlog::info("ready on {} with {}{}", config.bus.url, config_path,
-                 config.bus.keys
-                     ? ", signed as the " + std::string(RoleName(description.role)) + " of " + config.bus.keys->robot()
+    BusOptions& channels = load(config_path);
+    bus_arguments.Override(channels);
+    channels.keys = KeysOf(channels, description.role);
+    const std::unique_ptr<Bus> bus = OpenBus(channels, description.role);
+    const std::unique_ptr<Node> node = make_node(*bus);
+    if (!channels.keys) spdlog::warn(kUnsignedWarning);
+    spdlog::info("ready on {} with {}{}", channels.url, config_path,
+                 channels.keys
+                     ? ", signed as the " + std::string(RoleName(description.role)) + " of " + channels.keys->robot()
                      : "");
     DatagramWatch watched(*node, *bus);
     RunNode(watched, *bus);
