@@ -53,8 +53,7 @@ class PlanSearch final {
       }
       if (before == 0) found_.decision = decision;
       if (decision.outcome == Outcome::kFalsified) return false;
-      // A plan that does not stop is no nearer to the domain's bounds than one that does.
-      if (decision.cause != Cause::kNoStop) lessons_.Learn(decision.outcome);
+      lessons_.Learn(decision.outcome, decision.cause);
     }
     return false;
   }

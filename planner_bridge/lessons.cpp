@@ -2,7 +2,8 @@
 
 namespace forereach {
 
-void Lessons::Learn(Outcome outcome) {
+void Lessons::Learn(Outcome outcome, Cause cause) {
+  if (cause == Cause::kNoStop) return;
   if (outcome == Outcome::kSafety) clearance_ += step_;
   if (outcome == Outcome::kDomain) ++domain_exits_;
 }

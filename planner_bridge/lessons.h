@@ -13,9 +13,9 @@ class Lessons final {
   /** Starts with planner.clearance and without a margin from the domain's bounds. */
   explicit Lessons(const PlannerOptions& options) : clearance_(options.clearance), step_(options.clearance_step) {}
 
-  /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. No other outcome
-  changes anything. */
-  void Learn(Outcome outcome);
+  /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. Nothing else
+  changes anything, nor does a plan that does not stop: it is no nearer to the domain's bounds than one that does. */
+  void Learn(Outcome outcome, Cause cause);
 
   /** The distance that the next candidate keeps from obstacles, metres. */
   [[nodiscard]] double clearance() const { return clearance_; }

@@ -6,7 +6,6 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/point_mass.h"
@@ -17,15 +16,6 @@ namespace {
 // Tails keep this distance from the domain's bounds, so that rounding does not move a control across a bound.
 constexpr double kShareOfBound = 0.95;
 
-// Where a state that is zero but for one coordinate goes to in another.
-double StepResponse(const NominalModel& model, std::size_t from, std::size_t to) {
-  std::vector<double> z(static_cast<std::size_t>(model.num_variables()));
-  std::vector<double> next(static_cast<std::size_t>(model.num_states()));
-  z[from] = 1;
-  model.Evaluate(z, next);
-  return next[to];
-}
-
 // The largest magnitude that the bounds allow for both signs of a coordinate.
 double Reach(const Box& box, int k) { return std::min(-box.lower()(k), box.upper()(k)); }
 
@@ -34,7 +24,7 @@ return to straight ahead. */
 class BicycleMotion final : public Motion {
  public:
   BicycleMotion(const Problem& problem, double braking)
-      : dt_(StepResponse(*problem.model, kV, kX)),
+      : dt_(problem.model->parameters()[0]),
         deceleration_(std::min(braking, kShareOfBound * Reach(problem.domain.state, kA))),
         jerk_(kShareOfBound * Reach(problem.domain.input, 0)),
         steer_rate_(kShareOfBound * Reach(problem.domain.input, 1)),
@@ -74,7 +64,7 @@ class BicycleMotion final : public Motion {
   }
 
  private:
-  static constexpr std::size_t kX = 0, kTheta = 2, kV = 3, kA = 4, kDelta = 5;
+  static constexpr std::size_t kTheta = 2, kV = 3, kA = 4, kDelta = 5;
 
   static double WheelbaseOf(const NominalModel& model, double dt) {
     constexpr double kAngle = 0.1;
@@ -146,7 +136,7 @@ class BicycleMotion final : public Motion {
 class PointMassMotion final : public Motion {
  public:
   PointMassMotion(const Problem& problem, double braking)
-      : dt_(StepResponse(*problem.model, 2, 0)),
+      : dt_(problem.model->parameters()[0]),
         deceleration_(std::min({braking, kShareOfBound * Reach(problem.domain.input, 0),
                                 kShareOfBound * Reach(problem.domain.input, 1)})) {}
 

@@ -197,11 +197,10 @@ void PlannerNode::Learn(const decision_t& decision) {
   ++counts[std::string(CauseName(decision.cause))];
   // No candidate can be certified until the certifier's state changes.
   if (decision.cause == decision_t::CAUSE_NOT_ARMED || decision.cause == decision_t::CAUSE_NO_OBSTACLES ||
-      decision.cause == decision_t::CAUSE_FAULT || decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE)
+      decision.cause == decision_t::CAUSE_FAULT || decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE ||
+      decision.outcome == decision_t::ABSTAIN_FALSIFIED)
     return EndRound(false);
-  if (decision.outcome == decision_t::ABSTAIN_FALSIFIED) return EndRound(false);
-  // A plan that does not stop is no nearer to the domain's bounds than one that does.
-  if (decision.cause != decision_t::CAUSE_NO_STOP) round_->lessons.Learn(static_cast<Outcome>(decision.outcome));
+  round_->lessons.Learn(static_cast<Outcome>(decision.outcome), static_cast<Cause>(decision.cause));
 }
 
 void PlannerNode::OnObstacles(const Received& received) {

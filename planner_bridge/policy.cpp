@@ -1,17 +1,14 @@
 #include "planner_bridge/policy.h"
 
-#include <cmath>
 #include <fstream>
 #include <iterator>
-#include <limits>
-#include <set>
 
 #include <nlohmann/json.hpp>
 
 #include "certifier/numerics/limits.h"
-#include "certifier/numerics/text.h"
 #include "certifier/task/config_error.h"
 #include "certifier/task/files.h"
+#include "certifier/task/json_field.h"
 #include "certifier/task/json_file.h"
 
 namespace forereach {
@@ -23,80 +20,12 @@ constexpr const char* kFormat = "forereach-policy";
 constexpr const char* kActivation = "tanh";
 constexpr int kVersion = 1, kLargestLayer = 1024, kMostSizes = 9;
 
-/** A value of the file with its place: "file: layers[1].bias". */
-class Field final {
- public:
-  Field(std::string file, std::string name, const Json& json)
-      : file_(std::move(file)), name_(std::move(name)), json_(json) {}
+void RequireText(const JsonField& field, const std::string& text) {
+  if (field.Text() != text) field.Fail(field.Text() + " has to be " + text);
+}
 
-  [[noreturn]] void Fail(const std::string& what) const {
-    throw PolicyError(file_ + ": " + (name_.empty() ? "" : name_ + ": ") + what);
-  }
-
-  [[nodiscard]] Field operator[](const char* name) const {
-    const auto found = json_.find(name);
-    if (found == json_.end()) Fail(std::string("has no ") + name);
-    return {file_, name_ + (name_.empty() ? "" : ".") + name, *found};
-  }
-
-  [[nodiscard]] Field operator[](std::size_t i) const {
-    return {file_, name_ + "[" + std::to_string(i) + "]", json_[i]};
-  }
-
-  /** It is an object with these fields and no other. */
-  void RequireFields(const std::set<std::string>& names) const {
-    if (!json_.is_object()) Fail(json_.dump().substr(0, 40) + " is no object");
-    for (const auto& [name, value] : json_.items())
-      if (!names.contains(name)) Fail("has a field " + name + " that does not belong there");
-  }
-
-  /** It is a list of so many. */
-  void RequireCount(std::size_t count) const {
-    if (!json_.is_array()) Fail(json_.dump().substr(0, 40) + " is no list");
-    if (json_.size() != count)
-      Fail("has " + std::to_string(json_.size()) + " entries, has to have " + std::to_string(count));
-  }
-
-  [[nodiscard]] std::string Text() const {
-    if (!json_.is_string()) Fail(json_.dump().substr(0, 40) + " is no text");
-    return json_.get<std::string>();
-  }
-
-  void RequireText(const std::string& text) const {
-    if (Text() != text) Fail(Text() + " has to be " + text);
-  }
-
-  [[nodiscard]] int Integer(int lower, int upper) const {
-    if (!json_.is_number_integer() || json_ < lower || json_ > upper)
-      Fail(json_.dump().substr(0, 40) + " is no integer in [" + std::to_string(lower) + ", " + std::to_string(upper) +
-           "]");
-    return json_.get<int>();
-  }
-
-  [[nodiscard]] double Number(double above) const {
-    if (!json_.is_number() || !std::isfinite(json_.get<double>()) || !(json_.get<double>() > above))
-      Fail(json_.dump().substr(0, 40) + " is outside (" + ToText(above) + ", inf)");
-    return json_.get<double>();
-  }
-
-  [[nodiscard]] Eigen::VectorXd Numbers(std::size_t count,
-                                        double above = -std::numeric_limits<double>::infinity()) const {
-    RequireCount(count);
-    Eigen::VectorXd numbers(static_cast<Eigen::Index>(count));
-    for (std::size_t i = 0; i < count; ++i) numbers[static_cast<Eigen::Index>(i)] = (*this)[i].Number(above);
-    return numbers;
-  }
-
-  [[nodiscard]] std::size_t count() const { return json_.size(); }
-
- private:
-  std::string file_, name_;
-  const Json& json_;
-};
-
-std::vector<std::size_t> ReadSizes(const Field& field) {
-  const std::size_t count = field.count();
-  field.RequireCount(count);
+std::vector<std::size_t> ReadSizes(const JsonField& field) {
+  const std::size_t count = field.Count();
   if (count < 2 || count > kMostSizes)
     field.Fail("has " + std::to_string(count) + " entries, has to have 2 to " + std::to_string(kMostSizes));
   std::vector<std::size_t> sizes;
@@ -104,14 +33,14 @@ std::vector<std::size_t> ReadSizes(const Field& field) {
   return sizes;
 }
 
-Policy::Scaling ReadScaling(const Field& field, std::size_t count) {
+Policy::Scaling ReadScaling(const JsonField& field, std::size_t count) {
   field.RequireFields({"offset", "scale"});
   return {field["offset"].Numbers(count), field["scale"].Numbers(count, 0)};
 }
 
-Policy::Layer ReadLayer(const Field& field, std::size_t width, std::size_t height) {
+Policy::Layer ReadLayer(const JsonField& field, std::size_t width, std::size_t height) {
   field.RequireFields({"weight", "bias"});
-  const Field weight = field["weight"];
+  const JsonField weight = field["weight"];
   weight.RequireCount(height);
   Policy::Layer layer{Eigen::MatrixXd(height, width), field["bias"].Numbers(height)};
   for (std::size_t i = 0; i < height; ++i)
@@ -119,12 +48,12 @@ Policy::Layer ReadLayer(const Field& field, std::size_t width, std::size_t heigh
   return layer;
 }
 
-Policy Read(const Field& file) {
+Policy Read(const JsonField& file) {
   file.RequireFields(
       {"format", "version", "model", "activation", "inputs", "steps", "sizes", "input", "output", "layers"});
-  file["format"].RequireText(kFormat);
+  RequireText(file["format"], kFormat);
   static_cast<void>(file["version"].Integer(kVersion, kVersion));
-  file["activation"].RequireText(kActivation);
+  RequireText(file["activation"], kActivation);
   Policy policy;
   policy.model = file["model"].Text();
   policy.num_inputs = file["inputs"].Integer(1, kMaxInputs);
@@ -135,7 +64,7 @@ Policy Read(const Field& file) {
                        std::to_string(outputs));
   policy.input = ReadScaling(file["input"], sizes.front());
   policy.output = ReadScaling(file["output"], outputs);
-  const Field layers = file["layers"];
+  const JsonField layers = file["layers"];
   layers.RequireCount(sizes.size() - 1);
   for (std::size_t l = 0; l + 1 < sizes.size(); ++l)
     policy.layers.push_back(ReadLayer(layers[l], sizes[l], sizes[l + 1]));
@@ -184,16 +113,13 @@ Eigen::MatrixXd Policy::Act(const Eigen::VectorXd& features) const {
   return h.reshaped(num_inputs, num_steps());
 }
 
-Policy LoadPolicy(const std::string& path) {
-  Json json;
-  try {
-    json = ParseJson<Json>(ReadWhole(path, kLargestJsonFile));
-  } catch (const ConfigError& error) {
-    throw PolicyError(error.what());
-  } catch (const Json::exception& error) {
-    throw PolicyError(path + ": " + error.what());
-  }
-  return Read(Field(path, "", json));
+Policy LoadPolicy(const std::string& path) try {
+  const auto json = ParseJson<nlohmann::json>(ReadWhole(path, kLargestJsonFile));
+  return Read(JsonField(path, json));
+} catch (const ConfigError& error) {
+  throw PolicyError(error.what());
+} catch (const nlohmann::json::exception& error) {
+  throw PolicyError(path + ": " + error.what());
 }
 
 void SavePolicy(const std::string& path, const Policy& policy) {

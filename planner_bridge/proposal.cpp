@@ -138,11 +138,9 @@ class PositionProjection final : public ob::ProjectionEvaluator {
   const double cell_;
 };
 
-}  // namespace
-
-class Planner::Impl {
+class Planner final : public Proposer {
  public:
-  Impl(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles)
+  Planner(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles)
       : problem_(std::move(problem)),
         options_(std::move(options)),
         make_algorithm_(AlgorithmNamed(options_.algorithm)),
@@ -154,7 +152,8 @@ class Planner::Impl {
     ompl::msg::noOutputHandler();
   }
 
-  void SetObstacles(std::vector<Obstacle> obstacles) {
+  [[nodiscard]] const Motion& motion() const override { return *motion_; }
+  void SetObstacles(std::vector<Obstacle> obstacles) override {
     obstacles_ = std::move(obstacles);
     fields_.clear();
   }
@@ -165,7 +164,10 @@ class Planner::Impl {
     return fields_.try_emplace(clearance, region_, obstacles_, clearance, goal_).first->second;
   }
 
-  std::optional<Proposal> Propose(const PlanRequest& request);
+  [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
+
+ private:
+  class Search;
 
   std::shared_ptr<const Problem> problem_;
   PlannerOptions options_;
@@ -180,15 +182,71 @@ class Planner::Impl {
 /** One request: what is allowed, what counts as progress, and the work done so far. */
 class Planner::Search {
  public:
-  Search(const Impl& planner, const PlanRequest& request, const NavigationField& field);
+  Search(const Planner& planner, const PlanRequest& request, const NavigationField& field)
+      : planner_(planner),
+        field_(field),
+        model_(*planner.problem_->model),
+        n_(static_cast<std::size_t>(model_.num_states())),
+        m_(static_cast<std::size_t>(model_.num_inputs())),
+        start_(request.state) {
+    const Box& box = planner.problem_->domain.state;
+    const Eigen::VectorXd margin =
+        request.domain_margin.size() == 0 ? Eigen::VectorXd::Zero(start_.size()) : request.domain_margin;
+    lower_ = (box.lower() + margin).cwiseMin(start_).cwiseMax(box.lower());
+    upper_ = (box.upper() - margin).cwiseMax(start_).cwiseMin(box.upper());
+    const std::span<const double> x(start_.data(), n_);
+    const Eigen::VectorXd position = Position(x);
+    for (const Obstacle& obstacle : planner.obstacles_)
+      clearances_.push_back(std::clamp(ApproximateDistance(obstacle, position) - kTouch, 0.0, request.clearance));
+    start_distance_ = field.DistanceToGo(position);
+    gain_ = IdealGain();
+    top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
+    least_speed_ = std::min(-kReverse, planner.motion_->Speed(x));
+    at_rest_ = std::abs(planner.motion_->Speed(x)) <= kReverse;
+    start_valid_ = Allowed(x);
+  }
 
   /** False if the start itself is not allowed. */
   [[nodiscard]] bool StartIsValid() const { return start_valid_; }
   [[nodiscard]] bool StartsAtRest() const { return at_rest_; }
-  [[nodiscard]] std::optional<Proposal> Run(const Ambition& ambition, std::int64_t allowance);
+  [[nodiscard]] std::optional<Proposal> Run(const Ambition& ambition, std::int64_t allowance) {
+    const auto setup = SetUp(ambition);
+    const std::int64_t most = work_ + allowance;
+    std::int64_t rounds = 0;  // bounds a search that propagates nothing
+    setup->solve(ob::PlannerTerminationCondition([&] { return work_ >= most || ++rounds > allowance; }));
+    if (!setup->getProblemDefinition()->hasExactSolution()) return std::nullopt;
+    return Assemble(setup->getSolutionPath(), ambition);
+  }
 
  private:
-  class ProgressGoal;
+  class ProgressGoal final : public ob::Goal {
+   public:
+    ProgressGoal(const ob::SpaceInformationPtr& space, const Search& search, const Ambition& ambition)
+        : Goal(space), search_(search), ambition_(ambition) {}
+
+    bool isSatisfied(const ob::State* state) const override { return isSatisfied(state, nullptr); }
+
+    bool isSatisfied(const ob::State* state, double* distance) const override {
+      const double* s = Values(state);
+      const double missing = std::max(search_.Shortfall(s, ambition_), 0.0);
+      const double steps = search_.planner_.options_.progress_steps - search_.StepsOf(s);
+      const bool satisfied = missing == 0 && steps == 0 && EndsWell(s);
+      // Metres and steps alike: only their order matters. OMPL takes a state at distance zero for a solution.
+      if (distance != nullptr) *distance = satisfied ? 0 : missing + steps + 1;
+      return satisfied;
+    }
+
+   private:
+    bool EndsWell(const double* s) const {
+      const bool arrives = search_.BestOf(s) <= kShareOfRadius * search_.planner_.options_.goal_radius;
+      Eigen::MatrixXd tail;
+      return (arrives || search_.HeadsWell(search_.StateOf(s), ambition_.heading)) &&
+             search_.FindTail(search_.StateOf(s), ambition_, tail);
+    }
+
+    const Search& search_;
+    const Ambition ambition_;
+  };
 
   // A search state is x, the steps taken, and the shortest distance to go on the way.
   [[nodiscard]] double StepsOf(const double* s) const { return s[n_]; }
@@ -198,24 +256,183 @@ class Planner::Search {
   [[nodiscard]] Eigen::VectorXd Position(std::span<const double> x) const {
     return planner_.problem_->projection * Eigen::Map<const Eigen::VectorXd>(x.data(), std::ssize(x));
   }
-  void Step(std::span<const double> x, const double* u, std::span<double> next) const;
-  [[nodiscard]] bool Allowed(std::span<const double> x) const;
-  [[nodiscard]] bool Clear(const Eigen::VectorXd& position) const;
-  [[nodiscard]] bool HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const;
-  [[nodiscard]] bool Propagate(const double* from, const double* u, double* to) const;
-  [[nodiscard]] double SpeedAt(double distance) const;
-  [[nodiscard]] Eigen::VectorXd Drift(std::span<const double> x) const;
-  void Hint(const double* s, double turn, double slower, double* u) const;
-  [[nodiscard]] double IdealGain() const;
-  [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const;
-  [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const;
-  [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const;
-  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Ambition& ambition,
-                                   const Eigen::MatrixXd& tail) const;
-  [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition);
-  [[nodiscard]] std::optional<Proposal> Assemble(oc::PathControl& path, const Ambition& ambition) const;
 
-  const Impl& planner_;
+  void Step(std::span<const double> x, const double* u, std::span<double> next) const {
+    std::array<double, kMaxVariables> z;
+    std::copy_n(u, m_, std::copy(x.begin(), x.end(), z.begin()));
+    model_.Evaluate({z.data(), n_ + m_}, next);
+    ++work_;
+  }
+
+  [[nodiscard]] bool Allowed(std::span<const double> x) const {
+    const Eigen::Map<const Eigen::ArrayXd> state(x.data(), start_.size());
+    if (!((lower_.array() <= state).all() && (state <= upper_.array()).all())) return false;
+    const double speed = planner_.motion_->Speed(x);
+    if (!(least_speed_ <= speed && speed <= top_speed_)) return false;
+    return Clear(Position(x));
+  }
+
+  [[nodiscard]] bool Clear(const Eigen::VectorXd& position) const {
+    for (std::size_t o = 0; o < clearances_.size(); ++o)
+      if (!(ApproximateDistance(planner_.obstacles_[o], position) > clearances_[o])) return false;
+    return true;
+  }
+
+  // False outside the certification domain or past the progress part; then `to` is not a state of the search.
+  [[nodiscard]] bool Propagate(const double* from, const double* u, double* to) const {
+    std::array<double, kMaxVariables> z;
+    std::copy_n(u, m_, std::copy_n(from, n_, z.begin()));
+    const double steps = StepsOf(from) + 1, best = BestOf(from);  // `to` may be `from`
+    const bool inside =
+        steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
+    Step({z.data(), n_}, z.data() + n_, {to, n_});
+    to[n_] = inside ? steps : planner_.options_.progress_steps + 1;
+    to[n_ + 1] = std::min(best, field_.DistanceToGo(Position({to, n_})));
+    return inside;
+  }
+
+  // The speed to drive at a distance from the goal. It decreases towards the goal, so that the robot does not miss it.
+  [[nodiscard]] double SpeedAt(double distance) const {
+    const double cruise = planner_.options_.cruise_speed;
+    return std::clamp(distance / kArrivalTime, kArrivalSpeed * cruise, cruise);
+  }
+
+  // Follows the descent of the navigation field a short distance ahead, with a random turn and a random lower speed.
+  void Hint(const double* s, double turn, double slower, double* u) const {
+    const Eigen::VectorXd position = Position(StateOf(s));
+    const Eigen::VectorXd descent = field_.Descent(position + kLookAhead * Drift(StateOf(s)));
+    const double heading = std::atan2(descent.size() > 1 ? descent(1) : 0.0, descent(0)) + kLargestTurn * turn;
+    const double speed = SpeedAt(field_.DistanceToGo(position)) * (1 - kLargestSlowdown * slower);
+    planner_.motion_->Pursue(StateOf(s), heading, speed, {u, m_});
+  }
+
+  // How far the robot moves in one step without control.
+  [[nodiscard]] Eigen::VectorXd Drift(std::span<const double> x) const {
+    const std::array<double, kMaxInputs> rest{};
+    std::array<double, kMaxStates> next;
+    Step(x, rest.data(), {next.data(), n_});
+    return Position({next.data(), n_}) - Position(x);
+  }
+
+  // The distance that driving straight at the goal would gain, with acceleration up to the desired speed.
+  [[nodiscard]] double IdealGain() const {
+    const double dt = planner_.motion_->dt();
+    double speed = planner_.motion_->Speed({start_.data(), n_}), gain = 0;
+    for (int t = 0; t < planner_.options_.progress_steps; ++t) {
+      gain += dt * std::min(speed, SpeedAt(start_distance_ - gain));
+      speed += dt * planner_.options_.braking;
+    }
+    return gain;
+  }
+
+  // Metres that the state is short of the ambition, not positive if it is met.
+  [[nodiscard]] double Shortfall(const double* s, const Ambition& ambition) const {
+    const double near_enough = kShareOfRadius * planner_.options_.goal_radius;
+    return BestOf(s) - std::max(start_distance_ - ambition.share * gain_, near_enough);
+  }
+
+  // Evaluated a short time ahead, so that the steering angle counts. A robot at rest has no heading and passes.
+  [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const {
+    const std::array<double, kMaxInputs> rest{};
+    std::array<double, kMaxStates> ahead;
+    std::copy(x.begin(), x.end(), ahead.begin());
+    for (int t = 0; t < kLookAhead; ++t) Step({ahead.data(), n_}, rest.data(), {ahead.data(), n_});
+    const Eigen::VectorXd drift = Drift({ahead.data(), n_});
+    return drift.dot(field_.Descent(Position({ahead.data(), n_}))) >= cosine * drift.norm();
+  }
+
+  [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
+    const Motion& motion = *planner_.motion_;
+    for (int shape = 0; shape < motion.num_tails(); ++shape)
+      if (motion.Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
+    return false;
+  }
+
+  [[nodiscard]] bool TailIsAllowed(std::span<const double> x, const Ambition& ambition,
+                                   const Eigen::MatrixXd& tail) const {
+    std::array<double, kMaxVariables> z;
+    std::copy(x.begin(), x.end(), z.begin());
+    Eigen::VectorXd position = Position(x), direction = Eigen::VectorXd::Zero(position.size());
+    for (int t = 0; t < tail.cols(); ++t) {
+      std::copy_n(tail.col(t).data(), m_, z.begin() + static_cast<std::ptrdiff_t>(n_));
+      if (!planner_.problem_->domain.Contains({z.data(), n_ + m_})) return false;
+      std::array<double, kMaxStates> next;
+      Step({z.data(), n_}, z.data() + n_, {next.data(), n_});
+      if (!Allowed({next.data(), n_})) return false;
+      std::copy_n(next.begin(), n_, z.begin());
+      const Eigen::VectorXd moved = Position({z.data(), n_}) - position;
+      position += moved;
+      if (moved.norm() > kReverse) direction = moved.normalized();
+    }
+    return !ambition.room || HasRoom(position, direction);
+  }
+
+  // Whether a robot at rest here can drive on. A robot that cannot reverse could otherwise not leave the place.
+  [[nodiscard]] bool HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const {
+    for (double ahead = 1; ahead <= kRoomAhead; ++ahead)
+      if (!Clear(position + ahead * direction)) return false;
+    return planner_.region_.Contains(position + kRoomAhead * direction);
+  }
+
+  [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition) {
+    auto states = std::make_shared<ob::RealVectorStateSpace>(static_cast<unsigned>(n_ + 2));
+    ob::RealVectorBounds bounds(static_cast<unsigned>(n_ + 2));
+    std::copy(lower_.begin(), lower_.end(), bounds.low.begin());  // and 0, of steps and distance
+    std::copy(upper_.begin(), upper_.end(), bounds.high.begin());
+    bounds.high[n_] = planner_.options_.progress_steps;
+    bounds.high[n_ + 1] = start_distance_;
+    states->setBounds(bounds);
+    const double cell = std::max(gain_ / planner_.options_.progress_steps, 0.1);
+    states->registerDefaultProjection(
+        std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
+
+    auto controls = std::make_shared<oc::RealVectorControlSpace>(states, static_cast<unsigned>(m_));
+    const Box& input = planner_.problem_->domain.input;
+    ob::RealVectorBounds control_bounds(static_cast<unsigned>(m_));
+    control_bounds.low.assign(input.lower().begin(), input.lower().end());
+    control_bounds.high.assign(input.upper().begin(), input.upper().end());
+    controls->setBounds(control_bounds);
+    controls->setControlSamplerAllocator([this](const oc::ControlSpace* space) {
+      return std::make_shared<HintedSampler>(
+          space, [this](const double* s, double turn, double slower, double* u) { Hint(s, turn, slower, u); });
+    });
+
+    auto setup = std::make_unique<oc::SimpleSetup>(controls);
+    const auto& space = setup->getSpaceInformation();
+    space->setPropagationStepSize(planner_.motion_->dt());
+    space->setMinMaxControlDuration(1, kLongestHold);
+    setup->setStatePropagator([this](const ob::State* from, const oc::Control* u, double, ob::State* to) {
+      static_cast<void>(Propagate(Values(from), Values(u), Values(to)));
+    });
+    setup->setStateValidityChecker([this](const ob::State* state) {
+      const double* s = Values(state);
+      return StepsOf(s) <= planner_.options_.progress_steps && Allowed(StateOf(s));
+    });
+    ob::ScopedState<ob::RealVectorStateSpace> start(states);
+    std::copy_n(start_.data(), n_, start->values);
+    start->values[n_] = 0;
+    start->values[n_ + 1] = start_distance_;
+    setup->setStartState(start);
+    setup->setGoal(std::make_shared<ProgressGoal>(space, *this, ambition));
+    setup->setPlanner(planner_.make_algorithm_(space));
+    return setup;
+  }
+
+  [[nodiscard]] std::optional<Proposal> Assemble(oc::PathControl& path, const Ambition& ambition) const {
+    path.interpolate();
+    const auto progress = static_cast<Eigen::Index>(path.getControlCount());
+    Eigen::MatrixXd tail;
+    if (!FindTail(StateOf(Values(path.getStates().back())), ambition, tail)) return std::nullopt;
+    Proposal proposal{
+        Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()), static_cast<int>(progress), {}};
+    for (Eigen::Index t = 0; t < progress; ++t)
+      std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, proposal.controls.col(t).data());
+    proposal.controls.rightCols(tail.cols()) = tail;
+    proposal.states = Rollout(model_, start_, proposal.controls);
+    return proposal;
+  }
+
+  const Planner& planner_;
   const NavigationField& field_;
   const NominalModel& model_;
   const std::size_t n_, m_;
@@ -227,243 +444,7 @@ class Planner::Search {
   mutable std::int64_t work_ = 0;  // model steps
 };
 
-class Planner::Search::ProgressGoal final : public ob::Goal {
- public:
-  ProgressGoal(const ob::SpaceInformationPtr& space, const Search& search, const Ambition& ambition)
-      : Goal(space), search_(search), ambition_(ambition) {}
-
-  bool isSatisfied(const ob::State* state) const override { return isSatisfied(state, nullptr); }
-
-  bool isSatisfied(const ob::State* state, double* distance) const override {
-    const double* s = Values(state);
-    const double missing = std::max(search_.Shortfall(s, ambition_), 0.0);
-    const double steps = search_.planner_.options_.progress_steps - search_.StepsOf(s);
-    const bool satisfied = missing == 0 && steps == 0 && EndsWell(s);
-    // Metres and steps alike: only their order matters. OMPL takes a state at distance zero for a solution.
-    if (distance != nullptr) *distance = satisfied ? 0 : missing + steps + 1;
-    return satisfied;
-  }
-
- private:
-  bool EndsWell(const double* s) const {
-    const bool arrives = search_.BestOf(s) <= kShareOfRadius * search_.planner_.options_.goal_radius;
-    Eigen::MatrixXd tail;
-    return (arrives || search_.HeadsWell(search_.StateOf(s), ambition_.heading)) &&
-           search_.FindTail(search_.StateOf(s), ambition_, tail);
-  }
-
-  const Search& search_;
-  const Ambition ambition_;
-};
-
-Planner::Search::Search(const Impl& planner, const PlanRequest& request, const NavigationField& field)
-    : planner_(planner),
-      field_(field),
-      model_(*planner.problem_->model),
-      n_(static_cast<std::size_t>(model_.num_states())),
-      m_(static_cast<std::size_t>(model_.num_inputs())),
-      start_(request.state) {
-  const Box& box = planner.problem_->domain.state;
-  const Eigen::VectorXd margin =
-      request.domain_margin.size() == 0 ? Eigen::VectorXd::Zero(start_.size()) : request.domain_margin;
-  lower_ = (box.lower() + margin).cwiseMin(start_).cwiseMax(box.lower());
-  upper_ = (box.upper() - margin).cwiseMax(start_).cwiseMin(box.upper());
-  const std::span<const double> x(start_.data(), n_);
-  const Eigen::VectorXd position = Position(x);
-  for (const Obstacle& obstacle : planner.obstacles_)
-    clearances_.push_back(std::clamp(ApproximateDistance(obstacle, position) - kTouch, 0.0, request.clearance));
-  start_distance_ = field.DistanceToGo(position);
-  gain_ = IdealGain();
-  top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
-  least_speed_ = std::min(-kReverse, planner.motion_->Speed(x));
-  at_rest_ = std::abs(planner.motion_->Speed(x)) <= kReverse;
-  start_valid_ = Allowed(x);
-}
-
-void Planner::Search::Step(std::span<const double> x, const double* u, std::span<double> next) const {
-  std::array<double, kMaxVariables> z;
-  std::copy_n(u, m_, std::copy(x.begin(), x.end(), z.begin()));
-  model_.Evaluate({z.data(), n_ + m_}, next);
-  ++work_;
-}
-
-bool Planner::Search::Allowed(std::span<const double> x) const {
-  const Eigen::Map<const Eigen::ArrayXd> state(x.data(), start_.size());
-  if (!((lower_.array() <= state).all() && (state <= upper_.array()).all())) return false;
-  const double speed = planner_.motion_->Speed(x);
-  if (!(least_speed_ <= speed && speed <= top_speed_)) return false;
-  return Clear(Position(x));
-}
-
-bool Planner::Search::Clear(const Eigen::VectorXd& position) const {
-  for (std::size_t o = 0; o < clearances_.size(); ++o)
-    if (!(ApproximateDistance(planner_.obstacles_[o], position) > clearances_[o])) return false;
-  return true;
-}
-
-// False outside the certification domain or past the progress part; then `to` is not a state of the search.
-bool Planner::Search::Propagate(const double* from, const double* u, double* to) const {
-  std::array<double, kMaxVariables> z;
-  std::copy_n(u, m_, std::copy_n(from, n_, z.begin()));
-  const double steps = StepsOf(from) + 1, best = BestOf(from);  // `to` may be `from`
-  const bool inside =
-      steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
-  Step({z.data(), n_}, z.data() + n_, {to, n_});
-  to[n_] = inside ? steps : planner_.options_.progress_steps + 1;
-  to[n_ + 1] = std::min(best, field_.DistanceToGo(Position({to, n_})));
-  return inside;
-}
-
-// The speed to drive at a distance from the goal. It decreases towards the goal, so that the robot does not miss it.
-double Planner::Search::SpeedAt(double distance) const {
-  const double cruise = planner_.options_.cruise_speed;
-  return std::clamp(distance / kArrivalTime, kArrivalSpeed * cruise, cruise);
-}
-
-// Follows the descent of the navigation field a short distance ahead, with a random turn and a random lower speed.
-void Planner::Search::Hint(const double* s, double turn, double slower, double* u) const {
-  const Eigen::VectorXd position = Position(StateOf(s));
-  const Eigen::VectorXd descent = field_.Descent(position + kLookAhead * Drift(StateOf(s)));
-  const double heading = std::atan2(descent.size() > 1 ? descent(1) : 0.0, descent(0)) + kLargestTurn * turn;
-  const double speed = SpeedAt(field_.DistanceToGo(position)) * (1 - kLargestSlowdown * slower);
-  planner_.motion_->Pursue(StateOf(s), heading, speed, {u, m_});
-}
-
-// How far the robot moves in one step without control.
-Eigen::VectorXd Planner::Search::Drift(std::span<const double> x) const {
-  const std::array<double, kMaxInputs> rest{};
-  std::array<double, kMaxStates> next;
-  Step(x, rest.data(), {next.data(), n_});
-  return Position({next.data(), n_}) - Position(x);
-}
-
-// The distance that driving straight at the goal would gain, with acceleration up to the desired speed.
-double Planner::Search::IdealGain() const {
-  const double dt = planner_.motion_->dt();
-  double speed = planner_.motion_->Speed({start_.data(), n_}), gain = 0;
-  for (int t = 0; t < planner_.options_.progress_steps; ++t) {
-    gain += dt * std::min(speed, SpeedAt(start_distance_ - gain));
-    speed += dt * planner_.options_.braking;
-  }
-  return gain;
-}
-
-// Metres that the state is short of the ambition, not positive if it is met.
-double Planner::Search::Shortfall(const double* s, const Ambition& ambition) const {
-  const double near_enough = kShareOfRadius * planner_.options_.goal_radius;
-  return BestOf(s) - std::max(start_distance_ - ambition.share * gain_, near_enough);
-}
-
-// Evaluated a short time ahead, so that the steering angle counts. A robot at rest has no heading and passes.
-bool Planner::Search::HeadsWell(std::span<const double> x, double cosine) const {
-  const std::array<double, kMaxInputs> rest{};
-  std::array<double, kMaxStates> ahead;
-  std::copy(x.begin(), x.end(), ahead.begin());
-  for (int t = 0; t < kLookAhead; ++t) Step({ahead.data(), n_}, rest.data(), {ahead.data(), n_});
-  const Eigen::VectorXd drift = Drift({ahead.data(), n_});
-  return drift.dot(field_.Descent(Position({ahead.data(), n_}))) >= cosine * drift.norm();
-}
-
-bool Planner::Search::FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
-  const Motion& motion = *planner_.motion_;
-  for (int shape = 0; shape < motion.num_tails(); ++shape)
-    if (motion.Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
-  return false;
-}
-
-bool Planner::Search::TailIsAllowed(std::span<const double> x, const Ambition& ambition,
-                                    const Eigen::MatrixXd& tail) const {
-  std::array<double, kMaxVariables> z;
-  std::copy(x.begin(), x.end(), z.begin());
-  Eigen::VectorXd position = Position(x), direction = Eigen::VectorXd::Zero(position.size());
-  for (int t = 0; t < tail.cols(); ++t) {
-    std::copy_n(tail.col(t).data(), m_, z.begin() + static_cast<std::ptrdiff_t>(n_));
-    if (!planner_.problem_->domain.Contains({z.data(), n_ + m_})) return false;
-    std::array<double, kMaxStates> next;
-    Step({z.data(), n_}, z.data() + n_, {next.data(), n_});
-    if (!Allowed({next.data(), n_})) return false;
-    std::copy_n(next.begin(), n_, z.begin());
-    const Eigen::VectorXd moved = Position({z.data(), n_}) - position;
-    position += moved;
-    if (moved.norm() > kReverse) direction = moved.normalized();
-  }
-  return !ambition.room || HasRoom(position, direction);
-}
-
-// Whether a robot at rest here can drive on. A robot that cannot reverse could otherwise not leave the place.
-bool Planner::Search::HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const {
-  for (double ahead = 1; ahead <= kRoomAhead; ++ahead)
-    if (!Clear(position + ahead * direction)) return false;
-  return planner_.region_.Contains(position + kRoomAhead * direction);
-}
-
-std::unique_ptr<oc::SimpleSetup> Planner::Search::SetUp(const Ambition& ambition) {
-  auto states = std::make_shared<ob::RealVectorStateSpace>(static_cast<unsigned>(n_ + 2));
-  ob::RealVectorBounds bounds(static_cast<unsigned>(n_ + 2));
-  std::copy(lower_.begin(), lower_.end(), bounds.low.begin());  // and 0, of steps and distance
-  std::copy(upper_.begin(), upper_.end(), bounds.high.begin());
-  bounds.high[n_] = planner_.options_.progress_steps;
-  bounds.high[n_ + 1] = start_distance_;
-  states->setBounds(bounds);
-  const double cell = std::max(gain_ / planner_.options_.progress_steps, 0.1);
-  states->registerDefaultProjection(std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
-
-  auto controls = std::make_shared<oc::RealVectorControlSpace>(states, static_cast<unsigned>(m_));
-  const Box& input = planner_.problem_->domain.input;
-  ob::RealVectorBounds control_bounds(static_cast<unsigned>(m_));
-  control_bounds.low.assign(input.lower().begin(), input.lower().end());
-  control_bounds.high.assign(input.upper().begin(), input.upper().end());
-  controls->setBounds(control_bounds);
-  controls->setControlSamplerAllocator([this](const oc::ControlSpace* space) {
-    return std::make_shared<HintedSampler>(
-        space, [this](const double* s, double turn, double slower, double* u) { Hint(s, turn, slower, u); });
-  });
-
-  auto setup = std::make_unique<oc::SimpleSetup>(controls);
-  const auto& space = setup->getSpaceInformation();
-  space->setPropagationStepSize(planner_.motion_->dt());
-  space->setMinMaxControlDuration(1, kLongestHold);
-  setup->setStatePropagator([this](const ob::State* from, const oc::Control* u, double, ob::State* to) {
-    static_cast<void>(Propagate(Values(from), Values(u), Values(to)));
-  });
-  setup->setStateValidityChecker([this](const ob::State* state) {
-    const double* s = Values(state);
-    return StepsOf(s) <= planner_.options_.progress_steps && Allowed(StateOf(s));
-  });
-  ob::ScopedState<ob::RealVectorStateSpace> start(states);
-  std::copy_n(start_.data(), n_, start->values);
-  start->values[n_] = 0;
-  start->values[n_ + 1] = start_distance_;
-  setup->setStartState(start);
-  setup->setGoal(std::make_shared<ProgressGoal>(space, *this, ambition));
-  setup->setPlanner(planner_.make_algorithm_(space));
-  return setup;
-}
-
-std::optional<Proposal> Planner::Search::Run(const Ambition& ambition, std::int64_t allowance) {
-  const auto setup = SetUp(ambition);
-  const std::int64_t most = work_ + allowance;
-  std::int64_t rounds = 0;  // bounds a search that propagates nothing
-  setup->solve(ob::PlannerTerminationCondition([&] { return work_ >= most || ++rounds > allowance; }));
-  if (!setup->getProblemDefinition()->hasExactSolution()) return std::nullopt;
-  return Assemble(setup->getSolutionPath(), ambition);
-}
-
-std::optional<Proposal> Planner::Search::Assemble(oc::PathControl& path, const Ambition& ambition) const {
-  path.interpolate();
-  const auto progress = static_cast<Eigen::Index>(path.getControlCount());
-  Eigen::MatrixXd tail;
-  if (!FindTail(StateOf(Values(path.getStates().back())), ambition, tail)) return std::nullopt;
-  Proposal proposal{
-      Eigen::MatrixXd(static_cast<Eigen::Index>(m_), progress + tail.cols()), static_cast<int>(progress), {}};
-  for (Eigen::Index t = 0; t < progress; ++t)
-    std::copy_n(Values(path.getControl(static_cast<unsigned>(t))), m_, proposal.controls.col(t).data());
-  proposal.controls.rightCols(tail.cols()) = tail;
-  proposal.states = Rollout(model_, start_, proposal.controls);
-  return proposal;
-}
-
-std::optional<Proposal> Planner::Impl::Propose(const PlanRequest& request) {
+std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
   if (request.state.size() != problem_->model->num_states() || !request.state.allFinite()) return std::nullopt;
   Search search(*this, request, Field(request.clearance));
   if (!search.StartIsValid()) return std::nullopt;
@@ -477,12 +458,11 @@ std::optional<Proposal> Planner::Impl::Propose(const PlanRequest& request) {
   return std::nullopt;
 }
 
-Planner::Planner(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles)
-    : impl_(std::make_unique<Impl>(std::move(problem), std::move(options), std::move(obstacles))) {}
-Planner::~Planner() = default;
+}  // namespace
 
-void Planner::SetObstacles(std::vector<Obstacle> obstacles) { impl_->SetObstacles(std::move(obstacles)); }
-const Motion& Planner::motion() const { return *impl_->motion_; }
-std::optional<Proposal> Planner::Propose(const PlanRequest& request) { return impl_->Propose(request); }
+std::unique_ptr<Proposer> MakeOmplProposer(std::shared_ptr<const Problem> problem, PlannerOptions options,
+                                           std::vector<Obstacle> obstacles) {
+  return std::make_unique<Planner>(std::move(problem), std::move(options), std::move(obstacles));
+}
 
 }  // namespace forereach

@@ -6,34 +6,20 @@ discretisation, against obstacles grown by a clearance and against the domain. *
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "planner_bridge/proposer.h"
 
 namespace forereach {
 
-class Planner final : public Proposer {
- public:
-  /** @throws std::invalid_argument for a model without Motion, an unknown algorithm, or an invalid goal or horizon. */
-  Planner(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles);
-  ~Planner() override;
+inline constexpr int kStepsPerMs = 400;  ///< Work of a search, see MakeOmplProposer.
 
-  void SetObstacles(std::vector<Obstacle> obstacles) override;
-  [[nodiscard]] const Motion& motion() const override;
-
-  /** One candidate, or nothing if the search used up its work: kStepsPerMs propagated model steps for each millisecond
-  of options.time_limit_ms. The search counts work instead of reading a clock, so the result depends only on request,
-  options and obstacles. A navigation field is computed once for each set of obstacles and clearance, in about 10 ms.
-  Only one thread of the process may call it, because OMPL's seed is global. */
-  [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
-
-  static constexpr int kStepsPerMs = 400;
-
- private:
-  class Search;
-  class Impl;
-  std::unique_ptr<Impl> impl_;
-};
+/** A proposer whose Propose gives one candidate, or nothing if the search used up its work: kStepsPerMs propagated
+model steps for each millisecond of options.time_limit_ms. The search counts work instead of reading a clock, so the
+result depends only on request, options and obstacles. A navigation field is computed once for each set of obstacles and
+clearance, in about 10 ms. Only one thread of the process may call Propose, because OMPL's seed is global.
+@throws std::invalid_argument for a model without Motion, an unknown algorithm, or an invalid goal or horizon. */
+[[nodiscard]] std::unique_ptr<Proposer> MakeOmplProposer(std::shared_ptr<const Problem> problem, PlannerOptions options,
+                                                         std::vector<Obstacle> obstacles);
 
 }  // namespace forereach

@@ -12,7 +12,7 @@ std::unique_ptr<Proposer> MakeProposer(const Config& config) try {
   const std::string& source = config.planner.source;
   if (source == "policy")
     return std::make_unique<PolicyProposer>(config.problem, config.planner, LoadPolicy(config.planner.policy));
-  if (source == "ompl") return std::make_unique<Planner>(config.problem, config.planner, config.obstacles);
+  if (source == "ompl") return MakeOmplProposer(config.problem, config.planner, config.obstacles);
   throw std::invalid_argument("planner.source: " + source + " is not ompl or policy");
 } catch (const std::invalid_argument& error) {
   throw ConfigError(config.path + ": " + error.what());

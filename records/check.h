@@ -14,18 +14,18 @@ namespace forereach {
 
 /** What became of the events of one log file that rows of the database come from. */
 struct LogCheck {
-  std::string log_file;
+  std::string log_file{};
   /** kDeleted: for the quota, which is no fault. kUnknown: no run of the database is its. */
   enum class Log { kThere, kMissing, kDeleted, kUnknown } log = Log::kThere;
   bool ended = true;
-  std::int64_t whole = 0;             ///< The log has the event, and its digest is the row's.
-  std::int64_t unchecked = 0;         ///< The log has it, but the row is older than digests.
-  std::vector<std::int64_t> changed;  ///< Event numbers: the log has another event of this number.
-  std::vector<std::int64_t> missing;  ///< Event numbers: the log has none; all, where it is not there.
-  LogDamage damage;                   ///< Of the log.
-  std::int64_t cut_bytes = 0;         ///< Behind the last whole record.
+  std::int64_t whole = 0;               ///< The log has the event, and its digest is the row's.
+  std::int64_t unchecked = 0;           ///< The log has it, but the row is older than digests.
+  std::vector<std::int64_t> changed{};  ///< Event numbers: the log has another event of this number.
+  std::vector<std::int64_t> missing{};  ///< Event numbers: the log has none; all, where it is not there.
+  LogDamage damage{};                   ///< Of the log.
+  std::int64_t cut_bytes = 0;           ///< Behind the last whole record.
 
-  std::vector<std::string> damaged_tasks;  ///< One sentence each, of the kept tasks that its decisions name.
+  std::vector<std::string> damaged_tasks{};  ///< One sentence each, of the kept tasks that its decisions name.
 
   /** Nothing is changed, missing but for the quota, or damaged. */
   [[nodiscard]] bool whole_log() const;

@@ -158,16 +158,15 @@ class PictureMaker final : public TimelineUser {
     switch (obstacle.kind()) {
       case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
       case Obstacle::Kind::kBox:
-        picture.polygons.push_back(
-            {points[0], {points[1].x(), points[0].y()}, points[1], {points[0].x(), points[1].y()}});
-        break;
-      case Obstacle::Kind::kPolygon: picture.polygons.push_back(InOrder({points.begin(), points.end()})); break;
+      case Obstacle::Kind::kPolygon: picture.polygons.push_back(InOrder(obstacle.hull())); break;
       case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
     }
   }
 
   // The hull's corners counter-clockwise (Andrew's chain): a polygon obstacle may list its points in any order.
-  static Picture::Polygon InOrder(Picture::Polygon points) {
+  static Picture::Polygon InOrder(const std::vector<Eigen::Vector3d>& corners) {
+    Picture::Polygon points;
+    for (const Eigen::Vector3d& corner : corners) points.push_back(corner.head<2>());
     std::ranges::sort(points,
                       [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
     Picture::Polygon hull;

@@ -9,7 +9,9 @@
 namespace forereach {
 namespace {
 
-Planner PlannerOf(const Config& config) { return Planner(config.problem, config.planner, config.obstacles); }
+std::unique_ptr<Proposer> PlannerOf(const Config& config) {
+  return MakeOmplProposer(config.problem, config.planner, config.obstacles);
+}
 
 PlanRequest From(const Eigen::VectorXd& state, std::uint32_t seed, double clearance = 0.3) {
   PlanRequest request;
@@ -41,11 +43,11 @@ void ExpectSound(const Config& config, const PlanRequest& request, const Proposa
 
 TEST(Planner, BicycleProposalsAreAllowedEndAtStandstillAndComeNearer) {
   const Config config = Bicycle();
-  Planner planner = PlannerOf(config);
+  const auto planner = PlannerOf(config);
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), seed);
-    const auto proposal = planner.Propose(request);
+    const auto proposal = planner->Propose(request);
     ASSERT_TRUE(proposal);
     EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
     ExpectSound(config, request, *proposal, {3, 4, 5});
@@ -56,13 +58,13 @@ TEST(Planner, BicycleProposalsAreAllowedEndAtStandstillAndComeNearer) {
 // Where little can be achieved, the search must not take the nearest miss for an answer.
 TEST(Planner, EveryProposalHasAllItsProgressSteps) {
   const Config config = Bicycle();
-  Planner planner = PlannerOf(config);
+  const auto planner = PlannerOf(config);
   int found = 0;
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     for (const Eigen::VectorXd& state :
          {Vec({18, 1, 0, 2, 0, 0}), Vec({20, 1, 0, 0, 0, 0}), Vec({70, 0, 0.5, 4, 0, 0})}) {
       const PlanRequest request = From(state, seed);
-      const auto proposal = planner.Propose(request);
+      const auto proposal = planner->Propose(request);
       if (!proposal) continue;
       ++found;
       EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps) << state.transpose() << ", seed " << seed;
@@ -74,11 +76,11 @@ TEST(Planner, EveryProposalHasAllItsProgressSteps) {
 
 TEST(Planner, PointMassProposalsAreAllowedEndAtStandstillAndComeNearer) {
   const Config config = PointMass();
-  Planner planner = PlannerOf(config);
+  const auto planner = PlannerOf(config);
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const PlanRequest request = From(Vec({0, 0, 1, 0}), seed);
-    const auto proposal = planner.Propose(request);
+    const auto proposal = planner->Propose(request);
     ASSERT_TRUE(proposal);
     EXPECT_EQ(proposal->progress_steps, config.planner.progress_steps);
     ExpectSound(config, request, *proposal, {2, 3});
@@ -92,9 +94,9 @@ TEST(Planner, EveryAlgorithmFindsAProposal) {
     Config config = Bicycle();
     config.planner.algorithm = name;
     config.planner.time_limit_ms = 60;
-    Planner planner = PlannerOf(config);
+    const auto planner = PlannerOf(config);
     const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 3);
-    const auto proposal = planner.Propose(request);
+    const auto proposal = planner->Propose(request);
     ASSERT_TRUE(proposal);
     ExpectSound(config, request, *proposal, {3, 4, 5});
   }
@@ -102,24 +104,24 @@ TEST(Planner, EveryAlgorithmFindsAProposal) {
 
 TEST(Planner, TheSameRequestGivesTheSameProposalWhateverWasAskedBefore) {
   const Config config = Bicycle();
-  Planner planner = PlannerOf(config), other = PlannerOf(config);
+  const auto planner = PlannerOf(config), other = PlannerOf(config);
   const PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 11);
-  const auto first = planner.Propose(request);
-  for (std::uint32_t seed = 20; seed < 25; ++seed) EXPECT_TRUE(other.Propose(From(Vec({5, 0, 0, 5, 0, 0}), seed)));
-  const auto second = other.Propose(request);
+  const auto first = planner->Propose(request);
+  for (std::uint32_t seed = 20; seed < 25; ++seed) EXPECT_TRUE(other->Propose(From(Vec({5, 0, 0, 5, 0, 0}), seed)));
+  const auto second = other->Propose(request);
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->controls, second->controls);
-  const auto different = planner.Propose(From(request.state, 12));
+  const auto different = planner->Propose(From(request.state, 12));
   ASSERT_TRUE(different);
   EXPECT_TRUE(first->controls.cols() != different->controls.cols() || first->controls != different->controls);
 }
 
 TEST(Planner, KeepsTheMarginFromTheDomain) {
   const Config config = Bicycle();
-  Planner planner = PlannerOf(config);
+  const auto planner = PlannerOf(config);
   PlanRequest request = From(Vec({0, 0, 0, 7, 0, 0}), 4);
   request.domain_margin = Vec({0, 10, 0, 0, 0.2, 0.2});
-  const auto proposal = planner.Propose(request);
+  const auto proposal = planner->Propose(request);
   ASSERT_TRUE(proposal);
   EXPECT_LE(proposal->states.row(1).cwiseAbs().maxCoeff(), 5);
   EXPECT_LE(proposal->states.row(5).cwiseAbs().maxCoeff(), 0.28 + 1e-12);
@@ -127,30 +129,30 @@ TEST(Planner, KeepsTheMarginFromTheDomain) {
 
 TEST(Planner, AnObstacleNearerThanTheClearanceAtTheStartDoesNotStopIt) {
   const Config config = Bicycle();
-  Planner planner = PlannerOf(config);
+  const auto planner = PlannerOf(config);
   const Eigen::VectorXd beside = Vec({25, -2.5, 0, 2, 0, 0});
   ASSERT_LT(ApproximateDistance(config.obstacles[0], Vec({25, -2.5})), 1);
-  EXPECT_TRUE(planner.Propose(From(beside, 5, 1)));
+  EXPECT_TRUE(planner->Propose(From(beside, 5, 1)));
 }
 
 TEST(Planner, NoProposalFromWhereNoneCanBe) {
   const Config config = Bicycle();
-  Planner planner = PlannerOf(config);
-  EXPECT_FALSE(planner.Propose(From(Vec({25, 1, 0, 0, 0, 0}), 1)));   // inside an obstacle
-  EXPECT_FALSE(planner.Propose(From(Vec({0, 0, 0, 20, 0, 0}), 1)));   // outside the domain
-  EXPECT_FALSE(planner.Propose(From(Vec({18, 1, 0, 10, 0, 0}), 1)));  // too fast to miss the obstacle ahead
-  EXPECT_FALSE(planner.Propose(From(Vec({0, 0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0}), 1)));
-  EXPECT_FALSE(planner.Propose(From(Vec({0, 0}), 1)));
+  const auto planner = PlannerOf(config);
+  EXPECT_FALSE(planner->Propose(From(Vec({25, 1, 0, 0, 0, 0}), 1)));   // inside an obstacle
+  EXPECT_FALSE(planner->Propose(From(Vec({0, 0, 0, 20, 0, 0}), 1)));   // outside the domain
+  EXPECT_FALSE(planner->Propose(From(Vec({18, 1, 0, 10, 0, 0}), 1)));  // too fast to miss the obstacle ahead
+  EXPECT_FALSE(planner->Propose(From(Vec({0, 0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0}), 1)));
+  EXPECT_FALSE(planner->Propose(From(Vec({0, 0}), 1)));
 }
 
 TEST(Planner, ObstaclesCanBeReplaced) {
   Config config = Bicycle();
-  Planner planner = PlannerOf(config);
+  const auto planner = PlannerOf(config);
   const PlanRequest blocked = From(Vec({18, 1, 0, 10, 0, 0}), 1);
-  ASSERT_FALSE(planner.Propose(blocked));
+  ASSERT_FALSE(planner->Propose(blocked));
   config.obstacles.clear();
-  planner.SetObstacles({});
-  const auto proposal = planner.Propose(blocked);
+  planner->SetObstacles({});
+  const auto proposal = planner->Propose(blocked);
   ASSERT_TRUE(proposal);
   ExpectSound(config, blocked, *proposal, {3, 4, 5});
 }
