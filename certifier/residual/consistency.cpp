@@ -57,13 +57,6 @@ std::optional<Violation> TestRow(const Declaration& declaration, const Observati
   return violated ? FirstOf(declaration, o, k, search, entries) : std::nullopt;
 }
 
-std::optional<Violation> TestRows(const Declaration& declaration, const Observations& o,
-                                  const LipschitzEnvelope* envelope) {
-  for (int k = 0; k < o.num_states(); ++k)
-    if (const auto violation = TestRow(declaration, o, k, envelope)) return violation;
-  return std::nullopt;
-}
-
 }  // namespace
 
 std::optional<Violation> TestPair(const Declaration& declaration, const Observations& o, int i, int j, int k) {
@@ -79,13 +72,11 @@ std::optional<Violation> TestPair(const Declaration& declaration, const Observat
   return std::nullopt;
 }
 
-std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations) {
-  return TestRows(declaration, observations, nullptr);
-}
-
 std::optional<Violation> FindViolation(const Declaration& declaration, const Observations& observations,
-                                       const LipschitzEnvelope& envelope) {
-  return TestRows(declaration, observations, &envelope);
+                                       const LipschitzEnvelope* envelope) {
+  for (int k = 0; k < observations.num_states(); ++k)
+    if (const auto violation = TestRow(declaration, observations, k, envelope)) return violation;
+  return std::nullopt;
 }
 
 }  // namespace forereach

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "certifier/residual/envelope_tail.h"
+#include "certifier/residual/pairs.h"
 #include "certifier/residual/search.h"
 
 namespace forereach {
@@ -37,9 +38,7 @@ LipschitzEnvelope::LipschitzEnvelope(const Declaration& declaration, const Obser
 void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& entries,
                                     const Observations& observations, std::span<const double> domain_lower,
                                     std::span<const double> domain_upper) const {
-  double values = 0, locations = 0, widths = 0;  // V, S, W
-  for (const double x : entries.floors) values = std::max(values, std::abs(x));
-  for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
+  double locations = 0, widths = 0;  // S, W
   for (const LipschitzRow::Column& column : row.distance.columns()) {
     const auto l = ToSize(column.variable);
     const double farthest = std::max({observations.z.col(column.variable).cwiseAbs().maxCoeff(),
@@ -51,10 +50,11 @@ void LipschitzEnvelope::BoundErrors(Row& row, const ObservationIndex::Entries& e
     row.component_errors.push_back(PlainErrorUpper(MulUp(4, MulUp(column.slope, farthest)), 4, 4));
   }
   const auto a = static_cast<int>(row.distance.columns().size());
-  row.value_limit = MulUp(options_.value_headroom, values);
+  row.value_limit = MulUp(options_.value_headroom, LargestValue(entries));
   const double magnitude = AddUp(AddUp(row.value_limit, MulUp(2, locations)), MulUp(3, widths));
   row.error = PlainErrorUpper(magnitude, a + 24, a * (kMaxGenerators + 4));
   if (!(magnitude < kHuge)) row.error = kInfinity;
+  row.pair_margin = PairMarginUpper(row.value_limit, locations, row.distance.columns().size());
 }
 
 using internal::Budget;

@@ -74,6 +74,8 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   [[nodiscard]] double lowest_ceiling(int k) const { return -rows_[ToSize(k)].negated_ceiling; }
   /** The largest |floor| and |ceiling| for which E_k holds. */
   [[nodiscard]] double value_limit(int k) const { return rows_[ToSize(k)].value_limit; }
+  /** PairMarginUpper for pairs of observations within value_limit and the domain, in a row with columns. */
+  [[nodiscard]] double pair_margin(int k) const { return rows_[ToSize(k)].pair_margin; }
 
   [[nodiscard]] bool uses_hull_distance() const { return uses_hull_distance_; }
 
@@ -81,10 +83,11 @@ class LipschitzEnvelope final : public ResidualEnclosure {
   // A coordinate of the residual.
   struct Row {
     LipschitzRow distance;
-    ObservationIndex index{};                // none where the row is constant:
-    double floor = 0, negated_ceiling = 0;   // then these are its bounds
-    double error = 0;                        // E_k
-    double value_limit = 0;                  // V
+    ObservationIndex index{};               // none where the row is constant:
+    double floor = 0, negated_ceiling = 0;  // then these are its bounds
+    double error = 0;                       // E_k
+    double value_limit = 0;                 // V
+    double pair_margin = 0;
     std::vector<double> component_errors{};  // of each column: of v_il and of L_kl r_l
   };
   struct Search;

@@ -25,7 +25,10 @@ class LipschitzRow final {
     double slope;  // L_kl > 0
   };
 
-  LipschitzRow(const Declaration& declaration, int coordinate);
+  LipschitzRow(const Declaration& declaration, int coordinate) {
+    for (int l = 0, columns = static_cast<int>(declaration.lipschitz.cols()); l < columns; ++l)
+      if (const double slope = declaration.lipschitz(coordinate, l); slope > 0) columns_.push_back({l, slope});
+  }
 
   [[nodiscard]] const std::vector<Column>& columns() const { return columns_; }
   [[nodiscard]] bool is_constant() const { return columns_.empty(); }
@@ -56,20 +59,9 @@ class LipschitzRow final {
   /** Whether sign pattern s has -1 at column l. */
   [[nodiscard]] static constexpr bool IsNegative(std::size_t s, std::size_t l) { return s >> l & 1; }
 
-  /** sum_l L_kl magnitude[l], rounded up. */
-  template <class Magnitude>
-  [[nodiscard]] double WeightedUpper(const Magnitude& magnitude) const;
-
  private:
   std::vector<Column> columns_;
 };
-
-template <class Magnitude>
-double LipschitzRow::WeightedUpper(const Magnitude& magnitude) const {
-  double sum = 0;
-  for (const Column& column : columns_) sum = AddUp(sum, MulUp(column.slope, magnitude[column.variable]));
-  return sum;
-}
 
 /** An upper bound on the error |computed - exact| of plain arithmetic, in any order, for an expression of sums,
 products of two factors, |.|, max and min. Each leaf passes at most `roundings` roundings, the magnitudes of all leaves

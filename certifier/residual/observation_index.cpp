@@ -17,8 +17,8 @@ constexpr std::size_t kFanout = kPackSize;
 class ObservationIndex::Builder {
  public:
   Builder(const Entries& entries, ObservationIndex& index)
-      : entries_(entries), index_(index), count_(entries.floors.size()), keys_(count_) {
-    for (std::size_t i = 0; i < count_; ++i) keys_[i].id = static_cast<std::uint32_t>(i);
+      : entries_(entries), index_(index), count_(entries.floors.size()), places_(count_) {
+    for (std::size_t i = 0; i < count_; ++i) places_[i].id = static_cast<std::uint32_t>(i);
     Arrange(0, count_);
     StoreBlocks();
     StoreLowestLevel();
@@ -27,7 +27,7 @@ class ObservationIndex::Builder {
   }
 
  private:
-  struct Key {
+  struct Place {
     double at;
     std::uint32_t id;
   };
@@ -45,11 +45,11 @@ class ObservationIndex::Builder {
     const std::size_t children = (count + child - 1) / child;
     if (children == 1) return Arrange(first, count);
     const std::size_t left = children / 2 * child, k = WidestCoordinate(first, count);
-    const auto begin = keys_.begin() + static_cast<std::ptrdiff_t>(first),
+    const auto begin = places_.begin() + static_cast<std::ptrdiff_t>(first),
                end = begin + static_cast<std::ptrdiff_t>(count);
-    for (auto key = begin; key != end; ++key) key->at = Coordinate(key->id, k);
+    for (auto place = begin; place != end; ++place) place->at = Coordinate(place->id, k);
     std::nth_element(begin, begin + static_cast<std::ptrdiff_t>(left), end,
-                     [](const Key& a, const Key& b) { return a.at != b.at ? a.at < b.at : a.id < b.id; });
+                     [](const Place& a, const Place& b) { return a.at != b.at ? a.at < b.at : a.id < b.id; });
     Divide(first, left, child);
     Divide(first + left, count - left, child);
   }
@@ -61,9 +61,9 @@ class ObservationIndex::Builder {
     std::size_t widest = 0;
     double width = -1;
     for (std::size_t k = 0; k < entries_.num_coordinates; ++k) {
-      double lowest = Coordinate(keys_[first].id, k), highest = lowest;
+      double lowest = Coordinate(places_[first].id, k), highest = lowest;
       for (std::size_t i = first; i < first + count; i += stride) {
-        const double x = Coordinate(keys_[i].id, k);
+        const double x = Coordinate(places_[i].id, k);
         lowest = std::min(lowest, x);
         highest = std::max(highest, x);
       }
@@ -84,7 +84,7 @@ class ObservationIndex::Builder {
       Pack* block = index_.blocks_.data() + i / kPackSize * index_.block_packs();
       const std::size_t lane = i % kPackSize;
       const bool used = i < count_;
-      const std::uint32_t id = used ? keys_[i].id : kNone;
+      const std::uint32_t id = used ? places_[i].id : kNone;
       index_.ids_[i] = id;
       for (std::size_t c = 0; c < k; ++c) block[c].set(lane, used ? Coordinate(id, c) : 0);
       block[k].set(lane, used ? entries_.floors[id] : kMinusInfinity);
@@ -158,13 +158,20 @@ class ObservationIndex::Builder {
   const Entries& entries_;
   ObservationIndex& index_;
   std::size_t count_;
-  std::vector<Key> keys_;
+  std::vector<Place> places_;
   std::size_t level_ = 0;  // the first node of the level being stored
 };
 
 ObservationIndex::ObservationIndex(const Entries& entries)
     : shape_(entries.shape), size_(entries.floors.size()), num_coordinates_(entries.num_coordinates) {
   Builder(entries, *this);
+}
+
+double LargestValue(const ObservationIndex::Entries& entries) {
+  double largest = 0;
+  for (const auto* values : {&entries.floors, &entries.ceilings})
+    for (const double x : *values) largest = std::max(largest, std::abs(x));
+  return largest;
 }
 
 ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,

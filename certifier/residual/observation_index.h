@@ -85,6 +85,9 @@ class ObservationIndex final {
 };
 
 /** Floors r~_ik - sigma_k and ceilings r~_ik + sigma_k, outward, with their coordinates in plain arithmetic. */
+/** The largest |floor| and |ceiling|. */
+[[nodiscard]] double LargestValue(const ObservationIndex::Entries& entries);
+
 [[nodiscard]] ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
                                                   const Observations& observations, int coordinate);
 

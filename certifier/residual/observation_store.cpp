@@ -14,82 +14,74 @@ namespace {
 
 std::span<const double> View(const Eigen::VectorXd& x) { return {x.data(), ToSize(x.size())}; }
 
-void SetRow(Eigen::MatrixXd& matrix, int row, std::span<const double> values) {
-  matrix.row(row) = Eigen::Map<const Eigen::RowVectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
 }  // namespace
+
+// One observation: d_z and n entries.
+struct ObservationStore::Entry {
+  std::span<const double> z, lower, upper;
+
+  void WriteTo(Observations& observations, int row) const {
+    const auto write = [row](Eigen::MatrixXd& matrix, std::span<const double> values) {
+      matrix.row(row) = Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
+    };
+    write(observations.z, z);
+    write(observations.lower, lower);
+    write(observations.upper, upper);
+  }
+};
 
 // Observations and their ids, row by row.
 struct ObservationStore::Known {
   Observations observations;
   std::vector<int> ids;
 
-  void Append(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper) {
-    const int row = observations.size();
-    for (Eigen::MatrixXd* matrix : {&observations.z, &observations.lower, &observations.upper})
-      matrix->conservativeResize(row + 1, Eigen::NoChange);
-    SetRow(observations.z, row, z);
-    SetRow(observations.lower, row, lower);
-    SetRow(observations.upper, row, upper);
-    ids.push_back(id);
+  // Room for so many rows of the sizes of others.
+  static Known WithRows(int rows, const Observations& like) {
+    const int n = like.num_states();
+    return {{Eigen::MatrixXd(rows, like.z.cols()), Eigen::MatrixXd(rows, n), Eigen::MatrixXd(rows, n)},
+            std::vector<int>(ToSize(rows))};
+  }
+
+  void Set(int row, int id, const Entry& entry) {
+    entry.WriteTo(observations, row);
+    ids[ToSize(row)] = id;
   }
 };
 
 // An index and its tail. Entries of the tail below its size do not change any more, and neither does the index.
 struct ObservationStore::Generation {
-  Observations observations;  // of the index
-  std::vector<int> ids;
+  Known indexed;
   LipschitzEnvelope envelope;
-  std::vector<double> margins;  // of the pairwise test, row by row
   EnvelopeTail tail;
-  Observations tail_observations;  // as many rows as the tail may hold
-  std::vector<int> tail_ids;
+  Known in_tail;  // as many rows as the tail may hold
 
-  Generation(const Declaration& declaration, Observations all, std::vector<int> all_ids, std::span<const double> lower,
-             std::span<const double> upper, const StoreOptions& options)
-      : observations(std::move(all)),
-        ids(std::move(all_ids)),
-        envelope(declaration, observations, lower, upper, options.envelope),
+  Generation(const Declaration& declaration, Known known, std::span<const double> lower, std::span<const double> upper,
+             const StoreOptions& options)
+      : indexed(std::move(known)),
+        envelope(declaration, indexed.observations, lower, upper, options.envelope),
         tail(declaration, envelope, options.tail_capacity),
-        tail_observations{Eigen::MatrixXd(options.tail_capacity, observations.z.cols()),
-                          Eigen::MatrixXd(options.tail_capacity, observations.num_states()),
-                          Eigen::MatrixXd(options.tail_capacity, observations.num_states())},
-        tail_ids(ToSize(options.tail_capacity)) {
-    for (int k = 0; k < envelope.num_states(); ++k) {
-      double locations = 0;
-      for (const LipschitzRow::Column& column : envelope.row(k).columns()) {
-        const auto l = ToSize(column.variable);
-        const double farthest = std::max(
-            {observations.z.col(column.variable).cwiseAbs().maxCoeff(), std::abs(lower[l]), std::abs(upper[l])});
-        locations = AddUp(locations, MulUp(column.slope, farthest));
-      }
-      margins.push_back(PairMarginUpper(envelope.value_limit(k), locations, envelope.row(k).columns().size()));
-    }
-  }
+        in_tail(Known::WithRows(options.tail_capacity, indexed.observations)) {}
 
-  // With the tail's first entries.
-  [[nodiscard]] Known All(int tail_size) const {
-    const Eigen::Index rows = observations.size() + tail_size;
-    Known all{{Eigen::MatrixXd(rows, observations.z.cols()), Eigen::MatrixXd(rows, observations.num_states()),
-               Eigen::MatrixXd(rows, observations.num_states())},
-              ids};
-    all.observations.z << observations.z, tail_observations.z.topRows(tail_size);
-    all.observations.lower << observations.lower, tail_observations.lower.topRows(tail_size);
-    all.observations.upper << observations.upper, tail_observations.upper.topRows(tail_size);
-    all.ids.insert(all.ids.end(), tail_ids.begin(), tail_ids.begin() + tail_size);
+  // The index's observations, the first `tail_size` of the tail, and room for `more`.
+  [[nodiscard]] Known All(int tail_size, int more = 0) const {
+    const Observations &early = indexed.observations, &late = in_tail.observations;
+    Known all = Known::WithRows(early.size() + tail_size + more, early);
+    const auto join = [&](Eigen::MatrixXd Observations::*part) {
+      (all.observations.*part).topRows(early.size()) = early.*part;
+      (all.observations.*part).middleRows(early.size(), tail_size) = (late.*part).topRows(tail_size);
+    };
+    join(&Observations::z);
+    join(&Observations::lower);
+    join(&Observations::upper);
+    std::copy_n(in_tail.ids.begin(), tail_size, std::ranges::copy(indexed.ids, all.ids.begin()).out);
     return all;
   }
 
   [[nodiscard]] bool HasRoom() const { return tail.size() < tail.capacity(); }
 
-  void Append(int id, std::span<const double> z, std::span<const double> lower, std::span<const double> upper) {
-    const int row = tail.size();
-    tail_ids[ToSize(row)] = id;
-    SetRow(tail_observations.z, row, z);
-    SetRow(tail_observations.lower, row, lower);
-    SetRow(tail_observations.upper, row, upper);
-    tail.Append(z, lower, upper);
+  void Append(int id, const Entry& entry) {
+    in_tail.Set(tail.size(), id, entry);
+    tail.Append(entry.z, entry.lower, entry.upper);
   }
 };
 
@@ -97,7 +89,7 @@ void ObservationStore::Snapshot::Enclose(const QuerySet& query, ResidualBounds& 
   generation_->envelope.Enclose(query, generation_->tail, tail_size_, bounds);
 }
 
-std::size_t ObservationStore::Snapshot::size() const { return generation_->ids.size() + ToSize(tail_size_); }
+std::size_t ObservationStore::Snapshot::size() const { return generation_->indexed.ids.size() + ToSize(tail_size_); }
 
 Observations ObservationStore::Snapshot::Contradiction() const {
   const Known all = generation_->All(tail_size_);
@@ -131,7 +123,7 @@ ObservationStore::ObservationStore(Declaration declaration, const Observations& 
   const bool keeps_all = ids.size() <= options_.max_observations;
   if (!keeps_all) violation_ = FindViolation(declaration_, observations);
   current_ = Build({observations, std::move(ids)});
-  if (keeps_all) violation_ = FindViolation(declaration_, current_->observations, current_->envelope);
+  if (keeps_all) violation_ = FindViolation(declaration_, current_->indexed.observations, &current_->envelope);
 }
 
 ObservationStore::~ObservationStore() = default;
@@ -168,8 +160,7 @@ std::shared_ptr<ObservationStore::Generation> ObservationStore::Build(Known know
     for (std::size_t i = 0; i < kept.size(); ++i) known.ids[i] = known.ids[ToSize(kept[i])];
     known.ids.resize(kept.size());
   }
-  return std::make_shared<Generation>(declaration_, std::move(known.observations), std::move(known.ids), domain_lower_,
-                                      domain_upper_, options_);
+  return std::make_shared<Generation>(declaration_, std::move(known), domain_lower_, domain_upper_, options_);
 }
 
 void ObservationStore::Compact() {
@@ -185,14 +176,14 @@ void ObservationStore::Compact() {
   const std::lock_guard writing(writing_);
   // What came in meanwhile.
   const int size = old->tail.size();
-  const Observations& tail = old->tail_observations;
+  const Observations& tail = old->in_tail.observations;
   for (int i = merged; i < size; ++i) {
     const Eigen::VectorXd z = tail.z.row(i), lower = tail.lower.row(i), upper = tail.upper.row(i);
     if (!fresh->tail.Covers(View(lower), View(upper))) {  // rare enough to wait for
       fresh = Build(old->All(size));
       break;
     }
-    fresh->Append(old->tail_ids[ToSize(i)], View(z), View(lower), View(upper));
+    fresh->Append(old->in_tail.ids[ToSize(i)], {View(z), View(lower), View(upper)});
   }
   Swap(std::move(fresh));
 }
@@ -200,9 +191,8 @@ void ObservationStore::Compact() {
 // One new observation against those of a generation.
 class ObservationStore::PartnerSearch {
  public:
-  PartnerSearch(const ObservationStore& store, std::span<const double> z, std::span<const double> lower,
-                std::span<const double> upper, int id)
-      : store_(store), generation_(*store.current_), z_(z), lower_(lower), upper_(upper), id_(id) {}
+  PartnerSearch(const ObservationStore& store, const Entry& entry, int id)
+      : store_(store), generation_(*store.current_), entry_(entry), id_(id) {}
 
   std::optional<Violation> FindPartner() {
     for (int k = 0; k < generation_.envelope.num_states(); ++k)
@@ -224,8 +214,8 @@ class ObservationStore::PartnerSearch {
 
   // The index by its tree, the tail block by block.
   bool TestRow(int k) {
-    const double margin = generation_.margins[ToSize(k)];
-    if (!std::isfinite(margin) || !generation_.tail.Covers(lower_, upper_)) return TestAll(k);
+    const double margin = generation_.envelope.pair_margin(k);
+    if (!std::isfinite(margin) || !generation_.tail.Covers(entry_.lower, entry_.upper)) return TestAll(k);
     const Point point = PointIn(k);
     const PairSearch search(generation_.envelope.index(k), margin, store_.options_.envelope.instructions);
     if (search.AnyPartner(point, [&](std::uint32_t j) { return TestIndexed(static_cast<int>(j), k); })) return true;
@@ -236,24 +226,22 @@ class ObservationStore::PartnerSearch {
   }
 
   bool TestAll(int k) {
-    for (int j = 0; j < generation_.observations.size(); ++j)
+    for (int j = 0; j < generation_.indexed.observations.size(); ++j)
       if (TestIndexed(j, k)) return true;
     for (int j = 0; j < generation_.tail.size(); ++j)
       if (TestInTail(j, k)) return true;
     return false;
   }
 
-  bool TestIndexed(int j, int k) { return Test(generation_.observations, j, generation_.ids, k); }
-  bool TestInTail(int j, int k) { return Test(generation_.tail_observations, j, generation_.tail_ids, k); }
+  bool TestIndexed(int j, int k) { return Test(generation_.indexed, j, k); }
+  bool TestInTail(int j, int k) { return Test(generation_.in_tail, j, k); }
 
-  bool Test(const Observations& others, int j, const std::vector<int>& ids, int k) {
-    Observations two = Select(others, {j, j});
-    SetRow(two.z, 1, z_);
-    SetRow(two.lower, 1, lower_);
-    SetRow(two.upper, 1, upper_);
+  bool Test(const Known& others, int j, int k) {
+    Observations two = Select(others.observations, {j, j});
+    entry_.WriteTo(two, 1);
     found_ = TestPair(store_.declaration_, two, 0, 1, k);
     if (!found_) return false;
-    found_->first = ids[ToSize(j)];
+    found_->first = others.ids[ToSize(j)];
     found_->second = id_;
     return true;
   }
@@ -263,14 +251,15 @@ class ObservationStore::PartnerSearch {
     const auto i = ToSize(k);
     const double sigma = store_.declaration_.noise_bound[k];
     const LipschitzRow& row = generation_.envelope.row(k);
-    Point point{std::vector<double>(row.num_coordinates()), SubDown(lower_[i], sigma), -AddUp(upper_[i], sigma)};
-    row.Map([&](int l) { return z_[ToSize(l)]; }, point.coordinates.data());
+    Point point{std::vector<double>(row.num_coordinates()), SubDown(entry_.lower[i], sigma),
+                -AddUp(entry_.upper[i], sigma)};
+    row.Map([&](int l) { return entry_.z[ToSize(l)]; }, point.coordinates.data());
     return point;
   }
 
   const ObservationStore& store_;
   const Generation& generation_;
-  std::span<const double> z_, lower_, upper_;
+  const Entry& entry_;
   int id_;
   std::optional<Violation> found_;
 };
@@ -282,6 +271,7 @@ ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, 
   for (std::size_t k = 0; k < lower.size(); ++k)
     if (!(-kInfinity < lower[k] && lower[k] <= upper[k] && upper[k] < kInfinity)) return {};
 
+  const Entry entry{z, lower, upper};
   std::unique_lock writing(writing_);
   while (!current_->HasRoom() || !current_->tail.Covers(lower, upper)) {
     const bool full = !current_->HasRoom();
@@ -294,21 +284,20 @@ ObservationStore::Insertion ObservationStore::Insert(std::span<const double> z, 
     const std::lock_guard compacting(compacting_);
     const std::lock_guard again(writing_);
     // Too large for the error bound of the index: into a new one at once.
-    const Insertion insertion = Enlist(z, lower, upper);
-    Known all = current_->All(current_->tail.size());
-    all.Append(insertion.id, z, lower, upper);
+    const Insertion insertion = Enlist(entry);
+    Known all = current_->All(current_->tail.size(), 1);
+    all.Set(all.observations.size() - 1, insertion.id, entry);
     Swap(Build(std::move(all)));
     return insertion;
   }
-  const Insertion insertion = Enlist(z, lower, upper);
-  current_->Append(insertion.id, z, lower, upper);
+  const Insertion insertion = Enlist(entry);
+  current_->Append(insertion.id, entry);
   return insertion;
 }
 
-ObservationStore::Insertion ObservationStore::Enlist(std::span<const double> z, std::span<const double> lower,
-                                                     std::span<const double> upper) {
+ObservationStore::Insertion ObservationStore::Enlist(const Entry& entry) {
   const int id = next_id_++;
-  Insertion insertion{id, PartnerSearch(*this, z, lower, upper, id).FindPartner()};
+  Insertion insertion{id, PartnerSearch(*this, entry, id).FindPartner()};
   if (insertion.violation) {
     const std::lock_guard lock(current_lock_);
     if (!violation_) violation_ = insertion.violation;

@@ -32,6 +32,7 @@ struct StoreOptions {
 
 class ObservationStore final {
  private:
+  struct Entry;
   struct Known;
   struct Generation;
   class PartnerSearch;
@@ -84,7 +85,7 @@ class ObservationStore final {
 
  private:
   std::shared_ptr<Generation> Build(Known known) const;
-  Insertion Enlist(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
+  Insertion Enlist(const Entry& entry);
   bool Violated() const;
   void Swap(std::shared_ptr<Generation> generation);
 

@@ -22,13 +22,18 @@ struct PairSearch::Kernel {
       const std::size_t side = 2 * k + 1;
       return Max(OneWay(group, node + side), OneWay(group + side, node));
     }
-    Pack excess = Max(Fill(group[0]) + LoadPack(node[1]), Fill(group[1]) + LoadPack(node[0]));
+    return LessGaps(Max(Fill(group[0]) + LoadPack(node[1]), Fill(group[1]) + LoadPack(node[0])), group, node);
+  }
+
+  // The value less the distance between the boxes of the group and of each child.
+  Pack LessGaps(const Pack& value, const double* group, const Pack* node) const {
+    Pack less = value;
     for (std::size_t c = 1; c <= k; ++c) {
       const Pack before = LoadPack(node[2 * c]) - Fill(group[2 * c + 1]);
       const Pack behind = Fill(group[2 * c]) - LoadPack(node[2 * c + 1]);
-      excess = excess - Max(Max(before, behind), Fill(0));
+      less = less - Max(Max(before, behind), Fill(0));
     }
-    return excess;
+    return less;
   }
 
   Pack OneWay(const double* group, const Pack* node) const {
@@ -41,19 +46,11 @@ struct PairSearch::Kernel {
 
   // The same between the point and the entries of a block.
   Pack Excess(const double* coordinates, double floor, double negated_ceiling, const Pack* block) const {
-    return ExcessOf(coordinates, floor, negated_ceiling, block, k, lifted);
-  }
-  Pack Distance(const double* coordinates, const Pack* block) const {
-    return DistanceOf(coordinates, block, k, lifted);
-  }
-
-  static Pack ExcessOf(const double* coordinates, double floor, double negated_ceiling, const Pack* block,
-                       std::size_t k, bool lifted) {
     return Max(Fill(floor) + LoadPack(block[k + 1]), Fill(negated_ceiling) + LoadPack(block[k])) -
-           DistanceOf(coordinates, block, k, lifted);
+           Distance(coordinates, block);
   }
 
-  static Pack DistanceOf(const double* coordinates, const Pack* block, std::size_t k, bool lifted) {
+  Pack Distance(const double* coordinates, const Pack* block) const {
     Pack distance = Fill(0);
     for (std::size_t c = 0; c < k; ++c) {
       const Pack along = Abs(Fill(coordinates[c]) - LoadPack(block[c]));
@@ -186,12 +183,7 @@ struct PairSearch::Kernel {
   // v_j - d at most, between a group with v = 0 and each child.
   Pack OneSide(const double* group, const Pack* node, std::size_t side) const {
     if (lifted) return OneWay(group, node + side * (2 * k + 1)) + Fill(margin);
-    Pack most = LoadPack(node[side]) + Fill(margin);
-    for (std::size_t c = 1; c <= k; ++c)
-      most = most -
-             Max(Max(LoadPack(node[2 * c]) - Fill(group[2 * c + 1]), Fill(group[2 * c]) - LoadPack(node[2 * c + 1])),
-                 Fill(0));
-    return most;
+    return LessGaps(LoadPack(node[side]) + Fill(margin), group, node);
   }
 
   void PartnersOf(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const {
@@ -199,12 +191,9 @@ struct PairSearch::Kernel {
              [&](std::uint32_t partner) { partners.push_back(partner); });
   }
 
-  static void InBlocks(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
-                       double margin, std::vector<std::uint32_t>& partners) {
-    const std::size_t k = row.num_coordinates();
-    const bool lifted = row.has_patterns();
+  void InBlocks(const Point& point, const Pack* blocks, std::size_t count, std::vector<std::uint32_t>& partners) const {
     for (std::size_t first = 0; first < count; first += kPackSize, blocks += k + 2) {
-      const Pack excess = ExcessOf(point.coordinates.data(), point.floor, point.negated_ceiling, blocks, k, lifted);
+      const Pack excess = Excess(point.coordinates.data(), point.floor, point.negated_ceiling, blocks);
       if (!(MaxLane(excess) > -margin)) continue;
       for (std::size_t lane = 0; lane < std::min(kPackSize, count - first); ++lane)
         if (excess.at(lane) > -margin) partners.push_back(static_cast<std::uint32_t>(first + lane));
@@ -233,7 +222,9 @@ void PairSearch::Suspects(const Point& point, std::size_t leaf, std::vector<std:
 void PairSearch::Suspects(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
                           double margin, std::vector<std::uint32_t>& partners) {
   partners.clear();
-  Dispatch<&Kernel::InBlocks>(BestInstructionSet(), point, row, blocks, count, margin, partners);
+  const ObservationIndex none;
+  const Kernel kernel{none, margin, row.num_coordinates(), row.has_patterns()};
+  Dispatch<&Kernel::InBlocks>(BestInstructionSet(), kernel, point, blocks, count, partners);
 }
 
 PairSearch::Other PairSearch::BestOther(const Point& point, std::size_t side, std::uint32_t self) const {
@@ -263,12 +254,10 @@ std::vector<double> PairSearch::GroupOf(const Point& point) const {
 }
 
 double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries, const Observations& o) {
-  double values = 0, locations = 0;
-  for (const double x : entries.floors) values = std::max(values, std::abs(x));
-  for (const double x : entries.ceilings) values = std::max(values, std::abs(x));
+  double locations = 0;
   for (const LipschitzRow::Column& column : row.columns())
     locations = AddUp(locations, MulUp(column.slope, o.z.col(column.variable).cwiseAbs().maxCoeff()));
-  return PairMarginUpper(values, locations, row.columns().size());
+  return PairMarginUpper(LargestValue(entries), locations, row.columns().size());
 }
 
 PairSearch::Point PointOf(const ObservationIndex::Entries& entries, int i) {
