@@ -26,18 +26,18 @@ class EquationsModel final : public NominalModel {
 
   void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out,
               InstructionSet instructions = BestInstructionSet()) const noexcept override {
-    forereach::Expand<kProgram>(parameters(), z, box, out, instructions);
+    Dispatch<&internal::Expand<kProgram>>(instructions, parameters().data(), z.data(), box.data(), out);
   }
 
   void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
                         const double* error, Remainder& out,
                         InstructionSet instructions = BestInstructionSet()) const noexcept override {
-    forereach::EncloseRemainder<kProgram>(method, slice, half_width, hessian, error, out, instructions);
+    Dispatch<&internal::EncloseBy<kProgram>>(instructions, method, slice, half_width, hessian, error, out);
   }
 
   void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next, ImageSums& sums,
            InstructionSet instructions = BestInstructionSet()) const noexcept override {
-    MapGenerators<kProgram>(expansion, error, slice, next, sums, instructions);
+    Dispatch<&internal::Map<kProgram>>(instructions, expansion, error, slice, next, sums);
   }
 
  private:

@@ -15,9 +15,7 @@ box. */
 
 FOREREACH_ARITHMETIC_BEGIN
 
-namespace forereach {
-
-namespace internal {
+namespace forereach::internal {
 
 inline PlainInterval operator+(PlainInterval a, PlainInterval b) { return {a.lower + b.lower, a.upper + b.upper}; }
 inline PlainInterval operator-(PlainInterval a) { return {-a.upper, -a.lower}; }
@@ -159,6 +157,7 @@ FOREREACH_INLINE void ForEachConstant(Visit visit) {
   (std::make_index_sequence<N>());
 }
 
+// @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4.
 template <const Program& kProgram>
 FOREREACH_INLINE void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
   constexpr auto kSize = ToSize(kProgram.size);
@@ -178,15 +177,6 @@ FOREREACH_INLINE void Expand(const double* parameters, const double* z, const Pl
   });
 }
 
-}  // namespace internal
-
-/** @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4. */
-template <const Program& kProgram>
-inline void Expand(std::span<const double> parameters, std::span<const double> z, std::span<const PlainInterval> box,
-                   Expansion& out, InstructionSet instructions = BestInstructionSet()) noexcept {
-  Dispatch<&internal::Expand<kProgram>>(instructions, parameters.data(), z.data(), box.data(), out);
-}
-
-}  // namespace forereach
+}  // namespace forereach::internal
 
 FOREREACH_ARITHMETIC_END

@@ -16,8 +16,7 @@ that is known at compile time. One pass over the generators, four at a time, als
 
 FOREREACH_ARITHMETIC_BEGIN
 
-namespace forereach {
-namespace internal {
+namespace forereach::internal {
 
 /** The states' part of row k of the Jacobian: entries first .. first + count - 1 of the program's. */
 struct RowSpan {
@@ -122,23 +121,15 @@ FOREREACH_INLINE void MapAndSum(const Expansion& expansion, const StepError& err
   StoreAll({RowSlack<kProgram, K>(expansion, error, slice)...}, next.mutable_slacks());
 }
 
+/** Sets the generators of `next` to fl(J G), J = expansion.jacobian, and its slack to |J| s + error.image, s the
+slice's slack: a bound, but for a relative 2^-44, on what this leaves out, for every slice and matrix J' that `error` is
+for: |J' (G b + diag(s) b') - fl(J G) b| <= slack,   |b|_inf <= 1, |b'|_inf <= 1. The center of `next` is left alone. */
 template <const Program& kProgram>
 FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
                           ImageSums& sums) {
   MapAndSum<kProgram>(expansion, error, slice, next, sums, std::make_index_sequence<ToSize(kProgram.states)>());
 }
 
-}  // namespace internal
-
-/** Sets the generators of `next` to fl(J G), J = expansion.jacobian, and its slack to |J| s + error.image, s the
-slice's slack: a bound, but for a relative 2^-44, on what this leaves out, for every slice and matrix J' that `error` is
-for: |J' (G b + diag(s) b') - fl(J G) b| <= slack,   |b|_inf <= 1, |b'|_inf <= 1. The center of `next` is left alone. */
-template <const Program& kProgram>
-void MapGenerators(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
-                   ImageSums& sums, InstructionSet instructions = BestInstructionSet()) noexcept {
-  Dispatch<&internal::Map<kProgram>>(instructions, expansion, error, slice, next, sums);
-}
-
-}  // namespace forereach
+}  // namespace forereach::internal
 
 FOREREACH_ARITHMETIC_END

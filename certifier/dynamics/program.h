@@ -55,7 +55,7 @@ struct Program {
   std::array<Operation, kMaxOperations> nodes{};
   int size = 0;
   std::array<short, kMaxStates> value{};
-  int states = 0, variables = 0;
+  short states = 0, variables = 0;
   std::array<First, kMaxFirst> jacobian{};
   int num_first = 0;
   std::array<Second, kMaxSecond> hessian{};

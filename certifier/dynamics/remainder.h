@@ -17,8 +17,7 @@ all H in the interval Hessian over its hull. As straight-line code for a program
 
 FOREREACH_ARITHMETIC_BEGIN
 
-namespace forereach {
-namespace internal {
+namespace forereach::internal {
 
 /** The second derivatives of states, as the remainder takes them: an input is a point, d = 0. */
 struct RemainderTerms {
@@ -225,6 +224,9 @@ FOREREACH_INLINE void EncloseCentred(const Zonotope& slice, const double* half_w
   StoreAll(half, out.half_width.data());
 }
 
+/** @param half_width r, n entries: inputs are points. @param hessian in the order of the program's.
+@param error of each term, StepError::remainder.
+Rounding is included. An entry that is not finite gives a half-width that is not. Cost O(second derivatives * m). */
 template <const Program& kProgram>
 FOREREACH_INLINE void EncloseBy(Method method, const Zonotope& slice, const double* half_width,
                                 const PlainInterval* hessian, const double* error, Remainder& out) {
@@ -235,18 +237,6 @@ FOREREACH_INLINE void EncloseBy(Method method, const Zonotope& slice, const doub
   out.half_width.fill(kInfinity);  // no method: no bound
 }
 
-}  // namespace internal
-
-/** @param half_width r, n entries: inputs are points. @param hessian in the order of the program's.
-@param error of each term, StepError::remainder.
-Rounding is included. An entry that is not finite gives a half-width that is not. Cost O(second derivatives * m). */
-template <const Program& kProgram>
-void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
-                      const double* error, Remainder& out,
-                      InstructionSet instructions = BestInstructionSet()) noexcept {
-  Dispatch<&internal::EncloseBy<kProgram>>(instructions, method, slice, half_width, hessian, error, out);
-}
-
-}  // namespace forereach
+}  // namespace forereach::internal
 
 FOREREACH_ARITHMETIC_END
