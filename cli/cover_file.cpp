@@ -76,9 +76,7 @@ void Append(CanonicalBytes& bytes, const Cover& cover) {
 }  // namespace
 
 std::vector<std::string> ArgumentNames(const Config& config) {
-  std::vector<std::string> names = config.problem->model->state_names();
-  const auto& inputs = config.problem->model->input_names();
-  names.insert(names.end(), inputs.begin(), inputs.end());
+  std::vector<std::string> names = config.problem->model->variable_names();
   for (const auto& parameter : config.residual->parameters) names.push_back(parameter.name);
   return names;
 }

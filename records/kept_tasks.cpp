@@ -9,8 +9,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "certifier/task/config.h"
 #include "certifier/task/files.h"
-#include "certifier/task/named_files.h"
 #include "records/event_log.h"
 
 namespace forereach {

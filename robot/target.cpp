@@ -13,6 +13,7 @@
 #include "certifier/dynamics/point_mass.h"
 #include "certifier/dynamics/residuals.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -79,7 +80,7 @@ auto Parameters(const Config& config) {
     if (known == Residual::kParameterNames.end())
       Fail(config, "residual: " + config.robot.residual + " has no parameter " + name);
     if (!std::isfinite(value)) Fail(config, "residual: parameter " + name + " is not finite");
-    values[static_cast<std::size_t>(known - Residual::kParameterNames.begin())] = value;
+    values[ToSize(known - Residual::kParameterNames.begin())] = value;
   }
   for (const char* name : Residual::Nominal::kParameterNames)
     if (!given.contains(name)) Fail(config, "residual: " + config.robot.residual + " needs the parameter " + name);
@@ -103,38 +104,26 @@ double Uniform(std::mt19937_64& random, double lower, double upper) {
   return std::min(lower + (upper - lower) * fraction, upper);
 }
 
-struct Bounds {
-  std::vector<double> lower, upper;
-};
-
-Bounds SampleBounds(const Problem& problem, const std::vector<SampleRange>& ranges) {
-  std::vector<std::string> names = problem.model->state_names();
-  const auto& inputs = problem.model->input_names();
-  names.insert(names.end(), inputs.begin(), inputs.end());
-
-  Bounds bounds;
-  for (const Box* box : {&problem.domain.state, &problem.domain.input}) {
-    bounds.lower.insert(bounds.lower.end(), box->lower().begin(), box->lower().end());
-    bounds.upper.insert(bounds.upper.end(), box->upper().begin(), box->upper().end());
-  }
+std::vector<Interval> SampleBounds(const Problem& problem, const std::vector<SampleRange>& ranges) {
+  const std::vector<std::string> names = problem.model->variable_names();
+  std::vector<Interval> bounds = problem.domain.Ranges();
   for (const SampleRange& range : ranges) {
     const auto name = std::find(names.begin(), names.end(), range.name);
     if (name == names.end()) throw std::invalid_argument("range: the model has no coordinate " + range.name);
-    const auto l = static_cast<std::size_t>(name - names.begin());
-    if (!(bounds.lower[l] <= range.lower && range.lower <= range.upper && range.upper <= bounds.upper[l]))
+    Interval& bound = bounds[ToSize(name - names.begin())];
+    if (!(bound.lower <= range.lower && range.lower <= range.upper && range.upper <= bound.upper))
       throw std::invalid_argument("range: " + range.name + " in [" + ToText(range.lower) + ", " + ToText(range.upper) +
-                                  "] is empty or not inside the domain's [" + ToText(bounds.lower[l]) + ", " +
-                                  ToText(bounds.upper[l]) + "]");
-    bounds.lower[l] = range.lower;
-    bounds.upper[l] = range.upper;
+                                  "] is empty or not inside the domain's [" + ToText(bound.lower) + ", " +
+                                  ToText(bound.upper) + "]");
+    bound = {range.lower, range.upper};
   }
   return bounds;
 }
 
-std::vector<double> SampleInside(const Domain& domain, const Bounds& bounds, std::mt19937_64& random) {
-  std::vector<double> z(bounds.lower.size());
+std::vector<double> SampleInside(const Domain& domain, const std::vector<Interval>& bounds, std::mt19937_64& random) {
+  std::vector<double> z(bounds.size());
   for (int attempt = 0; attempt < 1000; ++attempt) {
-    for (std::size_t l = 0; l < z.size(); ++l) z[l] = Uniform(random, bounds.lower[l], bounds.upper[l]);
+    for (std::size_t l = 0; l < z.size(); ++l) z[l] = Uniform(random, bounds[l].lower, bounds[l].upper);
     if (domain.Contains(z)) return z;
   }
   throw std::invalid_argument("ranges: no point inside the domain in 1000 samples");
@@ -157,17 +146,17 @@ Transitions MakeTransitions(const Target& target, const Problem& problem, std::u
   if (noise_bound.size() != 0 && noise_bound.size() != n)
     throw std::invalid_argument("noise_bound: " + std::to_string(noise_bound.size()) + " entries for " +
                                 std::to_string(n) + " states");
-  const Bounds bounds = SampleBounds(problem, ranges);
+  const std::vector<Interval> bounds = SampleBounds(problem, ranges);
   std::mt19937_64 random(seed);
   Transitions transitions{Eigen::MatrixXd(count, d), Eigen::MatrixXd(count, n)};
-  std::vector<double> next(static_cast<std::size_t>(n));
+  std::vector<double> next(ToSize(n));
   for (int i = 0; i < count; ++i) {
     const std::vector<double> z = SampleInside(problem.domain, bounds, random);
     const std::span<const double> point(z);
     target.Step(point.first(next.size()), point.subspan(next.size()), next);
     transitions.z.row(i) = Eigen::Map<const Eigen::RowVectorXd>(z.data(), d);
     transitions.x_next.row(i) = Eigen::Map<const Eigen::RowVectorXd>(next.data(), n);
-    for (int k = 0; k < noise_bound.size(); ++k)
+    for (Eigen::Index k = 0; k < noise_bound.size(); ++k)
       transitions.x_next(i, k) += Uniform(random, -noise_bound(k), noise_bound(k));
   }
   return transitions;

@@ -7,9 +7,8 @@ namespace forereach {
 namespace {
 
 std::string VariableName(const NominalModel& model, int index) {
-  const int n = model.num_states();
   if (index < 0 || index >= model.num_variables()) return "coordinate " + std::to_string(index);
-  return index < n ? model.state_names()[ToSize(index)] : model.input_names()[ToSize(index - n)];
+  return model.variable_names()[ToSize(index)];
 }
 
 std::string ExplainExit(const DomainExit& exit, const NominalModel& model) {

@@ -5,6 +5,12 @@
 
 namespace forereach {
 
+std::vector<std::string> NominalModel::variable_names() const {
+  std::vector<std::string> names = names_.states;
+  names.insert(names.end(), names_.inputs.begin(), names_.inputs.end());
+  return names;
+}
+
 std::string NominalModel::description() const {
   std::string text = names_.name;
   for (std::size_t p = 0; p < parameters_.size(); ++p)

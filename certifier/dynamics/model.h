@@ -58,6 +58,8 @@ class NominalModel {
   [[nodiscard]] const std::string& name() const { return names_.name; }
   [[nodiscard]] const std::vector<std::string>& state_names() const { return names_.states; }
   [[nodiscard]] const std::vector<std::string>& input_names() const { return names_.inputs; }
+  /** States, then inputs. */
+  [[nodiscard]] std::vector<std::string> variable_names() const;
   [[nodiscard]] const std::vector<std::string>& parameter_names() const { return names_.parameters; }
   [[nodiscard]] std::span<const double> parameters() const { return parameters_; }
   [[nodiscard]] const Program& program() const { return program_; }

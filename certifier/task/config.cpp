@@ -6,24 +6,18 @@
 #include <utility>
 
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/csv.h"
 #include "certifier/task/document.h"
 #include "certifier/task/draft.h"
 #include "certifier/task/key_rows.h"
-#include "certifier/task/named_files.h"
 
 namespace forereach {
 namespace {
 
-std::vector<std::string> Variables(const NominalModel& model) {
-  std::vector<std::string> names = model.state_names();
-  names.insert(names.end(), model.input_names().begin(), model.input_names().end());
-  return names;
-}
-
 std::vector<std::string> TransitionColumns(const NominalModel& model) {
-  std::vector<std::string> columns = Variables(model);
+  std::vector<std::string> columns = model.variable_names();
   for (const std::string& state : model.state_names()) columns.push_back(state + "_next");
   return columns;
 }
@@ -37,24 +31,22 @@ Transitions ReadTransitions(const std::string& path, const NominalModel& model, 
 // What a transition violates, in the words of the task file.
 std::string Describe(const DomainExit& exit, const Domain& domain, const NominalModel& model) {
   using Kind = DomainExit::Kind;
-  const std::vector<std::string> names = Variables(model);
+  const std::vector<std::string> names = model.variable_names();
   if (exit.kind == Kind::kLower || exit.kind == Kind::kUpper) {
     const Eigen::Index l = exit.index, n = model.num_states();
     const Box& box = l < n ? domain.state : domain.input;
     const Eigen::Index k = l < n ? l : l - n;
-    return names[static_cast<std::size_t>(l)] + ": " + ToText(exit.value) + " is outside " +
+    return names[ToSize(l)] + ": " + ToText(exit.value) + " is outside " +
            Range{box.lower()[k], box.upper()[k], false, false}.text() + " of domain." + (l < n ? "state" : "input");
   }
   std::string involved;
-  const auto involve = [&](Eigen::Index l) {
-    involved += (involved.empty() ? "" : ", ") + names[static_cast<std::size_t>(l)];
-  };
+  const auto involve = [&](Eigen::Index l) { involved += (involved.empty() ? "" : ", ") + names[ToSize(l)]; };
   const std::string limit = ToText(exit.value) + " is outside (-inf, " + ToText(exit.bound) + "] of domain.";
   if (exit.kind == Kind::kBall) {
-    for (const int l : domain.balls[static_cast<std::size_t>(exit.index)].coordinates) involve(l);
+    for (const int l : domain.balls[ToSize(exit.index)].coordinates) involve(l);
     return involved + ": distance " + limit + "balls[" + std::to_string(exit.index) + "]";
   }
-  const Eigen::VectorXd& coefficients = domain.inequalities[static_cast<std::size_t>(exit.index)].coefficients;
+  const Eigen::VectorXd& coefficients = domain.inequalities[ToSize(exit.index)].coefficients;
   for (Eigen::Index l = 0; l < coefficients.size(); ++l)
     if (coefficients[l] != 0) involve(l);
   return involved + ": sum " + limit + "inequalities[" + std::to_string(exit.index) + "]";
@@ -63,9 +55,9 @@ std::string Describe(const DomainExit& exit, const Domain& domain, const Nominal
 void RequireInside(const std::string& path, const Transitions& transitions, const Domain& domain,
                    const NominalModel& model) {
   std::array<Interval, kMaxVariables> point;
-  const auto size = static_cast<std::size_t>(model.num_variables());
+  const auto size = ToSize(model.num_variables());
   for (Eigen::Index i = 0; i < transitions.z.rows(); ++i) {
-    for (std::size_t l = 0; l < size; ++l) point[l] = Interval(transitions.z(i, static_cast<Eigen::Index>(l)));
+    for (Eigen::Index l = 0; l < transitions.z.cols(); ++l) point[ToSize(l)] = Interval(transitions.z(i, l));
     const DomainExit exit = FindExit(domain, {point.data(), size});
     if (exit.kind != DomainExit::Kind::kNone)
       throw ConfigError(path + ":" + std::to_string(i + 2) + ": " + Describe(exit, domain, model));

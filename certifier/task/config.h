@@ -42,6 +42,19 @@ enum class TransitionsFile { kRead, kIgnore };
 @throws ConfigError for a missing file, an unknown or missing key, a wrong size, a non-finite or out-of-range number. */
 [[nodiscard]] Config LoadConfig(const std::string& path, TransitionsFile transitions = TransitionsFile::kRead);
 
+/** Paths of the data that belongs to the task, but not to the file's own bytes. Empty: the task names none. A key file
+is none of these: it is a secret. */
+struct NamedFiles {
+  std::string transitions, policy;
+};
+
+/** The files that a task file names, relative to the task file's place. @throws ConfigError if it is no task file. */
+[[nodiscard]] NamedFiles FilesNamedBy(const std::string& path);
+
+/** The same as the other LoadConfig, but reads the files of `instead` in place of those that the task file names. An
+empty entry of `instead` replaces nothing. @throws ConfigError as the other. */
+[[nodiscard]] Config LoadConfig(const std::string& path, const NamedFiles& instead);
+
 /** @throws ConfigError, which says what to write, where the task does not say gate.obstacles: whoever certifies on a
 bus needs to know where its obstacles come from. */
 void RequireObstaclesSource(const Config& config);

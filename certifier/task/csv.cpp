@@ -6,6 +6,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/config_error.h"
 #include "certifier/task/files.h"
@@ -107,7 +108,7 @@ class Reader {
     if (line == 0)
       throw ConfigError(path_ + ":1: the file is empty; it has to begin with the header " + Joined(columns_));
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    return Eigen::Map<const RowMajor>(numbers_.data(), line - 1, static_cast<Eigen::Index>(columns_.size()));
+    return Eigen::Map<const RowMajor>(numbers_.data(), line - 1, std::ssize(columns_));
   }
 
  private:
@@ -117,7 +118,7 @@ class Reader {
     const std::size_t row = numbers_.size();
     numbers_.resize(row + fields.size());
     for (std::size_t j = 0; j < fields.size(); ++j) {
-      const auto column = static_cast<std::size_t>(order[j]);
+      const auto column = ToSize(order[j]);
       const auto [value, problem] = ParseNumber(fields[j]);
       if (!problem.empty())
         FailAt(path_, line,

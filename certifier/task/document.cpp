@@ -12,6 +12,7 @@
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
+#include "certifier/numerics/size.h"
 #include "certifier/task/config_error.h"
 #include "certifier/task/draft.h"
 #include "certifier/task/files.h"
@@ -256,7 +257,7 @@ class Checker {
       if (!IsChild(row, pattern)) continue;
       const std::string leaf(Leaf(row.path));
       if (leaf.starts_with('<')) {
-        known = leaf == "<state>" ? scope_.states : scope_.variables();
+        known = leaf == "<state>" ? scope_.states : scope_.variables;
         if (known.empty() || Contains(known, word)) return row;
       } else if (leaf == word) {
         return row;
@@ -304,9 +305,8 @@ class Checker {
     switch (row.size) {
       case Key::Size::kStates: return one_each(scope_.states);
       case Key::Size::kInputs: return one_each(scope_.inputs);
-      case Key::Size::kVariables: return one_each(scope_.variables());
-      case Key::Size::kSafety:
-        return require(static_cast<std::size_t>(scope_.safety_dim), ", as many as task.projection has rows");
+      case Key::Size::kVariables: return one_each(scope_.variables);
+      case Key::Size::kSafety: return require(ToSize(scope_.safety_dim), ", as many as task.projection has rows");
       case Key::Size::kAny: return RequireCount(node, row, key);
     }
   }
@@ -318,7 +318,7 @@ class Checker {
 
   void CheckNames(const YAML::Node& node, const Key& row, const std::string& key) const {
     RequireCount(node, row, key);
-    const std::vector<std::string> known = row.size == Key::Size::kStates ? scope_.states : scope_.variables();
+    const std::vector<std::string> known = row.size == Key::Size::kStates ? scope_.states : scope_.variables;
     std::vector<std::string> seen;
     for (std::size_t i = 0; i < node.size(); ++i) {
       if (!node[i].IsScalar()) Fail(node[i], key + Index(i), Shown(node[i]) + " is not a name");
@@ -390,10 +390,9 @@ YAML::Node Parse(const std::string& path, const std::string& text) {
 }
 
 Eigen::VectorXd VectorOf(const YAML::Node& node) {
-  Eigen::VectorXd vector(static_cast<Eigen::Index>(node.size()));
-  for (std::size_t i = 0; i < node.size(); ++i)
-    vector[static_cast<Eigen::Index>(i)] = ParseNumber(node[i].Scalar()).value;
-  return vector;
+  std::vector<double> entries;
+  for (const auto& entry : node) entries.push_back(ParseNumber(entry.Scalar()).value);
+  return Eigen::Map<const Eigen::VectorXd>(entries.data(), std::ssize(entries));
 }
 
 }  // namespace
@@ -422,8 +421,6 @@ Document::~Document() = default;
 void Document::Check(const SchemaScope& scope, const Visitor& visit) {
   Checker(path_, scope, visit, tree_->values).Check(tree_->root, "", "");
 }
-
-bool Document::Has(std::string_view key) const { return tree_->Find(key) != nullptr; }
 
 int Document::Count(std::string_view key) const {
   const YAML::Node* node = tree_->Find(key);
@@ -472,7 +469,7 @@ void Document::Read(std::string_view key, std::optional<double>& value) const { 
 
 std::string Document::Place(std::string_view key) const {
   std::string_view known = key;
-  while (!known.empty() && !Has(known)) known = Enclosing(known);
+  while (!known.empty() && tree_->Find(known) == nullptr) known = Enclosing(known);
   const YAML::Node* node = tree_->Find(known);
   return At(path_, node ? LineOf(node->Mark()) : 1) + std::string(key) + ": ";
 }

@@ -34,7 +34,6 @@ class Document final {
   /** The file's bytes. */
   [[nodiscard]] const std::string& text() const { return text_; }
 
-  [[nodiscard]] bool Has(std::string_view key) const;
   /** How many entries a list has, 0 if it is absent. */
   [[nodiscard]] int Count(std::string_view key) const;
   /** The keys of a map in the file's order, none if it is absent. */

@@ -10,14 +10,8 @@ namespace forereach {
 
 /** What names and sizes in the schema stand for. Where it is not known, everything fits. */
 struct SchemaScope {
-  std::vector<std::string> states, inputs;
+  std::vector<std::string> states, inputs, variables;
   int safety_dim = 0;
-
-  [[nodiscard]] std::vector<std::string> variables() const {
-    std::vector<std::string> all = states;
-    all.insert(all.end(), inputs.begin(), inputs.end());
-    return all;
-  }
 };
 
 /** Begins with all defaults; each key's row (schema.h) adds what the key says. */

@@ -6,6 +6,7 @@
 #include "certifier/dynamics/models.h"
 #include "certifier/dynamics/point_mass.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
@@ -28,8 +29,8 @@ Box ReadBox(const Document& file, const std::string& key) {
 // A matrix given by rows, all of one size.
 Eigen::MatrixXd ReadMatrix(const Document& file, const std::string& key) {
   const std::vector<Eigen::VectorXd> rows = file.Vectors(key);
-  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()), rows.front().size());
-  for (std::size_t i = 0; i < rows.size(); ++i) matrix.row(static_cast<Eigen::Index>(i)) = rows[i].transpose();
+  Eigen::MatrixXd matrix(std::ssize(rows), rows.front().size());
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) matrix.row(i) = rows[ToSize(i)].transpose();
   return matrix;
 }
 
@@ -48,8 +49,8 @@ const std::vector<Named<ModelMaker>>& Models() {
 
 void ReadModel(const Document& file, const std::string& key, TaskDraft& draft) {
   draft.problem.model = ValueNamed(Models(), file.Text(key + ".name"))(file);
-  draft.scope.states = draft.problem.model->state_names();
-  draft.scope.inputs = draft.problem.model->input_names();
+  const NominalModel& model = *draft.problem.model;
+  draft.scope = {model.state_names(), model.input_names(), model.variable_names()};
   draft.config.gate.longest_step_ms = file.Number(key + ".dt") * 1e3;
 }
 
@@ -65,9 +66,9 @@ std::vector<Key> ModelKeys() {
 
 void ReadBall(const Document& file, const std::string& key, TaskDraft& draft) {
   Domain::Ball ball{{}, file.Vector(key + ".center"), file.Number(key + ".radius")};
-  const std::vector<std::string> variables = draft.scope.variables();
+  const std::vector<std::string> variables = draft.scope.variables;
   for (const std::string& name : file.Names(key + ".coordinates")) ball.coordinates.push_back(IndexOf(variables, name));
-  const auto size = static_cast<Eigen::Index>(ball.coordinates.size());
+  const auto size = std::ssize(ball.coordinates);
   if (ball.center.size() != size)
     file.Fail(key + ".center", "has " + std::to_string(ball.center.size()) + " entries, has to have " +
                                    std::to_string(size) + ", as many as coordinates");
@@ -76,9 +77,8 @@ void ReadBall(const Document& file, const std::string& key, TaskDraft& draft) {
 
 void ReadInequality(const Document& file, const std::string& key, TaskDraft& draft) {
   const std::string sum = key + ".coefficients";
-  const std::vector<std::string> variables = draft.scope.variables();
-  Domain::Inequality inequality{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(variables.size())),
-                                file.Number(key + ".bound")};
+  const std::vector<std::string> variables = draft.scope.variables;
+  Domain::Inequality inequality{Eigen::VectorXd::Zero(std::ssize(variables)), file.Number(key + ".bound")};
   for (const std::string& name : file.KeysOf(sum))
     inequality.coefficients[IndexOf(variables, name)] = file.Number(sum + "." + name);
   if (inequality.coefficients.isZero(0)) file.Fail(sum, "are all zero, which bounds nothing");
@@ -123,7 +123,7 @@ std::vector<Key> DomainKeys() {
 
 void ReadLipschitzByNames(const Document& file, const std::string& key, TaskDraft& draft) {
   const NominalModel& model = *draft.problem.model;
-  const std::vector<std::string> variables = draft.scope.variables();
+  const std::vector<std::string> variables = draft.scope.variables;
   Eigen::MatrixXd& lipschitz = draft.problem.declaration.lipschitz;
   lipschitz.setZero(model.num_states(), model.num_variables());
   for (const std::string& row : file.KeysOf(key))
@@ -191,8 +191,7 @@ void SetProjection(const Document& file, const std::string& key, Eigen::MatrixXd
 void ReadProjectionByNames(const Document& file, const std::string& key, TaskDraft& draft) {
   const std::vector<std::string> names = file.Names(key);
   Eigen::MatrixXd projection = Eigen::MatrixXd::Zero(std::ssize(names), std::ssize(draft.scope.states));
-  for (std::size_t i = 0; i < names.size(); ++i)
-    projection(static_cast<Eigen::Index>(i), IndexOf(draft.scope.states, names[i])) = 1;
+  for (Eigen::Index i = 0; i < projection.rows(); ++i) projection(i, IndexOf(draft.scope.states, names[ToSize(i)])) = 1;
   SetProjection(file, key, std::move(projection), draft);
 }
 

@@ -15,24 +15,24 @@ struct Parameter {
 
 // A residual of dynamics/residuals.h. Its first parameters are its model's.
 struct Residual {
-  const char *name, *model;
+  const char* model;
   std::vector<const char*> parameter_names;
   std::vector<double> defaults;     // as many
   std::vector<Parameter> own_rows;  // of those that are not the model's
 };
 
 template <class Equations>
-Residual Make(std::vector<Parameter> own_rows) {
+Named<Residual> Make(std::vector<Parameter> own_rows) {
   const auto defaults = Equations{}.parameters();
   return {Equations::kName,
-          Equations::Nominal::kName,
-          {Equations::kParameterNames.begin(), Equations::kParameterNames.end()},
-          {defaults.begin(), defaults.end()},
-          std::move(own_rows)};
+          {Equations::Nominal::kName,
+           {Equations::kParameterNames.begin(), Equations::kParameterNames.end()},
+           {defaults.begin(), defaults.end()},
+           std::move(own_rows)}};
 }
 
-const std::vector<Residual>& Residuals() {
-  static const std::vector<Residual> residuals{
+const std::vector<Named<Residual>>& Residuals() {
+  static const std::vector<Named<Residual>> residuals{
       Make<HeadingSaturation>({
           {"understeer", "", kReal, "Fraction of the heading rate lost in full saturation."},
           {"friction", "", kNotNegative, "Friction coefficient; saturation begins at friction times gravity."},
@@ -51,31 +51,25 @@ const std::vector<Residual>& Residuals() {
   return residuals;
 }
 
-std::vector<std::string_view> ResidualNames() {
-  std::vector<std::string_view> names;
-  for (const Residual& residual : Residuals()) names.emplace_back(residual.name);
-  return names;
-}
-
 // "A is for model B, ..."
 std::string ModelsOfResiduals() {
   std::string text;
-  for (const auto& [name, model, names, defaults, rows] : Residuals())
-    text += text.empty() ? std::string(name) + " is for " + model : std::string(", ") + name + " for " + model;
+  for (const auto& [name, residual] : Residuals())
+    text += (text.empty() ? "" : ", ") + std::string(name) + (text.empty() ? " is for " : " for ") + residual.model;
   return text + ".";
 }
 
 // A row for each parameter of each residual that is not its model's, in the map `path`.
 std::vector<Key> ParameterKeys(const std::string& path, const Key::Reader& read) {
   std::vector<Key> keys;
-  for (const Residual& residual : Residuals())
+  for (const auto& [residual_name, residual] : Residuals())
     for (std::size_t i = 0, first = residual.defaults.size() - residual.own_rows.size(); i < residual.own_rows.size();
          ++i) {
       const auto& [name, unit, range, meaning] = residual.own_rows[i];
       if (std::string_view(name) != residual.parameter_names[first + i])
-        throw std::logic_error(std::string(residual.name) + " has no parameter " + name + " at this place");
-      keys.push_back(OnlyFor(residual.name, Optional(Number(path + "." + name, unit, range, meaning, read),
-                                                     ToText(residual.defaults[first + i]))));
+        throw std::logic_error(std::string(residual_name) + " has no parameter " + name + " at this place");
+      keys.push_back(OnlyFor(std::string(residual_name), Optional(Number(path + "." + name, unit, range, meaning, read),
+                                                                  ToText(residual.defaults[first + i]))));
     }
   return keys;
 }
@@ -83,14 +77,13 @@ std::vector<Key> ParameterKeys(const std::string& path, const Key::Reader& read)
 // The residual that is named at `key`: its model's parameters are the model's, all others have the default.
 ParametricResidual DefaultResidual(const Document& file, const std::string& key, const NominalModel& model) {
   const std::string name = file.Text(key);
-  const auto residual = std::ranges::find(Residuals(), name, &Residual::name);
-  if (residual == Residuals().end()) throw std::logic_error("a residual that the schema does not have: " + name);
-  if (residual->model != model.name())
-    file.Fail(key, name + " is for " + residual->model + ", the model is " + model.name());
+  const Residual& residual = ValueNamed(Residuals(), name);
+  if (residual.model != model.name())
+    file.Fail(key, name + " is for " + residual.model + ", the model is " + model.name());
   ParametricResidual result{name, {}};
-  for (std::size_t i = 0; i < residual->defaults.size(); ++i) {
-    const double value = i < model.parameters().size() ? model.parameters()[i] : residual->defaults[i];
-    result.parameters.push_back({residual->parameter_names[i], value, value});
+  for (std::size_t i = 0; i < residual.defaults.size(); ++i) {
+    const double value = i < model.parameters().size() ? model.parameters()[i] : residual.defaults[i];
+    result.parameters.push_back({residual.parameter_names[i], value, value});
   }
   return result;
 }
@@ -137,7 +130,7 @@ std::vector<Key> ResidualKeys() {
       Map("residual",
           "Equations of the residual with intervals for its parameters. `forereach declare` derives the declaration "
           "from them. The certifier does not read this key."),
-      Required(Word("residual.name", ResidualNames(), ModelsOfResiduals(), ReadResidual)),
+      Required(Word("residual.name", NamesIn(Residuals()), ModelsOfResiduals(), ReadResidual)),
   };
   for (const Key& number : ParameterKeys("residual", ReadExactParameter)) {
     keys.push_back(number);
@@ -151,7 +144,7 @@ std::vector<Key> ResidualKeys() {
 }
 
 std::vector<Key> RobotResidualKeys() {
-  std::vector<std::string_view> names = ResidualNames();
+  std::vector<std::string_view> names = NamesIn(Residuals());
   names.insert(names.begin(), "none");
   std::vector<Key> keys{
       Optional(Map("robot.residual", "The difference between the real robot and the nominal model."), "none"),

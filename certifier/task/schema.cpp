@@ -5,6 +5,7 @@
 
 #include "certifier/numerics/text.h"
 #include "certifier/task/key_rows.h"
+#include "command_line/nearest.h"
 
 namespace forereach {
 namespace {
@@ -23,12 +24,6 @@ std::string Numbered(const char* what, Size size) {
   return what;
 }
 
-std::string Words(const std::vector<std::string_view>& words) {
-  std::string text;
-  for (const std::string_view word : words) text += (text.empty() ? "" : ", ") + std::string(word);
-  return text;
-}
-
 std::string CountText(const Range& count) { return ToText(count.lower) + " to " + ToText(count.upper); }
 
 std::string TypeText(const Key& key) {
@@ -41,7 +36,7 @@ std::string TypeText(const Key& key) {
     case Type::kVectors: return CountText(key.count) + " lists of " + Numbered("numbers", key.size);
     case Type::kNames:
       return CountText(key.count) + (key.size == Size::kStates ? " names of states" : " names of states and inputs");
-    case Type::kWord: return (key.words.size() > 1 ? "one of " : "") + Words(key.words);
+    case Type::kWord: return (key.words.size() > 1 ? "one of " : "") + Joined({key.words.begin(), key.words.end()});
     case Type::kText: return "text";
     case Type::kChannel: return "channel";
   }
