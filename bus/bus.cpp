@@ -20,7 +20,7 @@ namespace {
 // The common part of both kinds of bus.
 class InboxBus : public Bus {
  public:
-  explicit InboxBus(std::shared_ptr<Screen> screen) : inbox_(std::move(screen)) {}
+  explicit InboxBus(const std::shared_ptr<Screen>& screen) : inbox_(screen), screen_(screen) {}
 
   void Subscribe(const std::string& channel, Handler handler) override {
     inbox_.Subscribe(channel, std::move(handler), false);
@@ -29,7 +29,9 @@ class InboxBus : public Bus {
     inbox_.Subscribe(channel, std::move(handler), true);
   }
   bool Publish(const std::string& channel, Bytes bytes) override {
-    return IsChannelName(channel) && FitsOneDatagram(channel.size(), bytes.size()) && Send(channel, bytes);
+    if (!screen_) return SendIfItFits(channel, bytes);
+    const std::optional<std::vector<std::uint8_t>> message = screen_->ToSend(channel, bytes);
+    return message && SendIfItFits(channel, *message);
   }
   int Dispatch(int timeout_ms) override {
     const int calls = HandOut(timeout_ms);
@@ -38,17 +40,25 @@ class InboxBus : public Bus {
   }
   std::int64_t dropped() const override { return inbox_.dropped(); }
   std::int64_t refused_dropped() const override { return inbox_.refused_dropped(); }
+  Refusals refusals() const override { return screen_ ? screen_->refusals() : Refusals{}; }
 
  protected:
   virtual bool Send(const std::string& channel, Bytes bytes) = 0;
   virtual int HandOut(int timeout_ms) = 0;
 
   Inbox inbox_;
+
+ private:
+  bool SendIfItFits(const std::string& channel, Bytes bytes) {
+    return IsChannelName(channel) && FitsOneDatagram(channel.size(), bytes.size()) && Send(channel, bytes);
+  }
+
+  const std::shared_ptr<Screen> screen_;
 };
 
 class MemoryBus final : public InboxBus {
  public:
-  MemoryBus(Clock clock, std::shared_ptr<Screen> screen) : InboxBus(std::move(screen)), clock_(std::move(clock)) {}
+  MemoryBus(Clock clock, const std::shared_ptr<Screen>& screen) : InboxBus(screen), clock_(std::move(clock)) {}
 
  private:
   struct Sent {
@@ -85,8 +95,8 @@ class MemoryBus final : public InboxBus {
 // LCM only sends: an lcm_t without subscriptions opens no receiving socket.
 class MulticastBus final : public InboxBus {
  public:
-  MulticastBus(const MulticastUrl& url, std::shared_ptr<Screen> screen)
-      : InboxBus(std::move(screen)),
+  MulticastBus(const MulticastUrl& url, const std::shared_ptr<Screen>& screen)
+      : InboxBus(screen),
         receiver_(url, [this](std::string_view channel, Bytes payload,
                               std::int64_t utime) { inbox_.Put(channel, payload, utime); }),
         sender_(url.ForSending()) {
@@ -108,12 +118,12 @@ class MulticastBus final : public InboxBus {
 
 }  // namespace
 
-std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock, std::shared_ptr<Screen> screen) {
-  if (url.starts_with("memq://")) return std::make_unique<MemoryBus>(std::move(clock), std::move(screen));
+std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock, const std::shared_ptr<Screen>& screen) {
+  if (url.starts_with("memq://")) return std::make_unique<MemoryBus>(std::move(clock), screen);
   if (!url.starts_with("udpm://"))
     throw BusError("bus: " + url + " has to begin with udpm:// or memq://, as in udpm://239.255.76.67:7667?ttl=0");
   try {
-    return std::make_unique<MulticastBus>(ParseMulticastUrl(url), std::move(screen));
+    return std::make_unique<MulticastBus>(ParseMulticastUrl(url), screen);
   } catch (const std::system_error& error) {
     throw BusError("bus: cannot open " + url + ": " + error.what() +
                    ". Is there a multicast route? `ip link set lo up; ip route add 224.0.0.0/4 dev lo` as root; "

@@ -8,6 +8,8 @@ Handlers run in the thread that calls Dispatch, never in the receive thread, so 
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "bus/authentic.h"
 #include "bus/bus_url.h"
@@ -24,7 +26,7 @@ struct Received {
   Bytes raw;           ///< The bytes as they arrived, with the trailer if there is one.
 };
 
-/** Decides which messages a bus admits. */
+/** Decides which messages a bus admits, and signs those that it sends. */
 class Screen {
  public:
   virtual ~Screen() = default;
@@ -34,6 +36,14 @@ class Screen {
   counted as dropped.
   @return the message, a subspan of `raw`; nothing if it is refused. */
   [[nodiscard]] virtual std::optional<Bytes> Admit(const std::string& channel, Bytes raw) = 0;
+
+  /** The bytes to send for a message; nothing if it must not be sent. Any thread may call it. */
+  [[nodiscard]] virtual std::optional<std::vector<std::uint8_t>> ToSend(const std::string& /*channel*/, Bytes message) {
+    return std::vector(message.begin(), message.end());
+  }
+
+  /** Bus::refusals. Any thread may call it. */
+  [[nodiscard]] virtual Refusals refusals() const { return {}; }
 };
 
 class Bus {
@@ -91,7 +101,7 @@ delivers within Dispatch, in order, stamped by `clock`, so several nodes in one 
 @throws BusError for any other kind of URL, or if the bus cannot be opened, for example without a multicast route. It
 never falls back to another bus. */
 [[nodiscard]] std::unique_ptr<Bus> OpenBus(const std::string& url, Clock clock = WallClockUs,
-                                           std::shared_ptr<Screen> screen = nullptr);
+                                           const std::shared_ptr<Screen>& screen = nullptr);
 
 /** The version of LCM in use, for example "1.3.1". */
 [[nodiscard]] std::string BusVersion();

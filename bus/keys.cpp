@@ -14,6 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "bus/descriptor.h"
 #include "lcmtypes/printable.h"
 
 namespace forereach {
@@ -78,21 +79,6 @@ class SecretText final {
 
  private:
   std::string text_;
-};
-
-// A file descriptor that closes itself.
-class File final {
- public:
-  explicit File(int descriptor) : descriptor_(descriptor) {}
-  ~File() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-  [[nodiscard]] int get() const { return descriptor_; }
-
- private:
-  int descriptor_;
 };
 
 }  // namespace
@@ -305,7 +291,7 @@ bool IsDirectory(const std::string& path) {
 // Checks the open file, so that the checked file is the one that is read.
 KeyFile Load(const std::string& path) {
   RequireSodium(path);
-  const File file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   struct stat status {};
   if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailSystem(path, "cannot be read");
   if (!S_ISREG(status.st_mode)) Fail(path, "is no regular file");
@@ -325,7 +311,7 @@ KeyFile Load(const std::string& path) {
 
 // A new file of the directory, on the disk.
 void WriteNew(int directory, const std::string& path, const std::string& name, mode_t mode, std::string_view text) {
-  const File file(::openat(directory, name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
+  const Descriptor file(::openat(directory, name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
   errno = file.get() < 0 ? errno : ENOSPC;  // a short write means a full disk
   if (file.get() < 0 || ::fchmod(file.get(), mode) != 0 ||
       ::write(file.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()) || ::fsync(file.get()) != 0)
@@ -358,7 +344,7 @@ void SyncParent(const std::string& path) {
   while (parent.size() > 1 && parent.back() == '/') parent.pop_back();
   const std::size_t slash = parent.rfind('/');
   parent = slash == parent.npos ? "." : parent.substr(0, std::max<std::size_t>(slash, 1));
-  const File directory(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const Descriptor directory(::open(parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (directory.get() < 0 || ::fsync(directory.get()) != 0) FailSystem(path, "cannot be written");
 }
 
@@ -370,7 +356,7 @@ void MakeKeys(const std::string& robot, const std::string& directory) {
   if (::mkdir(directory.c_str(), S_IRWXU) != 0) FailSystem(directory, "cannot be made");
   try {
     if (::chmod(directory.c_str(), S_IRWXU) != 0) FailSystem(directory, "cannot be made");  // whatever the umask
-    const File handle(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    const Descriptor handle(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
     if (handle.get() < 0) FailSystem(directory, "cannot be made");
     Digest entropy;
     randombytes_buf(entropy.data(), entropy.size());

@@ -15,7 +15,6 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/time.h>
-#include <unistd.h>
 
 #include "bus/clock.h"
 
@@ -51,13 +50,8 @@ long GrantedReceiveBufferBytes() {
   return bytes;
 }
 
-UdpReceiver::Socket::Socket() : handle_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-  Require(handle_ >= 0, "socket");
-}
-
-UdpReceiver::Socket::~Socket() { ::close(handle_); }
-
-UdpReceiver::UdpReceiver(const MulticastUrl& url, Deliver deliver) : deliver_(std::move(deliver)) {
+UdpReceiver::UdpReceiver(const MulticastUrl& url, Deliver deliver)
+    : deliver_(std::move(deliver)), socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
   Open(url);
   thread_ = std::thread([this] { Receive(); });
 }
@@ -73,7 +67,8 @@ DatagramCounts UdpReceiver::counts() const {
 }
 
 void UdpReceiver::Open(const MulticastUrl& url) {
-  const int socket = socket_.handle();
+  const int socket = socket_.get();
+  Require(socket >= 0, "socket");
   constexpr int kOn = 1, kOff = 0;
   SetOption(socket, SOL_SOCKET, SO_REUSEADDR, kOn, "sharing the port");  // with LCM's processes on this machine
   const long buffer = url.receive_buffer_bytes > 0 ? url.receive_buffer_bytes : kReceiveBufferBytes;
@@ -105,7 +100,7 @@ void UdpReceiver::ReceiveOne(std::uint8_t* buffer, std::size_t bytes) {
   header.msg_iovlen = 1;
   header.msg_control = control.data();
   header.msg_controllen = control.size();
-  const ssize_t size = ::recvmsg(socket_.handle(), &header, 0);
+  const ssize_t size = ::recvmsg(socket_.get(), &header, 0);
   if (size < 0) {
     if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return;
     {

@@ -11,6 +11,7 @@ replaces LCM's receiver, which can crash on a malformed header and allocates the
 
 #include "bus/bus_url.h"
 #include "bus/datagram.h"
+#include "bus/descriptor.h"
 
 namespace forereach {
 
@@ -33,24 +34,12 @@ class UdpReceiver final {
   [[nodiscard]] DatagramCounts counts() const;
 
  private:
-  class Socket final {
-   public:
-    Socket();
-    ~Socket();
-    Socket(const Socket&) = delete;
-    Socket& operator=(const Socket&) = delete;
-    [[nodiscard]] int handle() const { return handle_; }
-
-   private:
-    int handle_;
-  };
-
   void Open(const MulticastUrl& url);
   void Receive();
   void ReceiveOne(std::uint8_t* buffer, std::size_t bytes);
 
   const Deliver deliver_;
-  const Socket socket_;
+  const Descriptor socket_;
   mutable std::mutex mutex_;  // guards counts_
   DatagramCounts counts_;
   std::uint32_t last_lost_ = 0;  // the kernel's count; used only by the receive thread

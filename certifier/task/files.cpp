@@ -38,22 +38,15 @@ InputFile::InputFile(const std::string& path, std::int64_t most_bytes, std::stri
       // A pipe without a writer would make a blocking open wait.
       descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY)) {
   struct stat status {};
-  try {
-    if (descriptor_ < 0 && errno == ENXIO) Fail(KindOf(0));  // a socket
-    if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0) Fail(Reason());
-    if (!S_ISREG(status.st_mode)) Fail(KindOf(status.st_mode));
-    RequireAtMost(status.st_size);
-  } catch (...) {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    throw;
-  }
+  if (descriptor_.get() < 0 && errno == ENXIO) Fail(KindOf(0));  // a socket
+  if (descriptor_.get() < 0 || ::fstat(descriptor_.get(), &status) != 0) Fail(Reason());
+  if (!S_ISREG(status.st_mode)) Fail(KindOf(status.st_mode));
+  RequireAtMost(status.st_size);
 }
-
-InputFile::~InputFile() { ::close(descriptor_); }
 
 std::size_t InputFile::Read(char* to, std::size_t most) {
   ssize_t count;
-  do count = ::read(descriptor_, to, most);
+  do count = ::read(descriptor_.get(), to, most);
   while (count < 0 && errno == EINTR);
   if (count < 0)
     Fail("reading failed after " + std::to_string(read_) + " bytes: " + std::generic_category().message(errno));

@@ -9,12 +9,14 @@ read from a mount that stalls still waits; whoever may not wait reads in a threa
 #include <string>
 #include <string_view>
 
+#include "bus/descriptor.h"
+
 namespace forereach {
 
 inline constexpr std::int64_t kMegabyte = 1 << 20;
 inline constexpr std::int64_t kLargestTaskFile = 16 * kMegabyte;
 inline constexpr std::int64_t kLargestJsonFile = 1024 * kMegabyte;
-inline constexpr std::int64_t kLargestCsvFile = 16 * 1024 * kMegabyte;
+inline constexpr std::int64_t kLargestCsvFile = 16'384 * kMegabyte;
 
 /** A regular file, open for reading from its beginning to its end. */
 class InputFile final {
@@ -22,9 +24,6 @@ class InputFile final {
   /** @param named_by goes before each message: the place that names the file. @param most_bytes in the file.
   @throws ConfigError with file and cause if it is no regular file, cannot be opened, or is larger. */
   InputFile(const std::string& path, std::int64_t most_bytes, std::string named_by = "");
-  ~InputFile();
-  InputFile(const InputFile&) = delete;
-  InputFile& operator=(const InputFile&) = delete;
 
   /** The next bytes, at most so many; 0 at the end. @throws ConfigError if reading fails or the file has grown larger.
    */
@@ -37,7 +36,7 @@ class InputFile final {
   const std::string path_, named_by_;
   const std::int64_t most_bytes_;
   std::int64_t read_ = 0;
-  int descriptor_;
+  const Descriptor descriptor_;
 };
 
 /** All of a regular file. Same errors. */
