@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "certifier/gate/robot_state_message.h"
+#include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "lcmtypes/names.h"
 
@@ -60,7 +60,7 @@ void PlannerNode::OnRobotState(const Received& received) {
 
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
   return FaultOf(state, config_.problem->model->num_states()).empty() &&
-         Judge(state.utime, now_us, config_.gate).freshness != Freshness::kFuture;
+         CheckStamp(state.utime, now_us, config_.gate).freshness != Freshness::kFuture;
 }
 
 // True for a state that is neither late nor repeated.

@@ -26,7 +26,7 @@ before the candidate; the digests of the basis then differ from those that the d
 #include <vector>
 
 #include "certifier/gate/obstacles_in_force.h"
-#include "certifier/gate/transition_message.h"
+#include "certifier/gate/robot_messages.h"
 #include "certifier/task/config.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"

@@ -4,11 +4,13 @@
 #include <iterator>
 #include <utility>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach {
 
 void Conformance::Remember(const certified_plan_t& certified) {
   if (const auto known = Find(certified.plan.plan_id); known != plans_.end()) {
-    if (certified.plan.plan_id != last_.plan_id) plans_[static_cast<std::size_t>(known - plans_.begin())] = certified;
+    if (certified.plan.plan_id != last_.plan_id) plans_[ToSize(known - plans_.begin())] = certified;
     return;
   }
   const bool full = plans_.size() == kPlans;
@@ -21,7 +23,7 @@ void Conformance::Remember(const certified_plan_t& certified) {
 }
 
 std::optional<Conformance::Departure> Conformance::Check(const robot_state_t& state) {
-  const std::span<const double> measured(state.state, static_cast<std::size_t>(state.num_states));
+  const std::span<const double> measured(state.state, ToSize(state.num_states));
   const bool executing = state.mode == robot_state_t::EXECUTING;
   const StreamPosition position{state.sequence, state.utime};
   const Succession succession = order_.Compare(position, StreamOrder::kNoHorizon);
@@ -43,8 +45,7 @@ std::optional<Conformance::Departure> Conformance::Check(const transition_t& tra
     return std::nullopt;
   for (const Place& begin : {last_, before_})
     if (begin.plan_id >= 0 && begin.utime == transition.utime)
-      return Compare(begin.plan_id, begin.step + 1,
-                     {transition.next_state, static_cast<std::size_t>(transition.num_states)});
+      return Compare(begin.plan_id, begin.step + 1, {transition.next_state, ToSize(transition.num_states)});
   return std::nullopt;
 }
 
@@ -58,7 +59,7 @@ std::optional<Conformance::Departure> Conformance::Compare(std::int64_t plan_id,
   if (known == plans_.end() || step < 0 || step > known->plan.num_steps || std::ssize(state) != known->plan.num_states)
     return std::nullopt;
   for (int k = 0; k < known->plan.num_states; ++k) {
-    const double value = state[static_cast<std::size_t>(k)];
+    const double value = state[ToSize(k)];
     const double lower = known->slice_lower[step][k], upper = known->slice_upper[step][k];
     if (!(lower <= value && value <= upper)) return Departure{plan_id, step, k, value, lower, upper};
   }

@@ -5,9 +5,8 @@
 
 #include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/gate/robot_state_message.h"
+#include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
-#include "certifier/gate/transition_message.h"
 #include "certifier/numerics/text.h"
 #include "lcmtypes/seal.h"
 
@@ -135,12 +134,12 @@ std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candid
 }
 
 std::string Gate::CheckFresh(std::int64_t utime, std::int64_t now_us) const {
-  return Judge(utime, now_us, options_).fault;
+  return CheckStamp(utime, now_us, options_).fault;
 }
 
 std::optional<Gate::Rejection> Gate::CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const {
   const std::int64_t lifetime = Microseconds(options_.certificate_lifetime_ms);
-  const Stamp stamp = Judge(candidate.utime, now_us, options_);
+  const Stamp stamp = CheckStamp(candidate.utime, now_us, options_);
   if (stamp.freshness != Freshness::kFresh)
     return Rejection{stamp.freshness == Freshness::kStale ? decision_t::CAUSE_STALE : decision_t::CAUSE_FUTURE,
                      stamp.fault};

@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/numerics/size.h"
+
 namespace forereach {
 namespace {
 
@@ -25,6 +27,7 @@ Obstacle FromMessage(const obstacle_t& message) {
     case obstacle_t::BOX: RequirePoints(message, 2); return Obstacle::AxisBox(Point(message, 0), Point(message, 1));
     case obstacle_t::POLYGON: {
       std::vector<Eigen::VectorXd> vertices;
+      vertices.reserve(ToSize(message.num_points));
       for (int i = 0; i < message.num_points; ++i) vertices.push_back(Point(message, i));
       return Obstacle::Polygon(vertices);
     }

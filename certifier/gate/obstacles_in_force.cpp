@@ -28,7 +28,7 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
     return "sequence " + std::to_string(position.sequence) + " does not exceed the last, " +
            std::to_string(state_.order.newest()->sequence) + ", nor does its stamp the last one's";
   NoteOrder(position.sequence, now_us);
-  if (const std::string fault = Judge(position.utime, now_us, options_).fault; !fault.empty()) return Doubt(fault);
+  if (const std::string fault = CheckStamp(position.utime, now_us, options_).fault; !fault.empty()) return Doubt(fault);
   try {
     state_.heard = FromMessage(*message, dim_);
   } catch (const std::invalid_argument& error) {

@@ -4,7 +4,7 @@
 
 namespace forereach {
 
-Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options) {
+Stamp CheckStamp(std::int64_t utime, std::int64_t now_us, const GateOptions& options) {
   const std::int64_t max_age = Microseconds(options.max_age_ms), max_ahead = Microseconds(options.max_ahead_ms);
   return {FreshnessOf(utime, now_us, max_age, max_ahead), WhyNotFresh(utime, now_us, max_age, max_ahead)};
 }

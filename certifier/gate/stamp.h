@@ -16,7 +16,7 @@ struct Stamp {
 
 /** The freshness of a message with the stamp `utime` that arrived at `now_us`, both microseconds since the Unix epoch.
  */
-[[nodiscard]] Stamp Judge(std::int64_t utime, std::int64_t now_us, const GateOptions& options);
+[[nodiscard]] Stamp CheckStamp(std::int64_t utime, std::int64_t now_us, const GateOptions& options);
 
 /** IsNotAfter of lcmtypes/freshness.h, with the task's max_ahead. */
 [[nodiscard]] bool IsNotAfter(std::int64_t utime, std::int64_t then_us, std::int64_t now_us,

@@ -1,13 +1,18 @@
-/** An executed transition from the bus, as a certifier learns it. */
+/** Checks of what a robot sends: its state, and executed transitions as a certifier learns them. */
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "certifier/certify/problem.h"
+#include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 
 namespace forereach {
+
+/** Why a state is unusable at any time: num_states other than the model's, an entry that is not finite, an unknown
+mode. Empty if it is usable. It does not check the stamp (stamp.h). */
+[[nodiscard]] std::string FaultOf(const robot_state_t& state, int num_states);
 
 struct ExecutedTransition {
   std::vector<double> z, next;  ///< (x, u) and x+
