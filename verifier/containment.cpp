@@ -26,12 +26,12 @@ int AxisOf(const Column& column, int dim, const IsZero& is_zero) {
 class Search {
  public:
   Search(const Slice& inner, const Eigen::VectorXd& center, const Eigen::MatrixXd& generators)
-      : inner_(inner), center_(center), generators_(generators), taken_(ToSize(generators.cols())) {
-    for (const auto& column : inner.columns) {
-      Eigen::VectorXd& rounded = rounded_.emplace_back(inner.dim());
-      for (int k = 0; k < inner.dim(); ++k) rounded[k] = column[ToSize(k)].ToDouble();
-    }
-    pairs_.resize(rounded_.size());
+      : inner_(inner),
+        center_(center),
+        generators_(generators),
+        rounded_(inner.RoundedColumns()),
+        taken_(ToSize(generators.cols())),
+        pairs_(rounded_.size()) {
     for (Eigen::Index i = 0; i < generators.cols(); ++i) {
       axis_.push_back(AxisOf(generators.col(i), inner.dim(), [](double g) { return g == 0; }));
       taken_[ToSize(i)] = axis_.back() >= 0;  // those make up for the rest
@@ -126,7 +126,7 @@ class Search {
     std::vector<Real> gamma;
     for (std::size_t j = 0; j < pairs_.size(); ++j) gamma.push_back(pairs_[j] ? Gamma(j, line) : Real());
     for (int k = 0; k < inner_.dim(); ++k)
-      if (const auto uncovered = Uncovered(k, gamma)) return uncovered;
+      if (auto uncovered = Uncovered(k, gamma)) return uncovered;
     return std::nullopt;
   }
 

@@ -170,8 +170,8 @@ class ClaimCheck {
   }
   [[nodiscard]] Real SquaredDistanceOver(const Domain::Ball& ball, const Box& box) const {
     Real sum(0.0);
-    for (std::size_t i = 0; i < ball.coordinates.size(); ++i)
-      sum += sqr(box[ToSize(ball.coordinates[i])] - Real(ball.center[static_cast<Eigen::Index>(i)]));
+    for (Eigen::Index i = 0; i < ball.center.size(); ++i)
+      sum += sqr(box[ToSize(ball.coordinates[ToSize(i)])] - Real(ball.center[i]));
     return sum;
   }
 

@@ -277,8 +277,8 @@ Real ProjectedSlice::Radius() const {
   long exponent = -100000;
   for (const RealVector& g : generators_)
     for (const Real& entry : g) exponent = std::max(exponent, entry.exponent());
-  const auto p = static_cast<Eigen::Index>(center_.size());
-  Eigen::MatrixXd rough = Eigen::MatrixXd::Zero(3, static_cast<Eigen::Index>(generators_.size()));
+  const auto p = std::ssize(center_);
+  Eigen::MatrixXd rough = Eigen::MatrixXd::Zero(3, std::ssize(generators_));
   for (Eigen::Index j = 0; j < rough.cols(); ++j)
     for (Eigen::Index k = 0; k < p; ++k) rough(k, j) = generators_[ToSize(j)][ToSize(k)].ToDouble(-exponent);
   Eigen::VectorXd best = Eigen::VectorXd::Ones(rough.cols()), signs;
@@ -292,9 +292,10 @@ Real ProjectedSlice::Radius() const {
     }
   }
   RealVector sum(center_.size());
-  for (std::size_t j = 0; j < generators_.size(); ++j)
-    for (std::size_t k = 0; k < sum.size(); ++k)
-      sum[k] = best[static_cast<Eigen::Index>(j)] < 0 ? sum[k] - generators_[j][k] : sum[k] + generators_[j][k];
+  for (Eigen::Index j = 0; j < best.size(); ++j) {
+    const RealVector& g = generators_[ToSize(j)];
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] = best[j] < 0 ? sum[k] - g[k] : sum[k] + g[k];
+  }
   return sqrt(Dot(sum, sum)).lower();
 }
 

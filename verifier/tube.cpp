@@ -105,25 +105,31 @@ double CostOfConfusing(const Slice& slice, const Score& last, const Score& first
   return std::max(CostOfBoxing(slice.columns[last.column], size), CostOfBoxing(slice.columns[first.column], size));
 }
 
+// Keeps these columns, in this order, and boxes the others.
+void BoxAllBut(Slice& slice, const std::vector<std::size_t>& kept) {
+  Slice reduced{slice.center, {}};
+  for (const std::size_t j : kept) reduced.columns.push_back(slice.columns[j]);
+  for (int k = 0; k < slice.dim(); ++k) {
+    Real sum;
+    for (std::size_t j = 0; j < slice.columns.size(); ++j)
+      if (std::ranges::count(kept, j) == 0) sum += abs(slice.columns[j][ToSize(k)]);
+    if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
+  }
+  slice = std::move(reduced);
+}
+
 // Girard's rule: keep the (order - 1) n columns of largest |g|_1 - |g|_inf, ties to the earlier, box the rest. Returns
 // what it may have cost the certifier, in doubles, to go another way.
 double Reduce(Slice& slice, int order, double remainder_rounding) {
   const auto n = ToSize(slice.dim()), kept = ToSize(order - 1) * n;
   const double tiny = std::ranges::any_of(slice.columns, MayUnderflow) ? 1 : 0;
   if (slice.columns.size() <= ToSize(order) * n) return tiny;
-  std::vector<Score> scores = Ranking(slice);
+  const std::vector<Score> scores = Ranking(slice);
   const double close = kept > 0 ? CostOfConfusing(slice, scores[kept - 1], scores[kept], remainder_rounding) : 0;
-  const auto rest = scores.begin() + static_cast<std::ptrdiff_t>(kept);
-  std::sort(scores.begin(), rest, [](const Score& a, const Score& b) { return a.column < b.column; });
-  Slice reduced{slice.center, {}};
-  for (auto score = scores.begin(); score != rest; ++score)
-    reduced.columns.push_back(std::move(slice.columns[score->column]));
-  for (int k = 0; k < slice.dim(); ++k) {
-    Real sum;
-    for (auto score = rest; score != scores.end(); ++score) sum += abs(slice.columns[score->column][ToSize(k)]);
-    if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
-  }
-  slice = std::move(reduced);
+  std::vector<std::size_t> largest;
+  for (std::size_t i = 0; i < kept; ++i) largest.push_back(scores[i].column);
+  std::ranges::sort(largest);
+  BoxAllBut(slice, largest);
   return std::max(close, tiny);
 }
 
@@ -132,34 +138,22 @@ double Reduce(Slice& slice, int order, double remainder_rounding) {
 bool ReduceAs(Slice& slice, int order, const Eigen::MatrixXd& recorded) {
   const auto n = ToSize(slice.dim()), kept = ToSize(order - 1) * n;
   if (slice.columns.size() <= ToSize(order) * n) return true;
-  if (recorded.cols() < static_cast<Eigen::Index>(kept)) return false;
-  std::vector<Eigen::VectorXd> rounded;
-  for (const auto& column : slice.columns) {
-    rounded.emplace_back(slice.dim());
-    for (int k = 0; k < slice.dim(); ++k) rounded.back()[k] = column[ToSize(k)].ToDouble();
-  }
-  std::vector<bool> taken(slice.columns.size());
-  Slice reduced{slice.center, {}};
-  for (std::size_t i = 0; i < kept; ++i) {
-    const auto generator = recorded.col(static_cast<Eigen::Index>(i));
+  if (ToSize(recorded.cols()) < kept) return false;
+  const std::vector<Eigen::VectorXd> rounded = slice.RoundedColumns();
+  std::vector<std::size_t> chosen;
+  for (Eigen::Index i = 0; ToSize(i) < kept; ++i) {
+    const auto generator = recorded.col(i);
     std::size_t nearest = slice.columns.size();
     double least = kNone;
     for (std::size_t j = 0; j < slice.columns.size(); ++j) {
-      if (taken[j]) continue;
+      if (std::ranges::count(chosen, j) > 0) continue;
       const double away = std::min((rounded[j] - generator).lpNorm<1>(), (rounded[j] + generator).lpNorm<1>());
       if (away < least) least = away, nearest = j;
     }
     if (nearest == slice.columns.size()) return false;
-    taken[nearest] = true;
-    reduced.columns.push_back(slice.columns[nearest]);
+    chosen.push_back(nearest);
   }
-  for (int k = 0; k < slice.dim(); ++k) {
-    Real sum;
-    for (std::size_t j = 0; j < taken.size(); ++j)
-      if (!taken[j]) sum += abs(slice.columns[j][ToSize(k)]);
-    if (!sum.IsZero()) reduced.columns.push_back(Axis(slice.dim(), k, sum));
-  }
-  slice = std::move(reduced);
+  BoxAllBut(slice, chosen);
   return true;
 }
 
@@ -270,6 +264,15 @@ Real Slice::HalfWidth(int k) const {
 }
 
 // The bounds on r_k over one Z_t from data and declaration.
+std::vector<Eigen::VectorXd> Slice::RoundedColumns() const {
+  std::vector<Eigen::VectorXd> rounded;
+  for (const auto& column : columns) {
+    Eigen::VectorXd& entries = rounded.emplace_back(dim());
+    for (int k = 0; k < dim(); ++k) entries[k] = column[ToSize(k)].ToDouble();
+  }
+  return rounded;
+}
+
 struct TubeMaker::Known {
   Bounds bounds;
   bool contradiction = false;  // one that doubles show too
@@ -341,7 +344,7 @@ double TubeMaker::RemainderRounding() const {
 Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& controls, const TubeOptions& options) const {
   Tube tube;
   tube.slices.push_back(SliceOf(initial_set));
-  for (int t = 0; t < controls.cols() && !tube.failure; ++t) {
+  for (int t = 0, steps = static_cast<int>(controls.cols()); t < steps && !tube.failure; ++t) {
     const Slice slice = tube.slices.back();
     tube.failure = Advance(tube, Query(t, slice, controls.col(t)), options);
   }
@@ -411,12 +414,12 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
                    scale.IsZero() ? 1 : (abs(found - bound) / scale).ToDouble()};
   };
   const int n = domain.state.dim();
+  const std::vector<std::string> names = problem_.model->variable_names();
   for (int l = 0; l < static_cast<int>(query.hull.size()); ++l) {
     const Real lower(l < n ? domain.state.lower()[l] : domain.input.lower()[l - n]);
     const Real upper(l < n ? domain.state.upper()[l] : domain.input.upper()[l - n]);
     const Real &center = query.center[ToSize(l)], &r = query.half_width[ToSize(l)];
-    const std::string name =
-        l < n ? problem_.model->state_names()[ToSize(l)] : problem_.model->input_names()[ToSize(l - n)];
+    const std::string& name = names[ToSize(l)];
     if (const Answer a = IsAtMost(lower, center - r); a != Answer::kYes)
       return refuse(name, center - r, lower, a, "at least ");
     if (const Answer a = IsAtMost(center + r, upper); a != Answer::kYes) return refuse(name, center + r, upper, a);
@@ -424,9 +427,9 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
   for (std::size_t i = 0; i < domain.inequalities.size(); ++i) {
     const auto& [coefficients, bound] = domain.inequalities[i];
     Real largest;
-    for (std::size_t l = 0; l < query.center.size(); ++l) {
-      const Real c(coefficients[static_cast<Eigen::Index>(l)]);
-      largest += c * query.center[l] + abs(c) * query.half_width[l];
+    for (Eigen::Index l = 0; l < coefficients.size(); ++l) {
+      const Real c(coefficients[l]);
+      largest += c * query.center[ToSize(l)] + abs(c) * query.half_width[ToSize(l)];
     }
     if (const Answer a = IsAtMost(largest, bound); a != Answer::kYes)
       return refuse("inequality " + std::to_string(i), largest, bound, a);
@@ -434,9 +437,9 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
   for (std::size_t i = 0; i < domain.balls.size(); ++i) {
     const auto& [coordinates, center, radius] = domain.balls[i];
     Real square;
-    for (std::size_t c = 0; c < coordinates.size(); ++c) {
-      const auto l = ToSize(coordinates[c]);
-      square += sqr(abs(query.center[l] - Real(center[static_cast<Eigen::Index>(c)])) + query.half_width[l]);
+    for (Eigen::Index c = 0; c < center.size(); ++c) {
+      const auto l = ToSize(coordinates[ToSize(c)]);
+      square += sqr(abs(query.center[l] - Real(center[c])) + query.half_width[l]);
     }
     if (const Answer a = IsAtMost(square, sqr(Real(radius))); a != Answer::kYes)
       return refuse("ball " + std::to_string(i), sqrt(square), radius, a);

@@ -32,6 +32,8 @@ struct Slice {
   [[nodiscard]] int dim() const { return static_cast<int>(center.size()); }
   /** sum_j |G_kj|. */
   [[nodiscard]] Real HalfWidth(int k) const;
+  /** The columns in doubles, to the nearest. */
+  [[nodiscard]] std::vector<Eigen::VectorXd> RoundedColumns() const;
 };
 
 /** X_0: a box, or a zonotope of doubles. */
