@@ -22,30 +22,6 @@ InUse InUseBy(const candidate_plan_t& plan) {
   return {plan.num_steps + 1, plan.num_states};
 }
 
-// Bytes as on the bus: LCM's own functions encode them.
-class BusBytes {
- public:
-  explicit BusBytes(std::size_t at_most) { bytes_.reserve(at_most); }
-
-  void Append(std::int64_t value) { __int64_t_encode_array(Grow(sizeof value), 0, sizeof value, &value, 1); }
-  void Append(const Slices& slices, InUse in_use) {
-    const int size = in_use.states * static_cast<int>(sizeof(double));
-    for (int t = 0; t < in_use.slices; ++t)
-      __double_encode_array(Grow(static_cast<std::size_t>(size)), 0, size, slices[t], in_use.states);
-  }
-  void Append(const std::uint8_t (&digest)[32]) { std::memcpy(Grow(sizeof digest), digest, sizeof digest); }
-
-  [[nodiscard]] Digest digest() const { return DigestOf(bytes_); }
-
- private:
-  [[nodiscard]] std::uint8_t* Grow(std::size_t by) {
-    bytes_.resize(bytes_.size() + by);
-    return bytes_.data() + bytes_.size() - by;
-  }
-
-  std::vector<std::uint8_t> bytes_;
-};
-
 std::optional<SealFault> FindUnusedEntry(const char* name, const Slices& slices, InUse in_use) {
   for (int t = 0; t < kSlices; ++t)
     for (int k = t < in_use.slices ? in_use.states : 0; k < kStates; ++k) {
@@ -63,20 +39,22 @@ std::optional<SealFault> FindUnusedEntry(const char* name, const Slices& slices,
 
 Digest CertificateDigest(const certified_plan_t& certified) {
   const InUse in_use = InUseBy(certified.plan);
-  BusBytes bytes(EncodedSize<certified_plan_t>());
-  bytes.Append(certified_plan_t::getHash());
-  bytes.Append(certified.utime);
-  bytes.Append(certified.sequence);
-  bytes.Append(certified.expires_utime);
-  bytes.Append(certified.slice_lower, in_use);
-  bytes.Append(certified.slice_upper, in_use);
-  bytes.Append(certified.plan_digest);
-  bytes.Append(certified.config_digest);
-  bytes.Append(certified.model_digest);
-  bytes.Append(certified.declaration_digest);
-  bytes.Append(certified.observations_digest);
-  bytes.Append(certified.obstacles_digest);
-  return bytes.digest();
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(EncodedSize<certified_plan_t>());
+  const auto append = [&bytes](const auto& part) { bytes.insert(bytes.end(), std::begin(part), std::end(part)); };
+  for (const std::int64_t number :
+       {certified_plan_t::getHash(), certified.utime, certified.sequence, certified.expires_utime})
+    append(BigEndian(number));
+  for (const Slices* slices : {&certified.slice_lower, &certified.slice_upper})
+    for (int t = 0; t < in_use.slices; ++t)
+      for (int k = 0; k < in_use.states; ++k) append(BigEndian(std::bit_cast<std::uint64_t>((*slices)[t][k])));
+  append(certified.plan_digest);
+  append(certified.config_digest);
+  append(certified.model_digest);
+  append(certified.declaration_digest);
+  append(certified.observations_digest);
+  append(certified.obstacles_digest);
+  return DigestOf(bytes);
 }
 
 std::vector<SealFault> FindSealFaults(const certified_plan_t& certified) {

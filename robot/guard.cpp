@@ -43,14 +43,10 @@ GuardVerdict RefuseAt(GuardCause cause, int step, int coordinate, double value, 
 
 GuardVerdict RefuseDecode(DecodeStatus status, std::size_t received) {
   const std::size_t expected = EncodedSize<certified_plan_t>();
-  switch (status) {
-    case DecodeStatus::kUnknownFingerprint:
-      return Refuse(GuardCause::kUnknownFingerprint, Sentence("the %zu bytes are not a certified_plan_t", received));
-    case DecodeStatus::kTrailingBytes:
-      return Refuse(GuardCause::kTrailingBytes, Sentence("%zu bytes, a certified_plan_t has %zu", received, expected));
-    default:
-      return Refuse(GuardCause::kWrongLength, Sentence("%zu bytes, a certified_plan_t has %zu", received, expected));
-  }
+  if (status == DecodeStatus::kUnknownFingerprint)
+    return Refuse(GuardCause::kUnknownFingerprint, Sentence("the %zu bytes are not a certified_plan_t", received));
+  return Refuse(status == DecodeStatus::kTrailingBytes ? GuardCause::kTrailingBytes : GuardCause::kWrongLength,
+                Sentence("%zu bytes, a certified_plan_t has %zu", received, expected));
 }
 
 // x <= a + b in real arithmetic. Where x differs from the rounded sum, the exact sum lies on the same side of x; where
@@ -178,7 +174,7 @@ void RequireDomain(const std::optional<GuardDomain>& domain, const GuardOptions&
   if (!domain) return;
   const auto require = [](const char* what, const std::vector<double>& lower, const std::vector<double>& upper,
                           int size) {
-    bool good = lower.size() == static_cast<std::size_t>(size) && upper.size() == lower.size();
+    bool good = std::ssize(lower) == size && upper.size() == lower.size();
     for (std::size_t k = 0; good && k < lower.size(); ++k) good = lower[k] <= upper[k];
     if (!good)
       throw std::invalid_argument(std::string("GuardOptions: domain: ") + what + " has to have " +
@@ -402,7 +398,7 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_u
 }
 
 GuardVerdict Guard::ExamineStateSize(std::span<const double> state) const {
-  if (state.size() == static_cast<std::size_t>(options_.num_states)) return {};
+  if (std::ssize(state) == options_.num_states) return {};
   return Refuse(GuardCause::kWrongStateSize,
                 Sentence("a state of %zu entries, this robot has %d", state.size(), options_.num_states));
 }

@@ -9,6 +9,7 @@
 
 #include "bus/bus_options.h"
 #include "certifier/gate/stamp.h"
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "forereach/execution_event_t.hpp"
 
@@ -59,7 +60,7 @@ std::vector<int> RestCoordinates(const NominalModel& model) {
   constexpr std::array<std::string_view, 4> kMotion{"v", "a", "vx", "vy"};
   std::vector<int> rest;
   for (int k = 0; k < model.num_states(); ++k) {
-    const std::string& name = model.state_names()[static_cast<std::size_t>(k)];
+    const std::string& name = model.state_names()[ToSize(k)];
     if (std::find(kMotion.begin(), kMotion.end(), name) != kMotion.end()) rest.push_back(k);
   }
   return rest;
@@ -132,7 +133,7 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
 
 // The hold mode: no control and no residual acts.
 void RobotSimNode::Hold() {
-  for (const int k : rest_coordinates_) state_[static_cast<std::size_t>(k)] = 0;
+  for (const int k : rest_coordinates_) state_[ToSize(k)] = 0;
   if (!goal_reached_) ++stops_;
 }
 

@@ -12,7 +12,7 @@ Learned Observe(const Problem& problem, std::span<const double> z, std::span<con
   if (!std::ranges::all_of(z, finite) || !std::ranges::all_of(next, finite)) return Learned::kNotFinite;
   if (!problem.domain.Contains(z)) return Learned::kOutsideDomain;
   const auto row = [](std::span<const double> values) {
-    return Eigen::Map<const Eigen::RowVectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+    return Eigen::Map<const Eigen::RowVectorXd>(values.data(), std::ssize(values));
   };
   try {
     observed = Observe(*problem.model, {row(z), row(next)});

@@ -32,9 +32,9 @@ double SmallestValue(const Domain::Inequality& inequality, const Arguments& box)
 
 double SmallestSquaredDistance(const Domain::Ball& ball, const Arguments& box) {
   double smallest = 0;
-  for (std::size_t i = 0; i < ball.coordinates.size(); ++i) {
-    const Interval& z = box[ToSize(ball.coordinates[i])];
-    const double c = ball.center[static_cast<Eigen::Index>(i)];
+  for (Eigen::Index i = 0; i < ball.center.size(); ++i) {
+    const Interval& z = box[ToSize(ball.coordinates[ToSize(i)])];
+    const double c = ball.center[i];
     const double away = std::max({0.0, SubDown(z.lower, c), SubDown(c, z.upper)});
     smallest = AddDown(smallest, MulDown(away, away));
   }
@@ -56,13 +56,10 @@ void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z)
   for (int round = 0; round < 8 && !domain.Contains(z); ++round) {
     for (const auto& [coordinates, center, radius] : domain.balls) {
       double square = 0;
-      for (std::size_t i = 0; i < coordinates.size(); ++i)
-        square += std::pow(z[ToSize(coordinates[i])] - center[static_cast<Eigen::Index>(i)], 2);
+      const auto entry = [&](Eigen::Index i) -> double& { return z[ToSize(coordinates[ToSize(i)])]; };
+      for (Eigen::Index i = 0; i < center.size(); ++i) square += std::pow(entry(i) - center[i], 2);
       const double scale = std::min(1.0, kInward * radius / std::sqrt(square));
-      for (std::size_t i = 0; i < coordinates.size(); ++i) {
-        const double c = center[static_cast<Eigen::Index>(i)];
-        z[ToSize(coordinates[i])] = c + scale * (z[ToSize(coordinates[i])] - c);
-      }
+      for (Eigen::Index i = 0; i < center.size(); ++i) entry(i) = center[i] + scale * (entry(i) - center[i]);
     }
     for (const auto& [coefficients, bound] : domain.inequalities) {
       const Eigen::Map<Eigen::VectorXd> point(z.data(), coefficients.size());

@@ -13,29 +13,19 @@
 namespace forereach {
 namespace {
 
-double BoxLower(const Domain& domain, int l) {
-  const int n = domain.state.dim();
-  return l < n ? domain.state.lower()[l] : domain.input.lower()[l - n];
-}
-
-double BoxUpper(const Domain& domain, int l) {
-  const int n = domain.state.dim();
-  return l < n ? domain.state.upper()[l] : domain.input.upper()[l - n];
-}
-
 double LargestValue(const Domain::Inequality& inequality, std::span<const Interval> box) {
   double largest = 0;
-  for (std::size_t l = 0; l < box.size(); ++l) {
-    const double c = inequality.coefficients[static_cast<Eigen::Index>(l)];
-    if (c != 0) largest = AddUp(largest, MulUp(c, c > 0 ? box[l].upper : box[l].lower));
+  for (Eigen::Index l = 0; l < inequality.coefficients.size(); ++l) {
+    const double c = inequality.coefficients[l];
+    if (c != 0) largest = AddUp(largest, MulUp(c, c > 0 ? box[ToSize(l)].upper : box[ToSize(l)].lower));
   }
   return largest;
 }
 
 double LargestSquaredDistance(const Domain::Ball& ball, std::span<const Interval> box) {
   double largest = 0;
-  for (std::size_t i = 0; i < ball.coordinates.size(); ++i) {
-    const double away = box[ToSize(ball.coordinates[i])].DistanceUpper(ball.center[static_cast<Eigen::Index>(i)]);
+  for (Eigen::Index i = 0; i < ball.center.size(); ++i) {
+    const double away = box[ToSize(ball.coordinates[ToSize(i)])].DistanceUpper(ball.center[i]);
     largest = AddUp(largest, MulUp(away, away));
   }
   return largest;
@@ -61,9 +51,8 @@ void Domain::Validate(int num_states, int num_inputs) const {
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const auto& [coordinates, center, radius] = balls[i];
     const std::string which = "ball " + std::to_string(i);
-    require(
-        !coordinates.empty() && static_cast<Eigen::Index>(coordinates.size()) == center.size() && center.allFinite(),
-        which + " needs as many finite center entries as coordinates");
+    require(!coordinates.empty() && std::ssize(coordinates) == center.size() && center.allFinite(),
+            which + " needs as many finite center entries as coordinates");
     for (const int l : coordinates)
       require(0 <= l && l < variables, which + ": coordinate " + std::to_string(l) + " does not exist");
     require(radius >= 0 && radius < kInfinity, which + ": radius " + ToText(radius) + " is negative or not finite");
@@ -108,8 +97,8 @@ bool DomainTest::MeetsConstraintsWell(const double* center, const double* half_w
   bool inside = true;
   for (const auto& [coefficients, bound] : domain_.inequalities) {
     double value = 0, size = std::abs(bound) + 0x1p-1000;
-    for (std::size_t l = 0; l < size_; ++l) {
-      const double c = coefficients[static_cast<Eigen::Index>(l)];
+    for (Eigen::Index l = 0; l < coefficients.size(); ++l) {
+      const double c = coefficients[l];
       value += c * center[l] + std::abs(c) * half_width[l];
       size += std::abs(c) * (std::abs(center[l]) + half_width[l]);
     }
@@ -117,9 +106,9 @@ bool DomainTest::MeetsConstraintsWell(const double* center, const double* half_w
   }
   for (const auto& [coordinates, ball_center, radius] : domain_.balls) {
     double square = 0;
-    for (std::size_t i = 0; i < coordinates.size(); ++i) {
-      const auto l = ToSize(coordinates[i]);
-      const double middle = ball_center[static_cast<Eigen::Index>(i)];
+    for (Eigen::Index i = 0; i < ball_center.size(); ++i) {
+      const int l = coordinates[ToSize(i)];
+      const double middle = ball_center[i];
       const double reach =
           std::abs(center[l] - middle) + half_width[l] + RoundingError(kMargin, std::abs(center[l]) + std::abs(middle));
       square += reach * reach;
@@ -143,9 +132,11 @@ DomainExit DomainTest::FindExitOf(const double* center, const double* half_width
 
 DomainExit FindExit(const Domain& domain, std::span<const Interval> box) noexcept {
   using Kind = DomainExit::Kind;
+  const int n = domain.state.dim();
   for (int l = 0; l < static_cast<int>(box.size()); ++l) {
     const Interval& z = box[ToSize(l)];
-    const double lower = BoxLower(domain, l), upper = BoxUpper(domain, l);
+    const Box& side = l < n ? domain.state : domain.input;
+    const double lower = side.lower()[l < n ? l : l - n], upper = side.upper()[l < n ? l : l - n];
     if (!(lower <= z.lower)) return {Kind::kLower, l, z.lower, lower};
     if (!(z.upper <= upper)) return {Kind::kUpper, l, z.upper, upper};
   }

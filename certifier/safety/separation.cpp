@@ -16,14 +16,12 @@ using Vector = Eigen::Vector3d;  // unused coordinates are zero
 // The dual bound along a direction of unit length up to rounding, in plain arithmetic less a margin above its rounding.
 double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
   constexpr double kMargin = 0x1p-45, kTiny = 0x1p-1000;
-  const auto p = ToSize(slice.dim());
   double core = kInfinity, size = kTiny;
   for (const Vector& point : obstacle.hull()) core = std::min(core, d.dot(point));
   alignas(32) std::array<double, kMaxGenerators> along;
   std::fill_n(along.begin(), slice.padded_size(), 0.0);
   double spread = 0, center = 0;
-  for (std::size_t k = 0; k < p; ++k) {
-    const int i = static_cast<int>(k);
+  for (int i = 0; i < slice.dim(); ++i) {
     const double* row = slice.padded_row(i).data();
     Lanes sum = AllLanes(0);
     for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
@@ -46,23 +44,19 @@ double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const
 
 // The dual bound along d, rounded against us.
 [[gnu::noinline]] double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
-  const auto p = ToSize(slice.dim());
   double core = kInfinity;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     core = obstacle.offset();
   } else {
     for (const Vector& point : obstacle.hull()) {
       double along = 0;
-      for (std::size_t k = 0; k < p; ++k) {
-        const auto i = static_cast<Eigen::Index>(k);
-        along = AddDown(along, MulDown(d[i], point[i]));
-      }
+      for (int k = 0; k < slice.dim(); ++k) along = AddDown(along, MulDown(d[k], point[k]));
       core = std::min(core, along);
     }
   }
   Interval square(0);
-  for (std::size_t k = 0; k < p; ++k) square += sqr(Interval(d[static_cast<Eigen::Index>(k)]));
-  const double gap = SubDown(core, slice.SupportUpper({d.data(), p}));
+  for (int k = 0; k < slice.dim(); ++k) square += sqr(Interval(d[k]));
+  const double gap = SubDown(core, slice.SupportUpper({d.data(), ToSize(slice.dim())}));
   const double distance = DivDown(gap, gap > 0 ? SqrtUp(square.upper) : SqrtDown(square.lower));
   return square.lower > 0 && distance < kInfinity ? distance : -kInfinity;  // NaN fails
 }
@@ -240,13 +234,14 @@ Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
 
 Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
   constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
-  const auto p = ToSize(obstacle.dim());
+  const int p = obstacle.dim();
   double square = 0;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     const Eigen::VectorXd& normal = obstacle.points()[0];
     double gap = obstacle.offset(), size = std::abs(gap) + 0x1p-900;
-    for (std::size_t k = 0; k < p; ++k) {
-      const double d = normal[static_cast<Eigen::Index>(k)], part = std::abs(d) * slice.half_width[k];
+    for (int i = 0; i < p; ++i) {
+      const auto k = ToSize(i);
+      const double d = normal[i], part = std::abs(d) * slice.half_width[k];
       gap -= d * slice.center[k] + part;
       size += std::abs(d * slice.center[k]) + part;
       square += d * d;
@@ -254,8 +249,8 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
     const double distance = (gap - RoundingError(kMargin, size)) / std::sqrt(square) * (1 - kMargin);
     return {distance > 0x1p-400 && distance < kInfinity && square > 0x1p-400 ? distance : -kInfinity, 0};
   }
-  for (std::size_t k = 0; k < p; ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
+  for (int i = 0; i < p; ++i) {
+    const auto k = ToSize(i);
     const double below = obstacle.lower()[i] - slice.center[k], above = slice.center[k] - obstacle.upper()[i];
     const double size =
         std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i]) + std::abs(slice.center[k]) + slice.half_width[k];
