@@ -1,5 +1,14 @@
-/** A nominal model from one definition of its equations. The program is a compile-time constant. To add a model, write
-a struct like KinematicBicycle (kinematic_bicycle.h) and construct EquationsModel<YourModel>. */
+/** A nominal model from one definition of its equations. To add a model, write a struct like KinematicBicycle
+(kinematic_bicycle.h) and construct EquationsModel<YourModel>.
+
+`Equations` has
+- kStates, kInputs: n <= kMaxStates and m <= kMaxInputs;
+- kName, kStateNames, kInputNames, kParameterNames: names for people, task files and digests;
+- parameters(): the values of the parameters, in the units of the equations;
+- Step<T>(parameters, z, next): the equations x+ = f0(x, u) over any scalar type T, with z = (x, u).
+
+The program of operations and derivatives is a compile-time constant, so each function below is straight-line code. A
+program that exceeds the limits of program.h does not compile. */
 #pragma once
 
 #include <array>

@@ -1,5 +1,8 @@
-/** The expansion of a nominal model around a point, in plain arithmetic: value, Jacobian, and second derivatives over a
-box. */
+/** The expansion of a nominal model around a point: value f0(c), Jacobian D f0(c), and the range of each second
+derivative over a box.
+
+All arithmetic is plain, rounded to nearest, so no number here is a bound by itself; rounding.h bounds the error of
+each. The code is straight-line code for a program that is known at compile time (program.h). */
 #pragma once
 
 #include <algorithm>
@@ -40,16 +43,16 @@ inline PlainInterval TanCurvature(PlainInterval t) {
   return {2 * t.lower * (1 + t.lower * t.lower), 2 * t.upper * (1 + t.upper * t.upper)};
 }
 
-/** What belongs to the two ends of an interval. */
+/** A number for each end of an interval. */
 using Ends [[gnu::vector_size(16)]] = double;
 
 FOREREACH_INLINE Ends Both(double x) { return Ends{x, x}; }
 
-/** The turns from a center c to the ends of an interval around it: their sines, the first negative, and cosines. The
-first term that Taylor's polynomials leave out is below 2^-52 up to 1/4. */
+/** The angles from a center c to the ends of an interval around it: their sines (the first is negative) and cosines. Up
+to an angle of 1/4 by Taylor's polynomials, whose first omitted term is below 2^-52; above by the C library. */
 struct Turns {
   Ends sine, cosine;
-  bool wide;  // too wide to tell by the slopes at its ends whether a sine is monotone on it
+  bool wide;  // above 3: the slopes at the ends do not show whether a sine is monotone on the interval
 
   FOREREACH_INLINE Turns(double center, PlainInterval x) : wide(!(x.upper - x.lower <= 3)) {
     const Ends angle{center - x.lower, x.upper - center}, s = angle * angle;
@@ -62,8 +65,7 @@ struct Turns {
   }
 };
 
-/** Sine and cosine at both ends by the addition theorems. Where the slope changes its sign an extremum may lie inside.
- */
+/** Sine and cosine at both ends by the addition theorems. An extremum may lie inside if the slope changes its sign. */
 struct Wave {
   Ends sines, cosines;
   bool wide;
@@ -83,7 +85,7 @@ struct Wave {
   }
 };
 
-/** Tangent over an interval that holds no pole, given that of its center. */
+/** The range of the tangent over an interval without a pole, given the tangent of its center. */
 FOREREACH_INLINE PlainInterval TanRange(double tangent, const Turns& turns) {
   const Ends step = turns.sine / turns.cosine, range = (Both(tangent) + step) / (1 - Both(tangent) * step);
   return {range[0], range[1]};
@@ -158,6 +160,9 @@ FOREREACH_INLINE void ForEachConstant(Visit visit) {
 }
 
 // @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4.
+/** NominalModel::Expand for one program, with a pointer for each span. Cost: the program's operations; no branch except
+for angles above 1/4. If the domain contains a pole, the ranges mean nothing, and the bounds of rounding.h are infinite.
+*/
 template <const Program& kProgram>
 FOREREACH_INLINE void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
   constexpr auto kSize = ToSize(kProgram.size);

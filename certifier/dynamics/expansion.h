@@ -24,13 +24,16 @@ struct Expansion {
 };
 
 /** The method that bounds the remainder rho_k(d) = 1/2 d^T H_k d over |d| <= r.
-kPaper: |rho_k| <= 1/2 r^T B_k r, Eq. (qt-formula), with B_k the largest absolute values of the Hessian.
-kCentred: rho_k lies in [lower, upper], and the middle of this interval moves the center. A diagonal term has d_i^2 in
-  [0, r_i^2]. A mixed product lies in [-N, P],  P, N = (sum_j |g_ij / r_i +- g_lj / r_l|)^2 r_i r_l / 4,  because d_i
-d_l is a quarter of the difference of two squares. Nearly parallel generators make one of N and P small. If a diagonal
-term and a mixed term share a variable, the exact range of 1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l is a second
-bound, and the tighter one is used. The interval is sound and never wider than that of kPaper. docs/mathematics.md
-derives it. */
+- kPaper: |rho_k| <= 1/2 r^T B_k r, Eq. (qt-formula), with B_k the largest absolute values of the Hessian.
+- kCentred: rho_k lies in [lower, upper], and the middle of this interval moves the center. The interval is never wider
+  than that of kPaper.
+
+kCentred bounds each term. A diagonal term has d_i^2 in [0, r_i^2]. A mixed product is a quarter of the difference of
+two squares, so it lies in [-N, P],
+    P, N = (sum_j |g_ij / r_i +- g_lj / r_l|)^2 r_i r_l / 4.
+Nearly parallel generators make N or P small. If a diagonal term and a mixed term share a variable, the exact range of
+1/2 a s^2 + b s t over |s| <= r_i, |t| <= r_l is a second bound, and the tighter one is used. docs/mathematics.md
+derives this. */
 enum class Method { kPaper, kCentred };
 
 /** rho_k lies in center_k +- half_width_k. Zero where f0_k is affine. */

@@ -1,5 +1,8 @@
-/** The linear part of a step: the image of a slice's generators under the Jacobian, as straight-line code for a program
-that is known at compile time. One pass over the generators, four at a time, also finds what the next step needs. */
+/** The linear part of a step, Eq. (propagation): the generators fl(J G) of the image of a slice <c, G> + [-s, s] under
+the Jacobian J, and a slack that covers rounding and s.
+
+The code is straight-line code for a program that is known at compile time. One pass over the generators, four at a
+time, also computes the sums that the next step needs (ImageSums). */
 #pragma once
 
 #include <array>
@@ -59,7 +62,7 @@ FOREREACH_INLINE Lanes RowImage(const Lanes* columns, const Lanes* factors) {
   }
 }
 
-/** StoreAll of the sums of vectors. */
+/** Stores Sum(rows[i]) at to[i], with zeros up to a multiple of four. */
 template <std::size_t N>
 FOREREACH_INLINE void StoreSums(const Lanes (&rows)[N], double* to) {
   const auto at = [&](std::size_t i) __attribute__((always_inline)) { return i < N ? rows[i] : AllLanes(0); };
@@ -75,7 +78,7 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
   ColumnScores::Writer scores(sums.scores);
   const std::size_t size = slice.padded_size();
   for (std::size_t j = 0; j < size; j += kLaneCount) {
-    // All are read before any is written: a row may be in several.
+    // Reads every row before it writes any: an output may depend on several rows.
     const Lanes columns[] = {LoadLanes(slice.padded_row(static_cast<int>(K)).data() + j)...};
     Lanes column_sum = AllLanes(0), largest = AllLanes(0);
     const auto row = [&]<std::size_t Row>(std::integral_constant<std::size_t, Row>) __attribute__((always_inline)) {
@@ -92,7 +95,7 @@ FOREREACH_INLINE void MapRows(const Expansion& expansion, const Zonotope& slice,
   StoreSums(row_sums, sums.row.data());
 }
 
-/** (|J| s)_k + image_k: an upper bound but for a relative 2^-44 of itself. */
+/** (|J| s)_k + image_k in plain arithmetic. The exact value is at most 1 + 2^-44 times the result. */
 template <const Program& kProgram, std::size_t K>
 FOREREACH_INLINE double RowSlack(const Expansion& expansion, const StepError& error, const Zonotope& slice) {
   if constexpr (!kCountsRounding) return 0;
@@ -124,6 +127,12 @@ FOREREACH_INLINE void MapAndSum(const Expansion& expansion, const StepError& err
 /** Sets the generators of `next` to fl(J G), J = expansion.jacobian, and its slack to |J| s + error.image, s the
 slice's slack: a bound, but for a relative 2^-44, on what this leaves out, for every slice and matrix J' that `error` is
 for: |J' (G b + diag(s) b') - fl(J G) b| <= slack,   |b|_inf <= 1, |b'|_inf <= 1. The center of `next` is left alone. */
+/** NominalModel::Map for one program: sets the generators of `next` to fl(J G) and its slack to
+s' = fl(|J| s + error.image), with J = expansion.jacobian. For every matrix J' that `error` covers, |b|_inf <= 1 and
+|b'|_inf <= 1,
+    |J' (G b + diag(s) b') - fl(J G) b| <= (1 + 2^-44) s'.
+Does not change the center of `next`. Sets `sums` to those of fl(J G). Cost: a product for each nonzero of J and each
+generator. @pre `error` was made for half-widths that are not below the slice's. */
 template <const Program& kProgram>
 FOREREACH_INLINE void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
                           ImageSums& sums) {

@@ -1,5 +1,9 @@
-/** The nonlinear Taylor remainder of one step: rho_k(d) = 1/2 d^T H_k d with d = z - c_Z, for all z in the query and
-all H in the interval Hessian over its hull. As straight-line code for a program that is known at compile time. */
+/** The Taylor remainder of one step, Eq. (qt-formula): an interval that contains
+    rho_k(d) = 1/2 d^T H_k d
+for every d = x - c with x in the slice and every H_k in the interval Hessian over the slice's hull. Inputs are points,
+so their entries of d are zero. expansion.h describes the two methods.
+
+The code is straight-line code for a program that is known at compile time. It treats four terms at a time. */
 #pragma once
 
 #include <algorithm>
@@ -19,21 +23,21 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach::internal {
 
-/** The second derivatives of states, as the remainder takes them: an input is a point, d = 0. */
+/** The second derivatives by states, in the order in which each method uses them. */
 struct RemainderTerms {
-  // For kPaper: one second derivative.
+  // A term of kPaper: one second derivative.
   struct Single {
     std::size_t output = 0, first = 0, second = 0, entry = 0;
   };
-  // For kCentred: a mixed one, a diagonal one of the first variable, or both.
+  // A term of kCentred: a mixed derivative, a diagonal one of the first variable, or both.
   struct Joined {
     static constexpr std::size_t kNone = Program::kMaxSecond;
     std::size_t output = 0, first = 0, second = 0, mixed = kNone, diagonal = kNone;
-    std::size_t pair = 0;  // of the mixed one: which of `pairs`
+    std::size_t pair = 0;  // index into `pairs` for the mixed derivative
     [[nodiscard]] constexpr bool has_mixed() const { return mixed != kNone; }
     [[nodiscard]] constexpr bool has_diagonal() const { return diagonal != kNone; }
   };
-  // Two variables whose product occurs, in one output or more.
+  // Two variables with a mixed derivative in at least one output.
   struct Pair {
     std::size_t first = 0, second = 0;
     constexpr bool operator==(const Pair&) const = default;
@@ -80,9 +84,9 @@ struct RemainderTerms {
 template <const Program& kProgram>
 inline constexpr RemainderTerms kRemainderTerms{kProgram};
 
-// Above all relative rounding of the few operations below, whose results are compared with the sum of their terms'
-// sizes; and above what underflow leaves out, yet a normal number times any but a tiny derivative: others are slow to
-// multiply.
+// kRemainderRelative exceeds the relative rounding error of the operations below, measured against the sum of the sizes
+// of their terms. kRemainderTiny exceeds the error by underflow. Its product with a derivative is a normal number
+// unless the derivative is tiny; processors multiply subnormal numbers slowly.
 inline constexpr double kRemainderRelative = 0x1p-44, kRemainderTiny = 0x1p-1000;
 
 inline double CountedError(double error) { return kCountsRounding ? error : 0; }
@@ -108,7 +112,7 @@ FOREREACH_INLINE void EncloseSizes(const double* half_width, const PlainInterval
   StoreAll(sums, out.half_width.data());
 }
 
-// d_i d_l in [-negative, positive] for each pair of variables: positive, negative, positive, ...
+// The ends P, N of d_i d_l in [-N, P] for each pair of variables: P_0, N_0, P_1, N_1, ...
 template <const Program& kProgram>
 using ProductEnds = std::array<double, PaddedToLanes(2 * kRemainderTerms<kProgram>.num_pairs)>;
 
@@ -137,19 +141,20 @@ FOREREACH_INLINE ProductEnds<kProgram> EncloseProducts(const Zonotope& slice, co
     const Lanes product = r_i * r_l, quarter = AllLanes(0.25) / product;
     const Lanes sum = SumEach(sums[4 * g], sums[4 * g + 1], sums[4 * g + 2], sums[4 * g + 3]) + (s_i * r_l + s_l * r_i);
     const LaneMask fits =
-        (product > AllLanes(0x1p-400)) & (product < AllLanes(0x1p400));  // else a factor could underflow
+        (product > AllLanes(0x1p-400)) & (product < AllLanes(0x1p400));  // otherwise a factor could underflow
     StoreLanes(fits ? Min(product, sum * sum * quarter) : product, &ends[4 * g]);
   });
   return ends;
 }
 
-// max over 0 <= s <= r of 1/2 a s^2 + h t s, h and t >= 0. A product that may underflow meets a or h only after it did.
+// max over 0 <= s <= r of 1/2 a s^2 + h t s, with h and t >= 0. Multiplies by a and h last, so that an underflow before
+// is scaled like the margin that covers it.
 FOREREACH_INLINE Lanes Peak(const Lanes& a, const Lanes& h, const Lanes& t, const Lanes& r) {
   const Lanes slope = h * t, top = slope / -a, s = -a * r > slope ? top : r;
   return a * (s * s * AllLanes(0.5)) + h * (t * s);
 }
 
-// get(term) of the joined terms from the first on; zero behind the last.
+// get(term) of the joined terms kFirst .. kFirst + 3, and zero behind the last term.
 template <const Program& kProgram, std::size_t kFirst, class Get>
 FOREREACH_INLINE Lanes FourTerms(Get get) {
   const auto at = [&](std::size_t i) __attribute__((always_inline)) {
@@ -159,7 +164,7 @@ FOREREACH_INLINE Lanes FourTerms(Get get) {
   return Lanes{at(kFirst), at(kFirst + 1), at(kFirst + 2), at(kFirst + 3)};
 }
 
-// The ranges of four joined terms, 1/2 a d_i^2 + h d_i d_l, and what rounding may have taken from them.
+// The ranges of four joined terms 1/2 a d_i^2 + h d_i d_l, and bounds on their rounding errors.
 struct TermRanges {
   Lanes lower, upper, rounding;
 };
@@ -173,7 +178,7 @@ FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainIn
   const Lanes other = each([&](const Term& t) { return t.has_mixed() ? half_width[t.second] : 0; });
   const Lanes positive = each([&](const Term& t) { return t.has_mixed() ? products[2 * t.pair] : 0; });
   const Lanes negative = each([&](const Term& t) { return t.has_mixed() ? products[2 * t.pair + 1] : 0; });
-  // A variable that is a point makes its terms exactly zero, whatever their derivatives.
+  // If a variable is a point, its terms are exactly zero, even if a derivative is infinite.
   const LaneMask has_diagonal = r > AllLanes(0), has_mixed = has_diagonal & (other > AllLanes(0));
   const auto of_mixed = [&](auto get) __attribute__((always_inline)) {
     return has_mixed ? each([&](const Term& t) { return t.has_mixed() ? get(t.mixed) : 0; }) : AllLanes(0);
@@ -191,7 +196,7 @@ FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainIn
   const Lanes low = Min(h_lower * positive, -(h_upper * negative)) + half_square * Min(a_lower, AllLanes(0));
   const Lanes high = Max(h_upper * positive, -(h_lower * negative)) + half_square * Max(a_upper, AllLanes(0));
   const Lanes size = h_size * (r * other) + half_square * a_size;
-  // By both ends of h, for a NaN in either has to be seen.
+  // Uses both ends of h, so that a NaN in either end reaches the result.
   const Lanes underflow = AllLanes(0.5 * kRemainderTiny) * (Abs(h_lower) + Abs(h_upper) + a_size);
   const Lanes margin = of_mixed(counted) + of_diagonal(counted) + underflow;
   return {Max(low, -Peak(-a_lower, h_size, other, r)), Min(high, Peak(a_upper, h_size, other, r)),
@@ -227,6 +232,9 @@ FOREREACH_INLINE void EncloseCentred(const Zonotope& slice, const double* half_w
 /** @param half_width r, n entries: inputs are points. @param hessian in the order of the program's.
 @param error of each term, StepError::remainder.
 Rounding is included. An entry that is not finite gives a half-width that is not. Cost O(second derivatives * m). */
+/** NominalModel::EncloseRemainder for one program: |rho_k(d) - out.center_k| <= out.half_width_k for every d and H_k as
+above, in real arithmetic. If an entry of `hessian` is not finite, neither is the half-width of its output, unless one
+of its two variables is a point. Cost O(second derivatives * m). */
 template <const Program& kProgram>
 FOREREACH_INLINE void EncloseBy(Method method, const Zonotope& slice, const double* half_width,
                                 const PlainInterval* hessian, const double* error, Remainder& out) {

@@ -1,9 +1,9 @@
-/** The one place where a function is compiled for several instruction sets and one of them is chosen.
+/** Compiles a function for several instruction sets and calls one of them. No other file chooses an instruction set.
 
-A hot function is written once. `Dispatch<f>(instructions, arguments...)` calls it, in machine code of the baseline or
-of AVX2: all that f calls is inlined into the two. What f computes is the same to the last bit (lanes.h), so the choice
-changes the time alone. Where f calls functions that are not FOREREACH_INLINE, f is not either: g++ would not inline
-those any more. */
+A hot function f is written once. `Dispatch<f>(instructions, arguments...)` calls it in machine code for the baseline or
+for AVX2; everything that f calls is inlined into both. Both compute the same bits (lanes.h), so the choice changes the
+time only. If f calls functions that are not FOREREACH_INLINE, do not mark f FOREREACH_INLINE: g++ would no longer
+inline those functions. */
 #pragma once
 
 #include <utility>
@@ -16,7 +16,7 @@ namespace forereach {
 
 enum class InstructionSet { kBaseline, kAvx2 };
 
-/** The best one that this machine has. Cost: a load and a test. */
+/** The fastest instruction set that this machine has. Cost: a load and a test. */
 [[nodiscard]] inline InstructionSet BestInstructionSet() noexcept {
 #if defined(__x86_64__)
   return __builtin_cpu_supports("avx2") ? InstructionSet::kAvx2 : InstructionSet::kBaseline;
@@ -59,9 +59,8 @@ struct Compiled<kFunction, Result (Class::*)(Arguments...) const noexcept(kNoexc
 
 }  // namespace internal
 
-/** kFunction(arguments...), for a const member function with the object before the other arguments. No argument is
-moved from.
-@pre the machine has the instruction set. */
+/** Returns kFunction(arguments...). For a const member function, the object is the first argument. No argument is moved
+from. @pre the machine has the instruction set. */
 template <auto kFunction, class... Arguments>
 [[gnu::always_inline]] inline decltype(auto) Dispatch(InstructionSet instructions, Arguments&&... arguments) {
   using Both = internal::Compiled<kFunction>;

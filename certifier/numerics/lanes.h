@@ -1,11 +1,10 @@
-/** Lanes, four doubles at a time, and packs of eight: the same bits on every machine. Only +, -, *, /, max, min, |.|
-and comparisons are used, each lane by itself, and sums are always taken in the same order: what the instruction set
-(instruction_set.h) changes is the time.
+/** Vectors of doubles: Lanes has four, Pack has eight. Results have the same bits on every machine, because only +, -,
+*, /, max, min, |.| and comparisons are used, lane by lane, and sums always have the same order. The instruction set
+(instruction_set.h) changes the time only.
 
-How a vector is passed by value depends on the instruction set of the two functions. A vector of four therefore never
-enters or leaves a function that may not be inlined: functions and lambdas that take or return one are marked
-FOREREACH_INLINE, which also holds without optimisation, and one vector is seen as another by Bits and FromBits, where
-std::bit_cast would be a call. A pack is a class, and is passed in memory. */
+The convention for passing a vector by value depends on the instruction set for which a function is compiled. So every
+function or lambda that takes or returns Lanes is marked FOREREACH_INLINE, which inlines without optimisation too. Bits
+and FromBits reinterpret a vector; std::bit_cast would be a call. Pack is a class and is passed in memory. */
 #pragma once
 
 #include <array>
@@ -30,7 +29,7 @@ using LaneMask [[gnu::vector_size(32)]] = std::int64_t;
 
 #define FOREREACH_INLINE [[gnu::always_inline]] inline
 
-/** Up to the next multiple of kLaneCount. */
+/** The least multiple of kLaneCount that is not below `count`. */
 constexpr std::size_t PaddedToLanes(std::size_t count) { return (count + kLaneCount - 1) / kLaneCount * kLaneCount; }
 
 FOREREACH_INLINE Lanes LoadLanes(const double* from) {
@@ -39,7 +38,7 @@ FOREREACH_INLINE Lanes LoadLanes(const double* from) {
   return x;
 }
 FOREREACH_INLINE void StoreLanes(const Lanes& x, double* to) { __builtin_memcpy(to, &x, sizeof x); }
-/** Stores numbers four at a time, zeros behind the last: a load of four waits for four single stores. */
+/** Stores numbers four at a time, with zeros behind the last. (A load of four would wait for four single stores.) */
 template <std::size_t N>
 FOREREACH_INLINE void StoreAll(const double (&numbers)[N], double* to) {
   const auto at = [&](std::size_t i) __attribute__((always_inline)) { return i < N ? numbers[i] : 0.0; };
@@ -52,9 +51,9 @@ FOREREACH_INLINE Lanes Abs(const Lanes& x) {
   return FromBits(Bits(x) & LaneMask{INT64_MAX, INT64_MAX, INT64_MAX, INT64_MAX});
 }
 FOREREACH_INLINE Lanes Max(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
-/** b where a is NaN, as Max. */
+/** As Max, gives b where a is NaN. */
 FOREREACH_INLINE Lanes Min(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
-/** The first `count` of four, `other` behind them. */
+/** x in the first `count` lanes, `other` in the rest. */
 FOREREACH_INLINE Lanes FirstLanes(const Lanes& x, std::size_t count, double other) {
   const auto end = static_cast<std::int64_t>(count);
   return LaneMask{0, 1, 2, 3} < LaneMask{end, end, end, end} ? x : AllLanes(other);
@@ -74,7 +73,7 @@ FOREREACH_INLINE unsigned BitsOf(const LaneMask& mask) {
 
 namespace internal {
 
-// Where the two halves of each lane come from when the lanes of the index's bits are left out.
+// For each set of lanes to leave out, as bits: the places from which the halves of the packed lanes come.
 inline constexpr auto kPacking = [] {
   std::array<std::array<std::int32_t, 2 * kLaneCount>, 1 << kLaneCount> from{};
   for (std::size_t left_out = 0; left_out < from.size(); ++left_out)
@@ -88,7 +87,8 @@ inline constexpr auto kPacking = [] {
 
 }  // namespace internal
 
-/** Moves the lanes whose bits are not set to the front, in their order; those behind them are of no meaning. */
+/** Moves the lanes whose bits are not set in `left_out` to the front, in their order. The lanes behind them are
+undefined. */
 class Packing {
  public:
   FOREREACH_INLINE explicit Packing(unsigned left_out) {
@@ -109,15 +109,16 @@ class Packing {
   using Halves [[gnu::vector_size(32)]] = std::int32_t;
   Halves from_;
 };
+/** The sum of four, always in this order. */
 FOREREACH_INLINE double Sum(const Lanes& x) { return (x[0] + x[2]) + (x[1] + x[3]); }
-/** The Sum of each, to the same bits. */
+/** Sum(a), Sum(b), Sum(c), Sum(d), with the same bits. */
 FOREREACH_INLINE Lanes SumEach(const Lanes& a, const Lanes& b, const Lanes& c, const Lanes& d) {
   const Lanes a_c = __builtin_shufflevector(a, c, 0, 1, 4, 5) + __builtin_shufflevector(a, c, 2, 3, 6, 7);
   const Lanes b_d = __builtin_shufflevector(b, d, 0, 1, 4, 5) + __builtin_shufflevector(b, d, 2, 3, 6, 7);
   return __builtin_shufflevector(a_c, b_d, 0, 4, 2, 6) + __builtin_shufflevector(a_c, b_d, 1, 5, 3, 7);
 }
 
-/** Whether test(k), a mask of four, holds for the first n of all lanes, k = 0, 4, ... */
+/** Whether the masks test(0), test(4), ... hold in the first n lanes of all. */
 template <class Test>
 FOREREACH_INLINE bool HoldsForFirst(std::size_t n, Test test) {
   const auto count = static_cast<std::int64_t>(n);
@@ -132,12 +133,12 @@ inline constexpr std::size_t kPackSize = 8;
 struct alignas(64) Pack {
   Lanes low, high;
 
-  // As memory: one double is read or written, the others are left alone.
+  // Access one double in memory.
   [[nodiscard]] double at(std::size_t lane) const { return reinterpret_cast<const double*>(this)[lane]; }
   void set(std::size_t lane, double value) { reinterpret_cast<double*>(this)[lane] = value; }
 };
 
-/** One number in all eight, at half the registers. */
+/** A Pack of eight equal numbers, in half the registers. */
 struct Same {
   Lanes all;
   [[gnu::always_inline]] operator Pack() const { return {all, all}; }  // NOLINT: it is one
@@ -148,7 +149,7 @@ FOREREACH_INLINE Pack LoadPack(const Pack& p) { return {p.low, p.high}; }
 /** From any address of eight doubles. */
 FOREREACH_INLINE Pack LoadPack(const double* p) { return {LoadLanes(p), LoadLanes(p + kLaneCount)}; }
 
-/** The first `count` of eight doubles, zero behind them. @pre eight can be read. */
+/** The first `count` of eight doubles, with zeros behind them. @pre eight doubles can be read. */
 FOREREACH_INLINE Pack LoadFirst(const double* p, std::size_t count) {
   const auto n = static_cast<std::int64_t>(count);
   const LaneMask all{n, n, n, n};
@@ -170,11 +171,11 @@ FOREREACH_INLINE double MaxLane(const Pack& a) {
   return Max(Max(m[0], m[2]), Max(m[1], m[3]));
 }
 
-/** The sum of eight, each added three times at most. */
+/** The sum of eight. Each number passes three roundings. */
 FOREREACH_INLINE double SumLanes(const Pack& a) { return Sum(a.low + a.high); }
 
-/** Puts the number of its lane into the last three bits of each, finite, double: an error of seven units in the last
-place at most, for which TaggedLane of the largest gives its lane. */
+/** Replaces the last three bits of each double by the number of its lane, so that TaggedLane of the largest gives its
+lane. Changes a number by at most seven units in the last place. @pre all are finite. */
 FOREREACH_INLINE Pack TagLanes(const Pack& a) {
   const LaneMask rest = ~LaneMask{7, 7, 7, 7};
   return {FromBits((Bits(a.low) & rest) | LaneMask{0, 1, 2, 3}),

@@ -1,5 +1,5 @@
-/** What the certifier needs to know of the residual: bounds per coordinate on every admissible value over a query set.
-The joint between the tube (reach/propagator.h) and any method that bounds a residual. */
+/** The interface between the tube (reach/propagator.h) and a method that bounds the residual: for each coordinate,
+bounds on the values of every admissible residual over a query set. */
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ struct ResidualBounds {
   std::array<std::array<double, kMaxStates>, kMaxStates> slope;  ///< n rows of n entries, finite.
 };
 
-/** Z_t = X_t x {u_t}, with what the step knows of it already. */
+/** Z_t = X_t x {u_t}, with the half-widths that the step has already computed. */
 struct QuerySet {
   const Zonotope& slice;               ///< X_t
   std::span<const double> input;       ///< u_t
@@ -32,8 +32,8 @@ class ResidualEnclosure {
  public:
   virtual ~ResidualEnclosure() = default;
 
-  /** Sets lower, upper and capped, and with a slope has_slope and slope. A coordinate whose lower bound exceeds its
-  upper bound proves that no admissible residual exists. Called in every step: no heap, lock or exception.
+  /** Sets lower, upper and capped. A method with slopes also sets has_slope and slope. If a lower bound exceeds its
+  upper bound, no admissible residual exists. Called in every step: no heap, lock or exception.
   @pre the hull of the query lies in the certification domain, and bounds.has_slope is false. */
   virtual void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept = 0;
 };

@@ -1,8 +1,8 @@
-/** Observations that came after an envelope's index was built: few, in the order in which they came, looked at one
-block after the other beside the index.
+/** Observations that arrived after an envelope's index was built, in their order of arrival. A query scans all of them
+beside the index.
 
-One thread appends, any number read. A reader that got a size from size() may read that many entries: they were written
-before the size was, and nothing is ever written to them again. */
+One thread appends; any number of threads read. A reader may read as many entries as size() returned to it: each entry
+is complete before size() counts it and never changes afterwards. */
 #pragma once
 
 #include <atomic>
@@ -20,20 +20,22 @@ class EnvelopeTail final {
  public:
   static constexpr int kMaxCapacity = 1024;
 
-  /** @pre capacity is at most kMaxCapacity. */
+  /** @param envelope must outlive this object. @pre 0 <= capacity <= kMaxCapacity. Allocates all memory. */
   EnvelopeTail(const Declaration& declaration, const LipschitzEnvelope& envelope, int capacity);
 
-  /** How many entries may be read. */
+  /** The number of entries that may be read. */
   [[nodiscard]] int size() const { return size_.load(std::memory_order_acquire); }
   [[nodiscard]] int capacity() const { return capacity_; }
 
-  /** Whether the envelope's error bound holds for such an observation, n entries each. */
+  /** Whether the envelope's error bounds E_k hold for an observation with these enclosures of its residual, n entries
+  each: |lower_k| + sigma_k and |upper_k| + sigma_k are at most the envelope's value_limit(k). */
   [[nodiscard]] bool Covers(std::span<const double> lower, std::span<const double> upper) const;
 
-  /** @pre size() < capacity(), Covers(lower, upper), z lies in the envelope's domain. Only one thread may append. */
+  /** Adds an observation at z. Only one thread may call this. No allocation.
+  @pre size() < capacity(), Covers(lower, upper), and z lies in the envelope's domain. */
   void Append(std::span<const double> z, std::span<const double> lower, std::span<const double> upper);
 
-  /** Blocks of row k, laid out as those of an ObservationIndex; the lanes behind the size are not to be read. */
+  /** The blocks of row k, laid out as those of an ObservationIndex. Do not read lanes behind the last entry. */
   [[nodiscard]] const Pack* blocks(int k) const { return rows_[ToSize(k)].blocks.data(); }
   /** The highest floor and the highest negated ceiling of coordinate k over the first `count` entries. */
   [[nodiscard]] double HighestFloor(int k, int count) const;

@@ -4,16 +4,17 @@ with D_ik(Z) the worst-case Lipschitz distance from the query set to observation
 
 Rounding. A query runs in plain arithmetic; its error is bounded before there is a query, once per row, because the
 query's hull lies in the certification domain. The computed bound is an expression of sums, products of two, |.| and max
-whose leaves are r~_ik -+ sigma_k (taken outward, so exact as far as soundness goes), L_kl c_l, L_kl z_il, L_kl G_lj and
-L_kl s_l. Over all queries their magnitudes add up to at most
+whose leaves are r~_ik -+ sigma_k (rounded outward once, then taken as exact), L_kl c_l, L_kl z_il, L_kl G_lj and L_kl
+s_l. Over all queries their magnitudes add up to at most
     V + 2 S + 3 W,   V = max_i |r~_ik| + sigma_k,  S = sum_l L_kl max |z_l|,  W = sum_l L_kl R_l,
-max |z_l| over the domain and the observations, R_l half the domain's width, which bounds sum_j |G_lj| + s_l. (W counts
-three times because w_s - w_0 + w_0 is computed in place of w_s.) No leaf passes more than a + 24 roundings for a row
-with a columns: sums over generators run in eight lanes. With u = 2^-53 the error is below E_k = 2 (a + 24) u (V + 2 S +
-3 W) + one smallest double for each product that may underflow, evaluated upward, and lower_k - E_k, upper_k + E_k are
-bounds in real arithmetic. Where E_k is not finite, nor are they.
+with max |z_l| over the domain and the observations, and R_l half the domain's width, which bounds sum_j |G_lj| + s_l.
+(W counts three times because (w_s - w_0) + w_0 is computed in place of w_s.) In a row with a columns no leaf passes
+more than a + 24 roundings, because sums over generators run in eight lanes. With u = 2^-53 the error is below
+    E_k = 2 (a + 24) u (V + 2 S + 3 W) + one smallest double for each product that may underflow,
+evaluated upward. So lower_k - E_k and upper_k + E_k are bounds in real arithmetic. If E_k is not finite, neither are
+the bounds.
 
-Work. Any subset of the observations gives a sound envelope, so a search may stop when it has seen enough of them. */
+Work. Any subset of the observations gives a sound envelope, so a search may stop early. */
 #pragma once
 
 #include <span>
@@ -30,13 +31,14 @@ Work. Any subset of the observations gives a sound envelope, so a search may sto
 namespace forereach {
 
 struct EnvelopeOptions {
-  /** Leaves of 32 observations that one search for one side of one coordinate may look at, 1 to 2^20. Beyond it the
-  bounds are wider, and `capped`. So they are beyond 64 sign patterns a leaf. Data not made for it do not get there. */
+  /** The number of leaves of 32 observations that the search for one side of one coordinate may visit, 1 to 2^20. It
+  may also try 64 sign patterns a leaf. A search that meets a limit gives wider bounds and sets `capped`. Only data made
+  for this purpose are known to meet one. */
   int max_leaf_visits = 512;
-  /** Up to this many blocks are scanned without a tree. */
+  /** Up to this many blocks, a query scans all of them and skips the tree. */
   int max_flat_blocks = 32;
-  /** E_k holds for observations with |r~_ik| + sigma_k up to this many times the largest given, at least 1. More than 1
-  for an envelope that a tail is to be joined to. */
+  /** E_k holds for observations with |r~_ik| + sigma_k up to this many times the largest one given, >= 1. Choose more
+  than 1 if an EnvelopeTail will be added. */
   double value_headroom = 1;
   InstructionSet instructions = BestInstructionSet();  ///< Changes the time a query takes, never a bit of its result.
 };
@@ -45,8 +47,8 @@ class EnvelopeTail;
 
 class LipschitzEnvelope final : public ResidualEnclosure {
  public:
-  /** Up to this many nonzero columns of a row, D_ik is exact, by all signs that matter. Above, it is bounded over the
-  interval hull of the query set, which is sound and wider; uses_hull_distance() says so. */
+  /** For a row of L with at most this many nonzero columns, D_ik is exact. With more columns it is bounded over the
+  interval hull of the query set, which is sound and wider; then uses_hull_distance() is true. */
   static constexpr int kMaxExactColumns = 12;
 
   /** @param domain_lower, domain_upper d_z entries each: a box that contains the hull of every query.
@@ -55,19 +57,21 @@ class LipschitzEnvelope final : public ResidualEnclosure {
                     std::span<const double> domain_lower, std::span<const double> domain_upper,
                     const EnvelopeOptions& options = {});
 
-  /** No heap, lock or exception. For each row of L with a nonzero columns: 2^(a-1) m up to three columns, else a m, for
-  m generators; then O(2^(a-1)) or O(a) for each block looked at, in practice some dozens whatever the number of
-  observations, and where a is 4 to 12, 2^f m for an observation inside the slab of the query set in f columns. */
+  /** As ResidualEnclosure; never sets a slope. No heap, lock or exception. Cost for a row of L with a nonzero columns
+  and m generators:
+  - a <= 3: O(2^(a-1) m), then O(2^(a-1)) for each block visited;
+  - a > 3: O(a m), then O(a) for each block visited; and up to a = 12, O(2^f m) for each observation that lies within
+  the half-width of the query set in f columns. In practice some dozens of blocks are visited, whatever the number of
+  observations. */
   void Enclose(const QuerySet& set, ResidualBounds& bounds) const noexcept override;
 
-  /** The envelope of its own observations and the first `count` of the tail. Cost: those are all looked at, eight by
-  eight.
+  /** The envelope of its own observations and the first `count` of the tail, which are all scanned.
   @pre the tail was made for this envelope, and count <= tail.size() as read in this thread. */
   void Enclose(const QuerySet& set, const EnvelopeTail& tail, int count, ResidualBounds& bounds) const noexcept;
 
   [[nodiscard]] int num_states() const { return static_cast<int>(rows_.size()); }
   [[nodiscard]] const LipschitzRow& row(int k) const { return rows_[ToSize(k)].distance; }
-  /** Without entries for a constant row. */
+  /** Has no entries if row k is constant. */
   [[nodiscard]] const ObservationIndex& index(int k) const { return rows_[ToSize(k)].index; }
   /** The highest floor and the lowest ceiling of coordinate k over all observations. */
   [[nodiscard]] double highest_floor(int k) const { return rows_[ToSize(k)].floor; }

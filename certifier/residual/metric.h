@@ -1,10 +1,15 @@
-/** The distances D_i of the envelope, eight observations at a time, for the search over an ObservationIndex.
+/** The distances D_i of a query set to the observations, Eq. (zonotope-set-distance), eight at a time, for the search
+over an ObservationIndex (search.h).
 
-A metric gives D_i - common() for the observations of a block, and for the children of a node an upper bound on
-value_i - (D_i - common()) over the observations below, one side at a time; `common` is the part that no observation
-changes. All plain arithmetic; the bounds are raised by what it may be off by, so that they are never below what is
-computed for an observation. For the inside of
-lipschitz_envelope.cpp only: every function is to be inlined into an entry point for one instruction set. */
+A metric has
+- common(): the part of D_i that is the same for every observation;
+- Block(block): D_i - common() for the eight observations of a block;
+- Node(node, side): for each child, an upper bound on v_i - (D_i - common()) over the observations below it;
+- kRefines: if true, Block gives a lower bound of D_i - common(), and Refine(block, lane, ...) gives the value.
+
+All arithmetic is plain. The bounds of Node include a margin for its error, so they are never below a value computed for
+an observation. Only lipschitz_envelope.cpp includes this file: every function must be inlined into an entry point that
+is compiled for one instruction set. */
 #pragma once
 
 #include <bit>
@@ -24,7 +29,7 @@ inline constexpr std::size_t kMaxChunks = kMaxGenerators / kPackSize;
 static_assert(kMaxGenerators % kPackSize == 0, "the last eight of a row can be read");
 alignas(64) inline constexpr std::array<double, kMaxGenerators> kNoGenerators{};
 
-/** One variable of Z_t = <c, G> + [-s, s] x {u}: an input has neither generators nor slack. */
+/** One variable of the query set Z_t = (<c, G> + [-s, s]) x {u}. An input has neither generators nor slack. */
 struct Variable {
   double center, slack, half_width;
   const double* generators;
@@ -39,7 +44,7 @@ struct Variable {
   }
 };
 
-/** Eight generators of a row at a time; those after the last are zero. */
+/** Reads a row of generators, eight at a time. Entries behind the last generator are zero. */
 class Chunks {
  public:
   explicit Chunks(const Zonotope& slice) : generators_(ToSize(slice.num_generators())) {}
@@ -53,7 +58,7 @@ class Chunks {
   std::size_t generators_;
 };
 
-/** How far x is from each of eight intervals. */
+/** The distance of x to each of eight intervals; zero inside. */
 inline Pack Gap(const Pack& lowest, const Pack& highest, const Pack& x) {
   return Max(Max(lowest - x, x - highest), Fill(0));
 }
@@ -65,7 +70,7 @@ class PatternMetric {
  public:
   static constexpr bool kRefines = false;
 
-  /** @param margin not below twice the error of plain arithmetic in this row. */
+  /** @param margin at least twice the error bound of plain arithmetic in this row. */
   PatternMetric(const LipschitzRow& row, const QuerySet& set, double margin) {
     std::array<double, kColumns> weighted;
     std::array<Same, kColumns> slope;
@@ -156,7 +161,7 @@ class CenterDistance {
     return distance;
   }
 
-  /** v_i - d_i at most, but for rounding. */
+  /** An upper bound on v_i - d_i, without a margin for rounding. */
   [[nodiscard]] Pack Node(const Pack* node, std::size_t side) const {
     Pack bound = LoadPack(node[side]);
     for (std::size_t l = 0; l < columns_; ++l)
@@ -197,7 +202,8 @@ class SignMetric : public CenterDistance {
   static constexpr bool kRefines = true;
   static constexpr std::size_t kMaxColumns = 12;
 
-  /** @param errors of each column: not below the error of L_kl r_l plus that of v_il. @param margin as above. */
+  /** @param margin as PatternMetric's. @param errors for each column, at least the error of L_kl r_l plus that of v_il.
+   */
   SignMetric(const LipschitzRow& row, const QuerySet& set, double margin, std::span<const double> errors)
       : CenterDistance(row, set), chunks_(Chunks(set.slice).size()) {
     const Chunks chunks(set.slice);
@@ -219,8 +225,8 @@ class SignMetric : public CenterDistance {
     return CenterDistance::Node(node, side) - least_;
   }
 
-  /** D_i of one observation. Needs 2^f patterns for f free signs; where `patterns` does not allow them, the bound over
-  the hull, and `capped` is set. */
+  /** D_i of one observation, by 2^f patterns for f columns with a free sign. If `patterns` does not allow that many, it
+  sets `capped` and returns the larger distance over the hull. */
   [[nodiscard]] double Refine(const Pack* block, std::size_t lane, int& patterns, bool& capped) const {
     Signs signs;
     signs.sums[0] = 0;
@@ -233,7 +239,8 @@ class SignMetric : public CenterDistance {
       else
         signs.free[free] = l, signs.components[free++] = component;
     }
-    if (fixed == 0) --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], 1);  // s and -s are the same
+    if (fixed == 0)
+      --free, Extend(signs, 0, 0, signs.free[free], signs.components[free], 1);  // s and -s give the same value
     if (patterns < 1 << free) {
       capped = true;
       double distance = hull_;
@@ -253,14 +260,14 @@ class SignMetric : public CenterDistance {
     std::array<std::array<Pack, kMaxChunks>, kMaxColumns + 1> along;
   };
 
-  // Without a branch: signs are as good as random, and a product with one is exact.
+  // Multiplies by the sign: a branch would be mispredicted half the time, and the product is exact.
   void Extend(Signs& signs, std::size_t from, std::size_t to, std::size_t l, double component, double sign) const {
     signs.sums[to] = signs.sums[from] + sign * component;
     const Same same = Fill(sign);
     for (std::size_t j = 0; j < chunks_; ++j) signs.along[to][j] = signs.along[from][j] + same * weighted_[l][j];
   }
 
-  // Counts through the patterns; the last column changes fastest, so that few sums are made anew.
+  // Counts through the patterns. The last column changes fastest, so few sums are computed again.
   double Farthest(Signs& signs, std::size_t free) const {
     double farthest = 0;
     for (std::size_t pattern = 0; pattern < std::size_t{1} << free; ++pattern) {

@@ -1,15 +1,16 @@
-/** Observations of one residual coordinate, in blocks of eight, four blocks a leaf, under a tree of eight children a
-node.
+/** The observations of one residual coordinate k in blocks of eight, four blocks to a leaf, under a tree with eight
+children to a node.
 
-An entry i has K coordinates alpha_i (lipschitz_row.h), a floor and a ceiling: floor_i <= r_k(z_i) <= ceiling_i. The two
-sides have the values v_i = floor_i and v_i = -ceiling_i, so that both ask for a maximum. What is close in space is
-close in memory. A node bounds v_i - d(alpha, alpha_i) from above for all entries below each child, any alpha and both
-sides: lifted   (d an infinity norm)  max_i v_i, and for each coordinate c max_i (v_i - alpha_ic) and max_i (v_i +
-alpha_ic): v_i - d <= max_i (v_i -+ alpha_ic) +- alpha_c. That knows which value stands where, as a box does not. boxed
-(d a 1-norm)          max_i v_i, and for each coordinate the interval of the alpha_ic.
+An entry i has K coordinates alpha_i (lipschitz_row.h), a floor and a ceiling: floor_i <= r_k(z_i) <= ceiling_i. Side 0
+has the values v_i = floor_i, side 1 has v_i = -ceiling_i, so both sides ask for a maximum. Entries that are close in
+space are close in memory. For each child and each side, a node bounds v_i - d(alpha, alpha_i) over the entries below,
+for any alpha, in one of two shapes:
+- lifted, if d is an infinity norm: max_i v_i, and for each coordinate c max_i (v_i - alpha_ic) and max_i (v_i +
+  alpha_ic), because v_i - d <= max_i (v_i -+ alpha_ic) +- alpha_c. Unlike a box, this relates a value to its place.
+- boxed, if d is a 1-norm: max_i v_i, and for each coordinate the interval of the alpha_ic.
 
-Immutable: any number of threads may read it. Memory 8 (K + 2) + 4 bytes an entry and up to a fifth of that for the
-tree; set-up O(K N log N), half a second for 10^6 entries in two coordinates. */
+Immutable, so any number of threads may read it. Memory: 8 (K + 2) + 4 bytes an entry, and up to a fifth of that for the
+tree. Set-up: O(K N log N), half a second for 10^6 entries in two coordinates. */
 #pragma once
 
 #include <cstdint>
@@ -33,7 +34,7 @@ class ObservationIndex final {
 
   enum class Shape { kLifted, kBoxed };
 
-  /** One row's entries, in the order of their ids 0, 1, ... */
+  /** The entries of coordinate k, in the order of their ids 0, 1, ... */
   struct Entries {
     Shape shape;
     std::size_t num_coordinates;      // K
@@ -47,14 +48,14 @@ class ObservationIndex final {
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t num_coordinates() const { return num_coordinates_; }
-  /** Blocks with an entry. */
+  /** The number of blocks with an entry. */
   [[nodiscard]] std::size_t num_blocks() const { return (size_ + kPackSize - 1) / kPackSize; }
   [[nodiscard]] std::size_t num_leaves() const { return (size_ + kLeafSize - 1) / kLeafSize; }
   /** Levels of nodes, at least one. The highest has one node. */
   [[nodiscard]] int height() const { return static_cast<int>(levels_.size()); }
 
-  /** K packs of coordinates, then one of values for each side. A lane without an entry has the value minus infinity; so
-  have the blocks that fill up the last leaf. */
+  /** K packs of coordinates, then a pack of values for each side. A lane without an entry has the value -infinity, also
+  in the blocks that fill the last leaf. */
   [[nodiscard]] const Pack* block(std::size_t b) const { return blocks_.data() + b * block_packs(); }
   [[nodiscard]] const Pack* leaf(std::size_t i) const { return block(i * kLeafBlocks); }
   [[nodiscard]] std::size_t block_packs() const { return num_coordinates_ + 2; }
@@ -63,9 +64,9 @@ class ObservationIndex final {
 
   /** Node i of level 1..height(), its packs with a lane for each child. Its children are 8 i .. 8 i + 7 of the level
   below; below level 1 are the leaves.
-  Lifted: for each side, max (v - alpha_c) and max (v + alpha_c) of each c, then max v. Boxed: max v of each side, then
-  the lowest and the highest alpha_c of each c. A child that is not there has the largest negative double for every
-  maximum. */
+  - Lifted: for each side, max (v - alpha_c) and max (v + alpha_c) of each c, then max v.
+  - Boxed: max v of each side, then the lowest and the highest alpha_c of each c.
+  A missing child has -kMaxDouble for every maximum. */
   [[nodiscard]] const Pack* node(int level, std::size_t i) const {
     return nodes_.data() + (levels_[ToSize(level - 1)] + i) * node_packs();
   }
@@ -84,10 +85,11 @@ class ObservationIndex final {
   std::vector<std::size_t> levels_;  // the first node of each level
 };
 
-/** Floors r~_ik - sigma_k and ceilings r~_ik + sigma_k, outward, with their coordinates in plain arithmetic. */
 /** The largest |floor| and |ceiling|. */
 [[nodiscard]] double LargestValue(const ObservationIndex::Entries& entries);
 
+/** The entries of coordinate k = `coordinate`: floors r~_ik - sigma_k and ceilings r~_ik + sigma_k, rounded outward,
+and their coordinates in plain arithmetic. */
 [[nodiscard]] ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
                                                   const Observations& observations, int coordinate);
 

@@ -1,8 +1,9 @@
-/** Pairs of observations in one residual coordinate that may contradict the declaration: floor_i - ceiling_j > d(i, j).
+/** The search of the pairwise test, Eq. (pairwise-falsification): pairs (i, j) of observations of one coordinate k that
+may contradict the declaration, floor_i - ceiling_j > d_k(z_i, z_j).
 
-Plain arithmetic with a margin above its error, so that no contradiction is missed; whoever asks has to test the
-suspects exactly. Leaves of an ObservationIndex are compared by what its nodes know of them, and entries only where two
-leaves may hold a pair. */
+The arithmetic is plain, and the margin exceeds its error. So the suspects contain every contradiction, and the caller
+has to test each of them rigorously. Two leaves of an ObservationIndex are compared by their bounds first; their entries
+are compared only if the bounds allow a pair. */
 #pragma once
 
 #include <cstdint>
@@ -17,43 +18,45 @@ namespace forereach {
 
 class PairSearch final {
  public:
-  /** One observation outside the index or in it: coordinates as in the index, floor and negated ceiling. */
+  /** One observation, in the index or not: its coordinates (LipschitzRow::Map), its floor and its negated ceiling. */
   struct Point {
     std::vector<double> coordinates;
     double floor, negated_ceiling;
   };
 
-  /** @param margin not below the error of plain arithmetic: PairMarginUpper. The index has to outlive this. */
+  /** @param index must outlive this object. @param margin at least the error of plain arithmetic (PairMarginUpper). */
   PairSearch(const ObservationIndex& index, double margin, InstructionSet instructions = BestInstructionSet())
       : index_(index), margin_(margin), instructions_(instructions) {}
 
-  /** Calls test(id, id) for the suspects until one returns true, which is then the answer. Every unordered pair at most
-  once; the order is that of the index. */
+  /** Calls test(i, j) for the suspects, in the order of the index, each unordered pair at most once. Returns true as
+  soon as a call does. Cost: O(N log N) if few leaves can hold a pair, O(N^2) at worst. */
   template <class Test>
   bool AnyPair(const Test& test) const;
 
-  /** Calls test(id) for all entries that are suspects with the point until one returns true. */
+  /** Calls test(i) for the entries that are suspects with the point. Returns true as soon as a call does. */
   template <class Test>
   bool AnyPartner(const Point& point, const Test& test) const;
 
-  /** Suspects of a point among the first `count` entries of blocks that lie in the order of their numbers. */
+  /** Sets `partners` to the suspects of a point among the first `count` entries of adjacent blocks, where entry i is in
+  lane i % 8 of block i / 8. */
   static void Suspects(const Point& point, const LipschitzRow& row, const Pack* blocks, std::size_t count,
                        double margin, std::vector<std::uint32_t>& partners);
 
-  /** The entry other than `self` that says most about the point on one side: the largest v_j - d(point, j), v the floor
-  for side 0 and the negated ceiling for side 1. An entry that is the same as the point there, and whose id is above
-  `self`, does not count: of two that are the same, only the later has one that says as much. */
+  /** The entry j other than `self` with the largest v_j - d(point, j), where v is the floor for side 0 and the negated
+  ceiling for side 1. An entry that equals the point and has an id above `self` is skipped, so that of two equal entries
+  only the later is dominated by the other. */
   struct Other {
     double value = -kInfinity;
     std::uint32_t id = ObservationIndex::kNone;
   };
   [[nodiscard]] Other BestOther(const Point& point, std::size_t side, std::uint32_t self) const;
 
-  /** Leaves that may hold a partner, from number `first` on. Group: as a node's child, node_packs() doubles. */
+  /** Sets `leaves` to the leaves with numbers >= `first` that may hold a partner of a group's entry.
+  @param group the bounds of a leaf or a point, as one lane of a node: node_packs() doubles. */
   void Leaves(const std::vector<double>& group, std::size_t first, std::vector<std::size_t>& leaves) const;
-  /** Suspects of a leaf with another or with itself, each pair once. */
+  /** Sets `pairs` to the suspects between two leaves, or inside one if they are the same; each pair once. */
   void Suspects(std::size_t leaf, std::size_t other, std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) const;
-  /** Suspects of a point with a leaf. */
+  /** Sets `partners` to the suspects of a point in a leaf. */
   void Suspects(const Point& point, std::size_t leaf, std::vector<std::uint32_t>& partners) const;
 
   [[nodiscard]] std::vector<double> GroupOf(std::size_t leaf) const;
@@ -67,15 +70,15 @@ class PairSearch final {
   InstructionSet instructions_;
 };
 
-/** What plain arithmetic may be off by in floor_i - ceiling_j - d(i, j), where every |floor| and |ceiling| is at most
-`values` and sum_l L_kl |z_l| at most `locations`. Infinite where it may overflow. */
+/** An upper bound on the error of floor_i - ceiling_j - d(i, j) in plain arithmetic. Infinite if it may overflow.
+@param values a bound on every |floor| and |ceiling|. @param locations a bound on sum_l L_kl |z_l|. */
 [[nodiscard]] inline double PairMarginUpper(double values, double locations, std::size_t columns) noexcept {
   const double magnitude = MulUp(2, AddUp(values, locations));
   if (!(magnitude < 0x1p960)) return kInfinity;
   return PlainErrorUpper(magnitude, 2 * (static_cast<int>(columns) + 8), 4 * static_cast<int>(columns));
 }
 
-/** The same for all pairs of the given observations. */
+/** PairMarginUpper for all pairs of the given observations. */
 [[nodiscard]] double MarginUpper(const LipschitzRow& row, const ObservationIndex::Entries& entries,
                                  const Observations& observations);
 

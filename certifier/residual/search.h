@@ -1,6 +1,8 @@
-/** max_i (value_i - D_i) over an ObservationIndex, for both sides: value_i is the floor, or the negated ceiling. Scans
-all blocks, or goes down the tree and leaves out what cannot beat the best so far; both find the same number to the last
-bit, in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metric.h. */
+/** The search of the envelope, Eq. (set-envelope): max_i (v_i - D_i) over the entries i of an ObservationIndex, once
+with v_i = floor_i and once with v_i = -ceiling_i. D_i is the distance of the query set to entry i (metric.h).
+
+ScanBlocks looks at all blocks. SearchTree goes down the tree and skips every child whose bound does not exceed the best
+value so far. Both give the same bits, in plain arithmetic. Only lipschitz_envelope.cpp includes this file. */
 #pragma once
 
 #include "certifier/numerics/size.h"
@@ -12,21 +14,23 @@ bit, in plain arithmetic. For the inside of lipschitz_envelope.cpp only, as metr
 
 namespace forereach::internal {
 
-/** What a search may spend, and whether it would have gone on. */
+/** The limits on the work of a search. A search that meets one sets `capped`; its result is still sound. */
 struct Budget {
-  int leaves, patterns;
+  int leaves;    ///< that one search for one side may visit
+  int patterns;  ///< of signs that SignMetric::Refine may try
   bool capped = false;
 };
 
-/** Blocks at most that are scanned without a tree where entries are refined. */
+/** The largest number of blocks that ScanBlocks takes if the metric refines entries. */
 inline constexpr std::size_t kMaxRefinedBlocks = 128;
 
 struct Sides {
   double floor, negated_ceiling;
 };
 
-/** The best of a block's entries against `best`. One that is to be refined is looked at from its most promising entry
-on. */
+/** The larger of `best` and the block's max_i (v_i - D_i). If the metric refines, entries are refined in the order of
+their bounds, until no bound exceeds the best. @param optimistic upper bounds on v_i - D_i; the values themselves if the
+metric does not refine. */
 template <class Metric>
 double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, const Pack& optimistic, double best,
                    Budget& budget) {
@@ -43,7 +47,7 @@ double BestOfBlock(const Metric& metric, const Pack* block, const Pack& values, 
   }
 }
 
-/** All of `count` blocks in a row. */
+/** Both maxima over `count` adjacent blocks. */
 template <class Metric>
 Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std::size_t coordinates, Budget&) {
   Pack floors = Fill(-kInfinity), ceilings = Fill(-kInfinity);
@@ -55,7 +59,8 @@ Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std
   return {MaxLane(floors), MaxLane(ceilings)};
 }
 
-/** The same where entries are refined: the most promising block first, then those that may still beat what it holds. */
+/** The same if the metric refines: first the block with the largest bound, then the blocks whose bounds exceed the
+ * best. */
 template <class Metric>
 requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count,
                                            std::size_t coordinates, Budget& budget) {
@@ -86,7 +91,7 @@ requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blo
   return {best[0], best[1]};
 }
 
-/** One side of a leaf. */
+/** The larger of `best` and the maximum over one leaf, for one side. */
 template <class Metric>
 double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinates, std::size_t side, double best,
                   Budget& budget) {
@@ -101,8 +106,8 @@ double BestOfLeaf(const Metric& metric, const Pack* block, std::size_t coordinat
   return Max(best, MaxLane(highest));
 }
 
-/** One side of an index, depth first, the most promising child first. In steps, so that two descents share the time
-that each would wait for its last comparison or for memory. */
+/** The search of one side of an index: depth first, the child with the largest bound first. It proceeds in steps, so
+that two searches can alternate and hide the latency of comparisons and memory. */
 template <class Metric>
 class Descent {
  public:
@@ -110,8 +115,8 @@ class Descent {
   Descent(const Metric& metric, const ObservationIndex& index, std::size_t side, int max_leaves)
       : metric_(metric), index_(index), side_(side), leaves_(max_leaves), level_(index.height() + 1) {}
 
-  /** Down to the parent of leaves, then to one leaf after the other, and up when nothing there can beat the best. False
-  when nothing is left to see, or nothing may be. */
+  /** Visits one node or one leaf, then selects the next child whose bound exceeds the best. False if there is none, or
+  if the budget allows no further leaf. */
   bool Step(Budget& budget) {
     if (level_ > 1) {
       Level& at = levels_[ToSize(--level_)];
