@@ -91,8 +91,8 @@ std::vector<Table> FamilyTables(const Scope& scope, const Results& results) {
       "velocity slope over the deployed matrix's: a proved bound on the true one, and LACKI's estimate from the data.",
       {}};
   Table outcomes{"Adversarial residual family: plans",
-                 "The same data. The declaration is the true slopes, the matrix deployed for lambda = 1 for every "
-                 "target, or the estimate. The data refute none of the three.",
+                 "The same data. The declaration is one of three: the true slopes, the matrix deployed for lambda = 1, "
+                 "or the estimate. The data refute none of them.",
                  {}};
   const double last = LambdasOf(scope).back();
   for (const double lambda : LambdasOf(scope)) {
@@ -115,8 +115,9 @@ Plot ProfilePlot() {
     const double speed = 0.02 * i;
     lines += DataLine({speed, EscapeAt(1, speed), EscapeAt(2, speed), EscapeAt(4, speed), EscapeAt(8, speed)});
   }
-  return {"adversarial-profiles", "Adversarial family: all members agree up to the knee, and so on data left of it.",
-          720, 400, DataBlock("profile", lines) + R"(set xrange [0:3]; set yrange [0:8]
+  return {"adversarial-profiles",
+          "Adversarial family: all members agree up to the knee, so they agree on all data below it.", 720, 400,
+          DataBlock("profile", lines) + R"(set xrange [0:3]; set yrange [0:8]
 set arrow from 0.9, graph 0 to 0.9, graph 1 nohead dt 2 lc rgb grey
 set label 'knee' at 0.93, graph 0.95 textcolor rgb grey
 set object rectangle from 0, graph 0 to 0.283, graph 1 fc rgb sky fs solid 0.2 noborder behind
@@ -136,8 +137,8 @@ Plot SlopePlot(const Scope& scope) {
     lines += DataLine(
         {lambda, deployed * TruePart(lambda), deployed * EstimatedPart(scope, lambda).mean.value_or(0), deployed});
   return {"adversarial-slopes",
-          "Adversarial family: the true slope passes every declared bound; the data and the estimates from them do not "
-          "change.",
+          "Adversarial family: the true slope exceeds every declared bound, while the data and the estimates from them "
+          "stay the same.",
           720, 400, DataBlock("slope", lines) + R"(set logscale xy; set xrange [1:32]; set yrange [1e-4:10]
 set format y '10^{%T}'; set xtics (1, 2, 4, 8, 16, 32)
 set xlabel 'lambda'; set ylabel 'largest velocity slope'

@@ -77,9 +77,10 @@ std::vector<Table> BudgetTables(const Scope& scope, const Results& results) {
                "where the radius is infinite; the floor is 119. The others' budgets, summed over the horizon, by "
                "their medians; the paper's probability bound is one minus the total.",
                {}};
-  Table plug_ins{"CP-SLS-MPC, four covariances",
-                 "The same plans, every N. \"Every tested row is starved or vacuous\", says the paper of its four.",
-                 {}};
+  Table plug_ins{
+      "CP-SLS-MPC, four covariances",
+      "The same plans, every N. The paper says of its four rows: \"Every tested row is starved or vacuous\".",
+      {}};
   for (const Method& method : CpSlsMethods()) {
     int meaningful = 0;
     Pooled pooled;

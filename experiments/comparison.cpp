@@ -48,11 +48,11 @@ const char* Side(std::optional<double> coverage, std::optional<double> recall) {
 }
 
 std::vector<Table> Tables(const Scope& scope, const Results& results) {
-  Table bicycle{
-      "Methods, bicycle",
-      "Noiseless. Coverage is of complete tubes: a method without one has none. Methods differ in their bound "
-      "of the residual alone; the tube is made by the same propagation.",
-      {}};
+  Table bicycle{"Methods, bicycle",
+                "Noiseless. Coverage is the part of the complete tubes that contain every rollout; a method that "
+                "completes no tube has no entry. The methods differ only in their bound on the residual; the tube "
+                "comes from the same propagation.",
+                {}};
   Table point_mass{"Methods, point mass", "Noiseless, N = 100.", {}};
   for (const Method& method : Methods()) {
     const bool is_fore_reach = &method == &Methods().front();
@@ -112,17 +112,16 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
              " notitle, '' using 1:2:3 with points ps variable pt " + (m == 0 ? "3" : "7") + " lw 2 lc rgb " + color +
              " title \"" + method.name + "\"";
   }
-  return {
-      {"methods",
-       "Coverage of complete tubes where there are no data (B) against recall where there are (C), bicycle, by "
-       "method; larger marks, more observations. A method without a complete tube is plotted at coverage 1. Only the "
-       "upper right corner is both sound and informative.",
-       840, 480,
-       data +
-           "set xrange [-0.03:1.04]; set yrange [-0.04:1.05]\n"
-           "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
-           "set key outside right top\nset label 'certify nothing: " +
-           useless + "' at 0.97, 0.04 right font ',11'\n" + lines + "\n"}};
+  return {{"methods",
+           "Bicycle, by method: coverage of complete tubes in group B, which has no data, against recall in group C, "
+           "which has data. A larger mark means more observations. A method that completes no tube is plotted at "
+           "coverage 1. Only the upper right corner is both sound and informative.",
+           840, 480,
+           data +
+               "set xrange [-0.03:1.04]; set yrange [-0.04:1.05]\n"
+               "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
+               "set key outside right top\nset label 'certify nothing: " +
+               useless + "' at 0.97, 0.04 right font ',11'\n" + lines + "\n"}};
 }
 
 }  // namespace

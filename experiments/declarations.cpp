@@ -59,8 +59,8 @@ int Rejections(const Scope& scope, Layout layout, double factor) {
 std::vector<Table> TestTables(const Scope& scope) {
   Table table{
       "Incorrect declarations, pairwise test",
-      "The deployed matrix times a factor: the number of data sets, over every N, channel and seed of both systems, "
-      "that contradict it. Below the knee the residual is not visible, so data from there contradict nothing.",
+      "For the deployed matrix times each factor: the number of data sets that contradict it, over every N, channel "
+      "and seed of both systems. Below the knee the residual is nearly zero, so data from there contradict no matrix.",
       {}};
   for (const double factor : kFactors) {
     const std::string times = "L times " + Short(factor);
@@ -76,8 +76,9 @@ std::vector<Table> TestTables(const Scope& scope) {
 
 std::vector<Table> IncorrectTables(const Scope& scope, const Results& results) {
   Table table{"Incorrect declarations, plans",
-              "Data from below the knee, noiseless, the largest N; the usual plans. The tubes show errors that the "
-              "test cannot detect: too small a matrix gives tubes that the target leaves, and false certificates.",
+              "Data from below the knee, noiseless, the largest N; the same plans as above. The tubes show errors that "
+              "the pairwise test cannot detect: a matrix that is too small gives tubes that the target leaves, and "
+              "false certificates.",
               {}};
   for (const System* system : Systems())
     for (const double factor : kFactors) {
@@ -140,8 +141,8 @@ std::vector<Cell> BoxCells(const Scope& scope) {
 std::vector<Table> BoxTables(const Scope& scope, const Results& results) {
   Table table{
       "Parameter boxes",
-      "Bicycle, N = 400, noiseless; L bounds the slopes for all understeer, friction, gravity and gate temperature "
-      "within the box, by branch and bound. Slack: its norm over that without a box.",
+      "Bicycle, N = 400, noiseless. L bounds the slopes for every understeer, friction, gravity and gate temperature "
+      "in the box, by branch and bound. Slack: the norm of L over the norm of the L for the nominal parameters.",
       {}};
   const std::string why = "which parameters the paper's boxes hold, and how it bounds over them, is not in its text";
   const double norm = BoundOverBox(0).norm();

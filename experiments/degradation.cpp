@@ -75,8 +75,9 @@ std::vector<Plot> DegradationPlots(const Scope& scope, const Results& results) {
     };
     lines += DataLine({percent, recall(PointMassSystem()), recall(BicycleSystem())});
   }
-  return {{"degradation", "Recall of group C against the degradation of the nominal model; at 100 % there is no model.",
-           720, 400, DataBlock("recall", lines) + R"(set yrange [0:1.05]; set xrange [0:100]
+  return {{"degradation",
+           "Recall of group C against the degradation of the nominal model. At 100 % the nominal model is zero.", 720,
+           400, DataBlock("recall", lines) + R"(set yrange [0:1.05]; set xrange [0:100]
 set xlabel 'degradation d, %'; set ylabel 'certified recall, C'
 set key bottom left
 plot 0.5 with lines dt 2 lc rgb grey title 'reference', \

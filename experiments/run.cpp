@@ -36,14 +36,14 @@ std::string Preamble(const RunOptions& options) {
   return text + R"(.
 
 Models, residuals, horizons, the deployed declarations, sample sizes, noise scales and the order of zonotopes are the
-paper's. The bounds of its scenarios, its data regions and the sizes of its initial sets are not in its text: **those
-are ours**, in `experiments/scenarios.h`, `experiments/systems.h` and, for learned plans, `experiments/chunks`. So are
-its seeds. Nothing in the certifier was fitted to a figure; `method: paper` is used throughout.
+paper's. The paper's text does not give the bounds of its scenarios, its data regions, the sizes of its initial sets or
+its seeds: **those are ours**. They are in `experiments/scenarios.h`, `experiments/systems.h` and, for learned plans,
+`experiments/chunks`. No constant of the certifier was fitted to a figure. Every experiment uses `method: paper`.
 
 A plan is *target-safe* if no rollout from its initial set, corners included, touches the obstacle. *Recall* is the part
-of the target-safe plans that get a certificate; a certificate for another is *false*. *Coverage* is the part of the
-complete tubes that contain every rollout. With more than one seed: mean ± sample standard deviation. "Within the
-seeds' spread": the means differ by at most twice the standard error that both spreads give.
+of the target-safe plans that get a certificate. A certificate for any other plan is *false*. *Coverage* is the part of
+the complete tubes that contain every rollout. With more than one seed, a figure is the mean ± the sample standard
+deviation. "Within the seeds' spread" means that the means differ by at most twice their joint standard error.
 )";
 }
 

@@ -84,8 +84,8 @@ std::vector<Cell> ScalarCells(const Scope& scope) {
 
 std::vector<Table> ScalarTables(const Scope& scope, const Results& results) {
   Table table{"Scalar envelope",
-              "Bicycle, N = 400, noiseless: every entry of L is its largest one, so that a single number bounds the "
-              "residual.",
+              "Bicycle, N = 400, noiseless. Every entry of L is set to the largest entry, so a single number bounds "
+              "the residual.",
               {}};
   for (const Group group : kGroups) {
     const std::string where(1, NameOf(group));
@@ -146,8 +146,8 @@ std::vector<Plot> NoisePlots(const Scope& scope, const Results& results) {
   for (const char* multiple : {"0", "3.3"})
     paper += DataLine({std::stod(multiple), Paper(std::string("noise.recall.") + multiple).value});
   return {{"noise",
-           "Recall of group C at N = 400 as the observations get noisier; mean and one standard deviation over the "
-           "seeds. The paper's text does not give the sigma declared for its Gaussian noise; here it is 3 s.",
+           "Recall of group C at N = 400 against the noise of the observations; mean and one standard deviation over "
+           "the seeds. The paper's text does not give the sigma declared for its Gaussian noise; here it is 3 s.",
            720, 400,
            DataBlock("ours", ours) + DataBlock("paper", paper) + R"(set xrange [-0.15:3.6]; set yrange [0.8:1.01]
 set xlabel 'noise scale s, in multiples of the median residual'; set ylabel 'certified recall, bicycle C'

@@ -86,7 +86,7 @@ Table OutcomeTable(const Scope& scope, const Results& results, double noise) {
 
 Table GroupTable(const Scope& scope, const Results& results) {
   const int most = ChunkSystem().sample_sizes.back();
-  Table table{"Action chunks by group", "Noiseless, the largest N. The paper has no such figures.", {}};
+  Table table{"Action chunks by group", "Noiseless, the largest N. The paper does not report these figures.", {}};
   for (const Layout layout : kLayouts)
     for (const Group group : kGroups)
       for (const auto& [what, statistic] : std::initializer_list<std::pair<const char*, Statistic>>{
