@@ -1,20 +1,20 @@
 /** The simulated robot: a Target that executes certified plans under the Supervisor, one step at a time.
 
-Step boundaries lie at t_j = t_0 + j * step_period, t_0 being the first Tick. At each, in this order:
- 1. the control of the step that has ended is applied to the target, and the supervisor finishes the step;
- 2. CONTACT for every obstacle that contains the true state; GOAL_REACHED once, where |P x - goal| <= goal_radius first
-    holds;
- 3. the supervisor starts the pending plan, goes on with the current one or holds, and reports (supervisor.h).
+Step boundaries lie at t_j = t_0 + j * step_period, where t_0 is the first Tick. At each boundary, in this order:
+ 1. The target takes the control of the step that has ended, and the supervisor finishes the step.
+ 2. The node reports CONTACT for every obstacle that contains the true state, and GOAL_REACHED at the first boundary
+    with |P x - goal| <= goal_radius.
+ 3. The supervisor starts the pending plan, continues the current one, or holds; then it reports (supervisor.h).
 
-While the robot holds, the speed and acceleration that were left are zero at once (v and a of the bicycle, vx and vy of
-the point mass), every other coordinate keeps its value, and no control and no residual act until the next plan starts.
-An emergency stop is the same hold, whatever the speed was.
+While the robot holds, its speed and acceleration are set to zero (v and a of the bicycle, vx and vy of the point mass).
+Every other coordinate keeps its value, and neither control nor residual acts until the next plan starts. An emergency
+stop is the same hold at any speed.
 
-The run ends after the goal is reached or the time limit has passed: no further plan starts, the current one runs to its
-end, and once the robot holds it sends FINISHED for kFinishedBoundaries boundaries and is done.
+The run ends when the goal is reached or the time limit has passed. Then no further plan starts, and the current one
+runs to its end. Once the robot holds, it sends FINISHED for kFinishedBoundaries boundaries and is done.
 
-Obstacles and start are those of the task file. After a reload it also takes plans that are certified under the file as
-it is now (Guard::Expect); the robot and its world stay. */
+Obstacles and start are those of the task file. After a reload the robot also accepts plans that are certified under the
+new file (Guard::Expect); its state and its world do not change. */
 #pragma once
 
 #include <iostream>
@@ -36,21 +36,21 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
  public:
   static constexpr int kFinishedBoundaries = 5;
 
-  /** @param bus has to outlive the node, and hands out nothing after the node is gone.
-  @param out gets the summary at Stop.
+  /** @param bus must outlive the node and must not call it after its end. @param out receives the summary at Stop.
   @throws ConfigError if robot.start, planner.goal or the residual do not fit the model. */
   RobotSimNode(const Config& config, Bus& bus, std::ostream& out = std::cout);
 
-  /** Handles every boundary up to `now_us`; a late call catches up, each boundary at its own time. */
+  /** Handles every boundary up to `now_us`, microseconds since the Unix epoch. After a late call, each boundary keeps
+  its own time. */
   void Tick(std::int64_t now_us) override;
   [[nodiscard]] bool done() const override { return finished_boundaries_ >= kFinishedBoundaries; }
-  /** Reads the task file, beside the running work. */
+  /** Reads the task file in the background. */
   void Reload() override;
-  /** Prints Summary() on a line of its own. */
+  /** Prints Summary() as one line. */
   void Stop() override;
 
-  /** One JSON object: boundaries, steps_executed, steps_inside_slice, contacts, goal_reached, distance_to_goal (metres,
-  now; null without a goal), stops (times it stood before the goal, emergencies included), plans_accepted,
+  /** One JSON object: boundaries, steps_executed, steps_inside_slice, contacts, goal_reached, distance_to_goal
+  (current, in metres; null without a goal), stops (before the goal, emergency stops included), plans_accepted,
   plans_started, plans_refused (count by GuardCauseName), messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 

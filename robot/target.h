@@ -1,4 +1,4 @@
-/** The robot that the certifier does not know: nominal model plus residual. */
+/** The true system of a simulation: nominal model plus residual. The certifier does not know the residual. */
 #pragma once
 
 #include <cstdint>
@@ -14,33 +14,33 @@
 
 namespace forereach {
 
-/** x+ = f0(x, u) + r(x, u). Computed in extended precision from equations and residual together and rounded once, so
-that what is recorded of it is known to its last bit: a nominal successor that was rounded before the residual is
-added would be known to two. The error is at most half an ulp of x+ plus 2^-60 of the terms of its sum. */
+/** x+ = f0(x, u) + r(x, u), Eq. (dynamics). The sum is computed in extended precision and rounded once, so a recorded
+successor is known to its last bit. The error is at most half an ulp of x+ plus 2^-60 of the terms of the sum. */
 class Target {
  public:
   virtual ~Target() = default;
 
-  /** @param x n entries. @param u m entries. @param next n entries, may be x itself. */
+  /** Sets `next` to x+. @param x n entries. @param u m entries. @param next n entries; it may be x itself. */
   virtual void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const = 0;
 };
 
 /** The target that robot.residual names: "none", "heading_saturation" (kinematic_bicycle) or "velocity_knee"
-(point_mass). robot.residual_parameters: dt, and for the bicycle wheelbase, which have to be the model's own; any other
-member of residuals.h by its name, with the paper's value as default.
-@throws ConfigError for a residual that is unknown or another model's, an unknown, missing or non-finite parameter, or a
-dt or wheelbase that is not the model's. */
+(point_mass). robot.residual_parameters are those of residuals.h, by name; their defaults are the paper's values. dt,
+and for the bicycle wheelbase, must equal the model's.
+@throws ConfigError for an unknown residual, a residual of another model, an unknown or missing parameter, one that is
+not finite, or a dt or wheelbase that is not the model's. */
 [[nodiscard]] std::unique_ptr<Target> MakeTarget(const Config& config);
 
-/** Narrows one coordinate of z, named as the model names it. */
+/** A range for one coordinate of z, by its name in the model. */
 struct SampleRange {
   std::string name;
   double lower, upper;
 };
 
-/** `count` transitions of `target`: z uniform over the domain's box narrowed by `ranges`, kept if inside the whole
-domain (inequalities and balls too). The points are the same with every standard library and compiler.
-@param noise_bound empty, or n entries: to each successor an error uniform in [-bound, bound] is added.
+/** `count` transitions of `target`. z is uniform over the intersection of the domain's box with `ranges`; points that
+violate the domain's inequalities or balls are drawn again. The result depends on `seed` only, not on the standard
+library or compiler.
+@param noise_bound empty, or n entries: each successor gets an error uniform in [-bound, bound].
 @throws std::invalid_argument for an unknown name, a range that is empty or not inside the domain, a wrong size, or if
 fewer than one point in 1000 lies inside the domain. */
 [[nodiscard]] Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,

@@ -1,8 +1,8 @@
-/** What the digests in a decision are taken of: a byte string of exactly what matters, so that the same data in
-another order of columns, with other white space or spelled differently has the same digest.
+/** The digests of a task's data. Each is the BLAKE2b-256 of a canonical byte string, so the order of columns, white
+space and the spelling of numbers do not change it.
 
-The string is a sequence of items: a text is its length and its bytes, a count or length is 8 bytes, a number the 8
-bytes of the double, all little-endian; -0 is written as 0. Each string begins with a text that names its kind. */
+The string is a sequence of items, all little-endian. A text is its length and its bytes; a count or length has 8 bytes;
+a number is the 8 bytes of the double, with 0 for -0. Each string begins with a text that names its kind. */
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-/** A task file, read whole: all a robot needs. What each key means, its unit, range and default stand in schema.cpp
-and, made from it, in config/README.md. */
+/** The content of a task file, and the CSV files of transitions and plans. The schema (schema.h) defines each key's
+meaning, unit, range and default; config/README.md is generated from it. */
 #pragma once
 
 #include <memory>
@@ -20,6 +20,7 @@ and, made from it, in config/README.md. */
 
 namespace forereach {
 
+/** A checked task. Everything fits together: sizes, names, and all transitions lie in the domain. */
 struct Config {
   std::string path;
   Grounds grounds;  ///< Before anything is heard or learned.
@@ -35,42 +36,43 @@ struct Config {
   LoggerOptions logger;
 };
 
-/** Whether the transitions a task file names are read; not, where they are still to be made. */
+/** kIgnore: does not read the transitions that the task file names, for commands that will write them. */
 enum class TransitionsFile { kRead, kIgnore };
 
-/** Reads a task file and the transitions it names.
-@throws ConfigError for a missing file, an unknown or missing key, a wrong size, a non-finite or out-of-range number. */
+/** Reads a task file and the transitions that it names. Cost: linear in the files, except for the digests' hashing.
+@throws ConfigError with file, line, key, value and bound: a missing file, an unknown or missing key, a wrong size, a
+number that is not finite or out of range, a transition outside the domain. */
 [[nodiscard]] Config LoadConfig(const std::string& path, TransitionsFile transitions = TransitionsFile::kRead);
 
-/** Paths of the data that belongs to the task, but not to the file's own bytes. Empty: the task names none. A key file
-is none of these: it is a secret. */
+/** The paths of the data files of a task, which belong to the task but not to the bytes of its file. Empty if the task
+file names no such file. A key file is not listed: it is a secret, not data. */
 struct NamedFiles {
   std::string transitions, policy;
 };
 
-/** The files that a task file names, relative to the task file's place. @throws ConfigError if it is no task file. */
+/** The files that a task file names, relative to its directory. @throws ConfigError if it is not a task file. */
 [[nodiscard]] NamedFiles FilesNamedBy(const std::string& path);
 
-/** The same as the other LoadConfig, but reads the files of `instead` in place of those that the task file names. An
-empty entry of `instead` replaces nothing. @throws ConfigError as the other. */
+/** As the other LoadConfig, but reads each nonempty file of `instead` in place of the one that the task file names.
+@throws ConfigError as it does. */
 [[nodiscard]] Config LoadConfig(const std::string& path, const NamedFiles& instead);
 
-/** @throws ConfigError, which says what to write, where the task does not say gate.obstacles: whoever certifies on a
-bus needs to know where its obstacles come from. */
+/** Checks that the task sets gate.obstacles, which a process needs before it certifies on a bus.
+@throws ConfigError that says which line to add. */
 void RequireObstaclesSource(const Config& config);
 
-/** Reads transitions: CSV with a column for each state, each input and each state's successor `<state>_next`, in any
-order, one row a transition. @throws ConfigError, also if there is none. */
+/** Reads transitions from CSV (csv.h): columns for each state, each input and each successor `<state>_next`, in any
+order, in the model's units; one row a transition. @throws ConfigError, also if the file has no transition. */
 [[nodiscard]] Transitions LoadTransitions(const std::string& path, const NominalModel& model);
 
-/** Writes transitions so that LoadTransitions gives them back to the last bit. @throws ConfigError. */
+/** Writes transitions so that LoadTransitions returns the same bits. @throws ConfigError. */
 void SaveTransitions(const std::string& path, const NominalModel& model, const Transitions& transitions);
 
-/** Reads a plan: CSV with a header that names the inputs in any order, one row a step.
-@return one column a step, inputs in the model's order. @throws ConfigError. */
+/** Reads a plan from CSV (csv.h): a column for each input, in any order, in the model's units; one row a step.
+@return m-by-T, one column a step, inputs in the model's order. @throws ConfigError. */
 [[nodiscard]] Eigen::MatrixXd LoadPlan(const std::string& path, const NominalModel& model);
 
-/** Writes a plan so that LoadPlan gives it back to the last bit. @throws ConfigError. */
+/** Writes a plan so that LoadPlan returns the same bits. @throws ConfigError. */
 void SavePlan(const std::string& path, const NominalModel& model, const Eigen::MatrixXd& controls);
 
 }  // namespace forereach

@@ -1,4 +1,4 @@
-/** A YAML file and the places in it, checked against the schema. */
+/** A YAML file that is checked against the schema, with the line of each value for error messages. */
 #pragma once
 
 #include <functional>
@@ -18,42 +18,42 @@ struct SchemaScope;
 
 class Document final {
  public:
-  /** Reads and parses. @throws ConfigError if it cannot, also for anything but one YAML document. */
+  /** Reads and parses a file. @throws ConfigError if it cannot be read, or is not exactly one YAML document. */
   explicit Document(const std::string& path);
   ~Document();
 
-  /** Called with each value that is good, by its row and key, after everything inside it. */
+  /** Receives each value that passed its check, by its row and its key. A map or list comes after everything in it. */
   using Visitor = std::function<void(const Key& row, const std::string& key)>;
-  /** Checks everything against the schema in one pass. A map's keys are checked before its values, and its values in
-  the schema's order. Keys that were visited may be read, also by the visitor.
-  @param scope is looked at again for each value, so the visitor may fill it.
-  @throws ConfigError naming file, line, key, value and bound of the first thing that is wrong. */
+  /** Checks the whole document in one pass: the keys of a map before its values, its values in the schema's order. A
+  visited key may be read, also by the visitor.
+  @param scope is read again for each value, so the visitor may fill it.
+  @throws ConfigError with file, line, key, value and bound of the first error. */
   void Check(const SchemaScope& scope, const Visitor& visit);
 
   [[nodiscard]] const std::string& path() const { return path_; }
   /** The file's bytes. */
   [[nodiscard]] const std::string& text() const { return text_; }
 
-  /** How many entries a list has, 0 if it is absent. */
+  /** The number of entries of a list; 0 if it is absent. */
   [[nodiscard]] int Count(std::string_view key) const;
-  /** The keys of a map in the file's order, none if it is absent. */
+  /** The keys of a map in the file's order; none if it is absent. */
   [[nodiscard]] std::vector<std::string> KeysOf(std::string_view key) const;
 
-  // The value at a key that is present and has this type in the schema.
+  // The value of a key. @pre the key is present and has this type in the schema.
   [[nodiscard]] double Number(std::string_view key) const;
   [[nodiscard]] std::string Text(std::string_view key) const;
   [[nodiscard]] Eigen::VectorXd Vector(std::string_view key) const;
   [[nodiscard]] std::vector<Eigen::VectorXd> Vectors(std::string_view key) const;
   [[nodiscard]] std::vector<std::string> Names(std::string_view key) const;
 
-  // The same, by the type of the member that takes it.
+  // The same, selected by the type of `value`.
   void Read(std::string_view key, double& value) const;
   void Read(std::string_view key, int& value) const;
   void Read(std::string_view key, std::string& value) const;
   void Read(std::string_view key, std::vector<double>& value) const;
   void Read(std::string_view key, std::optional<double>& value) const;
 
-  /** "file:line: key: ": the place of a key, or of the map it is missing from. */
+  /** "file:line: key: " for a key that is present; otherwise the line of the map that lacks it. */
   [[nodiscard]] std::string Place(std::string_view key) const;
   /** @throws ConfigError Place(key) + what. */
   [[noreturn]] void Fail(std::string_view key, const std::string& what) const;

@@ -1,4 +1,4 @@
-/** A task file's content while it is read. */
+/** The content of a task file while it is being read. */
 #pragma once
 
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace forereach {
 
-/** What names and sizes in the schema stand for. Where it is not known, everything fits. */
+/** The values of the names and sizes in the schema. While `states` is empty, every name and size fits. */
 struct SchemaScope {
   std::vector<std::string> states, inputs, variables;
   int safety_dim = 0;
 };
 
-/** Begins with all defaults; each key's row (schema.h) adds what the key says. */
+/** Starts with all defaults. The reader of each key's row (schema.h) sets its members. */
 struct TaskDraft {
   Config config;  ///< Without problem and digests.
   Problem problem;

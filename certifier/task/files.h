@@ -1,7 +1,7 @@
-/** Reading files that people name, so that no file can hang the process or fill its memory.
+/** Reads files whose paths come from outside, with a limit on their size.
 
-Only regular files are read: a pipe, a socket, a device or a directory is an error, and opening one does not wait. A
-read from a mount that stalls still waits; whoever may not wait reads in a thread of its own (bus/reloading.h). */
+Only regular files are read. A pipe, a socket, a device or a directory is an error, and opening it does not wait. A read
+from a stalled mount does wait; a caller that must not wait reads in its own thread (bus/reloading.h). */
 #pragma once
 
 #include <cstddef>
@@ -21,12 +21,13 @@ inline constexpr std::int64_t kLargestCsvFile = 16'384 * kMegabyte;
 /** A regular file, open for reading from its beginning to its end. */
 class InputFile final {
  public:
-  /** @param named_by goes before each message: the place that names the file. @param most_bytes in the file.
-  @throws ConfigError with file and cause if it is no regular file, cannot be opened, or is larger. */
+  /** @param most_bytes the largest size accepted. @param named_by prefix of each message: the place that names the
+  file.
+  @throws ConfigError with file and cause if the file cannot be opened, is not regular, or is larger. */
   InputFile(const std::string& path, std::int64_t most_bytes, std::string named_by = "");
 
-  /** The next bytes, at most so many; 0 at the end. @throws ConfigError if reading fails or the file has grown larger.
-   */
+  /** Reads the next bytes, at most `most`, and returns their number; 0 at the end of the file.
+  @throws ConfigError if reading fails or the file has grown beyond the limit. */
   [[nodiscard]] std::size_t Read(char* to, std::size_t most);
 
  private:
@@ -39,10 +40,10 @@ class InputFile final {
   const Descriptor descriptor_;
 };
 
-/** All of a regular file. Same errors. */
+/** The content of a regular file. @throws ConfigError as InputFile does. */
 [[nodiscard]] std::string ReadWhole(const std::string& path, std::int64_t most_bytes, const std::string& named_by = "");
 
-/** Its first bytes, at most so many; the size of the file does not count. Same errors. */
+/** The first bytes of a regular file of any size, at most `bytes`. @throws ConfigError as InputFile does. */
 [[nodiscard]] std::string ReadBeginning(const std::string& path, std::size_t bytes);
 
 /** Writes all of `bytes` to an open file from `offset` on. False on failure; errno says why. */

@@ -1,15 +1,15 @@
-/** What a task file says of the gate. */
+/** The options of the gate, from `gate` in a task file. Times in milliseconds. */
 #pragma once
 
 #include <string>
 
 namespace forereach {
 
-/** Where the obstacles of a task are known from. */
+/** The source of a task's obstacles. */
 enum class ObstaclesSource {
-  kUnsaid,  ///< Tasks from before gate.obstacles: the file's, until some are heard. Read to replay old logs.
-  kBus,     ///< The file's and those that OBSTACLES carries; nothing is certified while no sender is heard.
-  kTask,    ///< The file's alone.
+  kUnsaid,  ///< The file's until OBSTACLES is heard. Only for replaying logs of tasks without gate.obstacles.
+  kBus,     ///< The file's and those on OBSTACLES. Nothing is certified while no sender is heard.
+  kTask,    ///< The file's only.
 };
 
 struct GateOptions {
@@ -18,15 +18,16 @@ struct GateOptions {
   double certificate_lifetime_ms = 2000;
   double decision_budget_ms = 5;  ///< A candidate that starts sooner is answered ABSTAIN_DEADLINE.
   int queue = 64;
-  bool shadow = false;             ///< Decide, and pass nothing on.
-  bool needs_robot_state = true;   ///< Certify only while the robot's state is heard.
-  double robot_timeout_ms = 1000;  ///< The robot's state counts as lost after this time without one.
+  bool shadow = false;             ///< Decides, but sends no certified plan.
+  bool needs_robot_state = true;   ///< Certifies only while the robot's state is heard.
+  double robot_timeout_ms = 1000;  ///< The robot's state is lost after this time without a message.
   double max_clock_jump_ms = 200;
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
-  double obstacles_timeout_ms = 1000;  ///< The obstacles heard on the bus are no longer known after this time.
-  bool learns = true;                  ///< Executed transitions add to the observations.
-  std::string state = "state";         ///< Directory that keeps a latched fault over a restart.
-  double longest_step_ms = 150;  ///< No step of a plan takes longer. From a file: the model's dt or the robot's period.
+  double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.
+  bool learns = true;                  ///< Adds executed transitions to the observations.
+  std::string state = "state";         ///< The directory that keeps a latched fault across restarts.
+  double longest_step_ms =
+      150;  ///< An upper bound on a step. Read from a file: the model's dt or robot.step_period_ms.
 };
 
 }  // namespace forereach

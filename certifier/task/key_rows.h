@@ -1,4 +1,4 @@
-/** Rows of the schema, made in few words. */
+/** Functions that make rows of the schema. */
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ inline constexpr Range kPositive{0, kReal.upper};
 constexpr Range UpTo(double upper) { return {0, upper, true, false}; }
 constexpr Range Between(double lower, double upper) { return {lower, upper, false, false}; }
 
-// ---- One row each: path, then what belongs to the type, then meaning and reader.
+// ---- One function for each type. Arguments: path, the members that the type uses, meaning, reader.
 
 inline Key Map(std::string path, std::string meaning, Key::Reader read = {}) {
   return {.path = std::move(path), .meaning = std::move(meaning), .read = std::move(read)};
@@ -82,7 +82,7 @@ inline Key Text(std::string path, std::string meaning, Key::Reader read = {}) {
   return Of(Key::Type::kText, std::move(path), std::move(meaning), std::move(read));
 }
 
-/** It has to be there where its map is. */
+/** The key must be present if its map is. */
 inline Key Required(Key key) {
   key.required = true;
   return key;
@@ -98,7 +98,7 @@ inline Key OnlyFor(std::string name, Key key) {
   return key;
 }
 
-/** A word of a task file and what it means. */
+/** A word of a task file and the value that it stands for. */
 template <class T>
 struct Named {
   std::string_view name;
@@ -112,7 +112,7 @@ std::vector<std::string_view> NamesIn(const std::vector<Named<T>>& all) {
   return names;
 }
 
-/** @throws std::logic_error if none has the name, which the check of its row excludes. */
+/** The value with a name. @throws std::logic_error if there is none; the check of the row excludes that. */
 template <class T>
 const T& ValueNamed(const std::vector<Named<T>>& all, std::string_view name) {
   const auto found = std::ranges::find(all, name, &Named<T>::name);
@@ -120,7 +120,7 @@ const T& ValueNamed(const std::vector<Named<T>>& all, std::string_view name) {
   return found->value;
 }
 
-/** The path of a file that a task file names, relative to the task file's own place. */
+/** The path of a file that a task file names, relative to the task file's directory. */
 inline std::string RelativeTo(const std::string& file, const std::string& path) {
   return (std::filesystem::path(file).parent_path() / path).string();
 }
@@ -135,11 +135,11 @@ inline void RequireOrdered(const Document& file, double lower, double upper, con
             ToText(upper) + " is outside " + Range{lower, kReal.upper, false, true}.text() + ", below " + lower_key);
 }
 
-/** Rows of one options structure. Their defaults are those of the structure's members. */
+/** Makes rows that set members of one options structure. Their defaults are the members' initial values. */
 template <class Options>
 class OptionRows final {
  public:
-  /** @param map path of the options' map. @param part where they stand in the draft. */
+  /** @param map the path of the options' map. @param part returns the structure in a draft. */
   OptionRows(std::string map, Options& (*part)(TaskDraft&)) : map_(std::move(map)), part_(part) {}
 
   template <class T>

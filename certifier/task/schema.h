@@ -1,6 +1,7 @@
-/** Every key of a task file, in one row: its path, unit, range, default and meaning, and the member that it fills.
+/** The schema of task files: one row for each key, with its path, unit, range, default, meaning, and the member that it
+sets.
 
-Documents are checked and read by this table (document.h), and config/README.md is made from it. */
+Documents are checked and read by these rows (document.h). config/README.md is generated from them. */
 #pragma once
 
 #include <functional>
@@ -23,18 +24,18 @@ struct Range {
   [[nodiscard]] bool Contains(double x) const {
     return (lower_open ? lower < x : lower <= x) && (upper_open ? x < upper : x <= upper);
   }
-  /** As in [0, inf). */
+  /** In the notation of "[0, inf)". */
   [[nodiscard]] std::string text() const;
 };
 
 inline constexpr Range kReal{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
 
-/** One row. A path has a dot before each key, `[]` for every entry of a list, `<state>` for every state's name and
-`<variable>` for every state's or input's. A path has several rows if its value may take several forms. */
+/** One row. In a path, a dot precedes each key, `[]` stands for every entry of a list, `<state>` for the name of every
+state, and `<variable>` for the name of every state or input. A path has several rows if its value has several forms. */
 struct Key {
   enum class Type {
     kMap,
-    kList,  ///< Of what `path[]` says.
+    kList,  ///< Its entries have the row `path[]`.
     kNumber,
     kInteger,
     kVector,   ///< A list of numbers.
@@ -44,10 +45,10 @@ struct Key {
     kText,
     kChannel,  ///< Letters, digits and underscores, at most 63.
   };
-  /** How many entries a vector has, or every vector of kVectors. */
+  /** The number of entries of a vector, or of every vector of kVectors. */
   enum class Size { kAny, kStates, kInputs, kVariables, kSafety };
-  /** Takes the value at `key`, which was checked, and everything in it, into the draft.
-  @throws ConfigError, std::invalid_argument if it does not fit with what was read before. */
+  /** Stores the checked value at `key`, with everything in it, in the draft.
+  @throws ConfigError, std::invalid_argument if it contradicts values that were read before. */
   using Reader = std::function<void(const Document& file, const std::string& key, TaskDraft& draft)>;
 
   std::string path = "";
@@ -57,18 +58,18 @@ struct Key {
   Size size = Size::kAny;
   Range count = kReal;                       ///< Of the entries of a list.
   std::vector<std::string_view> words = {};  ///< Of kWord.
-  std::string only = "";                     ///< Belongs to the map only if the key `name` in it has this value.
+  std::string only = "";                     ///< The key is allowed only if the key `name` of its map has this value.
   bool required = false;
-  std::string fallback = "";  ///< The value where the key is absent, in words or as YAML.
+  std::string fallback = "";  ///< The default, in words or as YAML.
   std::string meaning = "";
-  Reader read = {};  ///< Empty: the map or list around it reads it.
+  Reader read = {};  ///< Empty if the reader of the enclosing map or list reads it.
 };
 
-/** The rows, in the order in which a file is read: the model and the projection come before all keys whose names or
-sizes depend on them. */
+/** All rows, in the order in which a file is read. The model and the projection precede the keys whose names or sizes
+depend on them. */
 [[nodiscard]] std::span<const Key> Schema();
 
-/** "Keys" of config/README.md: the table for people. */
+/** The section "Keys" of config/README.md. */
 [[nodiscard]] std::string SchemaMarkdown();
 
 }  // namespace forereach
