@@ -39,7 +39,7 @@ struct Config {
 /** kIgnore: does not read the transitions that the task file names, for commands that will write them. */
 enum class TransitionsFile { kRead, kIgnore };
 
-/** Reads a task file and the transitions that it names. Cost: linear in the files, except for the digests' hashing.
+/** Reads a task file and the transitions that it names. Cost: linear in the files.
 @throws ConfigError with file, line, key, value and bound: a missing file, an unknown or missing key, a wrong size, a
 number that is not finite or out of range, a transition outside the domain. */
 [[nodiscard]] Config LoadConfig(const std::string& path, TransitionsFile transitions = TransitionsFile::kRead);

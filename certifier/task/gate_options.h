@@ -26,8 +26,7 @@ struct GateOptions {
   double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.
   bool learns = true;                  ///< Adds executed transitions to the observations.
   std::string state = "state";         ///< The directory that keeps a latched fault across restarts.
-  double longest_step_ms =
-      150;  ///< An upper bound on a step. Read from a file: the model's dt or robot.step_period_ms.
+  double longest_step_ms = 150;  ///< An upper bound on a step. The larger of the model's dt and robot.step_period_ms.
 };
 
 }  // namespace forereach
