@@ -128,7 +128,7 @@ class Asker {
   }
 
   [[nodiscard]] int unexpected() const { return unexpected_; }
-  // What the last decision says of the gate's work on it.
+  // The gate's time for the last decision, from the message.
   [[nodiscard]] double gate_us() const { return gate_us_; }
 
  private:

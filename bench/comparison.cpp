@@ -18,8 +18,8 @@ namespace forereach::bench {
 namespace {
 
 namespace bn = boost::numeric;
-// Outward rounding by the processor's rounding mode; sin, cos and tan are the C library's in that mode, whose errors
-// nobody bounds: rigorous up to them.
+// Outward rounding by the processor's rounding mode. sin, cos and tan are the C library's in that mode; their errors
+// are not bounded, so this is rigorous up to them.
 using BoostInterval =
     bn::interval<double,
                  bn::interval_lib::policies<bn::interval_lib::save_state<bn::interval_lib::rounded_transc_std<double>>,

@@ -27,14 +27,14 @@ std::vector<std::string> CommandNames(const CLI::App& app) {
   return names;
 }
 
-// An argument may hold any bytes; those that would drive a terminal are not printed.
+// Replaces control characters: an argument may contain any bytes.
 std::string Shown(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   return text;
 }
 
-// Of the first argument that nobody took: what it is not, and what was probably meant. Empty if all were taken.
+// The error for the first argument that no option took, with the nearest name. Empty if all were taken.
 std::string UnknownArgument(const CLI::App& app) {
   const std::vector<std::string> left = app.remaining(true);
   const auto chosen = app.get_subcommands();

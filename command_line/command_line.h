@@ -45,16 +45,15 @@ struct Command {
   std::string purpose{};
   std::string footer{};  ///< The end of its help: notes and examples.
   std::vector<Option> options{};
-  std::function<int()> run{};       ///< What a chosen command does. @return its exit code.
-  std::vector<Command> commands{};  ///< Exactly one has to be chosen, if there are any.
-  std::string* chosen = nullptr;    ///< Gets the name of the command that was chosen.
+  std::function<int()> run{};       ///< Runs the chosen command. @return its exit code.
+  std::vector<Command> commands{};  ///< If there are any, the user has to choose exactly one.
+  std::string* chosen = nullptr;    ///< Receives the name of the chosen command.
 };
 
-/** Parses. Each program also takes --help and --version, each command --help. The program's own options may stand
-after the command as well.
-@return nothing if the program is to go on; otherwise its exit code, after the text it owes: 0 after --help and
---version, kExitBadInput after a line that says what is wrong and, for an unknown command or option, what was probably
-meant. */
+/** Parses the arguments and sets the options. Every program also has --help and --version, every command --help. The
+program's own options are also accepted behind the command.
+@return nothing if the program should continue; otherwise its exit code: 0 after it has printed the text of --help or
+--version, kExitBadInput after it has printed the error and, for an unknown command or option, the nearest name. */
 [[nodiscard]] std::optional<int> ParseCommandLine(const Command& program, int argc, const char* const* argv);
 
 }  // namespace forereach

@@ -1,4 +1,4 @@
-/** What a task file says of the logger. */
+/** The options of the logger, from `logger` in a task file. */
 #pragma once
 
 #include <optional>
@@ -8,13 +8,13 @@ namespace forereach {
 
 struct LoggerOptions {
   std::string directory = "log";
-  int queue = 4096;                ///< Messages held for writing at most.
-  double flush_ms = 200;           ///< A killed logger loses at most this much.
-  double rotate_mb = 1024;         ///< Largest size of one log file, 10^6 bytes each.
-  double rotate_minutes = 60;      ///< Longest time in one log file.
-  std::optional<double> quota_mb;  ///< Largest size of all log files together; nothing: none is ever deleted.
-  double min_free_mb = 256;        ///< With less free on the disk recording pauses.
-  double unsigned_kb_per_s = 100;  ///< With keys: unsigned messages recorded at most, 10^3 bytes each.
+  int queue = 4096;                ///< The largest number of messages that wait to be written.
+  double flush_ms = 200;           ///< A killed logger loses at most the messages of this time.
+  double rotate_mb = 1024;         ///< The largest size of one log file, in 10^6 bytes.
+  double rotate_minutes = 60;      ///< The longest time span of one log file.
+  std::optional<double> quota_mb;  ///< The largest size of all log files. Without a value no file is ever deleted.
+  double min_free_mb = 256;        ///< Recording pauses if the disk has less free space, in 10^6 bytes.
+  double unsigned_kb_per_s = 100;  ///< With keys: the largest rate of recorded unsigned messages, in 10^3 bytes per s.
 };
 
 }  // namespace forereach

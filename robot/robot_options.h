@@ -1,4 +1,4 @@
-/** What a task file says of the simulated robot. */
+/** The options of the simulated robot, from `robot` in a task file. */
 #pragma once
 
 #include <map>
@@ -8,11 +8,11 @@
 namespace forereach {
 
 struct RobotOptions {
-  std::vector<double> start;      ///< State, model units; from a file one entry for each state.
-  double step_period_ms = 40;     ///< Wall-clock time of one model step.
-  double time_limit_s = 40;       ///< The run ends then, goal or not.
-  std::string residual = "none";  ///< How the real robot differs: none, heading_saturation, velocity_knee.
-  std::map<std::string, double> residual_parameters;  ///< From a file all of them, with the model's dt and wheelbase.
+  std::vector<double> start;      ///< The first state in the model's units, one entry for each state.
+  double step_period_ms = 40;     ///< The wall-clock time of one model step.
+  double time_limit_s = 40;       ///< The run ends at this time even without reaching the goal.
+  std::string residual = "none";  ///< The difference from the model: none, heading_saturation or velocity_knee.
+  std::map<std::string, double> residual_parameters;  ///< All parameters, with the model's dt and wheelbase.
 };
 
 }  // namespace forereach

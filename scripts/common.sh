@@ -1,4 +1,4 @@
-# Sourced by the scripts: where we are, who may do what, and what the machine needs.
+# Sourced by the scripts: the project's directory, root or sudo, and the packages that a script needs.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"

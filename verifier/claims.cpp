@@ -10,13 +10,13 @@
 namespace forereach::verifier {
 namespace {
 
-// Keeps the first claim that fails. Words are made for that one only.
+// Keeps the first claim that fails. Builds the description of that claim only.
 class Claims {
  public:
   Claims(int step, std::optional<Failure>& failure) : step_(step), failure_(failure) {}
 
-  /** `found` has to be at most (at least) `bound`, `what` says of what. A NaN bounds nothing. Deviations are seen
-  against `scale`. */
+  /** Claims that `found` is at most (at least) `bound`. `what` makes the name of the quantity. The claim fails for a
+  NaN. Deviations are measured relative to `scale`. */
   template <class What>
   void AtMost(const Real& found, const Real& bound, const Real& scale, What what) {
     Judge(IsAtMost(found, bound), found, bound, scale, "at most", what);

@@ -52,7 +52,7 @@ class Search {
     double rest;  // of the column, relative to it
   };
 
-  // As whoever made the record by the same rules has them. False if the numbers differ.
+  // Pairs them in the order that a certifier with the same rules writes. False if the numbers differ.
   bool PairByOrder() {
     Eigen::Index i = 0;
     for (std::size_t j = 0; j < rounded_.size(); ++j) {

@@ -71,8 +71,8 @@ bool MayUnderflow(const std::vector<Real>& column) {
   return std::ranges::all_of(column, [](const Real& entry) { return entry.exponent() < -1073; });
 }
 
-// All columns by their score, the largest first, ties to the earlier. Exact zeros are exact; all others are told apart
-// by the middles of enclosures far below a double's last place.
+// All columns by their score, the largest first; of equal scores the earlier first. Zeros are exact. Other scores are
+// compared by the middles of enclosures that are far narrower than a double's last place.
 std::vector<Score> Ranking(const Slice& slice) {
   std::vector<Score> scores;
   for (std::size_t j = 0; j < slice.columns.size(); ++j) scores.push_back(ScoreOf(slice.columns[j], j));

@@ -130,8 +130,8 @@ Jet cos(const Jet& a) {
   return Composed(a, {value, -sin(a.value), -value});
 }
 
-// Within a quarter turn the tangent has its argument's sign: widening past zero would show a kink that is not there to
-// whoever takes the absolute value.
+// Within a quarter turn the tangent has the sign of its argument. An enclosure that crosses zero would add a kink to
+// the absolute value of this tangent.
 Jet tan(const Jet& a) {
   Interval t = tan(a.value);
   if (t.IsFinite() && 0 <= a.value.lower && a.value.upper <= 1.5) t.lower = std::max(t.lower, 0.0);

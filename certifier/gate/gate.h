@@ -1,8 +1,10 @@
-/** The gate: a candidate's bytes and a clock in, exactly one decision out. No bus, no wall clock, no thread in it.
+/** The gate: takes a candidate's bytes and a clock, and gives exactly one decision. It uses no bus, wall clock or
+thread.
 
-Whatever is not a proof is an abstention or a rejection: bytes that are no candidate, one that is stale, stamped ahead
-of the clock, too late for its own start or to be decided on before it, a repetition, of wrong size or not finite, and
-any error inside. `Watch` decides whether certifying is allowed at all (watch.h); if not, the caller calls Refuse. */
+Without a proof the decision is an abstention or a rejection. Reasons are: bytes that are not a candidate; a stamp that
+is stale or ahead of the clock; a start that has passed, or leaves too little time to decide; a repetition; a wrong
+size; a number that is not finite; an internal error. `Watch` decides whether certifying is allowed at all (watch.h); if
+not, the caller calls Refuse. */
 #pragma once
 
 #include <cstdint>
@@ -42,20 +44,20 @@ class Gate final {
   [[nodiscard]] const Certifier& certifier() const { return certifier_; }
   [[nodiscard]] const GateOptions& options() const { return options_; }
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
-  /** Why these may not be all there are at this time (obstacles_in_force.h); empty if they are. */
+  /** The reason why obstacles() may be incomplete at this time (obstacles_in_force.h); empty if it is complete. */
   [[nodiscard]] std::string WhyObstaclesUnknown(std::int64_t now_us) const { return obstacles_.WhyUnknown(now_us); }
   /** The tube of the last candidate that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
-  /** Decides on one candidate. Never throws: an exception becomes a rejection. Both messages are complete but for
-  elapsed_us, which the caller measures. The clock is read twice: before, which is the decision's utime, and after: a
-  certificate that took longer than its budget is withdrawn. */
+  /** Decides on one candidate. Never throws: an exception becomes a rejection. The caller sets elapsed_us; all other
+  fields of both messages are complete. Reads the clock twice. The first reading is the decision's utime. By the second,
+  a certificate that took longer than gate.decision_budget_ms is withdrawn. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, const TimeSource& clock) noexcept;
-  /** The same at a moment, microseconds since the Unix epoch, as if it took no time. */
+  /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** Rejects a candidate, or abstains from it, without certifying it, for a cause that lies outside it. What is wrong
-  with itself goes before. */
+  /** Answers a candidate without certifying it, for a cause outside the candidate. The candidate's own defects take
+  precedence over `cause`. */
   [[nodiscard]] GateAnswer Refuse(Bytes candidate, std::int64_t now_us, std::int16_t cause, const std::string& why,
                                   std::int16_t outcome = decision_t::REJECTED) noexcept;
 
@@ -63,30 +65,30 @@ class Gate final {
   Both in microseconds since the Unix epoch. */
   [[nodiscard]] std::int64_t EarliestStart(std::int64_t now_us) const;
 
-  /** Takes the obstacles of an obstacles_t, as gate.obstacles says (obstacles_in_force.h). Whole or not at all: returns
-  what is wrong with the message, or an empty text. */
+  /** Replaces the obstacles by those of an obstacles_t, by the rules of obstacles_in_force.h. On an error it changes
+  nothing and returns the error's text; otherwise an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
-  /** Adds an executed transition to the observations, if the task has gate.learn, and chains grounds().observations:
-  BLAKE2b-256 of the digest before and the message's bytes. Returns which check refused it (certify/learned.h), and
-  nothing has changed, or an empty text. certifier().violation() tells whether it falsifies the declaration. */
+  /** Adds an executed transition to the observations, if the task has gate.learn. grounds().observations becomes the
+  BLAKE2b-256 of the digest before and the message's bytes. If a check refuses the transition, nothing changes and the
+  result names the check (certify/learned.h); otherwise it is empty. certifier().violation() is set if the transition
+  falsifies the declaration. */
   [[nodiscard]] std::string Learn(Bytes transition);
 
-  /** What keeps a robot's state from being believed: sizes, numbers, a stamp that is stale or ahead; empty if nothing.
-   */
+  /** Checks sizes, numbers and stamp of a robot's state. @return the first error, or an empty text. */
   [[nodiscard]] std::string CheckRobotState(const robot_state_t& state, std::int64_t now_us) const;
-  /** What is wrong with a stamp at this time (stamp.h), or empty. */
+  /** Checks a stamp at this time (stamp.h). @return the error, or an empty text. */
   [[nodiscard]] std::string CheckFresh(std::int64_t utime, std::int64_t now_us) const;
 
   /** As Certifier's. */
   void Compact() { certifier_.Compact(); }
 
-  /** Goes on where another gate stops: its counts, sources and the obstacles it has heard. */
+  /** Takes over the counts, the sources and the received obstacles of another gate, after a reload. */
   void Inherit(const Gate& before);
 
-  /** Counts so far and the grounds in force; the rest is the caller's. */
+  /** A heartbeat with the counts so far and the grounds in force. The caller sets the other fields. */
   [[nodiscard]] certifier_status_v3_t Status(std::int64_t now_us) const;
-  /** With everything heard and learned so far. */
+  /** The grounds in force, with everything received and learned so far. */
   [[nodiscard]] Grounds grounds() const;
 
  private:
@@ -106,13 +108,13 @@ class Gate final {
   [[nodiscard]] std::optional<Rejection> CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const;
   void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer);
   void WithdrawIfLate(GateAnswer& answer, std::int64_t now_us) const;
-  /** Fills and seals a message of zeros. */
+  /** Sets all fields of a message of zeros, and its seal. */
   void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
   void Count(const decision_t& decision);
 
   Certifier certifier_;
   GateOptions options_;
-  Grounds grounds_;  ///< But for the obstacles, which obstacles_ has.
+  Grounds grounds_;  ///< Without the digest of the obstacles, which obstacles_ has.
   ObstaclesInForce obstacles_;
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;

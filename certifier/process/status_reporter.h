@@ -52,7 +52,7 @@ class StatusReporter final {
   void Hurry() { next_us_ = 0; }
   /** Another certifier listens: it has to hear of this one before it takes charge. */
   void HurryToOthers();
-  /** @param steady_us of a clock that nobody sets. */
+  /** @param steady_us time of a monotonic clock, microseconds. */
   [[nodiscard]] bool IsDue(std::int64_t steady_us) const { return steady_us >= next_us_; }
   /** True until the first report in charge. */
   [[nodiscard]] bool IsFirst() const { return reports_ == 0; }

@@ -33,14 +33,14 @@ bool Contains(const std::vector<std::string>& words, std::string_view word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-// The last key of a path, and the path of the map it stands in.
+// The last key of a path, and the path of its map.
 std::string_view Leaf(std::string_view path) { return path.substr(path.rfind('.') + 1); }
 std::string_view Parent(std::string_view path) {
   const std::size_t end = path.rfind('.');
   return path.substr(0, end == std::string_view::npos ? 0 : end);
 }
 
-// The path of what a path stands in: a list for an index.
+// The path of the enclosing map, or list for an index.
 std::string_view Enclosing(std::string_view path) {
   const std::size_t end = path.find_last_of(".[");
   return path.substr(0, end == std::string_view::npos ? 0 : end);
@@ -374,7 +374,7 @@ std::string TabAdvice(const std::string& text, int line) {
   return "";
 }
 
-// Not by YAML::LoadAll: of a lone comma it reads empty documents without end.
+// Does not use YAML::LoadAll, which reads endless empty documents from a single comma.
 YAML::Node Parse(const std::string& path, const std::string& text) {
   try {
     std::istringstream in(text);
