@@ -439,6 +439,29 @@ TEST_F(LatchTest, ADeletedFileIsMadeAgainWithWhatItHeld) {
   EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
 }
 
+TEST_F(LatchTest, AFaultInAFileOrDirectoryThatTakesItsPlaceIsTakenOver) {
+  Begin();
+  Fault();
+  const std::string other = scratch_ / "other";
+  std::filesystem::create_directory(other);
+  std::filesystem::copy_file(file_, other + "/" + LatchFile::kName);
+  const auto expect_fault = [&] {
+    Heartbeat();
+    EXPECT_EQ(status_.fault, fault_t::ROBOT_STATE_LOST);
+    EXPECT_EQ(Ask().cause, decision_t::CAUSE_FAULT);
+    Reset();
+    ExpectArmed();
+  };
+  Reset();
+  ExpectArmed();
+  std::filesystem::copy_file(other + "/" + LatchFile::kName, file_ + "2");
+  std::filesystem::rename(file_ + "2", file_);
+  expect_fault();
+  std::filesystem::rename(directory_, scratch_ / "old");
+  std::filesystem::rename(other, directory_);
+  expect_fault();
+}
+
 TEST_F(LatchTest, AFaultThatCannotBeWrittenIsNotForgottenByARestart) {
   Begin();
   ExpectArmed();
