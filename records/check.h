@@ -1,4 +1,4 @@
-/** Holds a logger's directory against itself: the events that the database's rows come from against the logs. */
+/** Checks a logger's directory: whether the logs have every event from which a row of the database was made. */
 #pragma once
 
 #include <cstdint>
@@ -12,32 +12,31 @@
 
 namespace forereach {
 
-/** What became of the events of one log file that rows of the database come from. */
+/** The result for one log file: its events from which rows of the database were made. */
 struct LogCheck {
   std::string log_file{};
-  /** kDeleted: for the quota, which is no fault. kUnknown: no run of the database is its. */
+  /** kDeleted: the logger deleted it for the quota, which is not a fault. kUnknown: the database has no run for it. */
   enum class Log { kThere, kMissing, kDeleted, kUnknown } log = Log::kThere;
   bool ended = true;
-  std::int64_t whole = 0;               ///< The log has the event, and its digest is the row's.
-  std::int64_t unchecked = 0;           ///< The log has it, but the row is older than digests.
-  std::vector<std::int64_t> changed{};  ///< Event numbers: the log has another event of this number.
-  std::vector<std::int64_t> missing{};  ///< Event numbers: the log has none; all, where it is not there.
+  std::int64_t whole = 0;               ///< Events that the log has with the digest of the row.
+  std::int64_t unchecked = 0;           ///< Events that the log has, whose rows are older than digests.
+  std::vector<std::int64_t> changed{};  ///< Numbers of events for which the log has a different event.
+  std::vector<std::int64_t> missing{};  ///< Numbers of events that the log lacks; all of them if there is no log.
   LogDamage damage{};                   ///< Of the log.
-  std::int64_t cut_bytes = 0;           ///< Behind the last whole record.
+  std::int64_t cut_bytes = 0;           ///< Bytes behind the last whole record.
 
-  std::vector<std::string> damaged_tasks{};  ///< One sentence each, of the kept tasks that its decisions name.
+  std::vector<std::string> damaged_tasks{};  ///< A sentence for each damaged kept task that its decisions name.
 
-  /** Nothing is changed, missing but for the quota, or damaged. */
+  /** True if nothing is changed or damaged, and nothing is missing except for the quota. */
   [[nodiscard]] bool whole_log() const;
 };
 
-/** Checks every log that the database in `directory` knows, in the order of the runs, and lists behind them those that
-are named like a logger's and that it does not know. Cost: one pass over each log it knows.
-A log that is being written may end in a cut tail, which is no fault of it.
-@throws BadInput if there is no database, it cannot be read, or a log cannot be. */
+/** Checks every log that the database in `directory` lists, in the order of its runs. Behind them come logs with a
+logger's name that it does not list. A log that is being written may end in a cut tail, which is not a fault. Cost: one
+pass over each listed log. @throws BadInput if the database is missing, or it or a log cannot be read. */
 [[nodiscard]] std::vector<LogCheck> CheckLogs(const std::string& directory);
 
-/** Lines for a person: one for each log file, one for each event that is changed or missing, and a sum. */
+/** Text for people: a line for each log file, a line for each changed or missing event, and a total. */
 [[nodiscard]] std::string ToText(const std::vector<LogCheck>& checks);
 [[nodiscard]] nlohmann::json ToJson(const std::vector<LogCheck>& checks);
 

@@ -17,14 +17,14 @@ struct Mismatch {
   std::string what, expected, found;
 };
 
-/** How the name of a mismatch begins. */
+/** The possible beginnings of Mismatch::what. */
 inline constexpr const char* kAltered = "the record was altered after it was made: ";
 inline constexpr const char* kOtherInput = "another input than the certificate was made of: ";
 
 struct RecordedCertificate {
-  std::string name;                  ///< Which one, for a person.
-  std::vector<Mismatch> mismatches;  ///< Digests and the like that are wrong; the record was altered, or its inputs.
-  std::string missing;               ///< Why there is nothing to derive, or empty.
+  std::string name;                  ///< Identifies the certificate to people.
+  std::vector<Mismatch> mismatches;  ///< Digests that do not match: the record or its inputs were altered.
+  std::string missing;               ///< The reason why the certificate cannot be derived; empty if it can.
   verifier::Certificate certificate;
 
   void Compare(const std::string& what, const std::string& expected, const std::string& found) {
@@ -32,15 +32,15 @@ struct RecordedCertificate {
   }
 };
 
-/** The task file that a document names: its absolute path where there is such a file, else the path as it was given.
-@throws ConfigError naming file and field. */
+/** The task file that a document names: its absolute path if that file exists, otherwise the path as it was given.
+@throws ConfigError with file and field. */
 [[nodiscard]] std::string TaskOf(const std::string& path, const nlohmann::json& document);
 
-/** @throws ConfigError naming file and field unless the outcome is one there is. */
+/** Whether a document's outcome is `certified`. @throws ConfigError with file and field for an unknown outcome. */
 [[nodiscard]] bool IsCertificate(const std::string& path, const nlohmann::json& document);
 
-/** @pre IsCertificate. @throws ConfigError naming file and field if one is missing, unknown, or not of its type or
-size. */
+/** Reads the certificate in a document. @pre IsCertificate. @throws ConfigError with file and field if a field is
+missing, unknown, or has the wrong type or size. */
 [[nodiscard]] RecordedCertificate ReadCertificate(const std::string& path, const nlohmann::json& document,
                                                   const Config& config);
 

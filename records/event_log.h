@@ -40,8 +40,8 @@ struct LogEvent {
   [[nodiscard]] Bytes message() const { return WithoutSignature(data); }
 };
 
-/** The latest stamp that counts of the event's message (StreamOrder::Horizon): its sender's clock may be ahead of the
-logger's by a second. */
+/** The latest stamp that is accepted in the event's message (StreamOrder::Horizon). The sender's clock may be one
+second ahead of the logger's. */
 [[nodiscard]] inline std::int64_t HorizonOf(const LogEvent& event) {
   return StreamOrder::Horizon(event.utime, 1'000'000);
 }
@@ -57,7 +57,7 @@ inline constexpr std::int32_t kMaxLogDataBytes = 1 << 24;
 enum class LogStatus {
   kEvent,    ///< One whole record was read.
   kEnd,      ///< The file ends behind a whole record.
-  kCutTail,  ///< What is left is the beginning of one record: its writer was killed, or writes still.
+  kCutTail,  ///< The rest is the beginning of a record: its writer was killed, or is still writing.
   kCorrupt,  ///< Some bytes were not a record and have been skipped; the next call continues after them.
 };
 
@@ -74,17 +74,17 @@ class EventLogReader final {
   /** @throws LogError if the file cannot be read. */
   explicit EventLogReader(const std::string& path);
 
-  /** Reads the next record; `event` is meaningful for kEvent only. kEnd and kCutTail repeat.
-  Length fields are not believed blindly: one that points behind the end of the file is a cut tail only if no whole
-  record follows, and one behind whose record no sync word stands is damaged if it hides another whole record. Room is
-  made for records that are believed only.
-  Cost: linear in the bytes passed; `event` never holds more than kMaxLogDataBytes beside its channel. */
+  /** Reads the next record. `event` is valid for kEvent only. kEnd and kCutTail repeat.
+  A length field may be damaged. If it points behind the end of the file, the rest is a cut tail only if no whole record
+  follows. If no sync word follows its record, the record is damaged if it contains another whole record. Memory is
+  allocated for accepted records only.
+  Cost: linear in the bytes read; `event` never holds more than kMaxLogDataBytes beside its channel. */
   [[nodiscard]] LogStatus Next(LogEvent& event);
 
-  /** Bytes from the beginning of the file to behind the last record or damage passed. */
+  /** The offset behind the last record or damage. */
   [[nodiscard]] std::int64_t offset() const { return offset_; }
   [[nodiscard]] std::int64_t size() const { return size_; }
-  /** Passed so far. */
+  /** The damage found so far. */
   [[nodiscard]] const LogDamage& damage() const { return damage_; }
 
  private:
@@ -123,59 +123,57 @@ struct LogRecovery {
   std::int64_t first_utime = 0, last_utime = 0;  ///< Of the first and last whole record, 0 without one.
 };
 
-/** What became of a file that is being written: it may be moved, deleted, replaced or cut while its descriptor still
+/** The state of a file that is being written. It may be moved, deleted, replaced or cut while its descriptor still
 works. */
 enum class FilePlace {
   kThere,      ///< Its path leads to it.
-  kDeleted,    ///< No name leads to it any more.
+  kDeleted,    ///< The file has no name any more.
   kElsewhere,  ///< It has a name, but its path leads to nothing or to another file.
   kCut,        ///< The file is at its path, but some bytes that the disk had confirmed are missing.
-  kUnknown,    ///< Its path cannot be looked at, as without the permission to do so.
+  kUnknown,    ///< Its path cannot be examined, for example without permission.
 };
 
-/** Which file a path leads to. */
+/** Identifies a file independently of its path. */
 struct FileIdentity {
   std::uint64_t device = 0, inode = 0;
   friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
 };
 
-/** Nothing if the path leads to no file or cannot be looked at; errno then says why. */
+/** The file at a path. Nothing if there is none or it cannot be examined; then errno has the reason. */
 [[nodiscard]] std::optional<FileIdentity> IdentityOf(const std::string& path);
 
 class EventLogWriter final {
  public:
-  /** Creates the file and has the disk confirm that it is in its directory, or recovers an existing one: keeps all
-  whole records, removes a cut tail and nothing else, and continues the event numbers. Holds a lock on the file while it
-  lives.
+  /** Creates the file, with its directory entry confirmed by the disk, or recovers an existing one: removes a cut tail,
+  keeps everything else, and continues the event numbers. Holds a lock on the file until the destructor.
   @throws LogError if the file cannot be opened or another writer holds it. */
   explicit EventLogWriter(const std::string& path);
   ~EventLogWriter();
   EventLogWriter(const EventLogWriter&) = delete;
   EventLogWriter& operator=(const EventLogWriter&) = delete;
 
-  /** Takes one event into memory and returns its number; Flush brings it to the file.
-  @throws std::invalid_argument for a channel or data above the limits of this format. */
+  /** Buffers one event and returns its number. Flush writes it to the file.
+  @throws std::invalid_argument if channel or data exceed the limits of the format. */
   std::int64_t Append(std::int64_t utime, const std::string& channel, Bytes data);
 
-  /** Writes everything appended so far and has the disk confirm it. On failure the file is put back to its last
-  whole record, the events since are lost and false is returned; `problem` then says why. Where it cannot be put back,
-  the next Flush writes over what was left and confirms nothing before the file ends with its own last record. A file
-  that was cut by somebody else is left as it is. */
+  /** Writes all buffered events; the disk has confirmed them when the call returns true. On failure it truncates the
+  file to its last whole record, drops the events since, and returns false; `problem` has the reason. If the truncation
+  fails too, the next Flush overwrites the remainder and confirms nothing until the file ends with its own last record.
+  It does not change a file that another program has cut. */
   [[nodiscard]] bool Flush();
 
-  /** Whether what Flush confirms can be read at the path. Cost: two looks at the file system and 28 bytes read. */
+  /** Checks that the confirmed events can be read at the path. Cost: two calls to the file system and 28 bytes read. */
   [[nodiscard]] FilePlace Look() const;
 
-  /** Takes over what `lost` holds in memory, with its event numbers; `lost` holds nothing afterwards. To be called
-  before the first Append. */
+  /** Moves the buffered events of `lost` to this writer, with their event numbers. Call it before the first Append. */
   void TakeOver(EventLogWriter& lost);
 
-  /** Forgets what waits in memory, and what the file held: it is lost. */
+  /** Drops the buffered events and gives up the file, whose content is lost. */
   void Abandon();
 
   [[nodiscard]] const LogRecovery& recovery() const { return recovery_; }
   [[nodiscard]] const std::string& problem() const { return problem_; }
-  /** Bytes of the file after the last successful Flush, and those that wait in memory. */
+  /** The bytes of the file after the last successful Flush, and the buffered bytes. */
   [[nodiscard]] std::int64_t offset() const { return offset_; }
   [[nodiscard]] std::int64_t pending_bytes() const { return static_cast<std::int64_t>(buffer_.size()); }
   [[nodiscard]] std::int64_t next_number() const { return next_number_; }

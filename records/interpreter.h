@@ -1,5 +1,5 @@
-/** Turns what the bus carried, in the order of the log, into database rows. No file, no SQL, no clock: the same events
-give the same rows, live and when a log is read again.
+/** Makes database rows from messages in the order of the log. It uses no file, SQL or clock, so the same events give
+the same rows, live and when a log is read again.
 
 **Sequence numbers** (StreamOrder). A message ahead of its stream's count makes a gap "bus". A late or repeated one
 makes none. A sender that restarted makes a gap "restart". A late message that a gap has counted as lost stays counted.
@@ -25,7 +25,7 @@ With a key, messages that are not authentic (log_authenticator.h) make no rows a
 
 namespace forereach {
 
-/** Messages that share one sequence count: those of a channel, on the candidates' channel those of one source. */
+/** The messages that share one sequence count: those of a channel, or of one source on the candidates' channel. */
 struct Stream {
   std::string channel, source;
   auto operator<=>(const Stream&) const = default;
@@ -36,17 +36,17 @@ class Interpreter final {
   /** @param keys as LogAuthenticator's. */
   Interpreter(BusOptions channels, std::string log_file, std::optional<KeyRing> keys = {});
 
-  /** The stream of a message, and its place in it if it is one of a type that counts them. */
+  /** The stream of a message, and its position if its type has a sequence number. */
   [[nodiscard]] std::pair<Stream, std::optional<StreamPosition>> Identify(const std::string& channel,
                                                                           Bytes bytes) const;
 
-  /** The next event is the first of another file, which goes on where this one ends. */
+  /** The next event is the first of the next file of the same run. */
   void Continue(std::string log_file) { log_file_ = std::move(log_file); }
 
-  /** Adds the rows that the next event of the log gives. */
+  /** Adds the rows made from the next event of the log. */
   void Observe(const LogEvent& event, Rows& rows);
 
-  /** `lost` messages of the stream, the next ones of its count, are accounted for already: they make no second gap. */
+  /** The next `lost` sequence numbers of the stream are already in a gap; they make no second one. */
   void Forgive(const Stream& stream, std::int64_t lost);
 
   /** Messages that were not authentic. */

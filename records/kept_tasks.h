@@ -1,12 +1,12 @@
-/** The tasks of a directory's logs: task files and the files that they name, found by digest.
+/** The tasks of a directory's logs: copies of task files and of the files that they name, stored by digest.
 
     tasks/<config digest>/task.yaml                             the task file's bytes
     tasks/<config digest>/transitions-<observations digest>.csv the transitions that it names
     tasks/<config digest>/policy-<digest>                       the policy that it names, if it does
 
-All digests in hexadecimal. A task that was recorded with several versions of its transitions has one file for each.
-Names are made of digests alone, so that nothing in a log leads out of the directory, and what is read is held against
-its digest. Keys are not kept. */
+All digests are in hexadecimal. A task with several versions of its transitions has one file for each. Names consist of
+digests only, so no log can name a file outside the directory. What is read is compared with its digest. Keys are not
+kept. */
 #pragma once
 
 #include <memory>
@@ -26,31 +26,30 @@ struct TaskCopy {
   std::string task, transitions, policy;  ///< `policy` is empty if the task names none.
 };
 
-/** Reads the files of a task that was loaded before once more. @throws ConfigError if they cannot be read, or the task
-file has changed since. */
+/** Reads the files of a loaded task again. @throws ConfigError if they cannot be read, or the task file has changed. */
 [[nodiscard]] TaskCopy CopyTask(const Config& config);
 
 class KeptTasks final {
  public:
-  /** @param log_directory where the logs are; it is made when something is kept. */
+  /** @param log_directory the directory of the logs. Keep creates it if necessary. */
   explicit KeptTasks(const std::string& log_directory);
 
-  /** Keeps a task, if it is not kept already; each file appears whole or not at all, and is on the disk on return.
+  /** Keeps a task unless it is kept already. Each file appears whole or not at all, and is on the disk on return.
   @throws BadInput if it cannot be written, or transitions and digest do not agree. */
   void Keep(const TaskCopy& copy) const;
 
-  /** Where the task of this config digest is, or would be. */
+  /** The path of the task with this config digest, kept or not. */
   [[nodiscard]] std::string PathOf(const Digest& digest) const;
 
-  /** The task of this config digest, if it is kept. Of several versions of its transitions it is the one whose digest
-  is among `observations`. @throws ConfigError if what is kept is damaged, or cannot be told which version it was. */
+  /** The task with this config digest, if it is kept. Of several versions of its transitions it takes the one whose
+  digest is in `observations`. @throws ConfigError if a file is damaged, or the version is ambiguous. */
   [[nodiscard]] std::optional<Config> Find(const Digest& digest, const std::set<Digest>& observations) const;
 
-  /** What is damaged of the kept task of this config digest, in hexadecimal, one sentence for each version of its
-  transitions; nothing if it is whole or is not kept. */
+  /** The damage of the kept task with this config digest (in hexadecimal), a sentence for each version of its
+  transitions. Empty if the task is intact or not kept. */
   [[nodiscard]] std::vector<std::string> FindDamage(const std::string& digest) const;
 
-  /** Deletes the task of this config digest, in hexadecimal; anything else is ignored. */
+  /** Deletes the task with this config digest (in hexadecimal). Ignores any other text. */
   void Remove(const std::string& digest) const;
 
  private:

@@ -14,16 +14,16 @@ namespace forereach {
 
 class LogAuthenticator final {
  public:
-  /** @param keys public ones are enough; nothing: every message is taken for authentic. Messages count that were signed
-  for the bus `channels.name`, or without a name for the bus of the first authentic one. */
+  /** @param keys public keys suffice. Without keys every message counts as authentic.
+  Messages must be signed for the bus `channels.name`, or if that is empty for the bus of the first authentic one. */
   LogAuthenticator(const BusOptions& channels, std::optional<KeyRing> keys)
       : channels_(channels), speakers_(channels.speakers()), keys_(std::move(keys)) {}
 
-  /** Of the next event in the order of the log. On a signed channel neither unsigned and forged messages are authentic,
-  nor those that came before or were signed more than a second before the first that was heard here. */
+  /** Whether the next event of the log is authentic. On a signed channel a message is not authentic if it is unsigned
+  or forged, if its counter was used before, or if it was signed more than a second before the first message here. */
   [[nodiscard]] bool IsAuthentic(const LogEvent& event);
 
-  /** Messages that were not. */
+  /** The messages that were not authentic. */
   [[nodiscard]] Refusals refusals() const { return authenticator_ ? authenticator_->refusals() : Refusals{}; }
 
  private:

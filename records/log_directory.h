@@ -1,4 +1,4 @@
-/** The directory a logger writes to, as the file system sees it: names, sizes, free space. */
+/** The directory of a logger: names and sizes of its files, and free space. */
 #pragma once
 
 #include <cstdint>
@@ -13,28 +13,28 @@ class LogDirectory final {
  public:
   static constexpr const char* kDatabase = "decisions.sqlite";
 
-  /** Makes it if need be. @throws LogError if it cannot. */
+  /** Makes the directory if necessary. @throws LogError if it cannot. */
   explicit LogDirectory(std::string path);
-  /** Makes it again if it is gone. @throws LogError if it cannot. */
+  /** Makes the directory again if it is gone. @throws LogError if it cannot. */
   void Make() const;
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::string PathOf(const std::string& file) const;
 
-  /** "events-20260101-120000-000000.lcmlog" of a time in UTC with its microseconds, put off to the first whose name no
-  file has and `taken` does not hold for. Names sort as their times do. */
+  /** A name like "events-20260101-120000-000000.lcmlog" of a time in UTC with microseconds. Advances the time to the
+  first one whose name no file has and for which `taken` is false. Names sort like their times. */
   [[nodiscard]] std::string FreeName(std::int64_t& time_us, const std::function<bool(const std::string&)>& taken) const;
 
-  /** The files with names of this kind, with microseconds or, as they were before, without; sorted. */
+  /** The files with such names, sorted. Names of older versions have no microseconds. */
   [[nodiscard]] std::vector<std::string> Logs() const;
 
-  /** Bytes of all .lcmlog files but `except`. Cost: one look at each file. */
+  /** The bytes of all .lcmlog files except `except`. Cost: one call to the file system for each file. */
   [[nodiscard]] std::int64_t LogBytes(const std::string& except = "") const;
 
-  /** Bytes of a file, or nothing if it is not there. */
+  /** The bytes of a file, or nothing if there is none. */
   [[nodiscard]] std::optional<std::int64_t> Bytes(const std::string& file) const;
 
-  /** Deletes a file; false if it cannot be, or was not there. */
+  /** Deletes a file. False if it cannot be deleted or does not exist. */
   bool Remove(const std::string& file) const;
 
  private:
@@ -43,7 +43,7 @@ class LogDirectory final {
   std::string path_;
 };
 
-/** Bytes that an unprivileged process may still write to the disk of a directory; 0 if that cannot be found out. */
+/** The bytes that an unprivileged process can still write to a directory's disk; 0 if that is unknown. */
 [[nodiscard]] std::int64_t FreeBytes(const std::string& directory);
 
 }  // namespace forereach

@@ -10,18 +10,16 @@
 
 namespace forereach {
 
-/** The tasks of the config digests that a survey found, in the order in which they came; those of which there is none
-are left out. A task that is given stands for its own digest, the others are looked for in `directory`
-(records/kept_tasks.h).
-@param given path of a task file, or empty.
-@param logs what is said of the logs in an error.
-@throws BadInput if a task cannot be read; if no decision is of the given task, or without one no task is kept. The text
-says which config digest the log was made with, and where that task is. */
+/** The tasks of a survey's config digests, in the order of their first appearance. The given task is used for its own
+digest; the others are read from `directory` (records/kept_tasks.h). Digests without a task are skipped.
+@param given the path of a task file, or empty. @param logs the name of the logs in an error.
+@throws BadInput if a task cannot be read; if no decision is of the given task; or, without a given task, if no task is
+kept. The text has the config digest with which the log was made, and the place of that task. */
 [[nodiscard]] std::vector<Config> TasksOf(const LogSurvey& survey, const std::string& logs,
                                           const std::string& directory, const std::string& given);
 
-/** The same of logs that follow one another, after SurveyRun; kept tasks are looked for beside the first. With the key
-that counts. @throws ConfigError also as LogKey::Override. */
+/** The same for consecutive logs of one run, after SurveyRun. Kept tasks are read from the directory of the first log.
+The tasks have the key that `key` selects. @throws ConfigError also as LogKey::Override. */
 [[nodiscard]] std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given,
                                           const LogKey& key);
 

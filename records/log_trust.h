@@ -1,4 +1,4 @@
-/** Which messages of a log a command believes: the key to judge them by, and those that it passed over. */
+/** The key with which a command checks the messages of a log, and the number of messages that it skipped. */
 #pragma once
 
 #include <cstdint>
@@ -12,24 +12,24 @@
 
 namespace forereach {
 
-/** The command line's say in the key: by default that of the task file's bus.key. */
+/** The key from the command line. By default it is the bus.key of the task file. */
 struct LogKey {
   std::string file;
-  bool none = false;  ///< Everything is believed, whoever sent it.
+  bool none = false;  ///< Accept every message without a check.
 
   void Override(BusOptions& options) const;
-  /** Of a task that the logger kept, beside which there is no key. @throws ConfigError if it has one and the command
-  line does not say which. */
+  /** For tasks that the logger kept without their keys. @throws ConfigError if a task has a bus.key and the command
+  line has neither a key nor `none`. */
   void Override(std::vector<Config>& tasks, const std::string& given) const;
 };
 
-/** Numbers of skipped messages, which the robot's processes refused too. */
+/** The numbers of skipped messages. The robot's processes refused them too. */
 struct PassedOver {
-  Refusals not_authentic;        ///< Where there is a key (records/log_authenticator.h).
-  std::int64_t undecodable = 0;  ///< On the channel of certified plans, and none.
+  Refusals not_authentic;        ///< Zero without a key (records/log_authenticator.h).
+  std::int64_t undecodable = 0;  ///< Messages on the channel of certified plans that are not certified plans.
 };
 
-/** As the end of a sentence, empty if nothing was. */
+/** The numbers as the end of a sentence; empty if nothing was skipped. */
 [[nodiscard]] std::string DescribePassedOver(const PassedOver& passed_over);
 [[nodiscard]] nlohmann::json ToJson(const PassedOver& passed_over);
 

@@ -1,4 +1,5 @@
-/** Draws a run seen from above: obstacles, certified tubes, the driven path. Knows shapes only, nothing of logs. */
+/** Draws a run from above: obstacles, certified tubes and the driven path. It has shapes only and does not read logs.
+ */
 #pragma once
 
 #include <optional>
@@ -38,18 +39,18 @@ struct Picture {
   std::vector<Polygon> polygons;       ///< Obstacles.
   std::vector<HalfPlane> half_planes;  ///< Obstacles.
 
-  std::vector<Polygon> executed;                ///< Certified slices that the robot went through.
+  std::vector<Polygon> executed;                ///< Certified slices of executed steps.
   std::vector<Polygon> certified;               ///< Certified slices that newer plans replaced.
   std::vector<std::vector<Polygon>> abstained;  ///< Tubes refused for an obstacle (S), each up to
                                                 ///< the slice that may touch it.
 
   std::vector<Eigen::Vector2d> path;   ///< Measured positions, from the start on.
-  std::vector<Eigen::Vector2d> stops;  ///< Where the robot stood on the way.
+  std::vector<Eigen::Vector2d> stops;  ///< Positions of stops before the goal.
   std::optional<Circle> goal;
 };
 
-/** The files that a picture of this name is written to: the name itself if it ends in .svg, .png or .pdf; NAME.svg and
-NAME.png if it has no ending. Touches no file.
+/** The files for a picture with this name: the name itself if it ends in .svg, .png or .pdf; NAME.svg and NAME.png if
+it has no ending. Creates no file.
 @throws PictureError for another ending, for a directory, or if the directory of the file does not exist. */
 [[nodiscard]] std::vector<std::string> PictureFiles(const std::string& name);
 

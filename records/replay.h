@@ -1,4 +1,4 @@
-/** A recorded log through the same gate again, on the log's own clock. */
+/** Repeats the decisions of a recorded log by the same gate, on the log's clock. */
 #pragma once
 
 #include <cstdint>
@@ -11,23 +11,23 @@
 namespace forereach {
 
 struct ReplayResult {
-  std::int64_t candidates = 0;  ///< In the log.
-  std::int64_t agreed = 0;      ///< Same outcome, step, cause and digests as recorded.
-  /** Recorded as displaced, out of time, not armed, without known obstacles, in fault: a matter of the moment and not
-  of the plan, not compared. */
+  std::int64_t candidates = 0;  ///< Candidates in the log.
+  std::int64_t agreed = 0;      ///< Decisions with the recorded outcome, step, cause and digests.
+  /** Decisions that depend on the moment and not on the plan, which are not compared: displaced, out of time, not
+  armed, obstacles unknown, in fault. */
   std::int64_t circumstances = 0;
   std::int64_t corruptions = 0;  ///< Damaged places in the log.
   PassedOver passed_over;
-  /** One line for each decision that differs, each candidate without a recorded decision, each recorded decision
-  without a candidate, and each way in which the seal of a certified plan does not hold. */
+  /** A line for each decision that differs, each candidate without a recorded decision, each recorded decision without
+  a candidate, and each fault of a certified plan's seal. */
   std::vector<std::string> differences;
 };
 
-/** Feeds the candidates of logs that follow one another to a new gate, each at the time of its recorded decision and
-with the obstacles and executed transitions that the decision names by their digests, and compares what it says;
-certified plans have to be sealed (lcmtypes/seal.h). A certifier that was started again, or reloaded, within the logs
-begins with a new gate here too. With bus.key only authentic messages count. Each decision is held against the task of
-its own config digest, and one of another digest differs; with one task alone each is held against that.
+/** Gives the candidates of consecutive logs to a new gate, each at the time of its recorded decision and with the
+obstacles and executed transitions that the decision names by digest, and compares the results. It also checks the seals
+of certified plans (lcmtypes/seal.h). Where the certifier restarted or reloaded, replay starts with a new gate. With
+bus.key only authentic messages count. Each decision is compared under the task of its config digest; a decision of an
+unknown digest differs. With a single task, every decision is compared under that task.
 @param tasks at least one; channels and key are those of the first.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks);

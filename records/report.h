@@ -11,34 +11,32 @@
 
 namespace forereach {
 
-/** A picture of a log, and how far the tubes in it can be trusted. */
+/** A picture of a log, and the number of plans that are not in it. */
 struct LogPicture {
   Picture picture;
-  /** Plans whose outcome or step under `config` is not the recorded one; their tubes are left out. */
+  /** Plans whose recomputed outcome or step differs from the recorded one. Their tubes are not drawn. */
   int disagreements = 0;
 };
 
-/** Certifies the candidates of logs that follow one another again, under the task and the obstacles in force when each
-was decided, and collects what there is to draw: the tubes of certified plans and of abstentions S, the measured path,
-stops, goal, obstacles at the end. Without title and key numbers. Plans under other tasks are left out and counted.
-Cost: one certify call a plan.
-@param tasks at least one; path, goal and obstacles are those of the last. With one alone, decisions of any config
-digest count as its own. @throws LogError if a log cannot be read, PictureError if a task's safety coordinates are not
-planar.
-*/
+/** Certifies the candidates of consecutive logs again, under the task and the obstacles of their decisions. The picture
+has the tubes of certified plans and of abstentions S, the measured path, stops, goal, and the obstacles at the end; it
+has no title and no key numbers. Plans of other tasks are not drawn, but counted. Cost: one certify call for each plan.
+@param tasks at least one. Path, goal and obstacles are those of the last. With a single task, decisions of any config
+digest count as its decisions.
+@throws LogError if a log cannot be read, PictureError if a task's safety coordinates are not planar. */
 [[nodiscard]] LogPicture PictureFromLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
 
 struct ReportOptions {
   std::vector<std::string> logs;  ///< Files of one run, in their order.
-  std::string config;             ///< Task file; empty: the tasks that were kept beside the logs.
-  std::string picture;            ///< As PictureFiles takes it; none if empty.
+  std::string config;             ///< Task file. If empty, the tasks that were kept beside the logs.
+  std::string picture;            ///< A name for PictureFiles; no picture if empty.
   bool json = false;
   int width = 1200, height = 800;  ///< Pixels.
   LogKey key = {};                 ///< With a key only authentic messages count.
 };
 
-/** Prints the summary of logs to `out`, as text or as one JSON document, and writes its picture.
-@throws BadInput; nothing has been printed then. */
+/** Prints the summary of logs to `out`, as text or as one JSON document, and writes the picture.
+@throws BadInput, before anything is printed. */
 void Report(const ReportOptions& options, std::ostream& out);
 
 }  // namespace forereach

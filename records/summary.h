@@ -18,12 +18,12 @@
 
 namespace forereach {
 
-/** Nearest-rank quantiles of some microseconds, NaN without any. */
+/** Nearest-rank quantiles of durations in microseconds; NaN if there are none. */
 struct Quantiles {
   double p50 = kUnknown, p99 = kUnknown;
 
-  /** False also if all of them are zero: the simulated clock of `forereach run` stands still while something is
-  computed. */
+  /** False also if all durations are zero, as on the simulated clock of `forereach run`, which stops during
+  computations. */
   [[nodiscard]] bool WasMeasured() const { return p99 > 0; }
 };
 
@@ -36,28 +36,28 @@ struct Summary {
   std::int64_t proposed = 0;  ///< Candidates; from a database, decisions.
   std::int64_t decided = 0, certified = 0;
   std::map<std::string, std::int64_t> abstained, rejected;  ///< By cause.
-  Quantiles latency_us;                      ///< From a candidate's receipt to its decision's, both at the logger.
-  Quantiles certify_us;                      ///< The certify step alone.
-  std::optional<double> distance_to_goal_m;  ///< Of the last known state; nothing without goal or state.
-  double goal_radius_m = 0;                  ///< The goal counts as reached within this.
-  bool goal_reached = false;                 ///< At some time; the robot may have driven on since.
+  Quantiles latency_us;                      ///< Time between the receipts of candidate and decision at the logger.
+  Quantiles certify_us;                      ///< Time of the certify step only.
+  std::optional<double> distance_to_goal_m;  ///< At the last known state; no value without a goal or a state.
+  double goal_radius_m = 0;                  ///< The goal is reached within this distance.
+  bool goal_reached = false;                 ///< At any time of the run.
   std::int64_t contacts = 0;
-  std::int64_t steps_inside = 0, steps_outside = 0;  ///< Of the slice certified for that step.
-  /** Before the goal: braking tails begun, and times the robot came to stand, by a plan's end or a step outside. */
+  std::int64_t steps_inside = 0, steps_outside = 0;  ///< Executed steps by whether the state lay in its slice.
+  /** Before the goal: braking tails that began, and stops at a plan's end or after a step outside its slice. */
   std::int64_t tails = 0, stops = 0;
   std::int64_t refused = 0;                  ///< Certified plans that the guard refused.
   std::map<std::string, std::int64_t> lost;  ///< Messages missing, by reason.
-  std::int64_t backlog = 0;                  ///< Discarded by the bus before the logger took them, see rows.h.
+  std::int64_t backlog = 0;                  ///< Messages that the bus discarded before the logger took them (rows.h).
   std::int64_t restarts = 0;                 ///< Restarts of senders.
-  LogDamage damage;                          ///< Of the log.
-  PassedOver passed_over;                    ///< Messages of the log that count for nothing above.
+  LogDamage damage;                          ///< Damage of the logs.
+  PassedOver passed_over;                    ///< Messages of the logs that were skipped.
 };
 
-/** Aligned lines for a person, each ended by a newline. */
+/** Text for people, in aligned lines that end with a newline. */
 [[nodiscard]] std::string ToText(const Summary& summary);
 [[nodiscard]] nlohmann::json ToJson(const Summary& summary);
 
-/** Collects a summary piece by piece, in memory that does not grow: quantiles are those of the last kMaxSamples
+/** Collects a summary from single messages and rows in bounded memory. Quantiles are those of the last kMaxSamples
 durations. */
 class SummaryBuilder final {
  public:
@@ -65,7 +65,7 @@ class SummaryBuilder final {
 
   explicit SummaryBuilder(const Config& config);
 
-  /** One message in the order of the log, with the rows the interpreter made of it added apart. */
+  /** Adds the next message of the log. Add the rows that the interpreter makes of it separately. */
   void Add(const LogEvent& event);
   void Add(const DecisionRow& row);
   void Add(const EventRow& row);
@@ -93,8 +93,7 @@ class SummaryBuilder final {
   std::vector<double> state_;
 };
 
-/** Of logs that follow one another, as the files of one run do. With bus.key only authentic messages count. Damage is
-passed over and counted. Cost: linear in the logs. @throws LogError if a log cannot be read, KeyError if the key cannot.
-*/
+/** The summary of consecutive logs, the files of one run. With bus.key only authentic messages count. Damage is skipped
+and counted. Cost: linear in the logs. @throws LogError if a log cannot be read, KeyError if the key cannot be read. */
 [[nodiscard]] Summary SummarizeLogs(const std::vector<std::string>& logs, const Config& config);
 }  // namespace forereach

@@ -1,20 +1,21 @@
-/** A recorded run in the order of the certifier: the one reading of logs that replay, verify, report and summary share.
+/** Reads a recorded run in the order in which the certifier acted. Replay, verify, report and summary read logs only
+through this class.
 
-The timeline follows the certifier through event logs: when its process started, when it was reloaded, which obstacles
-and learned transitions each decision rests on. It pairs each candidate with its decision and its certified plan.
+The timeline follows the certifier through event logs: starts of its process, reloads, and the obstacles and learned
+transitions of each decision. It pairs each candidate with its decision and its certified plan.
 
 **Authentic messages.** With a key, messages that are not authentic (log_authenticator.h) are passed over and counted.
 
 **Starts and reloads.** Heartbeats, decisions and certified plans each have a count of their own (StreamOrder). A
-process has started when one of these counts begins anew and no other one has told of this start yet, and with a first
-heartbeat of sequence 0. A log may begin in the middle of a process's life, which is no start. A reload is told by the
-version in a heartbeat, or by a decision under the config digest of another task. A start forgets what was heard and
-learned. A reload forgets what was learned. Heartbeats of a certifier that is not in charge tell nothing.
+process has started when one of these counts begins again before another count has shown this start, and with a first
+heartbeat of sequence 0. A log may begin while the process already runs, which is not a start. A reload shows in the
+version of a heartbeat, or in a decision under the config digest of another task. A start forgets everything that was
+received and learned. A reload forgets what was learned. Heartbeats of a certifier that is not in charge are ignored.
 
-**Grounds.** A certifier may have decided before it received a message that the log already holds. A decision names the
-digests of its obstacles and observations, so for each of the two the timeline advances from the state of the decision
-before to the first logged state with that digest. If there is none, it advances to the last state that was logged
-before the candidate; the digests of the basis then differ from those that the decision names. */
+**Grounds.** The log may contain a message that the certifier received only after its decision. A decision names the
+digests of its obstacles and observations. So for each of the two the timeline advances from the state of the previous
+decision to the first logged state with that digest. If there is none, it advances to the last state that was logged
+before the candidate; then the digests of the basis differ from those that the decision names. */
 #pragma once
 
 #include <cstdint>
@@ -39,27 +40,27 @@ before the candidate; the digests of the basis then differ from those that the d
 
 namespace forereach {
 
-/** The inputs of one decision, as the log tells them. */
+/** The inputs of one decision, by the log. */
 struct Basis {
   const Config* task = nullptr;
-  Grounds grounds;  ///< By the log; those that the decision names are in its message.
+  Grounds grounds;  ///< The digests of these inputs. The decision's message has the digests that it names.
   std::shared_ptr<const std::vector<Obstacle>> obstacles;
-  /** The learned transitions that count, of Timeline::learned(task): [learned_begin, learned_end). */
+  /** The range [learned_begin, learned_end) of Timeline::learned(task) that was learned at that time. */
   std::size_t learned_begin = 0, learned_end = 0;
 };
 
 struct RecordedCandidate {
-  std::vector<std::uint8_t> bytes;  ///< Of a candidate_plan_t, without signature; any bytes.
-  std::string event;                ///< "events-....lcmlog event 17"; without the file if there is one only.
-  std::int64_t place = 0;           ///< In the order of the log.
+  std::vector<std::uint8_t> bytes;  ///< The message without its signature. It may not be a candidate_plan_t.
+  std::string event;                ///< "events-....lcmlog event 17"; without the file if only one was read.
+  std::int64_t place = 0;           ///< Position in the order of the log.
 };
 
 struct RecordedDecision {
   decision_t decision;
   std::string event;
-  std::optional<RecordedCandidate> candidate;  ///< Nothing: it is not in the log.
-  /** The decision's config digest is that of a known task, or one task alone is known. Otherwise `basis` is the state
-  under the task in force. */
+  std::optional<RecordedCandidate> candidate;  ///< No value if the log lacks it.
+  /** True if the decision's config digest is that of a known task, or if only one task is known. Otherwise `basis` is
+  the state under the task in force. */
   bool is_of_known_task = true;
   Basis basis;
 };
@@ -67,12 +68,12 @@ struct RecordedDecision {
 struct RecordedPlan {
   certified_plan_t certified;
   std::string event;
-  bool has_candidate = false;  ///< Its candidate is in the log.
+  bool has_candidate = false;  ///< Whether its candidate is in the log.
   bool is_of_known_task = true;
   Basis basis;
 };
 
-/** What a reader of a timeline is told, in the order of the certifier. */
+/** Receives the events of a timeline in the order in which the certifier acted. */
 class TimelineUser {
  public:
   TimelineUser() = default;
@@ -80,30 +81,30 @@ class TimelineUser {
   TimelineUser(const TimelineUser&) = delete;
   TimelineUser& operator=(const TimelineUser&) = delete;
 
-  virtual void OnEvent(const LogEvent&) {}  ///< Each authentic message, before it is acted on.
+  virtual void OnEvent(const LogEvent&) {}  ///< Every authentic message, before the calls that it causes.
   virtual void OnStart(const Config&) {}    ///< The process starts under this task.
-  virtual void OnReload(const Config&) {}   ///< It goes on under this task.
-  virtual void OnObstacles(Bytes /*message*/, std::int64_t /*utime*/) {}      ///< Another set is in force.
+  virtual void OnReload(const Config&) {}   ///< The process continues under this task.
+  virtual void OnObstacles(Bytes /*message*/, std::int64_t /*utime*/) {}      ///< A different set is in force.
   virtual void OnTransition(const ExecutedTransition&, Bytes /*message*/) {}  ///< A transition is learned.
   virtual void OnDecision(const RecordedDecision&) {}
   virtual void OnCertified(const RecordedPlan&) {}
 };
 
-/** For Timeline, which does not own its tasks. */
+/** Pointers for Timeline, which does not own its tasks. */
 [[nodiscard]] std::vector<const Config*> PointersTo(const std::vector<Config>& tasks);
 
 class Timeline final {
  public:
-  /** @param tasks at least one, which have to outlive the timeline. Channels and key are those of the first. Where
-  there is one task alone, decisions of any config digest count as its own.
-  @param user has to outlive the timeline. @throws KeyError if the key cannot be read. */
+  /** @param tasks at least one. They must outlive the timeline. Channels and key are those of the first. With a single
+  task, decisions of any config digest count as its decisions.
+  @param user must outlive the timeline. @throws KeyError if the key cannot be read. */
   Timeline(std::vector<const Config*> tasks, TimelineUser& user);
 
-  /** Reads event logs that follow one another, as the files of one run do, behind those that were read before.
-  @param names_files names of events have the name of the log. @throws LogError if one cannot be read. */
+  /** Reads consecutive event logs of one run, which follow those that were read before.
+  @param names_files whether names of events include the log's name. @throws LogError if a log cannot be read. */
   void Read(const std::vector<std::string>& logs, bool names_files);
 
-  /** The next logs are of these tasks, at least one. If the task in force is not among them, the process has started
+  /** Sets the tasks of the next logs, at least one. If the task in force is not among them, the process has started
   under the first. */
   void SetTasks(std::vector<const Config*> tasks);
 
@@ -113,17 +114,17 @@ class Timeline final {
   [[nodiscard]] const Undecided<RecordedCandidate>& undecided() const { return undecided_; }
   /** All transitions that were learned under a task, in the order of the log. */
   [[nodiscard]] const std::vector<ExecutedTransition>& learned(const Config& task) const { return learned_.at(&task); }
-  /** The obstacles by everything that was logged. */
+  /** The obstacles in force after everything that was logged. */
   [[nodiscard]] const std::vector<Obstacle>& logged_obstacles() const { return logged_obstacles_.all(); }
 
  private:
-  /** One of the certifier's counts, and the number of starts that it has told of or that were told before it began. */
+  /** One of the certifier's sequence counts, and the number of starts that it has shown or that came before it. */
   struct Count {
     StreamOrder order;
     std::int64_t starts = 0;
   };
-  /** What a message tells by its count. kStarts: a start that no other count has told of; kFollows: one that another
-  has; kOld: the message is late or repeated. */
+  /** The meaning of a message's place in its count. kStarts: a start that no other count has shown. kFollows: a start
+  that another count has shown. kOld: the message is late or repeated. */
   enum class Told { kGoesOn, kStarts, kFollows, kOld };
   struct Decided {
     Basis basis;

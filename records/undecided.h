@@ -1,4 +1,4 @@
-/** Candidates of a log that wait for their decision. */
+/** Candidates of a log without a decision so far. */
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@
 
 namespace forereach {
 
-/** Pairs candidates with decisions by the digest of the candidate's bytes. Of equal candidates the one sent first is
-decided first. `Entry` is what a reader notes of a candidate. Cost O(log n) for n candidates. */
+/** Pairs candidates with decisions by the digest of the candidate's bytes. Of equal candidates, the one that was sent
+first is paired first. `Entry` is a reader's data for a candidate. Cost: O(log n) for n candidates. */
 template <class Entry>
 class Undecided final {
  public:
-  /** @param most the number of candidates beyond which the oldest is dropped. */
+  /** @param most the largest number of candidates; beyond it the oldest is dropped. */
   explicit Undecided(std::size_t most = std::numeric_limits<std::size_t>::max()) : most_(most) {}
 
   void Add(const Digest& plan, Entry entry) {
@@ -25,13 +25,13 @@ class Undecided final {
     if (entries_.size() > most_) static_cast<void>(Take(entries_.begin()->second.first));
   }
 
-  /** The candidate that waits for the next decision on this plan, or null. */
+  /** The candidate for the next decision on this plan, or null. */
   [[nodiscard]] const Entry* Find(const Digest& plan) const {
     const auto found = of_plan_.lower_bound(plan);
     return found == of_plan_.end() || found->first != plan ? nullptr : &entries_.at(found->second).second;
   }
 
-  /** The same; it waits no longer. */
+  /** Removes and returns this candidate. */
   [[nodiscard]] std::optional<Entry> Take(const Digest& plan) {
     const auto found = of_plan_.lower_bound(plan);
     if (found == of_plan_.end() || found->first != plan) return std::nullopt;
@@ -42,7 +42,7 @@ class Undecided final {
     return taken;
   }
 
-  /** Calls `visit` with each that still waits, in the order in which they were sent. */
+  /** Calls `visit` with each candidate in the order in which they were sent. */
   template <class Visit>
   void ForEach(Visit visit) const {
     for (const auto& [number, entry] : entries_) visit(entry.second);
