@@ -55,6 +55,8 @@ template <class Number>
 struct OrNull {
   Number& number;
 };
+template <class Number>
+OrNull(Number&) -> OrNull<Number>;
 
 // The columns of a row, in the order of its table or query.
 auto ColumnsOf(auto& row) {
