@@ -226,8 +226,9 @@ struct Closest {
   int step = -1, obstacle = -1;
   Separation separation{kInfinity, 0};
 
-  void Consider(const Separation& found, int t, int o) noexcept {
-    if (const double its_clearance = found.clearance(); its_clearance < clearance) *this = {its_clearance, t, o, found};
+  void Consider(const Separation& found, int t, int o) noexcept { Consider(found, found.clearance(), t, o); }
+  void Consider(const Separation& found, double its_clearance, int t, int o) noexcept {
+    if (its_clearance < clearance) *this = {its_clearance, t, o, found};
   }
 };
 
@@ -276,7 +277,7 @@ Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube&
       if (by_hulls.IsProven()) {
         const double clearance = by_hulls.clearance();
         next_by_hull = std::min(next_by_hull, std::max(clearance, by_hull.clearance));
-        by_hull.Consider(by_hulls, t, o);
+        by_hull.Consider(by_hulls, clearance, t, o);
         continue;
       }
       const Separation best = separate(t, o, by_hulls);

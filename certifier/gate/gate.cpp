@@ -95,18 +95,13 @@ GateAnswer Gate::Answer(Bytes bytes, const TimeSource& clock, std::optional<Reje
 
 std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candidate, Zonotope& initial_set,
                                            std::int64_t now_us) {
-  const std::string size = std::to_string(bytes.size()) + " bytes";
-  switch (Decode(bytes, candidate)) {
-    case DecodeStatus::kUnknownFingerprint:
-      return Rejection{decision_t::CAUSE_UNKNOWN_FINGERPRINT, "not a candidate_plan_t"};
-    case DecodeStatus::kWrongLength:
-      return Rejection{decision_t::CAUSE_WRONG_LENGTH,
-                       size + ", must be " + std::to_string(EncodedSize<candidate_plan_t>())};
-    case DecodeStatus::kTrailingBytes:
-      return Rejection{decision_t::CAUSE_TRAILING_BYTES,
-                       size + ", must be " + std::to_string(EncodedSize<candidate_plan_t>())};
-    case DecodeStatus::kOk: break;
-  }
+  const DecodeStatus status = Decode(bytes, candidate);
+  if (status == DecodeStatus::kUnknownFingerprint)
+    return Rejection{decision_t::CAUSE_UNKNOWN_FINGERPRINT, "not a candidate_plan_t"};
+  if (status != DecodeStatus::kOk)
+    return Rejection{
+        status == DecodeStatus::kTrailingBytes ? decision_t::CAUSE_TRAILING_BYTES : decision_t::CAUSE_WRONG_LENGTH,
+        std::to_string(bytes.size()) + " bytes, must be " + std::to_string(EncodedSize<candidate_plan_t>())};
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
