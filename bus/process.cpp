@@ -5,11 +5,8 @@
 #include <optional>
 #include <utility>
 
-#include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
-
 #include "bus/authentic_bus.h"
+#include "bus/log.h"
 #include "bus/reloading.h"
 #include "lcmtypes/printable.h"
 
@@ -41,7 +38,7 @@ class DatagramWatch final : public Node {
     const DatagramCounts counts = bus_.datagrams();
     const std::int64_t amiss = counts.refused() + counts.lost_by_kernel + counts.receive_errors;
     if (amiss == std::exchange(said_, amiss)) return false;
-    spdlog::warn(
+    logging::Warn(
         "from the network, since the start: {} datagrams refused{}{}; {} lost to a full receive buffer; {} errors",
         counts.refused(), counts.refused() > 0 ? ": " : "", DescribeRefused(counts), counts.lost_by_kernel,
         counts.receive_errors);
@@ -53,25 +50,7 @@ class DatagramWatch final : public Node {
   std::int64_t said_ = 0, next_us_ = 0;
 };
 
-class PrintableMessage final : public spdlog::custom_flag_formatter {
- public:
-  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
-    const std::string text = Printable({message.payload.data(), message.payload.size()});
-    out.append(text.data(), text.data() + text.size());
-  }
-  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
-    return std::make_unique<PrintableMessage>();
-  }
-};
-
 }  // namespace
-
-void SetUpLog(const std::string& name) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
-  auto formatter = std::make_unique<spdlog::pattern_formatter>();
-  formatter->add_flag<PrintableMessage>('*').set_pattern("%H:%M:%S.%e %n %^%l%$: %*");
-  spdlog::set_formatter(std::move(formatter));
-}
 
 int Guarded(const std::string& name, const std::function<int()>& body) {
   try {
@@ -136,11 +115,11 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
     channels.keys = KeysOf(channels, description.role);
     const std::unique_ptr<Bus> bus = OpenBus(channels, description.role);
     const std::unique_ptr<Node> node = make_node(*bus);
-    if (!channels.keys) spdlog::warn(kUnsignedWarning);
-    spdlog::info("ready on {} with {}{}", channels.url, config_path,
-                 channels.keys
-                     ? ", signed as the " + std::string(RoleName(description.role)) + " of " + channels.keys->robot()
-                     : "");
+    if (!channels.keys) logging::Warn(kUnsignedWarning);
+    logging::Info("ready on {} with {}{}", channels.url, config_path,
+                  channels.keys
+                      ? ", signed as the " + std::string(RoleName(description.role)) + " of " + channels.keys->robot()
+                      : "");
     DatagramWatch watched(*node, *bus);
     RunNode(watched, *bus);
     return node->failed() ? 1 : 0;
@@ -148,7 +127,7 @@ int RunProcess(int argc, char** argv, const ProcessDescription& description, con
   if (reloads_under_way == 0) return code;
   // A thread that reads from a mount that stalls does not end, and may wake while static objects go.
   std::cout.flush();
-  spdlog::default_logger()->flush();
+  logging::Flush();
   std::_Exit(code);
 }
 

@@ -46,10 +46,6 @@ error. */
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const LoadTask& load,
                const MakeNode& make_node, std::vector<Option> options = {});
 
-/** Logs go to standard error, under this name, from here on. Control characters in a line are escaped: it may name what
-others chose. */
-void SetUpLog(const std::string& name);
-
 /** Runs `body` and turns its exceptions into exit codes, after one line: 2 for BadInput, 1 for others. */
 int Guarded(const std::string& name, const std::function<int()>& body);
 

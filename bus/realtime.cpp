@@ -6,9 +6,9 @@
 #include <string>
 
 #include <sched.h>
-#include <spdlog/spdlog.h>
 #include <sys/mman.h>
 
+#include "bus/log.h"
 #include "lcmtypes/bad_input.h"
 
 namespace forereach {
@@ -19,7 +19,7 @@ void BecomeRealtime(const RealtimeOptions& options) {
     const std::string why = std::string("cannot lock memory: ") + std::strerror(errno) +
                             "; as root, or with `ulimit -l unlimited` or LimitMEMLOCK=infinity";
     if (options.lock_memory == Lock::kRequire) throw BadInput("realtime.lock_memory: " + why);
-    spdlog::warn("{}", why);
+    logging::Warn("{}", why);
   }
   if (options.fifo_priority == 0) return;
   sched_param parameter{};

@@ -14,6 +14,7 @@
 #include "bus/keys.h"
 #include "bus/process.h"
 #include "certifier/task/config.h"
+#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
@@ -87,10 +88,11 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signe
   return {
       {"level", LevelName(status.level)},
       {"state", StateName(status.state)},
-      {"fault", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultName(status.fault))},
+      {"fault", status.fault == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(FaultName(status.fault))},
       {"latch", LatchName(status.latch)},
       {"message", GetText(status.message)},
-      {"advice", status.fault == 0 ? nlohmann::json(nullptr) : nlohmann::json(FaultAdvice(status.fault))},
+      {"advice",
+       status.fault == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(FaultAdvice(status.fault))},
       {"signed", is_signed},
       {"shadow", status.shadow != 0},
       {"version", status.version},
@@ -100,13 +102,16 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signe
       {"by_cause", by_cause},
       {"instance", status.instance},
       {"started_utime", status.started_utime},
-      {"other_instance", status.other_instance == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.other_instance)},
+      {"other_instance",
+       status.other_instance == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(status.other_instance)},
       {"obstacles",
        {{"source", ObstaclesSourceName(status.obstacles_source)},
         {"known", status.obstacles_known != 0},
         {"in_force", status.obstacles_in_force},
-        {"utime", status.obstacles_utime == 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_utime)},
-        {"age_us", status.obstacles_age_us < 0 ? nlohmann::json(nullptr) : nlohmann::json(status.obstacles_age_us)},
+        {"utime", status.obstacles_utime == 0 ? nlohmann::ordered_json(nullptr)
+                                              : nlohmann::ordered_json(status.obstacles_utime)},
+        {"age_us", status.obstacles_age_us < 0 ? nlohmann::ordered_json(nullptr)
+                                               : nlohmann::ordered_json(status.obstacles_age_us)},
         {"lost", status.obstacles_lost}}},
       {"unsigned", status.is_unsigned != 0},
       {"candidates_lost", status.candidates_lost},
@@ -125,7 +130,7 @@ nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signe
 
 void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
   if (json) {
-    std::cout << ToJson(status, is_signed) << std::endl;
+    std::cout << JsonText(ToJson(status, is_signed)) << std::endl;
     return;
   }
   std::cout << LevelName(status.level) << ", " << StateName(status.state) << (status.shadow ? ", shadow mode" : "");

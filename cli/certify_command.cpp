@@ -1,8 +1,11 @@
 #include <chrono>
 #include <iostream>
 
+#include <nlohmann/json.hpp>
+
 #include "certifier/certify/explain.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "records/decision_json.h"
 
@@ -48,7 +51,7 @@ int Certify(const Options& options) {
   result.controls = controls;
 
   if (options.json)
-    std::cout << ToJson(result, tube, certifier, config).dump() << std::endl;
+    std::cout << JsonText(ToJson(result, tube, certifier, config)) << std::endl;
   else
     PrintForPeople(result, tube, certifier);
   return result.decision.outcome == Outcome::kCertified ? 0 : 1;

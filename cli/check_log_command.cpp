@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <iostream>
 
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "records/check.h"
-#include "records/json_text.h"
 
 namespace forereach {
 namespace {

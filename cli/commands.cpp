@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "bus/log.h"
 #include "bus/process.h"
 
 namespace forereach {

@@ -8,6 +8,7 @@
 
 #include "certifier/task/canonical.h"
 #include "certifier/task/files.h"
+#include "certifier/task/json_text.h"
 
 namespace forereach {
 namespace {
@@ -134,7 +135,7 @@ void SaveCover(const std::string& path, const Config& config, const std::vector<
       {"entries", entries},
       {"digests", {{"residual", ToHex(ResidualDigest(config))}, {"cover", ToHex(CoverDigest(claims))}}}};
   std::ofstream file(path, std::ios::binary);
-  if (!(file << document.dump() << "\n") || !file.flush()) throw ConfigError(path + ": cannot be written");
+  if (!(file << JsonText(document) << "\n") || !file.flush()) throw ConfigError(path + ": cannot be written");
 }
 
 CoverFile LoadCover(const std::string& path, const Config& config) {
@@ -142,7 +143,7 @@ CoverFile LoadCover(const std::string& path, const Config& config) {
   const std::vector<std::string> names = ArgumentNames(config);
   CoverFile file;
   try {
-    const Json document = Json::parse(text);
+    const Json document = ParseJson(text, std::numeric_limits<int>::max());
     for (const Json& entry : document.at("entries"))
       file.claims.push_back({IndexOf(names, entry.at("row").get<std::string>()),
                              IndexOf(names, entry.at("column").get<std::string>()), entry.at("bound").get<double>(),

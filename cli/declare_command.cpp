@@ -13,6 +13,7 @@
 #include "certifier/dynamics/residuals.h"
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/cover_file.h"
 #include "cli/offline.h"
@@ -213,7 +214,7 @@ int Declare(const Options& options) {
     SaveCover(options.cover, config, claims);
   }
   if (options.json)
-    std::cout << ToJson(bounds, config, seconds).dump() << std::endl;
+    std::cout << JsonText(ToJson(bounds, config, seconds)) << std::endl;
   else
     PrintForPeople(bounds, config, seconds);
   return AllReached(bounds) ? 0 : 1;
@@ -280,7 +281,7 @@ int CheckCover(const Options& options) {
     Json document{{"verdict", verdict}, {"entries", file.claims.size()}, {"failures", Json::array()}};
     for (const Finding& finding : findings)
       document["failures"].push_back({{"entry", finding.entry}, {"claim", finding.what}});
-    std::cout << document.dump() << std::endl;
+    std::cout << JsonText(document) << std::endl;
   } else {
     for (const Finding& finding : findings)
       std::cout << "  " << finding.entry << (finding.entry.empty() ? "" : ": ") << finding.what << "\n";

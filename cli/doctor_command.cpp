@@ -22,6 +22,7 @@
 #include "bus/process.h"
 #include "bus/udp_receiver.h"
 #include "certifier/task/config.h"
+#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 
 namespace forereach {
@@ -168,7 +169,7 @@ int Diagnose(const BusOptions& bus, bool json) {
                                     {"warning", check.warning},
                                     {"found", check.found},
                                     {"advice", check.good ? nlohmann::json(nullptr) : nlohmann::json(check.advice)}});
-    std::cout << document << std::endl;
+    std::cout << JsonText(document) << std::endl;
   } else {
     for (const auto& [name, version] : versions) std::cout << "      " << name << " " << version << "\n";
     for (const Check& check : checks) {

@@ -3,9 +3,8 @@
 #include <string>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
 #include "bus/bus_options.h"
+#include "bus/log.h"
 #include "bus/process.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
@@ -34,7 +33,7 @@ class ObstaclesNode final : public Node {
   void Tick(std::int64_t now_us) override {
     if (const auto message = sender_.Due(now_us); message && !bus_.Publish(channels_.obstacles, *message) && !warned_) {
       warned_ = true;
-      spdlog::warn("the bus refused a message; receivers see a gap");
+      logging::Warn("the bus refused a message; receivers see a gap");
     }
   }
 
@@ -43,9 +42,9 @@ class ObstaclesNode final : public Node {
     const std::string why = WhyKeyCannotChange(channels_, config.bus, Role::kPerception);
     if (!why.empty()) throw ConfigError(path_ + ": " + why);
     sender_.Set(config.obstacles);
-    spdlog::info("the obstacles of {} from now on", path_);
+    logging::Info("the obstacles of {} from now on", path_);
   } catch (const std::exception& error) {
-    spdlog::error("not reloaded, the obstacles of before are sent: {}", error.what());
+    logging::Error("not reloaded, the obstacles of before are sent: {}", error.what());
   }
 
  private:
@@ -60,17 +59,17 @@ int Send(const Options& options) {
   Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
   options.bus.Override(config.bus);
   config.bus = WithKeys(std::move(config.bus), Role::kPerception);
-  if (!config.bus.keys) spdlog::warn(kUnsignedWarning);
+  if (!config.bus.keys) logging::Warn(kUnsignedWarning);
   const std::unique_ptr<Bus> bus = OpenBus(config.bus, Role::kPerception);
   const std::int64_t period_us =
       options.period_ms ? Microseconds(*options.period_ms) : ObstacleSender::PeriodUs(config.gate);
   if (3 * period_us > Microseconds(config.gate.obstacles_timeout_ms))
-    spdlog::warn(
+    logging::Warn(
         "every {} ms is less often than three times in gate.obstacles_timeout_ms: one lost message stops the robot",
         static_cast<double>(period_us) / 1e3);
   ObstaclesNode node(config, *bus, period_us);
-  spdlog::info("{} obstacles of {} on {} every {} ms", config.obstacles.size(), config.path, config.bus.url,
-               static_cast<double>(period_us) / 1e3);
+  logging::Info("{} obstacles of {} on {} every {} ms", config.obstacles.size(), config.path, config.bus.url,
+                static_cast<double>(period_us) / 1e3);
   RunNode(node, *bus);
   return 0;
 }

@@ -1,10 +1,12 @@
 #include <iostream>
 
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
 #include "lcmtypes/printable.h"
-#include "records/json_text.h"
 #include "records/log_tasks.h"
 #include "records/replay.h"
 

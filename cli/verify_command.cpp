@@ -8,13 +8,13 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/numerics/parallel.h"
+#include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
 #include "lcmtypes/printable.h"
 #include "records/certificate_files.h"
-#include "records/json_text.h"
 
 namespace forereach {
 namespace {

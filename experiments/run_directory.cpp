@@ -9,6 +9,7 @@
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/files.h"
+#include "certifier/task/json_text.h"
 #include "cli/progress.h"
 
 namespace forereach::experiments {
@@ -100,11 +101,11 @@ RunDirectory::RunDirectory(fs::path path, const Effort& effort) : path_(std::mov
   if (error) throw std::runtime_error((path_ / "cells").string() + ": " + error.message());
   const fs::path file = path_ / "run.json";
   if (!fs::exists(file)) {
-    WriteFile(file, Json{{"scenarios", effort.scenarios}, {"rollouts", effort.rollouts}}.dump(2) + "\n");
+    WriteFile(file, JsonText(Json{{"scenarios", effort.scenarios}, {"rollouts", effort.rollouts}}, 2) + "\n");
     return;
   }
   try {
-    const Json begun = Json::parse(ReadFile(file));
+    const Json begun = ParseJson<Json>(ReadFile(file));
     RequireSame(file, begun, "scenarios", effort.scenarios);
     RequireSame(file, begun, "rollouts", effort.rollouts);
   } catch (const Json::exception& bad) {
@@ -116,14 +117,14 @@ std::optional<CellResult> RunDirectory::Load(const Cell& cell) const {
   const fs::path file = path_ / "cells" / (cell.key() + ".json");
   if (!fs::exists(file)) return std::nullopt;
   try {
-    return FromJson(Json::parse(ReadFile(file)));
+    return FromJson(ParseJson<Json>(ReadFile(file)));
   } catch (const Json::exception& bad) {
     throw std::runtime_error(file.string() + ": " + bad.what() + "; delete it to have the cell run again");
   }
 }
 
 void RunDirectory::Store(const Cell& cell, const CellResult& result) const {
-  WriteFile(path_ / "cells" / (cell.key() + ".json"), ToJson(cell, result).dump(1) + "\n");
+  WriteFile(path_ / "cells" / (cell.key() + ".json"), JsonText(ToJson(cell, result), 1) + "\n");
 }
 
 std::vector<CellResult> RunAll(const std::vector<Cell>& cells, const RunDirectory& directory, unsigned threads) {

@@ -7,8 +7,8 @@
 
 #include <sanitizer/allocator_interface.h>
 #include <sanitizer/asan_interface.h>
-#include <spdlog/spdlog.h>
 
+#include "bus/log.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
 #include "fuzz/candidates.h"
@@ -210,7 +210,7 @@ std::vector<Config> Tasks() {
 
 bool Try(Bytes data) {
   static const std::vector<Config> tasks = [] {
-    spdlog::set_level(spdlog::level::off);
+    logging::Silence();
     return Tasks();
   }();
   FuzzedDataProvider input(data.data(), data.size());

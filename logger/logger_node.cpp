@@ -4,7 +4,7 @@
 #include <ostream>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "forereach/logger_status_t.hpp"
 #include "records/log_authenticator.h"

@@ -5,10 +5,10 @@
 #include <iterator>
 #include <set>
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 
 #include "bus/bus_options.h"
+#include "bus/log.h"
 #include "lcmtypes/heartbeat.h"
 
 namespace forereach {
@@ -126,7 +126,7 @@ void Recorder::AdoptLogs() {
       else
         database_->BeginRun(log, found.first_utime);
     } catch (const BadInput& error) {
-      spdlog::warn("no run knows {}, and it is left alone: {}", log, error.what());
+      logging::Warn("no run knows {}, and it is left alone: {}", log, error.what());
     }
   }
 }
@@ -137,12 +137,12 @@ void Recorder::Recover(const RunRow& run) {
   if (directory_.Bytes(run.log_file)) try {
       text = Mend(run, end_utime);
     } catch (const LogError& error) {
-      spdlog::warn("{} was not ended and is left alone: {}", run.log_file, error.what());
+      logging::Warn("{} was not ended and is left alone: {}", run.log_file, error.what());
       return;
     }
   database_->EndRun(run.log_file, end_utime, text);
   recovered_.push_back(run.log_file + ": " + text);
-  spdlog::warn("recovered {}", recovered_.back());
+  logging::Warn("recovered {}", recovered_.back());
 }
 
 std::string Recorder::Mend(const RunRow& run, std::int64_t& end_utime) {
@@ -231,7 +231,7 @@ void Recorder::Open(std::int64_t now_us, const std::string& continues) {
   rows_lost_ = needs_new_file_ = false;
   ++files_;
   age_.Start(now_us);
-  spdlog::info("recording to {}", log_path_);
+  logging::Info("recording to {}", log_path_);
   KeepTasks();
 }
 
@@ -245,7 +245,7 @@ void Recorder::AddTask(const Config& config) {
     tasks_.push_back(CopyTask(config));
     tasks_in_use_.insert(ToHex(config.grounds.config));
   } catch (const BadInput& error) {
-    spdlog::error("the task is not kept next to the log: {}", error.what());
+    logging::Error("the task is not kept next to the log: {}", error.what());
   }
 }
 
@@ -253,7 +253,7 @@ void Recorder::KeepTasks() const {
   for (const TaskCopy& task : tasks_) try {
       kept_tasks_.Keep(task);
     } catch (const BadInput& error) {
-      spdlog::error("the task {} is not kept next to the log: {}", ToHex(task.digest), error.what());
+      logging::Error("the task {} is not kept next to the log: {}", ToHex(task.digest), error.what());
     }
 }
 
@@ -277,8 +277,8 @@ void Recorder::NoticeTask(const LogEvent& event, std::int64_t now_us) {
     AddTask(config);
     KeepTasks();
   } catch (const BadInput& error) {
-    spdlog::warn("the certifier's task, config digest {}, is not kept next to the log: {}", ToHex(heard.first),
-                 error.what());
+    logging::Warn("the certifier's task, config digest {}, is not kept next to the log: {}", ToHex(heard.first),
+                  error.what());
   }
 }
 
@@ -386,7 +386,7 @@ void Recorder::GiveUpLog(FilePlace place, std::int64_t now_us) {
       ForEachEvent(reader,
                    [&](const LogEvent& event) { ++left[confirmed_.contains(event.channel) ? event.channel : "*"]; });
     } catch (const LogError& error) {
-      spdlog::error("{}: its remaining part cannot be read: {}", log_file_, error.what());
+      logging::Error("{}: its remaining part cannot be read: {}", log_file_, error.what());
     }
   std::int64_t events = CountEarlierFilesGone(now_us);
   for (const auto& [channel, confirmed] : std::exchange(confirmed_, {})) {
@@ -395,7 +395,7 @@ void Recorder::GiveUpLog(FilePlace place, std::int64_t now_us) {
     events += lost;
   }
   if (events > 0) gone_ = fmt::format("{} {}, {} confirmed events are gone", log_file_, DescribePlace(place), events);
-  spdlog::error("{} {} while it was written: {} confirmed events are gone", log_path_, DescribePlace(place), events);
+  logging::Error("{} {} while it was written: {} confirmed events are gone", log_path_, DescribePlace(place), events);
 }
 
 // Files that were deleted for the quota do not count.
@@ -428,7 +428,7 @@ void Recorder::StartAnew(std::int64_t now_us) {
     database().EndRun(lost, now_us, gone_.empty() ? "the log was lost while it was written" : gone_);
   } catch (const BadInput& error) {
     if (!is_log_lost_) {
-      spdlog::error("{} is left to the next start to end: {}", lost, error.what());
+      logging::Error("{} is left to the next start to end: {}", lost, error.what());
       return;
     }
     log_->Abandon();
@@ -445,7 +445,7 @@ void Recorder::WatchDatabase(std::int64_t now_us) {
   if (database_) {
     const std::optional<std::string> displaced = database_->FindDisplaced();
     if (!displaced) return;
-    spdlog::error("database: {}; it is opened again", *displaced);
+    logging::Error("database: {}; it is opened again", *displaced);
     database_problem_ = displaced_ = "database: " + *displaced;
     database_->Checkpoint();
     database_.reset();
@@ -541,9 +541,9 @@ void Recorder::Report() {
   const std::string now = trouble();
   if (now == reported_) return;
   if (now.empty())
-    spdlog::info("{} can be written again", options_.directory);
+    logging::Info("{} can be written again", options_.directory);
   else
-    spdlog::error("{}; what is lost is counted", now);
+    logging::Error("{}; what is lost is counted", now);
   reported_ = now;
 }
 
@@ -558,7 +558,7 @@ void Recorder::End(std::int64_t now_us) {
   if (flushed_rows_.empty() && !rows_lost_) try {
       database().EndRun(log_file_, now_us);
     } catch (const DatabaseError& error) {
-      spdlog::error("{} is left to the next start to end: {}", log_file_, error.what());
+      logging::Error("{} is left to the next start to end: {}", log_file_, error.what());
     }
 }
 
@@ -610,10 +610,10 @@ bool Recorder::MakeRoom(std::int64_t bytes, std::int64_t now_us) {
       if (!directory_.Remove(file)) continue;
       other_bytes_ -= size;
       ForgetTasksOf(file);
-      spdlog::warn("{}, {} bytes, deleted for logger.quota_mb; its rows stay", file, size);
+      logging::Warn("{}, {} bytes, deleted for logger.quota_mb; its rows stay", file, size);
     }
   } catch (const DatabaseError& error) {
-    spdlog::error("no log is deleted for logger.quota_mb: {}", error.what());
+    logging::Error("no log is deleted for logger.quota_mb: {}", error.what());
   }
   return HasRoom(bytes);
 }

@@ -8,6 +8,7 @@
 
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
+#include "certifier/task/json_text.h"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -214,17 +215,16 @@ void PlannerNode::OnObstacles(const Received& received) {
 void PlannerNode::Stop() { out_ << Summary() << std::endl; }
 
 std::string PlannerNode::Summary() const {
-  return nlohmann::ordered_json{{"proposed", proposed_},
-                                {"certified", certified_},
-                                {"abstained", abstained_},
-                                {"rejected", rejected_},
-                                {"unanswered", unanswered_},
-                                {"rounds", rounds_},
-                                {"rounds_without_certificate", fruitless_rounds_},
-                                {"searches_without_result", fruitless_searches_},
-                                {"messages_ignored", ignored_},
-                                {"messages_not_sent", sender_.refused()}}
-      .dump();
+  return JsonText(nlohmann::ordered_json{{"proposed", proposed_},
+                                         {"certified", certified_},
+                                         {"abstained", abstained_},
+                                         {"rejected", rejected_},
+                                         {"unanswered", unanswered_},
+                                         {"rounds", rounds_},
+                                         {"rounds_without_certificate", fruitless_rounds_},
+                                         {"searches_without_result", fruitless_searches_},
+                                         {"messages_ignored", ignored_},
+                                         {"messages_not_sent", sender_.refused()}});
 }
 
 }  // namespace forereach

@@ -9,7 +9,7 @@
 #include "certifier/task/config_error.h"
 #include "certifier/task/files.h"
 #include "certifier/task/json_field.h"
-#include "certifier/task/json_file.h"
+#include "certifier/task/json_text.h"
 
 namespace forereach {
 namespace {
@@ -90,13 +90,13 @@ std::string Lines(const Policy& policy) {
             {"output", ToJson(policy.output)}};
   for (const Policy::Layer& layer : policy.layers) head["sizes"].push_back(layer.bias.size());
   std::string text = "{\n";
-  for (const auto& [name, value] : head.items()) text += Json(name).dump() + ": " + value.dump() + ",\n";
+  for (const auto& [name, value] : head.items()) text += JsonText(Json(name)) + ": " + JsonText(value) + ",\n";
   text += "\"layers\": [\n";
   for (const Policy::Layer& layer : policy.layers) {
     text += "{\"weight\": [\n";
     for (Eigen::Index i = 0; i < layer.weight.rows(); ++i)
-      text += ToJson(Eigen::VectorXd(layer.weight.row(i))).dump() + (i + 1 < layer.weight.rows() ? ",\n" : "],\n");
-    text += "\"bias\": " + ToJson(layer.bias).dump() + (&layer == &policy.layers.back() ? "}]\n" : "},\n");
+      text += JsonText(ToJson(Eigen::VectorXd(layer.weight.row(i)))) + (i + 1 < layer.weight.rows() ? ",\n" : "],\n");
+    text += "\"bias\": " + JsonText(ToJson(layer.bias)) + (&layer == &policy.layers.back() ? "}]\n" : "},\n");
   }
   return text + "}\n";
 }

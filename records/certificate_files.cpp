@@ -16,7 +16,7 @@
 #include "certifier/certify/explain.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/files.h"
-#include "certifier/task/json_file.h"
+#include "certifier/task/json_text.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "records/database.h"
@@ -387,8 +387,7 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const
   try {
     switch (KindOf(path)) {
       case FileKind::kDatabase: return DatabaseReading(path, config_path, key).Finish();
-      case FileKind::kJson:
-        return {FromDecision(path, ParseJson<Json>(ReadWhole(path, kLargestJsonFile)), config_path)};
+      case FileKind::kJson: return {FromDecision(path, ParseJson(ReadWhole(path, kLargestJsonFile)), config_path)};
       case FileKind::kOther:
         if (Survey({path}).events == 0) break;
         [[fallthrough]];

@@ -4,8 +4,9 @@
 #include <filesystem>
 #include <iterator>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "lcmtypes/printable.h"
 #include "records/database.h"

@@ -10,6 +10,8 @@
 #include <sqlite3.h>
 #include <nlohmann/json.hpp>
 
+#include "certifier/task/json_text.h"
+
 namespace forereach {
 namespace {
 
@@ -134,7 +136,7 @@ class Database::Statement final {
   void BindNext(const std::string& value) {
     sqlite3_bind_text(statement_, ++column_, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT);
   }
-  void BindNext(const std::vector<double>& value) { BindNext(nlohmann::json(value).dump()); }
+  void BindNext(const std::vector<double>& value) { BindNext(JsonText(nlohmann::json(value))); }
   void BindNext(const std::array<std::string, kGrounds.size()>& values) {
     for (const std::string& value : values) BindNext(value);
   }
@@ -167,8 +169,7 @@ class Database::Statement final {
     std::string text;
     ReadNext(text);
     value.clear();
-    for (const auto& entry : nlohmann::json::parse(text))
-      value.push_back(entry.is_null() ? kUnknown : entry.get<double>());
+    for (const auto& entry : ParseJson(text)) value.push_back(entry.is_null() ? kUnknown : entry.get<double>());
   }
   void ReadNext(std::optional<std::int64_t>& value) {
     value = IsNull() ? std::nullopt : std::optional(sqlite3_column_int64(statement_, column_));

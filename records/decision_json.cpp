@@ -4,6 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include <nlohmann/json.hpp>
+
 #include "certifier/certify/explain.h"
 #include "certifier/safety/separation.h"
 #include "certifier/sets/zonogon.h"

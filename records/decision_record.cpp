@@ -5,8 +5,11 @@
 #include <filesystem>
 #include <set>
 
+#include <nlohmann/json.hpp>
+
 #include "certifier/certify/explain.h"
 #include "certifier/task/json_field.h"
+#include "certifier/task/json_text.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "records/decision_json.h"
@@ -42,8 +45,7 @@ class Reading {
  private:
   void Compare(const JsonField& field, const Json& expected) {
     if (field.json() == expected) return;
-    record_.mismatches.push_back(
-        {kAltered + field.name(), expected.dump(), field.json().dump(-1, ' ', false, Json::error_handler_t::replace)});
+    record_.mismatches.push_back({kAltered + field.name(), JsonText(expected), JsonText(field.json())});
   }
 
   void ReadInputs() {
@@ -144,7 +146,8 @@ class Reading {
       Compare(threshold, Json(radius));
       const double claimed = SubDown(margin.Number(), radius);
       if (claimed != clearance)
-        record_.Compare(kAltered + margin.name() + " less the radius", Json(clearance).dump(), Json(claimed).dump());
+        record_.Compare(kAltered + margin.name() + " less the radius", JsonText(Json(clearance)),
+                        JsonText(Json(claimed)));
     }
     const std::string sentence = ExplainCertificate(step, obstacle, clearance);
     Compare(document_["message"], sentence + (document_["capped"].Bool() ? kCapped : ""));

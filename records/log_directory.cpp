@@ -9,7 +9,7 @@
 #include <sys/statvfs.h>
 
 #include <fmt/chrono.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "records/event_log.h"
 

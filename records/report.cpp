@@ -11,16 +11,17 @@
 #include <thread>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
 
 #include "certifier/certify/batch.h"
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/sets/zonogon.h"
+#include "certifier/task/json_text.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
-#include "records/json_text.h"
 #include "records/log_tasks.h"
 #include "records/timeline.h"
 

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
 
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/printable.h"

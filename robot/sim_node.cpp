@@ -4,13 +4,14 @@
 #include <array>
 #include <limits>
 
-#include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
+#include "bus/log.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/json_text.h"
 #include "forereach/execution_event_t.hpp"
 
 namespace forereach {
@@ -24,7 +25,7 @@ std::optional<Config> Load(const std::string& path, const BusOptions& in_force) 
   if (!why.empty()) throw ConfigError(path + ": " + why);
   return config;
 } catch (const std::exception& error) {
-  spdlog::error("not reloaded: {}", error.what());
+  logging::Error("not reloaded: {}", error.what());
   return std::nullopt;
 }
 
@@ -98,7 +99,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
                 [this](const Received& received) { supervisor_.OnFault(received.raw, received.utime); });
   bus.Subscribe(config_.bus.command, [this](const Received& received) {
     const std::string why = supervisor_.OnCommand(received.raw, received.utime);
-    if (!why.empty()) spdlog::warn("{}: refused: {}", config_.bus.command, why);
+    if (!why.empty()) logging::Warn("{}: refused: {}", config_.bus.command, why);
   });
 }
 
@@ -110,15 +111,15 @@ void RobotSimNode::Tick(std::int64_t now_us) {
 }
 
 void RobotSimNode::Reload() {
-  if (!reload_.Ask()) spdlog::error("not reloaded: the reloads before have not ended; it is read again once one has");
+  if (!reload_.Ask()) logging::Error("not reloaded: the reloads before have not ended; it is read again once one has");
 }
 
 void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
-  if (reload_.TakeStall()) spdlog::error("not reloaded yet: a file that it reads does not answer");
+  if (reload_.TakeStall()) logging::Error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
   supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config));
-  spdlog::info("plans certified under {} as it is now are accepted", config_.path);
+  logging::Info("plans certified under {} as it is now are accepted", config_.path);
 }
 
 void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
@@ -142,8 +143,8 @@ void RobotSimNode::Send(const std::string& channel, Bytes message) { sender_.Sen
 void RobotSimNode::LogProgress(std::int64_t utime) {
   if (utime < next_progress_utime_) return;
   next_progress_utime_ = utime + kProgressUs;
-  spdlog::info("{} steps driven, {} inside their slices, {:.1f} m to the goal{}", supervisor_.counts().steps,
-               supervisor_.counts().steps_inside, DistanceToGoal(), supervisor_.control().empty() ? ", standing" : "");
+  logging::Info("{} steps driven, {} inside their slices, {:.1f} m to the goal{}", supervisor_.counts().steps,
+                supervisor_.counts().steps_inside, DistanceToGoal(), supervisor_.control().empty() ? ", standing" : "");
 }
 
 void RobotSimNode::ReportContacts(std::int64_t utime) {
@@ -190,7 +191,7 @@ std::string RobotSimNode::Summary() const {
   summary["plans_started"] = counts.started;
   summary["plans_refused"] = counts.refused;
   summary["messages_not_sent"] = sender_.refused();
-  return summary.dump();
+  return JsonText(summary);
 }
 
 }  // namespace forereach

@@ -6,12 +6,11 @@
 #include <random>
 #include <utility>
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 #include <sys/resource.h>
-#include <nlohmann/json.hpp>
 
 #include "bus/bus_options.h"
+#include "bus/log.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/process/faults.h"
 #include "lcmtypes/names.h"
@@ -72,14 +71,14 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       latch_(watch_, contradictions_, std::move(latch)),
       reporter_({channels_, bus_, sender_, watch_, charge_, contradictions_, latch_, reload_, queue_}) {
   if (gate_->certifier().problem().rest.empty() && config.gate.needs_robot_state)
-    spdlog::warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
+    logging::Warn("plans that end moving are certified: the task does not say what standing is (task.rest)");
   if (const auto& violation = gate_->certifier().violation())
-    spdlog::warn(
+    logging::Warn(
         "observations {} and {} contradict the declaration: every candidate will be answered ABSTAIN_FALSIFIED (F)",
         violation->first, violation->second);
   if (gate_->certifier().uses_hull_distance())
-    spdlog::warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
-                 LipschitzEnvelope::kMaxExactColumns);
+    logging::Warn("a row of the declaration has more than {} columns: set-to-sample distances are bounded over hulls",
+                  LipschitzEnvelope::kMaxExactColumns);
   bus.Subscribe(channels_.status, [this](const Received& received) { OnStatus(received); });
   bus.Subscribe(channels_.fault, [this](const Received& received) { OnFault(received); });
   bus.Subscribe(channels_.candidate, [this](const Received& received) { OnCandidate(received); });
@@ -157,7 +156,7 @@ std::string CertifierNode::WhyNotInCharge() const {
 }
 
 void CertifierNode::TakeCharge() {
-  spdlog::info("in charge, as instance {:016x}", charge_.self().instance);
+  logging::Info("in charge, as instance {:016x}", charge_.self().instance);
   has_begun_ = true;
   issued_.TolerateFrom(clocks_.steady());
   if (fault_of_other_)
@@ -172,7 +171,7 @@ void CertifierNode::TakeCharge() {
 // Forgets learned transitions and received messages, because another certifier has been in charge since. Keeps
 // contradictions.
 void CertifierNode::StandBy() {
-  spdlog::warn("{}", WhyNotInCharge());
+  logging::Warn("{}", WhyNotInCharge());
   LeaveWaiting();
   watch_.RobotHasFinished();
   if (!std::exchange(has_begun_, false) || gate_->certifier().violation()) return;
@@ -202,7 +201,7 @@ void CertifierNode::Refuse(const std::string& channel, const std::string& why) {
   const std::int64_t now = clocks_.steady();
   if (now < next_warning_us_) return;  // a flood of messages must not flood the log
   next_warning_us_ = now + kHeartbeatUs;
-  spdlog::warn("{}: refused: {} ({} messages in all)", channel, why, reporter_.counts.refused);
+  logging::Warn("{}: refused: {} ({} messages in all)", channel, why, reporter_.counts.refused);
 }
 
 void CertifierNode::OnObstacles(const Received& received) {
@@ -275,7 +274,7 @@ void CertifierNode::Obey(const command_t& command, std::int64_t now_us) {
         return Refuse(channels_.command, "the reset was sent before the fault, so nobody has inspected the fault");
       if (!latch_.Forget())
         return Refuse(channels_.command, "the fault stays, since the reset cannot be stored: " + latch_.why_not());
-      if (watch_.Reset()) spdlog::warn("{} has cleared the fault", GetText(command.source));
+      if (watch_.Reset()) logging::Warn("{} has cleared the fault", GetText(command.source));
       reporter_.Hurry();
       return;
     case command_t::RELOAD: return Reload();
@@ -299,8 +298,8 @@ void CertifierNode::Announce(fault_t fault, const Watch::Fault& latched) {
   latch_.Put(fault);
   SendFault();
   latch_.Flush();  // the disk may take longer than a robot can wait
-  spdlog::error("fault {}: {}; nothing is certified. What to do: {}", FaultName(latched.cause), latched.why,
-                FaultAdvice(latched.cause));
+  logging::Error("fault {}: {}; nothing is certified. What to do: {}", FaultName(latched.cause), latched.why,
+                 FaultAdvice(latched.cause));
   reporter_.Hurry();
 }
 

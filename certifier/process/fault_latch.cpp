@@ -2,8 +2,7 @@
 
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
+#include "bus/log.h"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "lcmtypes/names.h"
 
@@ -44,19 +43,19 @@ void FaultLatch::TellWatch() {
   if (!file_) return;
   const bool could = watch_.Lacks(Watch::Need::kLatch).empty();
   watch_.Set(Watch::Need::kLatch, file_->ready() ? "" : "no fault could be stored: " + file_->why_not());
-  if (could && !file_->ready()) spdlog::error("nothing is certified: no fault could be stored: {}", file_->why_not());
-  if (!could && file_->ready()) spdlog::info("{} can be written", file_->path());
+  if (could && !file_->ready()) logging::Error("nothing is certified: no fault could be stored: {}", file_->why_not());
+  if (!could && file_->ready()) logging::Info("{} can be written", file_->path());
 }
 
 void FaultLatch::TakeOver(const LatchFile::Content& stored) {
   for (const LatchFile::Contradiction& one : stored.contradictions) contradictions_.Add(one);
   if (contradictions_.ContradictInForce())
-    spdlog::error("a transition from before this start contradicts the declaration: every candidate is F");
+    logging::Error("a transition from before this start contradicts the declaration: every candidate is F");
   if (!stored.fault || !watch_.Latch({stored.fault->cause, stored.fault->utime, stored.why})) return;
   fault_ = *stored.fault;
   next_us_ = 0;
-  spdlog::error("fault {} from before this start: {}; nothing is certified. What to do: {}",
-                FaultName(stored.fault->cause), stored.why, FaultAdvice(stored.fault->cause));
+  logging::Error("fault {} from before this start: {}; nothing is certified. What to do: {}",
+                 FaultName(stored.fault->cause), stored.why, FaultAdvice(stored.fault->cause));
 }
 
 void FaultLatch::Check() {

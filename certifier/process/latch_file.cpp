@@ -16,7 +16,7 @@
 
 #include "certifier/numerics/limits.h"
 #include "certifier/task/files.h"
-#include "certifier/task/json_file.h"
+#include "certifier/task/json_text.h"
 #include "lcmtypes/bad_input.h"
 
 namespace forereach {
@@ -31,8 +31,6 @@ constexpr const char* kNewName = "latch.json.new";
 bool IsSameFile(const struct stat& a, const struct stat& b) { return a.st_dev == b.st_dev && a.st_ino == b.st_ino; }
 
 // ---- The content as JSON. Strings may hold any bytes; numbers come back to the last bit.
-
-std::string Dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json ToJson(const Eigen::MatrixXd& rows) {
   Json lists = Json::array();
@@ -84,20 +82,21 @@ LatchFile::Content ContentFrom(const Json& json) {
 // Text of exactly the file's size.
 std::string TextOf(const LatchFile::Content& content) {
   const Json inner = ToJson(content);
-  std::string text =
-      Dump({{"format", kFormat}, {"version", kVersion}, {"content", inner}, {"digest", ToHex(DigestOf(Dump(inner)))}});
+  std::string text = JsonText(
+      {{"format", kFormat}, {"version", kVersion}, {"content", inner}, {"digest", ToHex(DigestOf(JsonText(inner)))}});
   if (text.size() < LatchFile::kBytes) text.resize(LatchFile::kBytes - 1, ' '), text += '\n';
   return text;
 }
 
 // @throws Json::exception with the error.
 LatchFile::Content ContentOf(const std::string& text) {
-  const Json json = ParseJson<Json>(text);
+  const Json json = ParseJson(text);
   if (json.at("format") != kFormat) throw Json::other_error::create(501, "its format is another", nullptr);
   if (json.at("version") != kVersion)
     throw Json::other_error::create(
-        501, "its version is " + Dump(json["version"]) + ", this certifier knows " + std::to_string(kVersion), nullptr);
-  if (json.at("digest") != ToHex(DigestOf(Dump(json.at("content")))))
+        501, "its version is " + JsonText(json["version"]) + ", this certifier knows " + std::to_string(kVersion),
+        nullptr);
+  if (json.at("digest") != ToHex(DigestOf(JsonText(json.at("content")))))
     throw Json::other_error::create(501, "its digest is not that of its content", nullptr);
   return ContentFrom(json["content"]);
 }

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
+#include "certifier/task/json_text.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 
@@ -110,22 +111,21 @@ double StatusReporter::ElapsedPercentile(double fraction) const {
 std::string StatusReporter::Summary(const Gate& gate) const {
   const certifier_status_v3_t status = gate.Status(0);
   const auto count = [&](std::int16_t outcome) { return status.by_outcome[outcome]; };
-  return nlohmann::json{{"candidates", status.candidates},
-                        {"certified", count(decision_t::CERTIFIED)},
-                        {"abstained",
-                         {{"falsified", count(decision_t::ABSTAIN_FALSIFIED)},
-                          {"domain", count(decision_t::ABSTAIN_DOMAIN)},
-                          {"safety", count(decision_t::ABSTAIN_SAFETY)},
-                          {"deadline", count(decision_t::ABSTAIN_DEADLINE)}}},
-                        {"rejected", count(decision_t::REJECTED)},
-                        {"observations", status.observations},
-                        {"learned", status.learned},
-                        {"left_to_another_certifier", counts.left_to_other},
-                        {"faults", counts.faults},
-                        {"messages_refused", counts.refused},
-                        {"messages_not_sent", parts_.sender.refused()},
-                        {"elapsed_us", {{"p50", ElapsedPercentile(0.5)}, {"p99", ElapsedPercentile(0.99)}}}}
-      .dump();
+  return JsonText({{"candidates", status.candidates},
+                   {"certified", count(decision_t::CERTIFIED)},
+                   {"abstained",
+                    {{"falsified", count(decision_t::ABSTAIN_FALSIFIED)},
+                     {"domain", count(decision_t::ABSTAIN_DOMAIN)},
+                     {"safety", count(decision_t::ABSTAIN_SAFETY)},
+                     {"deadline", count(decision_t::ABSTAIN_DEADLINE)}}},
+                   {"rejected", count(decision_t::REJECTED)},
+                   {"observations", status.observations},
+                   {"learned", status.learned},
+                   {"left_to_another_certifier", counts.left_to_other},
+                   {"faults", counts.faults},
+                   {"messages_refused", counts.refused},
+                   {"messages_not_sent", parts_.sender.refused()},
+                   {"elapsed_us", {{"p50", ElapsedPercentile(0.5)}, {"p99", ElapsedPercentile(0.99)}}}});
 }
 
 }  // namespace forereach

@@ -3,15 +3,14 @@
 #include <initializer_list>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
 #include "bus/bus_options.h"
+#include "bus/log.h"
 
 namespace forereach {
 namespace {
 
 TaskReload::Loaded Load(const std::string& path, const BusOptions& in_force) try {
-  spdlog::info("reloading {}", path);
+  logging::Info("reloading {}", path);
   TaskReload::Loaded loaded{LoadConfig(path), nullptr, ""};
   RequireObstaclesSource(loaded.config);
   loaded.error = WhyKeyCannotChange(in_force, loaded.config.bus, Role::kCertifier);
@@ -41,7 +40,7 @@ std::optional<TaskReload::Loaded> TaskReload::Take(const Config& in_force, const
   const std::string why = loaded->error.empty() ? WhyNotTaken(loaded->config, in_force, contradictions) : loaded->error;
   if (!why.empty()) return Fail(why);
   error_.clear();
-  spdlog::info("version {} of {} is in force", ++version_, loaded->config.path);
+  logging::Info("version {} of {} is in force", ++version_, loaded->config.path);
   return loaded;
 }
 
@@ -70,7 +69,7 @@ std::string TaskReload::WhyNotTaken(const Config& config, const Config& in_force
 TaskReload::Loaded TaskReload::Fail(const std::string& why) {
   error_ = why;
   ++failed_;
-  spdlog::error("not reloaded, version {} stays in force: {}", version_, why);
+  logging::Error("not reloaded, version {} stays in force: {}", version_, why);
   return {{}, nullptr, why};
 }
 

@@ -2,8 +2,11 @@
 
 #include <cmath>
 
+#include <nlohmann/json.hpp>
+
 #include "certifier/numerics/text.h"
 #include "certifier/task/config_error.h"
+#include "certifier/task/json_text.h"
 
 namespace forereach {
 
@@ -11,10 +14,7 @@ void JsonField::Fail(const std::string& what) const {
   throw ConfigError(file_ + ": " + (name_.empty() ? "" : name_ + ": ") + what);
 }
 
-void JsonField::FailAs(const std::string& kind) const {
-  const std::string text = json_.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  Fail(text.substr(0, 40) + " is " + kind);
-}
+void JsonField::FailAs(const std::string& kind) const { Fail(JsonText(json_).substr(0, 40) + " is " + kind); }
 
 JsonField JsonField::operator[](const std::string& name) const {
   if (!json_.is_object()) FailAs("no object");

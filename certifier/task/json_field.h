@@ -9,7 +9,7 @@ Each function throws ConfigError, "file: layers[1].bias: ...", unless the value 
 #include <utility>
 
 #include <Eigen/Core>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 namespace forereach {
 

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "certifier/dynamics/models.h"
 #include "certifier/gate/obstacle_message.h"

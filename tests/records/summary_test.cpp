@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "forereach/robot_state_t.hpp"
 #include "tests/records/logs.h"

@@ -1,0 +1,40 @@
+/** Log lines of a process, on standard error. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <fmt/core.h>
+
+namespace forereach {
+
+/** Starts the log under this name. Control characters in a line are escaped, because a line may contain text from the
+network. */
+void SetUpLog(const std::string& name);
+
+namespace logging {
+
+enum class Level : std::uint8_t { kInfo, kWarning, kError };
+
+/** No line is written any more. */
+void Silence();
+void Flush();
+
+/** Writes one line, of a format string of {fmt} and its values. */
+void Write(Level level, fmt::string_view format, fmt::format_args values);
+
+template <class... Values>
+void Info(fmt::format_string<Values...> format, Values&&... values) {
+  Write(Level::kInfo, format, fmt::make_format_args(values...));
+}
+template <class... Values>
+void Warn(fmt::format_string<Values...> format, Values&&... values) {
+  Write(Level::kWarning, format, fmt::make_format_args(values...));
+}
+template <class... Values>
+void Error(fmt::format_string<Values...> format, Values&&... values) {
+  Write(Level::kError, format, fmt::make_format_args(values...));
+}
+
+}  // namespace logging
+}  // namespace forereach
