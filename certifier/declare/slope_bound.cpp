@@ -54,11 +54,12 @@ bool LiesOutside(const Domain& domain, const Arguments& box) {
 void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z) {
   constexpr double kInward = 1 - 0x1p-44;
   for (int round = 0; round < 8 && !domain.Contains(z); ++round) {
-    for (const auto& [coordinates, center, radius] : domain.balls) {
+    for (const Domain::Ball& ball : domain.balls) {
+      const auto entry = [&](Eigen::Index i) -> double& { return z[ToSize(ball.coordinates[ToSize(i)])]; };
+      const Eigen::VectorXd& center = ball.center;
       double square = 0;
-      const auto entry = [&](Eigen::Index i) -> double& { return z[ToSize(coordinates[ToSize(i)])]; };
       for (Eigen::Index i = 0; i < center.size(); ++i) square += std::pow(entry(i) - center[i], 2);
-      const double scale = std::min(1.0, kInward * radius / std::sqrt(square));
+      const double scale = std::min(1.0, kInward * ball.radius / std::sqrt(square));
       for (Eigen::Index i = 0; i < center.size(); ++i) entry(i) = center[i] + scale * (entry(i) - center[i]);
     }
     for (const auto& [coefficients, bound] : domain.inequalities) {
