@@ -11,7 +11,8 @@ endif()
 
 find_program(CCACHE ccache)
 if(CCACHE)  # without this, it keeps no file that was compiled with a precompiled header
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros
+    CCACHE_IGNOREOPTIONS=--param=* ${CCACHE})
 endif()
 
 # Precompiled headers, of g++ alone: clang's do not survive a cache. They hold no header of ours.
@@ -27,6 +28,8 @@ set_target_properties(forereach_options PROPERTIES EXPORT_NAME options)
 target_compile_options(forereach_options INTERFACE
   $<BUILD_INTERFACE:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Woverloaded-virtual>
   $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:Clang>:-Wno-psabi;-Wno-bitwise-instead-of-logical>>  # lanes, and tests without a branch
+  # g++ collects its garbage less often: the same code in less time, with up to 0.5 GB for each job.
+  $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>>
   -ffp-contract=off -fno-fast-math)
 if(FOREREACH_WERROR)
   target_compile_options(forereach_options INTERFACE $<BUILD_INTERFACE:-Werror>)
