@@ -46,7 +46,8 @@ class KeyScreen final : public Screen {
 
 std::unique_ptr<Bus> OpenSignedBus(const std::string& url, const KeyRing& keys, const std::string& bus_name,
                                    const Speakers& speakers, Clock clock) {
-  return OpenBus(url, clock, std::make_shared<KeyScreen>(keys, bus_name, speakers, clock));
+  const auto screen = std::make_shared<KeyScreen>(keys, bus_name, speakers, clock);
+  return OpenBus(url, std::move(clock), screen);
 }
 
 }  // namespace forereach
