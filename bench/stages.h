@@ -5,7 +5,7 @@ the place to follow. */
 namespace forereach::bench {
 
 /** Registers "stage/<name>/<scenario>/N" for stages that depend on the number of observations, and the others at N =
- * 400. */
+400. */
 void RegisterStages(int observations);
 
 }  // namespace forereach::bench

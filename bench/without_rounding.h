@@ -5,6 +5,6 @@ namespace benchmark {
 class State;
 }
 
-/** As certify/bicycle/N. In no namespace: the library's is renamed there (CMakeLists.txt), so that both can be linked.
- */
+/** As certify/bicycle/N. In no namespace: the library's is renamed there (CMakeLists.txt), so that both can be
+linked. */
 void RunCertifyWithoutRounding(benchmark::State& state, int observations);

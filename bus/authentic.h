@@ -59,7 +59,7 @@ class Signer final {
   Signer(KeyRing keys, const std::string& bus_name, std::uint64_t sender = RandomSender());
 
   /** The message with its trailer. Any thread may call it. @throws std::logic_error if the ring lacks the role's
-   * secret. */
+  secret. */
   [[nodiscard]] std::vector<std::uint8_t> Sign(Role role, const std::string& channel, Bytes message,
                                                std::int64_t now_us);
 

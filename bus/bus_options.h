@@ -56,8 +56,8 @@ inline constexpr const char* kUnsignedWarning = "UNSIGNED: anyone on this networ
 [[nodiscard]] BusOptions WithKeys(BusOptions options, Role role);
 
 /** Why a task file that was read again cannot take the place of the one that a process began with: another key, none,
-or other content of the same. Empty if it can. Reads the keys of `read_again`. @param role that the process speaks as.
-*/
+or other content of the same. Empty if it can. Reads the keys of `read_again`. @param role that the process speaks
+as. */
 [[nodiscard]] std::string WhyKeyCannotChange(const BusOptions& in_force, const BusOptions& read_again, Role role);
 
 }  // namespace forereach

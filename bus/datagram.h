@@ -64,7 +64,7 @@ struct DatagramCounts {
 };
 
 /** The refused datagrams as text, for example "3 fragments, 1 without the end of its channel's name". Empty if there
- * are none. */
+are none. */
 [[nodiscard]] std::string DescribeRefused(const DatagramCounts& counts);
 
 }  // namespace forereach

@@ -57,8 +57,8 @@ using PublicKey = std::array<std::uint8_t, 32>;
 using Signature = std::array<std::uint8_t, 64>;
 using GroupTag = std::array<std::uint8_t, 16>;
 
-/** The keys of a program. Secrets are not accessible; they are in memory that core dumps leave out. Copies share them.
- */
+/** The keys of a program. Secrets are not accessible; they are in memory that core dumps leave out. Copies share
+them. */
 class KeyRing final {
  public:
   struct Content;  // private to keys.cpp

@@ -65,8 +65,8 @@ template <class Message>
   return size;
 }
 
-/** Decodes `bytes` into `message`. Unless the result is kOk, `message` is zero. Cost: linear in the size of the type.
- */
+/** Decodes `bytes` into `message`. Unless the result is kOk, `message` is zero. Cost: linear in the size of the
+type. */
 template <class Message>
 [[nodiscard]] DecodeStatus Decode(Bytes bytes, Message& message) {
   message = Message{};

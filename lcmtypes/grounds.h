@@ -1,5 +1,5 @@
-/** The inputs that a decision rests on, by their digests. Messages and records name a decision's inputs by these five.
- */
+/** The inputs that a decision rests on, by their digests. Messages and records name a decision's inputs by these
+five. */
 #pragma once
 
 #include <array>

@@ -21,8 +21,8 @@ any other number. */
 /** "robot_state_lost", ... as fault_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view FaultName(std::int16_t cause);
 
-/** The operator's action for a fault, as text that follows "what to do: ". It says so if a reset alone does not help.
- */
+/** The operator's action for a fault, as text that follows "what to do: ". It says so if a reset alone does not
+help. */
 [[nodiscard]] std::string_view FaultAdvice(std::int16_t cause);
 
 /** True for faults that invalidate the executing plan's certificate: a robot stops. */

@@ -11,8 +11,8 @@ change the direction or place of the text around them. Names of channels, source
 O(bytes). */
 [[nodiscard]] std::string Printable(std::string_view text);
 
-/** The same, except that line ends stay. Use it for text of several lines whose parts are trusted or already printable.
- */
+/** The same, except that line ends stay. Use it for text of several lines whose parts are trusted or already
+printable. */
 [[nodiscard]] std::string PrintableLines(std::string_view text);
 
 }  // namespace forereach

@@ -37,7 +37,7 @@ class Proposer {
   virtual void SetObstacles(std::vector<Obstacle> obstacles) = 0;
   [[nodiscard]] virtual const Motion& motion() const = 0;
   /** One candidate, or nothing if none was found. The result depends only on the request, the construction and the
-   * obstacles. */
+  obstacles. */
   [[nodiscard]] virtual std::optional<Proposal> Propose(const PlanRequest& request) = 0;
 };
 

@@ -1,5 +1,5 @@
-/** Reads a decision's JSON document. The reader is strict: the document has exactly the keys of docs/decision.md.
- */
+/** Reads a decision's JSON document. The reader is strict: the document has exactly the keys of
+docs/decision.md. */
 #pragma once
 
 #include <string>

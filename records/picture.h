@@ -1,5 +1,5 @@
-/** Draws a run from above: obstacles, certified tubes and the driven path. It has shapes only and does not read logs.
- */
+/** Draws a run from above: obstacles, certified tubes and the driven path. It has shapes only and does not read
+logs. */
 #pragma once
 
 #include <optional>

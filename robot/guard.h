@@ -161,8 +161,8 @@ class Guard final {
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {});
   [[nodiscard]] bool halted() const { return halted_; }
 
-  /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check, Finish or Halt.
-   */
+  /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check, Finish or
+  Halt. */
   [[nodiscard]] const certified_plan_t* executing() const { return executing_.get(); }
   [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
 

@@ -25,8 +25,8 @@ struct Failure {
   std::string what;          ///< The claim, as text.
   std::string found, bound;  ///< The number found and its bound, for example "at most 4.5".
   bool certain = true;       ///< False: undecided; more bits may decide.
-  /** |found - bound| relative to the larger of the two; 1 if this is not defined. Tiny if only rounding is the cause.
-   */
+  /** |found - bound| relative to the larger of the two; 1 if this is not defined. Tiny if only rounding is the
+  cause. */
   double excess = 1;
 };
 

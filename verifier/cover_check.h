@@ -35,7 +35,7 @@ struct CoverVerdict {
 class CoverChecker final {
  public:
   /** @param domain valid for the residual. @throws std::invalid_argument for a residual that the verifier does not
-   * implement. */
+  implement. */
   CoverChecker(const Domain& domain, const ParametricResidual& residual);
 
   /** The derivatives (row, column) that are not identically zero. Each of them needs a claim. */

@@ -34,7 +34,7 @@ struct Dual {
 [[nodiscard]] Dual GateSlope(const Dual& e);
 
 /** t log(1 + exp(x / t)), which increases in x and t, and its derivative by x, the logistic function of x / t. @pre t >
- * 0. */
+0. */
 [[nodiscard]] Dual SoftRamp(const Dual& x, const Dual& t);
 [[nodiscard]] Dual SoftStep(const Dual& x, const Dual& t);
 

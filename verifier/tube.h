@@ -76,8 +76,8 @@ struct TubeOptions {
   bool reduce = true;            ///< Reduce the order by the certifier's rule, or never.
   bool split_remainder = false;  ///< Also bound the Hessian over half the box: the integral remainder in two parts.
   KnownRows known = {};
-  /** If not null: the recorded generators of each slice. The reduction keeps the columns nearest to the recorded ones.
-   */
+  /** If not null: the recorded generators of each slice. The reduction keeps the columns nearest to the recorded
+  ones. */
   const std::vector<Eigen::MatrixXd>* follow = nullptr;
 };
 
@@ -105,8 +105,8 @@ class TubeMaker final {
   const Problem& problem_;
   const Equations& equations_;
   Method method_;
-  /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included; [observation][state].
-   */
+  /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included;
+  [observation][state]. */
   std::vector<std::vector<Bounds>> residuals_;
   /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */
   std::vector<std::vector<Real>> sizes_;

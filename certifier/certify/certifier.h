@@ -53,8 +53,8 @@ class Certifier final {
   Learned Learn(std::span<const double> z, std::span<const double> next);
   /** Number of learned transitions that are not in the index yet. */
   [[nodiscard]] int num_unindexed() const { return observed_->store.tail_size(); }
-  /** Builds an index that includes them. It may run in its own thread at any time; the next Learn uses the new index.
-   */
+  /** Builds an index that includes them. It may run in its own thread at any time; the next Learn uses the new
+  index. */
   void Compact() { observed_->store.Compact(); }
 
   /** The proven distance between P X_t of a tube and an obstacle: the larger of the bounds by interval hulls and by the

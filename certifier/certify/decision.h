@@ -39,8 +39,8 @@ struct Decision {
   rest. F: difference of two residuals, and the difference that the declaration allows. */
   double margin = 0, threshold = 0;
 
-  /** True if a search for the tightest observation reached its cap. The tube is sound but may be wider than necessary.
-   */
+  /** True if a search for the tightest observation reached its cap. The tube is sound but may be wider than
+  necessary. */
   bool capped = false;
 };
 

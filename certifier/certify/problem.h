@@ -1,5 +1,5 @@
 /** The inputs that stay fixed while a robot runs: nominal model, domain, declaration, observations and safety
- * projection. */
+projection. */
 #pragma once
 
 #include <memory>

@@ -88,8 +88,8 @@ class EquationsSlopes final : public ResidualSlopes {
   std::array<Occurrence, kStates> occurrence_;
 };
 
-/** The slopes of the residual of dynamics/residuals.h with this name. @throws std::invalid_argument if there is none.
- */
+/** The slopes of the residual of dynamics/residuals.h with this name. @throws std::invalid_argument if there is
+none. */
 [[nodiscard]] std::unique_ptr<ResidualSlopes> MakeResidualSlopes(const std::string& name);
 
 /** The ranges of the parameters, in the order of the equations.

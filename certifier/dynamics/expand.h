@@ -161,8 +161,8 @@ FOREREACH_INLINE void ForEachConstant(Visit visit) {
 
 // @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4.
 /** NominalModel::Expand for one program, with a pointer for each span. Cost: the program's operations; no branch except
-for angles above 1/4. If the domain contains a pole, the ranges mean nothing, and the bounds of rounding.h are infinite.
-*/
+for angles above 1/4. If the domain contains a pole, the ranges mean nothing, and the bounds of rounding.h are
+infinite. */
 template <const Program& kProgram>
 FOREREACH_INLINE void Expand(const double* parameters, const double* z, const PlainInterval* box, Expansion& out) {
   constexpr auto kSize = ToSize(kProgram.size);

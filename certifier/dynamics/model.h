@@ -20,8 +20,8 @@ d_z = states + inputs entries. */
 
 namespace forereach {
 
-/** Enclosures of f0(z) and of its Jacobian at one point. Entries of the Jacobian that are not listed are exactly zero.
- */
+/** Enclosures of f0(z) and of its Jacobian at one point. Entries of the Jacobian that are not listed are exactly
+zero. */
 struct Linearization {
   std::array<Interval, kMaxStates> value;
   std::array<MatrixEntry, Program::kMaxFirst> entries;
@@ -92,8 +92,8 @@ class NominalModel {
                                 const PlainInterval* hessian, const double* error, Remainder& out,
                                 InstructionSet instructions = BestInstructionSet()) const noexcept = 0;
 
-  /** Sets the generators and the slack of `next` to the image of the slice under the expansion's Jacobian; see image.h.
-   */
+  /** Sets the generators and the slack of `next` to the image of the slice under the expansion's Jacobian; see
+  image.h. */
   virtual void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next,
                    ImageSums& sums, InstructionSet instructions = BestInstructionSet()) const noexcept = 0;
 

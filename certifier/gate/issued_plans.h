@@ -34,7 +34,7 @@ class IssuedPlans final {
   /** Uses new options from now on. */
   void Follow(const GateOptions& gate);
   /** Notes that another certifier may have issued plans until now. Unknown plans are tolerated while these may be
-   * executing. */
+  executing. */
   void TolerateFrom(std::int64_t steady_us);
 
   /** Adds a plan that was certified and sent. Cost O(1) on average. */

@@ -23,7 +23,7 @@ struct ExecutedTransition {
 [[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const NominalModel& model);
 
 /** Also refuses transitions that a certifier would not learn (certify/learned.h). For readers of logs, which have no
- * certifier. */
+certifier. */
 [[nodiscard]] ExecutedTransition FromMessage(const transition_t& message, const Problem& problem);
 
 }  // namespace forereach

@@ -14,8 +14,8 @@ struct Stamp {
   std::string fault;  ///< The reason why it is not fresh, as text; empty if it is fresh.
 };
 
-/** The freshness of a message with the stamp `utime` that arrived at `now_us`, both microseconds since the Unix epoch.
- */
+/** The freshness of a message with the stamp `utime` that arrived at `now_us`, both microseconds since the Unix
+epoch. */
 [[nodiscard]] Stamp CheckStamp(std::int64_t utime, std::int64_t now_us, const GateOptions& options);
 
 /** IsNotAfter of lcmtypes/freshness.h, with the task's max_ahead. */

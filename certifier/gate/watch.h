@@ -51,7 +51,7 @@ class Watch final {
   /** Notes a usable state of the robot. @param now_us microseconds since the Unix epoch. */
   void SeeRobot(std::int64_t now_us);
   /** Notes that the robot has finished, or that its earlier states do not count any more. Its silence is then not a
-   * fault. */
+  fault. */
   void RobotHasFinished();
 
   /** Processes the passing of time and latches ROBOT_STATE_LOST and CLOCK_JUMP. @param now_us by the wall clock.

@@ -1,5 +1,5 @@
 /** Upper bounds on all sizes, so that the certify step needs no heap. They are the limits of the bus messages
- * (docs/bus.md). */
+(docs/bus.md). */
 #pragma once
 
 #include "certifier/numerics/compilation.h"

@@ -47,8 +47,8 @@ struct Domain {
   [[nodiscard]] bool Contains(std::span<const double> z) const noexcept;
 };
 
-/** The constraint that a box does not provably satisfy. `value` is the extreme value over the box, `bound` the limit.
- */
+/** The constraint that a box does not provably satisfy. `value` is the extreme value over the box, `bound` the
+limit. */
 struct DomainExit {
   enum class Kind { kNone, kLower, kUpper, kInequality, kBall };
   Kind kind = Kind::kNone;

@@ -202,8 +202,8 @@ class SignMetric : public CenterDistance {
   static constexpr bool kRefines = true;
   static constexpr std::size_t kMaxColumns = 12;
 
-  /** @param margin as PatternMetric's. @param errors for each column, at least the error of L_kl r_l plus that of v_il.
-   */
+  /** @param margin as PatternMetric's. @param errors for each column, at least the error of L_kl r_l plus that of
+  v_il. */
   SignMetric(const LipschitzRow& row, const QuerySet& set, double margin, std::span<const double> errors)
       : CenterDistance(row, set), chunks_(Chunks(set.slice).size()) {
     const Chunks chunks(set.slice);

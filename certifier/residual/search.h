@@ -60,7 +60,7 @@ Sides ScanBlocks(const Metric& metric, const Pack* block, std::size_t count, std
 }
 
 /** The same if the metric refines: first the block with the largest bound, then the blocks whose bounds exceed the
- * best. */
+best. */
 template <class Metric>
 requires Metric::kRefines Sides ScanBlocks(const Metric& metric, const Pack* blocks, std::size_t count,
                                            std::size_t coordinates, Budget& budget) {

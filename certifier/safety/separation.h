@@ -3,8 +3,8 @@
     min {d . w : w in core} - max {d . y : y in slice} <= |d|_2 * distance(core, slice).
 
 The search for a good d runs in plain arithmetic and may fail. The left side is then evaluated with outward rounding, so
-the reported distance is valid for every d. The paper's test R_t < m_t, Eq. (safety-radius-margin), is a special case.
-*/
+the reported distance is valid for every d. The paper's test R_t < m_t, Eq. (safety-radius-margin), is a special
+case. */
 #pragma once
 
 #include <array>
@@ -31,8 +31,8 @@ struct Hull {
   std::array<double, kMaxSafetyDim> center, half_width;
 };
 
-/** Separates the interval hulls of slice and core; for a half-space it uses the normal. Sound but not tight. Cost O(p).
- */
+/** Separates the interval hulls of slice and core; for a half-space it uses the normal. Sound but not tight. Cost
+O(p). */
 [[nodiscard]] Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept;
 
 /** Separates slice and core by the best direction that the search finds. For p <= 2 the distance is exact up to

@@ -11,8 +11,8 @@ class Box final {
   Box() = default;
 
   /** @param lower, upper n entries each, in the units of the coordinates.
-  @throws std::invalid_argument if the sizes differ, an entry is not finite, or lower > upper; it names the coordinate.
-*/
+  @throws std::invalid_argument if the sizes differ, an entry is not finite, or lower > upper; it names the
+  coordinate. */
   Box(Eigen::VectorXd lower, Eigen::VectorXd upper);
 
   /** A box that contains {x : |x - center| <= half_width}, rounded outward.

@@ -13,8 +13,8 @@ A point has one corner, a segment two. Cost O(m log m) for m generators. @pre se
 [[nodiscard]] std::vector<Eigen::Vector2d> Outline(const Zonotope& set);
 
 /** An upper bound on the radius R = max {|y - c|_2 : y in <c, G>} in metres, Eq. (safety-radius-margin). In the plane
-its relative error is at most 1e-11. In other dimensions it is the half-diagonal of the interval hull. Cost O(m log m).
-*/
+its relative error is at most 1e-11. In other dimensions it is the half-diagonal of the interval hull. Cost O(m log
+m). */
 [[nodiscard]] double RadiusUpper(const Zonotope& set);
 
 }  // namespace forereach

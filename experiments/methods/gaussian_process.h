@@ -61,8 +61,8 @@ class GaussianProcess {
 };
 
 /** The process of largest likelihood found. Cost: about a hundred O(N^3), once for each (inputs, outputs) in the life
-of the program: the parameters found are kept, as bands of several k ask for the same. Any number of threads may call.
-*/
+of the program: the parameters found are kept, as bands of several k ask for the same. Any number of threads may
+call. */
 [[nodiscard]] GaussianProcess FitGaussianProcess(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs);
 
 /** Claims: at each single location, were the residual a draw of the fitted process, r_k(z) lies inside with the

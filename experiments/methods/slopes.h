@@ -15,8 +15,8 @@ do not count; a zero row stays zero. */
 namespace forereach::experiments {
 
 enum class SlopeEstimator {
-  /** max_ij (|r~_ik - r~_jk| - 2 sigma_k) / d_k, at least 0: Calliess et al. 2020 (LACKI), Eq. (7), lambda = 2 sigma.
-   */
+  /** max_ij (|r~_ik - r~_jk| - 2 sigma_k) / d_k, at least 0: Calliess et al. 2020 (LACKI), Eq. (7), lambda = 2
+  sigma. */
   kLacki,
   /** 1.5 max_ij |r~_ik - r~_jk| / d_k: Strongin's estimate times a reliability factor above 1 (Strongin & Sergeyev
   2000). The factor is ours; his smallest constant for a flat function is left out. */

@@ -1,5 +1,5 @@
-/** Datagrams as a stranger can send them to a bus: malformed, malicious or at random; and the socket that sends them.
- */
+/** Datagrams as a stranger can send them to a bus: malformed, malicious or at random; and the socket that sends
+them. */
 #pragma once
 
 #include <cstdint>

@@ -17,8 +17,8 @@ inline void Seal(certified_plan_t& certified) {
 
 inline constexpr std::int64_t kPlanStart = 1'000'000'000'000, kPlanStepUs = 40'000;
 
-/** Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5]. Not sealed.
- */
+/** Two states, one input, three steps. X0 = (1 +- 0.5, -2 +- 0.25); slice t = [-10 - t, 10 + t] x [-5, 5]. Not
+sealed. */
 inline certified_plan_t SmallPlan(std::int64_t plan_id = 7) {
   certified_plan_t certified{};
   candidate_plan_t& plan = certified.plan;
