@@ -14,7 +14,7 @@ class KeyScreen final : public Screen {
         speakers_(speakers),
         clock_(std::move(clock)),
         signer_(keys, bus_name),
-        authenticator_(keys, bus_name, speakers, clock_() - 1) {}
+        authenticator_(keys, bus_name, speakers, clock_() - 1) {}  // its first message may have this microsecond
 
   std::optional<Bytes> Admit(const std::string& channel, Bytes raw) override {
     const std::scoped_lock lock(mutex_);

@@ -39,7 +39,7 @@ void IssuedPlans::Add(const certified_plan_t& certified, std::int64_t steady_us)
                      plan.num_steps, false});
 }
 
-std::optional<IssuedPlans::Stranger> IssuedPlans::Judge(const robot_state_t& state, std::int64_t steady_us) {
+std::optional<IssuedPlans::Stranger> IssuedPlans::FindStranger(const robot_state_t& state, std::int64_t steady_us) {
   if (state.mode != robot_state_t::EXECUTING) return std::nullopt;
   std::string why;
   for (Issued& issued : issued_) {  // two sources may have used one plan_id

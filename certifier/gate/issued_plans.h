@@ -42,7 +42,7 @@ class IssuedPlans final {
 
   /** The violation in the robot's report of the plan that it executes. Nothing if it executes none or an allowed one.
   @param state usable and fresh (Gate::CheckRobotState). Cost O(remembered plans), at most about 30 us. */
-  [[nodiscard]] std::optional<Stranger> Judge(const robot_state_t& state, std::int64_t steady_us);
+  [[nodiscard]] std::optional<Stranger> FindStranger(const robot_state_t& state, std::int64_t steady_us);
 
  private:
   struct Issued {

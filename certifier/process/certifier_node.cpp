@@ -232,7 +232,7 @@ void CertifierNode::OnRobotState(const Received& received) {
   if (!is_in_charge()) return;  // the robot may execute another's plans
   if (const auto departure = conformance_.Check(state)) Fail(SliceLeft(*departure));
   // In shadow mode another certifier decides which plans the robot executes.
-  const auto stranger = issued_.Judge(state, clocks_.steady());
+  const auto stranger = issued_.FindStranger(state, clocks_.steady());
   if (stranger && !gate_->options().shadow) Fail(UncertifiedPlan(*stranger));
 }
 

@@ -42,7 +42,7 @@ class IssuedPlansTest : public testing::Test {
     return state;
   }
   std::string Judge(const robot_state_t& state, std::int64_t steady) {
-    const auto stranger = issued_.Judge(state, steady);
+    const auto stranger = issued_.FindStranger(state, steady);
     return stranger ? stranger->why : "";
   }
 
@@ -85,11 +85,12 @@ TEST_F(IssuedPlansTest, ItBeginsBeforeItExpires) {
   for (const int step : {0, 9}) {
     IssuedPlans issued(Gate(), kSteady);
     issued.Add(Plan(1), kLater);
-    const auto late = issued.Judge(Executing(1, step, latest + 1 + step * kStep), kLater);
+    const auto late = issued.FindStranger(Executing(1, step, latest + 1 + step * kStep), kLater);
     ASSERT_TRUE(late);
     EXPECT_THAT(late->why, HasSubstr("plan 1, which began 500 ms after its certificate had expired"));
-    EXPECT_FALSE(issued.Judge(Executing(1, step, latest + step * kStep), kLater));
-    EXPECT_FALSE(issued.Judge(Executing(1, step, latest + 3'600'000'000), kLater)) << "the clock was set meanwhile";
+    EXPECT_FALSE(issued.FindStranger(Executing(1, step, latest + step * kStep), kLater));
+    EXPECT_FALSE(issued.FindStranger(Executing(1, step, latest + 3'600'000'000), kLater))
+        << "the clock was set meanwhile";
   }
 }
 
