@@ -28,8 +28,9 @@ spdlog::level::level_enum LevelOf(logging::Level level) {
   switch (level) {
     case logging::Level::kInfo: return spdlog::level::info;
     case logging::Level::kWarning: return spdlog::level::warn;
-    default: return spdlog::level::err;
+    case logging::Level::kError: break;
   }
+  return spdlog::level::err;
 }
 
 }  // namespace

@@ -16,11 +16,12 @@ namespace logging {
 
 enum class Level : std::uint8_t { kInfo, kWarning, kError };
 
-/** No line is written any more. */
+/** Writes no further line. */
 void Silence();
+/** Returns when all lines are written. */
 void Flush();
 
-/** Writes one line, of a format string of {fmt} and its values. */
+/** Writes one line, made from a format string of {fmt} and its values. */
 void Write(Level level, fmt::string_view format, fmt::format_args values);
 
 template <class... Values>

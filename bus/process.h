@@ -15,8 +15,8 @@ namespace forereach {
 struct ProcessDescription {
   std::string name;     ///< "forereach-certifier"
   std::string purpose;  ///< What it does, in a sentence or two.
-  std::string example;  ///< A command line one can type.
-  Role role;            ///< That it speaks as.
+  std::string example;  ///< A command line to type.
+  Role role;            ///< The role under which it sends.
 };
 
 /** Reads a task file. @return the options of its bus, which stay with the caller. @throws BadInput. */
@@ -38,9 +38,8 @@ struct BusArguments {
 
 /** Runs a node as a process with `--config FILE`, `--lcm-url URL` and `--key PATH` until it is done or gets SIGTERM or
 SIGINT.
-@param load is called once; then the command line's URL and key, and the keys, are put into the options that it
-returned.
-@param make_node is called after that, with the bus. @param options a process's own options, if it has any.
+@param load is called once. RunProcess then sets the command line's URL and key, and the keys, in the options that it
+returned. @param make_node is called after that, with the bus. @param options the process's own options, if any.
 @return 0, or 2 after one line on standard error that says what is wrong with arguments, config or bus; 1 on any other
 error. */
 int RunProcess(int argc, char** argv, const ProcessDescription& description, const LoadTask& load,

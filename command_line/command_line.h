@@ -17,7 +17,7 @@ vector an option that may be repeated. The option of an empty optional has no de
 using Variable = std::variant<bool*, int*, unsigned*, std::int64_t*, std::uint64_t*, double*, std::string*,
                               std::optional<int>*, std::optional<double>*, std::vector<std::string>*>;
 
-/** Closed. A value outside, or one that is not a number of the variable's type, is refused. */
+/** A closed range. A value outside it, or one that is not a number of the variable's type, is refused. */
 struct Between {
   double lower = 0, upper = 0;
 };
@@ -25,8 +25,8 @@ struct Between {
 /** Most are {name, variable, type, help} or {name, variable, type, help, range}. */
 struct Option {
   std::string name{};   ///< "--config"; without dashes the name of a positional argument.
-  Variable variable{};  ///< Has to live until the command line is parsed.
-  std::string type{};   ///< What help shows for its value, as in FILE; by default the kind of number, or TEXT.
+  Variable variable{};  ///< Must outlive ParseCommandLine.
+  std::string type{};   ///< The name of its value in help, for example FILE; by default the kind of number, or TEXT.
   std::string help{};
   std::optional<Between> range{};  ///< Of a number.
   bool required = false;

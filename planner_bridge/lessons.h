@@ -13,8 +13,9 @@ class Lessons final {
   /** Starts with planner.clearance and without a margin from the domain's bounds. */
   explicit Lessons(const PlannerOptions& options) : clearance_(options.clearance), step_(options.clearance_step) {}
 
-  /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. Nothing else
-  changes anything, nor does a plan that does not stop: it is no nearer to the domain's bounds than one that does. */
+  /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. No other outcome
+  changes anything, and neither does the cause kNoStop: a plan that does not stop is no nearer to the domain's bounds.
+*/
   void Learn(Outcome outcome, Cause cause);
 
   /** The distance that the next candidate keeps from obstacles, metres. */

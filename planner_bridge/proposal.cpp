@@ -377,7 +377,7 @@ class Planner::Search {
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition) {
     auto states = std::make_shared<ob::RealVectorStateSpace>(static_cast<unsigned>(n_ + 2));
     ob::RealVectorBounds bounds(static_cast<unsigned>(n_ + 2));
-    std::copy(lower_.begin(), lower_.end(), bounds.low.begin());  // and 0, of steps and distance
+    std::copy(lower_.begin(), lower_.end(), bounds.low.begin());  // steps and distance begin at 0
     std::copy(upper_.begin(), upper_.end(), bounds.high.begin());
     bounds.high[n_] = planner_.options_.progress_steps;
     bounds.high[n_ + 1] = start_distance_;

@@ -1,6 +1,7 @@
-/** A value of a JSON document with its place in it, for readers that take a document only if it is as described.
+/** A value of a JSON document with its place, for strict readers: a document with a missing, unknown or wrong member is
+refused.
 
-Each function throws ConfigError, "file: layers[1].bias: ...", unless the value is what the function's name says. */
+Each function throws ConfigError, "file: layers[1].bias: ...", if the value has another type, size or range. */
 #pragma once
 
 #include <limits>
@@ -17,16 +18,17 @@ class JsonField final {
  public:
   static constexpr double kAny = -std::numeric_limits<double>::infinity();
 
-  /** A document. @param file its name in errors. Both have to outlive this object and all that are made from it. */
+  /** A document. @param file its name in errors. Both must outlive this object and all objects made from it. */
   JsonField(const std::string& file, const nlohmann::json& json) : JsonField(file, "", json) {}
 
   [[noreturn]] void Fail(const std::string& what) const;
 
-  /** A member of an object; an entry of a list. */
+  /** A member of an object. */
   [[nodiscard]] JsonField operator[](const std::string& name) const;
+  /** An entry of a list. @pre i < Count(). */
   [[nodiscard]] JsonField operator[](std::size_t i) const;
 
-  /** It is an object with these members and no other. */
+  /** Requires an object with exactly these members. */
   void RequireFields(const std::set<std::string>& names) const;
   /** The length of a list. */
   [[nodiscard]] std::size_t Count() const;
@@ -35,7 +37,7 @@ class JsonField final {
   [[nodiscard]] std::string Text() const;
   [[nodiscard]] bool Bool() const;
   [[nodiscard]] int Integer(int lower, int upper) const;
-  /** Finite and above `above`. */
+  /** A finite number > `above`. */
   [[nodiscard]] double Number(double above = kAny) const;
   [[nodiscard]] Eigen::VectorXd Numbers(std::size_t count, double above = kAny) const;
 

@@ -14,9 +14,8 @@ namespace forereach {
 
 using MakeTaskNode = std::function<std::unique_ptr<Node>(const Config& config, Bus& bus)>;
 
-/** RunProcess (bus/process.h) with LoadConfig. The node's `config.bus` has the command line's URL and key, and the
-keys.
- */
+/** RunProcess (bus/process.h) with LoadConfig. In the node's config, `bus` has the command line's URL and key, and the
+keys that were read. */
 inline int RunProcess(int argc, char** argv, const ProcessDescription& description, const MakeTaskNode& make_node,
                       std::vector<Option> options = {}) {
   Config config;
