@@ -14,8 +14,7 @@ class Lessons final {
   explicit Lessons(const PlannerOptions& options) : clearance_(options.clearance), step_(options.clearance_step) {}
 
   /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. No other outcome
-  changes anything, and neither does the cause kNoStop: a plan that does not stop is no nearer to the domain's bounds.
-*/
+  changes anything. Neither does the cause kNoStop: it says nothing about the domain's bounds. */
   void Learn(Outcome outcome, Cause cause);
 
   /** The distance that the next candidate keeps from obstacles, metres. */

@@ -138,7 +138,7 @@ LogStatus EventLogReader::Next(LogEvent& event) {
     next = FindRecord(offset_ + 1, size_);
     if (found == Found::kCut && next == size_) return LogStatus::kCutTail;
   }
-  damage_ = damage_ + LogDamage{1, next - offset_};
+  damage_ += {1, next - offset_};
   offset_ = next;
   return LogStatus::kCorrupt;
 }
@@ -161,7 +161,7 @@ LogDamage ForEachEvent(const std::vector<std::string>& logs,
   for (const std::string& log : logs) {
     EventLogReader reader(log);
     ForEachEvent(reader, [&](const LogEvent& event) { visit(event, log); });
-    damage = damage + reader.damage();
+    damage += reader.damage();
   }
   return damage;
 }
@@ -174,19 +174,13 @@ std::optional<FileIdentity> IdentityOf(const std::string& path) {
 
 EventLogWriter::EventLogWriter(const std::string& path)
     : path_(path), file_(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
-  if (file_ < 0) throw LogError(Reason("log: cannot write ", path));
-  try {
-    if (::flock(file_, LOCK_EX | LOCK_NB) != 0) throw LogError("log: " + path + " is being written by another process");
-    if (!ConfirmDirectory(std::filesystem::path(path).parent_path().string()))
-      throw LogError(Reason("log: cannot write ", path));
-    Recover(path);
-  } catch (...) {
-    ::close(file_);
-    throw;
-  }
+  if (file_.get() < 0) throw LogError(Reason("log: cannot write ", path));
+  if (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0)
+    throw LogError("log: " + path + " is being written by another process");
+  if (!ConfirmDirectory(std::filesystem::path(path).parent_path().string()))
+    throw LogError(Reason("log: cannot write ", path));
+  Recover(path);
 }
-
-EventLogWriter::~EventLogWriter() { ::close(file_); }
 
 void EventLogWriter::Recover(const std::string& path) {
   EventLogReader reader(path);
@@ -198,7 +192,8 @@ void EventLogWriter::Recover(const std::string& path) {
   offset_ = reader.offset();
   recovery_.cut_bytes = reader.size() - offset_;
   recovery_.damage = reader.damage();
-  if (recovery_.cut_bytes > 0 && ::ftruncate(file_, offset_) != 0) throw LogError(Reason("log: cannot recover ", path));
+  if (recovery_.cut_bytes > 0 && ::ftruncate(file_.get(), offset_) != 0)
+    throw LogError(Reason("log: cannot recover ", path));
 }
 
 std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& channel, Bytes data) {
@@ -211,7 +206,7 @@ std::int64_t EventLogWriter::Append(std::int64_t utime, const std::string& chann
 
 FilePlace EventLogWriter::Look() const {
   struct stat status {};
-  if (::fstat(file_, &status) != 0) return FilePlace::kUnknown;
+  if (::fstat(file_.get(), &status) != 0) return FilePlace::kUnknown;
   if (status.st_nlink == 0) return FilePlace::kDeleted;
   const std::optional<FileIdentity> found = IdentityOf(path_);
   if (!found && errno != ENOENT && errno != ENOTDIR) return FilePlace::kUnknown;
@@ -222,7 +217,7 @@ FilePlace EventLogWriter::Look() const {
 // A file that was cut and has grown again, by a write behind the cut, has zeros where its last records were.
 bool EventLogWriter::MarkStands() const {
   std::array<std::uint8_t, kHeaderBytes> bytes{};
-  return ::pread(file_, bytes.data(), mark_.size(), mark_at_) == std::ssize(mark_) &&
+  return ::pread(file_.get(), bytes.data(), mark_.size(), mark_at_) == std::ssize(mark_) &&
          std::equal(mark_.begin(), mark_.end(), bytes.begin());
 }
 
@@ -241,8 +236,8 @@ bool EventLogWriter::Flush() {
   if (buffer_.empty()) return true;
   const std::int64_t end = offset_ + pending_bytes();
   const std::string_view bytes(reinterpret_cast<const char*>(buffer_.data()), buffer_.size());
-  const bool confirmed =
-      WriteAt(file_, bytes, offset_) && (!is_torn_ || ::ftruncate(file_, end) == 0) && ::fdatasync(file_) == 0;
+  const bool confirmed = WriteAt(file_.get(), bytes, offset_) && (!is_torn_ || ::ftruncate(file_.get(), end) == 0) &&
+                         ::fdatasync(file_.get()) == 0;
   const bool is_cut = !MarkStands();  // since the last look
   if (confirmed && !is_cut) {
     mark_.assign(buffer_.begin(), buffer_.begin() + kHeaderBytes);
@@ -253,7 +248,7 @@ bool EventLogWriter::Flush() {
   } else {
     problem_ = std::string("log: cannot write: ") + std::strerror(errno);
     // A torn record in the middle of the file would read as damage.
-    is_torn_ = ::ftruncate(file_, offset_) != 0;
+    is_torn_ = ::ftruncate(file_.get(), offset_) != 0;
     if (is_torn_) problem_ += std::string("; cannot put the file back: ") + std::strerror(errno);
   }
   buffer_.clear();

@@ -18,6 +18,7 @@ damage. */
 #include <vector>
 
 #include "bus/authentic.h"
+#include "bus/descriptor.h"
 #include "lcmtypes/bad_input.h"
 #include "lcmtypes/codec.h"
 #include "lcmtypes/stream_order.h"
@@ -64,8 +65,10 @@ enum class LogStatus {
 /** Damaged places of logs, and the bytes in them. */
 struct LogDamage {
   std::int64_t places = 0, bytes = 0;
-  friend LogDamage operator+(const LogDamage& a, const LogDamage& b) {
-    return {a.places + b.places, a.bytes + b.bytes};
+  LogDamage& operator+=(const LogDamage& other) {
+    places += other.places;
+    bytes += other.bytes;
+    return *this;
   }
 };
 
@@ -148,9 +151,6 @@ class EventLogWriter final {
   keeps everything else, and continues the event numbers. Holds a lock on the file until the destructor.
   @throws LogError if the file cannot be opened or another writer holds it. */
   explicit EventLogWriter(const std::string& path);
-  ~EventLogWriter();
-  EventLogWriter(const EventLogWriter&) = delete;
-  EventLogWriter& operator=(const EventLogWriter&) = delete;
 
   /** Buffers one event and returns its number. Flush writes it to the file.
   @throws std::invalid_argument if channel or data exceed the limits of the format. */
@@ -183,7 +183,7 @@ class EventLogWriter final {
   [[nodiscard]] bool MarkStands() const;
 
   const std::string path_;
-  int file_ = -1;
+  const Descriptor file_;
   bool is_torn_ = false;  // there may be bytes after offset_
   std::vector<std::uint8_t> buffer_;
   std::vector<std::uint8_t> mark_;  // the header of a record that the last Flush has written, which is not all zero

@@ -9,6 +9,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "bus/descriptor.h"
 #include "certifier/task/config.h"
 #include "certifier/task/files.h"
 #include "records/event_log.h"
@@ -42,11 +43,8 @@ class Part final {
  public:
   Part(const std::string& path, const std::string& bytes) : path_(path), part_(path + ".part") {
     ::unlink(part_.c_str());  // of a logger that was killed
-    const int file = ::open(part_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
-    if (file < 0) FailToWrite(part_);
-    const bool whole = WriteAt(file, bytes, 0) && ::fsync(file) == 0;
-    ::close(file);
-    if (!whole) FailToWrite(part_);
+    const Descriptor file(::open(part_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+    if (file.get() < 0 || !WriteAt(file.get(), bytes, 0) || ::fsync(file.get()) != 0) FailToWrite(part_);
   }
   ~Part() { ::unlink(part_.c_str()); }
   Part(const Part&) = delete;

@@ -47,10 +47,10 @@ void Timeline::SetTasks(std::vector<const Config*> tasks) {
 
 void Timeline::Read(const std::vector<std::string>& logs, bool names_files) {
   if (!has_begun_) Start();
-  damage_ = damage_ + ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
-              const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
-              Take(event, file + "event " + std::to_string(event.number));
-            });
+  damage_ += ForEachEvent(logs, [&](const LogEvent& event, const std::string& log) {
+    const std::string file = names_files ? std::filesystem::path(log).filename().string() + " " : "";
+    Take(event, file + "event " + std::to_string(event.number));
+  });
 }
 
 void Timeline::Take(const LogEvent& event, const std::string& name) {

@@ -90,13 +90,9 @@ bool WriteAt(int descriptor, std::string_view bytes, std::int64_t offset) {
 }
 
 bool ConfirmDirectory(const std::string& path) {
-  const int directory = ::open(path.empty() ? "." : path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (directory < 0) return false;
-  const bool confirmed = ::fsync(directory) == 0 || errno == EINVAL;  // EINVAL: this file system knows no such thing
-  const int cause = errno;
-  ::close(directory);
-  errno = cause;
-  return confirmed;
+  const Descriptor directory(::open(path.empty() ? "." : path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (directory.get() < 0) return false;
+  return ::fsync(directory.get()) == 0 || errno == EINVAL;  // EINVAL: this file system knows no such thing
 }
 
 }  // namespace forereach

@@ -97,6 +97,13 @@ class LatchTest : public testing::Test {
     now_us_ += 1'000'001;
     Run();
   }
+  // Leaves a fault and one contradiction in the latch, and no certifier.
+  void FalsifyAndEnd() {
+    Begin();
+    SayState();
+    Falsify();
+    node_.reset();
+  }
   void Falsify() {
     const Eigen::VectorXd z = (Eigen::VectorXd(6) << 1, 1, 0.5, 0.5, 0, 0).finished();
     transition_t transition{};
@@ -266,10 +273,7 @@ TEST_F(LatchTest, OneContradictionOfADeclarationIsEnough) {
 }
 
 TEST_F(LatchTest, MoreContradictionsThanFitArmNobody) {
-  Begin();
-  SayState();
-  Falsify();
-  node_.reset();
+  FalsifyAndEnd();
   LatchFile file(directory_);
   LatchFile::Content content = file.Read().value();
   content.contradictions.resize(LatchFile::kMostContradictions, content.contradictions[0]);
@@ -283,10 +287,7 @@ TEST_F(LatchTest, MoreContradictionsThanFitArmNobody) {
 }
 
 TEST_F(LatchTest, AFaultThatDoesNotFitIsNotForgottenByARestart) {
-  Begin();
-  SayState();
-  Falsify();
-  node_.reset();
+  FalsifyAndEnd();
   {
     LatchFile file(directory_);
     LatchFile::Content content = file.Read().value();
@@ -409,10 +410,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& of) { return of.param.name; });
 
 TEST_F(LatchTest, NoAlteredByteIsTakenForAnythingElse) {
-  Begin();
-  SayState();
-  Falsify();
-  node_.reset();
+  FalsifyAndEnd();
   const std::string good = Contents(file_);
   const std::size_t used = good.find_last_not_of(" \n") + 1;
   const auto held = LatchFile(directory_).Read();
