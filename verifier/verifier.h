@@ -39,6 +39,7 @@ struct Certificate {
   InitialSet initial_set;
   Eigen::MatrixXd controls;  ///< inputs-by-T
   std::vector<Obstacle> obstacles;
+  Schedule schedule;                  ///< Needed where obstacles move.
   KnownRows known;                    ///< The problem's transitions that the certifier knew.
   std::vector<RecordedSlice> slices;  ///< T + 1 slices, or none. Without them only safety is checked.
 };

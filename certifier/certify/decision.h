@@ -11,6 +11,7 @@
 #include "certifier/numerics/size.h"
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/consistency.h"
+#include "certifier/safety/motion.h"
 #include "certifier/sets/zonotope.h"
 
 namespace forereach {
@@ -22,7 +23,8 @@ enum class Cause { kNone = 0, kPairwise = 1, kDomainExit = 2, kNoFiniteEnclosure
 struct Decision {
   Outcome outcome = Outcome::kNone;
   Cause cause = Cause::kNone;
-  /** The first t at which X_t fails. -1 for a certificate, and for F found before the first step. */
+  /** The first t at which X_t fails. S with Problem::between: the body may touch the obstacle between t and t + 1. -1
+  for a certificate, and for F found before the first step. */
   int step = -1;
 
   /** @name Witness. A member that does not apply to the outcome is -1 or kNone. */
@@ -31,12 +33,16 @@ struct Decision {
   int coordinate = -1;  ///< F: residual coordinate. D: coordinate of z, or state without a finite enclosure.
   int first_observation = -1, second_observation = -1;  ///< F: the violating pair.
   int obstacle = -1;                                    ///< S: the obstacle. Certificate: the closest obstacle.
-  int closest_step = -1;                                ///< Certificate: the step of the closest slice.
+  int part = -1;                                        ///< S: the part of the body. Certificate: the closest part.
+  /** Certificate: the step of the closest slice. If the problem has bounds between the samples: the step t after which
+  the body comes closest, before t + 1. */
+  int closest_step = -1;
   ///@}
 
-  /** The deciding value and the value that it is compared with. Certificate and S: proven distance from the slice to
-  the obstacle's core, and the obstacle's radius (m). D: extreme value of the hull, and the bound of the domain or of
-  rest. F: difference of two residuals, and the difference that the declaration allows. */
+  /** The deciding value and the value that it is compared with. Certificate and S: proven distance from the body
+  to the obstacle's core, and the distance to be kept: the radius of the obstacle, its growth and the part's radius (m).
+  D: extreme value of the hull, and the bound of the domain or of rest. F: difference of two residuals, and the
+  difference that the declaration allows. */
   double margin = 0, threshold = 0;
 
   /** True if a search for the tightest observation reached its cap. The tube is sound but may be wider than
@@ -48,7 +54,8 @@ struct Decision {
 struct Plan {
   const double* controls = nullptr;
   int num_inputs = 0, num_steps = 0;
-  int stride = 0;  ///< Doubles from one step to the next, at least num_inputs.
+  int stride = 0;       ///< Doubles from one step to the next, at least num_inputs.
+  Schedule schedule{};  ///< Only needed where obstacles move.
 
   [[nodiscard]] std::span<const double> input(int t) const {
     return {controls + static_cast<std::ptrdiff_t>(t) * stride, ToSize(num_inputs)};

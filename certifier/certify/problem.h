@@ -3,6 +3,7 @@ projection. */
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "certifier/dynamics/expansion.h"
@@ -11,6 +12,7 @@ projection. */
 #include "certifier/reach/domain.h"
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/transitions.h"
+#include "certifier/safety/body.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/sets/box.h"
 #include "certifier/sets/eigen.h"
@@ -28,9 +30,12 @@ struct Problem {
   Domain domain;                              ///< Z_cert
   Declaration declaration;                    ///< L and sigma
   Transitions transitions;                    ///< D_N, all inside the domain
-  Eigen::MatrixXd projection;                 ///< P, p-by-n
-  Method method = Method::kCentred;           ///< How the nominal remainder is bounded
-  int max_leaf_visits = 512;                  ///< EnvelopeOptions: bounds the work of one search
+  Eigen::MatrixXd projection;                 ///< P, p-by-n: the position of the robot's frame
+  Body body;                                  ///< By default the point P x
+  /** The bounds with which a certificate holds at all times; without them it holds at the samples only. */
+  std::optional<Between> between;
+  Method method = Method::kCentred;   ///< How the nominal remainder is bounded
+  int max_leaf_visits = 512;          ///< EnvelopeOptions: bounds the work of one search
   int max_observations = 10'000'000;  ///< Above this number, observations that never attain the envelope are removed
   int zonotope_order = 5;             ///< rho: at most rho * n generators after reduction
   InstructionSet instructions = BestInstructionSet();  ///< Changes the computing time only, not a bit of the result

@@ -13,6 +13,8 @@ inline constexpr int kMaxSteps = 128;                          ///< T
 inline constexpr int kMaxObstacles = 64;
 inline constexpr int kMaxObstaclePoints = 16;
 inline constexpr int kMaxSafetyDim = 3;  ///< p
+inline constexpr int kMaxBodyParts = 16;
+inline constexpr int kMaxBodyPoints = 16;  ///< of all parts together
 /** Columns of [J G, diag(q), diag(h)]: an order-5 zonotope in 16 states has 80, its successor 112. */
 inline constexpr int kMaxGenerators = 112;
 

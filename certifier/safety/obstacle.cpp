@@ -107,6 +107,36 @@ Obstacle Obstacle::HalfSpace(const Eigen::VectorXd& normal, double offset) {
   return half_space;
 }
 
+Obstacle Obstacle::Moving(const Motion& motion) const {
+  Require(motion.velocity.allFinite(), "motion: velocity is not finite");
+  for (int k = dim_; k < kMaxSafetyDim; ++k)
+    Require(motion.velocity[k] == 0, "motion: velocity has an entry " + std::to_string(k) + ", the obstacle has " +
+                                         std::to_string(dim_) + " dimensions");
+  const auto require_size = [](const char* what, double size) {
+    Require(size >= 0 && size < kInfinity,
+            std::string("motion: ") + what + " " + ToText(size) + " is negative or not finite");
+  };
+  require_size("uncertainty", motion.uncertainty);
+  require_size("growth", motion.growth);
+  require_size("growth_rate", motion.growth_rate);
+  Require(-Schedule::kLatest <= motion.stamp_us && motion.stamp_us <= Schedule::kLatest,
+          "motion: stamp " + std::to_string(motion.stamp_us) + " is not within 2^60 us of the epoch");
+  Require(motion.from_us <= motion.until_us, "motion: the window [" + std::to_string(motion.from_us) + ", " +
+                                                 std::to_string(motion.until_us) + "] us is empty");
+  Obstacle moving = *this;
+  moving.motion_ = motion;
+  return moving;
+}
+
+double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y, std::int64_t time_us) {
+  if (!obstacle.motion()) return ApproximateDistance(obstacle, y);
+  const Motion& motion = *obstacle.motion();
+  if (time_us < motion.from_us || motion.until_us < time_us) return kInfinity;
+  const double tau = static_cast<double>(time_us - motion.stamp_us) * 1e-6;
+  return ApproximateDistance(obstacle, y - motion.velocity.head(y.size()) * tau) - motion.uncertainty -
+         motion.growth * std::abs(tau) - motion.growth_rate * tau * tau / 2;
+}
+
 double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
   switch (obstacle.kind()) {
     case Obstacle::Kind::kCircle: return (y - obstacle.points()[0]).norm() - obstacle.radius();

@@ -4,11 +4,13 @@ An unsafe set is a core plus a ball. The core is the convex hull of points, or a
     O = core + {y : |y|_2 <= radius}. */
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/safety/motion.h"
 #include "certifier/sets/eigen.h"
 
 namespace forereach {
@@ -28,10 +30,15 @@ class Obstacle final {
   [[nodiscard]] static Obstacle Polygon(const std::vector<Eigen::VectorXd>& vertices);
   /** {y : normal . y >= offset}, p = 1, 2 or 3. The normal points into the unsafe side and is not zero. */
   [[nodiscard]] static Obstacle HalfSpace(const Eigen::VectorXd& normal, double offset);
+  /** This obstacle, moving: the points and the radius are those at the motion's stamp. A number that is not finite, a
+  negative growth or an empty window throws, too. */
+  [[nodiscard]] Obstacle Moving(const Motion& motion) const;
   ///@}
 
   [[nodiscard]] Kind kind() const { return kind_; }
   [[nodiscard]] int dim() const { return dim_; }
+  /** Nothing if the obstacle stands. */
+  [[nodiscard]] const std::optional<Motion>& motion() const { return motion_; }
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] double offset() const { return offset_; }
   /** The defining vectors: a circle's center, a box's lower and upper corner, a polygon's vertices in the given order,
@@ -53,12 +60,17 @@ class Obstacle final {
   int dim_;
   double radius_ = 0, offset_ = 0;
   std::vector<Eigen::VectorXd> points_;
+  std::optional<Motion> motion_;
   std::vector<Eigen::Vector3d> hull_;
   Eigen::Vector3d lower_ = Eigen::Vector3d::Constant(-kInfinity), upper_ = Eigen::Vector3d::Constant(kInfinity);
 };
 
-/** The distance in metres from a point y (p entries) to the obstacle, negative inside, in plain arithmetic. Use it for
-planning, simulation and display, not for bounds. */
+/** The distance in metres from a point y (p entries) to the obstacle, negative inside, in plain arithmetic. A motion is
+ignored. Use it for planning, simulation and display, not for bounds. */
 [[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y);
+
+/** The same at a time in microseconds: of a moving obstacle with its growth at that time; infinite outside its window.
+ */
+[[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y, std::int64_t time_us);
 
 }  // namespace forereach

@@ -70,6 +70,12 @@ Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
     for (const Eigen::VectorXd& point : obstacle.points()) bytes.Numbers(point);
     bytes.Number(obstacle.radius());
     bytes.Number(obstacle.offset());
+    if (!obstacle.motion()) continue;
+    const Motion& motion = *obstacle.motion();
+    bytes.Text("motion");
+    bytes.Numbers(motion.velocity);
+    for (const double number : {motion.uncertainty, motion.growth, motion.growth_rate}) bytes.Number(number);
+    for (const std::int64_t time : {motion.stamp_us, motion.from_us, motion.until_us}) bytes.Count(time);
   }
   return bytes.digest();
 }

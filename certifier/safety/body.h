@@ -1,0 +1,40 @@
+/** The robot's body and how far its motion may curve between two samples. Both are declared in the task file. */
+#pragma once
+
+#include <vector>
+
+#include "certifier/sets/eigen.h"
+
+namespace forereach {
+
+/** A convex part of the body in the robot's own frame: conv {points} + {y : |y|_2 <= radius}. */
+struct BodyPart {
+  std::vector<Eigen::Vector3d> points{Eigen::Vector3d::Zero()};  ///< At least 1, metres; unused entries are 0.
+  double radius = 0;                                             ///< Metres, not negative.
+
+  friend bool operator==(const BodyPart&, const BodyPart&) = default;
+};
+
+/** The body, the union of its parts. The place of a point q of the robot's frame in the state x is
+    g_q(x) = P x + R(x_heading) q,
+with P the problem's projection and R the rotation by an angle in the first two coordinates. Without a heading,
+g_q(x) = P x + q. The default is the point P x. */
+struct Body {
+  int heading = -1;  ///< The state that is the heading in radians; -1: the body does not turn.
+  std::vector<BodyPart> parts{BodyPart{}};
+
+  friend bool operator==(const Body&, const Body&) = default;
+};
+
+/** The declared bounds on the true motion between two samples, which are `period` apart. With y(s) = P x(s):
+    |y_k''| <= acceleration_k,    |theta'| <= turn_rate,    |theta''| <= turn_acceleration.
+So y(s) lies in conv(P X_t u P X_{t+1}) + [-e, e] with e_k = acceleration_k period^2 / 8, and the place of a body's
+point q deviates by |q| (turn_rate^2 + turn_acceleration) period^2 / 8 more. docs/soundness.md has the proof. */
+struct Between {
+  Eigen::VectorXd acceleration;  ///< p entries, m/s^2, not negative.
+  double turn_rate = 0;          ///< rad/s, not negative.
+  double turn_acceleration = 0;  ///< rad/s^2, not negative.
+  double period = 0;             ///< Seconds from one sample to the next: the model's dt.
+};
+
+}  // namespace forereach
