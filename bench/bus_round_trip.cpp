@@ -199,7 +199,7 @@ int main(int argc, char** argv) {
   int rounds = 20'000;
   const Command program{.name = "bus_round_trip",
                         .purpose = "Round trips on the bus, by a bare echo and by the certifier: percentiles as JSON",
-                        .options = {{"--rounds", &rounds, "", "round trips of each kind", Between{1, 10'000'000}}}};
+                        .options = {{"--rounds", &rounds, "", "round trips of each kind", NumberRange{1, 10'000'000}}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   try {
     const nlohmann::json certified = Compare(MakeTask(Scenario::kBicycle, kObservations), true, rounds, 0);

@@ -49,8 +49,8 @@ int main(int argc, char** argv) {
   int calls = 1'000'000, observations = 400;
   const Command program{.name = "tail",
                         .purpose = "Latency of single certify calls: percentiles as JSON",
-                        .options = {{"--calls", &calls, "", "calls measured", Between{1, 100'000'000}},
-                                    {"--observations", &observations, "", "N", Between{25, 1'000'000}}}};
+                        .options = {{"--calls", &calls, "", "calls measured", NumberRange{1, 100'000'000}},
+                                    {"--observations", &observations, "", "N", NumberRange{25, 1'000'000}}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   std::cout << nlohmann::json{{"observations", observations},
                               {"bicycle", Measure(Scenario::kBicycle, observations, calls).ToJson()},

@@ -21,7 +21,7 @@ inline constexpr const char* kTaskOfLogs =
 [[nodiscard]] inline Option JsonFlag(bool& json, const char* help = "One JSON document on standard output") {
   return {"--json", &json, "", help};
 }
-[[nodiscard]] inline Option JobsOption(unsigned& jobs) { return {"--jobs", &jobs, "", "Threads", Between{1, 256}}; }
+[[nodiscard]] inline Option JobsOption(unsigned& jobs) { return {"--jobs", &jobs, "", "Threads", NumberRange{1, 256}}; }
 
 [[nodiscard]] Command CertifyCommand();
 [[nodiscard]] Command PlanCommand();

@@ -295,34 +295,36 @@ int CheckCover(const Options& options) {
 
 Command DeclareCommand() {
   const auto options = std::make_shared<Options>();
-  return {.name = kDeclare.name,
-          .purpose = kDeclare.purpose,
-          .footer =
-              "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
-              "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
-              "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
-              "found.\n"
-              "Copy the last line of the output into the task file.\n\n"
-              "Examples:\n"
-              "  forereach declare --config config/bicycle.yaml\n"
-              "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
-              "  forereach declare --config config/point_mass.yaml --check cover.json",
-          .options =
-              {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
-               {"--gap", &options->search.gap, "",
-                "Stop when no bound exceeds the largest slope found by more than this fraction", Between{1e-12, 1e3}},
-               {"--max-boxes", &options->search.max_boxes, "",
-                "Stop after this many boxes for each bound; the bound found by then is valid", Between{1, 100'000'000}},
-               {"--cover", &options->cover, "FILE.json", "The file for the proof: the boxes, and a bound for each"},
-               {.name = "--check",
-                .variable = &options->check,
-                .type = "FILE.json",
-                .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
-                        "confirmed, 1 not confirmed",
-                .excludes = "--cover"},
-               JobsOption(options->jobs),
-               JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
-          .run = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); }};
+  return {
+      .name = kDeclare.name,
+      .purpose = kDeclare.purpose,
+      .footer =
+          "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
+          "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
+          "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
+          "found.\n"
+          "Copy the last line of the output into the task file.\n\n"
+          "Examples:\n"
+          "  forereach declare --config config/bicycle.yaml\n"
+          "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
+          "  forereach declare --config config/point_mass.yaml --check cover.json",
+      .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
+                  {"--gap", &options->search.gap, "",
+                   "Stop when no bound exceeds the largest slope found by more than this fraction",
+                   NumberRange{1e-12, 1e3}},
+                  {"--max-boxes", &options->search.max_boxes, "",
+                   "Stop after this many boxes for each bound; the bound found by then is valid",
+                   NumberRange{1, 100'000'000}},
+                  {"--cover", &options->cover, "FILE.json", "The file for the proof: the boxes, and a bound for each"},
+                  {.name = "--check",
+                   .variable = &options->check,
+                   .type = "FILE.json",
+                   .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
+                           "confirmed, 1 not confirmed",
+                   .excludes = "--cover"},
+                  JobsOption(options->jobs),
+                  JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
+      .run = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); }};
 }
 
 }  // namespace forereach

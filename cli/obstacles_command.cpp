@@ -89,7 +89,7 @@ Command ObstaclesCommand() {
       .options = {ConfigOption(options->config, "Task file (YAML) with the obstacles and the bus"),
                   {"--period-ms", &options->period_ms, "MS",
                    "Time from one message to the next; by default a quarter of gate.obstacles_timeout_ms",
-                   Between{1, kMaxPeriodMs}}},
+                   NumberRange{1, kMaxPeriodMs}}},
       .run = [options] { return Send(*options); }};
   options->bus.AddTo(command.options);
   return command;

@@ -82,7 +82,7 @@ Command PlanCommand() {
           .options = {ConfigOption(options->config),
                       Required({"--out", &options->out, "FILE.csv", "The file for the controls"}),
                       {"--seed", &options->seed, "", "Equal seeds give equal plans",
-                       Between{0, std::numeric_limits<std::uint32_t>::max()}}},
+                       NumberRange{0, std::numeric_limits<std::uint32_t>::max()}}},
           .run = [options] { return MakePlan(*options); }};
 }
 

@@ -84,7 +84,7 @@ std::string Text(double bound) {
 }
 
 template <typename T>
-CLI::Validator Inside(const Between& range) {
+CLI::Validator Inside(const NumberRange& range) {
   const std::string lower = Text(range.lower), upper = Text(range.upper);
   return {[=](const std::string& text) {
             T value{};

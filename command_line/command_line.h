@@ -18,7 +18,7 @@ using Variable = std::variant<bool*, int*, unsigned*, std::int64_t*, std::uint64
                               std::optional<int>*, std::optional<double>*, std::vector<std::string>*>;
 
 /** A closed range. A value outside it, or one that is not a number of the variable's type, is refused. */
-struct Between {
+struct NumberRange {
   double lower = 0, upper = 0;
 };
 
@@ -28,7 +28,7 @@ struct Option {
   Variable variable{};  ///< Must outlive ParseCommandLine.
   std::string type{};   ///< The name of its value in help, for example FILE; by default the kind of number, or TEXT.
   std::string help{};
-  std::optional<Between> range{};  ///< Of a number.
+  std::optional<NumberRange> range{};  ///< Of a number.
   bool required = false;
   std::vector<std::string> one_of{};  ///< The words that it may be; empty: any text.
   std::string needs{}, excludes{};    ///< The name of another option of this command.

@@ -35,7 +35,7 @@ std::vector<Option> Declared(SampleOptions& options) {
           {.name = "--count",
            .variable = &options.count,
            .help = "The number of transitions",
-           .range = Between{1, 10'000'000},
+           .range = NumberRange{1, 10'000'000},
            .needs = kMake},
           {.name = "--range",
            .variable = &options.ranges,

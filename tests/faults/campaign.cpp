@@ -1154,7 +1154,7 @@ bool IsClean(const Row& row, const Options& options) {
 
 int Main(int argc, char** argv) {
   Options options;
-  const Between some{1, 10'000'000};
+  const NumberRange some{1, 10'000'000};
   std::vector<std::string> kinds;
   for (const auto& [name, run] : Campaign::kKinds) kinds.emplace_back(name);
   const Command program{

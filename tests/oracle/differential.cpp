@@ -284,7 +284,7 @@ int main(int argc, char** argv) {
   unsigned jobs = 1;
   double seconds = 0;
   std::string method = "paper";
-  const Between positive{1, 1e9};
+  const NumberRange positive{1, 1e9};
   const Command program{
       .name = "forereach_differential",
       .purpose = "Certifies random plans of random problems and lets the verifier derive every certificate anew.",

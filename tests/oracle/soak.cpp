@@ -162,7 +162,7 @@ int main(int argc, char** argv) {
   const Command program{
       .name = "forereach_soak",
       .purpose = "Certifies random plans of random problems and checks what every outcome promises.",
-      .options = {{.name = "--count", .variable = &count, .help = "Certify calls", .range = Between{1, 1e9}},
+      .options = {{.name = "--count", .variable = &count, .help = "Certify calls", .range = NumberRange{1, 1e9}},
                   {.name = "--seed", .variable = &seed, .help = "Of the random numbers"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   forereach::Soak soak(seed);
