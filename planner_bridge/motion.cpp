@@ -21,7 +21,7 @@ double Reach(const Box& box, int k) { return std::min(-box.lower()(k), box.upper
 
 /** Jerk-limited deceleration to v = a = 0, while the wheels go to a bend, stay there for half of the time and then
 return to straight ahead. */
-class BicycleMotion final : public Motion {
+class BicycleMotion final : public RobotMotion {
  public:
   BicycleMotion(const Problem& problem, double braking)
       : dt_(problem.model->parameters()[0]),
@@ -133,7 +133,7 @@ class BicycleMotion final : public Motion {
 };
 
 /** Constant deceleration against the velocity. */
-class PointMassMotion final : public Motion {
+class PointMassMotion final : public RobotMotion {
  public:
   PointMassMotion(const Problem& problem, double braking)
       : dt_(problem.model->parameters()[0]),
@@ -166,7 +166,7 @@ class PointMassMotion final : public Motion {
 
 }  // namespace
 
-std::unique_ptr<Motion> MakeMotion(const Problem& problem, double braking) {
+std::unique_ptr<RobotMotion> MakeMotion(const Problem& problem, double braking) {
   const std::string& name = problem.model->name();
   if (name == KinematicBicycle::kName) return std::make_unique<BicycleMotion>(problem, braking);
   if (name == PointMass::kName) return std::make_unique<PointMassMotion>(problem, braking);

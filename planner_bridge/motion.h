@@ -1,5 +1,5 @@
 /** Driving and braking of a nominal model: the functions that planning needs in addition to its equations. To plan for
-a new model, implement Motion for it. */
+a new model, implement RobotMotion for it. */
 #pragma once
 
 #include <memory>
@@ -11,9 +11,9 @@ a new model, implement Motion for it. */
 
 namespace forereach {
 
-class Motion {
+class RobotMotion {
  public:
-  virtual ~Motion() = default;
+  virtual ~RobotMotion() = default;
 
   /** Duration of one step, s. */
   [[nodiscard]] virtual double dt() const = 0;
@@ -42,6 +42,6 @@ class Motion {
 /** The motion of the problem's model: kinematic_bicycle or point_mass.
 @param braking deceleration of a braking tail, m/s^2, positive; less if the domain does not allow it.
 @throws std::invalid_argument for any other model. */
-[[nodiscard]] std::unique_ptr<Motion> MakeMotion(const Problem& problem, double braking);
+[[nodiscard]] std::unique_ptr<RobotMotion> MakeMotion(const Problem& problem, double braking);
 
 }  // namespace forereach

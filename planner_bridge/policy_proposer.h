@@ -25,7 +25,7 @@ class PolicyProposer final : public Proposer {
   PolicyProposer(std::shared_ptr<const Problem> problem, PlannerOptions options, Policy policy);
 
   void SetObstacles(std::vector<Obstacle>) override {}
-  [[nodiscard]] const Motion& motion() const override { return *motion_; }
+  [[nodiscard]] const RobotMotion& motion() const override { return *motion_; }
   /** One candidate. Nothing after 1 + kFan attempts, or if no braking tail of at most tail_steps ends the plan.
   Clearance, margin and seed of the request are ignored. */
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
@@ -37,7 +37,7 @@ class PolicyProposer final : public Proposer {
   std::shared_ptr<const Problem> problem_;
   PlannerOptions options_;
   Policy policy_;
-  std::unique_ptr<Motion> motion_;
+  std::unique_ptr<RobotMotion> motion_;
   double wheelbase_, duration_;  // m; s of a block
 };
 

@@ -152,7 +152,7 @@ class Planner final : public Proposer {
     ompl::msg::noOutputHandler();
   }
 
-  [[nodiscard]] const Motion& motion() const override { return *motion_; }
+  [[nodiscard]] const RobotMotion& motion() const override { return *motion_; }
   void SetObstacles(std::vector<Obstacle> obstacles) override {
     obstacles_ = std::move(obstacles);
     fields_.clear();
@@ -172,7 +172,7 @@ class Planner final : public Proposer {
   std::shared_ptr<const Problem> problem_;
   PlannerOptions options_;
   MakeAlgorithm make_algorithm_;
-  std::unique_ptr<Motion> motion_;
+  std::unique_ptr<RobotMotion> motion_;
   Box region_;
   Eigen::VectorXd goal_;
   std::vector<Obstacle> obstacles_;
@@ -342,7 +342,7 @@ class Planner::Search {
   }
 
   [[nodiscard]] bool FindTail(std::span<const double> x, const Ambition& ambition, Eigen::MatrixXd& tail) const {
-    const Motion& motion = *planner_.motion_;
+    const RobotMotion& motion = *planner_.motion_;
     for (int shape = 0; shape < motion.num_tails(); ++shape)
       if (motion.Brake(x, shape, planner_.options_.tail_steps, tail) && TailIsAllowed(x, ambition, tail)) return true;
     return false;

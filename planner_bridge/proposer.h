@@ -35,7 +35,7 @@ class Proposer {
   virtual ~Proposer() = default;
 
   virtual void SetObstacles(std::vector<Obstacle> obstacles) = 0;
-  [[nodiscard]] virtual const Motion& motion() const = 0;
+  [[nodiscard]] virtual const RobotMotion& motion() const = 0;
   /** One candidate, or nothing if none was found. The result depends only on the request, the construction and the
   obstacles. */
   [[nodiscard]] virtual std::optional<Proposal> Propose(const PlanRequest& request) = 0;
