@@ -17,7 +17,7 @@ Interval Seconds(std::int64_t us) noexcept {
 
 }  // namespace
 
-Encounter Meet(const Motion& motion, const Schedule& schedule, int first, int last) noexcept {
+Encounter Meet(const ObstacleMotion& motion, const Schedule& schedule, int first, int last) noexcept {
   Encounter encounter;
   const std::int64_t error = schedule.clock_error_us;
   const std::array at{schedule.start_us + first * schedule.step_us, schedule.start_us + last * schedule.step_us};

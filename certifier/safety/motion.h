@@ -14,7 +14,7 @@ namespace forereach {
 /** How an obstacle O moves. At the time stamp_us + tau it lies in
     O + velocity tau + {y : |y|_2 <= uncertainty + growth |tau| + growth_rate tau^2 / 2},    tau in seconds,
 if that time lies in the window [from_us, until_us], and nowhere otherwise. */
-struct Motion {
+struct ObstacleMotion {
   static constexpr std::int64_t kAlways = std::numeric_limits<std::int64_t>::max();
 
   std::int64_t stamp_us = 0;                            ///< Microseconds since the epoch of the plan's schedule.
@@ -24,7 +24,7 @@ struct Motion {
   double growth_rate = 0;                               ///< m/s^2
   std::int64_t from_us = -kAlways, until_us = kAlways;  ///< from_us <= until_us; -kAlways, kAlways: without an end.
 
-  friend bool operator==(const Motion&, const Motion&) = default;
+  friend bool operator==(const ObstacleMotion&, const ObstacleMotion&) = default;
 };
 
 /** The times of a plan's samples: sample t is at start_us + t step_us, and a time between two samples in proportion.
@@ -49,6 +49,6 @@ struct Encounter {
 
 /** The encounter with an obstacle between the samples `first` and `last`, first <= last.
 @pre the bounds of Schedule hold. Cost O(1), no allocation. */
-[[nodiscard]] Encounter Meet(const Motion& motion, const Schedule& schedule, int first, int last) noexcept;
+[[nodiscard]] Encounter Meet(const ObstacleMotion& motion, const Schedule& schedule, int first, int last) noexcept;
 
 }  // namespace forereach

@@ -107,7 +107,7 @@ Obstacle Obstacle::HalfSpace(const Eigen::VectorXd& normal, double offset) {
   return half_space;
 }
 
-Obstacle Obstacle::Moving(const Motion& motion) const {
+Obstacle Obstacle::Moving(const ObstacleMotion& motion) const {
   Require(motion.velocity.allFinite(), "motion: velocity is not finite");
   for (int k = dim_; k < kMaxSafetyDim; ++k)
     Require(motion.velocity[k] == 0, "motion: velocity has an entry " + std::to_string(k) + ", the obstacle has " +
@@ -130,7 +130,7 @@ Obstacle Obstacle::Moving(const Motion& motion) const {
 
 double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y, std::int64_t time_us) {
   if (!obstacle.motion()) return ApproximateDistance(obstacle, y);
-  const Motion& motion = *obstacle.motion();
+  const ObstacleMotion& motion = *obstacle.motion();
   if (time_us < motion.from_us || motion.until_us < time_us) return kInfinity;
   const double tau = static_cast<double>(time_us - motion.stamp_us) * 1e-6;
   return ApproximateDistance(obstacle, y - motion.velocity.head(y.size()) * tau) - motion.uncertainty -

@@ -32,13 +32,13 @@ class Obstacle final {
   [[nodiscard]] static Obstacle HalfSpace(const Eigen::VectorXd& normal, double offset);
   /** This obstacle, moving: the points and the radius are those at the motion's stamp. A number that is not finite, a
   negative growth or an empty window throws, too. */
-  [[nodiscard]] Obstacle Moving(const Motion& motion) const;
+  [[nodiscard]] Obstacle Moving(const ObstacleMotion& motion) const;
   ///@}
 
   [[nodiscard]] Kind kind() const { return kind_; }
   [[nodiscard]] int dim() const { return dim_; }
   /** Nothing if the obstacle stands. */
-  [[nodiscard]] const std::optional<Motion>& motion() const { return motion_; }
+  [[nodiscard]] const std::optional<ObstacleMotion>& motion() const { return motion_; }
   [[nodiscard]] double radius() const { return radius_; }
   [[nodiscard]] double offset() const { return offset_; }
   /** The defining vectors: a circle's center, a box's lower and upper corner, a polygon's vertices in the given order,
@@ -60,7 +60,7 @@ class Obstacle final {
   int dim_;
   double radius_ = 0, offset_ = 0;
   std::vector<Eigen::VectorXd> points_;
-  std::optional<Motion> motion_;
+  std::optional<ObstacleMotion> motion_;
   std::vector<Eigen::Vector3d> hull_;
   Eigen::Vector3d lower_ = Eigen::Vector3d::Constant(-kInfinity), upper_ = Eigen::Vector3d::Constant(kInfinity);
 };

@@ -71,7 +71,7 @@ Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles) {
     bytes.Number(obstacle.radius());
     bytes.Number(obstacle.offset());
     if (!obstacle.motion()) continue;
-    const Motion& motion = *obstacle.motion();
+    const ObstacleMotion& motion = *obstacle.motion();
     bytes.Text("motion");
     bytes.Numbers(motion.velocity);
     for (const double number : {motion.uncertainty, motion.growth, motion.growth_rate}) bytes.Number(number);
