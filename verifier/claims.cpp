@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "certifier/numerics/size.h"
 #include "verifier/containment.h"
@@ -44,7 +45,9 @@ class SliceCheck {
   SliceCheck(const Problem& problem, const Certificate& certificate, const Tube& tube, int t)
       : problem_(problem),
         certificate_(certificate),
+        t_(t),
         slice_(tube.slices[ToSize(t)]),
+        next_(t + 1 < static_cast<int>(tube.slices.size()) ? &tube.slices[ToSize(t + 1)] : nullptr),
         step_(t < static_cast<int>(tube.steps.size()) ? &tube.steps[ToSize(t)] : nullptr),
         recorded_(certificate.slices.empty() ? nothing_ : certificate.slices[ToSize(t)]),
         claims_(t, failure_) {}
@@ -54,6 +57,7 @@ class SliceCheck {
     if (!failure_ && recorded_.has_generators) CheckGenerators();
     for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
     if (!step_) CheckRest();
+    if (!failure_) CheckRadius();
     if (!failure_) CheckSafety();
     return failure_;
   }
@@ -131,32 +135,60 @@ class SliceCheck {
     }
   }
 
+  void CheckRadius() {
+    if (!recorded_.radius) return;
+    const Real radius = ProjectedSlice(slice_, problem_.projection).Radius();
+    claims_.AtLeast(*recorded_.radius, radius, radius,
+                    [] { return std::string("the recorded radius covers the projected slice"); });
+  }
+
+  // At this sample, or from this sample to the next; the last sample then belongs to the step before.
   void CheckSafety() {
-    const ProjectedSlice projected(slice_, problem_.projection);
-    if (recorded_.radius) {
-      const Real radius = projected.Radius();
-      claims_.AtLeast(*recorded_.radius, radius, radius,
-                      [] { return std::string("the recorded radius covers the projected slice"); });
-    }
+    if (problem_.between && !next_) return;
+    const Slice* last = problem_.between ? next_ : nullptr;
+    std::vector<std::vector<Sweep>> sweeps;
+    for (const BodyPart& part : problem_.body.parts) sweeps.push_back(SweepsOf(problem_, part, slice_, last));
     for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
       if (!recorded_.clearance.empty() && !(claimed > 0))
         claims_.Judge(Answer::kNo, claimed, 0.0, 1.0, "above",
                       [&] { return "the record claims to be clear of obstacle " + std::to_string(o); });
-      Real best;
-      const Answer answer = IsClear(projected, certificate_.obstacles[o], claimed, best);
-      claims_.Judge(answer, best, claimed, abs(best) + Real(certificate_.obstacles[o].radius()),
-                    claimed > 0 ? "at least" : "above", [&] {
-                      return "the slice keeps clear of obstacle " + std::to_string(o) +
-                             (claimed > 0 ? " by what is recorded" : "");
-                    });
+      const Obstacle& obstacle = certificate_.obstacles[o];
+      const Passage passage = PassageOf(obstacle, certificate_.schedule, t_, last ? t_ + 1 : t_);
+      if (!passage.is_there) continue;
+      for (std::size_t p = 0; p < sweeps.size() && !failure_; ++p) {
+        Real best;
+        const Answer answer = IsClearOfAny(sweeps[p], obstacle, claimed, best, passage);
+        claims_.Judge(
+            answer, best, claimed, abs(best) + Real(obstacle.radius()), claimed > 0 ? "at least" : "above", [&] {
+              return std::string(last ? "the motion to the next sample" : "the slice") + " keeps clear of obstacle " +
+                     std::to_string(o) + (sweeps.size() > 1 ? " with part " + std::to_string(p) : "") +
+                     (claimed > 0 ? " by what is recorded" : "");
+            });
+      }
     }
+  }
+
+  // The part lies in every one of the sweeps: one that is clear is enough.
+  static Answer IsClearOfAny(const std::vector<Sweep>& sweeps, const Obstacle& obstacle, double claimed, Real& best,
+                             const Passage& passage) {
+    Answer answer = Answer::kNo;
+    for (std::size_t i = 0; i < sweeps.size(); ++i) {
+      Real found;
+      const Answer of_this = IsClear(sweeps[i], obstacle, claimed, found, passage);
+      best = i == 0 ? found : max(best, found);
+      if (of_this == Answer::kYes) return of_this;
+      if (of_this == Answer::kUnknown) answer = of_this;
+    }
+    return answer;
   }
 
   inline static const RecordedSlice nothing_{};
   const Problem& problem_;
   const Certificate& certificate_;
+  const int t_;
   const Slice& slice_;
+  const Slice* next_;
   const Step* step_;
   const RecordedSlice& recorded_;
   std::optional<Failure> failure_;

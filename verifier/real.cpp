@@ -56,6 +56,11 @@ void Real::Release() {
 }
 
 Real::Real(double x) : Real(Uninitialized{}) { mpfi_set_d(value_, x); }
+Real Real::Integer(std::int64_t n) {
+  Real result{Uninitialized{}};
+  mpfi_set_si(result.value_, n);
+  return result;
+}
 Real::Real(const Real& other) : Real(Uninitialized{}) { mpfi_set(value_, other.value_); }
 Real& Real::operator=(const Real& other) {
   if (this != &other) *this = Real(other);

@@ -6,6 +6,7 @@ The result of an operation is an interval that contains the exact result for all
 
 #include <mpfi.h>
 
+#include <cstdint>
 #include <string>
 #include <utility>
 
@@ -31,6 +32,8 @@ class Real final {
   Real() : Real(0.0) {}
   /** The point x, exactly. */
   Real(double x);  // NOLINT: as numbers do
+  /** The point n, exactly. @pre Precision::bits() >= 64. */
+  [[nodiscard]] static Real Integer(std::int64_t n);
   Real(const Real& other);
   Real(Real&& other) noexcept { *value_ = std::exchange(*other.value_, Empty()); }
   Real& operator=(const Real& other);

@@ -1,6 +1,7 @@
 #include "verifier/separation.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <optional>
 
@@ -78,13 +79,30 @@ RealVector AffineMinimum(const std::vector<RealVector>& points) {
   return weights;
 }
 
-// The dual bound along directions, the best of which leads to the point of {core - slice} nearest to the origin.
+// The dual bound along directions, the best of which leads to the point of {core - sweep} nearest to the origin. The
+// sweep is taken without its radius and without the smallest of its balls: these are distances to be kept.
 class Search {
  public:
-  Search(const ProjectedSlice& slice, const Obstacle& obstacle, double clearance)
-      : slice_(slice), obstacle_(obstacle), clearance_(clearance) {
+  Search(const Sweep& sweep, const Obstacle& obstacle, double clearance, const Passage& passage)
+      : sweep_(sweep),
+        obstacle_(obstacle),
+        clearance_(clearance),
+        kept_(Real(obstacle.radius()) + passage.growth + sweep.radius()) {
+    const std::vector<Place>& places = sweep.places();
+    Real least = places.front().ball;
+    for (const Place& place : places) least = min(least, place.ball);
+    kept_ += least;
+    const auto center = [&](const Place& place) {
+      const RealVector& shift = passage.shift[ToSize(place.sample)];
+      return shift.empty() ? place.center : Minus(place.center, shift);
+    };
+    const RealVector reference = IsHalfSpace() ? RealVector(places.front().center.size()) : center(places.front());
+    for (const Place& place : places) {
+      offsets_.push_back(Minus(center(place), reference));
+      balls_.push_back(place.ball - least);
+    }
     if (IsHalfSpace()) return;
-    for (const RealVector& point : CorePoints(obstacle)) core_.push_back(Minus(point, slice.center()));
+    for (const RealVector& point : CorePoints(obstacle)) core_.push_back(Minus(point, reference));
   }
 
   /** True once a direction proves the clearance. */
@@ -97,7 +115,7 @@ class Search {
         core_, [](const RealVector& a, const RealVector& b) { return CertainlyBelow(Dot(a, a), Dot(b, b)); });
     if (Try(*nearest)) return true;
     const Face face = NearestFace(*nearest);
-    if (Try(face.nearest) || TryExactly(face)) return true;
+    if (face.is_proof || Try(face.nearest) || TryExactly(face)) return true;
     if (Touches(face.nearest))
       undecided_ = false;
     else
@@ -109,44 +127,60 @@ class Search {
   [[nodiscard]] bool undecided() const { return undecided_; }
 
  private:
-  /** Corners of {core - slice}, and the point of their simplex that is nearest to the origin. */
+  /** Corners of {core - sweep}, and the point of their simplex that is nearest to the origin. */
   struct Face {
     std::vector<RealVector> corners;
     RealVector nearest;
-    bool is_best;  ///< No corner lies below the nearest point; false: more bits are needed to go on.
+    bool is_best;           ///< No corner lies below the nearest point; false: more bits are needed to go on.
+    bool is_proof = false;  ///< The nearest point is a direction that proves the clearance.
   };
 
   [[nodiscard]] bool IsHalfSpace() const { return obstacle_.kind() == Obstacle::Kind::kHalfSpace; }
+  [[nodiscard]] Real Needed() const { return Real(clearance_) + kept_; }
+
+  // max {d . y : y in place i}, |d| = length.
+  [[nodiscard]] Real Support(std::size_t i, const RealVector& d, const Real& length) const {
+    const Place& place = sweep_.places()[i];
+    Real value = Dot(d, offsets_[i]);
+    for (const RealVector& g : place.generators) value += abs(Dot(d, g));
+    if (!place.bend.IsZero()) value += place.bend.Farthest(d).value;
+    if (!balls_[i].IsZero()) value += balls_[i] * length;
+    return value;
+  }
 
   // Whether d proves the clearance: gap >= (clearance + radius) |d|.
   bool Try(const RealVector& d) {
     const Real square = Dot(d, d);
     if (!IsPositive(square)) return false;
     const Real length = sqrt(square);
+    Real reach = Support(0, d, length);
+    for (std::size_t i = 1; i < offsets_.size(); ++i) reach = max(reach, Support(i, d, length));
     Real gap;
     if (IsHalfSpace()) {
-      gap = Real(obstacle_.offset()) - slice_.Support(d);
+      gap = Real(obstacle_.offset()) - reach;
     } else {
       gap = Dot(d, core_.front());
       for (const RealVector& point : core_) gap = min(gap, Dot(d, point));
-      for (const RealVector& g : slice_.generators()) gap -= abs(Dot(d, g));
+      gap -= reach;
     }
-    const Real bound = (gap / length - Real(obstacle_.radius())).lower();
+    const Real bound = (gap / length - kept_).lower();
     best_ = best_ ? max(*best_, bound) : bound;
-    const Real needed = (Real(clearance_) + Real(obstacle_.radius())) * length;
+    const Real needed = Needed() * length;
     const Answer answer = clearance_ > 0 ? IsAtMost(needed, gap) : IsBelow(needed, gap);
     undecided_ |= answer == Answer::kUnknown;
     return answer == Answer::kYes;
   }
 
-  // The nearest point is one of {core - slice}: the distance is at most its length. With many bits, one that is nothing
+  // The nearest point is one of {core - sweep}: the distance is at most its length. With many bits, one that is nothing
   // beside the corners is zero: distances of sets of doubles have no such size.
   [[nodiscard]] bool Touches(const RealVector& nearest) const {
     const Real length = sqrt(Dot(nearest, nearest));
-    if (CertainlyBelow(length + Tolerance() * length, Real(clearance_) + Real(obstacle_.radius()))) return true;
+    if (CertainlyBelow(length + Tolerance() * length, Needed())) return true;
     Real size;
     for (const RealVector& point : core_) size = max(size, Dot(point, point));
-    for (const RealVector& g : slice_.generators()) size = max(size, Dot(g, g));
+    for (const RealVector& offset : offsets_) size = max(size, Dot(offset, offset));
+    for (const Place& place : sweep_.places())
+      for (const RealVector& g : place.generators) size = max(size, Dot(g, g));
     return Precision::bits() > 4 * 1074 && CertainlyAtMost(length, Tolerance() * sqrt(size));
   }
 
@@ -155,10 +189,10 @@ class Search {
   bool TryExactly(const Face& face) {
     const auto& corners = face.corners;
     RealVector normal;
-    if (corners.size() == 2 && slice_.dim() == 2) {
+    if (corners.size() == 2 && sweep_.dim() == 2) {
       const RealVector edge = Minus(corners[1], corners[0]);
       normal = {-edge[1], edge[0]};
-    } else if (corners.size() == 3 && slice_.dim() == 3) {
+    } else if (corners.size() == 3 && sweep_.dim() == 3) {
       const RealVector a = Minus(corners[1], corners[0]), b = Minus(corners[2], corners[0]);
       normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     }
@@ -171,28 +205,49 @@ class Search {
     return Try(straight);
   }
 
-  // The corner of {core - slice} with the smallest d . y.
+  // The corner of {core - sweep} with the smallest d . y. A ball and a bend have points instead of corners.
   [[nodiscard]] RealVector Lowest(const RealVector& d) const {
-    RealVector corner = *std::ranges::min_element(core_, [&](const RealVector& a, const RealVector& b) {
-      return CertainlyBelow(Dot(d, a).middle(), Dot(d, b).middle());
-    });
-    for (const RealVector& g : slice_.generators()) {
+    const Real length = sqrt(Dot(d, d));
+    std::size_t farthest = 0;
+    if (offsets_.size() > 1) {
+      Real reach = Support(0, d, length).middle();
+      for (std::size_t i = 1; i < offsets_.size(); ++i)
+        if (const Real further = Support(i, d, length).middle(); CertainlyBelow(reach, further))
+          reach = further, farthest = i;
+    }
+    const Place& place = sweep_.places()[farthest];
+    RealVector corner = Minus(*std::ranges::min_element(core_,
+                                                        [&](const RealVector& a, const RealVector& b) {
+                                                          return CertainlyBelow(Dot(d, a).middle(), Dot(d, b).middle());
+                                                        }),
+                              offsets_[farthest]);
+    for (const RealVector& g : place.generators) {
       const bool plus = IsPositive(Dot(d, g).middle());
       for (std::size_t k = 0; k < corner.size(); ++k)
         if (!g[k].IsZero()) corner[k] = plus ? corner[k] - g[k] : corner[k] + g[k];
     }
+    if (!place.bend.IsZero()) {
+      const std::array<Real, 2> point = place.bend.Farthest(d).point;
+      for (std::size_t k = 0; k < point.size(); ++k) corner[k] -= point[k];
+    }
+    if (const Real& ball = balls_[farthest]; !ball.IsZero() && IsPositive(length))
+      for (std::size_t k = 0; k < corner.size(); ++k) corner[k] -= ball * d[k] / length;
     return Middle(corner);
   }
 
-  // By Wolfe's algorithm: the nearest point of a simplex of corners, until no corner lies below it.
-  [[nodiscard]] Face NearestFace(const RealVector& start) const {
+  // By Wolfe's algorithm: the nearest point of a simplex of corners, until no corner lies below it, or the way to it is
+  // a proof: on a round set the algorithm only comes closer and closer.
+  [[nodiscard]] Face NearestFace(const RealVector& start) {
     std::vector<RealVector> corners{Lowest(start)};
     RealVector weights{Real(1.0)}, nearest = corners.front();
-    const Real tolerance = Tolerance();
+    const Real tolerance = Tolerance(), needed = Needed().middle();
     bool is_best = false;
     for (int round = 0; round < kMostRounds; ++round) {
       const RealVector corner = Lowest(nearest);
-      const Real square = Dot(nearest, nearest).middle(), progress = (square - Dot(nearest, corner)).middle();
+      const Real square = Dot(nearest, nearest).middle(), gap = Dot(nearest, corner).middle();
+      const bool may_prove = IsPositive(square) && CertainlyAtMost((needed * sqrt(square)).middle(), gap);
+      if (may_prove && Try(nearest)) return {std::move(corners), std::move(nearest), true, true};
+      const Real progress = (square - gap).middle();
       is_best = !CertainlyBelow(tolerance * square, progress);
       if (is_best) break;
       corners.push_back(corner);
@@ -239,68 +294,21 @@ class Search {
     return true;
   }
 
-  const ProjectedSlice& slice_;
+  const Sweep& sweep_;
   const Obstacle& obstacle_;
   const double clearance_;
-  std::vector<RealVector> core_;  // relative to the slice's center
+  Real kept_;                        // the radii and the smallest ball: the distance to be kept besides the clearance
+  std::vector<RealVector> offsets_;  // the centers of the places, relative to the first's, seen from the obstacle
+  RealVector balls_;                 // of the places, less the smallest
+  std::vector<RealVector> core_;     // relative to the first place's center
   std::optional<Real> best_;
   bool undecided_ = false;
 };
 
 }  // namespace
 
-ProjectedSlice::ProjectedSlice(const Slice& slice, const Eigen::MatrixXd& projection) {
-  const auto image = [&](const std::vector<Real>& x) {
-    RealVector y(ToSize(projection.rows()));
-    for (Eigen::Index k = 0; k < projection.rows(); ++k)
-      for (Eigen::Index l = 0; l < projection.cols(); ++l)
-        if (const Real& entry = x[ToSize(l)]; projection(k, l) != 0 && !entry.IsZero())
-          y[ToSize(k)] += projection(k, l) == 1 ? entry : Real(projection(k, l)) * entry;
-    return y;
-  };
-  center_ = image(slice.center);
-  for (const auto& column : slice.columns) {
-    RealVector g = image(column);
-    if (!std::ranges::all_of(g, [](const Real& entry) { return entry.IsZero(); })) generators_.push_back(std::move(g));
-  }
-}
-
-Real ProjectedSlice::Support(const std::vector<Real>& d) const {
-  Real value = Dot(d, center_);
-  for (const RealVector& g : generators_) value += abs(Dot(d, g));
-  return value;
-}
-
-// The farthest point is a corner; in the plane its signs are those of a direction next to some generator's normal.
-// Doubles choose, brought to a size near one.
-Real ProjectedSlice::Radius() const {
-  long exponent = -100000;
-  for (const RealVector& g : generators_)
-    for (const Real& entry : g) exponent = std::max(exponent, entry.exponent());
-  const auto p = std::ssize(center_);
-  Eigen::MatrixXd rough = Eigen::MatrixXd::Zero(3, std::ssize(generators_));
-  for (Eigen::Index j = 0; j < rough.cols(); ++j)
-    for (Eigen::Index k = 0; k < p; ++k) rough(k, j) = generators_[ToSize(j)][ToSize(k)].ToDouble(-exponent);
-  Eigen::VectorXd best = Eigen::VectorXd::Ones(rough.cols()), signs;
-  double longest = -1;
-  for (Eigen::Index j = 0; j < rough.cols(); ++j) {
-    const Eigen::Vector3d g = rough.col(j);
-    const Eigen::Vector3d normal(-g.y(), g.x(), g.z());
-    for (const Eigen::Vector3d& d : {g, Eigen::Vector3d(normal + 1e-9 * g), Eigen::Vector3d(normal - 1e-9 * g)}) {
-      signs = (rough.transpose() * d).unaryExpr([](double along) { return along < 0 ? -1.0 : 1.0; });
-      if (const double length = (rough * signs).norm(); length > longest) longest = length, best = signs;
-    }
-  }
-  RealVector sum(center_.size());
-  for (Eigen::Index j = 0; j < best.size(); ++j) {
-    const RealVector& g = generators_[ToSize(j)];
-    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] = best[j] < 0 ? sum[k] - g[k] : sum[k] + g[k];
-  }
-  return sqrt(Dot(sum, sum)).lower();
-}
-
-Answer IsClear(const ProjectedSlice& slice, const Obstacle& obstacle, double clearance, Real& best) {
-  Search search(slice, obstacle, clearance);
+Answer IsClear(const Sweep& sweep, const Obstacle& obstacle, double clearance, Real& best, const Passage& passage) {
+  Search search(sweep, obstacle, clearance, passage);
   const bool proven = search.Run();
   best = search.best() ? *search.best() : Real(-std::numeric_limits<double>::infinity());
   if (proven) return Answer::kYes;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -17,6 +18,41 @@ constexpr std::array kBits{256, 2304, 6656};
 constexpr double kRounding = 0x1p-40;
 // How far a difference between slices may have grown when a claim fails for it.
 constexpr double kGrowth = 1024;
+
+bool IsSize(double x) { return 0 <= x && x < std::numeric_limits<double>::infinity(); }
+
+// Body and bounds between the samples.
+const char* FindMisfit(const Body& body, Eigen::Index p, int num_states) {
+  if (body.heading < -1 || body.heading >= num_states || (body.heading >= 0 && p < 2))
+    return "the body's heading is a state, in two coordinates or more";
+  if (body.parts.empty()) return "the body has a part";
+  for (const BodyPart& part : body.parts)
+    if (part.points.empty() || !IsSize(part.radius) ||
+        !std::ranges::all_of(part.points, [](const Eigen::Vector3d& point) { return point.allFinite(); }))
+      return "the body's parts have points, finite numbers and no negative radius";
+  return nullptr;
+}
+const char* FindMisfit(const Between& between, Eigen::Index p, const NominalModel& model) {
+  if (between.acceleration.size() != p) return "the bounds between samples fit the projection";
+  if (!std::ranges::all_of(between.acceleration, IsSize) || !IsSize(between.turn_rate) ||
+      !IsSize(between.turn_acceleration) || !IsSize(between.period))
+    return "the bounds between samples are finite and not negative";
+  for (std::size_t i = 0; i < model.parameters().size(); ++i)
+    if (model.parameter_names()[i] == "dt" && model.parameters()[i] != between.period)
+      return "the bounds between samples are those of the model's step";
+  return nullptr;
+}
+
+// The obstacles' own numbers are checked where they are made.
+const char* FindMisfit(const Schedule& schedule, const std::vector<Obstacle>& obstacles) {
+  const auto& [start, step, error] = schedule;
+  if (start < -Schedule::kLatest || start > Schedule::kLatest || step < 0 || step > Schedule::kLongest || error < 0 ||
+      error > Schedule::kLongest)
+    return "the schedule lies within its bounds";
+  const bool moves =
+      std::ranges::any_of(obstacles, [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
+  return moves && step < 1 ? "there is a schedule, since an obstacle moves" : nullptr;
+}
 
 // What does not fit before anything is derived.
 std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& certificate) {
@@ -34,6 +70,10 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
     return misfit("the initial set is finite and fits the model");
   for (const Obstacle& obstacle : certificate.obstacles)
     if (obstacle.dim() != problem.projection.rows()) return misfit("the obstacles fit the projection");
+  if (const char* what = FindMisfit(problem.body, problem.projection.rows(), n)) return misfit(what);
+  if (problem.between)
+    if (const char* what = FindMisfit(*problem.between, problem.projection.rows(), *problem.model)) return misfit(what);
+  if (const char* what = FindMisfit(certificate.schedule, certificate.obstacles)) return misfit(what);
   if (certificate.slices.empty()) return std::nullopt;
   const auto steps = ToSize(certificate.controls.cols());
   if (certificate.slices.size() != steps + 1)
@@ -45,7 +85,9 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
     if (!fits(slice.lower) || slice.lower.size() != slice.upper.size() || !fits(slice.center) ||
         slice.center.size() != slice.half_width.size() || (slice.has_generators && slice.generators.rows() != n) ||
         !fits(slice.envelope_lower) || slice.envelope_lower.size() != slice.envelope_upper.size() ||
-        !fits(slice.remainder) || (!slice.clearance.empty() && slice.clearance.size() != certificate.obstacles.size()))
+        !fits(slice.remainder) ||
+        (!slice.clearance.empty() && slice.clearance.size() != certificate.obstacles.size()) ||
+        (!slice.clearance.empty() && problem.between && t == steps))
       return Failure{static_cast<int>(t), "the recorded slice has the task's sizes", "", ""};
   }
   return std::nullopt;

@@ -1,7 +1,8 @@
 /** Confirms or refutes a certificate. It rederives the certificate from its inputs, in intervals of 256 bits and more.
 
 Confirmed: the verifier's own tube, which is sound for the given doubles in real arithmetic, stays in the domain, lies
-inside every recorded set, and is disjoint from every obstacle. Refuted: one of these is false. */
+inside every recorded set, and what the body sweeps over it is disjoint from every obstacle. Refuted: one of these is
+false. */
 #pragma once
 
 #include <map>
@@ -29,7 +30,9 @@ struct RecordedSlice {
   Eigen::VectorXd center, half_width;  ///< the hull by center and half-widths.
   Eigen::MatrixXd generators;          ///< X_t = <center, generators>, if has_generators.
   bool has_generators = false;
-  std::vector<double> clearance;  ///< For each obstacle, metres.
+  /** For each obstacle, metres: at this sample or, with Problem::between, from this sample to the next; the last slice
+  then has none. Infinite: the obstacle is nowhere at that time. */
+  std::vector<double> clearance;
   std::optional<double> radius;
   Eigen::VectorXd envelope_lower, envelope_upper, remainder;
 };

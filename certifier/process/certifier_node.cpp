@@ -34,7 +34,7 @@ std::int64_t PageFaults() {
 }
 
 Config Checked(const Config& config) {
-  RequireForCertifyingOnBus(config);
+  RequireObstaclesSource(config);
   return config;
 }
 

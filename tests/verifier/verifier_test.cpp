@@ -9,6 +9,7 @@
 
 #include "certifier/dynamics/models.h"
 #include "tests/oracle/random.h"
+#include "tests/verifier/hand_made.h"
 #include "tests/verifier/record.h"
 #include "verifier/containment.h"
 #include "verifier/equations.h"
@@ -18,24 +19,6 @@ namespace forereach::verifier {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr double kTiny = std::numeric_limits<double>::denorm_min();
-
-double Up(double x) { return std::nextafter(x, HUGE_VAL); }
-double Down(double x) { return std::nextafter(x, -HUGE_VAL); }
-
-// dt = 1/2, so that every number of a step is a double. The one observation is of the nominal model: its residual is
-// known to a last bit of zero, the smallest double there is, in every coordinate.
-std::shared_ptr<Problem> Halves() {
-  auto problem = std::make_shared<Problem>();
-  problem->model = MakePointMass(0.5);
-  problem->domain.state = Box(Eigen::Vector4d::Constant(-8), Eigen::Vector4d::Constant(8));
-  problem->domain.input = Box(Eigen::Vector2d(-2, -2), Eigen::Vector2d(2, 2));
-  problem->declaration = {Eigen::MatrixXd::Zero(4, 6), Eigen::VectorXd::Zero(4)};
-  problem->transitions = {Eigen::MatrixXd::Zero(1, 6), Eigen::MatrixXd::Zero(1, 4)};
-  problem->projection = Eigen::MatrixXd::Identity(2, 4);
-  return problem;
-}
 
 // One step with u = (1, 0) from the unit box: X_1 has center (1/8, 0, 1/2, 0) and half-widths (3/2, 3/2, 1, 1), and
 // kTiny more.
@@ -51,21 +34,6 @@ Certificate OneStep() {
   second.upper = Eigen::Vector4d(Up(1.625), Up(1.5), Up(1.5), Up(1));
   certificate.slices = {first, second};
   return certificate;
-}
-
-Verdict Judge(const std::shared_ptr<const Problem>& problem, const Certificate& certificate,
-              Method method = Method::kPaper) {
-  return Verifier(problem, method).Verify(certificate);
-}
-
-void ExpectConfirmed(const Verdict& verdict) {
-  EXPECT_EQ(verdict.status, Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
-}
-
-void ExpectRefuted(const Verdict& verdict, int step, const std::string& what) {
-  EXPECT_EQ(verdict.status, Status::kRefuted);
-  EXPECT_EQ(verdict.failure.step, step);
-  EXPECT_THAT(verdict.failure.what, HasSubstr(what));
 }
 
 TEST(HandMade, TrueToTheLastBitIsConfirmed) { ExpectConfirmed(Judge(Halves(), OneStep())); }

@@ -1,0 +1,223 @@
+#include "verifier/sweep.h"
+
+#include <algorithm>
+
+#include "certifier/numerics/size.h"
+
+namespace forereach::verifier {
+namespace {
+
+using RealVector = std::vector<Real>;
+
+// Below pi.
+constexpr double kHalfTurn = 3.14159;
+
+RealVector Image(const Eigen::MatrixXd& projection, const RealVector& x) {
+  RealVector y(ToSize(projection.rows()));
+  for (Eigen::Index k = 0; k < projection.rows(); ++k)
+    for (Eigen::Index l = 0; l < projection.cols(); ++l)
+      if (const Real& entry = x[ToSize(l)]; projection(k, l) != 0 && !entry.IsZero())
+        y[ToSize(k)] += projection(k, l) == 1 ? entry : Real(projection(k, l)) * entry;
+  return y;
+}
+
+bool IsZeroVector(const RealVector& vector) {
+  return std::ranges::all_of(vector, [](const Real& entry) { return entry.IsZero(); });
+}
+
+Real Length(const Real& x, const Real& y) { return y.IsZero() ? abs(x) : sqrt(sqr(x) + sqr(y)); }
+
+// R(angle) q in the first two coordinates.
+std::array<Real, 2> Rotated(const Real& angle, const Real& x, const Real& y) {
+  const Real c = cos(angle), s = sin(angle);
+  return {c * x - s * y, s * x + c * y};
+}
+
+// The places of a part's points, with what the declared bounds allow between two samples.
+class Places {
+ public:
+  Places(const Problem& problem, bool sweeps) : problem_(problem), sweeps_(sweeps) {}
+
+  // By Taylor's theorem.
+  [[nodiscard]] Place Of(const Eigen::Vector3d& point, const Slice& slice, int sample) const {
+    Place place = OfFrame(slice, sample);
+    for (std::size_t k = 2; k < place.center.size(); ++k) place.center[k] += Real(point[static_cast<int>(k)]);
+    const Real x(point[0]), y(place.center.size() > 1 ? point[1] : 0);
+    if (!Turns(point)) {
+      place.center[0] += x;
+      if (place.center.size() > 1) place.center[1] += y;
+      return Widened(std::move(place), Real());
+    }
+    const auto h = ToSize(problem_.body.heading);
+    const Real& theta = slice.center[h];
+    const std::array<Real, 2> turned = Rotated(theta, x, y);
+    for (std::size_t k = 0; k < 2; ++k) place.center[k] += turned[k];
+    place.generators.clear();
+    for (const RealVector& column : slice.columns) {
+      RealVector generator = Image(problem_.projection, column);
+      if (!column[h].IsZero()) {
+        generator[0] -= column[h] * turned[1];
+        generator[1] += column[h] * turned[0];
+      }
+      if (!IsZeroVector(generator)) place.generators.push_back(std::move(generator));
+    }
+    place.bend = Bend(theta, slice.HalfWidth(problem_.body.heading), x, y);
+    return Widened(std::move(place), Deviation(point));
+  }
+
+  // Where no heading is known: the ball of the points' distance from the frame.
+  [[nodiscard]] Place Around(const BodyPart& part, const Slice& slice, int sample) const {
+    Real ball;
+    for (const Eigen::Vector3d& point : part.points) {
+      const Real flat = Length(Real(point[0]), Real(point[1]));
+      ball = max(ball, Length(flat, Real(point[2])) + Deviation(point));
+    }
+    return Widened(OfFrame(slice, sample), ball);
+  }
+
+  [[nodiscard]] bool Turns(const Eigen::Vector3d& point) const {
+    return problem_.body.heading >= 0 && (point[0] != 0 || point[1] != 0);
+  }
+
+ private:
+  [[nodiscard]] Place OfFrame(const Slice& slice, int sample) const {
+    const ProjectedSlice frame(slice, problem_.projection);
+    return {frame.center(), frame.generators(), Bend(), Real(), sample};
+  }
+
+  // How far a point that turns may be from its chord.
+  [[nodiscard]] Real Deviation(const Eigen::Vector3d& point) const {
+    if (!sweeps_ || !Turns(point)) return {};
+    const Between& between = *problem_.between;
+    return Length(Real(point[0]), Real(point[1])) * (sqr(Real(between.turn_rate)) + Real(between.turn_acceleration)) *
+           EighthOfSquare();
+  }
+
+  [[nodiscard]] Real EighthOfSquare() const { return sqr(Real(problem_.between->period)) * Real(0.125); }
+
+  [[nodiscard]] Place Widened(Place place, const Real& ball) const {
+    place.ball = ball;
+    for (std::size_t k = 0; sweeps_ && k < place.center.size(); ++k) {
+      RealVector axis(place.center.size());
+      axis[k] = Real(problem_.between->acceleration[static_cast<Eigen::Index>(k)]) * EighthOfSquare();
+      if (!axis[k].IsZero()) place.generators.push_back(std::move(axis));
+    }
+    return place;
+  }
+
+  const Problem& problem_;
+  const bool sweeps_;
+};
+
+}  // namespace
+
+ProjectedSlice::ProjectedSlice(const Slice& slice, const Eigen::MatrixXd& projection)
+    : center_(Image(projection, slice.center)) {
+  for (const auto& column : slice.columns)
+    if (RealVector g = Image(projection, column); !IsZeroVector(g)) generators_.push_back(std::move(g));
+}
+
+// The farthest point is a corner; in the plane its signs are those of a direction next to some generator's normal.
+// Doubles choose, brought to a size near one.
+Real ProjectedSlice::Radius() const {
+  long exponent = -100000;
+  for (const RealVector& g : generators_)
+    for (const Real& entry : g) exponent = std::max(exponent, entry.exponent());
+  const auto p = std::ssize(center_);
+  Eigen::MatrixXd rough = Eigen::MatrixXd::Zero(3, std::ssize(generators_));
+  for (Eigen::Index j = 0; j < rough.cols(); ++j)
+    for (Eigen::Index k = 0; k < p; ++k) rough(k, j) = generators_[ToSize(j)][ToSize(k)].ToDouble(-exponent);
+  Eigen::VectorXd best = Eigen::VectorXd::Ones(rough.cols()), signs;
+  double longest = -1;
+  for (Eigen::Index j = 0; j < rough.cols(); ++j) {
+    const Eigen::Vector3d g = rough.col(j);
+    const Eigen::Vector3d normal(-g.y(), g.x(), g.z());
+    for (const Eigen::Vector3d& d : {g, Eigen::Vector3d(normal + 1e-9 * g), Eigen::Vector3d(normal - 1e-9 * g)}) {
+      signs = (rough.transpose() * d).unaryExpr([](double along) { return along < 0 ? -1.0 : 1.0; });
+      if (const double length = (rough * signs).norm(); length > longest) longest = length, best = signs;
+    }
+  }
+  RealVector sum(center_.size());
+  Real square;
+  for (Eigen::Index j = 0; j < best.size(); ++j) {
+    const RealVector& g = generators_[ToSize(j)];
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] = best[j] < 0 ? sum[k] - g[k] : sum[k] + g[k];
+  }
+  for (const Real& entry : sum)
+    if (!entry.IsZero()) square += entry * entry;
+  return sqrt(square).lower();
+}
+
+Bend::Bend(const Real& theta, const Real& r, const Real& qx, const Real& qy) {
+  if (r.IsZero()) return;
+  const Real half_square = Real(0.5) * sqr(r);
+  for (const Real& angle : {theta - r, theta, theta + r}) {
+    const std::array<Real, 2> turned = Rotated(angle, qx, qy);
+    arc_.push_back({-(half_square * turned[0]), -(half_square * turned[1])});
+  }
+  radius_ = half_square * Length(qx, qy);
+  is_circle_ = !CertainlyBelow(r, kHalfTurn);
+}
+
+// Of an arc shorter than a half turn, d is met inside if the arc runs towards d at its start and away at its end.
+Bend::Extreme Bend::Farthest(const std::vector<Real>& d) const {
+  Extreme best;
+  const auto consider = [&](const Real& value, const std::array<Real, 2>& point) {
+    if (CertainlyBelow(best.value.middle(), value.middle())) best.point = point;
+    best.value = max(best.value, value);
+  };
+  for (const auto& point : arc_) consider(d[0] * point[0] + d[1] * point[1], point);
+  const auto towards = [&](const std::array<Real, 2>& point) { return d[1] * point[0] - d[0] * point[1]; };
+  bool inside = is_circle_;
+  for (std::size_t i = 0; i + 1 < arc_.size(); ++i)
+    inside |= !CertainlyAtMost(towards(arc_[i]), Real()) && !CertainlyAtMost(Real(), towards(arc_[i + 1]));
+  const Real length = Length(d[0], d[1]);
+  if (!inside || !CertainlyBelow(Real(), length)) return best;
+  consider(radius_ * length, {radius_ * d[0] / length, radius_ * d[1] / length});
+  return best;
+}
+
+Sweep::Sweep(const ProjectedSlice& slice) : places_{Place{slice.center(), slice.generators(), Bend(), Real(), 0}} {}
+
+std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Slice& first, const Slice* last) {
+  const Places places(problem, last != nullptr);
+  std::vector<Place> around, exact;
+  for (int sample = 0; sample < (last ? 2 : 1); ++sample) {
+    const Slice& slice = sample == 0 ? first : *last;
+    around.push_back(places.Around(part, slice, sample));
+    for (const Eigen::Vector3d& point : part.points) exact.push_back(places.Of(point, slice, sample));
+  }
+  const Real radius(part.radius);
+  std::vector<Sweep> sweeps;
+  if (std::ranges::any_of(part.points, [&](const Eigen::Vector3d& point) { return places.Turns(point); }))
+    sweeps.emplace_back(std::move(around), radius);
+  sweeps.emplace_back(std::move(exact), radius);
+  return sweeps;
+}
+
+Passage PassageOf(const Obstacle& obstacle, const Schedule& schedule, int first, int last) {
+  if (!obstacle.motion()) return {};
+  const ObstacleMotion& motion = *obstacle.motion();
+  const auto time = [&](int t) {
+    return Real::Integer(schedule.start_us) + Real::Integer(t) * Real::Integer(schedule.step_us);
+  };
+  const Real error = Real::Integer(schedule.clock_error_us), stamp = Real::Integer(motion.stamp_us);
+  const Real begin = time(first) - error, end = time(last) + error, million(1e6);
+  Passage passage;
+  passage.is_there =
+      !CertainlyBelow(Real::Integer(motion.until_us), begin) && !CertainlyBelow(end, Real::Integer(motion.from_us));
+  if (!passage.is_there) return passage;
+  Real speed;
+  for (int k = 0; k < obstacle.dim(); ++k) {
+    const Real velocity(motion.velocity[k]);
+    passage.shift[0].push_back(velocity * (time(first) - stamp) / million);
+    passage.shift[1].push_back(velocity * (time(last) - stamp) / million);
+    speed = Length(speed, velocity);
+  }
+  const Real tau = max(abs(begin - stamp), abs(end - stamp)) / million;
+  passage.growth = Real(motion.uncertainty) + Real(motion.growth) * tau +
+                   Real(0.5) * Real(motion.growth_rate) * sqr(tau) + speed * error / million;
+  return passage;
+}
+
+}  // namespace forereach::verifier

@@ -1,0 +1,109 @@
+/** What a part of the body sweeps, in high precision: the convex hull of the places of its points over a slice, or over
+two consecutive slices and the time between them.
+
+The place of a point q is g_q(x) = P x + R(x_h) q, with h the heading. Over a slice x = c + D b, |b|_inf <= 1, with
+theta = c_h and r the half-width of the slice in h, every direction d has an angle xi with |xi - theta| <= r and
+
+    d . g_q(x) = d . (P c + R(theta) q) + d . (P + R'(theta) q e_h^T) D b - 1/2 (D b)_h^2 d . R(xi) q,
+
+by Taylor's theorem for d . R(.) q, whose second derivative is its negative. (D b)_h^2 lies in [0, r^2]. And always
+|g_q(x) - P x| <= |q|, which is tighter where r is large. */
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/certify/problem.h"
+#include "verifier/real.h"
+#include "verifier/tube.h"
+
+namespace forereach::verifier {
+
+/** The projection P X of a slice, p = 1, 2 or 3. */
+class ProjectedSlice final {
+ public:
+  ProjectedSlice(const Slice& slice, const Eigen::MatrixXd& projection);
+
+  [[nodiscard]] int dim() const { return static_cast<int>(center_.size()); }
+  [[nodiscard]] const std::vector<Real>& center() const { return center_; }
+  [[nodiscard]] const std::vector<std::vector<Real>>& generators() const { return generators_; }
+
+  /** A lower bound on max {|y - P c|_2 : y in P X}; for p <= 2 it is the maximum. */
+  [[nodiscard]] Real Radius() const;
+
+ private:
+  std::vector<Real> center_;
+  std::vector<std::vector<Real>> generators_;
+};
+
+/** The second-order part of a place: conv {-1/2 s R(xi) q : 0 <= s <= r^2, |xi - theta| <= r}, the hull of the origin
+and an arc, in the first two coordinates. By default {0}. */
+class Bend final {
+ public:
+  Bend() = default;
+  Bend(const Real& theta, const Real& r, const Real& qx, const Real& qy);
+
+  [[nodiscard]] bool IsZero() const { return arc_.empty(); }
+  /** max {d . y : y in this}, and a point that attains it but for rounding. @pre d has at least 2 entries. */
+  struct Extreme {
+    Real value;
+    std::array<Real, 2> point;
+  };
+  [[nodiscard]] Extreme Farthest(const std::vector<Real>& d) const;
+
+ private:
+  std::vector<std::array<Real, 2>> arc_;  // its points at theta - r, theta and theta + r
+  Real radius_;
+  bool is_circle_ = false;  // r may be pi or more
+};
+
+/** A set that contains the place of a point: <center, generators> + bend + {y : |y|_2 <= ball}. */
+struct Place {
+  std::vector<Real> center;
+  std::vector<std::vector<Real>> generators;
+  Bend bend;
+  Real ball;
+  int sample = 0;  ///< 0: at the first sample of the sweep; 1: at the last.
+};
+
+/** conv {places} + {y : |y|_2 <= radius}. */
+class Sweep final {
+ public:
+  /** The point P x over one slice. */
+  Sweep(const ProjectedSlice& slice);  // NOLINT: a set is the hull of itself
+  Sweep(std::vector<Place> places, const Real& radius) : places_(std::move(places)), radius_(radius) {}
+
+  [[nodiscard]] int dim() const { return static_cast<int>(places_.front().center.size()); }
+  [[nodiscard]] const std::vector<Place>& places() const { return places_; }
+  [[nodiscard]] const Real& radius() const { return radius_; }
+
+ private:
+  std::vector<Place> places_;
+  Real radius_;
+};
+
+/** Sets each of which contains all that `part` of the body sweeps: over the slice `first` or, with `last`, from one
+sample to the next, where Problem::between widens the hull by [-e, e], e_k = acceleration_k period^2 / 8, and the place
+of q by a ball of |q| (turn_rate^2 + turn_acceleration) period^2 / 8. One set is by Taylor's theorem. A part that turns
+has another before it, of P X and a ball of the largest |q|. @pre a Certifier accepts the problem. */
+[[nodiscard]] std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Slice& first,
+                                          const Slice* last);
+
+/** How a moving obstacle is met between two samples of a plan, seen from the obstacle. By default: it stands. */
+struct Passage {
+  bool is_there = true;                    ///< False: the obstacle's window and the time between the samples are apart.
+  std::array<std::vector<Real>, 2> shift;  ///< velocity tau at the first and at the last sample; empty: zero.
+  Real growth;                             ///< Added to the obstacle's radius.
+};
+
+/** The passage between the samples first <= last, at the times start + t step, each known up to the clock error:
+
+    is_there: until >= first time - error, and from <= last time + error,
+    growth = uncertainty + growth |tau| + growth_rate tau^2 / 2 + |velocity| error,
+
+with tau the time since the stamp, and |tau| the largest that the error allows. */
+[[nodiscard]] Passage PassageOf(const Obstacle& obstacle, const Schedule& schedule, int first, int last);
+
+}  // namespace forereach::verifier
