@@ -32,6 +32,7 @@ void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifi
 
 int Certify(const Options& options) {
   const Config config = LoadConfig(options.config);
+  RequireForCertifying(config);
   const Certifier certifier(config.problem);
   const Eigen::MatrixXd controls = LoadPlan(options.plan, *config.problem->model);
   const Plan plan{controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),

@@ -49,6 +49,7 @@ int ReportFailure(const Options& options, const Config& config, const CertifiedP
 
 int MakePlan(const Options& options) {
   const Config config = LoadConfig(options.config);
+  RequireForCertifying(config);
   const auto proposer = MakeProposer(config);
   const Certifier certifier(config.problem);
   const CertifiedPlan plan = FindCertifiedPlan(*proposer, certifier, config, options.seed);

@@ -88,6 +88,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
       period_us_(Microseconds(config.robot.step_period_ms)),
       rest_coordinates_(RestCoordinates(*config.problem->model)),
       reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
+      obstacles_(config),
       state_(config.robot.start),
       supervisor_(OptionsOf(config_), *this) {
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
@@ -97,6 +98,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
                 [this](const Received& received) { supervisor_.OnCertified(received.raw, received.utime); });
   bus.Subscribe(config_.bus.fault,
                 [this](const Received& received) { supervisor_.OnFault(received.raw, received.utime); });
+  bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
   bus.Subscribe(config_.bus.command, [this](const Received& received) {
     const std::string why = supervisor_.OnCommand(received.raw, received.utime);
     if (!why.empty()) logging::Warn("{}: refused: {}", config_.bus.command, why);
@@ -123,9 +125,12 @@ void RobotSimNode::TakeReload() {
 }
 
 void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
-  if (const auto control = supervisor_.control(); !control.empty()) target_->Step(state_, control, state_);
+  const std::span<const double> control = supervisor_.control();
+  const bool moves = !control.empty();
+  if (moves) target_->Step(state_, control, state_);
   supervisor_.FinishStep(utime, now_us);
-  ReportContacts(utime);
+  ReportContacts(utime, moves);
+  state_before_ = state_;
   ReportGoal(utime);
   const bool ends = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
   if (supervisor_.Boundary(utime, now_us, ends).empty() && ends) ++finished_boundaries_;
@@ -147,12 +152,28 @@ void RobotSimNode::LogProgress(std::int64_t utime) {
                 supervisor_.counts().steps_inside, DistanceToGoal(), supervisor_.control().empty() ? ", standing" : "");
 }
 
-void RobotSimNode::ReportContacts(std::int64_t utime) {
-  for (std::size_t o = 0; o < config_.obstacles.size(); ++o) {
-    const double clearance = ApproximateDistance(config_.obstacles[o], Position());
-    if (!(clearance <= 0)) continue;
+void RobotSimNode::OnObstacles(const Received& received) {
+  // What it refuses is no news: the certifier reports it.
+  static_cast<void>(obstacles_.Update(received.bytes, received.utime));
+}
+
+std::vector<Contact> RobotSimNode::Contacts(std::int64_t utime, bool moved) const {
+  const Problem& problem = *config_.problem;
+  const Sample now{state_, utime};
+  if (!problem.between || state_before_.empty()) return FindContacts(problem, obstacles_.all(), now);
+  const Between standing{Eigen::VectorXd::Zero(problem.projection.rows()), 0, 0, problem.between->period};
+  return FindContacts(problem, obstacles_.all(), {state_before_, utime - period_us_}, now,
+                      moved ? *problem.between : standing);
+}
+
+void RobotSimNode::ReportContacts(std::int64_t utime, bool moved) {
+  for (const Contact& contact : Contacts(utime, moved)) {
     ++contacts_;
-    supervisor_.Report(utime, execution_event_t::CONTACT, clearance, "inside obstacle " + std::to_string(o));
+    std::string text = "inside obstacle " + std::to_string(contact.obstacle);
+    if (config_.problem->body != Body())
+      text = "part " + std::to_string(contact.part) + " meets obstacle " + std::to_string(contact.obstacle);
+    if (config_.problem->between) text += ", " + ToText(contact.at) + " of a step after the last sample";
+    supervisor_.Report(utime, execution_event_t::CONTACT, contact.clearance, text);
   }
 }
 

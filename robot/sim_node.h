@@ -2,8 +2,8 @@
 
 Step boundaries lie at t_j = t_0 + j * step_period, where t_0 is the first Tick. At each boundary, in this order:
  1. The target takes the control of the step that has ended, and the supervisor finishes the step.
- 2. The node reports CONTACT for every obstacle that contains the true state, and GOAL_REACHED at the first boundary
-    with |P x - goal| <= goal_radius.
+ 2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h), and
+    GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
  3. The supervisor starts the pending plan, continues the current one, or holds; then it reports (supervisor.h).
 
 While the robot holds, its speed and acceleration are set to zero (v and a of the bicycle, vx and vy of the point mass).
@@ -13,8 +13,10 @@ stop is the same hold at any speed.
 The run ends when the goal is reached or the time limit has passed. Then no further plan starts, and the current one
 runs to its end. Once the robot holds, it sends FINISHED for kFinishedBoundaries boundaries and is done.
 
-Obstacles and start are those of the task file. After a reload the robot also accepts plans that are certified under the
-new file (Guard::Expect); its state and its world do not change. */
+The start is that of the task file. The obstacles are those that are in force for a certifier of this task
+(obstacles_in_force.h), known or not: while OBSTACLES is silent, the last ones stay. After a reload the robot also
+accepts plans that are certified under the new file (Guard::Expect); its state and the file's obstacles do not change.
+*/
 #pragma once
 
 #include <iostream>
@@ -26,7 +28,9 @@ new file (Guard::Expect); its state and its world do not change. */
 
 #include "bus/node.h"
 #include "bus/reloading.h"
+#include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
+#include "robot/contacts.h"
 #include "robot/supervisor.h"
 #include "robot/target.h"
 
@@ -61,7 +65,9 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   void Send(const std::string& channel, Bytes message) override;
   void TakeReload();
   void Boundary(std::int64_t utime, std::int64_t now_us);
-  void ReportContacts(std::int64_t utime);
+  void ReportContacts(std::int64_t utime, bool moved);
+  [[nodiscard]] std::vector<Contact> Contacts(std::int64_t utime, bool moved) const;
+  void OnObstacles(const Received& received);
   void ReportGoal(std::int64_t utime);
   void LogProgress(std::int64_t utime);
   [[nodiscard]] Eigen::VectorXd Position() const;
@@ -75,7 +81,9 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   std::vector<int> rest_coordinates_;  // zero while standing
   Reloading<std::optional<Config>> reload_;
 
+  ObstaclesInForce obstacles_;
   std::vector<double> state_;
+  std::vector<double> state_before_;  // at the last boundary; empty before the first
   std::optional<std::int64_t> start_utime_;
   std::int64_t next_progress_utime_ = 0;
   bool goal_reached_ = false;

@@ -34,7 +34,7 @@ std::int64_t PageFaults() {
 }
 
 Config Checked(const Config& config) {
-  RequireObstaclesSource(config);
+  RequireForCertifyingOnBus(config);
   return config;
 }
 

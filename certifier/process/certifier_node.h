@@ -66,8 +66,8 @@ class CertifierNode final : public Node {
   static constexpr int kAtOnce = 8;                 ///< Candidates decided on before the bus is looked at again.
 
   /** @param listen_us how long it listens for another certifier before it takes charge; Charge::kListenUs on a bus that
-  others can be on. @param latch may be null: then a restart forgets a fault. @throws ConfigError if the task does not
-  say gate.obstacles. */
+  others can be on. @param latch may be null: then a restart forgets a fault.
+  @throws ConfigError as RequireForCertifyingOnBus. */
   CertifierNode(const Config& config, Bus& bus, Clocks clocks = {}, std::int64_t listen_us = 0,
                 std::unique_ptr<LatchFile> latch = nullptr);
   ~CertifierNode() override;

@@ -12,7 +12,7 @@ namespace {
 TaskReload::Loaded Load(const std::string& path, const BusOptions& in_force) try {
   logging::Info("reloading {}", path);
   TaskReload::Loaded loaded{LoadConfig(path), nullptr, ""};
-  RequireObstaclesSource(loaded.config);
+  RequireForCertifyingOnBus(loaded.config);
   loaded.error = WhyKeyCannotChange(in_force, loaded.config.bus, Role::kCertifier);
   if (!loaded.error.empty()) loaded.error = path + ": " + loaded.error;
   loaded.gate = std::make_unique<Gate>(loaded.config);

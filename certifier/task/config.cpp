@@ -108,13 +108,28 @@ NamedFiles FilesNamedBy(const std::string& path) {
   return {draft.transitions, draft.config.planner.policy};
 }
 
-void RequireObstaclesSource(const Config& config) {
-  if (config.gate.obstacles != ObstaclesSource::kUnsaid) return;
+void RequireForCertifying(const Config& config) {
+  if (config.says_between || config.problem->method == Method::kPaper) return;
   throw ConfigError(
       config.path +
-      ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those of the last OBSTACLES message; "
-      "nothing is certified before the first message or while there are none. `task`: the obstacles are those of this "
-      "file");
+      ": task.between: missing. Write under `task:` the line `between: {acceleration: [...]}` with bounds "
+      "on the true motion from one sample to the next, which `forereach declare --between` proposes: a "
+      "certificate holds at all times. Or write `between: samples`: it holds at its sample instants only");
+}
+
+void RequireForCertifyingOnBus(const Config& config) {
+  RequireForCertifying(config);
+  if (config.gate.obstacles == ObstaclesSource::kUnsaid)
+    throw ConfigError(config.path +
+                      ": gate.obstacles: missing. `bus`: the obstacles are those of this file and those of the last "
+                      "OBSTACLES message; nothing is certified before the first message or while there are none. "
+                      "`task`: the obstacles are those of this file");
+  const auto moving = std::ranges::find_if(config.obstacles, [](const Obstacle& o) { return o.motion().has_value(); });
+  if (moving != config.obstacles.end())
+    throw ConfigError(
+        config.path + ": task.obstacles[" + std::to_string(moving - config.obstacles.begin()) +
+        "].motion: its times begin with the plan, so it is for `forereach certify`. On a bus, write "
+        "`gate: {obstacles: bus}`, and send the obstacle of a file of its own with `forereach obstacles`");
 }
 
 Transitions LoadTransitions(const std::string& path, const NominalModel& model) {

@@ -26,7 +26,9 @@ struct Config {
   Grounds grounds;  ///< Before anything is heard or learned.
   std::shared_ptr<const Problem> problem;
   std::vector<Obstacle> obstacles;
-  Box initial_set;                             ///< X0, rounded outward.
+  Box initial_set;  ///< X0, rounded outward.
+  /** False: the file has no task.between, and its certificates hold at the samples only. */
+  bool says_between = false;
   std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds; dt and wheelbase are the model's.
   GateOptions gate;
   RealtimeOptions realtime;
@@ -57,9 +59,16 @@ struct NamedFiles {
 @throws ConfigError as it does. */
 [[nodiscard]] Config LoadConfig(const std::string& path, const NamedFiles& instead);
 
-/** Checks that the task sets gate.obstacles, which a process needs before it certifies on a bus.
-@throws ConfigError that says which line to add. */
-void RequireObstaclesSource(const Config& config);
+/** @name What LoadConfig does not require, so that logs recorded before these keys can be read again.
+@throws ConfigError that says which line to add or to change. */
+///@{
+/** What a command needs before it certifies anew: the task has task.between, or is of the paper's method. */
+void RequireForCertifying(const Config& config);
+/** What a process needs before it certifies on a bus: the same, the task has gate.obstacles, and no obstacle of the
+file moves. A motion in a file begins with the plan; on a bus `forereach obstacles` sends it with the time that it
+begins. */
+void RequireForCertifyingOnBus(const Config& config);
+///@}
 
 /** Reads transitions from CSV (csv.h): columns for each state, each input and each successor `<state>_next`, in any
 order, in the model's units; one row a transition. @throws ConfigError, also if the file has no transition. */

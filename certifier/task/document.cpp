@@ -306,7 +306,12 @@ class Checker {
       case Key::Size::kStates: return one_each(scope_.states);
       case Key::Size::kInputs: return one_each(scope_.inputs);
       case Key::Size::kVariables: return one_each(scope_.variables);
-      case Key::Size::kSafety: return require(ToSize(scope_.safety_dim), ", as many as task.projection has rows");
+      case Key::Size::kSafety:
+        return require(ToSize(scope_.safety_dim), ", one a safety coordinate (task.projection or task.body)");
+      case Key::Size::kPoint:
+        if (node.size() != 2 && node.size() != 3)
+          Fail(node, key, "has " + std::to_string(node.size()) + " entries, has to have 2 or 3");
+        return;
       case Key::Size::kAny: return RequireCount(node, row, key);
     }
   }

@@ -1,10 +1,14 @@
 // The rows of a task file that say what is certified: model, domain, declaration, residual, task, certifier.
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <iterator>
+#include <span>
 
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/key_rows.h"
@@ -13,6 +17,8 @@ namespace forereach::key_rows {
 namespace {
 
 using Size = Key::Size;
+
+constexpr Range kWithinDecades = Between(-1e9, 1e9);  // in microseconds within the bounds of a schedule
 
 int IndexOf(const std::vector<std::string>& names, const std::string& name) {
   return static_cast<int>(std::ranges::find(names, name) - names.begin());
@@ -188,15 +194,81 @@ void SetProjection(const Document& file, const std::string& key, Eigen::MatrixXd
   draft.problem.projection = std::move(projection);
 }
 
+Eigen::MatrixXd ProjectionTo(std::span<const std::string> names, const std::vector<std::string>& states) {
+  Eigen::MatrixXd projection = Eigen::MatrixXd::Zero(std::ssize(names), std::ssize(states));
+  for (Eigen::Index i = 0; i < projection.rows(); ++i) projection(i, IndexOf(states, names[ToSize(i)])) = 1;
+  return projection;
+}
+
 void ReadProjectionByNames(const Document& file, const std::string& key, TaskDraft& draft) {
-  const std::vector<std::string> names = file.Names(key);
-  Eigen::MatrixXd projection = Eigen::MatrixXd::Zero(std::ssize(names), std::ssize(draft.scope.states));
-  for (Eigen::Index i = 0; i < projection.rows(); ++i) projection(i, IndexOf(draft.scope.states, names[ToSize(i)])) = 1;
-  SetProjection(file, key, std::move(projection), draft);
+  SetProjection(file, key, ProjectionTo(file.Names(key), draft.scope.states), draft);
 }
 
 void ReadProjectionMatrix(const Document& file, const std::string& key, TaskDraft& draft) {
   SetProjection(file, key, ReadMatrix(file, key), draft);
+}
+
+bool Has(const Document& file, const std::string& map, std::string_view name) {
+  const std::vector<std::string> keys = file.KeysOf(map);
+  return std::ranges::find(keys, name) != keys.end();
+}
+
+// @throws ConfigError unless `of` is the size of a part's point.
+void RequirePointSize(const Document& file, const std::string& key, Eigen::Index size, Eigen::Index of) {
+  if (size != of)
+    file.Fail(key, "has " + std::to_string(size) + " entries, has to have " + std::to_string(of) +
+                       ", as many as the first point of the body");
+}
+
+// `size` is that of the body's points, 0 before the first.
+BodyPart ReadPart(const Document& file, const std::string& key, Eigen::Index& size) {
+  if (const std::size_t kinds = file.KeysOf(key).size(); kinds != 1)
+    file.Fail(key, "has " + std::to_string(kinds) + " keys, has to have one of disc, hull");
+  const bool is_disc = Has(file, key, "disc");
+  const std::string shape = key + (is_disc ? ".disc" : ".hull"), at = shape + (is_disc ? ".at" : ".points");
+  const std::vector<Eigen::VectorXd> points = is_disc ? std::vector{file.Vector(at)} : file.Vectors(at);
+  BodyPart part{{}, Has(file, shape, "radius") ? file.Number(shape + ".radius") : 0};
+  for (const Eigen::VectorXd& point : points) {
+    if (size == 0) size = point.size();
+    RequirePointSize(file, is_disc ? at : Entry(at, std::ssize(part.points)), point.size(), size);
+    part.points.emplace_back(Eigen::Vector3d::Zero()).head(size) = point;
+  }
+  return part;
+}
+
+void ReadBody(const Document& file, const std::string& key, TaskDraft& draft) {
+  if (draft.scope.safety_dim != 0) file.Fail(key, "the task has task.projection too; delete one of them");
+  Body body{.heading = -1, .parts = {}};
+  Eigen::Index size = 0;
+  std::size_t points = 0;
+  for (int i = 0; i < file.Count(key + ".parts"); ++i)
+    points += body.parts.emplace_back(ReadPart(file, Entry(key + ".parts", i), size)).points.size();
+  if (points > kMaxBodyPoints)
+    file.Fail(key + ".parts",
+              "have " + std::to_string(points) + " points, which is outside " + Between(1, kMaxBodyPoints).text());
+  const std::vector<std::string> pose = file.Names(key + ".pose");
+  if (const Eigen::Index names = std::ssize(pose); names == size + 1)
+    body.heading = IndexOf(draft.scope.states, pose.back());
+  else if (names != size)
+    file.Fail(key + ".pose", "has " + std::to_string(names) + " entries, has to have " + std::to_string(size) +
+                                 ", as many as the points of the body, or one more, the heading");
+  SetProjection(file, key + ".pose", ProjectionTo(std::span(pose).first(ToSize(size)), draft.scope.states), draft);
+  draft.problem.body = std::move(body);
+}
+
+void ReadBetween(const Document& file, const std::string& key, TaskDraft& draft) {
+  forereach::Between between{.acceleration = file.Vector(key + ".acceleration"), .period = file.Number("model.dt")};
+  const bool turns = draft.problem.body.heading >= 0;
+  for (const auto& [name, member] :
+       {std::pair{".turn_rate", &forereach::Between::turn_rate}, {".turn_acceleration", &Between::turn_acceleration}}) {
+    const bool is_given = Has(file, key, name + 1);
+    if (turns != is_given)
+      file.Fail(key + name, turns ? "missing: task.body has a heading, so the bound is needed"
+                                  : "is for a body with a heading, the last name of task.body.pose");
+    if (is_given) between.*member = file.Number(key + name);
+  }
+  draft.problem.between = std::move(between);
+  draft.config.says_between = true;
 }
 
 // A row of an obstacle's kind: what `make` gives of the map at `key` is one of the task's obstacles.
@@ -225,14 +297,42 @@ Obstacle ReadHalfPlane(const Document& file, const std::string& key) {
   return Obstacle::HalfSpace(file.Vector(key + ".normal"), file.Number(key + ".offset"));
 }
 
-void RequireOneKind(const Document& file, const std::string& key, TaskDraft&) {
-  if (const std::size_t kinds = file.KeysOf(key).size(); kinds != 1)
-    file.Fail(key, "has " + std::to_string(kinds) + " keys, has to have one of circle, box, polygon, half_plane");
+// Microseconds of a time in seconds; nothing is lost of a window between these two.
+std::int64_t MicrosecondsDown(double seconds) { return static_cast<std::int64_t>(std::floor(MulDown(seconds, 1e6))); }
+std::int64_t MicrosecondsUp(double seconds) { return static_cast<std::int64_t>(std::ceil(MulUp(seconds, 1e6))); }
+
+// The obstacle was read before.
+void ReadMotion(const Document& file, const std::string& key, TaskDraft& draft) {
+  ObstacleMotion motion;
+  motion.velocity.head(draft.scope.safety_dim) = file.Vector(key + ".velocity");
+  for (const auto& [name, member] : {std::pair{".uncertainty", &ObstacleMotion::uncertainty},
+                                     {".growth", &ObstacleMotion::growth},
+                                     {".growth_rate", &ObstacleMotion::growth_rate}})
+    if (Has(file, key, name + 1)) motion.*member = file.Number(key + name);
+  const std::string from = key + ".from", until = key + ".until";
+  if (Has(file, key, "from")) motion.from_us = MicrosecondsDown(file.Number(from));
+  if (Has(file, key, "until")) motion.until_us = MicrosecondsUp(file.Number(until));
+  if (Has(file, key, "from") && Has(file, key, "until"))
+    RequireOrdered(file, file.Number(from), file.Number(until), from, until);
+  Obstacle& obstacle = draft.config.obstacles.back();
+  obstacle = obstacle.Moving(motion);
+}
+
+void ReadObstacle(const Document& file, const std::string& key, TaskDraft& draft) {
+  const bool moves = Has(file, key, "motion");
+  if (const std::size_t kinds = file.KeysOf(key).size() - (moves ? 1 : 0); kinds != 1)
+    file.Fail(key,
+              "has " + std::to_string(kinds) + " keys of a shape, has to have one of circle, box, polygon, half_plane");
+  if (moves) ReadMotion(file, key + ".motion", draft);
+}
+
+void RequirePosition(const Document& file, const std::string& key, TaskDraft& draft) {
+  if (draft.scope.safety_dim == 0) file.Fail(key + ".projection", "missing: the task needs this key, or task.body");
 }
 
 std::vector<Key> TaskKeys() {
   return {
-      Required(Map("task", "The certification task.")),
+      Required(Map("task", "The certification task. It has either projection or body.", RequirePosition)),
       Required(Map("task.initial_set", "X0, the set of initial states. A candidate on the bus has its own.",
                    ReadInitialSet)),
       Required(Vector("task.initial_set.center", "of the state", kReal, Size::kStates, "Its middle.")),
@@ -244,14 +344,49 @@ std::vector<Key> TaskKeys() {
       Number("task.rest.<state>", "of the state", kNotNegative,
              "Its bound, which has to hold for the whole last slice. Choose it so small that the robot's hold mode can "
              "stop the remaining motion."),
-      Required(Names("task.projection", Between(1, kMaxSafetyDim), Size::kStates,
-                     "P: the 1 to 3 states that are the coordinates of obstacles, in metres.", ReadProjectionByNames)),
-      Required(Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
-                       "P as a matrix: 1 to 3 rows, one entry for each state.", ReadProjectionMatrix)),
+      Names("task.projection", Between(1, kMaxSafetyDim), Size::kStates,
+            "P: the 1 to 3 states that are the coordinates of obstacles, in metres. The robot is this point.",
+            ReadProjectionByNames),
+      Vectors("task.projection", "", kReal, Between(1, kMaxSafetyDim), Size::kStates,
+              "P as a matrix: 1 to 3 rows, one entry for each state.", ReadProjectionMatrix),
+      Map("task.body", "The robot's body, the union of its parts. Obstacles are given in its position's coordinates.",
+          ReadBody),
+      Required(Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
+                     "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point of "
+                     "a part has entries. One name more is the heading, in radians: the frame turns by it in the first "
+                     "two coordinates. Without it the frame does not turn.")),
+      Required(List(
+          "task.body.parts", Between(1, kMaxBodyParts),
+          "Convex parts in the robot's frame, with at most " + std::to_string(kMaxBodyPoints) + " points in all.")),
+      Map("task.body.parts[]", "One of disc and hull."),
+      Map("task.body.parts[].disc", "A disc, or a ball: the points within a radius of one point."),
+      Required(Vector("task.body.parts[].disc.at", "m", kReal, Size::kPoint, "Its center.")),
+      Required(Number("task.body.parts[].disc.radius", "m", kNotNegative, "Its radius.")),
+      Map("task.body.parts[].hull", "The points within a radius of the convex hull of some points."),
+      Required(Vectors("task.body.parts[].hull.points", "m", kReal, Between(1, kMaxBodyPoints), Size::kPoint,
+                       "The points, in any order.")),
+      Optional(Number("task.body.parts[].hull.radius", "m", kNotNegative, "The radius."), "0"),
+      Optional(Word("task.between", {"samples"},
+                    "A certificate holds at its sample instants only, as in the paper. Only with `certifier.method: "
+                    "paper` may the key be absent: forereach-certifier and the commands that certify require it "
+                    "otherwise.",
+                    [](const Document&, const std::string&, TaskDraft& draft) { draft.config.says_between = true; }),
+               "samples with `certifier.method: paper`"),
+      Map("task.between",
+          "A certificate holds at all times. These are bounds on the true motion of the robot from one sample to the "
+          "next, model.dt later. `forereach declare --between` proposes them.",
+          ReadBetween),
+      Required(Vector("task.between.acceleration", "m/s^2", kNotNegative, Size::kSafety,
+                      "The largest absolute second derivative of each safety coordinate.")),
+      Number("task.between.turn_rate", "rad/s", kNotNegative,
+             "The largest absolute derivative of the heading. Required if task.body has a heading."),
+      Number("task.between.turn_acceleration", "rad/s^2", kNotNegative,
+             "The largest absolute second derivative of the heading. Required if task.body has a heading."),
       Required(List(
           "task.obstacles", Between(0, kMaxObstacles),
           "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those received on the bus count too.")),
-      Map("task.obstacles[]", "One of circle, box, polygon and half_plane.", RequireOneKind),
+      Map("task.obstacles[]", "One of circle, box, polygon and half_plane, and for an obstacle that moves motion.",
+          ReadObstacle),
       ObstacleKind("circle", "A disc; the projection has to have 2 rows.", ReadCircle),
       Required(Vector("task.obstacles[].circle.center", "m", kReal, Size::kSafety, "Its center.")),
       Required(Number("task.obstacles[].circle.radius", "m", kNotNegative, "Its radius.")),
@@ -265,6 +400,21 @@ std::vector<Key> TaskKeys() {
       Required(Vector("task.obstacles[].half_plane.normal", "", kReal, Size::kSafety,
                       "Points into the unsafe side; not zero.")),
       Required(Number("task.obstacles[].half_plane.offset", "m", kReal, "In metres if the normal has length 1.")),
+      Map("task.obstacles[].motion",
+          "How the obstacle moves; its shape is that at the start of the plan, or when `forereach obstacles` starts. "
+          "Times are seconds from there. At time t the obstacle has moved by velocity t, and lies within uncertainty + "
+          "growth |t| + growth_rate t^2 / 2 of there. Only for these two commands."),
+      Required(Vector("task.obstacles[].motion.velocity", "m/s", kReal, Size::kSafety, "Its velocity.")),
+      Optional(Number("task.obstacles[].motion.uncertainty", "m", kNotNegative, "How far off it may be at time 0."),
+               "0"),
+      Optional(Number("task.obstacles[].motion.growth", "m/s", kNotNegative, "How fast this grows."), "0"),
+      Optional(Number("task.obstacles[].motion.growth_rate", "m/s^2", kNotNegative, "How fast the growth grows."), "0"),
+      Optional(Number("task.obstacles[].motion.from", "s", kWithinDecades,
+                      "The obstacle is there from this time on. It is rounded down to microseconds."),
+               "always"),
+      Optional(Number("task.obstacles[].motion.until", "s", kWithinDecades,
+                      "The obstacle is there up to this time, and after it nowhere. It is rounded up to microseconds."),
+               "always"),
   };
 }
 

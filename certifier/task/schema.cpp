@@ -18,7 +18,8 @@ std::string Numbered(const char* what, Size size) {
     case Size::kStates: return std::string(what) + ", one a state";
     case Size::kInputs: return std::string(what) + ", one an input";
     case Size::kVariables: return std::string(what) + ", one a state and input";
-    case Size::kSafety: return std::string(what) + ", one a row of the projection";
+    case Size::kSafety: return std::string(what) + ", one a safety coordinate";
+    case Size::kPoint: return "2 or 3 " + std::string(what);
     case Size::kAny: break;
   }
   return what;

@@ -45,8 +45,8 @@ struct Key {
     kText,
     kChannel,  ///< Letters, digits and underscores, at most 63.
   };
-  /** The number of entries of a vector, or of every vector of kVectors. */
-  enum class Size { kAny, kStates, kInputs, kVariables, kSafety };
+  /** The number of entries of a vector, or of every vector of kVectors. kPoint: 2 or 3. */
+  enum class Size { kAny, kStates, kInputs, kVariables, kSafety, kPoint };
   /** Stores the checked value at `key`, with everything in it, in the draft.
   @throws ConfigError, std::invalid_argument if it contradicts values that were read before. */
   using Reader = std::function<void(const Document& file, const std::string& key, TaskDraft& draft)>;
@@ -65,8 +65,8 @@ struct Key {
   Reader read = {};  ///< Empty if the reader of the enclosing map or list reads it.
 };
 
-/** All rows, in the order in which a file is read. The model and the projection precede the keys whose names or sizes
-depend on them. */
+/** All rows, in the order in which a file is read. The model, and the projection or body, precede the keys whose names
+or sizes depend on them. */
 [[nodiscard]] std::span<const Key> Schema();
 
 /** The section "Keys" of config/README.md. */

@@ -1,6 +1,10 @@
 // What a good task file means.
 #include "certifier/task/config.h"
 
+#include <fstream>
+#include <regex>
+#include <sstream>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -119,22 +123,140 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(logger.quota_mb, 20);
 }
 
+// What the check says of the task; empty if it takes it.
+std::string Refusal(void (*require)(const Config&), const Config& config) {
+  try {
+    require(config);
+    return {};
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+}
+
+std::string RefusalOnBus(const Config& config) { return Refusal(RequireForCertifyingOnBus, config); }
+
 TEST(LoadConfig, WhoCertifiesOnABusHasToSayWhereObstaclesComeFrom) {
   const TaskFiles files;
   const Config unsaid = files.Load(kTask);
   EXPECT_EQ(unsaid.gate.obstacles, ObstaclesSource::kUnsaid) << "`forereach certify` needs none";
-  try {
-    RequireObstaclesSource(unsaid);
-    ADD_FAILURE() << "taken";
-  } catch (const ConfigError& error) {
-    EXPECT_THAT(error.what(), testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles: missing"),
-                                             testing::HasSubstr("`bus`"), testing::HasSubstr("`task`")));
-  }
+  EXPECT_NO_THROW(RequireForCertifying(unsaid));
+  EXPECT_THAT(RefusalOnBus(unsaid), testing::AllOf(testing::StartsWith(unsaid.path + ": gate.obstacles: missing"),
+                                                   testing::HasSubstr("`bus`"), testing::HasSubstr("`task`")));
   for (const auto& [word, source] : std::initializer_list<std::pair<std::string, ObstaclesSource>>{
            {"bus", ObstaclesSource::kBus}, {"task", ObstaclesSource::kTask}}) {
     const Config config = files.Load(std::string(kTask) + "gate: {obstacles: " + word + "}\n");
     EXPECT_EQ(config.gate.obstacles, source);
-    EXPECT_NO_THROW(RequireObstaclesSource(config));
+    EXPECT_EQ(RefusalOnBus(config), "");
+  }
+}
+
+TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
+  const TaskFiles files;
+  const std::string task = std::string(kTask) + "gate: {obstacles: task}\n", line = "  between: samples\n";
+  const Config unsaid = files.Load(Replaced(task, line, ""));
+  EXPECT_FALSE(unsaid.says_between);
+  EXPECT_FALSE(unsaid.problem->between) << "as logs from before the key were recorded";
+  const auto says = testing::AllOf(testing::StartsWith(unsaid.path + ": task.between: missing. Write "),
+                                   testing::HasSubstr("`between: samples`"));
+  EXPECT_THAT(Refusal(RequireForCertifying, unsaid), says);
+  EXPECT_THAT(RefusalOnBus(unsaid), says);
+  EXPECT_EQ(RefusalOnBus(files.Load(Replaced(task, line, "") + "certifier: {method: paper}\n")), "");
+
+  const Config samples = files.Load(task);
+  EXPECT_TRUE(samples.says_between);
+  EXPECT_FALSE(samples.problem->between);
+  EXPECT_EQ(RefusalOnBus(samples), "");
+  const Config bounds = files.Load(Replaced(task, "samples", "{acceleration: [3.5, 0]}"));
+  EXPECT_EQ(RefusalOnBus(bounds), "");
+  ASSERT_TRUE(bounds.problem->between);
+  EXPECT_EQ(bounds.problem->between->acceleration, Numbers({3.5, 0}));
+  EXPECT_EQ(bounds.problem->between->period, 0.15);
+  EXPECT_EQ(bounds.problem->between->turn_rate, 0);
+  EXPECT_EQ(bounds.problem->between->turn_acceleration, 0);
+}
+
+// The bicycle of a shipped task with this for its projection.
+std::string BicycleWith(const std::string& body) {
+  std::ostringstream text;
+  text << std::ifstream(FOREREACH_SOURCE_DIR "/config/demo.yaml").rdbuf();
+  const std::string task = std::regex_replace(text.str(), std::regex("  between: .*\n"), "");
+  return Replaced(Replaced(task, "  projection: [x, y]\n", body), "\ntransitions: data/demo_transitions.csv",
+                  "\ntransitions: " FOREREACH_SOURCE_DIR "/config/data/demo_transitions.csv");
+}
+
+TEST(LoadConfig, ReadsABodyThatTurns) {
+  const Problem problem = *TaskFiles()
+                               .Load(BicycleWith("  body:\n"
+                                                 "    pose: [x, y, theta]\n"
+                                                 "    parts:\n"
+                                                 "      - disc: {at: [1.4, 0], radius: 0.9}\n"
+                                                 "      - hull: {points: [[-1, 0.5], [-1, -0.5], [4, 0]]}\n"
+                                                 "      - hull: {points: [[2, 0]], radius: 0.25}\n"
+                                                 "  between: {acceleration: [1, 2], turn_rate: 3, "
+                                                 "turn_acceleration: 4}\n"))
+                               .problem;
+  EXPECT_EQ(problem.body.heading, 2);
+  ASSERT_EQ(problem.body.parts.size(), 3u);
+  EXPECT_EQ(problem.body.parts[0], (BodyPart{{{1.4, 0, 0}}, 0.9}));
+  EXPECT_EQ(problem.body.parts[1], (BodyPart{{{-1, 0.5, 0}, {-1, -0.5, 0}, {4, 0, 0}}, 0}));
+  EXPECT_EQ(problem.body.parts[2], (BodyPart{{{2, 0, 0}}, 0.25}));
+  EXPECT_EQ(problem.projection, (Eigen::MatrixXd{{1, 0, 0, 0, 0, 0}, {0, 1, 0, 0, 0, 0}}));
+  ASSERT_TRUE(problem.between);
+  EXPECT_EQ(problem.between->acceleration, Numbers({1, 2}));
+  EXPECT_EQ(problem.between->turn_rate, 3);
+  EXPECT_EQ(problem.between->turn_acceleration, 4);
+  EXPECT_EQ(problem.between->period, 0.1);
+}
+
+TEST(LoadConfig, ReadsABodyThatDoesNotTurn) {
+  const TaskFiles files;
+  const auto with = [&](const std::string& body) {
+    return *files.Load(Replaced(kTask, "  projection: [px, py]\n", "  body: " + body + "\n")).problem;
+  };
+  const Problem flat = with("{pose: [py, px], parts: [{disc: {at: [1, 2], radius: 0}}]}");
+  EXPECT_EQ(flat.body, (Body{-1, {{{{1, 2, 0}}, 0}}}));
+  EXPECT_EQ(flat.projection, (Eigen::MatrixXd{{0, 1, 0, 0}, {1, 0, 0, 0}}));
+  EXPECT_EQ(files.Load(kTask).problem->body, Body{}) << "a projection is the short form for a point";
+
+  // In space, a fourth name would be the heading.
+  for (const auto& [pose, heading] : {std::pair{"[px, py, vx]", -1}, {"[px, py, vx, vy]", 3}}) {
+    const Problem space = *files
+                               .Load(Replaced(Replaced(kTask, "  projection: [px, py]\n",
+                                                       "  body: {pose: " + std::string(pose) +
+                                                           ", parts: [{hull: {points: [[1, 2, 3], [4, 5, 6]]}}]}\n"),
+                                              "[{circle: {center: [3, 2], radius: 0.8}}]", "[]"))
+                               .problem;
+    EXPECT_EQ(space.body, (Body{heading, {{{{1, 2, 3}, {4, 5, 6}}, 0}}}));
+    EXPECT_EQ(space.projection.rows(), 3);
+  }
+}
+
+TEST(LoadConfig, ReadsObstaclesThatMove) {
+  const Config config = TaskFiles().Load(Replaced(
+      kTask, "[{circle: {center: [3, 2], radius: 0.8}}]",
+      "\n    - {motion: {velocity: [1, -2]}, circle: {center: [3, 2], radius: 0.8}}\n"
+      "    - box: {lower: [1, 1], upper: [2, 2]}\n"
+      "    - half_plane: {normal: [1, 0], offset: 9}\n"
+      "      motion: {velocity: [0, 0], uncertainty: 0.5, growth: 0.25, growth_rate: 0.125, from: -1.5, until: "
+      "0.0000019}\n"));
+  ASSERT_EQ(config.obstacles.size(), 3u);
+  EXPECT_EQ(config.obstacles[0].motion(), (ObstacleMotion{.velocity = {1, -2, 0}}));
+  EXPECT_EQ(config.obstacles[1].motion(), std::nullopt);
+  EXPECT_EQ(
+      config.obstacles[2].motion(),
+      (ObstacleMotion{.uncertainty = 0.5, .growth = 0.25, .growth_rate = 0.125, .from_us = -1'500'000, .until_us = 2}))
+      << "a window is rounded outward";
+  EXPECT_NO_THROW(RequireForCertifying(config));
+}
+
+TEST(LoadConfig, OnABusNoObstacleOfTheFileMoves) {
+  const TaskFiles files;
+  const std::string moves = Replaced(
+      kTask, "radius: 0.8}}", "radius: 0.8}}, {circle: {center: [3, 2], radius: 0.8}, motion: {velocity: [0, 0]}}");
+  for (const char* source : {"bus", "task"}) {
+    const Config config = files.Load(moves + "gate: {obstacles: " + source + "}\n");
+    EXPECT_THAT(RefusalOnBus(config), testing::AllOf(testing::StartsWith(config.path + ": task.obstacles[1].motion: "),
+                                                     testing::HasSubstr("`forereach obstacles`")));
   }
 }
 

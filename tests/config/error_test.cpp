@@ -23,9 +23,9 @@ TEST_F(ErrorTest, TheGoodTaskIsGood) { EXPECT_EQ(files_.Error(kTask), ""); }
 TEST_F(ErrorTest, UnknownKeys) {
   EXPECT_EQ(files_.ErrorWith("  noise_bound:", "  noise_bounds:"),
             "task.yaml:11: declaration.noise_bounds: unknown key; did you mean noise_bound?");
-  EXPECT_EQ(ErrorAfter("planer: {}\n"), "task.yaml:19: planer: unknown key; did you mean planner?");
+  EXPECT_EQ(ErrorAfter("planer: {}\n"), "task.yaml:20: planer: unknown key; did you mean planner?");
   EXPECT_EQ(ErrorAfter("gate: {colour: 3}\n"),
-            "task.yaml:19: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
+            "task.yaml:20: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
             "decision_budget_ms, queue, mode, arming, robot_timeout_ms, max_clock_jump_ms, "
             "obstacles, obstacles_timeout_ms, learn, require_stop, state");
   EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
@@ -34,7 +34,7 @@ TEST_F(ErrorTest, UnknownKeys) {
             "task.yaml:9: declaration.lipschitz.vx.v_y: unknown key; did you mean vy?");
   EXPECT_EQ(files_.ErrorWith("radius: 0.8", "radius: 0.8, color: red"),
             "task.yaml:18: task.obstacles[0].circle.color: unknown key; known here: center, radius");
-  EXPECT_THAT(ErrorAfter("<<: {gate: {}}\n"), StartsWith("task.yaml:19: <<: unknown key"));
+  EXPECT_THAT(ErrorAfter("<<: {gate: {}}\n"), StartsWith("task.yaml:20: <<: unknown key"));
 }
 
 TEST_F(ErrorTest, ErrorsComeInTheSchemasOrder) {
@@ -60,9 +60,128 @@ TEST_F(ErrorTest, WhatStandingIs) {
   EXPECT_EQ(error("{vx: .nan}"), "task.yaml:17: task.rest.vx: .nan is not a finite number; write a number in [0, inf)");
   EXPECT_EQ(error("{ax: 0.1}"), "task.yaml:17: task.rest.ax: unknown key; did you mean px?");
   EXPECT_EQ(ErrorAfter("gate: {require_stop: true}\n"),
-            "task.yaml:19: gate.require_stop: true, but task.rest does not say what standing is");
+            "task.yaml:20: gate.require_stop: true, but task.rest does not say what standing is");
   EXPECT_EQ(ErrorAfter("gate: {require_stop: false}\n"), "");
   EXPECT_THAT(ErrorAfter("gate: {require_stop: yes}\n"), HasSubstr("gate.require_stop: yes is not known"));
+}
+
+TEST_F(ErrorTest, Bodies) {
+  const auto error = [&](const std::string& body) {
+    return files_.ErrorWith("  projection: [px, py]", "  body: " + body);
+  };
+  const auto parts = [&](const std::string& list) { return error("{pose: [px, py], parts: " + list + "}"); };
+  const std::string good = "[{disc: {at: [1, 0], radius: 0}}]";
+  EXPECT_EQ(parts(good), "");
+  EXPECT_EQ(files_.ErrorWith("  projection: [px, py]\n", ""),
+            "task.yaml:14: task.projection: missing: the task needs this key, or task.body");
+  EXPECT_EQ(files_.ErrorWith("  projection: [px, py]\n",
+                             "  projection: [px, py]\n  body: {pose: [px, py], parts: " + good + "}\n"),
+            "task.yaml:18: task.body: the task has task.projection too; delete one of them");
+  EXPECT_THAT(error("{parts: " + good + "}"), StartsWith("task.yaml:17: task.body.pose: missing: "));
+  EXPECT_THAT(error("{pose: [px, py]}"), StartsWith("task.yaml:17: task.body.parts: missing: "));
+  EXPECT_EQ(parts("[]"), "task.yaml:17: task.body.parts: has 0 entries, which is outside [1, 16]");
+  EXPECT_EQ(parts("[{}]"), "task.yaml:17: task.body.parts[0]: has 0 keys, has to have one of disc, hull");
+  EXPECT_EQ(parts("[{disc: {at: [1, 0], radius: 0}, hull: {points: [[1, 0]]}}]"),
+            "task.yaml:17: task.body.parts[0]: has 2 keys, has to have one of disc, hull");
+  EXPECT_EQ(parts("[{ball: {}}]"), "task.yaml:17: task.body.parts[0].ball: unknown key; did you mean hull?");
+  EXPECT_THAT(parts("[{disc: {at: [1, 0]}}]"), StartsWith("task.yaml:17: task.body.parts[0].disc.radius: missing: "));
+  EXPECT_EQ(parts("[{disc: {at: [1, 0], radius: -1e-300}}]"),
+            "task.yaml:17: task.body.parts[0].disc.radius: -1e-300 is outside [0, inf)");
+  EXPECT_EQ(parts("[{disc: {at: [1, .inf], radius: 0}}]"),
+            "task.yaml:17: task.body.parts[0].disc.at[1]: .inf is not a finite number; write a number in (-inf, inf), "
+            "its unit is m");
+  EXPECT_EQ(parts("[{disc: {at: [1], radius: 0}}]"),
+            "task.yaml:17: task.body.parts[0].disc.at: has 1 entries, has to have 2 or 3");
+  EXPECT_EQ(parts("[{hull: {points: [[1, 0], [1, 0, 0, 0]]}}]"),
+            "task.yaml:17: task.body.parts[0].hull.points[1]: has 4 entries, has to have 2 or 3");
+  EXPECT_EQ(parts("[{disc: {at: [1, 0], radius: 0}}, {hull: {points: [[1, 0], [1, 0, 0]]}}]"),
+            "task.yaml:17: task.body.parts[1].hull.points[1]: has 3 entries, has to have 2, as many as the first point "
+            "of the body");
+  EXPECT_THAT(error("{pose: [px], parts: " + good + "}"), HasSubstr("task.body.pose: has 1 entries, which is outside"));
+  EXPECT_EQ(error("{pose: [px, px], parts: " + good + "}"), "task.yaml:17: task.body.pose[1]: duplicate name px");
+  EXPECT_EQ(error("{pose: [px, ax], parts: " + good + "}"),
+            "task.yaml:17: task.body.pose[1]: ax is not a coordinate; did you mean px?");
+  for (const auto& [pose, points] : {std::pair{"[px, py]", "[[1, 0, 0]]"}, {"[px, py, vx, vy]", "[[1, 0]]"}})
+    EXPECT_THAT(error("{pose: " + std::string(pose) + ", parts: [{hull: {points: " + points + "}}]}"),
+                testing::AllOf(StartsWith("task.yaml:17: task.body.pose: has "),
+                               HasSubstr(", as many as the points of the body, or one more, the heading")));
+}
+
+TEST_F(ErrorTest, ABodyHasAtMostSixteenPointsInAll) {
+  const auto error = [&](int hull, int discs) {
+    std::string parts = "[{hull: {points: [[0, 0]";
+    for (int i = 1; i < hull; ++i) parts += ", [0, " + std::to_string(i) + "]";
+    parts += "]}}";
+    for (int i = 0; i < discs; ++i) parts += ", {disc: {at: [0, 0], radius: 1}}";
+    return files_.ErrorWith("  projection: [px, py]", "  body: {pose: [px, py], parts: " + parts + "]}");
+  };
+  EXPECT_EQ(error(16, 0), "");
+  EXPECT_EQ(error(1, 15), "");
+  EXPECT_EQ(error(9, 7), "");
+  EXPECT_EQ(error(17, 0), "task.yaml:17: task.body.parts[0].hull.points: has 17 entries, which is outside [1, 16]");
+  EXPECT_EQ(error(1, 16), "task.yaml:17: task.body.parts: has 17 entries, which is outside [1, 16]");
+  EXPECT_EQ(error(9, 8), "task.yaml:17: task.body.parts: have 17 points, which is outside [1, 16]");
+}
+
+TEST_F(ErrorTest, BoundsBetweenSamples) {
+  const auto error = [&](const std::string& between) {
+    return files_.ErrorWith("between: samples", "between: " + between);
+  };
+  EXPECT_EQ(error("{acceleration: [0, 1]}"), "");
+  EXPECT_EQ(error("sample"), "task.yaml:19: task.between: sample is not known; did you mean samples?");
+  EXPECT_EQ(error("[1, 1]"), "task.yaml:19: task.between: a list is not a word or a map");
+  EXPECT_THAT(error("{}"), StartsWith("task.yaml:19: task.between.acceleration: missing: "));
+  EXPECT_EQ(error("{acceleration: [-1e-300, 1]}"),
+            "task.yaml:19: task.between.acceleration[0]: -1e-300 is outside [0, inf)");
+  EXPECT_EQ(error("{acceleration: [1]}"),
+            "task.yaml:19: task.between.acceleration: has 1 entries, has to have 2, one a safety coordinate "
+            "(task.projection or task.body)");
+  EXPECT_EQ(error("{acceleration: [1, 1], turn_rate: 0}"),
+            "task.yaml:19: task.between.turn_rate: is for a body with a heading, the last name of task.body.pose");
+  EXPECT_EQ(error("{acceleration: [1, 1], turn_acceleration: 0}"),
+            "task.yaml:19: task.between.turn_acceleration: is for a body with a heading, the last name of "
+            "task.body.pose");
+
+  const auto turning = [&](const std::string& between) {
+    const std::string body = "  body: {pose: [px, py, vx], parts: [{disc: {at: [1, 0], radius: 1}}]}";
+    return files_.Error(Replaced(Replaced(kTask, "  projection: [px, py]", body), "between: samples",
+                                 "between: {acceleration: [1, 1]" + between + "}"));
+  };
+  EXPECT_EQ(turning(", turn_rate: 0, turn_acceleration: 0"), "");
+  EXPECT_EQ(turning(", turn_rate: 0"),
+            "task.yaml:19: task.between.turn_acceleration: missing: task.body has a heading, so the bound is needed");
+  EXPECT_EQ(turning(""),
+            "task.yaml:19: task.between.turn_rate: missing: task.body has a heading, so the bound is needed");
+  EXPECT_EQ(turning(", turn_rate: -1, turn_acceleration: 0"),
+            "task.yaml:19: task.between.turn_rate: -1 is outside [0, inf)");
+}
+
+TEST_F(ErrorTest, MotionsOfObstacles) {
+  const auto error = [&](const std::string& motion) {
+    return files_.ErrorWith("radius: 0.8}}", "radius: 0.8}, motion: " + motion + "}");
+  };
+  const auto with = [&](const std::string& rest) { return error("{velocity: [1, 1], " + rest + "}"); };
+  EXPECT_EQ(error("{velocity: [1, 1]}"), "");
+  EXPECT_THAT(error("{}"), StartsWith("task.yaml:18: task.obstacles[0].motion.velocity: missing: "));
+  EXPECT_EQ(error("{velocity: [1, 1, 0]}"),
+            "task.yaml:18: task.obstacles[0].motion.velocity: has 3 entries, has to have 2, one a safety coordinate "
+            "(task.projection or task.body)");
+  for (const std::string name : {"uncertainty", "growth", "growth_rate"}) {
+    EXPECT_EQ(with(name + ": 0"), "");
+    EXPECT_EQ(with(name + ": -1"), "task.yaml:18: task.obstacles[0].motion." + name + ": -1 is outside [0, inf)");
+  }
+  for (const std::string name : {"from", "until"}) {
+    for (const char* end : {"-1e9", "1e9"}) EXPECT_EQ(with(name + ": " + end), "");
+    EXPECT_EQ(with(name + ": 1000000001"),
+              "task.yaml:18: task.obstacles[0].motion." + name + ": 1000000001 is outside [-1e+09, 1e+09]");
+  }
+  EXPECT_EQ(with("from: 1, until: 1"), "");
+  EXPECT_EQ(
+      with("from: 1, until: 0.5"),
+      "task.yaml:18: task.obstacles[0].motion.until: 0.5 is outside [1, inf), below task.obstacles[0].motion.from");
+  EXPECT_EQ(
+      files_.ErrorWith("{circle: {center: [3, 2], radius: 0.8}}", "{motion: {velocity: [1, 1]}}"),
+      "task.yaml:18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane");
 }
 
 TEST_F(ErrorTest, KeysOfAnotherModel) {
@@ -71,9 +190,9 @@ TEST_F(ErrorTest, KeysOfAnotherModel) {
   EXPECT_EQ(files_.ErrorWith("point_mass", "kinematic_bicycle"),
             "task.yaml:1: model.wheelbase: missing: Distance between the axles.");
   EXPECT_EQ(ErrorAfter("robot: {residual: {name: velocity_knee, friction: 1}}\n"),
-            "task.yaml:19: robot.residual.friction: is for heading_saturation, not for velocity_knee");
+            "task.yaml:20: robot.residual.friction: is for heading_saturation, not for velocity_knee");
   EXPECT_EQ(ErrorAfter("robot: {residual: {name: heading_saturation}}\n"),
-            "task.yaml:19: robot.residual.name: heading_saturation is for kinematic_bicycle, the model is point_mass");
+            "task.yaml:20: robot.residual.name: heading_saturation is for kinematic_bicycle, the model is point_mass");
 }
 
 TEST_F(ErrorTest, MissingKeys) {
@@ -84,15 +203,15 @@ TEST_F(ErrorTest, MissingKeys) {
   EXPECT_THAT(files_.ErrorWith(", radius: 0.8", ""),
               StartsWith("task.yaml:18: task.obstacles[0].circle.radius: missing: "));
   EXPECT_EQ(ErrorAfter("planner: {source: policy}\n"),
-            "task.yaml:19: planner.policy: missing: a policy's file, for planner.source: policy");
-  EXPECT_THAT(ErrorAfter("robot: {residual: {}}\n"), StartsWith("task.yaml:19: robot.residual.name: missing: "));
+            "task.yaml:20: planner.policy: missing: a policy's file, for planner.source: policy");
+  EXPECT_THAT(ErrorAfter("robot: {residual: {}}\n"), StartsWith("task.yaml:20: robot.residual.name: missing: "));
 }
 
 TEST_F(ErrorTest, DoubleKeys) {
   EXPECT_EQ(files_.ErrorWith("vy: 0.05}", "vx: 0.05}"),
             "task.yaml:9: declaration.lipschitz.vx.vx: duplicate key, first in line 9; delete one of them");
   EXPECT_EQ(ErrorAfter("transitions: other.csv\n"),
-            "task.yaml:19: transitions: duplicate key, first in line 12; delete one of them");
+            "task.yaml:20: transitions: duplicate key, first in line 12; delete one of them");
 }
 
 TEST_F(ErrorTest, SizesThatDoNotFit) {
@@ -101,8 +220,8 @@ TEST_F(ErrorTest, SizesThatDoNotFit) {
   EXPECT_EQ(files_.ErrorWith("{lower: [-3, -3]", "{lower: [-3]"),
             "task.yaml:6: domain.input.lower: has 1 entries, has to have 2: ax, ay");
   EXPECT_EQ(files_.ErrorWith("center: [3, 2]", "center: [3, 2, 1]"),
-            "task.yaml:18: task.obstacles[0].circle.center: has 3 entries, has to have 2, as many as task.projection "
-            "has rows");
+            "task.yaml:18: task.obstacles[0].circle.center: has 3 entries, has to have 2, one a safety coordinate "
+            "(task.projection or task.body)");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[[1, 0, 0]]"),
             "task.yaml:17: task.projection[0]: has 3 entries, has to have 4: px, py, vx, vy");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, py, vx, vy]"),
@@ -110,7 +229,8 @@ TEST_F(ErrorTest, SizesThatDoNotFit) {
   EXPECT_EQ(files_.ErrorWith("  input: {", "  balls: [{coordinates: [vx, vy], center: [0], radius: 1}]\n  input: {"),
             "task.yaml:6: domain.balls[0].center: has 1 entries, has to have 2, as many as coordinates");
   EXPECT_EQ(ErrorAfter("planner: {goal: [1, 2, 3]}\n"),
-            "task.yaml:19: planner.goal: has 3 entries, has to have 2, as many as task.projection has rows");
+            "task.yaml:20: planner.goal: has 3 entries, has to have 2, one a safety coordinate (task.projection or "
+            "task.body)");
 }
 
 TEST_F(ErrorTest, MatricesThatDoNotFit) {
@@ -143,15 +263,15 @@ TEST_F(ErrorTest, NumbersOutsideTheirRange) {
             "task.yaml:16: task.initial_set.half_width[3]: -0.1 is outside [0, inf)");
   EXPECT_EQ(files_.ErrorWith("radius: 0.8", "radius: -0.8"),
             "task.yaml:18: task.obstacles[0].circle.radius: -0.8 is outside [0, inf)");
-  EXPECT_EQ(ErrorAfter("gate: {max_age_ms: 0}\n"), "task.yaml:19: gate.max_age_ms: 0 is outside (0, 3600000]");
-  EXPECT_EQ(ErrorAfter("gate: {queue: 0}\n"), "task.yaml:19: gate.queue: 0 is outside [1, 65536]");
+  EXPECT_EQ(ErrorAfter("gate: {max_age_ms: 0}\n"), "task.yaml:20: gate.max_age_ms: 0 is outside (0, 3600000]");
+  EXPECT_EQ(ErrorAfter("gate: {queue: 0}\n"), "task.yaml:20: gate.queue: 0 is outside [1, 65536]");
   EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 0}\n"),
-            "task.yaml:19: certifier.zonotope_order: 0 is outside [1, 112]");
+            "task.yaml:20: certifier.zonotope_order: 0 is outside [1, 112]");
   EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 27}\n"),
-            "task.yaml:19: certifier.zonotope_order: 27 is outside [1, 26] for 4 states");
+            "task.yaml:20: certifier.zonotope_order: 27 is outside [1, 26] for 4 states");
   EXPECT_EQ(
       ErrorAfter("planner: {progress_steps: 100, tail_steps: 29}\n"),
-      "task.yaml:19: planner.tail_steps: 29 is outside [0, 28]: with progress_steps 129 steps, a plan has at most 128");
+      "task.yaml:20: planner.tail_steps: 29 is outside [0, 28]: with progress_steps 129 steps, a plan has at most 128");
 }
 
 TEST_F(ErrorTest, TheLargestOrderIsAccepted) { EXPECT_EQ(ErrorAfter("certifier: {zonotope_order: 26}\n"), ""); }
@@ -207,7 +327,7 @@ TEST_F(ErrorTest, NumbersThatAreWrittenOtherwise) {
                    "integer in [1, 65536]"}};
   for (const auto& [written, error] : of_queue)
     EXPECT_EQ(ErrorAfter(std::string("gate: {queue: ") + written + "}\n"),
-              std::string("task.yaml:19: gate.queue: ") + error);
+              std::string("task.yaml:20: gate.queue: ") + error);
   EXPECT_EQ(files_.ErrorWith("    upper: [20, 20, 5.4, 5.4]", "    upper: [20, '20', 5.4, 5.4]"),
             "task.yaml:5: domain.state.upper[1]: \"20\" is quoted text, not a number; write 20 without quotes");
 }
@@ -218,11 +338,11 @@ TEST_F(ErrorTest, YamlThatReadsOtherwiseThanItLooks) {
   EXPECT_THAT(files_.ErrorWith("  lipschitz:", "\tlipschitz:"),
               testing::EndsWith("; line 8 is indented with a tab, write spaces"));
   EXPECT_EQ(ErrorAfter("robot:\n  time_limit_s: 0,5\n"),
-            "task.yaml:20: robot.time_limit_s: 0,5 is not a number; write 0.5, with a point");
+            "task.yaml:21: robot.time_limit_s: 0,5 is not a number; write 0.5, with a point");
 }
 
 TEST_F(ErrorTest, ValuesOfAnotherType) {
-  EXPECT_EQ(ErrorAfter("gate: 3\n"), "task.yaml:19: gate: 3 is not a map");
+  EXPECT_EQ(ErrorAfter("gate: 3\n"), "task.yaml:20: gate: 3 is not a map");
   EXPECT_EQ(files_.ErrorWith("center: [0, 0, 1, 0]", "center: [0, 0, fast, 0]"),
             "task.yaml:15: task.initial_set.center[2]: fast is not a number; write a number in (-inf, inf)");
   EXPECT_EQ(files_.ErrorWith("center: [0, 0, 1, 0]", "center: 1"),
@@ -233,26 +353,27 @@ TEST_F(ErrorTest, WordsThatAreNotKnown) {
   EXPECT_EQ(files_.ErrorWith("point_mass", "pointmass"),
             "task.yaml:1: model.name: pointmass is not known; did you mean point_mass?");
   EXPECT_EQ(ErrorAfter("certifier: {method: magic}\n"),
-            "task.yaml:19: certifier.method: magic is not known; known here: centred, paper");
+            "task.yaml:20: certifier.method: magic is not known; known here: centred, paper");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, pz]"),
             "task.yaml:17: task.projection[1]: pz is not a coordinate; did you mean px?");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, ax]"),
             "task.yaml:17: task.projection[1]: ax is not a coordinate; did you mean px?");
   EXPECT_EQ(files_.ErrorWith("[px, py]", "[px, px]"), "task.yaml:17: task.projection[1]: duplicate name px");
   EXPECT_EQ(ErrorAfter("bus: {channels: {status: 'A.*'}}\n"),
-            "task.yaml:19: bus.channels.status: A.* is not 1 to 63 letters, digits and underscores");
+            "task.yaml:20: bus.channels.status: A.* is not 1 to 63 letters, digits and underscores");
   EXPECT_EQ(ErrorAfter("bus: {channels: {status: PLAN_DECISION}}\n"),
-            "task.yaml:19: bus.channels.status: PLAN_DECISION is the name of another channel too");
+            "task.yaml:20: bus.channels.status: PLAN_DECISION is the name of another channel too");
   EXPECT_EQ(ErrorAfter("logger: {rotate_mb: 20, quota_mb: 10}\n"),
-            "task.yaml:19: logger.quota_mb: 10 is less than logger.rotate_mb, 20");
+            "task.yaml:20: logger.quota_mb: 10 is less than logger.rotate_mb, 20");
 }
 
 TEST_F(ErrorTest, ObstaclesThatMakeNoSense) {
   const auto with = [&](const std::string& obstacle) {
     return files_.ErrorWith("{circle: {center: [3, 2], radius: 0.8}}", obstacle);
   };
-  EXPECT_EQ(with("{}"),
-            "task.yaml:18: task.obstacles[0]: has 0 keys, has to have one of circle, box, polygon, half_plane");
+  EXPECT_EQ(
+      with("{}"),
+      "task.yaml:18: task.obstacles[0]: has 0 keys of a shape, has to have one of circle, box, polygon, half_plane");
   EXPECT_THAT(with("{half_plane: {normal: [0, 0], offset: 1}}"),
               StartsWith("task.yaml:18: task.obstacles[0].half_plane: "));
   EXPECT_EQ(

@@ -39,6 +39,7 @@ inline Config SmallTask() {
   config.obstacles = {Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5)};
   config.gate.needs_robot_state = false;
   config.gate.obstacles = ObstaclesSource::kTask;
+  config.says_between = true;
   config.grounds = GroundsOf(DigestOf(std::string_view("small task")), problem, config.obstacles);
   config.problem = std::make_shared<const Problem>(std::move(problem));
   return config;

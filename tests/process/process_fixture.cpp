@@ -42,6 +42,7 @@ transitions: )" FOREREACH_SOURCE_DIR R"(/config/data/point_mass_100.csv
 task:
   initial_set: {center: [0, 0, 0, 0], half_width: [0.05, 0.05, 0.03, 0.03]}
   projection: [px, py]
+  between: samples
   obstacles:
     - circle: {center: [0, 2], radius: 0.8}
 gate: {max_age_ms: 20000, max_ahead_ms: 50, certificate_lifetime_ms: 60000, arming: none, max_clock_jump_ms: 10000,

@@ -9,6 +9,7 @@
 
 #include "bus/authentic_bus.h"
 #include "certifier/dynamics/models.h"
+#include "certifier/gate/obstacle_message.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -524,6 +525,38 @@ TEST(RobotSim, ReportsContactAtEveryBoundaryInsideAnObstacle) {
   EXPECT_NEAR(rig.First(kContact).value, 1 - 0.045 - 0.96, 1e-12);
   EXPECT_EQ(GetText(rig.First(kContact).message), "inside obstacle 1");
   EXPECT_EQ(rig.Summary()["contacts"], 2);
+}
+
+TEST(RobotSim, ReportsContactWithAnObstacleOfTheBusThatAppearsOnTheWay) {
+  Config config = PointMassTask();
+  config.gate.obstacles = ObstaclesSource::kBus;
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(2);
+  obstacles_t message = ToMessage({Obstacle::Circle(Eigen::Vector2d(1, 0), 0.96)});
+  message.utime = BoundaryTime(2);
+  rig.SendRaw("OBSTACLES", Bytes(Encode(message)));
+  rig.RunTo(4);
+  EXPECT_EQ(rig.Count(kContact), 2) << "as with one of the file";
+  EXPECT_EQ(rig.First(kContact).utime, BoundaryTime(3));
+}
+
+TEST(RobotSim, BulgesBetweenItsSamplesWhileItMoves) {
+  Config config = PointMassTask();
+  Problem problem = *config.problem;
+  problem.between = Between{Eigen::Vector2d(0, 4), 0, 0, 0.15};
+  config.problem = std::make_shared<const Problem>(problem);
+  const double bulge = 4 * 0.15 * 0.15 / 8;  // at 0, 0.011 and 0.045 the middles of steps are at 0.0055 and 0.028
+  config.obstacles = {Obstacle::Circle(Eigen::Vector2d((0.01125 + 0.045) / 2, 1 + bulge - 1e-9), 1)};
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(9);
+  ASSERT_EQ(rig.Count(kContact), 1);
+  EXPECT_EQ(rig.First(kContact).utime, BoundaryTime(3));
+  EXPECT_NEAR(rig.First(kContact).value, -1e-9, 1e-12);
+  EXPECT_EQ(GetText(rig.First(kContact).message), "inside obstacle 0, 0.5 of a step after the last sample");
 }
 
 TEST(RobotSim, ALateTickGivesTheSameRun) {
