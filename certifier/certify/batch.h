@@ -20,7 +20,7 @@ depend on the number of threads.
 @param initial_sets X_0 of each plan, or a single one for all plans.
 @param threads at least 1, including the calling thread; no more than one thread for each plan is used.
 @throws std::invalid_argument if threads is 0, or the number of initial sets is neither 1 nor the number of plans.
-Cost: the sum of the calls divided by the cores; each thread has a Tube of about 2 MB.
+Cost: the sum of the calls divided by the cores; each thread has a Tube of about 2.5 MB.
 @pre Certifier::Require passes for each plan. */
 [[nodiscard]] std::vector<Decision> CertifyAll(const Certifier& certifier, std::span<const Plan> plans,
                                                std::span<const Zonotope> initial_sets,

@@ -7,7 +7,6 @@
 
 #include "certifier/numerics/arithmetic.h"
 #include "certifier/numerics/size.h"
-#include "certifier/safety/separation.h"
 
 namespace forereach {
 namespace {
@@ -112,7 +111,7 @@ Certifier::Observed::Observed(const Problem& problem) : store(MakeStore(problem)
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
     : problem_((Validated(problem), std::move(problem))),
-      projection_(problem_->projection, problem_->model->num_states()),
+      safety_(*problem_),
       observed_(std::in_place, *problem_),
       violation_(observed_->known.violation()),
       propagator_(*problem_->model, problem_->domain, observed_->known, problem_->zonotope_order, problem_->method,
@@ -120,7 +119,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
     : problem_((Validated(problem), std::move(problem))),
-      projection_(problem_->projection, problem_->model->num_states()),
+      safety_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->zonotope_order, problem_->method,
                   problem_->instructions) {}
 
@@ -148,6 +147,11 @@ std::optional<Certifier::Misfit> Certifier::FindMisfit(const Plan& plan) const {
   if (plan.num_steps < 1 || plan.num_steps > kMaxSteps)
     return size(number(plan.num_steps) + " steps, must be 1 to " + number(kMaxSteps));
   if (plan.controls == nullptr) return size("no controls, its pointer is null");
+  const auto& [start, step, error] = plan.schedule;
+  constexpr std::int64_t kLatest = Schedule::kLatest, kLongest = Schedule::kLongest;
+  if (start < -kLatest || start > kLatest || step < 0 || step > kLongest || error < 0 || error > kLongest)
+    return size("its schedule starts at " + number(start) + " us with steps of " + number(step) +
+                " us and a clock error of " + number(error) + " us, must be within 2^60, [0, 2^40] and [0, 2^40]");
   for (int t = 0; t < plan.num_steps; ++t)
     for (std::size_t k = 0; k < plan.input(t).size(); ++k)
       if (!std::isfinite(plan.input(t)[k]))
@@ -158,6 +162,9 @@ std::optional<Certifier::Misfit> Certifier::FindMisfit(const Plan& plan) const {
 
 void Certifier::Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const {
   if (const auto misfit = FindMisfit(plan)) throw std::invalid_argument(misfit->what);
+  const bool moves =
+      std::ranges::any_of(obstacles, [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
+  RequireThat(!moves || plan.schedule.step_us > 0, "plan: no schedule, and an obstacle moves");
   Require(initial_set, obstacles);
 }
 
@@ -171,9 +178,9 @@ void Certifier::Require(const Zonotope& initial_set, std::span<const Obstacle> o
                                                         " generators, must be at most " + number(most) +
                                                         ", the zonotope order times the states");
   for (std::size_t o = 0; o < obstacles.size(); ++o)
-    RequireThat(obstacles[o].dim() == projection_.dim(),
+    RequireThat(obstacles[o].dim() == projection().dim(),
                 "obstacle " + std::to_string(o) + ": dimension " + std::to_string(obstacles[o].dim()) +
-                    ", the projection has " + std::to_string(projection_.dim()));
+                    ", the projection has " + std::to_string(projection().dim()));
 }
 
 Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles,
@@ -184,7 +191,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   if (violation()) return Falsified(*violation());
   Decision decision = Propagate(plan, tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
-  if (decision.outcome == Outcome::kNone) decision = JudgeSafety(obstacles, tube);
+  if (decision.outcome == Outcome::kNone) decision = safety_.Judge(obstacles, plan.schedule, tube);
   for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;
   return decision;
 }
@@ -216,86 +223,6 @@ Decision Certifier::JudgeRest(const Tube& tube) const noexcept {
     break;
   }
   return decision;
-}
-
-namespace {
-
-// The closest approach found so far.
-struct Closest {
-  double clearance = kInfinity;
-  int step = -1, obstacle = -1;
-  Separation separation{kInfinity, 0};
-
-  void Consider(const Separation& found, int t, int o) noexcept { Consider(found, found.clearance(), t, o); }
-  void Consider(const Separation& found, double its_clearance, int t, int o) noexcept {
-    if (its_clearance < clearance) *this = {its_clearance, t, o, found};
-  }
-};
-
-Decision Judged(Outcome outcome, const Closest& closest) {
-  Decision decision;
-  decision.outcome = outcome;
-  decision.obstacle = closest.obstacle;
-  decision.closest_step = closest.step;
-  decision.margin = closest.separation.distance;
-  decision.threshold = closest.separation.threshold;
-  if (outcome == Outcome::kSafety) {
-    decision.cause = Cause::kObstacle;
-    decision.step = closest.step;
-  }
-  return decision;
-}
-
-}  // namespace
-
-Separation Certifier::SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept {
-  return BetterOf(SeparateHulls(projection_.EncloseHull(tube.slice(t), tube.half_width(t)), obstacle), tube, t,
-                  obstacle);
-}
-
-Separation Certifier::BetterOf(const Separation& by_hulls, const Tube& tube, int t,
-                               const Obstacle& obstacle) const noexcept {
-  Zonotope projected;
-  projection_.Enclose(tube.slice(t), tube.half_width(t), projected);
-  const Separation best = Separate(projected, obstacle, problem_->instructions);
-  return best.distance > by_hulls.distance ? best : by_hulls;
-}
-
-// Interval hulls settle what is far away. What they do not prove, and then what they leave as possibly closest, is
-// settled by the best direction.
-Decision Certifier::JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept {
-  Closest by_hull, closest;
-  double next_by_hull = kInfinity;  // the second smallest clearance by hulls
-  const auto separate = [&](int t, int o, const Separation& by_hulls) {
-    return BetterOf(by_hulls, tube, t, obstacles[ToSize(o)]);
-  };
-  const int count = static_cast<int>(obstacles.size());
-  for (int t = 0; t <= tube.length(); ++t) {
-    const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
-    for (int o = 0; o < count; ++o) {
-      const Separation by_hulls = SeparateHulls(hull, obstacles[ToSize(o)]);
-      if (by_hulls.IsProven()) {
-        const double clearance = by_hulls.clearance();
-        next_by_hull = std::min(next_by_hull, std::max(clearance, by_hull.clearance));
-        by_hull.Consider(by_hulls, clearance, t, o);
-        continue;
-      }
-      const Separation best = separate(t, o, by_hulls);
-      if (!best.IsProven()) return Judged(Outcome::kSafety, {best.clearance(), t, o, best});
-      closest.Consider(best, t, o);
-    }
-  }
-  if (by_hull.clearance < closest.clearance)
-    closest.Consider(separate(by_hull.step, by_hull.obstacle, by_hull.separation), by_hull.step, by_hull.obstacle);
-  for (int t = 0; t <= tube.length() && next_by_hull < closest.clearance; ++t) {
-    const Hull hull = projection_.EncloseHull(tube.slice(t), tube.half_width(t));
-    for (int o = 0; o < count; ++o) {
-      const Separation by_hulls = SeparateHulls(hull, obstacles[ToSize(o)]);
-      if (!by_hulls.IsProven() || by_hulls.clearance() >= closest.clearance) continue;
-      if (t != closest.step || o != closest.obstacle) closest.Consider(separate(t, o, by_hulls), t, o);
-    }
-  }
-  return Judged(Outcome::kCertified, closest);
 }
 
 }  // namespace forereach

@@ -12,11 +12,11 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 #include "certifier/certify/decision.h"
 #include "certifier/certify/learned.h"
 #include "certifier/certify/problem.h"
+#include "certifier/certify/safety.h"
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/enclosure.h"
 #include "certifier/residual/observation_store.h"
 #include "certifier/safety/projection.h"
-#include "certifier/safety/separation.h"
 
 namespace forereach {
 
@@ -35,7 +35,7 @@ class Certifier final {
   Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual);
 
   [[nodiscard]] const Problem& problem() const { return *problem_; }
-  [[nodiscard]] const Projection& projection() const { return projection_; }
+  [[nodiscard]] const Projection& projection() const { return safety_.placement().projection(); }
   /** The pair of observations that contradicts the declaration, Eq. (falsification), if there is one. Learned
   observations are numbered after those of the problem. */
   [[nodiscard]] const std::optional<Violation>& violation() const { return violation_; }
@@ -57,32 +57,45 @@ class Certifier final {
   index. */
   void Compact() { observed_->store.Compact(); }
 
-  /** The proven distance between P X_t of a tube and an obstacle: the larger of the bounds by interval hulls and by the
-  best direction. @pre 0 <= t <= tube.length(). */
-  [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle) const noexcept;
+  /** The test of a tube against obstacles, and the distances of a tube to them (safety.h). */
+  [[nodiscard]] const SafetyTest& safety() const { return safety_; }
+  /** The last test of Certify alone, from the unit `first_step` on, for a tube of this certifier that Certify has
+  completed: whether the remaining steps of a plan hold, too, among other obstacles. @pre as Certify. */
+  [[nodiscard]] Decision JudgeSafety(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
+                                     int first_step) const noexcept {
+    return safety_.Judge(obstacles, schedule, tube, first_step);
+  }
+  /** SafetyTest::Separate. */
+  [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle,
+                                         const Schedule& schedule = {}) const {
+    return safety_.Separate(tube, t, obstacle, schedule).separation;
+  }
 
   /** What keeps a plan from being certified: `what` names value and bound. */
   struct Misfit {
     enum class Kind { kSize, kNumber } kind;
     std::string what;
   };
-  /** The first misfit of a plan: sizes other than the problem's or not 1..kMaxSteps steps, then a control that is not
-  finite. Nothing if there is none. Its controls are read only if the sizes fit. */
+  /** The first misfit of a plan: sizes other than the problem's, not 1..kMaxSteps steps or a schedule out of its bounds
+  (motion.h), then a control that is not finite. Nothing if there is none. Its controls are read only if the sizes fit.
+*/
   [[nodiscard]] std::optional<Misfit> FindMisfit(const Plan& plan) const;
 
   /** Checks the preconditions of Certify: a plan without a misfit, X_0 in the states with at most order * n generators,
-  obstacles of the safety dimension p. @throws std::invalid_argument with the value and its bound if one is violated. */
+  obstacles of the safety dimension p, and a schedule if one of them moves. @throws std::invalid_argument with the value
+  and its bound if one is violated. */
   void Require(const Plan& plan, const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
   /** The same without the plan, which FindMisfit has passed. */
   void Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
 
   /** Decides whether the plan is safe for every admissible residual and every initial state in `initial_set`. The
   outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, `tube.slice(t)` contains every
-  reachable state and its projection is disjoint from every obstacle (Theorem "ForeReach containment").
+  reachable state and the body there is disjoint from every obstacle (Theorem "ForeReach containment"); with
+  Problem::between also at all times between these samples, for every motion within the declared bounds.
 
   The tests run in this order. First F. Then, for t < T, the domain, the remainder and the envelope; the first failure
   ends the run. After the horizon, the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then
-  S, for t in 0..T; the first unsafe t is reported. X_T is not tested against the domain.
+  S, for each sample or step t (safety.h); the first unsafe t is reported. X_T is not tested against the domain.
   @param tube receives the slices. @pre Require passes.
   Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
   it, each with its own tube. */
@@ -91,12 +104,8 @@ class Certifier final {
 
  private:
   [[nodiscard]] Decision Propagate(const Plan& plan, Tube& tube) const noexcept;
-  /** SeparateSlice, given the result by hulls. */
-  [[nodiscard]] Separation BetterOf(const Separation& by_hulls, const Tube& tube, int t,
-                                    const Obstacle& obstacle) const noexcept;
   /** Outcome kNone if the last slice is provably at rest. */
   [[nodiscard]] Decision JudgeRest(const Tube& tube) const noexcept;
-  [[nodiscard]] Decision JudgeSafety(std::span<const Obstacle> obstacles, const Tube& tube) const noexcept;
 
   struct Observed {
     explicit Observed(const Problem& problem);
@@ -106,7 +115,7 @@ class Certifier final {
   };
 
   std::shared_ptr<const Problem> problem_;
-  Projection projection_;
+  SafetyTest safety_;
   std::optional<Observed> observed_;  // none where an enclosure was given; propagator_ refers to it
   std::optional<Violation> violation_;
   Propagator propagator_;

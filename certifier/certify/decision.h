@@ -12,6 +12,7 @@
 #include "certifier/reach/propagator.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/safety/motion.h"
+#include "certifier/safety/separation.h"
 #include "certifier/sets/zonotope.h"
 
 namespace forereach {
@@ -63,10 +64,10 @@ struct Plan {
 };
 
 /** The computed part of the reachable tube: slices X_0 .. X_length and a record of each completed step. Construct it
-once and reuse it for every plan: it has room for the longest horizon, about 2 MB. */
+once and reuse it for every plan: it has room for the longest horizon, about 2.5 MB. */
 class Tube final {
  public:
-  Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps + 1) {}
+  Tube() : slices_(kMaxSteps + 1), steps_(kMaxSteps + 1), places_(kMaxPieces) {}
 
   /** Upper bounds on the half-widths of the hull of X_t, t <= length(). */
   [[nodiscard]] std::span<const double> half_width(int t) const {
@@ -84,8 +85,10 @@ class Tube final {
 
  private:
   friend class Certifier;
+  friend class SafetyTest;
   std::vector<Zonotope> slices_;
   std::vector<StepRecord> steps_;
+  std::vector<Zonotope> places_;  // scratch memory of SafetyTest
   int length_ = 0;
 };
 

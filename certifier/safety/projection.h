@@ -15,6 +15,8 @@ class Projection final {
   Projection(const Eigen::MatrixXd& matrix, int num_states);
 
   [[nodiscard]] int dim() const { return dim_; }
+  /** The nonzero entries of P. */
+  [[nodiscard]] std::span<const MatrixEntry> entries() const { return entries_; }
 
   /** A hull that contains Box(P X). It depends only on the center of X and on the half-widths of its hull.
   @param half_width n upper bounds on the half-widths of Box(X). Cost O(nonzeros of P). */

@@ -13,15 +13,18 @@ namespace {
 
 using Vector = Eigen::Vector3d;  // unused coordinates are zero
 
-// The dual bound along a direction of unit length up to rounding, in plain arithmetic less a margin above its rounding.
-double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
+// The dual bound for a piece along a direction of unit length up to rounding, in plain arithmetic less a margin above
+// its rounding.
+double PlainDistanceLower(const Piece& piece, const Obstacle& obstacle, const Vector& d) noexcept {
+  const Zonotope& slice = *piece.set;
   constexpr double kMargin = 0x1p-45, kTiny = 0x1p-1000;
   double core = kInfinity, size = kTiny;
   for (const Vector& point : obstacle.hull()) core = std::min(core, d.dot(point));
   alignas(32) std::array<double, kMaxGenerators> along;
   std::fill_n(along.begin(), slice.padded_size(), 0.0);
-  double spread = 0, center = 0;
+  double spread = 0, center = 0, shifted = 0;
   for (int i = 0; i < slice.dim(); ++i) {
+    const Interval& shift = piece.shift[ToSize(i)];
     const double* row = slice.padded_row(i).data();
     Lanes sum = AllLanes(0);
     for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
@@ -30,20 +33,22 @@ double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const
       sum += Abs(part);
     }
     center += d[i] * slice.center(i);
+    shifted += std::min(d[i] * shift.lower, d[i] * shift.upper);
     spread += std::abs(d[i]) * slice.slack(i);
-    size +=
-        std::abs(d[i]) * (std::abs(slice.center(i)) + std::abs(obstacle.lower()[i]) + std::abs(obstacle.upper()[i])) +
-        Sum(sum);
+    size += std::abs(d[i]) * (std::abs(slice.center(i)) + shift.Magnitude() + std::abs(obstacle.lower()[i]) +
+                              std::abs(obstacle.upper()[i])) +
+            Sum(sum);
   }
   Lanes sum = AllLanes(0);
   for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) sum += Abs(LoadLanes(&along[j]));
   spread += Sum(sum);
-  const double gap = core - center - spread - RoundingError(kMargin, size);
-  return gap > 0 && gap < kInfinity ? gap * (1 - kMargin) : -kInfinity;
+  const double gap = core - center - spread + shifted - RoundingError(kMargin, size);
+  return gap > 0 && gap < kInfinity ? SubDown(gap * (1 - kMargin), piece.ball) : -kInfinity;
 }
 
-// The dual bound along d, rounded against us.
-[[gnu::noinline]] double DistanceLower(const Zonotope& slice, const Obstacle& obstacle, const Vector& d) noexcept {
+// The dual bound for a piece along d, rounded against us.
+[[gnu::noinline]] double DistanceLower(const Piece& piece, const Obstacle& obstacle, const Vector& d) noexcept {
+  const Zonotope& slice = *piece.set;
   double core = kInfinity;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     core = obstacle.offset();
@@ -54,11 +59,14 @@ double PlainDistanceLower(const Zonotope& slice, const Obstacle& obstacle, const
       core = std::min(core, along);
     }
   }
-  Interval square(0);
-  for (int k = 0; k < slice.dim(); ++k) square += sqr(Interval(d[k]));
-  const double gap = SubDown(core, slice.SupportUpper({d.data(), ToSize(slice.dim())}));
+  Interval square(0), shifted(0);
+  for (int k = 0; k < slice.dim(); ++k) {
+    square += sqr(Interval(d[k]));
+    shifted += Interval(d[k]) * piece.shift[ToSize(k)];
+  }
+  const double gap = AddDown(SubDown(core, slice.SupportUpper({d.data(), ToSize(slice.dim())})), shifted.lower);
   const double distance = DivDown(gap, gap > 0 ? SqrtUp(square.upper) : SqrtDown(square.lower));
-  return square.lower > 0 && distance < kInfinity ? distance : -kInfinity;  // NaN fails
+  return square.lower > 0 && distance < kInfinity ? SubDown(distance, piece.ball) : -kInfinity;  // NaN fails
 }
 
 // Shorter vectors have squares that underflow, and no direction that could be trusted.
@@ -67,19 +75,24 @@ bool IsSafeLength(double length) { return length > 0x1p-400 && length < kInfinit
 // Directions are compared by plain arithmetic on unit vectors.
 class Search {
  public:
-  Search(const Zonotope& slice, const Obstacle& obstacle) noexcept : slice_(slice), hull_(obstacle.hull()) {
-    center_.setZero();
-    for (int k = 0; k < slice.dim(); ++k) center_[k] = slice.center(k);
+  Search(std::span<const Piece> pieces, const Obstacle& obstacle) noexcept : pieces_(pieces), hull_(obstacle.hull()) {
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      centers_[i].setZero();
+      for (int k = 0; k < dim(); ++k) centers_[i][k] = pieces[i].set->center(k) - pieces[i].shift[ToSize(k)].Middle();
+    }
   }
 
+  [[nodiscard]] int dim() const { return pieces_.front().set->dim(); }
+  /** The only piece's: see TryAllNormals and BestSpatial. */
+  [[nodiscard]] int num_generators() const { return pieces_.front().set->num_generators(); }
   [[nodiscard]] Vector generator(int j) const {
     Vector g = Vector::Zero();
-    for (int k = 0; k < slice_.dim(); ++k) g[k] = slice_.generator(k, j);
+    for (int k = 0; k < dim(); ++k) g[k] = pieces_.front().set->generator(k, j);
     return g;
   }
 
-  // A point of {core - slice}.
-  [[nodiscard]] Vector Offset() const { return hull_.front() - center_; }
+  // A point of {core - hull of the pieces}.
+  [[nodiscard]] Vector Offset() const { return hull_.front() - centers_.front(); }
 
   void Consider(const Vector& direction) noexcept {
     const double length = direction.norm();
@@ -91,36 +104,38 @@ class Search {
   [[nodiscard]] const Vector& best() const { return best_; }
   [[nodiscard]] double value() const { return value_; }
 
-  // The first point of {core - slice} that a unit direction d meets, from below; considers d.
+  // The first point of {core - hull of the pieces} that a unit direction d meets, from below; considers d.
   [[nodiscard]] Vector Lowest(const Vector& d) noexcept {
-    Vector lowest = hull_.front() - center_;
+    Vector lowest = hull_.front();
     for (const Vector& point : hull_)
-      if (const Vector other = point - center_; d.dot(other) < d.dot(lowest)) lowest = other;
-    const double *x = slice_.padded_row(0).data(), *y = slice_.padded_row(1).data();
-    Lanes far_x = AllLanes(0), far_y = AllLanes(0), spread = AllLanes(0);
-    for (std::size_t j = 0; j < slice_.padded_size(); j += kLaneCount) {
-      const Lanes g_x = LoadLanes(x + j), g_y = LoadLanes(y + j);
-      const Lanes along = AllLanes(d.x()) * g_x + AllLanes(d.y()) * g_y;
-      far_x += along < AllLanes(0) ? -g_x : g_x;
-      far_y += along < AllLanes(0) ? -g_y : g_y;
-      spread += Abs(along);
+      if (d.dot(point) < d.dot(lowest)) lowest = point;
+    Vector first = Vector::Zero();
+    double value = kInfinity;
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const auto [offset, spread] = Farthest(*pieces_[i].set, d);
+      const Vector towards = lowest - centers_[i];
+      if (const double its_value = d.dot(towards) - spread - pieces_[i].ball; its_value < value) {
+        value = its_value;
+        first = towards - offset - pieces_[i].ball * d;
+      }
     }
-    Keep(d, d.dot(lowest) - Sum(spread));
-    return lowest - Vector(Sum(far_x), Sum(far_y), 0);
+    Keep(d, value);
+    return first;
   }
 
-  // The corner of {core - slice} that direction d + tilt (tilt infinitely small) supports, seen from the origin.
+  // The corner of {core - the only piece} that direction d + tilt (tilt infinitely small) supports, seen from the
+  // origin.
   [[nodiscard]] Vector Corner(const Vector& d, const Vector& tilt) const noexcept {
     const auto side = [&](const Vector& x) {
       const double along = d.dot(x);
       return std::abs(along) > 1e-9 * x.norm() ? along : tilt.dot(x);
     };
-    Vector corner = hull_.front() - center_;
+    Vector corner = hull_.front() - centers_.front();
     for (std::size_t i = 1; i < hull_.size(); ++i) {
-      const Vector other = hull_[i] - center_;
+      const Vector other = hull_[i] - centers_.front();
       if (side(other - corner) < 0) corner = other;
     }
-    for (int j = 0; j < slice_.num_generators(); ++j) {
+    for (int j = 0; j < num_generators(); ++j) {
       const Vector g = generator(j);
       corner -= side(g) > 0 ? g : Vector(-g);
     }
@@ -128,15 +143,42 @@ class Search {
   }
 
  private:
+  struct Reach {
+    Vector offset;  // from the center to the farthest point along d
+    double spread;  // d . offset
+  };
+  [[nodiscard]] FOREREACH_INLINE static Reach Farthest(const Zonotope& set, const Vector& d) noexcept {
+    std::array<Lanes, kMaxSafetyDim> far{};
+    Lanes spread = AllLanes(0);
+    const auto p = ToSize(set.dim());
+    for (std::size_t j = 0; j < set.padded_size(); j += kLaneCount) {
+      Lanes along = AllLanes(d[0]) * LoadLanes(set.padded_row(0).data() + j);
+      for (std::size_t k = 1; k < p; ++k)
+        along = along +
+                AllLanes(d[static_cast<Eigen::Index>(k)]) * LoadLanes(set.padded_row(static_cast<int>(k)).data() + j);
+      for (std::size_t k = 0; k < p; ++k) {
+        const Lanes g = LoadLanes(set.padded_row(static_cast<int>(k)).data() + j);
+        far[k] += along < AllLanes(0) ? -g : g;
+      }
+      spread += Abs(along);
+    }
+    return {Vector(Sum(far[0]), Sum(far[1]), Sum(far[2])), Sum(spread)};
+  }
+
   void ConsiderUnit(const Vector& d) noexcept {
     double value = kInfinity;
-    for (const Vector& point : hull_) value = std::min(value, d.dot(point - center_));
-    std::array<double, kMaxGenerators> along{};
-    for (int k = 0; k < slice_.dim(); ++k) {
-      const std::span<const double> row = slice_.row(k);
-      for (std::size_t j = 0; j < row.size(); ++j) along[j] += d[k] * row[j];
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const Zonotope& set = *pieces_[i].set;
+      double its_value = kInfinity;
+      for (const Vector& point : hull_) its_value = std::min(its_value, d.dot(point - centers_[i]));
+      std::array<double, kMaxGenerators> along{};
+      for (int k = 0; k < set.dim(); ++k) {
+        const std::span<const double> row = set.row(k);
+        for (std::size_t j = 0; j < row.size(); ++j) along[j] += d[k] * row[j];
+      }
+      for (std::size_t j = 0; j < ToSize(set.num_generators()); ++j) its_value -= std::abs(along[j]);
+      value = std::min(value, its_value - pieces_[i].ball);
     }
-    for (std::size_t j = 0; j < ToSize(slice_.num_generators()); ++j) value -= std::abs(along[j]);
     Keep(d, value);
   }
 
@@ -146,9 +188,9 @@ class Search {
     best_ = d;
   }
 
-  const Zonotope& slice_;
+  std::span<const Piece> pieces_;
   const std::vector<Vector>& hull_;
-  Vector center_;
+  std::array<Vector, kMaxPieces> centers_;
   Vector best_ = Vector::UnitX();
   double value_ = -kInfinity;
 };
@@ -163,13 +205,28 @@ Vector NearestOnSegment(const Vector& a, const Vector& b) {
   return a + edge * std::clamp(-a.dot(edge) / length_square, 0.0, 1.0);
 }
 
-// Gilbert, Johnson and Keerthi's search for the point of {core - slice} next to the origin: from one point found
-// towards it, the lowest point in that direction, and the nearest point of the segments between those kept. A few steps
-// do.
-void Descend(Search& search, Vector nearest) noexcept {
-  constexpr int kMaxSteps = 12;
-  Vector kept[2] = {nearest, nearest};
-  for (int step = 0; step < kMaxSteps; ++step) {
+// The point of the triangle a, b, c next to the origin.
+Vector NearestOnTriangle(const Vector& a, const Vector& b, const Vector& c) {
+  const Vector normal = (b - a).cross(c - a);
+  const double square = normal.squaredNorm();
+  if (square > 0) {
+    const auto is_inside = [&](const Vector& from, const Vector& to) {
+      return normal.dot((to - from).cross(-from)) >= 0;
+    };
+    if (is_inside(a, b) && is_inside(b, c) && is_inside(c, a)) return normal * (normal.dot(a) / square);
+  }
+  Vector nearest = NearestOnSegment(a, b);
+  for (const Vector& other : {NearestOnSegment(b, c), NearestOnSegment(c, a)})
+    if (other.squaredNorm() < nearest.squaredNorm()) nearest = other;
+  return nearest;
+}
+
+// Gilbert, Johnson and Keerthi's search for the point of {core - set} next to the origin: from one point found towards
+// it, the lowest point in that direction, and the nearest point of the simplices between it and those kept. A few steps
+// do for one zonotope.
+void DescendInPlane(Search& search, int most_steps) noexcept {
+  Vector nearest = search.Offset(), kept[2] = {nearest, nearest};
+  for (int step = 0; step < most_steps; ++step) {
     const double length = nearest.norm();
     if (!IsSafeLength(length)) return;
     const Vector lowest = search.Lowest(nearest / length);
@@ -181,10 +238,30 @@ void Descend(Search& search, Vector nearest) noexcept {
   }
 }
 
+// The same with triangles.
+void DescendInSpace(Search& search, int most_steps) noexcept {
+  Vector nearest = search.Offset(), kept[3] = {nearest, nearest, nearest};
+  for (int step = 0; step < most_steps; ++step) {
+    const double length = nearest.norm();
+    if (!IsSafeLength(length)) return;
+    const Vector lowest = search.Lowest(nearest / length);
+    if (search.value() >= length * (1 - 1e-15)) return;
+    int left_out = 0;
+    for (int i = 0; i < 3; ++i) {
+      const Vector other = NearestOnTriangle(lowest, kept[(i + 1) % 3], kept[(i + 2) % 3]);
+      if (i == 0 || other.squaredNorm() < nearest.squaredNorm()) nearest = other, left_out = i;
+    }
+    kept[left_out] = lowest;
+  }
+}
+
+// Of several pieces, the nearest face may join two of them, so the normals of one piece are not all there are.
+constexpr int kStepsForOne = 12, kStepsForSeveral = 50;
+
 // In the plane the distance is attained along the normal of an edge of {core - slice}, or towards a corner next to the
 // best such edge: the dual bound is concave in d, so it rises to its maximum and falls after it.
-[[gnu::noinline]] void TryAllNormals(Search& search, const Zonotope& slice, const std::vector<Vector>& hull) noexcept {
-  for (int j = 0; j < slice.num_generators(); ++j) search.Consider(Turned(search.generator(j)));
+[[gnu::noinline]] void TryAllNormals(Search& search, const std::vector<Vector>& hull) noexcept {
+  for (int j = 0; j < search.num_generators(); ++j) search.Consider(Turned(search.generator(j)));
   for (std::size_t a = 0; a < hull.size(); ++a)
     for (std::size_t b = 0; b < a; ++b) search.Consider(Turned(hull[a] - hull[b]));
   const Vector normal = search.best();
@@ -192,19 +269,24 @@ void Descend(Search& search, Vector nearest) noexcept {
   search.Consider(search.Corner(normal, -Turned(normal)));
 }
 
-Vector BestPlanar(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  Search search(slice, obstacle);
-  Descend(search, search.Offset());
-  if (!(search.value() > obstacle.radius())) TryAllNormals(search, slice, obstacle.hull());
+Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold) noexcept {
+  Search search(pieces, obstacle);
+  DescendInPlane(search, pieces.size() == 1 ? kStepsForOne : kStepsForSeveral);
+  if (pieces.size() == 1 && !(search.value() > threshold)) TryAllNormals(search, obstacle.hull());
   return search.best();
 }
 
 // In space disjoint polytopes are separated by a face normal of one, or the cross product of an edge of each. The edges
 // of a box are the axes; the faces of a zonotope lie along pairs of generators.
-[[gnu::noinline]] Vector BestSpatial(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  Search search(slice, obstacle);
+[[gnu::noinline]] Vector BestSpatial(std::span<const Piece> pieces, const Obstacle& obstacle,
+                                     double threshold) noexcept {
+  Search search(pieces, obstacle);
   for (int k = 0; k < 3; ++k) search.Consider(Vector::Unit(k));
-  for (int j = 0; j < slice.num_generators(); ++j) {
+  if (pieces.size() > 1 || threshold > 0) {  // such a normal may separate and still not show the distance
+    DescendInSpace(search, kStepsForSeveral);
+    return search.best();
+  }
+  for (int j = 0; j < search.num_generators(); ++j) {
     const Vector g = search.generator(j);
     for (int k = 0; k < 3; ++k) search.Consider(g.cross(Vector::Unit(k)));
     for (int i = 0; i < j; ++i) search.Consider(g.cross(search.generator(i)));
@@ -212,7 +294,7 @@ Vector BestPlanar(const Zonotope& slice, const Obstacle& obstacle) noexcept {
   return search.best();
 }
 
-Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
+Vector BestDirection(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold) noexcept {
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     Vector normal = Vector::Zero();
     normal.head(obstacle.dim()) = obstacle.points()[0];
@@ -220,12 +302,12 @@ Vector BestDirection(const Zonotope& slice, const Obstacle& obstacle) noexcept {
   }
   switch (obstacle.dim()) {
     case 1: {
-      Search search(slice, obstacle);
+      Search search(pieces, obstacle);
       search.Consider(Vector::UnitX());
       return search.best();
     }
-    case 2: return BestPlanar(slice, obstacle);
-    case 3: return BestSpatial(slice, obstacle);
+    case 2: return BestPlanar(pieces, obstacle, threshold);
+    case 3: return BestSpatial(pieces, obstacle, threshold);
     default: return Vector::Zero();  // proves nothing
   }
 }
@@ -263,18 +345,39 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
 
 namespace {
 
-FOREREACH_INLINE Separation SeparateInline(const Zonotope& slice, const Obstacle& obstacle) noexcept {
-  const Vector direction = BestDirection(slice, obstacle);
-  if (obstacle.kind() != Obstacle::Kind::kHalfSpace && std::abs(direction.squaredNorm() - 1) < 0x1p-46)
-    if (const Separation plain{PlainDistanceLower(slice, obstacle, direction), obstacle.radius()}; plain.IsProven())
-      return plain;
-  return {DistanceLower(slice, obstacle, direction), obstacle.radius()};
+// The least of a bound over all pieces.
+template <class Bound>
+FOREREACH_INLINE double LeastOf(std::span<const Piece> pieces, Bound bound) noexcept {
+  double least = kInfinity;
+  for (const Piece& piece : pieces) {
+    const double found = bound(piece);
+    least = found >= least ? least : found < least ? found : -kInfinity;  // NaN proves nothing
+  }
+  return least;
+}
+
+FOREREACH_INLINE Separation SeparateInline(std::span<const Piece> pieces, const Obstacle& obstacle,
+                                           double threshold) noexcept {
+  const Vector direction = BestDirection(pieces, obstacle, threshold);
+  if (obstacle.kind() != Obstacle::Kind::kHalfSpace && std::abs(direction.squaredNorm() - 1) < 0x1p-46) {
+    const auto plain = [&](const Piece& piece) __attribute__((always_inline)) {
+      return PlainDistanceLower(piece, obstacle, direction);
+    };
+    if (const Separation found{LeastOf(pieces, plain), threshold}; found.IsProven()) return found;
+  }
+  return {LeastOf(pieces, [&](const Piece& piece) { return DistanceLower(piece, obstacle, direction); }), threshold};
 }
 
 }  // namespace
 
+Separation Separate(std::span<const Piece> pieces, const Obstacle& obstacle, double added,
+                    InstructionSet instructions) noexcept {
+  return Dispatch<&SeparateInline>(instructions, pieces, obstacle, AddUp(obstacle.radius(), added));
+}
+
 Separation Separate(const Zonotope& slice, const Obstacle& obstacle, InstructionSet instructions) noexcept {
-  return Dispatch<&SeparateInline>(instructions, slice, obstacle);
+  const Piece piece{&slice};
+  return Separate({&piece, 1}, obstacle, 0, instructions);
 }
 
 }  // namespace forereach

@@ -1,6 +1,9 @@
-/** Proofs that a projected slice is disjoint from an obstacle, by a dual bound. For every direction d,
+/** Proofs that a projected slice, or what a body sweeps, is disjoint from an obstacle, by a dual bound. For every
+direction d and every set Y,
 
-    min {d . w : w in core} - max {d . y : y in slice} <= |d|_2 * distance(core, slice).
+    min {d . w : w in core} - max {d . y : y in Y} <= |d|_2 * distance(core, Y),
+
+and the maximum over the convex hull of several sets is the largest of their maxima.
 
 The search for a good d runs in plain arithmetic and may fail. The left side is then evaluated with outward rounding, so
 the reported distance is valid for every d. The paper's test R_t < m_t, Eq. (safety-radius-margin), is a special
@@ -8,6 +11,7 @@ case. */
 #pragma once
 
 #include <array>
+#include <span>
 
 #include "certifier/numerics/instruction_set.h"
 #include "certifier/safety/obstacle.h"
@@ -16,9 +20,10 @@ case. */
 namespace forereach {
 
 struct Separation {
-  /** A lower bound on the distance from slice to core, in metres. Not positive if no distance was proven. */
+  /** A lower bound on the distance from the set to the core, in metres. Not positive if no distance was proven. */
   double distance = -kInfinity;
-  /** The obstacle's radius, in metres. The slice is disjoint from the obstacle if distance > threshold. */
+  /** The distance to be kept, in metres: the obstacle's radius and what is added to it. The set is disjoint from the
+  obstacle if distance > threshold. */
   double threshold = 0;
 
   [[nodiscard]] bool IsProven() const { return distance > threshold; }
@@ -31,6 +36,15 @@ struct Hull {
   std::array<double, kMaxSafetyDim> center, half_width;
 };
 
+/** One of the sets whose convex hull is separated from an obstacle: {y - v : y in set, v in shift} + {y : |y|_2 <=
+ball}. The shift is that of the obstacle, since its motion is seen from the obstacle. */
+struct Piece {
+  const Zonotope* set = nullptr;
+  double ball = 0;                              ///< Metres, not negative.
+  std::array<Interval, kMaxSafetyDim> shift{};  ///< Metres.
+};
+inline constexpr int kMaxPieces = 2 * kMaxBodyPoints;  ///< The points of a body at two samples.
+
 /** Separates the interval hulls of slice and core; for a half-space it uses the normal. Sound but not tight. Cost
 O(p). */
 [[nodiscard]] Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept;
@@ -41,6 +55,14 @@ exists, up to rounding. Cost for m generators: for p <= 2, O(m) if a few directi
 nothing; for p = 3, O(m^3).
 @param instructions changes the computing time only. @pre slice.dim() == obstacle.dim() */
 [[nodiscard]] Separation Separate(const Zonotope& slice, const Obstacle& obstacle,
+                                  InstructionSet instructions = BestInstructionSet()) noexcept;
+
+/** Separates the convex hull of 1 to kMaxPieces pieces and the core, likewise. The search for several pieces, or in
+space with a threshold, approaches the nearest point of {core - hull}; its distance is exact up to the search's
+tolerance, about 1e-9 of the distance. Cost O(m) for the generators of all pieces and each of at most some fifty
+directions.
+@param added what is added to the obstacle's radius as the threshold, metres, not negative. */
+[[nodiscard]] Separation Separate(std::span<const Piece> pieces, const Obstacle& obstacle, double added,
                                   InstructionSet instructions = BestInstructionSet()) noexcept;
 
 }  // namespace forereach

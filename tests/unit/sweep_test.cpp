@@ -1,0 +1,451 @@
+// Bodies, motion between samples, and obstacles that move: each at its boundary, just inside and just outside.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/dynamics/models.h"
+
+namespace forereach {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kHair = 1e-9;  // above the rounding of a few steps, metres
+
+Eigen::VectorXd Vec(std::initializer_list<double> entries) {
+  Eigen::VectorXd vector(std::ssize(entries));
+  std::copy(entries.begin(), entries.end(), vector.data());
+  return vector;
+}
+
+Problem Bare(std::shared_ptr<const NominalModel> model, const Eigen::VectorXd& state, const Eigen::VectorXd& input) {
+  Problem problem;
+  const int n = model->num_states(), variables = model->num_variables();
+  problem.model = std::move(model);
+  problem.domain.state = Box(-state, state);
+  problem.domain.input = Box(-input, input);
+  problem.declaration = {Eigen::MatrixXd::Zero(n, variables), Eigen::VectorXd::Zero(n)};
+  problem.projection = Eigen::MatrixXd::Identity(2, n);
+  problem.transitions = {Eigen::MatrixXd::Zero(1, variables), Eigen::MatrixXd::Zero(1, n)};
+  return problem;
+}
+
+// One step of 0.5 s: whole numbers stay exact. The residual is zero.
+Problem PointMassProblem() { return Bare(MakePointMass(0.5), Vec({100, 100, 8, 8}), Vec({2, 2})); }
+Problem BicycleProblem() { return Bare(MakeKinematicBicycle(0.5, 2.5), Vec({40, 40, 3.2, 25, 3, 1}), Vec({20, 2})); }
+
+Between Curving(double x, double y) {
+  Between between;
+  between.acceleration = Vec({x, y});
+  between.period = 0.5;
+  return between;
+}
+
+Decision Judge(const Problem& problem, const Eigen::VectorXd& start, int steps, const std::vector<Obstacle>& obstacles,
+               const Schedule& schedule = {}, const Eigen::VectorXd& half_width = {}) {
+  const Certifier certifier(std::make_shared<Problem>(problem));
+  Tube tube;
+  const std::vector<double> controls(2 * static_cast<std::size_t>(steps), 0.0);
+  const Plan plan{controls.data(), 2, steps, 2, schedule};
+  const auto set = Zonotope::FromBox(start, half_width.size() > 0 ? half_width : Eigen::VectorXd(0 * start));
+  certifier.Require(plan, set, obstacles);
+  return certifier.Certify(plan, set, obstacles, tube);
+}
+
+bool IsCertified(const Decision& decision) { return decision.outcome == Outcome::kCertified; }
+
+Body Parts(std::vector<BodyPart> parts, int heading = -1) { return {heading, std::move(parts)}; }
+
+// 2 m a step along x; the bulge in y is 2 * 0.5^2 / 8.
+TEST(Between, APostBetweenTwoSamplesCounts) {
+  Problem problem = PointMassProblem();
+  const auto post = [](double x, double gap) {
+    return std::vector{Obstacle::Circle(Vec({x, 0.05 + 0.0625 + gap}), 0.05)};
+  };
+  const Eigen::VectorXd start = Vec({0, 0, 4, 0});
+  EXPECT_TRUE(IsCertified(Judge(problem, start, 3, post(1, -0.1))));  // at its samples only
+  problem.between = Curving(0, 2);
+  for (const double x : {0.0, 1.0, 3.9, 6.0}) {
+    EXPECT_TRUE(IsCertified(Judge(problem, start, 3, post(x, kHair)))) << x;
+    const Decision touched = Judge(problem, start, 3, post(x, -kHair));
+    EXPECT_EQ(touched.outcome, Outcome::kSafety) << x;
+    EXPECT_EQ(touched.step, x < 2 ? 0 : x < 4 ? 1 : 2) << x;
+    EXPECT_EQ(touched.part, 0);
+  }
+  EXPECT_TRUE(IsCertified(Judge(problem, start, 3, {Obstacle::Circle(Vec({6.05 + kHair, 0}), 0.05)})));
+}
+
+TEST(Between, ASampleBelongsToBothOfItsSteps) {
+  Problem problem = PointMassProblem();
+  problem.between = Curving(0, 0);
+  const Decision d = Judge(problem, Vec({0, 0, 4, 0}), 3, {Obstacle::Circle(Vec({4, 1}), 0.5)});
+  EXPECT_TRUE(IsCertified(d));
+  EXPECT_THAT(d.closest_step, testing::AnyOf(1, 2));
+  EXPECT_NEAR(d.margin, 1, 1e-12);
+}
+
+// The chord from (0, 0) to (2, 2): the sweep is not the box around it.
+TEST(Between, TheSweepIsTheHullOfBothSlices) {
+  Problem problem = PointMassProblem();
+  problem.between = Curving(0, 0);
+  const auto corner = [](double radius) { return std::vector{Obstacle::Circle(Vec({1.5, 0.5}), radius)}; };
+  const double distance = std::sqrt(0.5);
+  EXPECT_TRUE(IsCertified(Judge(problem, Vec({0, 0, 4, 4}), 1, corner(distance - kHair))));
+  EXPECT_FALSE(IsCertified(Judge(problem, Vec({0, 0, 4, 4}), 1, corner(distance + kHair))));
+}
+
+TEST(Between, AHalfPlaneIsMetBetweenSamples) {
+  Problem problem = PointMassProblem();
+  problem.between = Curving(0, 2);
+  const auto wall = [](double offset) { return std::vector{Obstacle::HalfSpace(Vec({0, 1}), offset)}; };
+  EXPECT_TRUE(IsCertified(Judge(problem, Vec({0, 0, 4, 0}), 1, wall(0.0625 + kHair))));
+  EXPECT_FALSE(IsCertified(Judge(problem, Vec({0, 0, 4, 0}), 1, wall(0.0625 - kHair))));
+}
+
+TEST(Body, ADiscAndAHullThatDoNotTurn) {
+  Problem problem = PointMassProblem();
+  const Eigen::VectorXd start = Vec({0, 0, 0, 0});
+  const auto disc_at = [](double x, double y) { return std::vector{Obstacle::Circle(Vec({x, y}), 1)}; };
+  problem.body = Parts({{{Vector3d(2, 0, 0)}, 0.5}});
+  EXPECT_TRUE(IsCertified(Judge(problem, start, 1, disc_at(3.5 + kHair, 0))));
+  EXPECT_FALSE(IsCertified(Judge(problem, start, 1, disc_at(3.5 - kHair, 0))));
+  problem.body = Parts({{{Vector3d(-1, 2, 0), Vector3d(1, 2, 0)}, 0}, {{Vector3d(0, 0, 0), Vector3d(2, 2, 0)}, 0.25}});
+  EXPECT_TRUE(IsCertified(Judge(problem, start, 1, disc_at(0, 3 + kHair))));
+  const Decision edge = Judge(problem, start, 1, disc_at(0, 3 - kHair));  // between the points of part 0
+  EXPECT_EQ(edge.outcome, Outcome::kSafety);
+  EXPECT_EQ(edge.part, 0);
+  const double distance = std::sqrt(0.5) + 0;  // of (2, 1) from the segment of part 1
+  EXPECT_NEAR(Judge(problem, start, 1, {Obstacle::Circle(Vec({2, 1}), 0)}).margin, distance, 1e-9);
+  EXPECT_EQ(Judge(problem, start, 1, {Obstacle::Circle(Vec({2, 1}), distance - 0.25 - kHair)}).part, 1);
+  EXPECT_FALSE(IsCertified(Judge(problem, start, 1, {Obstacle::Circle(Vec({2, 1}), distance - 0.25 + kHair)})));
+}
+
+// A bicycle that stands: its corner is at R(theta) q.
+TEST(Body, TurnsWithTheHeading) {
+  Problem problem = BicycleProblem();
+  problem.body = Parts({{{Vector3d(3, 1, 0), Vector3d(-1, 1, 0), Vector3d(3, -1, 0), Vector3d(-1, -1, 0)}, 0}}, 2);
+  for (const double theta : {0.5, -2.0, 3.0}) {
+    const double c = std::cos(theta), s = std::sin(theta);
+    const double x = 3 * c - s, y = 3 * s + c, away = std::hypot(3.0, 1.0);
+    const auto post = [&](double gap) {  // in the direction of the corner from the origin
+      const double far = (away + 0.5 + gap) / away;
+      return std::vector{Obstacle::Circle(Vec({x * far, y * far}), 0.5)};
+    };
+    const Eigen::VectorXd start = Vec({0, 0, theta, 0, 0, 0});
+    EXPECT_TRUE(IsCertified(Judge(problem, start, 1, post(kHair)))) << theta;
+    EXPECT_FALSE(IsCertified(Judge(problem, start, 1, post(-kHair)))) << theta;
+  }
+}
+
+// Over a range of headings a point 3 m ahead stays on an arc; the enclosure is the tangent and the sagitta.
+TEST(Body, APlaceIsCorrelatedWithTheSlice) {
+  Problem problem = BicycleProblem();
+  problem.body = Parts({{{Vector3d(3, 0, 0)}, 0}}, 2);
+  const Eigen::VectorXd start = Vec({0, 0, 0, 0, 0, 0}), spread = Vec({0, 0, 0.1, 0, 0, 0});
+  const auto judge = [&](double nx, double ny, double offset) {
+    return IsCertified(Judge(problem, start, 1, {Obstacle::HalfSpace(Vec({nx, ny}), offset)}, {}, spread));
+  };
+  EXPECT_TRUE(judge(1, 0, 3 + kHair));
+  EXPECT_FALSE(judge(1, 0, 3 - kHair));
+  EXPECT_TRUE(judge(0, 1, 3 * (0.1 + 0.1 * 0.005) + kHair));
+  EXPECT_FALSE(judge(0, 1, 3 * std::sin(0.1) - kHair));
+  EXPECT_TRUE(judge(-1, 0, -3 * std::cos(0.1) + 0.001));
+  EXPECT_FALSE(judge(-1, 0, -3 * std::cos(0.1) - kHair));
+}
+
+// A point 2 m ahead that may turn by 1 rad/s and 3 rad/s^2 leaves its chord by 2 (1 + 3) 0.5^2 / 8.
+TEST(Body, ATurningPointLeavesItsChord) {
+  Problem problem = BicycleProblem();
+  problem.body = Parts({{{Vector3d(2, 0, 0)}, 0}}, 2);
+  problem.between = Curving(0, 0);
+  problem.between->turn_rate = 1;
+  problem.between->turn_acceleration = 3;
+  const auto post = [](double gap) { return std::vector{Obstacle::Circle(Vec({2.5 + 0.25 + gap, 0}), 0.5)}; };
+  EXPECT_TRUE(IsCertified(Judge(problem, Vec({0, 0, 0, 0, 0, 0}), 1, post(kHair))));
+  EXPECT_FALSE(IsCertified(Judge(problem, Vec({0, 0, 0, 0, 0, 0}), 1, post(-kHair))));
+}
+
+TEST(Body, IsRefusedIfItIsNone) {
+  const auto refusal = [](const std::function<void(Problem&)>& change) -> std::string {
+    Problem problem = BicycleProblem();
+    change(problem);
+    try {
+      const Certifier certifier(std::make_shared<Problem>(problem));
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  using testing::StartsWith;
+  EXPECT_EQ(refusal([](Problem&) {}), "accepted");
+  EXPECT_THAT(refusal([](Problem& p) { p.body.heading = 6; }), StartsWith("body: heading 6"));
+  EXPECT_THAT(refusal([](Problem& p) { p.projection.conservativeResize(1, 6), p.body.heading = 2; }),
+              StartsWith("body: heading 2"));
+  EXPECT_THAT(refusal([](Problem& p) { p.body.parts.clear(); }), StartsWith("body: 0 parts"));
+  EXPECT_THAT(refusal([](Problem& p) { p.body.parts[0].points.clear(); }), StartsWith("body: part 0: no points"));
+  EXPECT_THAT(refusal([](Problem& p) { p.body.parts[0].points.resize(17, Vector3d::Zero()); }),
+              StartsWith("body: 17 points"));
+  EXPECT_THAT(refusal([](Problem& p) { p.body.parts.resize(17); }), StartsWith("body: 17 parts"));
+  EXPECT_THAT(refusal([](Problem& p) { p.body.parts[0].points[0][2] = 1; }), StartsWith("body: part 0: a point has"));
+  EXPECT_THAT(refusal([&](Problem& p) { p.body.parts[0].points[0][0] = nan; }), StartsWith("body: part 0: a point"));
+  for (const double size : {-1.0, nan, kInfinity}) {
+    EXPECT_THAT(refusal([&](Problem& p) { p.body.parts[0].radius = size; }), StartsWith("body: part 0: radius"));
+    EXPECT_THAT(refusal([&](Problem& p) { p.between = Curving(0, size); }), StartsWith("between: acceleration"));
+    EXPECT_THAT(refusal([&](Problem& p) { p.between = Curving(0, 0), p.between->turn_rate = size; }),
+                StartsWith("between: turn_rate"));
+    EXPECT_THAT(refusal([&](Problem& p) { p.between = Curving(0, 0), p.between->turn_acceleration = size; }),
+                StartsWith("between: turn_acceleration"));
+    EXPECT_THAT(refusal([&](Problem& p) { p.between = Curving(0, 0), p.between->period = size; }),
+                StartsWith("between: period"));
+  }
+  EXPECT_THAT(refusal([](Problem& p) { p.between = Between{Vec({1}), 0, 0, 1}; }), StartsWith("between: 1 acc"));
+}
+
+Obstacle Approaching(double radius, const ObstacleMotion& motion) {
+  return Obstacle::Circle(Vec({10, 0}), radius).Moving(motion);
+}
+ObstacleMotion AtFour() {
+  ObstacleMotion motion;
+  motion.velocity = Vector3d(-4, 0, 0);
+  return motion;
+}
+
+// The robot stands at the origin for 2 s; the obstacle comes from 10 m to 2 m.
+TEST(Moving, IsWhereItIsAtTheTimeOfTheStep) {
+  const Eigen::VectorXd rest = Vec({0, 0, 0, 0});
+  const Schedule schedule{7'000'000, 500'000, 0};
+  ObstacleMotion motion = AtFour();
+  motion.stamp_us = 7'000'000;
+  for (const bool sweeps : {false, true}) {
+    Problem problem = PointMassProblem();
+    if (sweeps) problem.between = Curving(0, 0);
+    EXPECT_TRUE(IsCertified(Judge(problem, rest, 4, {Approaching(2 - kHair, motion)}, schedule)));
+    const Decision touched = Judge(problem, rest, 4, {Approaching(2 + kHair, motion)}, schedule);
+    EXPECT_EQ(touched.outcome, Outcome::kSafety);
+    EXPECT_EQ(touched.step, sweeps ? 3 : 4);
+    // A stamp a second before the plan's start: it is 4 m nearer.
+    motion.stamp_us = 6'000'000;
+    EXPECT_EQ(Judge(problem, rest, 4, {Approaching(2 - kHair, motion)}, schedule).step, sweeps ? 2 : 3);
+    motion.stamp_us = 7'000'000;
+  }
+}
+
+TEST(Moving, ClockErrorAndGrowthAddUp) {
+  const Eigen::VectorXd rest = Vec({0, 0, 0, 0});
+  const Problem problem = PointMassProblem();
+  Schedule schedule{0, 500'000, 250'000};
+  EXPECT_TRUE(IsCertified(Judge(problem, rest, 4, {Approaching(1 - kHair, AtFour())}, schedule)));  // 4 m/s, 0.25 s
+  EXPECT_FALSE(IsCertified(Judge(problem, rest, 4, {Approaching(1 + kHair, AtFour())}, schedule)));
+  schedule.clock_error_us = 0;
+  ObstacleMotion motion = AtFour();
+  motion.uncertainty = 0.25;
+  motion.growth = 0.125;       // 0.25 after 2 s
+  motion.growth_rate = 0.125;  // 0.25 after 2 s
+  EXPECT_TRUE(IsCertified(Judge(problem, rest, 4, {Approaching(1.25 - kHair, motion)}, schedule)));
+  EXPECT_FALSE(IsCertified(Judge(problem, rest, 4, {Approaching(1.25 + kHair, motion)}, schedule)));
+  motion = {};
+  motion.growth = 1;
+  motion.stamp_us = 8'000'000;  // the plan ends 6 s before the stamp; its start is 8 s before
+  EXPECT_TRUE(IsCertified(Judge(problem, rest, 4, {Approaching(2 - kHair, motion)}, schedule)));
+  EXPECT_EQ(Judge(problem, rest, 4, {Approaching(2 + kHair, motion)}, schedule).step, 0);
+}
+
+TEST(Moving, CountsInItsWindowOnly) {
+  const Eigen::VectorXd rest = Vec({0, 0, 0, 0});
+  Problem problem = PointMassProblem();
+  Schedule schedule{0, 500'000, 1'000};
+  ObstacleMotion motion = AtFour();
+  motion.velocity.setZero();
+  const auto judge = [&](std::int64_t from, std::int64_t until) {
+    motion.from_us = from;
+    motion.until_us = until;
+    return Judge(problem, rest, 4, {Obstacle::Circle(Vec({0, 0}), 1).Moving(motion)}, schedule).step;
+  };
+  EXPECT_EQ(judge(500'001 + 1'000, 999'999 - 1'000), -1);  // between two samples
+  EXPECT_EQ(judge(500'000 + 1'000, 999'999 - 1'000), 1);
+  EXPECT_EQ(judge(500'001 + 1'000, 1'000'000 - 1'000), 2);
+  EXPECT_EQ(judge(-ObstacleMotion::kAlways, -1'001), -1);
+  EXPECT_EQ(judge(-ObstacleMotion::kAlways, -1'000), 0);
+  EXPECT_EQ(judge(2'001'001, ObstacleMotion::kAlways), -1);
+  EXPECT_EQ(judge(2'001'000, ObstacleMotion::kAlways), 4);
+  problem.between = Curving(0, 0);
+  EXPECT_EQ(judge(500'001 + 1'000, 999'999 - 1'000), 1);
+}
+
+// They cross within one step: 1.4 m apart at both samples, at one place between them.
+TEST(Moving, TheRelativeMotionIsSwept) {
+  Problem problem = PointMassProblem();
+  const Eigen::VectorXd start = Vec({0, 0, 4, 0});
+  const Schedule schedule{0, 500'000, 0};
+  ObstacleMotion motion;
+  motion.velocity = Vector3d(0, 4, 0);
+  const auto pedestrian = [&](double x, double radius) {
+    return std::vector{Obstacle::Circle(Vec({x, -1}), radius).Moving(motion)};
+  };
+  EXPECT_TRUE(IsCertified(Judge(problem, start, 1, pedestrian(1, 1), schedule)));
+  problem.between = Curving(0, 0);
+  EXPECT_FALSE(IsCertified(Judge(problem, start, 1, pedestrian(1, 0), schedule)));
+  // Relative to the pedestrian at x = 2 the robot moves from (-2, 1) to (0, -1), along x + y = -1.
+  EXPECT_TRUE(IsCertified(Judge(problem, start, 1, pedestrian(2, std::sqrt(0.5) - kHair), schedule)));
+  EXPECT_FALSE(IsCertified(Judge(problem, start, 1, pedestrian(2, std::sqrt(0.5) + kHair), schedule)));
+}
+
+TEST(Moving, AWallMovesToo) {
+  const Problem problem = PointMassProblem();
+  ObstacleMotion motion;
+  motion.velocity = Vector3d(-1, 0, 0);
+  const auto wall = [&](double offset) { return std::vector{Obstacle::HalfSpace(Vec({2, 0}), offset).Moving(motion)}; };
+  const Schedule schedule{0, 500'000, 0};
+  EXPECT_TRUE(IsCertified(Judge(problem, Vec({0, 0, 0, 0}), 2, wall(2 + kHair), schedule)));
+  EXPECT_FALSE(IsCertified(Judge(problem, Vec({0, 0, 0, 0}), 2, wall(2 - kHair), schedule)));
+}
+
+TEST(Moving, NeedsASchedule) {
+  const Problem problem = PointMassProblem();
+  const std::vector<Obstacle> moving{Approaching(1, AtFour())};
+  const Eigen::VectorXd rest = Vec({0, 0, 0, 0});
+  EXPECT_THROW((void)Judge(problem, rest, 1, moving), std::invalid_argument);
+  const std::int64_t latest = Schedule::kLatest, longest = Schedule::kLongest;
+  for (const Schedule& bad :
+       {Schedule{latest + 1, 1, 0}, Schedule{-latest - 1, 1, 0}, Schedule{0, longest + 1, 0}, Schedule{0, -1, 0},
+        Schedule{0, 1, -1}, Schedule{0, 1, longest + 1}, Schedule{std::numeric_limits<std::int64_t>::min(), 1, 0}})
+    EXPECT_THROW((void)Judge(problem, rest, 1, moving, bad), std::invalid_argument);
+  // The extremes do not overflow: the obstacle is 4e12 m away, and the clock's error is worth 4e6 m.
+  for (const std::int64_t start : {-latest, latest})
+    EXPECT_TRUE(IsCertified(Judge(problem, rest, 100, moving, {start, longest, longest})));
+}
+
+TEST(Moving, RefusesAMotionThatIsNone) {
+  const Obstacle disc = Obstacle::Circle(Vec({0, 0}), 1);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [&](const std::function<void(ObstacleMotion&)>& change) {
+    ObstacleMotion motion;
+    change(motion);
+    EXPECT_THROW((void)disc.Moving(motion), std::invalid_argument);
+  };
+  EXPECT_NO_THROW((void)disc.Moving({}));
+  for (const double bad : {nan, kInfinity, -kInfinity}) refused([&](ObstacleMotion& m) { m.velocity[0] = bad; });
+  refused([](ObstacleMotion& m) { m.velocity[2] = 1; });
+  for (const double bad : {nan, kInfinity, -1e-300}) {
+    refused([&](ObstacleMotion& m) { m.uncertainty = bad; });
+    refused([&](ObstacleMotion& m) { m.growth = bad; });
+    refused([&](ObstacleMotion& m) { m.growth_rate = bad; });
+  }
+  refused([](ObstacleMotion& m) { m.stamp_us = Schedule::kLatest + 1; });
+  refused([](ObstacleMotion& m) { m.from_us = 1, m.until_us = 0; });
+}
+
+TEST(JudgeSafety, BeginsWhereItIsTold) {
+  Problem problem = PointMassProblem();
+  problem.between = Curving(0, 0);
+  Certifier certifier(std::make_shared<Problem>(problem));
+  Tube tube;
+  const std::vector<double> controls(8, 0.0);
+  const Plan plan{controls.data(), 2, 4, 2};
+  const auto start = Zonotope::FromBox(Vec({0, 0, 4, 0}), Vec({0, 0, 0, 0}));
+  ASSERT_TRUE(IsCertified(certifier.Certify(plan, start, {}, tube)));
+  const std::vector<Obstacle> behind{Obstacle::Circle(Vec({1, 0}), 0.5)};  // met in step 0 only
+  EXPECT_EQ(certifier.JudgeSafety(behind, {}, tube, 0).step, 0);
+  const Decision later = certifier.JudgeSafety(behind, {}, tube, 1);
+  EXPECT_TRUE(IsCertified(later));
+  EXPECT_NEAR(later.margin - later.threshold, 0.5, 1e-9);
+  EXPECT_EQ(certifier.JudgeSafety(behind, {}, tube, 4).obstacle, -1);
+}
+
+// Against the best of many directions: what the search claims is a bound, and nearly the best one.
+TEST(SeparatePieces, FindsTheDistanceOfTheirHull) {
+  std::mt19937_64 random(20261123);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::normal_distribution<double> normal;
+  for (const int p : {2, 3}) {
+    int proven = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+      const int count = 1 + trial % 5;
+      std::vector<Zonotope> sets;
+      std::vector<Piece> pieces;
+      for (int i = 0; i < count; ++i) {
+        Eigen::VectorXd center(p);
+        Eigen::MatrixXd generators(p, 1 + trial % 4);
+        for (double& x : center.reshaped()) x = 2 * uniform(random);
+        for (double& x : generators.reshaped()) x = 0.3 * uniform(random);
+        sets.emplace_back(center, generators);
+      }
+      for (int i = 0; i < count; ++i) {
+        Piece& piece = pieces.emplace_back();
+        piece.set = &sets[static_cast<std::size_t>(i)];
+        piece.ball = trial % 3 == 0 ? 0 : 0.1 * std::abs(uniform(random));
+        for (int k = 0; k < p; ++k) piece.shift[static_cast<std::size_t>(k)] = Interval(uniform(random));
+      }
+      Eigen::VectorXd lower(p), upper(p);
+      for (int k = 0; k < p; ++k) {
+        lower[k] = 4 * uniform(random);
+        upper[k] = lower[k] + std::abs(uniform(random));
+      }
+      const Obstacle box = Obstacle::AxisBox(lower, upper);
+      double best = -kInfinity;
+      const auto consider = [&](const Vector3d& d) {
+        double value = kInfinity;
+        for (const Vector3d& point : box.hull()) value = std::min(value, d.dot(point));
+        double support = -kInfinity;
+        for (const Piece& piece : pieces) {
+          double its = piece.ball;
+          for (int k = 0; k < p; ++k)
+            its += d[k] * (piece.set->center(k) - piece.shift[static_cast<std::size_t>(k)].lower);
+          for (int j = 0; j < piece.set->num_generators(); ++j) {
+            double along = 0;
+            for (int k = 0; k < p; ++k) along += d[k] * piece.set->generator(k, j);
+            its += std::abs(along);
+          }
+          support = std::max(support, its);
+        }
+        best = std::max(best, value - support);
+      };
+      Vector3d d = Vector3d::Zero();
+      if (p == 2) {
+        for (int i = 0; i < 3600; ++i) consider({std::cos(i * M_PI / 1800), std::sin(i * M_PI / 1800), 0});
+      } else {
+        for (int i = 0; i < 20000; ++i) {
+          for (int k = 0; k < 3; ++k) d[k] = normal(random);
+          consider(d.normalized());
+        }
+      }
+      const Separation found = Separate(pieces, box, 0.25);
+      EXPECT_EQ(found.threshold, 0.25);
+      if (best <= 0.01) continue;
+      ++proven;
+      EXPECT_GE(found.distance, best - 1e-7) << "p " << p << " trial " << trial;
+      for (int i = 0; i < 200; ++i) {  // no point of the hull is nearer to the core
+        const auto& [set, ball, shift] = pieces[static_cast<std::size_t>(random() % pieces.size())];
+        Vector3d apart = box.hull()[random() % box.hull().size()];
+        for (int k = 0; k < p; ++k) apart[k] -= set->center(k) - shift[static_cast<std::size_t>(k)].lower;
+        for (int j = 0; j < set->num_generators(); ++j) {
+          const double sign = random() % 2 == 0 ? 1 : -1;
+          for (int k = 0; k < p; ++k) apart[k] -= sign * set->generator(k, j);
+        }
+        ASSERT_GE(apart.norm() - ball, found.distance - 1e-12) << "p " << p << " trial " << trial;
+      }
+    }
+    EXPECT_GT(proven, 50);
+  }
+}
+
+// Two points 1.7 m apart in space: their segment passes the obstacle, a point, at a distance of sqrt(2 / 3).
+TEST(SeparatePieces, ASegmentInSpace) {
+  Problem problem = PointMassProblem();
+  problem.projection = Eigen::MatrixXd::Identity(3, 4);
+  problem.body = Parts({{{Vector3d(0, 0, 0), Vector3d(1, 1, 1)}, 0}});
+  const Eigen::VectorXd rest = Vec({0, 0, 0, 0});
+  const Obstacle box = Obstacle::AxisBox(Vec({1, 0, 0}), Vec({1, 0, 0}));
+  for (const double gap : {kHair, -kHair}) {
+    problem.body.parts[0].radius = std::sqrt(2.0 / 3) - gap;
+    EXPECT_EQ(IsCertified(Judge(problem, rest, 1, {box})), gap > 0) << gap;
+  }
+}
+
+}  // namespace
+}  // namespace forereach
