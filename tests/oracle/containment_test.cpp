@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "certifier/certify/certifier.h"
+#include "tests/oracle/admissible.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
@@ -24,65 +25,6 @@ Quad ToQuad(const Real& x) {
   const Real rest = x - Real(static_cast<double>(high)) - Real(static_cast<double>(high - static_cast<double>(high)));
   return static_cast<Quad>(high) + static_cast<Quad>(rest.ToLongDouble());
 }
-
-// An admissible residual is any function between the McShane extensions of the data from below and above that satisfies
-// the declaration; so are a mixture of both, and a third function cut off by them.
-class AdmissibleResidual {
- public:
-  AdmissibleResidual(Random& random, const Problem& problem)
-      : declaration_(problem.declaration), z_(problem.transitions.z), own_(random, problem.declaration.lipschitz) {
-    const bool bicycle = problem.model->num_states() == 6;
-    for (int i = 0; i < problem.transitions.size(); ++i) {
-      const Eigen::VectorXd z = z_.row(i);
-      const auto nominal = NominalSuccessor(bicycle, {z.begin(), z.end()});
-      std::vector<Real> lower, upper;
-      for (std::size_t k = 0; k < nominal.size(); ++k) {
-        const auto coordinate = static_cast<Eigen::Index>(k);
-        const double next = problem.transitions.x_next(i, coordinate);
-        const Real slack =
-            Real(NextUp(std::abs(next))) - Real(std::abs(next)) + Real(declaration_.noise_bound[coordinate]);
-        lower.push_back(Real(next) - nominal[k] - slack);
-        upper.push_back(Real(next) - nominal[k] + slack);
-      }
-      lower_.push_back(lower);
-      upper_.push_back(upper);
-    }
-    for (Eigen::Index k = 0; k < declaration_.lipschitz.rows(); ++k) kind_.push_back(random.Below(4));
-    mix_ = random.Uniform(0, 1);
-  }
-
-  Real operator()(const std::vector<Real>& z, int k) const {
-    Real from_below, from_above;
-    for (std::size_t i = 0; i < lower_.size(); ++i) {
-      Real distance = 0;
-      for (Eigen::Index l = 0; l < z_.cols(); ++l)
-        if (declaration_.lipschitz(k, l) != 0)
-          distance += Real(declaration_.lipschitz(k, l)) *
-                      abs(z[static_cast<std::size_t>(l)] - z_(static_cast<Eigen::Index>(i), l));
-      const auto row = static_cast<std::size_t>(k);
-      const Real low = lower_[i][row] - distance, high = upper_[i][row] + distance;
-      if (i == 0 || low > from_below) from_below = low;
-      if (i == 0 || high < from_above) from_above = high;
-    }
-    switch (kind_[static_cast<std::size_t>(k)]) {
-      case 0: return from_below;
-      case 1: return from_above;
-      case 2: return from_below + Real(mix_) * (from_above - from_below);
-      default: {
-        const Real own = own_(z, k);
-        return own < from_below ? from_below : own > from_above ? from_above : own;
-      }
-    }
-  }
-
- private:
-  Declaration declaration_;
-  Eigen::MatrixXd z_;
-  Ramps own_;
-  std::vector<std::vector<Real>> lower_, upper_;
-  std::vector<int> kind_;
-  double mix_;
-};
 
 // Half-spaces whose intersection is the slice or contains it: the hull, the normals of every generator in each pair of
 // coordinates (together exactly the slice's projection on that pair), and random directions.
@@ -138,16 +80,6 @@ class Membership {
 
   std::vector<HalfSpace> half_spaces_;
 };
-
-std::vector<Real> PointOf(Random& random, const Zonotope& set) {
-  std::vector<Real> x(set.center().begin(), set.center().end());
-  const bool corner = random.Coin(0.7);
-  for (int j = 0; j < set.num_generators(); ++j) {
-    const Real weight(corner ? random.Sign() : random.Uniform(-1, 1));
-    for (int k = 0; k < set.dim(); ++k) x[static_cast<std::size_t>(k)] += weight * Real(set.generator(k, j));
-  }
-  return x;
-}
 
 // The distance from P x to the obstacle's core is at least what its dual bound in 256 bits says; the obstacles are
 // convex, so being outside is being beyond one of their sides, or away from the centre.

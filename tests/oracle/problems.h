@@ -69,10 +69,11 @@ struct Query {
   Zonotope initial_set;
   Eigen::MatrixXd controls;  // a column a step
   std::vector<Obstacle> obstacles;
+  Schedule schedule{};
 
   [[nodiscard]] Plan plan() const {
     return {controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
-            static_cast<int>(controls.rows())};
+            static_cast<int>(controls.rows()), schedule};
   }
 };
 

@@ -1,0 +1,376 @@
+/** What a certificate claims at all times, tried: continuous motions under certified plans, in 256 bits.
+
+A trial makes one random problem (worlds.h) and plans of it, and places obstacles that the certifier just accepts. Under
+each certificate it follows admissible residuals from sample to sample. Between two samples it follows motions whose
+second derivatives are piecewise constant, within the declared bounds and often equal to them, and that keep the
+samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A contact is a broken promise.
+*/
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/numerics/size.h"
+#include "tests/oracle/admissible.h"
+#include "tests/oracle/exact.h"
+#include "tests/oracle/meeting.h"
+#include "tests/oracle/random.h"
+#include "tests/oracle/worlds.h"
+
+namespace forereach {
+
+/** A part of the declaration that the certifier of a trial is not told, which shows that the trial would find its
+absence. */
+enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, kClockError };
+
+struct Tally {
+  long problems = 0, plans = 0, certified = 0, motions = 0, moments = 0, decided_exactly = 0, inadmissible = 0;
+
+  void Add(const Tally& other) {
+    problems += other.problems;
+    plans += other.plans;
+    certified += other.certified;
+    motions += other.motions;
+    moments += other.moments;
+    decided_exactly += other.decided_exactly;
+    inadmissible += other.inadmissible;
+  }
+  [[nodiscard]] std::string Text() const {
+    std::ostringstream text;
+    text << problems << " problems, " << plans << " plans, " << certified << " certified; " << motions << " motions, "
+         << moments << " moments, " << decided_exactly << " of them decided in 256 bits";
+    return text.str();
+  }
+};
+
+/** A contact under a certificate. */
+class Contradiction : public std::logic_error {
+  using std::logic_error::logic_error;
+};
+
+/** b(s) for s in [0, 1] with |b''| <= 1 and b(0) = b(1) = 0: the pieces are b'' on equal parts. */
+class Bulge {
+ public:
+  explicit Bulge(std::vector<double> pieces) : pieces_(std::move(pieces)) {}
+
+  template <class Scalar>
+  [[nodiscard]] Scalar At(double s) const {
+    return Twice<Scalar>(s).first - Scalar(s) * Twice<Scalar>(1).first;
+  }
+  /** The largest |b'|. */
+  [[nodiscard]] exact::Real Steepest() const {
+    const exact::Real mean = Twice<exact::Real>(1).first;
+    exact::Real steepest = 0;
+    for (std::size_t i = 0; i <= pieces_.size(); ++i) {
+      const double s = static_cast<double>(i) / static_cast<double>(pieces_.size());
+      const exact::Real slope = abs(Twice<exact::Real>(s).second - mean);
+      if (steepest < slope) steepest = slope;
+    }
+    return steepest;
+  }
+
+ private:
+  // The integral of the integral of b'', and the integral.
+  template <class Scalar>
+  [[nodiscard]] std::pair<Scalar, Scalar> Twice(double s) const {
+    const double width = 1 / static_cast<double>(pieces_.size());  // a power of two
+    Scalar value(0.0), slope(0.0);
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const double in_it = std::clamp(s - static_cast<double>(i) * width, 0.0, width);
+      const Scalar h(in_it), c(pieces_[i]);
+      value = value + slope * h + c * h * h / Scalar(2.0);
+      slope = slope + c * h;
+    }
+    return {value, slope};
+  }
+
+  std::vector<double> pieces_;
+};
+
+/** One motion from a sample to the next: of each safety coordinate in units of a_k T^2, and of the heading in units of
+turn T^2, with |turn| <= alpha. */
+struct Path {
+  std::vector<Bulge> of_position;
+  Bulge of_heading;
+  double turn;
+};
+
+/** The pose at two samples. */
+struct Chord {
+  std::vector<exact::Real> from, to;  // p entries
+  exact::Real heading_from, heading_to;
+};
+
+template <class Scalar>
+Scalar Of(const exact::Real& x) {
+  if constexpr (std::is_same_v<Scalar, double>)
+    return x.ToDouble();
+  else
+    return x;
+}
+
+/** The judge of one problem. */
+class MotionJudge {
+ public:
+  MotionJudge(const Problem& problem, const Schedule& schedule) : problem_(problem), schedule_(schedule) {}
+
+  [[nodiscard]] Chord ChordOf(const std::vector<exact::Real>& from, const std::vector<exact::Real>& to) const {
+    const auto heading = [&](const std::vector<exact::Real>& x) {
+      return problem_.body.heading < 0 ? exact::Real() : x[ToSize(problem_.body.heading)];
+    };
+    return {Position(from), Position(to), heading(from), heading(to)};
+  }
+
+  /** A motion that the bounds admit; nothing if the heading turns too fast from one sample to the other already. */
+  [[nodiscard]] std::optional<Path> AnyPath(Random& random, const Chord& chord) const {
+    const Between& between = *problem_.between;
+    const bool extreme = random.Coin(0.7);
+    const auto any = [&] {
+      std::vector<double> pieces(std::size_t{1} << random.Integer(0, 3));
+      const double sign = random.Sign();
+      const bool constant = random.Coin();
+      for (double& piece : pieces) piece = constant ? sign : extreme ? random.Sign() : random.Uniform(-1, 1);
+      return Bulge(pieces);
+    };
+    Path path{{}, any(), 0};
+    for (std::size_t k = 0; k < chord.from.size(); ++k) path.of_position.push_back(any());
+    const exact::Real period(between.period), change = abs(chord.heading_to - chord.heading_from);
+    const exact::Real left = exact::Real(between.turn_rate) - change / period;
+    if (problem_.body.heading >= 0 && left < exact::Real(0.0)) return std::nullopt;
+    const double most = (left / (period * path.of_heading.Steepest())).ToDouble() * (1 - 1e-12);
+    path.turn = std::max(0.0, std::min(between.turn_acceleration, most));
+    return path;
+  }
+
+  /** The parts of the body at s in [0, 1]. Without a path the samples are the only moments. */
+  template <class Scalar>
+  [[nodiscard]] std::vector<std::vector<Point3<Scalar>>> Place(const Chord& chord, const Path* path, double s) const {
+    const Scalar rest(1 - s), share(s);
+    const double period = path ? problem_.between->period : 0;
+    const Scalar square = Scalar(period) * Scalar(period);
+    Point3<Scalar> y{Scalar(0.0), Scalar(0.0), Scalar(0.0)};
+    for (std::size_t k = 0; k < chord.from.size(); ++k) {
+      y[k] = rest * Of<Scalar>(chord.from[k]) + share * Of<Scalar>(chord.to[k]);
+      if (path)
+        y[k] = y[k] + Scalar(problem_.between->acceleration[static_cast<Eigen::Index>(k)]) * square *
+                          path->of_position[k].At<Scalar>(s);
+    }
+    Scalar heading = rest * Of<Scalar>(chord.heading_from) + share * Of<Scalar>(chord.heading_to);
+    if (path) heading = heading + Scalar(path->turn) * square * path->of_heading.At<Scalar>(s);
+    using std::cos, std::sin;
+    const Scalar c = cos(heading), d = sin(heading);
+    std::vector<std::vector<Point3<Scalar>>> parts;
+    for (const BodyPart& part : problem_.body.parts) {
+      parts.emplace_back();
+      for (const Eigen::Vector3d& q : part.points) {
+        Point3<Scalar> place{Scalar(q[0]), Scalar(q[1]), Scalar(q[2])};
+        if (problem_.body.heading >= 0)
+          place = {c * Scalar(q[0]) - d * Scalar(q[1]), d * Scalar(q[0]) + c * Scalar(q[1]), Scalar(q[2])};
+        parts.back().push_back(Plus(y, Scalar(1.0), place));
+      }
+    }
+    return parts;
+  }
+
+  /** Whether a part meets the obstacle at the time of sample t + s, off by `error_us` of the clock. */
+  template <class Scalar>
+  [[nodiscard]] bool Meet(const std::vector<std::vector<Point3<Scalar>>>& parts, const Obstacle& obstacle, int t,
+                          double s, std::int64_t error_us, double slack, double tolerance) const {
+    Point3<Scalar> shift{Scalar(0.0), Scalar(0.0), Scalar(0.0)};
+    Scalar radius(obstacle.radius());
+    if (const auto& motion = obstacle.motion()) {
+      const std::int64_t sample = schedule_.start_us + t * schedule_.step_us + error_us;
+      const double within = s * static_cast<double>(schedule_.step_us);  // exact: s has few bits
+      if (!IsThere(*motion, sample, within)) return false;
+      const Scalar tau = (Scalar(static_cast<double>(sample - motion->stamp_us)) + Scalar(within)) / Scalar(1e6);
+      const Scalar age = tau < Scalar(0.0) ? Scalar(0.0) - tau : tau;
+      for (std::size_t k = 0; k < shift.size(); ++k)
+        shift[k] = Scalar(motion->velocity[static_cast<Eigen::Index>(k)]) * tau;
+      radius = radius + Scalar(motion->uncertainty) + Scalar(motion->growth) * age +
+               Scalar(motion->growth_rate) * age * age / Scalar(2.0);
+    }
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      if (Meets(obstacle, shift, parts[i], radius + Scalar(problem_.body.parts[i].radius) + Scalar(slack), tolerance))
+        return true;
+    return false;
+  }
+
+  [[nodiscard]] const Problem& problem() const { return problem_; }
+  [[nodiscard]] const Schedule& schedule() const { return schedule_; }
+
+ private:
+  // Whether sample + within, in microseconds, is in the obstacle's window.
+  static bool IsThere(const ObstacleMotion& motion, std::int64_t sample, double within) {
+    const bool begun =
+        motion.from_us == -ObstacleMotion::kAlways || static_cast<double>(motion.from_us - sample) <= within;
+    return begun &&
+           (motion.until_us == ObstacleMotion::kAlways || within <= static_cast<double>(motion.until_us - sample));
+  }
+
+  [[nodiscard]] std::vector<exact::Real> Position(const std::vector<exact::Real>& x) const {
+    std::vector<exact::Real> y;
+    for (Eigen::Index k = 0; k < problem_.projection.rows(); ++k) {
+      y.emplace_back(0.0);
+      for (std::size_t l = 0; l < x.size(); ++l)
+        y.back() += exact::Real(problem_.projection(k, static_cast<Eigen::Index>(l))) * x[l];
+    }
+    return y;
+  }
+
+  const Problem& problem_;
+  const Schedule schedule_;
+};
+
+/** One problem with all its plans. */
+class MotionTrial {
+ public:
+  explicit MotionTrial(std::uint64_t seed, Untold untold = Untold::kNothing) : random_(seed), untold_(untold) {}
+
+  /** @throws Contradiction with the circumstances. */
+  [[nodiscard]] Tally Run(int plans) {
+    const bool bicycle = random_.Coin();
+    const auto problem = AnyWorld(random_, bicycle);
+    const auto told = std::make_shared<Problem>(*problem);
+    if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
+    if (untold_ == Untold::kTurn && told->between) told->between->turn_rate = told->between->turn_acceleration = 0;
+    if (untold_ == Untold::kBody) told->body = Body();
+    const Certifier certifier(told);
+    tally_.problems = 1;
+    for (int i = 0; i < plans; ++i) RunPlan(certifier, *problem, bicycle);
+    return tally_;
+  }
+
+ private:
+  struct Neighbour {
+    Obstacle obstacle, told;
+  };
+
+  void RunPlan(const Certifier& certifier, const Problem& problem, bool bicycle) {
+    Query query = AnyDrive(random_, problem);
+    ++tally_.plans;
+    Schedule told = query.schedule;
+    if (untold_ == Untold::kClockError) told.clock_error_us = 0;
+    if (!bicycle || random_.Coin()) query.controls *= random_.Uniform(0, 1);
+    Plan plan = query.plan();
+    plan.schedule = told;
+    if (certifier.Certify(plan, query.initial_set, {}, tube_).outcome != Outcome::kCertified) return;
+    std::vector<Obstacle> obstacles, told_obstacles;
+    for (int o = random_.Integer(1, 3); o > 0; --o) {
+      const auto neighbour = PlaceNeighbour(certifier, problem, query.schedule, told);
+      if (!neighbour) continue;
+      obstacles.push_back(neighbour->obstacle);
+      told_obstacles.push_back(neighbour->told);
+    }
+    certifier.Require(plan, query.initial_set, told_obstacles);
+    if (certifier.Certify(plan, query.initial_set, told_obstacles, tube_).outcome != Outcome::kCertified)
+      throw std::logic_error("a tube that is judged alone is certified among the same obstacles");
+    ++tally_.certified;
+    const MotionJudge judge(problem, query.schedule);
+    for (int r = 0; r < 3; ++r) Rollout(judge, query, obstacles, bicycle);
+  }
+
+  // An obstacle near the path that the certifier just accepts.
+  std::optional<Neighbour> PlaceNeighbour(const Certifier& certifier, const Problem& problem, const Schedule& schedule,
+                                          const Schedule& told_schedule) {
+    const int p = static_cast<int>(problem.projection.rows()), t = random_.Integer(0, tube_.length());
+    const auto shape = AnyShape(random_, p);
+    std::optional<ObstacleMotion> motion;
+    if (random_.Coin(0.7)) motion = AnyMotion(random_, p, schedule, tube_.length());
+    const Eigen::VectorXd center =
+        Eigen::Map<const Eigen::VectorXd>(tube_.slice(t).center().data(), tube_.slice(t).dim());
+    Eigen::VectorXd place = problem.projection * center;
+    if (motion) {
+      const std::int64_t at = schedule.start_us + t * schedule.step_us;
+      place -= motion->velocity.head(p) * (static_cast<double>(at - motion->stamp_us) * 1e-6);
+    }
+    Eigen::VectorXd direction = random_.Vector(p);
+    if (direction.norm() < 1e-3) return std::nullopt;
+    direction.normalize();
+    const auto made = [&](double away, bool told) {
+      Obstacle obstacle = shape(place + away * direction);
+      if (!motion) return obstacle;
+      ObstacleMotion moves = *motion;
+      if (told && untold_ == Untold::kVelocity) moves.velocity.setZero();
+      if (told && untold_ == Untold::kGrowth) moves.uncertainty = moves.growth = moves.growth_rate = 0;
+      return obstacle.Moving(moves);
+    };
+    const auto accepted = [&](double away) {
+      const std::vector<Obstacle> alone{made(away, true)};
+      return certifier.JudgeSafety(alone, told_schedule, tube_, 0).outcome == Outcome::kCertified;
+    };
+    double near = 0, far = 1;
+    while (far < 500 && !accepted(far)) far *= 2;
+    if (far >= 500) return std::nullopt;
+    for (int i = 0; i < 45; ++i) (accepted((near + far) / 2) ? far : near) = (near + far) / 2;
+    return Neighbour{made(far, false), made(far, true)};
+  }
+
+  void Rollout(const MotionJudge& judge, const Query& query, const std::vector<Obstacle>& obstacles, bool bicycle) {
+    const Problem& problem = judge.problem();
+    const AdmissibleResidual residual(random_, problem);
+    std::vector<exact::Real> x = PointOf(random_, query.initial_set);
+    const int steps = query.plan().num_steps;
+    for (int t = 0; t < steps; ++t) {
+      std::vector<exact::Real> z = x;
+      for (const double u : query.plan().input(t)) z.emplace_back(u);
+      std::vector<exact::Real> next = NominalSuccessor(bicycle, z);
+      for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k));
+      const Chord chord = judge.ChordOf(x, next);
+      if (problem.between)
+        Follow(judge, chord, obstacles, t);
+      else
+        Visit(judge, chord, nullptr, obstacles, t, 0);
+      if (t + 1 == steps) Visit(judge, chord, nullptr, obstacles, t, 1);
+      x = next;
+    }
+  }
+
+  void Follow(const MotionJudge& judge, const Chord& chord, const std::vector<Obstacle>& obstacles, int t) {
+    for (int m = 0; m < 5; ++m) {
+      const std::optional<Path> path = judge.AnyPath(random_, chord);
+      if (!path) {
+        ++tally_.inadmissible;
+        return;
+      }
+      ++tally_.motions;
+      for (int i = 0; i < 6; ++i) Visit(judge, chord, &*path, obstacles, t, random_.Integer(0, 16) / 16.0);
+    }
+  }
+
+  void Visit(const MotionJudge& judge, const Chord& chord, const Path* path, const std::vector<Obstacle>& obstacles,
+             int t, double s) {
+    constexpr double kScreen = 1e-6, kDouble = 1e-13, kReal = 1e-60;
+    ++tally_.moments;
+    const auto parts = judge.Place<double>(chord, path, s);
+    const std::int64_t most = judge.schedule().clock_error_us;
+    for (std::size_t o = 0; o < obstacles.size(); ++o) {
+      const std::int64_t error = random_.Coin(0.3) || most == 0 ? 0
+                                 : random_.Coin()               ? (random_.Coin() ? most : -most)
+                                                                : random_.Below(static_cast<int>(2 * most + 1)) - most;
+      if (!judge.Meet(parts, obstacles[o], t, s, error, kScreen, kDouble)) continue;
+      ++tally_.decided_exactly;
+      if (!judge.Meet(judge.Place<exact::Real>(chord, path, s), obstacles[o], t, s, error, 0, kReal)) continue;
+      std::ostringstream text;
+      text << random_.trace() << ": obstacle " << o << " (kind " << static_cast<int>(obstacles[o].kind())
+           << (obstacles[o].motion() ? ", moving" : "") << ") is met at step " << t << " + " << s << ", clock off by "
+           << error << " us, p = " << chord.from.size() << ", " << judge.problem().body.parts.size() << " parts"
+           << (path ? "" : ", at a sample") << "; plan " << tally_.plans << " of its problem";
+      throw Contradiction(text.str());
+    }
+  }
+
+  Random random_;
+  Untold untold_;
+  Tally tally_;
+  Tube tube_;
+};
+
+}  // namespace forereach
