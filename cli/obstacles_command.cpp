@@ -1,11 +1,14 @@
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "bus/bus_options.h"
 #include "bus/log.h"
 #include "bus/process.h"
+#include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/task/config.h"
@@ -22,15 +25,22 @@ struct Options {
   std::optional<double> period_ms;
 };
 
-// Replaces perception: it sends the obstacles of a task file.
+// What receivers would refuse in every message.
+void RequireTracks(const Config& config) try {
+  static_cast<void>(FromMessage(ToMessageV2(config.obstacles, 0), static_cast<int>(config.problem->projection.rows())));
+} catch (const std::invalid_argument& error) {
+  throw ConfigError(config.path + ": task.obstacles: " + error.what());
+}
+
+// Replaces perception: it sends the obstacles of a task file. Their motions begin when it starts.
 class ObstaclesNode final : public Node {
  public:
   ObstaclesNode(const Config& config, Bus& bus, std::int64_t period_us)
-      : path_(config.path), channels_(config.bus), bus_(bus), sender_(period_us) {
-    sender_.Set(config.obstacles);
-  }
+      : path_(config.path), channels_(config.bus), bus_(bus), obstacles_(config.obstacles), sender_(period_us) {}
 
   void Tick(std::int64_t now_us) override {
+    if (!begin_us_) begin_us_ = now_us;
+    sender_.Set(BegunAt(*begin_us_, obstacles_));
     if (const auto message = sender_.Due(now_us); message && !bus_.Publish(channels_.obstacles, *message) && !warned_) {
       warned_ = true;
       logging::Warn("the bus refused a message; receivers see a gap");
@@ -41,7 +51,8 @@ class ObstaclesNode final : public Node {
     const Config config = LoadConfig(path_, TransitionsFile::kIgnore);
     const std::string why = WhyKeyCannotChange(channels_, config.bus, Role::kPerception);
     if (!why.empty()) throw ConfigError(path_ + ": " + why);
-    sender_.Set(config.obstacles);
+    RequireTracks(config);
+    obstacles_ = config.obstacles;
     logging::Info("the obstacles of {} from now on", path_);
   } catch (const std::exception& error) {
     logging::Error("not reloaded, the obstacles of before are sent: {}", error.what());
@@ -51,12 +62,15 @@ class ObstaclesNode final : public Node {
   const std::string path_;
   const BusOptions channels_;
   Bus& bus_;
+  std::vector<Obstacle> obstacles_;  // of the file
   ObstacleSender sender_;
+  std::optional<std::int64_t> begin_us_;  // of their motions
   bool warned_ = false;
 };
 
 int Send(const Options& options) {
   Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
+  RequireTracks(config);
   options.bus.Override(config.bus);
   config.bus = WithKeys(std::move(config.bus), Role::kPerception);
   if (!config.bus.keys) logging::Warn(kUnsignedWarning);
@@ -81,8 +95,8 @@ Command ObstaclesCommand() {
   Command command{
       .name = "obstacles",
       .purpose =
-          "Send a task file's obstacles on the bus repeatedly until SIGTERM, in place of perception. SIGHUP reads the "
-          "file again",
+          "Send a task file's obstacles on the bus repeatedly until SIGTERM, in place of perception. Their "
+          "motions begin when it starts. SIGHUP reads the file again",
       .footer =
           "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nWith gate.obstacles: bus, a "
           "certifier certifies nothing before it receives obstacles, and nothing after they stop.",

@@ -142,6 +142,31 @@ obstacles_t AnyObstacles(FuzzedDataProvider& input, std::int64_t sequence, std::
   return obstacles;
 }
 
+// Windows of one track in reach of the plan; garbage as asked.
+obstacles_v2_t AnyMoving(FuzzedDataProvider& input, std::int64_t sequence, std::int64_t now) {
+  ObstacleMotion motion;
+  motion.stamp_us = now;
+  motion.velocity.y() = 0.1;
+  const Obstacle circle = Obstacle::Circle(Eigen::Vector2d(3.5, 0), 0.5);
+  obstacles_v2_t obstacles = ToMessageV2({circle.Moving(motion)}, now);
+  obstacles.sequence = AnyInteger(input, sequence, 8);
+  if (!input.ConsumeBool()) return obstacles;
+  obstacles.num_obstacles = input.ConsumeIntegralInRange<std::int16_t>(-1, 4);
+  for (int i = 0; i < obstacles.num_obstacles; ++i) {
+    obstacle_v2_t& piece = obstacles.obstacle[i];
+    piece.shape = input.ConsumeBool() ? AnyObstacle(input) : obstacles.obstacle[0].shape;
+    piece.track = AnySmall(input, 2);
+    piece.utime = AnyInteger(input, now, 1'000'000);
+    piece.from_utime = AnyInteger(input, now, 1'000'000);
+    piece.until_utime = AnyInteger(input, now, 4'000'000);
+    for (double& number : piece.velocity) number = AnyNumber(input);
+    for (double* number : {&piece.uncertainty, &piece.growth, &piece.growth_rate})
+      if (input.ConsumeBool()) *number = AnyNumber(input);
+    piece.gone = AnySmall(input, 2);
+  }
+  return obstacles;
+}
+
 command_t Command(std::int64_t now) {
   command_t command{};
   command.utime = now;
@@ -155,7 +180,7 @@ class Session final {
 
   void Step(FuzzedDataProvider& input) {
     ++step_;
-    switch (input.ConsumeIntegralInRange(0, 6)) {
+    switch (input.ConsumeIntegralInRange(0, 7)) {
       case 0: return Tick();
       case 1: return bus_.Deliver("ROBOT_STATE", Damaged(input, RobotState(input, step_, now_)), now_);
       case 2: return bus_.Deliver("PLAN_CANDIDATE", Damaged(input, AnyCandidate(input, now_)), now_);
@@ -163,6 +188,7 @@ class Session final {
       case 4: return bus_.Deliver("OBSTACLES", Damaged(input, AnyObstacles(input, step_, now_)), now_);
       case 5: return DeliverCommand(Damaged(input, Command(now_)));
       case 6: return Wait(input);
+      case 7: return bus_.Deliver("OBSTACLES", Damaged(input, AnyMoving(input, step_, now_)), now_);
     }
   }
 
@@ -203,7 +229,9 @@ std::vector<Config> Tasks() {
   stubborn.gate.queue = 1;
   Config seeing = SmallTaskOnTheBus();
   seeing.gate.needs_robot_state = true;
-  return {watchful, SmallTask(), stubborn, seeing};
+  Config timed = seeing;
+  timed.gate.max_clock_error_ms = 20;
+  return {watchful, SmallTask(), stubborn, seeing, timed};
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 
 #include "bus/bus_options.h"
 #include "certifier/certify/explain.h"
+#include "certifier/gate/candidate_message.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/files.h"
 #include "certifier/task/json_text.h"
@@ -114,7 +115,9 @@ class CertificateReader final : public TimelineUser {
       return;
     }
     certificate.name += ", plan " + std::to_string(certified.plan.plan_id) + " of " + GetText(certified.plan.source);
+    if (certificate.missing = WhyNoSchedule(certified.plan, task.gate); !certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
+    certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);
     certificate.certificate.known = KnownRowsOf(recorded.basis);
     for (const SealFault& fault : FindSealFaults(certified))
       certificate.mismatches.push_back({kAltered + fault.field, fault.expected, fault.found});

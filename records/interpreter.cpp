@@ -10,6 +10,7 @@
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/obstacles_t.hpp"
+#include "forereach/obstacles_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/heartbeat.h"
@@ -88,7 +89,10 @@ std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std
   if (channel == channels_.fault) return {plain, PositionOf<fault_t>(bytes)};
   if (channel == channels_.event) return {plain, PositionOf<execution_event_t>(bytes)};
   if (channel == channels_.logger_status) return {plain, PositionOf<logger_status_t>(bytes)};
-  if (channel == channels_.obstacles) return {plain, PositionOf<obstacles_t>(bytes)};
+  if (channel == channels_.obstacles) {
+    const auto position = PositionOf<obstacles_v2_t>(bytes);
+    return {plain, position ? position : PositionOf<obstacles_t>(bytes)};
+  }
   return {plain, std::nullopt};
 }
 

@@ -62,7 +62,8 @@ class PictureMaker final : public TimelineUser {
       return;
     }
     obstacles_ = recorded.basis.obstacles;
-    decided_.push_back({*candidate, decision.outcome, decision.step});
+    decided_.push_back(
+        {*candidate, ScheduleOf(*candidate, recorded.basis.task->gate), decision.outcome, decision.step});
     if (decided_.size() >= kBatch) CertifyAgain();
   }
 
@@ -88,6 +89,7 @@ class PictureMaker final : public TimelineUser {
  private:
   struct Decided {
     candidate_plan_t candidate;
+    Schedule schedule;
     int outcome, step;
   };
 
@@ -99,7 +101,7 @@ class PictureMaker final : public TimelineUser {
     std::vector<const Decided*> asked;
     for (const Decided& decided : decided_) try {
         const Zonotope initial_set = InitialSetOf(decided.candidate);
-        const Plan plan = PlanOf(decided.candidate);
+        const Plan plan = PlanOf(decided.candidate, decided.schedule);
         certifier_->Require(plan, initial_set, *obstacles_);
         plans.push_back(plan);
         initial_sets.push_back(initial_set);

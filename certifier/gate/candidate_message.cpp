@@ -1,12 +1,29 @@
 #include "certifier/gate/candidate_message.h"
 
+#include <algorithm>
 #include <stdexcept>
-#include <string>
+
+#include "certifier/gate/stamp.h"
 
 namespace forereach {
 
-Plan PlanOf(const candidate_plan_t& candidate) {
-  return {candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs};
+Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule) {
+  return {candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs, schedule};
+}
+
+Schedule ScheduleOf(const candidate_plan_t& candidate, const GateOptions& options) {
+  if (!options.max_clock_error_ms) return {};
+  return {candidate.start_utime, candidate.step_us, Microseconds(*options.max_clock_error_ms)};
+}
+
+std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options) {
+  if (!options.max_clock_error_ms) return {};
+  const std::int64_t longest = std::min(Microseconds(options.longest_step_ms), Schedule::kLongest);
+  if (candidate.step_us < 1 || candidate.step_us > longest)
+    return "step_us is " + std::to_string(candidate.step_us) + ", must be 1 to " + std::to_string(longest);
+  if (candidate.start_utime < -Schedule::kLatest || candidate.start_utime > Schedule::kLatest)
+    return "start_utime is " + std::to_string(candidate.start_utime) + ", must be within 2^60 of the epoch";
+  return {};
 }
 
 Zonotope InitialSetOf(const candidate_plan_t& candidate) {

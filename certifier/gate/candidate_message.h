@@ -2,15 +2,26 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "certifier/certify/decision.h"
+#include "certifier/task/gate_options.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
 
-/** u_0 .. u_{T-1}. Refers to the candidate's numbers; whether its counts fit is for Certifier::Require to say. */
-[[nodiscard]] Plan PlanOf(const candidate_plan_t& candidate);
+/** u_0 .. u_{T-1} and their schedule. Refers to the candidate's numbers; whether its counts fit is for
+Certifier::Require to say. */
+[[nodiscard]] Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule = {});
+
+/** When a plan's samples are, by start_utime, step_us and gate.max_clock_error_ms. Without that key the plan has no
+schedule. Whether the candidate's times are within the bounds of a schedule is for WhyNoSchedule to say. */
+[[nodiscard]] Schedule ScheduleOf(const candidate_plan_t& candidate, const GateOptions& options);
+
+/** Why the candidate's times are no schedule: step_us is not 1 to the task's longest step, or start_utime is further
+than Schedule::kLatest from the epoch. Empty if they are one, and without gate.max_clock_error_ms. */
+[[nodiscard]] std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options);
 
 /** X_0. @throws std::invalid_argument if num_states is not 1 to 16, or as Zonotope::FromBox does. */
 [[nodiscard]] Zonotope InitialSetOf(const candidate_plan_t& candidate);

@@ -105,6 +105,8 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
+  if (std::string why = WhyNoSchedule(candidate, options_); !why.empty())
+    return Rejection{decision_t::CAUSE_WRONG_DIMENSION, std::move(why)};
   return CheckSource(candidate, now_us);
 }
 
@@ -178,8 +180,9 @@ std::optional<Gate::Rejection> Gate::CheckDeadline(const candidate_plan_t& candi
 }
 
 void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer) {
-  certifier_.Require(initial_set, obstacles_.all());
-  const Decision verdict = certifier_.Certify(PlanOf(candidate), initial_set, obstacles_.all(), tube_);
+  const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
+  certifier_.Require(plan, initial_set, obstacles_.all());
+  const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
 
   decision_t& decision = answer.decision;
   decision.outcome = static_cast<std::int16_t>(verdict.outcome);

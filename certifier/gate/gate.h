@@ -65,8 +65,8 @@ class Gate final {
   Both in microseconds since the Unix epoch. */
   [[nodiscard]] std::int64_t EarliestStart(std::int64_t now_us) const;
 
-  /** Replaces the obstacles by those of an obstacles_t, by the rules of obstacles_in_force.h. On an error it changes
-  nothing and returns the error's text; otherwise an empty text. */
+  /** Replaces the obstacles by those of an obstacles_t or obstacles_v2_t, by the rules of obstacles_in_force.h. On an
+  error it changes nothing and returns the error's text; otherwise an empty text. */
   [[nodiscard]] std::string UpdateObstacles(Bytes message, std::int64_t now_us);
 
   /** Adds an executed transition to the observations, if the task has gate.learn. grounds().observations becomes the

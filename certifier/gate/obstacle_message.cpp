@@ -1,9 +1,12 @@
 #include "certifier/gate/obstacle_message.h"
 
+#include <algorithm>
+#include <map>
 #include <stdexcept>
 #include <string>
 
 #include "certifier/numerics/size.h"
+#include "lcmtypes/freshness.h"
 
 namespace forereach {
 namespace {
@@ -38,39 +41,186 @@ Obstacle FromMessage(const obstacle_t& message) {
   }
 }
 
+std::string At(std::int64_t us) { return std::to_string(us) + " us"; }
+
+// The pieces of one track, in the order of their windows.
+class Track final {
+ public:
+  Track(std::int64_t number, std::vector<const obstacle_v2_t*> pieces) : number_(number), pieces_(std::move(pieces)) {
+    std::ranges::stable_sort(pieces_, {}, &obstacle_v2_t::from_utime);
+    for (const obstacle_v2_t* piece : pieces_) end_ = std::max(end_, piece->until_utime);
+    ends_ = std::ranges::any_of(pieces_, [&](const obstacle_v2_t* piece) { return piece->gone != 0; });
+  }
+
+  // @throws std::invalid_argument if the windows do not cover all times from the stamp of the message on.
+  void RequireCover(std::int64_t stamp) const {
+    if (const std::int64_t begin = pieces_.front()->from_utime; begin > stamp)
+      Refuse("begins at " + At(begin) + ", after the message of " + At(stamp));
+    std::int64_t covered = pieces_.front()->until_utime;
+    for (const obstacle_v2_t* piece : pieces_) {
+      if (piece->from_utime > covered) Refuse("is nowhere between " + At(covered) + " and " + At(piece->from_utime));
+      covered = std::max(covered, piece->until_utime);
+      if (ends_ && piece->until_utime == end_ && piece->gone == 0)
+        Refuse("has two pieces that end at " + At(end_) + ", and only one of them is gone");
+      if (piece->gone != 0 && piece->until_utime != end_)
+        Refuse("is gone at " + At(piece->until_utime) + " and goes on until " + At(end_));
+    }
+  }
+
+  [[nodiscard]] bool BeginsWith(const obstacle_v2_t& piece) const {
+    return piece.from_utime == pieces_.front()->from_utime;
+  }
+  [[nodiscard]] bool GoesOnAfter(const obstacle_v2_t& piece) const { return !ends_ && piece.until_utime == end_; }
+
+ private:
+  [[noreturn]] void Refuse(const std::string& why) const {
+    throw std::invalid_argument("track " + std::to_string(number_) + " " + why);
+  }
+
+  std::int64_t number_;
+  std::vector<const obstacle_v2_t*> pieces_;
+  std::int64_t end_ = INT64_MIN;
+  bool ends_;
+};
+
+std::map<std::int64_t, Track> TracksOf(const obstacles_v2_t& message) {
+  std::map<std::int64_t, std::vector<const obstacle_v2_t*>> pieces;
+  for (int i = 0; i < message.num_obstacles; ++i) pieces[message.obstacle[i].track].push_back(&message.obstacle[i]);
+  std::map<std::int64_t, Track> tracks;
+  for (auto& [number, of_track] : pieces) {
+    const Track& track = tracks.emplace(number, Track(number, std::move(of_track))).first->second;
+    track.RequireCover(message.utime);
+  }
+  return tracks;
+}
+
+ObstacleMotion MotionOf(const obstacle_v2_t& piece, const Track& track) {
+  ObstacleMotion motion;
+  motion.stamp_us = piece.utime;
+  for (int k = 0; k < piece.shape.dimension; ++k) motion.velocity[k] = piece.velocity[k];
+  motion.uncertainty = piece.uncertainty;
+  motion.growth = piece.growth;
+  motion.growth_rate = piece.growth_rate;
+  motion.from_us =
+      track.BeginsWith(piece) ? -ObstacleMotion::kAlways : std::max(piece.from_utime, -ObstacleMotion::kAlways);
+  motion.until_us = track.GoesOnAfter(piece) ? ObstacleMotion::kAlways : piece.until_utime;
+  return motion;
+}
+
+Obstacle FromMessage(const obstacle_v2_t& piece, std::int64_t stamp, const std::map<std::int64_t, Track>& tracks) {
+  const Obstacle shape = FromMessage(piece.shape);
+  if (const std::string why = WhyNotFresh(piece.utime, stamp, kFarthestStampUs, kFarthestStampUs); !why.empty())
+    throw std::invalid_argument(why + ", from its message");
+  const ObstacleMotion motion = MotionOf(piece, tracks.at(piece.track));
+  ObstacleMotion standing;
+  standing.stamp_us = motion.stamp_us;
+  return motion == standing ? shape : shape.Moving(motion);
+}
+
+// What no rule of a track can be applied to.
+void RequireWindow(const obstacle_v2_t& piece) {
+  if (piece.gone != 0 && piece.gone != 1)
+    throw std::invalid_argument("gone " + std::to_string(piece.gone) + ", must be 0 or 1");
+  if (piece.from_utime > piece.until_utime)
+    throw std::invalid_argument("track " + std::to_string(piece.track) + ": the window from " + At(piece.from_utime) +
+                                " until " + At(piece.until_utime) + " is empty");
+}
+
+// Calls of(i) for each obstacle of a message. @throws std::invalid_argument with the number that was refused.
+template <class Message, class Of>
+void ForEach(const Message& message, Of of) {
+  for (int i = 0; i < message.num_obstacles; ++i) {
+    try {
+      of(i);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("obstacle " + std::to_string(i) + ": " + error.what());
+    }
+  }
+}
+
+void RequireCount(int count) {
+  if (count < 0 || count > kMaxObstacles)
+    throw std::invalid_argument("obstacles: " + std::to_string(count) + ", must be 0 to " +
+                                std::to_string(kMaxObstacles));
+}
+
+Obstacle OfDimension(int dim, Obstacle obstacle) {
+  if (obstacle.dim() != dim)
+    throw std::invalid_argument("dimension " + std::to_string(obstacle.dim()) + ", must be " + std::to_string(dim));
+  return obstacle;
+}
+
+obstacle_t ShapeOf(const Obstacle& from) {
+  obstacle_t to{};
+  to.kind = static_cast<std::int16_t>(from.kind());
+  to.dimension = static_cast<std::int16_t>(from.dim());
+  to.num_points = static_cast<std::int16_t>(from.points().size());
+  to.value = from.kind() == Obstacle::Kind::kHalfSpace ? from.offset() : from.radius();
+  for (std::size_t p = 0; p < from.points().size(); ++p)
+    for (Eigen::Index k = 0; k < from.points()[p].size(); ++k) to.point[p][k] = from.points()[p][k];
+  return to;
+}
+
+bool Continues(const Obstacle& obstacle, const Obstacle& before) {
+  return obstacle.motion() && before.motion() && obstacle.motion()->from_us != -ObstacleMotion::kAlways &&
+         obstacle.motion()->from_us == before.motion()->until_us;
+}
+
 }  // namespace
 
 std::vector<Obstacle> FromMessage(const obstacles_t& message, int dim) {
-  if (message.num_obstacles < 0 || message.num_obstacles > kMaxObstacles)
-    throw std::invalid_argument("obstacles: " + std::to_string(message.num_obstacles) + ", must be 0 to " +
-                                std::to_string(kMaxObstacles));
+  RequireCount(message.num_obstacles);
   std::vector<Obstacle> obstacles;
-  for (int i = 0; i < message.num_obstacles; ++i) {
-    const std::string which = "obstacle " + std::to_string(i) + ": ";
-    try {
-      obstacles.push_back(FromMessage(message.obstacle[i]));
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(which + error.what());
-    }
-    if (obstacles.back().dim() != dim)
-      throw std::invalid_argument(which + "dimension " + std::to_string(obstacles.back().dim()) + ", must be " +
-                                  std::to_string(dim));
-  }
+  ForEach(message, [&](int i) { obstacles.push_back(OfDimension(dim, FromMessage(message.obstacle[i]))); });
+  return obstacles;
+}
+
+std::vector<Obstacle> FromMessage(const obstacles_v2_t& message, int dim) {
+  RequireCount(message.num_obstacles);
+  ForEach(message, [&](int i) { RequireWindow(message.obstacle[i]); });
+  const std::map<std::int64_t, Track> tracks = TracksOf(message);
+  std::vector<Obstacle> obstacles;
+  ForEach(message, [&](int i) {
+    obstacles.push_back(OfDimension(dim, FromMessage(message.obstacle[i], message.utime, tracks)));
+  });
   return obstacles;
 }
 
 obstacles_t ToMessage(const std::vector<Obstacle>& obstacles) {
   obstacles_t message{};
   message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
+  std::ranges::transform(obstacles, message.obstacle, ShapeOf);
+  return message;
+}
+
+obstacles_v2_t ToMessageV2(const std::vector<Obstacle>& obstacles, std::int64_t utime,
+                           std::span<const std::int64_t> tracks) {
+  obstacles_v2_t message{};
+  message.utime = utime;
+  message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
+  std::int64_t track = -1;
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
-    obstacle_t& to = message.obstacle[i];
-    const Obstacle& from = obstacles[i];
-    to.kind = static_cast<std::int16_t>(from.kind());
-    to.dimension = static_cast<std::int16_t>(from.dim());
-    to.num_points = static_cast<std::int16_t>(from.points().size());
-    to.value = from.kind() == Obstacle::Kind::kHalfSpace ? from.offset() : from.radius();
-    for (std::size_t p = 0; p < from.points().size(); ++p)
-      for (Eigen::Index k = 0; k < from.points()[p].size(); ++k) to.point[p][k] = from.points()[p][k];
+    ObstacleMotion motion;
+    motion.stamp_us = utime;
+    motion = obstacles[i].motion().value_or(motion);
+    if (i == 0 || !Continues(obstacles[i], obstacles[i - 1])) track = static_cast<std::int64_t>(i);
+    obstacle_v2_t& to = message.obstacle[i];
+    to.shape = ShapeOf(obstacles[i]);
+    to.track = tracks.empty() ? track : tracks[i];
+    to.utime = motion.stamp_us;
+    to.from_utime = motion.from_us;
+    to.until_utime = motion.until_us;
+    std::ranges::copy(motion.velocity, to.velocity);
+    to.uncertainty = motion.uncertainty;
+    to.growth = motion.growth;
+    to.growth_rate = motion.growth_rate;
+  }
+  for (int i = 0; i < message.num_obstacles; ++i) {
+    obstacle_v2_t& piece = message.obstacle[i];
+    const bool goes_on = std::ranges::any_of(std::span(message.obstacle, obstacles.size()), [&](const auto& other) {
+      return other.track == piece.track && other.until_utime > piece.until_utime;
+    });
+    piece.gone = !goes_on && piece.until_utime != ObstacleMotion::kAlways;
   }
   return message;
 }

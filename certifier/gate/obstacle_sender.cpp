@@ -19,27 +19,41 @@ ObstacleSender::ObstacleSender(std::int64_t period_us) : period_us_(period_us) {
   if (period_us <= 0) throw std::invalid_argument("period " + std::to_string(period_us) + " us, must be positive");
 }
 
-void ObstacleSender::Set(const std::vector<Obstacle>& obstacles) {
+void ObstacleSender::Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks) {
   if (obstacles.size() > kMaxObstacles)
     throw std::invalid_argument("obstacles: " + std::to_string(obstacles.size()) + ", at most " +
                                 std::to_string(kMaxObstacles) + " fit into a message");
-  obstacles_t message = ToMessage(obstacles);
-  if (message_) {
-    message.utime = message_->utime;
-    message.sequence = message_->sequence;
-    if (Encode(message) == Encode(*message_)) return;
-  }
-  message_ = message;
+  if (!tracks.empty() && tracks.size() != obstacles.size())
+    throw std::invalid_argument(std::to_string(tracks.size()) + " tracks of " + std::to_string(obstacles.size()) +
+                                " obstacles");
+  const Digest digest = ObstaclesDigest(obstacles);
+  if (content_ && digest == content_->digest && tracks == content_->tracks) return;
+  content_ = {obstacles, tracks, digest};
   last_us_.reset();
 }
 
-std::optional<obstacles_t> ObstacleSender::Due(std::int64_t now_us) {
-  if (!message_ || (last_us_ && *last_us_ <= now_us && now_us < *last_us_ + period_us_)) return std::nullopt;
+std::optional<obstacles_v2_t> ObstacleSender::Due(std::int64_t now_us) {
+  if (!content_ || (last_us_ && *last_us_ <= now_us && now_us < *last_us_ + period_us_)) return std::nullopt;
   last_us_ = now_us;
-  message_->utime = now_us;
-  obstacles_t due = *message_;
-  ++message_->sequence;
+  obstacles_v2_t due = ToMessageV2(content_->obstacles, now_us, content_->tracks);
+  due.sequence = sequence_++;
   return due;
+}
+
+std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles) {
+  std::vector<Obstacle> begun;
+  for (const Obstacle& obstacle : obstacles) {
+    if (!obstacle.motion()) {
+      begun.push_back(obstacle);
+      continue;
+    }
+    ObstacleMotion motion = *obstacle.motion();
+    motion.stamp_us += begin_us;
+    if (motion.from_us != -ObstacleMotion::kAlways) motion.from_us += begin_us;
+    if (motion.until_us != ObstacleMotion::kAlways) motion.until_us += begin_us;
+    begun.push_back(obstacle.Moving(motion));
+  }
+  return begun;
 }
 
 }  // namespace forereach

@@ -1,5 +1,5 @@
-/** The sending side of OBSTACLES, for a perception program. It repeats the whole set, so that receivers know that
-perception is running. It uses no bus and no clock:
+/** The sending side of OBSTACLES, for a perception program. It repeats the whole set as obstacles_v2_t, so that
+receivers know that perception is running. It uses no bus and no clock:
 
     ObstacleSender sender(ObstacleSender::PeriodUs(config.gate));
     sender.Set(obstacles);                                                  // after each change
@@ -14,7 +14,8 @@ A bus has one sender. A restarted sender begins at sequence 0, which receivers a
 
 #include "certifier/safety/obstacle.h"
 #include "certifier/task/gate_options.h"
-#include "forereach/obstacles_t.hpp"
+#include "forereach/obstacles_v2_t.hpp"
+#include "lcmtypes/codec.h"
 
 namespace forereach {
 
@@ -27,18 +28,31 @@ class ObstacleSender final {
   /** @param period_us time from one message to the next, positive; at most a third of the receivers' timeout. */
   explicit ObstacleSender(std::int64_t period_us);
 
-  /** Sets all obstacles. If they differ from the last ones, the next message is due at once.
-  @throws std::invalid_argument for more than kMaxObstacles. */
-  void Set(const std::vector<Obstacle>& obstacles);
+  /** Sets all obstacles. If they differ from the last ones, the next message is due at once. Motions have the times of
+  the clock that Due is called with.
+  @param tracks as of ToMessageV2, which also has the rules for tracks that receivers check.
+  @throws std::invalid_argument for more than kMaxObstacles, or tracks of another number. */
+  void Set(const std::vector<Obstacle>& obstacles, const std::vector<std::int64_t>& tracks = {});
 
   /** The next message, if it is due, with the stamp `now_us` in microseconds since the Unix epoch. Nothing before the
   first Set. A clock that is set back does not delay a message. */
-  [[nodiscard]] std::optional<obstacles_t> Due(std::int64_t now_us);
+  [[nodiscard]] std::optional<obstacles_v2_t> Due(std::int64_t now_us);
 
  private:
+  struct Content {
+    std::vector<Obstacle> obstacles;
+    std::vector<std::int64_t> tracks;
+    Digest digest;  // of the obstacles
+  };
+
   const std::int64_t period_us_;
-  std::optional<obstacles_t> message_;   // the next
+  std::optional<Content> content_;
+  std::int64_t sequence_ = 0;            // of the next message
   std::optional<std::int64_t> last_us_;  // nothing: due at once
 };
+
+/** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on.
+@pre |begin_us| and the obstacles' finite times are at most Schedule::kLatest. */
+[[nodiscard]] std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles);
 
 }  // namespace forereach

@@ -8,6 +8,7 @@
 #include "certifier/numerics/text.h"
 #include "certifier/task/canonical.h"
 #include "forereach/obstacles_t.hpp"
+#include "forereach/obstacles_v2_t.hpp"
 
 namespace forereach {
 
@@ -19,9 +20,15 @@ ObstaclesInForce::ObstaclesInForce(const Config& config)
 std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
   if (options_.obstacles == ObstaclesSource::kTask)
     return "gate.obstacles is task: those of the task file are all there are";
-  const auto message = Decoded<obstacles_t>(bytes);
-  if (!message) return Doubt("not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) + " bytes");
-  const StreamPosition position{message->sequence, message->utime};
+  if (const auto moving = Decoded<obstacles_v2_t>(bytes)) return Take(*moving, now_us);
+  if (const auto standing = Decoded<obstacles_t>(bytes)) return Take(*standing, now_us);
+  return Doubt("not an obstacles_t of " + std::to_string(EncodedSize<obstacles_t>()) +
+               " bytes, nor an obstacles_v2_t of " + std::to_string(EncodedSize<obstacles_v2_t>()));
+}
+
+template <class Message>
+std::string ObstaclesInForce::Take(const Message& message, std::int64_t now_us) {
+  const StreamPosition position{message.sequence, message.utime};
   if (position.sequence < 0) return Doubt("sequence " + std::to_string(position.sequence) + " is negative");
   const std::int64_t horizon = StreamOrder::Horizon(now_us, Microseconds(options_.max_ahead_ms));
   if (!IsNews(state_.order.Compare(position, horizon)))
@@ -30,7 +37,9 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
   NoteOrder(position.sequence, now_us);
   if (const std::string fault = CheckStamp(position.utime, now_us, options_).fault; !fault.empty()) return Doubt(fault);
   try {
-    state_.heard = FromMessage(*message, dim_);
+    std::vector<Obstacle> heard = FromMessage(message, dim_);
+    RequireClock(heard);
+    state_.heard = std::move(heard);
   } catch (const std::invalid_argument& error) {
     return Doubt(error.what());
   }
@@ -38,6 +47,15 @@ std::string ObstaclesInForce::Update(Bytes bytes, std::int64_t now_us) {
   state_.doubt.clear();
   Put(options_.obstacles != ObstaclesSource::kUnsaid);
   return {};
+}
+
+// When a plan meets what moves is known only up to the error of the robot's clock.
+void ObstaclesInForce::RequireClock(const std::vector<Obstacle>& obstacles) const {
+  if (options_.max_clock_error_ms) return;
+  const auto moving = std::ranges::find_if(obstacles, [](const Obstacle& each) { return each.motion().has_value(); });
+  if (moving != obstacles.end())
+    throw std::invalid_argument("obstacle " + std::to_string(moving - obstacles.begin()) +
+                                " moves, and the task has no gate.max_clock_error_ms");
 }
 
 // Of a message that is newer than the last one taken.

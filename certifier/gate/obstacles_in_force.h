@@ -1,7 +1,9 @@
 /** The obstacles in force, and whether they are known to be complete. They depend on gate.obstacles of the task:
 
-`bus`: the obstacles of the task file and those of the last OBSTACLES message. No message removes an obstacle of the
-file. The obstacles are known from the first usable message on, until one of these events:
+`bus`: the obstacles of the task file and those of the last OBSTACLES message, an obstacles_t or an obstacles_v2_t. The
+messages of both types are one stream. An obstacle may move only if the task has gate.max_clock_error_ms; otherwise a
+message with it is refused. No message removes an obstacle of the file. The obstacles are known from the first usable
+message on, until one of these events:
 - The last message's stamp is older than gate.obstacles_timeout_ms.
 - A message is refused, except for a late or repeated one, because its content is unknown. The next valid message ends
 this.
@@ -36,9 +38,9 @@ class ObstaclesInForce final {
   /** Starts with the obstacles of the task. */
   explicit ObstaclesInForce(const Config& config);
 
-  /** Takes the bytes of an obstacles_t that arrived at `now_us`, completely or not at all. Its stamp has to be fresh
-  (stamp.h), and it has to be newer than the last message or from a restarted sender (stream_order.h). Returns the
-  error, or an empty text. */
+  /** Takes the bytes of an obstacles_t or an obstacles_v2_t that arrived at `now_us`, completely or not at all. Its
+  stamp has to be fresh (stamp.h), and it has to be newer than the last message or from a restarted sender
+  (stream_order.h). Returns the error, or an empty text. */
   [[nodiscard]] std::string Update(Bytes message, std::int64_t now_us);
 
   /** The reason why all() may be incomplete at this time; empty if the obstacles are known. Cost O(1). */
@@ -66,6 +68,9 @@ class ObstaclesInForce final {
   };
 
   [[nodiscard]] std::string Doubt(const std::string& why);
+  template <class Message>
+  [[nodiscard]] std::string Take(const Message& message, std::int64_t now_us);
+  void RequireClock(const std::vector<Obstacle>& obstacles) const;
   void NoteOrder(std::int64_t sequence, std::int64_t now_us);
   [[nodiscard]] Freshness FreshnessOfLast(std::int64_t now_us) const;
   // Sets all_ to the task's obstacles, if of_task, and the received ones.

@@ -55,6 +55,7 @@ std::string TaskReload::WhyNotTaken(const Config& config, const Config& in_force
            {bus != channels_, "bus.channels"},
            {config.realtime != in_force.realtime, "realtime"},
            {config.gate.obstacles != in_force.gate.obstacles, "gate.obstacles"},
+           {config.gate.max_clock_error_ms != in_force.gate.max_clock_error_ms, "gate.max_clock_error_ms"},
            {config.gate.state != in_force.gate.state, "gate.state"},
            {after.model->num_states() != before.model->num_states(), "the number of states"},
            {after.model->num_inputs() != before.model->num_inputs(), "the number of inputs"},

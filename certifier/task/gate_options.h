@@ -1,6 +1,7 @@
 /** The options of the gate, from `gate` in a task file. Times in milliseconds. */
 #pragma once
 
+#include <optional>
 #include <string>
 
 namespace forereach {
@@ -22,6 +23,9 @@ struct GateOptions {
   bool needs_robot_state = true;   ///< Certifies only while the robot's state is heard.
   double robot_timeout_ms = 1000;  ///< The robot's state is lost after this time without a message.
   double max_clock_jump_ms = 200;
+  /** How far step t of a plan may be from start_utime + t step_us, on the clock of the obstacles' stamps. Without it no
+  obstacle may move. */
+  std::optional<double> max_clock_error_ms;
   ObstaclesSource obstacles = ObstaclesSource::kUnsaid;
   double obstacles_timeout_ms = 1000;  ///< The obstacles of the bus are unknown after this time without a message.
   bool learns = true;                  ///< Adds executed transitions to the observations.

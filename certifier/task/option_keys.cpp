@@ -48,6 +48,12 @@ std::vector<Key> GateKeys() {
                   "The robot's state counts as lost after this time without one."),
       gate.Number("max_clock_jump_ms", "ms", UpTo(kHourMs), &GateOptions::max_clock_jump_ms,
                   "If the wall clock moves by more than this relative to the monotonic clock, a fault is latched."),
+      Optional(gate.Number("max_clock_error_ms", "ms", Between(0, kHourMs), &GateOptions::max_clock_error_ms,
+                           "How far step t of a plan may be from `start_utime` + t `step_us`, on the clock that stamps "
+                           "the obstacles. Half of it is for the robot: its guard stops a plan at a step that is "
+                           "further off on the robot's own clock. The other half is for the difference between the "
+                           "clocks of the robot and of the obstacles' sender. Moving obstacles need this key."),
+               "no obstacle may move"),
       Optional(gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
                                  "bus: the obstacles are task.obstacles and those of the last OBSTACLES message; "
                                  "nothing is certified before the first message or while there are none. task: the "
@@ -98,7 +104,8 @@ constexpr std::array kChannels{
     ChannelRow{"decision", &BusOptions::decision, "decision_t, one for each candidate."},
     ChannelRow{"certified", &BusOptions::certified, "certified_plan_t, what a robot may execute."},
     ChannelRow{"robot_state", &BusOptions::robot_state, "robot_state_t, from the robot."},
-    ChannelRow{"obstacles", &BusOptions::obstacles, "obstacles_t, all perceived obstacles, sent repeatedly."},
+    ChannelRow{"obstacles", &BusOptions::obstacles,
+               "obstacles_v2_t or obstacles_t, all perceived obstacles, sent repeatedly."},
     ChannelRow{"transition", &BusOptions::transition, "transition_t, executed steps."},
     ChannelRow{"status", &BusOptions::status, "certifier_status_v3_t, the certifier's heartbeat."},
     ChannelRow{"event", &BusOptions::event, "execution_event_t, events of the robot's guard."},

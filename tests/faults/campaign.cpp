@@ -722,18 +722,18 @@ class Campaign final {
     });
     ObstacleTries("OBSTACLES with gaps, NaN, wrong counts, from the future (signed)", [&](Row& row, Rig& rig, int i) {
       rig.perception().SetSilent(true);
-      rig.perception().SayNow([](obstacles_t&) { return true; });
-      rig.perception().SayNow([&](obstacles_t& message) {
+      rig.perception().SayNow([](obstacles_v2_t&) { return true; });
+      rig.perception().SayNow([&](obstacles_v2_t& message) {
         switch (i % 5) {
           case 0: return false;  // lost: the next one is a gap
-          case 1: message.obstacle[0].point[0][1] = std::numeric_limits<double>::quiet_NaN(); break;
+          case 1: message.obstacle[0].shape.point[0][1] = std::numeric_limits<double>::quiet_NaN(); break;
           case 2: message.num_obstacles = 65; break;
           case 3: message.utime += 60'000'000; break;
-          default: message.obstacle[message.num_obstacles - 1].kind = 99; break;
+          default: message.obstacle[message.num_obstacles - 1].shape.kind = 99; break;
         }
         return true;
       });
-      if (i % 5 == 0) rig.perception().SayNow([](obstacles_t&) { return true; });
+      if (i % 5 == 0) rig.perception().SayNow([](obstacles_v2_t&) { return true; });
       rig.Listen(milliseconds(50));
       DemandUnknown(row, rig, "after a message that was lost or refused");
       rig.perception().SetSilent(false);

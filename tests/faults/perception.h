@@ -46,6 +46,7 @@ class Perception final {
     const std::lock_guard lock(mutex_);
     auto message = sender_.Due(--set_back_us_).value();  // due: each time the clock was set back, once more
     message.utime = WallClockUs();
+    for (obstacle_v2_t& obstacle : message.obstacle) obstacle.utime = message.utime;
     if (spoil(message)) bus_->Publish(channel_, message);
   }
 

@@ -359,25 +359,117 @@ TEST_F(GateObstaclesTest, SixtyFourObstaclesFit) {
   EXPECT_EQ(Decide().obstacle, 64) << "behind the task's";
 }
 
-TEST(ObstacleMessageTest, EveryKindGoesThroughTheBus) {
-  const std::vector<Obstacle> obstacles = {
-      Obstacle::Circle(Eigen::Vector2d(0.1, -2), 0.3),
-      Obstacle::AxisBox(Eigen::Vector2d(1, 2), Eigen::Vector2d(3, 4.5)),
-      Obstacle::Polygon({Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0.5, 2), Eigen::Vector2d(0, 1)}),
-      Obstacle::HalfSpace(Eigen::Vector2d(-1, 0.5), -7)};
-  const auto message = Decoded<obstacles_t>(Encode(ToMessage(obstacles)));
-  ASSERT_TRUE(message);
-  const std::vector<Obstacle> back = FromMessage(*message, 2);
-  EXPECT_EQ(ObstaclesDigest(back), ObstaclesDigest(obstacles));
+// ---- obstacles_v2_t.
+
+std::vector<Obstacle> Passing() {
+  ObstacleMotion motion;
+  motion.stamp_us = kNow;
+  motion.velocity = {0, 1, 0};
+  return {Obstacle::Circle(Eigen::Vector2d(8, 0), 0.5).Moving(motion)};
 }
 
-TEST(ObstacleMessageTest, BoxesAndHalfSpacesExistInOneAndThreeDimensions) {
-  for (const int dim : {1, 3}) {
-    const std::vector<Obstacle> obstacles = {
-        Obstacle::AxisBox(Eigen::VectorXd::Constant(dim, -1), Eigen::VectorXd::Constant(dim, 2)),
-        Obstacle::HalfSpace(Eigen::VectorXd::LinSpaced(dim, 1, 2), 3)};
-    EXPECT_EQ(ObstaclesDigest(FromMessage(ToMessage(obstacles), dim)), ObstaclesDigest(obstacles));
-    EXPECT_THROW((void)FromMessage(ToMessage(obstacles), 2), std::invalid_argument);
+Config SmallTaskWithAClock() {
+  Config config = SmallTaskOnTheBus();
+  config.gate.max_clock_error_ms = 20;
+  return config;
+}
+
+std::vector<std::uint8_t> MovingMessage(std::int64_t sequence, std::int64_t utime = kNow,
+                                        const std::vector<Obstacle>& obstacles = Passing()) {
+  obstacles_v2_t message = ToMessageV2(obstacles, utime);
+  message.sequence = sequence;
+  return Encode(message);
+}
+
+TEST(GateMovingTest, BothTypesAreOneStream) {
+  Gate gate(SmallTaskWithAClock());
+  const std::vector<Obstacle> of_task = SmallTask().obstacles;
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
+  EXPECT_EQ(gate.grounds().obstacles, ObstaclesDigest(Both(of_task, Passing())));
+  EXPECT_EQ(gate.UpdateObstacles(Encode(Message(kFarAway, 1)), kNow), "");
+  EXPECT_EQ(gate.grounds().obstacles, ObstaclesDigest(Both(of_task, kFarAway)));
+  EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "");
+  EXPECT_THAT(gate.UpdateObstacles(MovingMessage(1), kNow), HasSubstr("does not exceed the last"));
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(3), kNow), "");
+  EXPECT_THAT(gate.WhyObstaclesUnknown(kNow), HasSubstr("sequence 3 came out of order"));
+  EXPECT_EQ(gate.UpdateObstacles(Encode(Message(kFarAway, 4)), kNow), "");
+  EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "");
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0, kNow + 1), kNow), "") << "its sender restarted";
+  EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "") << "or it is a second sender";
+  EXPECT_NE(gate.WhyObstaclesUnknown(kNow + 1'000'002), "") << "it is silent for too long";
+}
+
+TEST(GateMovingTest, OnesThatAreStaleAheadOrNoMessageAreRefused) {
+  for (const std::int64_t age : {500'001, -50'001}) {
+    Gate gate(SmallTaskWithAClock());
+    EXPECT_THAT(gate.UpdateObstacles(MovingMessage(0, kNow - age), kNow), HasSubstr("stamped"));
+  }
+  Gate gate(SmallTaskWithAClock());
+  std::vector<std::uint8_t> bytes = MovingMessage(0);
+  bytes.pop_back();
+  EXPECT_THAT(gate.UpdateObstacles(bytes, kNow), HasSubstr("nor an obstacles_v2_t"));
+  EXPECT_THAT(gate.WhyObstaclesUnknown(kNow), HasSubstr("the last message was refused"));
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
+  EXPECT_EQ(gate.WhyObstaclesUnknown(kNow), "");
+  obstacles_v2_t nowhere = ToMessageV2(Passing(), kNow);
+  nowhere.sequence = 1;
+  nowhere.obstacle[0].from_utime = kNow + 1;
+  const Digest before = gate.grounds().obstacles;
+  EXPECT_THAT(gate.UpdateObstacles(Encode(nowhere), kNow), HasSubstr("track 0 begins at"));
+  EXPECT_EQ(gate.grounds().obstacles, before);
+  EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
+}
+
+TEST(GateMovingTest, WithoutAClockNothingMoves) {
+  Gate gate(SmallTaskOnTheBus());
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0, kNow, kFarAway), kNow), "") << "what stands needs none";
+  EXPECT_THAT(gate.UpdateObstacles(MovingMessage(1), kNow),
+              HasSubstr("obstacle 0 moves, and the task has no gate.max_clock_error_ms"));
+  EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
+}
+
+// The plan's times count only where an obstacle may move: logs of before have candidates with any step_us.
+TEST(GateMovingTest, AScheduleOutOfItsBoundsIsRejected) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  Gate gate(SmallTaskWithAClock()), without(SmallTaskOnTheBus());
+  ASSERT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
+  std::int64_t id = 0;
+  for (const std::int64_t step : {std::int64_t{0}, std::int64_t{-1}, std::int64_t{150'001}, kMost, -kMost - 1}) {
+    candidate_plan_t candidate = Candidate(++id);
+    candidate.step_us = step;
+    const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
+    EXPECT_EQ(decision.outcome, decision_t::REJECTED);
+    EXPECT_EQ(decision.cause, decision_t::CAUSE_WRONG_DIMENSION);
+    EXPECT_THAT(GetText(decision.message), HasSubstr("step_us is " + std::to_string(step) + ", must be 1 to 150000"));
+    EXPECT_EQ(without.Decide(Encode(candidate), kNow).decision.outcome, decision_t::CERTIFIED);
+  }
+  for (const std::int64_t step : {1, 150'000}) {
+    candidate_plan_t candidate = Candidate(++id);
+    candidate.step_us = step;
+    EXPECT_EQ(gate.Decide(Encode(candidate), kNow).decision.outcome, decision_t::CERTIFIED) << step;
+  }
+  for (const std::int64_t start : {std::int64_t{0}, std::int64_t{-1}, kMost, -kMost - 1}) {
+    candidate_plan_t candidate = Candidate(++id);
+    candidate.start_utime = start;
+    const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
+    EXPECT_EQ(decision.outcome, decision_t::REJECTED);
+    EXPECT_EQ(decision.cause, start > 0 ? decision_t::CAUSE_FUTURE : decision_t::CAUSE_TOO_LATE);
+  }
+}
+
+// A receiver whose clock is wrong by centuries accepts such stamps.
+TEST(GateMovingTest, StartsBeyondTheLatestTimeOfAScheduleAreRejected) {
+  for (const std::int64_t sign : {1, -1}) {
+    for (const bool is_inside : {true, false}) {
+      Gate gate(SmallTaskWithAClock());
+      const std::int64_t start = sign * (Schedule::kLatest + (is_inside ? 0 : 1)), now = start - 500'000;
+      const decision_t decision = gate.Decide(Encode(Candidate(1, 0, now)), now).decision;
+      if (is_inside) {
+        EXPECT_EQ(decision.outcome, decision_t::CERTIFIED);
+      } else {
+        EXPECT_THAT(GetText(decision.message), HasSubstr("must be within 2^60 of the epoch"));
+      }
+    }
   }
 }
 

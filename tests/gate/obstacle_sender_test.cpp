@@ -39,7 +39,7 @@ TEST(ObstacleSenderTest, AChangeIsDueAtOnceAndTheSameSetIsNot) {
   const auto none = sender.Due(2);
   ASSERT_TRUE(none);
   EXPECT_EQ(none->num_obstacles, 0) << "nothing of those before is left";
-  EXPECT_EQ(none->obstacle[0].num_points, 0);
+  EXPECT_EQ(none->obstacle[0].shape.num_points, 0);
   EXPECT_EQ(none->sequence, 1);
 }
 
@@ -56,6 +56,45 @@ TEST(ObstacleSenderTest, WhatCannotBeSaidIsRefused) {
   EXPECT_THROW(sender.Set(std::vector<Obstacle>(65, kOne[0])), std::invalid_argument);
   EXPECT_EQ(sender.Due(0)->num_obstacles, 64) << "those before stay";
   for (const std::int64_t period : {0, -1}) EXPECT_THROW(ObstacleSender{period}, std::invalid_argument);
+}
+
+TEST(ObstacleSenderTest, WhatMovesKeepsItsStampAndWhatStandsGetsThatOfTheMessage) {
+  ObstacleMotion motion;
+  motion.stamp_us = 500;
+  motion.velocity.x() = 1;
+  ObstacleSender sender(1000);
+  sender.Set({kOne[0], kOne[0].Moving(motion)}, {7, 9});
+  for (const std::int64_t now : {1000, 2000}) {
+    const auto message = sender.Due(now);
+    ASSERT_TRUE(message);
+    EXPECT_EQ(message->obstacle[0].utime, now);
+    EXPECT_EQ(message->obstacle[1].utime, 500);
+    EXPECT_EQ(message->obstacle[0].track, 7);
+    EXPECT_EQ(message->obstacle[1].track, 9);
+    EXPECT_EQ(ObstaclesDigest(FromMessage(*message, 2)), ObstaclesDigest({kOne[0], kOne[0].Moving(motion)}));
+  }
+  motion.stamp_us = 501;
+  sender.Set({kOne[0], kOne[0].Moving(motion)}, {7, 9});
+  EXPECT_TRUE(sender.Due(2001)) << "another stamp is a change";
+  sender.Set({kOne[0], kOne[0].Moving(motion)}, {7, 10});
+  EXPECT_TRUE(sender.Due(2002)) << "another track, too";
+  sender.Set({kOne[0], kOne[0].Moving(motion)}, {7, 10});
+  EXPECT_FALSE(sender.Due(2003));
+  EXPECT_THROW(sender.Set(kOne, {7, 10}), std::invalid_argument);
+}
+
+TEST(ObstacleSenderTest, MotionsOfAFileBeginWithTheSender) {
+  ObstacleMotion motion;
+  motion.from_us = -20;
+  motion.until_us = 30;
+  const std::vector<Obstacle> begun = BegunAt(kNow, {kOne[0], kOne[0].Moving(motion), kOne[0].Moving({})});
+  EXPECT_FALSE(begun[0].motion());
+  EXPECT_EQ(begun[1].motion()->stamp_us, kNow);
+  EXPECT_EQ(begun[1].motion()->from_us, kNow - 20);
+  EXPECT_EQ(begun[1].motion()->until_us, kNow + 30);
+  EXPECT_EQ(begun[2].motion()->stamp_us, kNow);
+  EXPECT_EQ(begun[2].motion()->from_us, -ObstacleMotion::kAlways);
+  EXPECT_EQ(begun[2].motion()->until_us, ObstacleMotion::kAlways);
 }
 
 TEST(ObstacleSenderTest, AtItsPeriodAGateKnowsWhereTwoMessagesInARowAreLost) {
