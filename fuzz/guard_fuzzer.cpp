@@ -1,5 +1,6 @@
 // The guard under any plans, states and times: what it executes was sealed, signed where there is a key, finite, in
-// time, and newer than the last; each state it let pass lies in its slice; and nothing happens while it is halted.
+// time, and newer than the last; where a jitter is declared, each step is within it; each state it let pass lies in its
+// slice; and nothing happens while it is halted.
 #include <cmath>
 
 #include "fuzz/fuzz.h"
@@ -9,20 +10,21 @@
 namespace forereach {
 namespace {
 
-constexpr std::int64_t kStart = kPlanStart, kStepUs = kPlanStepUs;
+constexpr std::int64_t kStart = kPlanStart, kStepUs = kPlanStepUs, kJitterUs = 3000;
 
 const KeyRing& Keys(bool ours) {
   static const KeyRing keys = MakeKeyRing("ours", DigestOf("ours")), other = MakeKeyRing("other", DigestOf("other"));
   return ours ? keys : other;
 }
 
-// With the key it has a domain too, which the small plan reaches exactly.
+// With the key it has a domain too, which the small plan reaches exactly, and a jitter.
 GuardOptions Options(bool with_key) {
   GuardOptions options{2, 1, kStepUs, DigestOf("config"), DigestOf("model")};
   if (!with_key) return options;
   options.keys = Keys(true);
   options.bus_name = "bus";
   options.domain = GuardDomain{{-12, -5}, {12, 5}, {-3}, {3}};
+  options.max_jitter_us = kJitterUs;
   return options;
 }
 
@@ -151,17 +153,20 @@ class Session final {
     Require(plan && !guard_.pending() && Apart(plan->plan.start_utime, boundary) <= kStepUs / 2 &&
             now <= plan->expires_utime);
     RequireInSlice(*plan, 0, state);
+    if (with_key_) Require(Apart(plan->plan.start_utime, boundary) <= kJitterUs && IsOnTime(*plan, 0, now));
     step_ = 0;
   }
 
   void Check(FuzzedDataProvider& input) {
     const int step = input.ConsumeBool() ? input.ConsumeIntegral<int>() : step_ + 1;
     const std::vector<double> state = State(input);
-    const bool ok = guard_.Check(step, state).ok();
+    const std::int64_t now = AnyInteger(input, kStart + (step_ + 1) * kStepUs, 2 * kStepUs);
+    const bool ok = guard_.Check(step, state, now).ok();
     Require(ok == (guard_.executing() != nullptr));  // after any refusal nothing is executing
     if (!ok) return;
     Require(step == ++step_);
     RequireInSlice(*guard_.executing(), step, state);
+    Require(!with_key_ || IsOnTime(*guard_.executing(), step, now));
     has_executed_ = true;
   }
 
@@ -169,6 +174,13 @@ class Session final {
     Require(state.size() == 2 && step <= plan.plan.num_steps);
     for (std::size_t k = 0; k < 2; ++k)
       Require(plan.slice_lower[step][k] <= state[k] && state[k] <= plan.slice_upper[step][k]);
+  }
+
+  // In wider arithmetic. No time is later than the last one of 64 bits.
+  static bool IsOnTime(const certified_plan_t& plan, int step, std::int64_t now) {
+    const __int128 due = plan.plan.start_utime + static_cast<__int128>(step) * plan.plan.step_us;
+    const __int128 late = now - std::min<__int128>(due, INT64_MAX);
+    return -kJitterUs <= late && late <= kJitterUs;
   }
 
   static std::uint64_t Apart(std::int64_t a, std::int64_t b) {

@@ -64,6 +64,7 @@ std::string_view EventName(std::int16_t kind) {
     case execution_event_t::CONTACT: return "contact";
     case execution_event_t::HALTED: return "halted";
     case execution_event_t::RESET: return "reset";
+    case execution_event_t::OFF_SCHEDULE: return "off_schedule";
     default: return "unknown";
   }
 }

@@ -159,6 +159,7 @@ std::string_view GuardCauseName(GuardCause cause) {
     case GuardCause::kTooEarly: return "too_early";
     case GuardCause::kTooLate: return "too_late";
     case GuardCause::kOutsideInitialSet: return "outside_initial_set";
+    case GuardCause::kOffSchedule: return "off_schedule";
     case GuardCause::kWrongStateSize: return "wrong_state_size";
     case GuardCause::kOutsideSlice: return "outside_slice";
     case GuardCause::kNotExecuting: return "not_executing";
@@ -195,6 +196,9 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   require("num_states", options_.num_states, kMaxPlanStates);
   require("num_inputs", options_.num_inputs, kMaxPlanInputs);
   require("step_us", options_.step_us, INT64_MAX);
+  if (options_.max_jitter_us && *options_.max_jitter_us < 0)
+    throw std::invalid_argument("GuardOptions: max_jitter_us is " + std::to_string(*options_.max_jitter_us) +
+                                ", it must not be negative");
   RequireDomain(options_.domain, options_);
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
@@ -384,13 +388,15 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_u
                                  std::span<const double> state) const {
   if (!pending_) return Refuse(halted_ ? GuardCause::kHalted : GuardCause::kNothingPending, {});
   const candidate_plan_t& plan = pending_->plan;
-  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(options_.step_us / 2)) {
+  const std::int64_t most = std::min(options_.step_us / 2, options_.max_jitter_us.value_or(INT64_MAX));
+  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(most)) {
     const bool early = boundary_utime < plan.start_utime;
     return Refuse(early ? GuardCause::kTooEarly : GuardCause::kTooLate,
                   Sentence("plan %" PRId64 " starts at %" PRId64 " us, this boundary is %" PRId64 " us", plan.plan_id,
                            plan.start_utime, boundary_utime));
   }
   GuardVerdict verdict = CheckExpiry(*pending_, now_us);
+  if (verdict.ok()) verdict = ExamineTime(plan, 0, now_us);
   if (!verdict.ok()) return verdict;
   verdict = ExamineStateSize(state);
   if (verdict.ok()) verdict = CheckInitialSet(plan, state);
@@ -403,19 +409,36 @@ GuardVerdict Guard::ExamineStateSize(std::span<const double> state) const {
                 Sentence("a state of %zu entries, this robot has %d", state.size(), options_.num_states));
 }
 
-GuardVerdict Guard::ExamineStep(int step, std::span<const double> state) const {
+// On what is due at the beginning of a step. A time that no integer holds is due at the last one.
+GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const {
+  if (!options_.max_jitter_us) return {};
+  std::int64_t due = 0;
+  if (__builtin_mul_overflow(plan.step_us, step, &due) || __builtin_add_overflow(plan.start_utime, due, &due))
+    due = INT64_MAX;
+  const std::uint64_t apart = Apart(now_us, due);
+  if (apart <= static_cast<std::uint64_t>(*options_.max_jitter_us)) return {};
+  const bool late = now_us > due;
+  return RefuseAt(GuardCause::kOffSchedule, step, -1, static_cast<double>(apart) * (late ? 1 : -1),
+                  static_cast<double>(*options_.max_jitter_us),
+                  Sentence("plan %" PRId64 ": step %d was due at %" PRId64 " us, it is %" PRIu64
+                           " us too %s, at most %" PRId64 " us are allowed",
+                           plan.plan_id, step, due, apart, late ? "late" : "early", *options_.max_jitter_us));
+}
+
+GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const {
   if (!executing_) return Refuse(GuardCause::kNotExecuting, "no plan is executing");
   const int num_steps = executing_->plan.num_steps;
   if (step != last_step_ + 1 || step > num_steps)
     return Refuse(GuardCause::kStepOutOfOrder, Sentence("step %d of %d after step %d", step, num_steps, last_step_));
-  const GuardVerdict verdict = ExamineStateSize(state);
-  return verdict.ok() ? CheckSlice(*executing_, step, state) : verdict;
+  GuardVerdict verdict = ExamineStateSize(state);
+  if (verdict.ok()) verdict = CheckSlice(*executing_, step, state);
+  return verdict.ok() ? ExamineTime(executing_->plan, step, now_us) : verdict;
 }
 
-GuardVerdict Guard::Check(int step, std::span<const double> measured_state) noexcept {
+GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept {
   GuardVerdict verdict;
   try {
-    verdict = ExamineStep(step, measured_state);
+    verdict = ExamineStep(step, measured_state, now_us);
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }

@@ -6,13 +6,15 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
     Accept    -> the plan is pending and waits for its start; a newer plan replaces it
     TryStart  -> at the plan's start boundary, with the state inside X_0: the plan executes from step 0 and replaces
                  the plan before it
-    Check     -> after each control: the state is inside X_t, so the next control may be applied
+    Check     -> after each control: the state is inside X_t, so the next control may be applied. With
+                 GuardOptions::max_jitter_us also: the step is on time
     Finish    -> no plan is executing
     Halt      -> no plan is executing, and none is accepted or started until Reset
 
 Every refusal is final. A plan that TryStart refuses for another cause than an early start is discarded. A plan whose
 Check fails stops executing. If Check finds a state outside its slice, the guard halts itself, because an assumption of
-the next certificate is false too. Apply only controls of the plan that `executing` returns, and control t only after
+the next certificate is false too. A step that is off its schedule only ends the plan: TryStart looks at the time of the
+next one. Apply only controls of the plan that `executing` returns, and control t only after
 its step t has passed.
 
 Check compares with interval hulls: a certified_plan_t contains, for t = 0..T, the interval hull of the certified slice
@@ -70,6 +72,7 @@ enum class GuardCause {
   kTooLate,
   kOutsideInitialSet,
   // TryStart and Check
+  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us.
   kWrongStateSize,
   kOutsideSlice,
   // Check
@@ -90,7 +93,7 @@ struct GuardVerdict {
       -1;  ///< Witness of kOutsideInitialSet, kOutsideSlice, kUnusedEntry, kNonFinite, kEmptySlice, kOutsideDomain.
   int coordinate =
       -1;            ///< Witness: coordinate of state, X_0, slice or control; for kOutsideDomain inputs follow states.
-  double value = 0;  ///< Witness: the value of that coordinate.
+  double value = 0;  ///< Witness: the value of that coordinate; for kOffSchedule the lateness in microseconds.
   double bound = 0;  ///< Witness: the violated bound, rounded to double.
   std::string message;  ///< One sentence with the values; empty for kNone.
 
@@ -116,6 +119,9 @@ struct GuardOptions {
   std::string bus_name = {};               ///< For example "239.255.76.67:7667". Not empty with keys.
   std::string channel = "PLAN_CERTIFIED";  ///< The channel of certified plans.
   std::optional<GuardDomain> domain = {};  ///< If set, plans that leave it are refused.
+  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, microseconds, not
+  negative. Where obstacles may move, it is half of the task's gate.max_clock_error_ms. */
+  std::optional<std::int64_t> max_jitter_us = {};
 };
 
 class Guard final {
@@ -137,15 +143,17 @@ class Guard final {
   /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= step_us / 2;
   now_us <= expires_utime, because a delayed robot reaches a boundary late; the measured state lies in X_0 = {x : |x -
   initial_center| <= initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN lies in no
-  set. kNothingPending and kTooEarly change nothing. After any other refusal no plan is pending. The executing plan
+  set. With max_jitter_us, boundary_utime and now_us have to be within it of start_utime, too. kNothingPending and
+  kTooEarly change nothing. After any other refusal no plan is pending. The executing plan
   continues unless the new one starts. It allocates nothing if it passes.
   @param measured_state num_states entries in the model's units. */
   [[nodiscard]] GuardVerdict TryStart(std::int64_t boundary_utime, std::int64_t now_us,
                                       std::span<const double> measured_state) noexcept;
 
-  /** Checks the state measured after control step - 1 against the hull of slice `step`. Call it for step = 1, 2, .. T
-  in this order. After a refusal no plan is executing. Cost O(n); it allocates nothing if it passes. */
-  [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state) noexcept;
+  /** Checks the state measured after control step - 1 against the hull of slice `step`, and then, with max_jitter_us,
+  |now_us - start_utime - step * step_us| <= max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal
+  no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
+  [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
 
   /** Ends the executing plan. */
   void Finish() noexcept { executing_.reset(); }
@@ -180,7 +188,8 @@ class Guard final {
   [[nodiscard]] GuardVerdict ExamineDomain(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
                                           std::span<const double> state) const;
-  [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state) const;
+  [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const;
+  [[nodiscard]] GuardVerdict ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
 
   GuardOptions options_;

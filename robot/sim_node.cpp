@@ -47,6 +47,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.bus_name = config.bus.bus_name();
   options.guard.channel = config.bus.certified;
   options.guard.domain = DomainOf(config);
+  if (const auto& error_ms = config.gate.max_clock_error_ms) options.guard.max_jitter_us = Microseconds(*error_ms) / 2;
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
   options.fault = config.bus.fault;

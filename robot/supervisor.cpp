@@ -92,13 +92,14 @@ void Supervisor::FinishStep(std::int64_t utime, std::int64_t now_us) {
   const std::int64_t plan_id = PlanId();
   SendTransition(utime - options_.guard.step_us);
   ++step_;
-  const GuardVerdict verdict = guard_.Check(step_, robot_.state());
+  const GuardVerdict verdict = guard_.Check(step_, robot_.state(), now_us);
   if (verdict.ok()) {
     ++counts_.steps_inside;
     return SendEvent(utime, execution_event_t::STEP_INSIDE, plan_id, step_, 0, "inside the certified slice");
   }
-  SendEvent(utime, execution_event_t::STEP_OUTSIDE, plan_id, step_, verdict.value, "emergency stop: " + verdict.message,
-            verdict.coordinate);
+  const bool is_off = verdict.cause == GuardCause::kOffSchedule;
+  SendEvent(utime, is_off ? execution_event_t::OFF_SCHEDULE : execution_event_t::STEP_OUTSIDE, plan_id, step_,
+            verdict.value, "emergency stop: " + verdict.message, verdict.coordinate);
   halted_utime_ = now_us;
   Hold();
 }

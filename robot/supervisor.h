@@ -10,7 +10,8 @@ call Boundary at every step boundary:
 
 Boundary does, in this order:
  1. FinishStep: if a plan is executing, sends the step that has ended as transition_t and checks the measured state
-    against the certified slice: STEP_INSIDE, or STEP_OUTSIDE, an emergency stop;
+    against the certified slice: STEP_INSIDE, or STEP_OUTSIDE, an emergency stop. A step that is further off its
+    schedule than the guard's max_jitter_us is OFF_SCHEDULE, an emergency stop that needs no reset;
  2. a pending plan whose start_utime is this boundary takes over, in the middle of a plan or at rest: STARTED. If a
 check of the guard fails it is REFUSED, and the current plan goes on;
  3. otherwise the current plan goes on: TAIL_BEGUN where its braking tail begins, STANDING where it ends, with a hold;
@@ -18,9 +19,9 @@ check of the guard fails it is REFUSED, and the current plan goes on;
 So without a newer certificate the robot runs the tail that is certified already, holds at rest, and can start from
 there.
 
-After an emergency stop no plan is accepted until a reset arrives whose stamp is later than everything that halted the
-robot. A fault whose stamp is not later than the last reset is a repetition and is ignored. A plan that is executing is
-not affected by Expect.
+After every other emergency stop no plan is accepted until a reset arrives whose stamp is later than everything that
+halted the robot. A fault whose stamp is not later than the last reset is a repetition and is ignored. A plan that is
+executing is not affected by Expect.
 
 With keys, messages count only if the certifier signed the plan or fault, and the operator the command. Messages that
 this class sends are not signed: sign them with bus/authentic.h's Signer, or with a bus that does.
@@ -85,8 +86,8 @@ class Supervisor final {
   std::string OnCommand(Bytes message, std::int64_t now_us);
 
   /** Handles a step boundary. @param utime the boundary's time. @param now_us later than that if the robot was held up;
-  a plan that has expired meanwhile is refused. @param ends the robot ends its run: no further plan starts, and at rest
-  it reports FINISHED.
+  a plan that has expired meanwhile is refused, and with the guard's max_jitter_us the plan under way ends where now_us
+  is too late. @param ends the robot ends its run: no further plan starts, and at rest it reports FINISHED.
   @return the control to apply until the next boundary, num_inputs entries, valid until the next call of this object;
   empty: hold. */
   std::span<const double> Boundary(std::int64_t utime, std::int64_t now_us, bool ends = false);

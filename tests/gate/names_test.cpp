@@ -162,7 +162,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                          {"GOAL_REACHED", 8},
                                                          {"CONTACT", 9},
                                                          {"HALTED", 10},
-                                                         {"RESET", 11}}));
+                                                         {"RESET", 11},
+                                                         {"OFF_SCHEDULE", 14}}));
   EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},

@@ -397,31 +397,31 @@ TEST(GuardStart, OnlyAnEarlyPlanIsKept) {
 
 TEST(GuardStart, ANewPlanTakesOverAndARefusedOneDoesNot) {
   Guard guard = Executing(SmallPlan(7));
-  EXPECT_TRUE(guard.Check(1, State{1, -2}).ok());
+  EXPECT_TRUE(guard.Check(1, State{1, -2}, kNow).ok());
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
   EXPECT_FALSE(guard.TryStart(kStart, kStart, State{9, -2}).ok());
   ASSERT_NE(guard.executing(), nullptr);
   EXPECT_EQ(guard.executing()->plan.plan_id, 7);
-  EXPECT_TRUE(guard.Check(2, State{1, -2}).ok()) << "the plan before goes on";
+  EXPECT_TRUE(guard.Check(2, State{1, -2}, kNow).ok()) << "the plan before goes on";
 
   EXPECT_TRUE(guard.Accept(Sealed(SmallPlan(9)), kNow).ok());
   EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
   EXPECT_EQ(guard.executing()->plan.plan_id, 9);
-  EXPECT_TRUE(guard.Check(1, State{1, -2}).ok()) << "the new plan begins at its own step 1";
+  EXPECT_TRUE(guard.Check(1, State{1, -2}, kNow).ok()) << "the new plan begins at its own step 1";
 }
 
 TEST(GuardCheck, BoundsAreInsideAndTheNextNumberIsNot) {
   for (int step = 1; step <= 3; ++step) {
     for (const State inside : {State{-10.0 - step, -5}, {10.0 + step, 5}}) {
       Guard guard = Executing();
-      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}).ok());
-      EXPECT_TRUE(guard.Check(step, inside).ok()) << step;
+      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}, kNow).ok());
+      EXPECT_TRUE(guard.Check(step, inside, kNow).ok()) << step;
     }
     const double reach = 10.0 + step;
     for (const State outside : {State{Below(-reach), 0}, {Above(reach), 0}, {0, Below(-5)}, {0, Above(5)}}) {
       Guard guard = Executing();
-      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}).ok());
-      const GuardVerdict verdict = guard.Check(step, outside);
+      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}, kNow).ok());
+      const GuardVerdict verdict = guard.Check(step, outside, kNow);
       const int k = outside[0] != 0 ? 0 : 1;
       EXPECT_EQ(verdict.cause, GuardCause::kOutsideSlice);
       EXPECT_EQ(verdict.step, step);
@@ -436,32 +436,133 @@ TEST(GuardCheck, BoundsAreInsideAndTheNextNumberIsNot) {
 TEST(GuardCheck, AfterARefusalNothingIsExecuting) {
   for (const State bad : {State{kNaN, 0}, {0, kNaN}, {kInf, 0}, {0, -kInf}, {11.5, 0}}) {
     Guard guard = Executing();
-    EXPECT_EQ(guard.Check(1, bad).cause, GuardCause::kOutsideSlice);
+    EXPECT_EQ(guard.Check(1, bad, kNow).cause, GuardCause::kOutsideSlice);
     EXPECT_EQ(guard.executing(), nullptr);
-    EXPECT_EQ(guard.Check(2, State{0, 0}).cause, GuardCause::kNotExecuting);
+    EXPECT_EQ(guard.Check(2, State{0, 0}, kNow).cause, GuardCause::kNotExecuting);
   }
 }
 
 TEST(GuardCheck, StepsComeInOrderAndEndAtTheHorizon) {
   Guard guard = Executing();
-  EXPECT_EQ(guard.Check(2, State{0, 0}).cause, GuardCause::kStepOutOfOrder) << "step 1 was not checked";
+  EXPECT_EQ(guard.Check(2, State{0, 0}, kNow).cause, GuardCause::kStepOutOfOrder) << "step 1 was not checked";
   guard = Executing();
-  for (int t = 1; t <= 3; ++t) EXPECT_TRUE(guard.Check(t, State{0, 0}).ok());
-  EXPECT_EQ(guard.Check(4, State{0, 0}).cause, GuardCause::kStepOutOfOrder);
+  for (int t = 1; t <= 3; ++t) EXPECT_TRUE(guard.Check(t, State{0, 0}, kNow).ok());
+  EXPECT_EQ(guard.Check(4, State{0, 0}, kNow).cause, GuardCause::kStepOutOfOrder);
   guard = Executing();
-  EXPECT_TRUE(guard.Check(1, State{0, 0}).ok());
-  EXPECT_EQ(guard.Check(1, State{0, 0}).cause, GuardCause::kStepOutOfOrder);
+  EXPECT_TRUE(guard.Check(1, State{0, 0}, kNow).ok());
+  EXPECT_EQ(guard.Check(1, State{0, 0}, kNow).cause, GuardCause::kStepOutOfOrder);
   guard = Executing();
-  EXPECT_EQ(guard.Check(1, std::array{0.0, 0.0, 0.0}).cause, GuardCause::kWrongStateSize);
+  EXPECT_EQ(guard.Check(1, std::array{0.0, 0.0, 0.0}, kNow).cause, GuardCause::kWrongStateSize);
   guard = Executing();
   guard.Finish();
   EXPECT_EQ(guard.executing(), nullptr);
-  EXPECT_EQ(guard.Check(1, State{0, 0}).cause, GuardCause::kNotExecuting);
+  EXPECT_EQ(guard.Check(1, State{0, 0}, kNow).cause, GuardCause::kNotExecuting);
+}
+
+// ---- The schedule.
+
+constexpr std::int64_t kJitter = 3000, kMost = std::numeric_limits<std::int64_t>::max();
+
+Guard OnTime(std::int64_t jitter_us = kJitter) {
+  GuardOptions options = TwoStates();
+  options.max_jitter_us = jitter_us;
+  return Guard(options);
+}
+
+Guard ExecutingOnTime(const certified_plan_t& certified = SmallPlan()) {
+  Guard guard = OnTime();
+  EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
+  EXPECT_TRUE(guard.TryStart(kStart, kStart, State{1, -2}).ok());
+  return guard;
+}
+
+TEST(GuardSchedule, AStepWithinTheJitterPassesAndOneOutsideEndsThePlan) {
+  for (const int step : {1, 2, 3}) {
+    for (const std::int64_t off : {-kJitter, std::int64_t{0}, kJitter}) {
+      Guard guard = ExecutingOnTime();
+      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}, kStart + t * kStep).ok());
+      EXPECT_TRUE(guard.Check(step, State{0, 0}, kStart + step * kStep + off).ok()) << off;
+    }
+    for (const std::int64_t off : {-kJitter - 1, kJitter + 1}) {
+      Guard guard = ExecutingOnTime();
+      for (int t = 1; t < step; ++t) ASSERT_TRUE(guard.Check(t, State{0, 0}, kStart + t * kStep).ok());
+      const GuardVerdict verdict = guard.Check(step, State{0, 0}, kStart + step * kStep + off);
+      EXPECT_EQ(verdict.cause, GuardCause::kOffSchedule);
+      EXPECT_EQ(verdict.plan_id, 7);
+      EXPECT_EQ(verdict.step, step);
+      EXPECT_EQ(verdict.value, static_cast<double>(off));
+      EXPECT_EQ(verdict.bound, static_cast<double>(kJitter));
+      EXPECT_THAT(verdict.message,
+                  testing::HasSubstr("was due at " + std::to_string(kStart + step * kStep) + " us, it is 3001 us too " +
+                                     (off > 0 ? "late" : "early") + ", at most 3000 us are allowed"));
+      EXPECT_EQ(guard.executing(), nullptr);
+      EXPECT_FALSE(guard.halted()) << "the next plan is looked at by its own time";
+      EXPECT_EQ(guard.Check(step + 1, State{0, 0}, kStart + (step + 1) * kStep).cause, GuardCause::kNotExecuting);
+    }
+  }
+}
+
+TEST(GuardSchedule, AStateOutsideItsSliceHaltsOffTheScheduleToo) {
+  Guard guard = ExecutingOnTime();
+  EXPECT_EQ(guard.Check(1, State{100, 0}, kMost).cause, GuardCause::kOutsideSlice);
+  EXPECT_TRUE(guard.halted());
+}
+
+TEST(GuardSchedule, AStartIsWithinTheJitterToo) {
+  for (const std::int64_t off : {-kJitter, std::int64_t{0}, kJitter}) {
+    Guard guard = OnTime();
+    ASSERT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+    EXPECT_TRUE(guard.TryStart(kStart + off, kStart + off, State{1, -2}).ok()) << off;
+  }
+  for (const std::int64_t off : {-kJitter - 1, kJitter + 1}) {
+    Guard guard = OnTime();
+    ASSERT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+    EXPECT_EQ(guard.TryStart(kStart, kStart + off, State{1, -2}).cause, GuardCause::kOffSchedule);
+    EXPECT_EQ(guard.pending(), nullptr);
+    EXPECT_EQ(guard.executing(), nullptr);
+  }
+  Guard early = OnTime(), late = OnTime();
+  ASSERT_TRUE(early.Accept(Sealed(SmallPlan()), kNow).ok());
+  ASSERT_TRUE(late.Accept(Sealed(SmallPlan()), kNow).ok());
+  EXPECT_EQ(early.TryStart(kStart - kJitter - 1, kStart - kJitter - 1, State{1, -2}).cause, GuardCause::kTooEarly);
+  EXPECT_TRUE(early.TryStart(kStart, kStart, State{1, -2}).ok());
+  EXPECT_EQ(late.TryStart(kStart + kJitter + 1, kStart + kJitter + 1, State{1, -2}).cause, GuardCause::kTooLate);
+}
+
+// Half a step stays the bound where the jitter is larger.
+TEST(GuardSchedule, ALargeJitterAllowsNoOtherBoundary) {
+  Guard guard = OnTime(kMost);
+  ASSERT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+  EXPECT_EQ(guard.TryStart(kStart - kStep / 2 - 1, kStart, State{1, -2}).cause, GuardCause::kTooEarly);
+  EXPECT_TRUE(guard.TryStart(kStart + kStep / 2, kStart, State{1, -2}).ok());
+  for (const std::int64_t jitter : {-1, -7}) EXPECT_THROW((void)OnTime(jitter), std::invalid_argument);
+  EXPECT_NO_THROW((void)OnTime(0));
+}
+
+TEST(GuardSchedule, TimesThatNoIntegerHoldsAreOffTheSchedule) {
+  for (const std::int64_t now : {kMost, -kMost - 1, std::int64_t{0}}) {
+    Guard guard = ExecutingOnTime();
+    EXPECT_EQ(guard.Check(1, State{0, 0}, now).cause, GuardCause::kOffSchedule) << now;
+  }
+  certified_plan_t last = SmallPlan();
+  last.plan.start_utime = last.expires_utime = kMost - kStep;  // its second step is due after the last time of all
+  Guard guard = OnTime();
+  ASSERT_TRUE(guard.Accept(Sealed(last), kNow).ok());
+  ASSERT_TRUE(guard.TryStart(kMost - kStep, kMost - kStep, State{1, -2}).ok());
+  EXPECT_TRUE(guard.Check(1, State{0, 0}, kMost).ok());
+  EXPECT_TRUE(guard.Check(2, State{0, 0}, kMost).ok()) << "it cannot be later";
+  EXPECT_EQ(guard.Check(3, State{0, 0}, -kMost - 1).cause, GuardCause::kOffSchedule);
+}
+
+TEST(GuardSchedule, WithoutAJitterNoTimeCounts) {
+  Guard guard = Executing();
+  EXPECT_TRUE(guard.Check(1, State{0, 0}, kMost).ok());
+  EXPECT_TRUE(guard.Check(2, State{0, 0}, -kMost - 1).ok());
 }
 
 TEST(GuardHalt, AStateOutsideItsSliceHaltsUntilAReset) {
   Guard guard = Executing();
-  EXPECT_EQ(guard.Check(1, State{100, 0}).cause, GuardCause::kOutsideSlice);
+  EXPECT_EQ(guard.Check(1, State{100, 0}, kNow).cause, GuardCause::kOutsideSlice);
   EXPECT_TRUE(guard.halted());
   const auto next = Sealed(SmallPlan(8));
   EXPECT_EQ(guard.Accept(next, kNow).cause, GuardCause::kHalted);

@@ -26,7 +26,8 @@ enum : std::int16_t {
   kTailBegun = execution_event_t::TAIL_BEGUN,
   kStanding = execution_event_t::STANDING,
   kHalted = execution_event_t::HALTED,
-  kReset = execution_event_t::RESET
+  kReset = execution_event_t::RESET,
+  kOffSchedule = execution_event_t::OFF_SCHEDULE
 };
 
 SupervisorOptions TwoStates() {
@@ -105,6 +106,37 @@ TEST_F(SupervisorTest, APlanIsExecutedToItsEndThenTheRobotHolds) {
   EXPECT_EQ(transitions_[1].state[0], 2);
   EXPECT_EQ(transitions_[1].input[0], 11);
   EXPECT_EQ(transitions_[1].next_state[0], 3);
+}
+
+TEST_F(SupervisorTest, AStepThatIsTooLateEndsThePlanWithoutAReset) {
+  SupervisorOptions options = TwoStates();
+  options.guard.max_jitter_us = 3000;
+  Supervisor supervisor(options, *this);
+  const auto boundary = [&](int j, std::int64_t late) { return supervisor.Boundary(At(j), At(j) + late); };
+  supervisor.OnCertified(Sealed(SmallPlan(7)), At(0) - 1000);
+  EXPECT_FALSE(boundary(0, 3000).empty());
+  EXPECT_FALSE(boundary(1, 3000).empty());
+  EXPECT_TRUE(boundary(2, 3001).empty());
+  EXPECT_EQ(holds_, 1);
+  EXPECT_FALSE(supervisor.halted());
+  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kInside, kTailBegun, kOffSchedule));
+  EXPECT_EQ(events_.back().plan_id, 7);
+  EXPECT_EQ(events_.back().step, 2);
+  EXPECT_EQ(events_.back().value, 3001);
+  EXPECT_THAT(GetText(events_.back().message), HasSubstr("emergency stop: plan 7: step 2 was due at"));
+
+  certified_plan_t next = SmallPlan(8);
+  next.plan.start_utime = At(4);
+  next.expires_utime = At(9);
+  supervisor.OnCertified(Sealed(next), At(3));
+  EXPECT_FALSE(boundary(4, 0).empty()) << "a plan from rest on time";
+  next.plan.plan_id = 9;
+  next.plan.start_utime = At(6);
+  supervisor.OnCertified(Sealed(next), At(5));
+  EXPECT_FALSE(boundary(5, 0).empty());
+  EXPECT_EQ(supervisor.counts().refused.count("off_schedule"), 0u);
+  (void)boundary(6, 3001);
+  EXPECT_EQ(supervisor.counts().refused.at("off_schedule"), 1) << "it starts too late";
 }
 
 TEST_F(SupervisorTest, HoldsAtRestUntilACertifiedPlanStarts) {
