@@ -15,6 +15,7 @@ std::string_view OutcomeName(std::int16_t outcome) {
     case decision_t::ABSTAIN_SAFETY: return "abstain_safety";
     case decision_t::REJECTED: return "rejected";
     case decision_t::ABSTAIN_DEADLINE: return "abstain_deadline";
+    case decision_t::ABSTAIN_OBSTACLES: return "abstain_obstacles";
     default: return "unknown";
   }
 }

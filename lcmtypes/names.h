@@ -8,8 +8,8 @@
 
 namespace forereach {
 
-/** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected", "abstain_deadline"; "unknown" for
-any other number. */
+/** "certified", "abstain_falsified", "abstain_domain", "abstain_safety", "rejected", "abstain_deadline",
+"abstain_obstacles"; "unknown" for any other number. */
 [[nodiscard]] std::string_view OutcomeName(std::int16_t outcome);
 
 /** "none", "pairwise", "domain_exit", ... as decision_t's CAUSE_ constants; "unknown" for any other number. */

@@ -226,6 +226,7 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   add(abstained("pairwise"), "abstained F");
   add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
   add(abstained("obstacle"), "abstained S");
+  add(abstained("no_obstacles"), "abstained without obstacles");
   if (summary.latency_us.WasMeasured())
     numbers.push_back(fmt::format("decided in {} (p50), {} (p99)", DurationText(summary.latency_us.p50),
                                   DurationText(summary.latency_us.p99)));

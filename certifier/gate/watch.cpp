@@ -12,9 +12,15 @@
 namespace forereach {
 namespace {
 
-constexpr std::array<std::int16_t, Watch::kNeeds> kCauses{decision_t::CAUSE_SECOND_CERTIFIER,
-                                                          decision_t::CAUSE_LATCH_UNWRITABLE,
-                                                          decision_t::CAUSE_NOT_ARMED, decision_t::CAUSE_NO_OBSTACLES};
+struct Answer {
+  std::int16_t cause, outcome = decision_t::REJECTED;
+};
+
+// Of candidates that come before the need is met.
+constexpr std::array<Answer, Watch::kNeeds> kAnswers{{{decision_t::CAUSE_SECOND_CERTIFIER},
+                                                      {decision_t::CAUSE_LATCH_UNWRITABLE},
+                                                      {decision_t::CAUSE_NOT_ARMED},
+                                                      {decision_t::CAUSE_NO_OBSTACLES, decision_t::ABSTAIN_OBSTACLES}}};
 
 }  // namespace
 
@@ -76,12 +82,12 @@ Watch::State Watch::state() const {
 }
 
 std::optional<Watch::Refusal> Watch::WhyNot() const {
-  if (fault_) return Refusal{decision_t::CAUSE_FAULT, "fault: " + fault_->why};
+  if (fault_) return Refusal{decision_t::CAUSE_FAULT, decision_t::REJECTED, "fault: " + fault_->why};
   std::optional<Refusal> refusal;
   for (std::size_t need = 0; need < kNeeds; ++need) {
     if (lacking_[need].empty()) continue;
     if (!refusal)
-      refusal = {kCauses[need], lacking_[need]};
+      refusal = {kAnswers[need].cause, kAnswers[need].outcome, lacking_[need]};
     else
       refusal->why += "; " + lacking_[need];
   }

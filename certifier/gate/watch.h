@@ -32,8 +32,8 @@ class Watch final {
   enum class Need { kCharge, kLatch, kRobotState, kObstacles };
   static constexpr std::size_t kNeeds = 4;
   struct Refusal {
-    std::int16_t cause;  ///< decision_t's
-    std::string why;     ///< Names everything that is missing.
+    std::int16_t cause, outcome;  ///< decision_t's
+    std::string why;              ///< Names everything that is missing.
   };
 
   explicit Watch(const WatchOptions& options);

@@ -348,7 +348,8 @@ void CertifierNode::AnswerDue() {
 GateAnswer CertifierNode::Decide(Bytes candidate) {
   const std::int64_t now = clocks_.wall();
   LookForObstacles(now);
-  if (const auto refusal = watch_.WhyNot()) return gate_->Refuse(candidate, now, refusal->cause, refusal->why);
+  if (const auto refusal = watch_.WhyNot())
+    return gate_->Refuse(candidate, now, refusal->cause, refusal->why, refusal->outcome);
   if (contradictions_.ContradictInForce() && !gate_->certifier().violation())
     return gate_->Refuse(candidate, now, decision_t::CAUSE_PAIRWISE,
                          "a transition that was seen before contradicts the declaration; another has to be declared",

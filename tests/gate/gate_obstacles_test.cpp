@@ -428,6 +428,48 @@ TEST(GateMovingTest, WithoutAClockNothingMoves) {
   EXPECT_NE(gate.WhyObstaclesUnknown(kNow), "");
 }
 
+// The candidate starts in half a second and reaches the wall with its sample 5, 0.75 s later; its sample 6 is past it.
+constexpr std::int64_t kAtTheWall = kNow + 500'000 + 750'000, kError = 20'000;
+const Obstacle kWall = Obstacle::AxisBox(Eigen::Vector2d(0.7, -5), Eigen::Vector2d(0.8, 5));
+
+std::int16_t OutcomeAmong(const std::vector<Obstacle>& obstacles) {
+  Gate gate(SmallTaskWithAClock());
+  EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0, kNow, obstacles), kNow), "");
+  const decision_t decision = gate.Decide(Encode(Candidate(1)), kNow).decision;
+  if (decision.outcome == decision_t::ABSTAIN_SAFETY) {
+    EXPECT_THAT(decision.step, testing::AnyOf(4, 5));
+    EXPECT_EQ(decision.obstacle, static_cast<int>(obstacles.size())) << "the task's own comes first";
+  }
+  return decision.outcome;
+}
+
+TEST(GateMovingTest, AWindowIsMetUpToTheClockError) {
+  EXPECT_EQ(OutcomeAmong({kWall}), decision_t::ABSTAIN_SAFETY);
+  for (const std::int64_t off : {-1, 0}) {
+    ObstacleMotion gone, beside, comes;
+    gone.stamp_us = beside.stamp_us = comes.stamp_us = kNow;
+    gone.until_us = kAtTheWall - kError + off;
+    EXPECT_EQ(OutcomeAmong({kWall.Moving(gone)}), off < 0 ? decision_t::CERTIFIED : decision_t::ABSTAIN_SAFETY);
+    beside.until_us = comes.from_us = kAtTheWall + kError - off;
+    EXPECT_EQ(OutcomeAmong({kFarAway[0].Moving(beside), kWall.Moving(comes)}),
+              off < 0 ? decision_t::CERTIFIED : decision_t::ABSTAIN_SAFETY);
+  }
+}
+
+TEST(GateMovingTest, APedestrianIsMetWhereItIsThen) {
+  const auto walks = [](double y, double uncertainty = 0) {
+    ObstacleMotion motion;
+    motion.stamp_us = kNow;
+    motion.velocity.y() = -1;
+    motion.uncertainty = uncertainty;
+    return Obstacle::Circle(Eigen::Vector2d(0.75, y), 0.2).Moving(motion);
+  };
+  EXPECT_EQ(OutcomeAmong({walks(1.25)}), decision_t::ABSTAIN_SAFETY) << "both are there 1.25 s from now";
+  EXPECT_EQ(OutcomeAmong({walks(0)}), decision_t::CERTIFIED) << "it stands on the way now, and has left it then";
+  EXPECT_EQ(OutcomeAmong({walks(2.5)}), decision_t::CERTIFIED) << "it comes later";
+  EXPECT_EQ(OutcomeAmong({walks(2.5, 1)}), decision_t::ABSTAIN_SAFETY) << "where it is, is not known well enough";
+}
+
 // The plan's times count only where an obstacle may move: logs of before have candidates with any step_us.
 TEST(GateMovingTest, AScheduleOutOfItsBoundsIsRejected) {
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();

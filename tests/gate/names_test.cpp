@@ -125,7 +125,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                  {"ABSTAIN_DOMAIN", 3},
                                  {"ABSTAIN_SAFETY", 4},
                                  {"REJECTED", 5},
-                                 {"ABSTAIN_DEADLINE", 6}}));
+                                 {"ABSTAIN_DEADLINE", 6},
+                                 {"ABSTAIN_OBSTACLES", 7}}));
   EXPECT_EQ(causes, (Constants{{"NONE", 0},
                                {"PAIRWISE", 1},
                                {"DOMAIN_EXIT", 2},

@@ -35,6 +35,8 @@ TEST(WatchTest, IsArmedIfNothingIsLackingAndSaysAllThatIs) {
                               : second      ? decision_t::CAUSE_SECOND_CERTIFIER
                               : robot_lacks ? decision_t::CAUSE_NOT_ARMED
                                             : decision_t::CAUSE_NO_OBSTACLES);
+    EXPECT_EQ(refusal->outcome,
+              refusal->cause == decision_t::CAUSE_NO_OBSTACLES ? decision_t::ABSTAIN_OBSTACLES : decision_t::REJECTED);
     if (fault) {
       EXPECT_EQ(refusal->why, "fault: jumped");
       continue;

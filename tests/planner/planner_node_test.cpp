@@ -420,13 +420,13 @@ TEST_F(PlannerNodeTest, EndsTheRoundWhereTheCertifierDoesNotKnowTheObstacles) {
   decision_t decision{};
   decision.plan_id = candidates_.back().plan_id;
   SetText(decision.source, PlannerNode::kSource);
-  decision.outcome = decision_t::REJECTED;
+  decision.outcome = decision_t::ABSTAIN_OBSTACLES;
   decision.cause = decision_t::CAUSE_NO_OBSTACLES;
   ASSERT_TRUE(bus_->Publish(config_.bus.decision, decision));
   Deliver();
   Run(20);
   EXPECT_EQ(candidates_.size(), 1u) << "no other candidate before the next state";
-  EXPECT_EQ(Summary()["rejected"], nlohmann::json({{"no_obstacles", 1}}));
+  EXPECT_EQ(Summary()["abstained"], nlohmann::json({{"no_obstacles", 1}}));
 }
 
 // As the gate does: else the planner would go on around the obstacles of before, and the gate refuse what it finds.

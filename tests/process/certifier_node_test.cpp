@@ -256,9 +256,9 @@ class ObstaclesNodeTest : public CertifierNodeTest {
   // The decision and the heartbeat say so.
   void ExpectUnknown(const std::string& why) {
     const decision_t decision = Ask();
-    EXPECT_EQ(decision.outcome, decision_t::REJECTED);
+    EXPECT_EQ(decision.outcome, decision_t::ABSTAIN_OBSTACLES);
     EXPECT_EQ(decision.cause, decision_t::CAUSE_NO_OBSTACLES);
-    EXPECT_THAT(GetText(decision.message), testing::HasSubstr("rejected: waits for OBSTACLES: " + why));
+    EXPECT_THAT(GetText(decision.message), testing::HasSubstr("abstained: waits for OBSTACLES: " + why));
     now_us_ += CertifierNode::kHeartbeatUs;
     Run();
     EXPECT_EQ(status_.back().level, certifier_status_v3_t::STALE);
