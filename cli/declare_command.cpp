@@ -16,6 +16,7 @@
 #include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/cover_file.h"
+#include "cli/declare_between.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
 
@@ -26,7 +27,8 @@ using Json = nlohmann::json;
 
 struct Options {
   std::string config, cover, check;
-  bool json = false;
+  std::string from = "equations";
+  bool json = false, between = false;
   SlopeBoundOptions search;
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
@@ -304,10 +306,14 @@ Command DeclareCommand() {
           "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
           "found.\n"
           "Copy the last line of the output into the task file.\n\n"
+          "--between needs no residual. It bounds how far the robot's path curves from one sample to the next, for the "
+          "key\n"
+          "task.between.\n\n"
           "Examples:\n"
           "  forereach declare --config config/bicycle.yaml\n"
           "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
-          "  forereach declare --config config/point_mass.yaml --check cover.json",
+          "  forereach declare --config config/point_mass.yaml --check cover.json\n"
+          "  forereach declare --config config/demo.yaml --between",
       .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
                   {"--gap", &options->search.gap, "",
                    "Stop when no bound exceeds the largest slope found by more than this fraction",
@@ -315,16 +321,34 @@ Command DeclareCommand() {
                   {"--max-boxes", &options->search.max_boxes, "",
                    "Stop after this many boxes for each bound; the bound found by then is valid",
                    NumberRange{1, 100'000'000}},
-                  {"--cover", &options->cover, "FILE.json", "The file for the proof: the boxes, and a bound for each"},
+                  {.name = "--cover",
+                   .variable = &options->cover,
+                   .type = "FILE.json",
+                   .help = "The file for the proof: the boxes, and a bound for each",
+                   .excludes = "--between"},
                   {.name = "--check",
                    .variable = &options->check,
                    .type = "FILE.json",
                    .help = "Check such a file instead, in 128 bits and with independent formulas: exit 0 "
                            "confirmed, 1 not confirmed",
                    .excludes = "--cover"},
+                  {.name = "--between",
+                   .variable = &options->between,
+                   .help = "Bound the motion between two samples instead",
+                   .excludes = "--check"},
+                  {.name = "--from",
+                   .variable = &options->from,
+                   .help = "With --between. equations: proven bounds over the domain, from the model's equations in "
+                           "continuous time; positions: largest second differences of the task's transitions",
+                   .one_of = {"equations", "positions"},
+                   .needs = "--between"},
                   JobsOption(options->jobs),
                   JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
-      .run = [options] { return options->check.empty() ? Declare(*options) : CheckCover(*options); }};
+      .run = [options] {
+        if (options->between)
+          return DeclareBetween({options->config, options->from == "positions", options->json, options->search});
+        return options->check.empty() ? Declare(*options) : CheckCover(*options);
+      }};
 }
 
 }  // namespace forereach

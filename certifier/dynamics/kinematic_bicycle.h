@@ -3,6 +3,10 @@
     x+ = x + dt v cos(theta),  y+ = y + dt v sin(theta),  theta+ = theta + dt / wheelbase v tan(delta),
     v+ = v + dt a,  a+ = a + dt jerk,  delta+ = delta + dt steer_rate.
 
+Its equations in continuous time are
+    x' = v cos(theta),  y' = v sin(theta),  theta' = v tan(delta) / wheelbase,  v' = a,  a' = jerk,  delta' =
+steer_rate.
+
 Units: m, m, rad, m/s, m/s^2, rad; inputs m/s^3 and rad/s. */
 #pragma once
 
@@ -38,6 +42,19 @@ struct KinematicBicycle {
     next[3] = v + dt * a;
     next[4] = a + dt * jerk;
     next[5] = delta + dt * steer_rate;
+  }
+
+  /** The equations in continuous time: `rate` is x'. Arguments as for Step. */
+  template <class T>
+  static constexpr void Rate(std::span<const T> parameters, std::span<const T> z, std::span<T> rate) {
+    using std::cos, std::sin, std::tan;
+    const T &theta = z[2], &v = z[3];
+    rate[0] = v * cos(theta);
+    rate[1] = v * sin(theta);
+    rate[2] = v * tan(z[5]) / parameters[1];
+    rate[3] = z[4];
+    rate[4] = z[6];
+    rate[5] = z[7];
   }
 
   [[nodiscard]] std::array<double, 2> parameters() const { return {dt, wheelbase}; }

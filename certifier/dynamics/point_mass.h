@@ -1,5 +1,5 @@
 /** Point mass in the plane: p+ = p + dt v + dt^2/2 u, v+ = v + dt u, with p in m, v in m/s and u in m/s^2. The model is
-affine, so its remainder is exactly zero. */
+affine, so its remainder is exactly zero. It is the exact solution of p' = v, v' = u for a constant u. */
 #pragma once
 
 #include <array>
@@ -27,6 +27,15 @@ struct PointMass {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       next[axis] = z[axis] + dt * z[axis + 2] + half_square * z[axis + 4];
       next[axis + 2] = z[axis + 2] + dt * z[axis + 4];
+    }
+  }
+
+  /** The equations in continuous time: `rate` is x'. Arguments as for Step. */
+  template <class T>
+  static constexpr void Rate(std::span<const T>, std::span<const T> z, std::span<T> rate) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      rate[axis] = z[axis + 2];
+      rate[axis + 2] = z[axis + 4];
     }
   }
 

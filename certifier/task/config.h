@@ -25,6 +25,7 @@ struct Config {
   std::string path;
   Grounds grounds;  ///< Before anything is heard or learned.
   std::shared_ptr<const Problem> problem;
+  double period = 0;  ///< model.dt: from one sample to the next, s.
   std::vector<Obstacle> obstacles;
   Box initial_set;  ///< X0, rounded outward.
   /** False: the file has no task.between, and its certificates hold at the samples only. */

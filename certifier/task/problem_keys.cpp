@@ -57,7 +57,8 @@ void ReadModel(const Document& file, const std::string& key, TaskDraft& draft) {
   draft.problem.model = ValueNamed(Models(), file.Text(key + ".name"))(file);
   const NominalModel& model = *draft.problem.model;
   draft.scope = {model.state_names(), model.input_names(), model.variable_names()};
-  draft.config.gate.longest_step_ms = file.Number(key + ".dt") * 1e3;
+  draft.config.period = file.Number(key + ".dt");
+  draft.config.gate.longest_step_ms = draft.config.period * 1e3;
 }
 
 std::vector<Key> ModelKeys() {
@@ -257,7 +258,7 @@ void ReadBody(const Document& file, const std::string& key, TaskDraft& draft) {
 }
 
 void ReadBetween(const Document& file, const std::string& key, TaskDraft& draft) {
-  forereach::Between between{.acceleration = file.Vector(key + ".acceleration"), .period = file.Number("model.dt")};
+  forereach::Between between{.acceleration = file.Vector(key + ".acceleration"), .period = draft.config.period};
   const bool turns = draft.problem.body.heading >= 0;
   for (const auto& [name, member] :
        {std::pair{".turn_rate", &forereach::Between::turn_rate}, {".turn_acceleration", &Between::turn_acceleration}}) {

@@ -10,6 +10,7 @@
 #include "certifier/task/config.h"
 #include "cli/cover_file.h"
 #include "tests/cli/program.h"
+#include "tests/config/task_files.h"
 #include "tests/records/logs.h"
 
 namespace forereach {
@@ -91,6 +92,72 @@ TEST_F(DeclareTest, ItsLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
   }
   EXPECT_GT(lipschitz(2, 5), 0.4077);
   EXPECT_THAT(Declare().text, HasSubstr("declaration:\n  " + document["yaml"].get<std::string>()));
+}
+
+TEST_F(DeclareTest, BetweenProposesProvenBoundsFromTheEquations) {
+  const Output output = Forereach("declare --config config/demo.yaml --between");
+  EXPECT_EQ(output.code, 0);
+  EXPECT_THAT(output.text, HasSubstr("from the equations of kinematic_bicycle\n"));
+  EXPECT_THAT(output.text, HasSubstr("The residual is not included"));
+  const Json document = Json::parse(Forereach("declare --config config/demo.yaml --between --json").text);
+  EXPECT_EQ(document["source"], "equations");
+  EXPECT_TRUE(document["proven"]);
+  ASSERT_EQ(document["entries"].size(), 2u) << "the task has no body with a heading";
+  EXPECT_EQ(document["entries"][0]["name"], "x''");
+  const double bound = document["entries"][0]["upper"], found = document["entries"][0]["lower"];
+  EXPECT_GT(found, 21.8) << "3 m/s^2 along and 21.7 m/s^2 across the heading";
+  EXPECT_LE(bound, found * (1 + 1e-7));
+  EXPECT_THAT(output.text, HasSubstr("\n\ntask:\n  " + document["yaml"].get<std::string>() + "\n"));
+}
+
+TEST_F(DeclareTest, BetweensLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
+  const std::string body = "  body: {pose: [x, y, theta], parts: [{disc: {at: [1, 0], radius: 1}}]}\n",
+                    demo = std::regex_replace(Read(FOREREACH_SOURCE_DIR "/config/demo.yaml"),
+                                              std::regex("  projection: .*\n  between: .*\n"), body);
+  std::ofstream(task_) << demo;
+  const Json document = Json::parse(Declare("--between --json").text);
+  ASSERT_EQ(document["entries"].size(), 4u);
+  std::ofstream(task_) << Replaced(demo, body, body + "  " + document["yaml"].get<std::string>() + "\n");
+  const Between between = LoadConfig(task_, TransitionsFile::kIgnore).problem->between.value();
+  const double bounds[] = {between.acceleration[0], between.acceleration[1], between.turn_rate,
+                           between.turn_acceleration};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_GE(bounds[i], document["entries"][i]["upper"]);
+    EXPECT_LE(bounds[i], document["entries"][i]["upper"].get<double>() * (1 + 1e-5));
+  }
+}
+
+TEST_F(DeclareTest, BetweenTakesLoggedPositionsIfAsked) {
+  const std::string point_mass = Read(FOREREACH_SOURCE_DIR "/config/point_mass.yaml");
+  std::ofstream(task_) << Replaced(point_mass, "transitions: data/point_mass_100.csv", "transitions: steps.csv");
+  const auto steps = [&](const char* second) {
+    scratch_.Write("steps.csv", std::string("px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n"
+                                            "0,0,1,0,0,0,0.15,0,1,0\n") +
+                                    second + ",0,1,0,0,0,0.345,0,1,0\n");
+  };
+  steps("0.15");
+  const Output output = Declare("--between --from positions");
+  EXPECT_EQ(output.code, 0);
+  EXPECT_THAT(output.text, HasSubstr("from the logged positions\n"));
+  EXPECT_THAT(output.text, HasSubstr("in 1 triples of logged samples. This proves nothing"));
+  const Json document = Json::parse(Declare("--between --from positions --json").text);
+  EXPECT_EQ(document["source"], "positions");
+  EXPECT_FALSE(document["proven"]);
+  EXPECT_NEAR(document["entries"][0]["upper"], 2, 1e-9) << "(0.345 - 2 * 0.15) / 0.15^2";
+  EXPECT_EQ(document["entries"][1]["upper"], 0);
+  steps("0.16");
+  const Output isolated = Declare("--between --from positions");
+  EXPECT_EQ(isolated.code, 2);
+  EXPECT_THAT(isolated.text, HasSubstr("transitions: none begins with the state in which the one before it ends"));
+}
+
+TEST_F(DeclareTest, BetweenExcludesWhatBelongsToTheResidual) {
+  for (const char* options : {"--between --cover cover.json", "--between --check cover.json", "--from positions"})
+    EXPECT_EQ(Forereach("declare --config config/demo.yaml " + std::string(options) + " 2>&1").code, 2) << options;
+  std::ofstream(task_) << Replaced(Read(FOREREACH_SOURCE_DIR "/config/demo.yaml"), "-0.36]", "-1.5]");
+  const Output output = Declare("--between");
+  EXPECT_EQ(output.code, 1) << output.text;
+  EXPECT_THAT(output.text, HasSubstr("no finite bound on the motion between two samples"));
 }
 
 TEST_F(DeclareTest, StopsAtTheWorkLimitWithABoundAndSaysSo) {

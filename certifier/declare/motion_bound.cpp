@@ -1,0 +1,258 @@
+#include "certifier/declare/motion_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <queue>
+#include <stdexcept>
+#include <string>
+
+#include "certifier/numerics/arithmetic.h"
+
+namespace forereach {
+namespace {
+
+using Arguments = std::vector<Interval>;  // z = (x, u)
+using Quantity = std::function<RangeWithSlopes(const Flow::Derivatives&)>;
+
+std::optional<Interval> Intersection(const Interval& a, const Interval& b) {
+  const Interval both(std::max(a.lower, b.lower), std::min(a.upper, b.upper));
+  return both.lower <= both.upper ? std::optional(both) : std::nullopt;
+}
+
+// ---- Where a motion is between two samples.
+
+Arguments BoxOf(const Domain& domain) {
+  Arguments box;
+  for (const Box* part : {&domain.state, &domain.input})
+    for (int k = 0; k < part->dim(); ++k) box.emplace_back(part->lower()[k], part->upper()[k]);
+  return box;
+}
+
+[[noreturn]] void FailWithoutBound() {
+  throw std::runtime_error(
+      "no finite bound on the motion between two samples: the equations have none over the states that it can reach "
+      "from the domain within one step; narrow `domain`");
+}
+
+Flow::Derivatives DerivativesOver(const SampledMotion& motion, const Arguments& box) {
+  Flow::Derivatives derivatives;
+  motion.flow.Enclose(box, derivatives);
+  for (int k = 0; k < motion.domain.state.dim(); ++k)
+    if (!derivatives.first[ToSize(k)].value.IsFinite() || !derivatives.second[ToSize(k)].value.IsFinite())
+      FailWithoutBound();
+  return derivatives;
+}
+
+// B with Z + [0, period] f(B) in B, so no motion that begins in Z leaves B within a period (Picard).
+Arguments Reachable(const SampledMotion& motion, const Arguments& start) {
+  constexpr int kRounds = 100;
+  constexpr double kWider = 1.05;
+  Arguments box = start;
+  const Interval period(0, motion.period);
+  for (int round = 0; round < kRounds; ++round) {
+    const Flow::Derivatives derivatives = DerivativesOver(motion, box);
+    bool is_inside = true;
+    Arguments wider = box;
+    for (std::size_t k = 0; k < ToSize(motion.domain.state.dim()); ++k) {
+      const Interval moved = period * derivatives.first[k].value, after = start[k] + moved;
+      is_inside = is_inside && box[k].lower <= after.lower && after.upper <= box[k].upper;
+      wider[k] = Join(box[k], start[k] + Interval(kWider) * moved);
+    }
+    if (is_inside) return box;
+    box = wider;
+  }
+  FailWithoutBound();
+}
+
+// Between two samples in the domain. `reachable` holds all of it.
+Arguments BetweenSamples(const SampledMotion& motion, const Arguments& start, const Arguments& reachable) {
+  constexpr int kRounds = 3;
+  const Interval eighth = Interval(motion.period) * Interval(motion.period) / Interval(8);
+  Arguments box = reachable;
+  for (int round = 0; round < kRounds; ++round) {
+    const Flow::Derivatives derivatives = DerivativesOver(motion, box);
+    for (std::size_t k = 0; k < ToSize(motion.domain.state.dim()); ++k) {
+      const double away = (eighth * Interval(derivatives.second[k].value.Magnitude())).upper;
+      if (const auto both = Intersection(box[k], start[k] + Interval(-away, away))) box[k] = *both;
+    }
+  }
+  return box;
+}
+
+// In a plan's last step. Nothing if no such step ends at rest.
+std::optional<Arguments> LastStep(const SampledMotion& motion, const Arguments& reachable) {
+  const Flow::Derivatives derivatives = DerivativesOver(motion, reachable);
+  Arguments box = reachable;
+  for (std::size_t k = 0; k < ToSize(motion.domain.state.dim()); ++k) {
+    const double rest = motion.rest[static_cast<Eigen::Index>(k)];
+    if (!(rest < kInfinity)) continue;
+    const auto both =
+        Intersection(box[k], Interval(-rest, rest) - Interval(0, motion.period) * derivatives.first[k].value);
+    if (!both) return std::nullopt;
+    box[k] = *both;
+  }
+  return box;
+}
+
+// ---- The largest value of a quantity over a box, by branch and bound.
+
+class Search {
+ public:
+  // Values up to `least` are of no interest.
+  Search(const Flow& flow, Quantity quantity, const SlopeBoundOptions& options, double least)
+      : flow_(flow), quantity_(std::move(quantity)), options_(options) {
+    found_.lower = least;
+  }
+
+  MotionBound Run(const Arguments& region) {
+    Push(region);
+    while (!pieces_.empty()) {
+      found_.upper = pieces_.top().bound;
+      if (found_.upper <= (1 + options_.gap) * found_.lower || !Cut()) break;
+    }
+    found_.upper = std::max(found_.upper, 0.0);
+    found_.reached = found_.upper <= (1 + options_.gap) * found_.lower;
+    return found_;
+  }
+
+ private:
+  struct Piece {
+    double bound;
+    Arguments box;
+    bool operator<(const Piece& other) const { return bound < other.bound; }
+  };
+
+  RangeWithSlopes Evaluate(const Arguments& box) {
+    ++found_.boxes;
+    flow_.Enclose(box, derivatives_);
+    return quantity_(derivatives_);
+  }
+
+  // Adds a box, after every argument in which the quantity is monotone is set to its better end.
+  void Push(Arguments box) {
+    RangeWithSlopes range = Evaluate(box);
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (std::size_t i = 0; i < box.size(); ++i) {
+        const Interval& slope = range.gradient[i];
+        if (!(box[i].lower < box[i].upper) || (slope.lower < 0 && slope.upper > 0)) continue;
+        box[i] = slope.lower >= 0 ? box[i].upper : box[i].lower;
+        changed = true;
+      }
+      if (changed) range = Evaluate(box);
+    }
+    if (!range.value.IsFinite()) range.value.upper = kInfinity;
+    Arguments middle = box;
+    for (Interval& argument : middle) argument = argument.Middle();
+    found_.lower = std::max(found_.lower, Evaluate(middle).value.lower);
+    pieces_.push({range.value.upper, std::move(box)});
+  }
+
+  // Halves the box of the largest bound. False if that is not possible.
+  bool Cut() {
+    if (found_.boxes >= options_.max_boxes) return false;
+    Arguments box = pieces_.top().box;
+    const auto widest = std::ranges::max_element(box, {}, [](const Interval& x) { return x.upper - x.lower; });
+    const double middle = widest->Middle();
+    if (!(widest->lower < middle && middle < widest->upper)) return false;
+    pieces_.pop();
+    const double upper = widest->upper;
+    widest->upper = middle;
+    Push(box);
+    *widest = {middle, upper};
+    Push(std::move(box));
+    return true;
+  }
+
+  const Flow& flow_;
+  Quantity quantity_;
+  const SlopeBoundOptions options_;
+  Flow::Derivatives derivatives_;
+  std::priority_queue<Piece> pieces_;
+  MotionBound found_;
+};
+
+RangeWithSlopes Negated(RangeWithSlopes range) {
+  range.value = -range.value;
+  for (Interval& slope : range.gradient) slope = -slope;
+  return range;
+}
+
+MotionBound BoundMagnitude(const Flow& flow, const Quantity& quantity, const std::vector<Arguments>& regions,
+                           const SlopeBoundOptions& options) {
+  MotionBound all;
+  for (const Arguments& region : regions) {
+    for (const bool negated : {false, true}) {
+      const auto side = [&](const Flow::Derivatives& d) { return negated ? Negated(quantity(d)) : quantity(d); };
+      const MotionBound one = Search(flow, side, options, all.lower).Run(region);
+      all.upper = std::max(all.upper, one.upper);
+      all.lower = std::max(all.lower, one.lower);
+      all.boxes += one.boxes;
+    }
+  }
+  if (!(all.upper < kInfinity)) FailWithoutBound();
+  all.reached = all.upper <= (1 + options.gap) * all.lower;
+  return all;
+}
+
+// A row of P times x''.
+Quantity AccelerationAlong(const Eigen::VectorXd& row) {
+  return [row](const Flow::Derivatives& derivatives) {
+    RangeWithSlopes sum;
+    for (Eigen::Index k = 0; k < row.size(); ++k) {
+      if (row[k] == 0) continue;
+      const RangeWithSlopes& second = derivatives.second[ToSize(k)];
+      sum.value += Interval(row[k]) * second.value;
+      for (std::size_t i = 0; i < sum.gradient.size(); ++i) sum.gradient[i] += Interval(row[k]) * second.gradient[i];
+    }
+    return sum;
+  };
+}
+
+}  // namespace
+
+MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options) {
+  RequireExactArithmetic();
+  const int n = motion.domain.state.dim();
+  if (motion.projection.cols() != n || motion.rest.size() != n || motion.heading >= n)
+    throw std::invalid_argument("motion: projection, rest or heading are not those of " + std::to_string(n) +
+                                " states");
+  const Arguments start = BoxOf(motion.domain), reachable = Reachable(motion, start);
+  std::vector<Arguments> regions{BetweenSamples(motion, start, reachable)};
+  if (auto last = LastStep(motion, reachable)) regions.push_back(std::move(*last));
+  MotionBounds bounds;
+  for (Eigen::Index i = 0; i < motion.projection.rows(); ++i)
+    bounds.acceleration.push_back(
+        BoundMagnitude(motion.flow, AccelerationAlong(motion.projection.row(i)), regions, options));
+  if (motion.heading < 0) return bounds;
+  const auto heading = ToSize(motion.heading);
+  bounds.turn_rate = BoundMagnitude(
+      motion.flow, [&](const Flow::Derivatives& d) { return d.first[heading]; }, regions, options);
+  bounds.turn_acceleration = BoundMagnitude(
+      motion.flow, [&](const Flow::Derivatives& d) { return d.second[heading]; }, regions, options);
+  return bounds;
+}
+
+MeasuredMotion MeasureMotion(const Transitions& transitions, const Eigen::MatrixXd& projection, int heading,
+                             double period) {
+  MeasuredMotion measured;
+  measured.acceleration = Eigen::VectorXd::Zero(projection.rows());
+  const Eigen::Index n = transitions.x_next.cols();
+  for (Eigen::Index i = 0; i + 1 < transitions.x_next.rows(); ++i) {
+    const Eigen::VectorXd first = transitions.z.row(i).head(n), second = transitions.x_next.row(i),
+                          third = transitions.x_next.row(i + 1);
+    if (second.transpose() != transitions.z.row(i + 1).head(n)) continue;
+    ++measured.triples;
+    const Eigen::VectorXd difference = (first - 2 * second + third) / (period * period);
+    measured.acceleration = measured.acceleration.cwiseMax((projection * difference).cwiseAbs());
+    if (heading < 0) continue;
+    for (const double rate : {(second - first)[heading] / period, (third - second)[heading] / period})
+      measured.turn_rate = std::max(measured.turn_rate, std::abs(rate));
+    measured.turn_acceleration = std::max(measured.turn_acceleration, std::abs(difference[heading]));
+  }
+  return measured;
+}
+
+}  // namespace forereach

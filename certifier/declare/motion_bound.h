@@ -1,0 +1,64 @@
+/** Bounds on how far a motion x' = f(x, u) curves from one sample to the next, where u is constant: what `Between`
+(certifier/safety/body.h) declares. They are proven by interval branch and bound over the states that such a motion can
+reach between two samples. */
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "certifier/declare/flow.h"
+#include "certifier/declare/slope_bound.h"
+#include "certifier/reach/domain.h"
+#include "certifier/residual/transitions.h"
+#include "certifier/sets/eigen.h"
+
+namespace forereach {
+
+/** lower <= sup |g| <= upper, where g is one derivative of the motion. */
+struct MotionBound {
+  double upper = 0;
+  double lower = 0;       ///< Of |g| at one state of the box over which it is bounded.
+  std::size_t boxes = 0;  ///< Number of boxes evaluated.
+  bool reached = true;    ///< Whether the search reached the gap.
+};
+
+struct MotionBounds {
+  std::vector<MotionBound> acceleration;     ///< Of each (P x)_k''.
+  MotionBound turn_rate, turn_acceleration;  ///< Of the heading's first and second derivative; 0 without a heading.
+};
+
+/** The motion between two samples, a period apart, of a plan that is certified. */
+struct SampledMotion {
+  const Flow& flow;
+  const Domain& domain;               ///< Only its box is used.
+  double period;                      ///< s
+  const Eigen::MatrixXd& projection;  ///< P, p-by-n
+  int heading;                        ///< The state that is the heading; -1: none.
+  /** A plan ends with |x_k| <= rest_k; infinite where nothing is known. n entries. */
+  Eigen::VectorXd rest;
+};
+
+/** Bounds for every motion that is in the domain at its samples. A plan's last sample is not tested against the domain;
+there the bounds hold for every motion that begins in the domain and ends at rest.
+
+Between two samples in the domain a state x_k lies within period^2 / 8 sup |x_k''| of the domain's box. In the last step
+it lies in the box B with Z + [0, period] f(B) in B, where Z is the domain's box, and, counted back from the end, in
+[-rest_k, rest_k] - [0, period] f_k(B).
+@throws std::runtime_error if there is no such B or no finite bound, for example over a pole of the tangent.
+@throws std::invalid_argument if a size is wrong. Cost: at most options.max_boxes evaluations for each bound. */
+[[nodiscard]] MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options = {});
+
+/** What recorded transitions show: the largest second difference of positions over a period squared, in plain
+arithmetic. It is at most the largest acceleration between the samples. */
+struct MeasuredMotion {
+  Eigen::VectorXd acceleration;
+  double turn_rate = 0, turn_acceleration = 0;
+  int triples = 0;  ///< Of samples that follow one another: a transition begins with the state in which the last ended.
+};
+
+/** @param heading as in SampledMotion. */
+[[nodiscard]] MeasuredMotion MeasureMotion(const Transitions& transitions, const Eigen::MatrixXd& projection,
+                                           int heading, double period);
+
+}  // namespace forereach

@@ -1,0 +1,168 @@
+#include "cli/declare_between.h"
+
+#include <algorithm>
+#include <chrono>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/declare/motion_bound.h"
+#include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
+#include "certifier/task/config.h"
+#include "certifier/task/json_text.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kDigits = 6;
+
+// One number of task.between.
+struct Row {
+  std::string key, name, unit;
+  MotionBound bound;
+};
+
+struct Proposal {
+  std::vector<Row> rows;
+  std::string source, remark;
+  double seconds = 0;
+};
+
+std::vector<Row> RowsOf(const Config& config, const std::vector<MotionBound>& acceleration,
+                        const MotionBound& turn_rate, const MotionBound& turn_acceleration) {
+  const Problem& problem = *config.problem;
+  const std::vector<std::string>& states = problem.model->state_names();
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < acceleration.size(); ++i) {
+    std::string name;
+    for (std::size_t k = 0; k < states.size(); ++k) {
+      const double weight = problem.projection(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
+      if (weight != 0) name += (name.empty() ? "" : " + ") + (weight == 1 ? "" : ToText(weight) + " ") + states[k];
+    }
+    rows.push_back({"acceleration", name + "''", "m/s^2", acceleration[i]});
+  }
+  if (problem.body.heading < 0) return rows;
+  const std::string& heading = states[ToSize(problem.body.heading)];
+  rows.push_back({"turn_rate", heading + "'", "rad/s", turn_rate});
+  rows.push_back({"turn_acceleration", heading + "''", "rad/s^2", turn_acceleration});
+  return rows;
+}
+
+Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
+  const Problem& problem = *config.problem;
+  const auto flow = MakeFlow(*problem.model);
+  if (!flow)
+    throw ConfigError(config.path + ": model: the equations of " + problem.model->name() +
+                      " in continuous time are not known; use --from positions");
+  Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
+  for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
+  const auto begin = std::chrono::steady_clock::now();
+  const MotionBounds bounds =
+      BoundMotion({*flow, problem.domain, config.period, problem.projection, problem.body.heading, rest}, search);
+  Proposal proposal;
+  proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
+  proposal.source = "equations";
+  proposal.remark = "Proven for the equations of " + problem.model->name() +
+                    ", for each motion with constant controls between two\nsamples that are in the domain" +
+                    (problem.rest.empty() ? ", and for the last step of a plan, which may leave the domain.\n"
+                                          : ", and for the last step of a plan, which ends at rest.\n") +
+                    "The residual is not included: it is a difference at the samples, and bounds no curvature between "
+                    "them. Add what\n"
+                    "the true robot does beyond the equations.";
+  return proposal;
+}
+
+Proposal FromPositions(const Config& config) {
+  const Problem& problem = *config.problem;
+  const MeasuredMotion measured =
+      MeasureMotion(problem.transitions, problem.projection, problem.body.heading, config.period);
+  if (measured.triples == 0)
+    throw ConfigError(
+        config.path +
+        ": transitions: none begins with the state in which the one before it ends, so there is no second "
+        "difference; use transitions that were recorded one after another");
+  const auto found = [](double value) { return MotionBound{value, value, 0, true}; };
+  std::vector<MotionBound> acceleration;
+  for (const double value : measured.acceleration) acceleration.push_back(found(value));
+  Proposal proposal;
+  proposal.rows = RowsOf(config, acceleration, found(measured.turn_rate), found(measured.turn_acceleration));
+  proposal.source = "positions";
+  proposal.remark = "Largest second differences in " + std::to_string(measured.triples) +
+                    " triples of logged samples. This proves nothing: the true motion curves at\n"
+                    "least as much. Errors of the measurement are included. Add a margin, and what was not driven.";
+  return proposal;
+}
+
+std::string Yaml(const std::vector<Row>& rows) {
+  std::string acceleration, others;
+  for (const Row& row : rows) {
+    const std::string value = RoundedUp(row.bound.upper, kDigits);
+    if (row.key == "acceleration")
+      acceleration += (acceleration.empty() ? "" : ", ") + value;
+    else
+      others += ", " + row.key + ": " + value;
+  }
+  return "between: {acceleration: [" + acceleration + "]" + others + "}";
+}
+
+bool AllReached(const std::vector<Row>& rows) {
+  return std::ranges::all_of(rows, [](const Row& row) { return row.bound.reached; });
+}
+
+Json ToJson(const Proposal& proposal, const Config& config) {
+  Json document{{"source", proposal.source},
+                {"proven", proposal.source == "equations"},
+                {"reached", AllReached(proposal.rows)},
+                {"yaml", Yaml(proposal.rows)},
+                {"seconds", proposal.seconds},
+                {"entries", Json::array()},
+                {"digests", {{"config", ToHex(config.grounds.config)}, {"model", ToHex(config.grounds.model)}}}};
+  for (const Row& row : proposal.rows)
+    document["entries"].push_back({{"key", row.key},
+                                   {"name", row.name},
+                                   {"unit", row.unit},
+                                   {"upper", row.bound.upper},
+                                   {"lower", row.bound.lower},
+                                   {"boxes", row.bound.boxes},
+                                   {"reached", row.bound.reached}});
+  return document;
+}
+
+void PrintForPeople(const Proposal& proposal, const Config& config) {
+  const bool proven = proposal.source == "equations";
+  std::ostringstream text;
+  text << std::left << "declare: motion between two samples, " << ToText(config.period) << " s apart, from the "
+       << (proven ? "equations of " + config.problem->model->name() : "logged positions")
+       << (AllReached(proposal.rows) ? "" : "; stopped at --max-boxes") << "\n";
+  for (const Row& row : proposal.rows) {
+    text << "  " << std::setw(10) << row.name << (proven ? " at most " : " at least ") << std::setw(9)
+         << (proven ? RoundedUp(row.bound.upper, kDigits) : RoundedDown(row.bound.lower, kDigits)) << std::setw(8)
+         << row.unit;
+    if (proven)
+      text << "  largest found " << RoundedDown(row.bound.lower, kDigits) << ", " << row.bound.boxes << " boxes";
+    text << "\n";
+  }
+  std::cout << text.str() << proposal.remark << "\n\ntask:\n  " << Yaml(proposal.rows) << std::endl;
+}
+
+}  // namespace
+
+int DeclareBetween(const BetweenCommand& command) {
+  const Config config =
+      LoadConfig(command.config, command.from_positions ? TransitionsFile::kRead : TransitionsFile::kIgnore);
+  const Proposal proposal = command.from_positions ? FromPositions(config) : FromEquations(config, command.search);
+  if (command.json)
+    std::cout << JsonText(ToJson(proposal, config)) << std::endl;
+  else
+    PrintForPeople(proposal, config);
+  return AllReached(proposal.rows) ? 0 : 1;
+}
+
+}  // namespace forereach

@@ -1,0 +1,236 @@
+// Bounds on the motion between two samples: known suprema, motions that come close to them, and what has no bound.
+#include "certifier/declare/motion_bound.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/kinematic_bicycle.h"
+#include "certifier/dynamics/models.h"
+
+namespace forereach {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kGap = 1e-5;
+
+Domain DomainOf(const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, const Eigen::VectorXd& input) {
+  Domain domain;
+  domain.state = Box(lower, upper);
+  domain.input = Box(-input, input);
+  return domain;
+}
+
+Domain BicycleDomain(double v, double a, double delta) {
+  const Eigen::VectorXd upper{{50, 50, 3.2, v, a, delta}}, lower{{-50, -50, -3.2, -0.5, -a, -delta}};
+  return DomainOf(lower, upper, Eigen::Vector2d(10, 1));
+}
+
+MotionBounds Bound(const NominalModel& model, const Domain& domain, double period, int heading,
+                   const Eigen::VectorXd& rest) {
+  const auto flow = MakeFlow(model);
+  const Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(2, model.num_states());
+  return BoundMotion({*flow, domain, period, projection, heading, rest}, {.gap = kGap});
+}
+
+Eigen::VectorXd NoRest(int n) { return Eigen::VectorXd::Constant(n, kInfinite); }
+
+TEST(MotionBound, OfAPointMassIsItsLargestControl) {
+  const auto model = MakePointMass(0.15);
+  const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3), Eigen::Vector2d(2, 0.5));
+  const MotionBounds bounds = Bound(*model, domain, 0.15, -1, NoRest(4));
+  for (const auto& [bound, supremum] :
+       {std::pair{bounds.acceleration.at(0), 2.0}, std::pair{bounds.acceleration.at(1), 0.5}}) {
+    EXPECT_EQ(bound.upper, supremum);
+    EXPECT_EQ(bound.lower, supremum);
+    EXPECT_TRUE(bound.reached);
+  }
+  EXPECT_EQ(bounds.turn_rate.upper, 0);
+}
+
+// The acceleration is a along the heading and v^2 tan(delta) / wheelbase across it, so its largest component in any
+// fixed direction has the length of both. A bit is added to v for the motion between two samples, and nothing to a and
+// delta, which move in straight lines.
+TEST(MotionBound, OfABicycleThatStopsIsAtTheDomainsEnds) {
+  const double v = 12, a = 3, delta = 0.36, wheelbase = 2.5, period = 0.1, jerk = 10;
+  Eigen::VectorXd rest = NoRest(6);
+  rest[3] = 0.16, rest[4] = 0.02;
+  const MotionBounds bounds =
+      Bound(*MakeKinematicBicycle(period, wheelbase), BicycleDomain(v, a, delta), period, 2, rest);
+  const auto across = [&](double speed) { return speed * speed * std::tan(delta) / wheelbase; };
+  const double between = v + jerk * period * period / 8;
+  for (const MotionBound& bound : bounds.acceleration) {
+    EXPECT_GE(bound.upper, std::hypot(a, across(v)));
+    EXPECT_LE(bound.upper, std::hypot(a, across(between)) * (1 + kGap));
+    EXPECT_TRUE(bound.reached);
+    EXPECT_LE(bound.lower, bound.upper);
+  }
+  EXPECT_GE(bounds.turn_rate.upper, v * std::tan(delta) / wheelbase);
+  EXPECT_LE(bounds.turn_rate.upper, between * std::tan(delta) / wheelbase * (1 + kGap));
+  // (v tan(delta))' = a tan(delta) + v delta' / cos(delta)^2
+  const auto turning = [&](double speed) {
+    return (a * std::tan(delta) + speed / std::pow(std::cos(delta), 2)) / wheelbase;
+  };
+  EXPECT_GE(bounds.turn_acceleration.upper, turning(v));
+  EXPECT_LE(bounds.turn_acceleration.upper, turning(between) * (1 + kGap));
+}
+
+// The last sample of a plan is not tested against the domain, so the last step of a plan that need not end at rest goes
+// on for a period: delta to 0.36 + 0.1, v to 12 + 0.1 (3 + 10 / 2 0.1).
+TEST(MotionBound, OfABicycleThatNeedNotStopIncludesTheLastStep) {
+  const double wheelbase = 2.5, period = 0.1;
+  const MotionBounds bounds =
+      Bound(*MakeKinematicBicycle(period, wheelbase), BicycleDomain(12, 3, 0.36), period, 2, NoRest(6));
+  const double rate = 12.35 * std::tan(0.46) / wheelbase;
+  EXPECT_GE(bounds.turn_rate.upper, rate);
+  EXPECT_LE(bounds.turn_rate.upper, rate * 1.02);
+  EXPECT_GE(bounds.acceleration[0].upper, std::hypot(4, 12.35 * rate));
+}
+
+// x' = f(x, u), by classical Runge-Kutta with steps so small that its error is far below the bounds' gap.
+using State = std::array<double, 8>;
+State RateOf(const State& z, double wheelbase) {
+  const std::array<double, 2> parameters{0.1, wheelbase};
+  State rate{};
+  KinematicBicycle::Rate<double>(parameters, z, std::span(rate).first(6));
+  return rate;
+}
+State Sum(const State& z, double h, const State& rate) {
+  State sum = z;
+  for (std::size_t k = 0; k < 6; ++k) sum[k] += h * rate[k];
+  return sum;
+}
+
+TEST(MotionBound, NoMotionOfTheBicycleExceedsIt) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  const double wheelbase = 2, period = 0.2, v = 6, a = 2, delta = 0.6;
+  const Domain domain = BicycleDomain(v, a, delta);
+  const MotionBounds free = Bound(*MakeKinematicBicycle(period, wheelbase), domain, period, 2, NoRest(6));
+  Eigen::VectorXd rest = NoRest(6);
+  rest[3] = 0.2;
+  const MotionBounds stops = Bound(*MakeKinematicBicycle(period, wheelbase), domain, period, 2, rest);
+  EXPECT_LT(stops.acceleration[0].upper, free.acceleration[0].upper);
+
+  int inside = 0, left = 0;
+  double largest = 0;
+  for (int motion = 0; motion < 4000; ++motion) {
+    State z{};
+    for (std::size_t k = 0; k < 8; ++k) {
+      const Box& box = k < 6 ? domain.state : domain.input;
+      const auto i = static_cast<Eigen::Index>(k < 6 ? k : k - 6);
+      // Often an end: there are the largest values.
+      const double at = std::uniform_real_distribution(-0.3, 1.3)(random);
+      z[k] = box.lower()[i] + std::clamp(at, 0.0, 1.0) * (box.upper()[i] - box.lower()[i]);
+    }
+    struct Largest {
+      double acceleration = 0, rate = 0, turn = 0;
+    } seen;
+    constexpr int kSubsteps = 100;
+    const double h = period / kSubsteps;
+    for (int i = 0; i <= kSubsteps; ++i) {
+      const double turn_rate = z[3] * std::tan(z[5]) / wheelbase;
+      seen.acceleration =
+          std::max({seen.acceleration, std::abs(z[4] * std::cos(z[2]) - z[3] * std::sin(z[2]) * turn_rate),
+                    std::abs(z[4] * std::sin(z[2]) + z[3] * std::cos(z[2]) * turn_rate)});
+      seen.rate = std::max(seen.rate, std::abs(turn_rate));
+      seen.turn =
+          std::max(seen.turn, std::abs(z[4] * std::tan(z[5]) + z[3] * z[7] / std::pow(std::cos(z[5]), 2)) / wheelbase);
+      if (i == kSubsteps) break;
+      const State k1 = RateOf(z, wheelbase), k2 = RateOf(Sum(z, h / 2, k1), wheelbase),
+                  k3 = RateOf(Sum(z, h / 2, k2), wheelbase), k4 = RateOf(Sum(z, h, k3), wheelbase);
+      for (std::size_t k = 0; k < 6; ++k) z[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
+    }
+    const auto expect_within = [&](const MotionBounds& bounds) {
+      EXPECT_LE(seen.acceleration, bounds.acceleration[0].upper);
+      EXPECT_LE(seen.rate, bounds.turn_rate.upper);
+      EXPECT_LE(seen.turn, bounds.turn_acceleration.upper);
+    };
+    expect_within(free);
+    const bool ends_inside = domain.state.Contains(Eigen::Map<const Eigen::VectorXd>(z.data(), 6));
+    if (ends_inside || std::abs(z[3]) <= rest[3]) {
+      expect_within(stops);
+      largest = std::max(largest, seen.acceleration / stops.acceleration[0].upper);
+    }
+    ++(ends_inside ? inside : left);
+  }
+  EXPECT_GT(inside, 300);
+  EXPECT_GT(left, 300);
+  EXPECT_GT(largest, 0.8) << "motions that come close to the bound";
+}
+
+TEST(MotionBound, ThereIsNoneOverAPoleOfTheTangent) {
+  const auto bound = [](double delta) {
+    return Bound(*MakeKinematicBicycle(0.1, 2.5), BicycleDomain(12, 3, delta), 0.1, 2, NoRest(6));
+  };
+  EXPECT_NO_THROW((void)bound(1.4));  // reaches 1.5 in the last step
+  EXPECT_THAT([&] { (void)bound(1.5); }, testing::ThrowsMessage<std::runtime_error>(
+                                             testing::HasSubstr("no finite bound on the motion between two samples")));
+}
+
+// x' = x^2 from x = 1 is infinite after a second.
+struct Explosion {
+  static constexpr int kStates = 1, kInputs = 1;
+  static constexpr std::array<const char*, 1> kParameterNames{"unused"};
+  template <class T>
+  static void Rate(std::span<const T>, std::span<const T> z, std::span<T> rate) {
+    rate[0] = z[0] * z[0];
+  }
+};
+
+TEST(MotionBound, ThereIsNoneWhereTheMotionEndsBeforeThePeriod) {
+  const std::array<double, 1> unused{0};
+  const EquationsFlow<Explosion> flow(unused);
+  const Domain domain = DomainOf(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1), Eigen::VectorXd::Ones(1));
+  const Eigen::MatrixXd projection = Eigen::MatrixXd::Ones(1, 1);
+  const auto bound = [&](double period) {
+    return BoundMotion({flow, domain, period, projection, -1, NoRest(1)}).acceleration.at(0);
+  };
+  EXPECT_THROW((void)bound(1), std::runtime_error);
+  // x(s) = 1 / (1 - s) and x'' = 2 x^3.
+  const MotionBound early = bound(0.1);
+  EXPECT_GE(early.upper, 2 / std::pow(0.9, 3));
+  EXPECT_LE(early.upper, 3.5);
+}
+
+TEST(MotionBound, StopsAtItsLargestNumberOfBoxesWithAValidBound) {
+  const auto flow = MakeFlow(*MakeKinematicBicycle(0.1, 2.5));
+  const Domain domain = BicycleDomain(12, 3, 0.36);
+  const Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(2, 6);
+  const MotionBounds bounds = BoundMotion({*flow, domain, 0.1, projection, -1, NoRest(6)}, {.max_boxes = 10});
+  EXPECT_FALSE(bounds.acceleration[0].reached);
+  EXPECT_GE(bounds.acceleration[0].upper,
+            Bound(*MakeKinematicBicycle(0.1, 2.5), domain, 0.1, -1, NoRest(6)).acceleration[0].lower);
+}
+
+TEST(MotionBound, OfWeightedStatesAddsThemUp) {
+  const auto flow = MakeFlow(*MakePointMass(0.15));
+  const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3), Eigen::Vector2d(2, 0.5));
+  const Eigen::MatrixXd projection{{1, -4, 0, 0}};
+  EXPECT_EQ(BoundMotion({*flow, domain, 0.15, projection, -1, NoRest(4)}).acceleration.at(0).upper, 4);
+}
+
+TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {
+  Transitions transitions;
+  // From 0 by 1, 4 and 9; then elsewhere.
+  transitions.z = Eigen::MatrixXd{{0, 0, 0}, {1, 0.5, 0}, {5, 0.25, 0}, {7, 1, 0}};
+  transitions.x_next = Eigen::MatrixXd{{1, 0.5}, {5, 0.25}, {14, 0}, {8, 3}};
+  const Eigen::MatrixXd projection{{1, 0}};
+  const MeasuredMotion measured = MeasureMotion(transitions, projection, 1, 0.5);
+  EXPECT_EQ(measured.triples, 2);
+  EXPECT_EQ(measured.acceleration[0], (14 - 2 * 5 + 1) / 0.25);
+  EXPECT_EQ(measured.turn_rate, 1);
+  EXPECT_EQ(measured.turn_acceleration, 0.75 / 0.25);
+  EXPECT_EQ(MeasureMotion(transitions, projection, -1, 0.5).turn_rate, 0);
+  transitions.z(1, 0) = std::nextafter(1.0, 2.0);
+  EXPECT_EQ(MeasureMotion(transitions, projection, 1, 0.5).triples, 1);
+}
+
+}  // namespace
+}  // namespace forereach
