@@ -1,5 +1,7 @@
 // Every inbound type in any order through the certifier's node: each candidate is answered once, a certified plan goes
 // out right before its decision, and none while a fault is latched or the robot's state or the obstacles are not known.
+// A withdrawal names a plan that was certified, with fewer controls than the withdrawals of it before, unless it
+// repeats the last one; or a plan that the robot says it executes.
 #include <cstdlib>
 #include <map>
 #include <new>
@@ -60,8 +62,11 @@ class WitnessBus final : public Bus {
       certified_ = Decoded<certified_plan_t>(bytes);
       Require(certified_ && FindSealFaults(*certified_).empty());
       has_certified = true;
+      standing_[GetDigest(certified_->certificate_digest)] = certified_->plan.num_steps + 1;
     } else if (channel == "PLAN_DECISION") {
       TakeDecision(Decoded<decision_t>(bytes));
+    } else if (channel == "PLAN_WITHDRAWN") {
+      TakeWithdrawal(Decoded<withdrawal_t>(bytes));
     }
     return true;
   }
@@ -87,7 +92,20 @@ class WitnessBus final : public Bus {
     certified_.reset();
   }
 
+  void TakeWithdrawal(const std::optional<withdrawal_t>& withdrawal) {
+    Require(withdrawal.has_value() && withdrawal->sequence == withdrawals_++ && withdrawal->valid_steps >= 0);
+    if (withdrawal->cause == withdrawal_t::UNKNOWN_PLAN) {
+      Require(withdrawal->valid_steps == 0 && GetDigest(withdrawal->certificate_digest) == Digest{});
+      return;
+    }
+    const auto standing = standing_.find(GetDigest(withdrawal->certificate_digest));
+    Require(standing != standing_.end() && withdrawal->valid_steps <= standing->second);
+    standing->second = withdrawal->valid_steps;
+  }
+
   std::map<std::string, Handler> handlers_;
+  std::map<Digest, int> standing_;  // controls, by certificate; of a whole one: one more than it has
+  std::int64_t withdrawals_ = 0;
   std::map<Digest, int> unanswered_;
   std::optional<certified_plan_t> certified_;
 };
@@ -174,13 +192,22 @@ command_t Command(std::int64_t now) {
   return command;
 }
 
+execution_event_t AnAnswer(FuzzedDataProvider& input) {
+  execution_event_t event{};
+  event.kind = input.ConsumeBool() ? AnySmall(input, 16) : execution_event_t::WITHDRAWN;
+  event.plan_id = input.ConsumeIntegralInRange(0, 9) - 1;
+  event.step = AnySmall(input, 12);
+  event.value = input.ConsumeBool() ? AnyNumber(input) : input.ConsumeIntegralInRange(0, 15);
+  return event;
+}
+
 class Session final {
  public:
   explicit Session(const Config& config) : node_(config, bus_, {[this] { return now_; }, [this] { return steady_; }}) {}
 
   void Step(FuzzedDataProvider& input) {
     ++step_;
-    switch (input.ConsumeIntegralInRange(0, 7)) {
+    switch (input.ConsumeIntegralInRange(0, 8)) {
       case 0: return Tick();
       case 1: return bus_.Deliver("ROBOT_STATE", Damaged(input, RobotState(input, step_, now_)), now_);
       case 2: return bus_.Deliver("PLAN_CANDIDATE", Damaged(input, AnyCandidate(input, now_)), now_);
@@ -189,6 +216,7 @@ class Session final {
       case 5: return DeliverCommand(Damaged(input, Command(now_)));
       case 6: return Wait(input);
       case 7: return bus_.Deliver("OBSTACLES", Damaged(input, AnyMoving(input, step_, now_)), now_);
+      case 8: return bus_.Deliver("EXECUTION_EVENT", Damaged(input, AnAnswer(input)), now_);
     }
   }
 

@@ -1,9 +1,11 @@
 // The guard under any plans, states and times: what it executes was sealed, signed where there is a key, finite, in
+// The guard under any plans, states and times: what it executes was sealed, signed where there is a key, finite, in
 // time, and newer than the last; where a jitter is declared, each step is within it; each state it let pass lies in its
-// slice; and nothing happens while it is halted.
+// slice; nothing happens while it is halted; and no control is given that a withdrawal has taken back.
 #include <cmath>
 
 #include "fuzz/fuzz.h"
+#include "lcmtypes/grounds.h"
 #include "robot/guard.h"
 #include "tests/robot/sealed_plan.h"
 
@@ -77,18 +79,22 @@ class Session final {
   explicit Session(bool with_key) : guard_(Options(with_key)), with_key_(with_key) {}
 
   void Step(FuzzedDataProvider& input) {
-    switch (input.ConsumeIntegralInRange(0, 5)) {
+    switch (input.ConsumeIntegralInRange(0, 6)) {
       case 0: return Check(input);
       case 1: return TryStart(input);
       case 2: return Accept(input);
       case 3: return guard_.Finish();
       case 4: return guard_.Reset();
       case 5: return guard_.Halt();
+      case 6: return Withdraw(input);
     }
   }
 
   [[nodiscard]] bool has_executed() const { return has_executed_; }
-  void RequireConsistent() const { Require(!guard_.halted() || (!guard_.pending() && !guard_.executing())); }
+  void RequireConsistent() const {
+    Require(!guard_.halted() || (!guard_.pending() && !guard_.executing()));
+    Require(!guard_.control().empty() == (guard_.executing() && step_ < std::min(standing_, NumSteps())));
+  }
 
  private:
   // With the guard's key where it has one, or otherwise, or as before.
@@ -106,6 +112,49 @@ class Session final {
     if (how == 2)
       message_ = {input.ConsumeBool() ? sign(forger_, Role::kCertifier) : sign(signer_, Role::kPlanner), false};
     if (message_.is_signed) message_.bytes = sign(signer_, Role::kCertifier);
+  }
+
+  [[nodiscard]] int NumSteps() const { return guard_.executing() ? guard_.executing()->plan.num_steps : 0; }
+
+  // Of a plan that AnyPlan may have made, by its certificate or by its id alone.
+  void Withdraw(FuzzedDataProvider& input) {
+    certified_plan_t plan = SmallPlan(input.ConsumeIntegralInRange(1, 8));
+    Seal(plan);
+    withdrawal_t message{};
+    message.plan_id = plan.plan.plan_id;
+    message.expires_utime = plan.expires_utime;
+    message.valid_steps = AnySmall(input, 4);
+    const int kind = input.ConsumeIntegralInRange(0, 3);
+    message.cause = kind == 2 ? withdrawal_t::UNKNOWN_PLAN : withdrawal_t::OBSTACLE;
+    if (kind == 0) SetDigest(message.certificate_digest, GetDigest(plan.certificate_digest));
+    if (kind == 3) SetDigest(message.certificate_digest, DigestOf("another"));
+    SetGrounds(message, GroundsOf(plan));
+    const int how = input.ConsumeIntegralInRange(0, 2);
+    std::vector<std::uint8_t> bytes = Encode(message);
+    if (how == 2) Damage(input, bytes);
+    const bool is_signed = with_key_ == (how != 1);
+    if (is_signed) bytes = signer_.Sign(Role::kCertifier, "PLAN_WITHDRAWN", bytes, kStart);
+    const auto before = guard_.executing() ? guard_.standing_steps() : std::nullopt;
+    const auto* const executing = guard_.executing();
+    const bool was_pending = guard_.pending() != nullptr;
+    const GuardWithdrawal answer = guard_.Withdraw(bytes);
+    Require(answer.verdict.ok() == answer.verdict.message.empty() &&
+            answer.verdict.cause != GuardCause::kInternalError && guard_.executing() == executing);
+    const auto after = executing ? guard_.standing_steps() : std::nullopt;
+    if (!answer.verdict.ok()) return Require(after == before && was_pending == (guard_.pending() != nullptr));
+    Require(is_signed == with_key_);
+    Require(!before || (after && *after <= *before));
+    if (how == 2) {  // its content may be another
+      if (after) standing_ = *after;
+      if (last_id_) last_id_.reset();
+      return;
+    }
+    const bool names = executing && (kind == 0 ? Encode(*executing) == Encode(plan)
+                                               : kind == 1 && executing->plan.plan_id == plan.plan.plan_id);
+    if (names) standing_ = std::min(standing_, std::clamp<int>(message.valid_steps, 0, NumSteps()));
+    Require(after.value_or(standing_) == standing_);
+    if (kind != 2 && last_id_) last_id_ = std::max(*last_id_, plan.plan.plan_id);
+    if (kind != 2) last_expiry_ = std::max(last_expiry_, plan.expires_utime);
   }
 
   void Accept(FuzzedDataProvider& input) {
@@ -155,6 +204,7 @@ class Session final {
     RequireInSlice(*plan, 0, state);
     if (with_key_) Require(Apart(plan->plan.start_utime, boundary) <= kJitterUs && IsOnTime(*plan, 0, now));
     step_ = 0;
+    standing_ = 128;
   }
 
   void Check(FuzzedDataProvider& input) {
@@ -164,7 +214,7 @@ class Session final {
     const bool ok = guard_.Check(step, state, now).ok();
     Require(ok == (guard_.executing() != nullptr));  // after any refusal nothing is executing
     if (!ok) return;
-    Require(step == ++step_);
+    Require(step == ++step_ && step <= standing_);
     RequireInSlice(*guard_.executing(), step, state);
     Require(!with_key_ || IsOnTime(*guard_.executing(), step, now));
     has_executed_ = true;
@@ -202,6 +252,7 @@ class Session final {
   std::int64_t last_expiry_ = INT64_MIN;
   Message message_;
   int step_ = 0;
+  int standing_ = 128;  // controls of the executing plan
   bool has_executed_ = false;
 };
 

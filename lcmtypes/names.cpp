@@ -4,6 +4,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 
 namespace forereach {
 
@@ -65,6 +66,8 @@ std::string_view EventName(std::int16_t kind) {
     case execution_event_t::CONTACT: return "contact";
     case execution_event_t::HALTED: return "halted";
     case execution_event_t::RESET: return "reset";
+    case execution_event_t::WITHDRAWN: return "withdrawn";
+    case execution_event_t::EMERGENCY_STOP: return "emergency_stop";
     case execution_event_t::OFF_SCHEDULE: return "off_schedule";
     default: return "unknown";
   }
@@ -99,6 +102,19 @@ std::string_view FaultAdvice(std::int16_t cause) {
       return "find the program that commands the robot without the guard, or the other certifier on this bus; then "
              "`forereach reset`";
     default: return "find the reason, then `forereach reset`";
+  }
+}
+
+std::string_view WithdrawalName(std::int16_t cause) {
+  switch (cause) {
+    case withdrawal_t::FALSIFIED: return "falsified";
+    case withdrawal_t::DOMAIN_EXIT: return "domain_exit";
+    case withdrawal_t::NO_FINITE_ENCLOSURE: return "no_finite_enclosure";
+    case withdrawal_t::OBSTACLE: return "obstacle";
+    case withdrawal_t::NO_STOP: return "no_stop";
+    case withdrawal_t::NOT_JUDGED: return "not_judged";
+    case withdrawal_t::UNKNOWN_PLAN: return "unknown_plan";
+    default: return "unknown";
   }
 }
 

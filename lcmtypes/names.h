@@ -28,6 +28,9 @@ help. */
 /** True for faults that invalidate the executing plan's certificate: a robot stops. */
 [[nodiscard]] bool StopsTheRobot(std::int16_t cause);
 
+/** "falsified", "obstacle", ... as withdrawal_t's constants; "unknown" for any other number. */
+[[nodiscard]] std::string_view WithdrawalName(std::int16_t cause);
+
 /** "OK", "STALE", "ERROR": the level of certifier_status_v3_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view LevelName(std::int16_t level);
 

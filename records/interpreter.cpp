@@ -13,6 +13,7 @@
 #include "forereach/obstacles_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/heartbeat.h"
 #include "lcmtypes/names.h"
 
@@ -79,6 +80,7 @@ std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std
   }
   if (channel == channels_.decision) return {plain, PositionOf<decision_t>(bytes)};
   if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
+  if (channel == channels_.withdrawn) return {plain, PositionOf<withdrawal_t>(bytes)};
   if (channel == channels_.robot_state) return {plain, PositionOf<robot_state_t>(bytes)};
   if (channel == channels_.transition) return {plain, PositionOf<transition_t>(bytes)};
   if (channel == channels_.status) {

@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <stdexcept>
 
+#include "lcmtypes/grounds.h"
 #include "lcmtypes/seal.h"
 
 namespace forereach {
@@ -41,12 +42,14 @@ GuardVerdict RefuseAt(GuardCause cause, int step, int coordinate, double value, 
   return verdict;
 }
 
+template <class Message>
 GuardVerdict RefuseDecode(DecodeStatus status, std::size_t received) {
-  const std::size_t expected = EncodedSize<certified_plan_t>();
+  const std::size_t expected = EncodedSize<Message>();
   if (status == DecodeStatus::kUnknownFingerprint)
-    return Refuse(GuardCause::kUnknownFingerprint, Sentence("the %zu bytes are not a certified_plan_t", received));
+    return Refuse(GuardCause::kUnknownFingerprint,
+                  Sentence("the %zu bytes are not a %s", received, Message::getTypeName()));
   return Refuse(status == DecodeStatus::kTrailingBytes ? GuardCause::kTrailingBytes : GuardCause::kWrongLength,
-                Sentence("%zu bytes, a certified_plan_t has %zu", received, expected));
+                Sentence("%zu bytes, a %s has %zu", received, Message::getTypeName(), expected));
 }
 
 // x <= a + b in real arithmetic. Where x differs from the rounded sum, the exact sum lies on the same side of x; where
@@ -164,6 +167,7 @@ std::string_view GuardCauseName(GuardCause cause) {
     case GuardCause::kOutsideSlice: return "outside_slice";
     case GuardCause::kNotExecuting: return "not_executing";
     case GuardCause::kStepOutOfOrder: return "step_out_of_order";
+    case GuardCause::kWithdrawn: return "withdrawn";
     case GuardCause::kInternalError: return "internal_error";
   }
   return "unknown";
@@ -204,7 +208,8 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
   // A plan expires and its plan_id has to be new, so a plan from before the guard's start does no more harm than a late
   // one.
-  authenticator_.emplace(*options_.keys, options_.bus_name, Speakers{{options_.channel, Role::kCertifier}}, 0);
+  authenticator_.emplace(*options_.keys, options_.bus_name,
+                         Speakers{{options_.channel, Role::kCertifier}, {options_.withdrawn, Role::kCertifier}}, 0);
 }
 
 void Guard::Halt() noexcept {
@@ -222,29 +227,30 @@ void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std:
 }
 
 // Checks and removes the signature.
-GuardVerdict Guard::Authenticated(Bytes& bytes) {
+GuardVerdict Guard::Authenticated(const std::string& channel, Bytes& bytes) {
   if (!authenticator_) return {};
-  const auto [authenticity, message] = authenticator_->Check(options_.channel, bytes);
+  const auto [authenticity, message] = authenticator_->Check(channel, bytes);
   bytes = message;
   switch (authenticity) {
     case Authenticity::kAuthentic: return {};
-    case Authenticity::kUnsigned: return Refuse(GuardCause::kUnsigned, "the plan is not signed");
-    case Authenticity::kForged: return Refuse(GuardCause::kForged, "the plan is not signed by this robot's certifier");
-    case Authenticity::kForeign: return Refuse(GuardCause::kForeign, "the plan was signed for another bus");
+    case Authenticity::kUnsigned: return Refuse(GuardCause::kUnsigned, channel + " is not signed");
+    case Authenticity::kForged:
+      return Refuse(GuardCause::kForged, channel + " is not signed by this robot's certifier");
+    case Authenticity::kForeign: return Refuse(GuardCause::kForeign, channel + " was signed for another bus");
     case Authenticity::kReplayed: break;
   }
-  return Refuse(GuardCause::kSignatureReplayed, "the plan's signature was used before");
+  return Refuse(GuardCause::kSignatureReplayed, "the signature on " + channel + " was used before");
 }
 
 GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept {
   GuardVerdict verdict;
   try {
     if (halted_) return Refuse(GuardCause::kHalted, "halted until a person resets it");
-    verdict = Authenticated(certified_plan_bytes);
+    verdict = Authenticated(options_.channel, certified_plan_bytes);
     if (!verdict.ok()) return verdict;
     auto certified = std::make_unique<certified_plan_t>();
     const DecodeStatus status = Decode(certified_plan_bytes, *certified);
-    if (status != DecodeStatus::kOk) return RefuseDecode(status, certified_plan_bytes.size());
+    if (status != DecodeStatus::kOk) return RefuseDecode<certified_plan_t>(status, certified_plan_bytes.size());
     verdict = Examine(*certified, now_us);
     verdict.plan_id = certified->plan.plan_id;
     if (!verdict.ok()) return verdict;
@@ -261,6 +267,69 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
     verdict.cause = GuardCause::kInternalError;
   }
   return verdict;
+}
+
+namespace {
+
+bool Names(const withdrawal_t& message, const certified_plan_t& certified) {
+  const Digest named = GetDigest(message.certificate_digest);
+  if (named == Digest{}) return message.plan_id == certified.plan.plan_id;
+  return named == GetDigest(certified.certificate_digest);
+}
+
+// Whether what the plan was certified under is what the message's certifier has in force. Observations may have been
+// added: they only narrow what is reachable.
+bool IsUnderEqualGrounds(const certified_plan_t& certified, const withdrawal_t& message) {
+  Grounds now = GroundsOf(message);
+  now.observations = GetDigest(certified.observations_digest);
+  return GroundsOf(certified) == now;
+}
+
+}  // namespace
+
+GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes) noexcept {
+  GuardWithdrawal answer;
+  try {
+    answer.verdict = Authenticated(options_.withdrawn, withdrawal_bytes);
+    if (!answer.verdict.ok()) return answer;
+    withdrawal_t message;
+    const DecodeStatus status = Decode(withdrawal_bytes, message);
+    if (status == DecodeStatus::kOk)
+      Take(message, answer);
+    else
+      answer.verdict = RefuseDecode<withdrawal_t>(status, withdrawal_bytes.size());
+  } catch (...) {
+    answer.verdict.cause = GuardCause::kInternalError;
+  }
+  return answer;
+}
+
+void Guard::Take(const withdrawal_t& message, GuardWithdrawal& answer) {
+  const auto counts = [&](const std::unique_ptr<certified_plan_t>& plan) {
+    return plan && Names(message, *plan) &&
+           !(message.cause == withdrawal_t::UNKNOWN_PLAN && IsUnderEqualGrounds(*plan, message));
+  };
+  if (counts(executing_)) {
+    const int valid = std::clamp<int>(message.valid_steps, 0, executing_->plan.num_steps);
+    standing_steps_ = std::min(standing_steps_.value_or(valid), valid);
+  }
+  if (counts(pending_)) pending_.reset();
+  if (message.cause != withdrawal_t::UNKNOWN_PLAN) {
+    last_accepted_ = std::max(last_accepted_.value_or(message.plan_id), message.plan_id);
+    last_expiry_ = std::max(last_expiry_, message.expires_utime);
+  }
+  answer.verdict.plan_id = message.plan_id;
+  answer.sequence = message.sequence;
+  if (executing_ && Names(message, *executing_))
+    answer.standing_steps = standing_steps_.value_or(executing_->plan.num_steps);
+  answer.message = GetText(message.message);
+}
+
+std::span<const double> Guard::control() const {
+  if (!executing_) return {};
+  const candidate_plan_t& plan = executing_->plan;
+  if (last_step_ >= std::min<int>(plan.num_steps, standing_steps_.value_or(plan.num_steps))) return {};
+  return {plan.control[last_step_], static_cast<std::size_t>(plan.num_inputs)};
 }
 
 GuardVerdict Guard::ExamineSizes(const candidate_plan_t& plan) const {
@@ -379,6 +448,7 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
   if (verdict.ok()) {
     executing_ = std::move(pending_);
     last_step_ = 0;
+    standing_steps_.reset();
   }
   pending_.reset();
   return verdict;
@@ -430,6 +500,9 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
   const int num_steps = executing_->plan.num_steps;
   if (step != last_step_ + 1 || step > num_steps)
     return Refuse(GuardCause::kStepOutOfOrder, Sentence("step %d of %d after step %d", step, num_steps, last_step_));
+  if (standing_steps_ && step > *standing_steps_)
+    return Refuse(GuardCause::kWithdrawn,
+                  Sentence("control %d of plan %" PRId64 " had been withdrawn", step - 1, executing_->plan.plan_id));
   GuardVerdict verdict = ExamineStateSize(state);
   if (verdict.ok()) verdict = CheckSlice(*executing_, step, state);
   return verdict.ok() ? ExamineTime(executing_->plan, step, now_us) : verdict;

@@ -8,14 +8,15 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
                  the plan before it
     Check     -> after each control: the state is inside X_t, so the next control may be applied. With
                  GuardOptions::max_jitter_us also: the step is on time
+    Withdraw  -> controls of a plan stand no longer: a pending plan is dropped, and of the executing one only the
+                 controls before `standing_steps` may still be applied
     Finish    -> no plan is executing
     Halt      -> no plan is executing, and none is accepted or started until Reset
 
 Every refusal is final. A plan that TryStart refuses for another cause than an early start is discarded. A plan whose
 Check fails stops executing. If Check finds a state outside its slice, the guard halts itself, because an assumption of
 the next certificate is false too. A step that is off its schedule only ends the plan: TryStart looks at the time of the
-next one. Apply only controls of the plan that `executing` returns, and control t only after
-its step t has passed.
+next one. Apply only what `control` returns.
 
 Check compares with interval hulls: a certified_plan_t contains, for t = 0..T, the interval hull of the certified slice
 X_t, rounded outward. X_t lies in its hull. So a state outside the hull has left X_t, and the certificate does not cover
@@ -35,6 +36,7 @@ Plan ids of all sources are compared with each other, because a robot follows on
 
 #include "bus/authentic.h"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -78,6 +80,7 @@ enum class GuardCause {
   // Check
   kNotExecuting,
   kStepOutOfOrder,  ///< Not the step after the last one checked, or past the horizon.
+  kWithdrawn,       ///< The control before this step had been withdrawn.
   // all of them
   kInternalError,  ///< Out of memory.
 };
@@ -107,6 +110,14 @@ struct GuardDomain {
   std::vector<double> state_lower, state_upper, input_lower, input_upper;
 };
 
+/** The guard's answer to a withdrawal. */
+struct GuardWithdrawal {
+  GuardVerdict verdict = {};   ///< Whether the message counts, and its plan_id.
+  std::int64_t sequence = -1;  ///< The message's.
+  int standing_steps = 0;      ///< Controls of the plan that may still be applied: 0 unless it is executing.
+  std::string message = {};    ///< The certifier's sentence.
+};
+
 struct GuardOptions {
   int num_states = 0;                        ///< 1..16
   int num_inputs = 0;                        ///< 1..8
@@ -116,9 +127,10 @@ struct GuardOptions {
   /** From LoadKeys(PATH, Role::kRobot). If set, plans without a signature by the certifier of these keys, for
   `bus_name` and `channel`, are refused (bus/authentic.h). */
   std::optional<KeyRing> keys = {};
-  std::string bus_name = {};               ///< For example "239.255.76.67:7667". Not empty with keys.
-  std::string channel = "PLAN_CERTIFIED";  ///< The channel of certified plans.
-  std::optional<GuardDomain> domain = {};  ///< If set, plans that leave it are refused.
+  std::string bus_name = {};                 ///< For example "239.255.76.67:7667". Not empty with keys.
+  std::string channel = "PLAN_CERTIFIED";    ///< The channel of certified plans.
+  std::string withdrawn = "PLAN_WITHDRAWN";  ///< The channel of withdrawals.
+  std::optional<GuardDomain> domain = {};    ///< If set, plans that leave it are refused.
   /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, microseconds, not
   negative. Where obstacles may move, it is half of the task's gate.max_clock_error_ms. */
   std::optional<std::int64_t> max_jitter_us = {};
@@ -155,6 +167,17 @@ class Guard final {
   no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
 
+  /** Takes one message of PLAN_WITHDRAWN, also while the guard is halted. With keys, the certifier has to have signed
+  it. A plan is meant if its certificate digest is the message's, or if the message names none and the plan_id is equal.
+  - Pending: it is dropped.
+  - Executing: only controls 0 .. valid_steps - 1 may be applied, of several messages the fewest. So a repeated or late
+    message never extends what stands.
+  - Neither: it is not accepted later. Until its certificate has expired, a plan_id has to exceed it (see Accept).
+  Cause UNKNOWN_PLAN comes from a certifier that has not certified the plan, and does not count if the plan was
+  certified under exactly the message's configuration, model, declaration and obstacles: then nothing has changed. A
+  valid_steps outside 0 .. num_steps counts as the nearest of these numbers. */
+  [[nodiscard]] GuardWithdrawal Withdraw(Bytes withdrawal_bytes) noexcept;
+
   /** Ends the executing plan. */
   void Finish() noexcept { executing_.reset(); }
 
@@ -169,6 +192,11 @@ class Guard final {
   void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {});
   [[nodiscard]] bool halted() const { return halted_; }
 
+  /** The control that may be applied after the last step that passed: num_inputs entries. Empty if no plan is
+  executing, if its controls are used up, or if the next one has been withdrawn. Valid as `executing` is. */
+  [[nodiscard]] std::span<const double> control() const;
+  /** The number of controls of the executing plan that may be applied, if some were withdrawn; nothing if none was. */
+  [[nodiscard]] std::optional<int> standing_steps() const { return executing_ ? standing_steps_ : std::nullopt; }
   /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check, Finish or
   Halt. */
   [[nodiscard]] const certified_plan_t* executing() const { return executing_.get(); }
@@ -180,7 +208,8 @@ class Guard final {
     std::optional<GuardDomain> domain;
   };
 
-  [[nodiscard]] GuardVerdict Authenticated(Bytes& bytes);
+  [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, Bytes& bytes);
+  void Take(const withdrawal_t& message, GuardWithdrawal& answer);
   [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
   [[nodiscard]] std::vector<Task>::const_iterator FindExpected(const certified_plan_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
@@ -199,7 +228,8 @@ class Guard final {
   std::optional<std::int64_t> last_accepted_;  // plan_id
   std::int64_t last_expiry_ = INT64_MIN;       // the latest expiry of the accepted plans
   std::unique_ptr<certified_plan_t> pending_, executing_;
-  int last_step_ = 0;  // last checked step of the executing plan
+  int last_step_ = 0;                  // last checked step of the executing plan
+  std::optional<int> standing_steps_;  // of the executing plan
 };
 
 }  // namespace forereach

@@ -46,6 +46,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.keys = KeysOf(config.bus, Role::kRobot);
   options.guard.bus_name = config.bus.bus_name();
   options.guard.channel = config.bus.certified;
+  options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
   if (const auto& error_ms = config.gate.max_clock_error_ms) options.guard.max_jitter_us = Microseconds(*error_ms) / 2;
   options.max_age_us = Microseconds(config.gate.max_age_ms);
@@ -97,6 +98,8 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
     RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
   bus.Subscribe(config_.bus.certified,
                 [this](const Received& received) { supervisor_.OnCertified(received.raw, received.utime); });
+  bus.Subscribe(config_.bus.withdrawn,
+                [this](const Received& received) { supervisor_.OnWithdrawn(received.raw, received.utime); });
   bus.Subscribe(config_.bus.fault,
                 [this](const Received& received) { supervisor_.OnFault(received.raw, received.utime); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
@@ -209,6 +212,7 @@ std::string RobotSimNode::Summary() const {
   summary["goal_reached"] = goal_reached_;
   summary["distance_to_goal"] = DistanceToGoal();  // NaN becomes null
   summary["stops"] = stops_;
+  summary["emergency_stops"] = counts.emergency_stops;
   summary["plans_accepted"] = counts.accepted;
   summary["plans_started"] = counts.started;
   summary["plans_refused"] = counts.refused;

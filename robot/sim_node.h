@@ -54,8 +54,8 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   void Stop() override;
 
   /** One JSON object: boundaries, steps_executed, steps_inside_slice, contacts, goal_reached, distance_to_goal
-  (current, in metres; null without a goal), stops (before the goal, emergency stops included), plans_accepted,
-  plans_started, plans_refused (count by GuardCauseName), messages_not_sent. */
+  (current, in metres; null without a goal), stops (before the goal, emergency stops included), emergency_stops (for a
+  withdrawal), plans_accepted, plans_started, plans_refused (count by GuardCauseName), messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 
   [[nodiscard]] std::span<const double> state() const override { return state_; }

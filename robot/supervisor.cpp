@@ -1,6 +1,8 @@
 #include "robot/supervisor.h"
 
 #include <algorithm>
+#include <climits>
+#include <stdexcept>
 #include <utility>
 
 #include "forereach/robot_state_t.hpp"
@@ -23,6 +25,9 @@ std::int16_t SetValues(double (&field)[N], std::span<const double> values) {
 
 Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
     : options_(std::move(options)), robot_(robot), guard_(options_.guard) {
+  if (options_.emergency_stop_steps < 0 || options_.emergency_stop_steps > 128)
+    throw std::invalid_argument("SupervisorOptions: emergency_stop_steps is " +
+                                std::to_string(options_.emergency_stop_steps) + ", it has to be 0 to 128");
   if (!options_.guard.keys) return;
   // Nothing recorded earlier releases the robot: a command has to be fresh, and later than what halted it.
   authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
@@ -41,6 +46,14 @@ void Supervisor::OnCertified(Bytes message, std::int64_t now_us) {
   if (!verdict.ok()) return SendRefusal(now_us, verdict);
   ++counts_.accepted;
   SendEvent(now_us, execution_event_t::ACCEPTED, verdict.plan_id, -1, 0, "the plan waits for its start");
+}
+
+void Supervisor::OnWithdrawn(Bytes message, std::int64_t now_us) {
+  const GuardWithdrawal answer = guard_.Withdraw(message);
+  if (!answer.verdict.ok()) return SendRefusal(now_us, answer.verdict);
+  SendEvent(now_us, execution_event_t::WITHDRAWN, answer.verdict.plan_id, answer.standing_steps,
+            static_cast<double>(answer.sequence), answer.message);
+  if (IsExecuting() && step_ >= guard_.standing_steps().value_or(INT_MAX)) StopInEmergency(now_us);
 }
 
 void Supervisor::OnFault(Bytes message, std::int64_t now_us) {
@@ -116,6 +129,7 @@ void Supervisor::StartPending(std::int64_t utime, std::int64_t now_us) {
 }
 
 void Supervisor::ContinuePlan(std::int64_t utime) {
+  if (MustStop(utime)) return StopInEmergency(utime);
   const candidate_plan_t& plan = guard_.executing()->plan;
   if (step_ == plan.num_steps) {
     SendEvent(utime, execution_event_t::STANDING, plan.plan_id, step_, 0, "the plan is finished: holding still");
@@ -123,6 +137,26 @@ void Supervisor::ContinuePlan(std::int64_t utime) {
   } else if (step_ == plan.progress_steps) {
     SendEvent(utime, execution_event_t::TAIL_BEGUN, plan.plan_id, step_, 0, "no newer certificate: braking");
   }
+}
+
+// Whether what stands has to be left now, at a step boundary.
+bool Supervisor::MustStop(std::int64_t utime) const {
+  const std::optional<int> standing = guard_.standing_steps();
+  if (!standing || step_ < *standing - options_.emergency_stop_steps) return false;
+  const certified_plan_t* const next = guard_.pending();
+  if (step_ >= *standing || !next || next->plan.start_utime < utime) return true;
+  // A plan takes over at the boundary nearest to its start.
+  const std::uint64_t ahead = static_cast<std::uint64_t>(next->plan.start_utime) - static_cast<std::uint64_t>(utime);
+  const auto step_us = static_cast<std::uint64_t>(options_.guard.step_us);
+  return ahead > static_cast<std::uint64_t>(*standing - step_) * step_us + step_us / 2;
+}
+
+void Supervisor::StopInEmergency(std::int64_t utime) {
+  ++counts_.emergency_stops;
+  SendEvent(utime, execution_event_t::EMERGENCY_STOP, PlanId(), step_, 0,
+            "emergency stop, which is not certified: the controls from " + std::to_string(*guard_.standing_steps()) +
+                " on were withdrawn, and no newer certificate takes over");
+  Hold();
 }
 
 void Supervisor::Hold() {
@@ -136,12 +170,6 @@ void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest,
 
 void Supervisor::Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) {
   SendEvent(utime, kind, PlanId(), Step(), value, text);
-}
-
-std::span<const double> Supervisor::control() const {
-  if (!IsExecuting() || step_ == guard_.executing()->plan.num_steps) return {};
-  const candidate_plan_t& plan = guard_.executing()->plan;
-  return {plan.control[step_], static_cast<std::size_t>(plan.num_inputs)};
 }
 
 std::int64_t Supervisor::PlanId() const { return IsExecuting() ? guard_.executing()->plan.plan_id : -1; }

@@ -1,10 +1,12 @@
 /** What a robot does besides the guard's checks: it follows certified plans from boundary to boundary, stops, obeys
 faults and commands, and reports all of it on the bus.
 
-You implement Supervisor::Robot (state, hold, send, reload), pass it the bytes of three channels as they arrive, and
+You implement Supervisor::Robot (state, hold, send, reload), pass it the bytes of four channels as they arrive, and
 call Boundary at every step boundary:
 
     PLAN_CERTIFIED -> OnCertified     ACCEPTED, or REFUSED with the guard's cause
+    PLAN_WITHDRAWN -> OnWithdrawn     WITHDRAWN, which answers the certifier; EMERGENCY_STOP if the control that is
+                                      being applied stands no longer
     FAULT          -> OnFault         HALTED, an emergency stop, for a fault that invalidates certificates
     COMMAND        -> OnCommand       RESET releases a halted robot; RELOAD calls Robot::Reload
 
@@ -19,12 +21,16 @@ check of the guard fails it is REFUSED, and the current plan goes on;
 So without a newer certificate the robot runs the tail that is certified already, holds at rest, and can start from
 there.
 
+A plan of which the certifier has withdrawn a part goes on within the controls that stand. A newer plan may take over
+until then. If none is pending that starts in time, EMERGENCY_STOP is made emergency_stop_steps before the end of what
+stands: a hold that no certificate covers. The robot is not halted by it.
+
 After every other emergency stop no plan is accepted until a reset arrives whose stamp is later than everything that
 halted the robot. A fault whose stamp is not later than the last reset is a repetition and is ignored. A plan that is
 executing is not affected by Expect.
 
-With keys, messages count only if the certifier signed the plan or fault, and the operator the command. Messages that
-this class sends are not signed: sign them with bus/authentic.h's Signer, or with a bus that does.
+With keys, messages count only if the certifier signed the plan, withdrawal or fault, and the operator the command.
+Messages that this class sends are not signed: sign them with bus/authentic.h's Signer, or with a bus that does.
 
 No clock, no bus, no thread, not thread-safe. It needs the guard and the message types only. All times are microseconds
 since the Unix epoch. */
@@ -49,8 +55,12 @@ namespace forereach {
 
 struct SupervisorOptions {
   GuardOptions guard;
-  std::int64_t max_age_us = 500'000;                 ///< The task's gate.max_age_ms: an older command is refused.
-  std::int64_t max_ahead_us = 50'000;                ///< The task's gate.max_ahead_ms: so is one from further ahead.
+  std::int64_t max_age_us = 500'000;   ///< The task's gate.max_age_ms: an older command is refused.
+  std::int64_t max_ahead_us = 50'000;  ///< The task's gate.max_ahead_ms: so is one from further ahead.
+  /** The steps that Robot::Hold needs from the highest speed to rest, 0 to 128. An emergency stop for a withdrawal
+  begins so many steps before the controls that stand are used up, so that the robot comes to rest within what they
+  would have covered if it brakes along them. 0: it stops at once. */
+  int emergency_stop_steps = 0;
   std::string fault = "FAULT", command = "COMMAND";  ///< Channels, as the guard's `channel`: they are signed.
   std::string robot_state = "ROBOT_STATE", transition = "TRANSITION", event = "EXECUTION_EVENT";
 };
@@ -72,7 +82,7 @@ class Supervisor final {
   };
 
   struct Counts {
-    std::int64_t boundaries = 0, steps = 0, steps_inside = 0, accepted = 0, started = 0;
+    std::int64_t boundaries = 0, steps = 0, steps_inside = 0, accepted = 0, started = 0, emergency_stops = 0;
     std::map<std::string, std::int64_t> refused;  ///< By GuardCauseName.
   };
 
@@ -81,6 +91,7 @@ class Supervisor final {
 
   /** A message of its channel, as it came, trailer included, and when. */
   void OnCertified(Bytes message, std::int64_t now_us);
+  void OnWithdrawn(Bytes message, std::int64_t now_us);
   void OnFault(Bytes message, std::int64_t now_us);
   /** @return why the command is refused, in words; empty if it is obeyed or not for robots. */
   std::string OnCommand(Bytes message, std::int64_t now_us);
@@ -101,7 +112,7 @@ class Supervisor final {
   void Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text);
 
   /** The control that applies now; empty: hold. */
-  [[nodiscard]] std::span<const double> control() const;
+  [[nodiscard]] std::span<const double> control() const { return guard_.control(); }
   [[nodiscard]] bool halted() const { return guard_.halted(); }
   [[nodiscard]] const Counts& counts() const { return counts_; }
 
@@ -112,6 +123,8 @@ class Supervisor final {
   [[nodiscard]] int Step() const { return IsExecuting() ? step_ : -1; }
   void StartPending(std::int64_t utime, std::int64_t now_us);
   void ContinuePlan(std::int64_t utime);
+  [[nodiscard]] bool MustStop(std::int64_t utime) const;
+  void StopInEmergency(std::int64_t utime);
   void Hold();
   void SendState(std::int64_t utime, bool ends);
   void SendTransition(std::int64_t utime);

@@ -202,6 +202,40 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   SetText(decision.message, "rejected: shadow mode; else: " + Explain(verdict, certifier_.problem()));
 }
 
+namespace {
+
+// Of a plan whose first failure is this verdict.
+int StandingSteps(const Decision& verdict, int num_steps, bool is_swept) {
+  if (verdict.outcome == Outcome::kCertified || verdict.cause == Cause::kNoStop) return num_steps;
+  if (verdict.outcome == Outcome::kDomain) return verdict.step;
+  if (verdict.outcome == Outcome::kSafety) return std::max(is_swept ? verdict.step : verdict.step - 1, 0);
+  return 0;
+}
+
+}  // namespace
+
+Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noexcept {
+  try {
+    const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
+    const Zonotope initial_set = InitialSetOf(candidate);
+    certifier_.Require(plan, initial_set, obstacles_.all());
+    const bool is_swept = certifier_.problem().between.has_value();
+    const auto standing = [&](const Decision& verdict) {
+      return Standing{StandingSteps(verdict, plan.num_steps, is_swept), verdict};
+    };
+    const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
+    const Standing whole = standing(verdict);
+    if (verdict.outcome == Outcome::kCertified || verdict.outcome == Outcome::kFalsified) return whole;
+    // Certify has not tested S after D. A failure of S before first_step is past.
+    const Decision rest = certifier_.JudgeSafety(obstacles_.all(), plan.schedule, tube_, first_step);
+    if (verdict.outcome == Outcome::kSafety) return standing(rest);
+    const Standing safe = standing(rest);
+    return rest.outcome == Outcome::kSafety && safe.steps < whole.steps ? safe : whole;
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
 // Should the budget not have been enough: its execution might begin before the robot has it.
 void Gate::WithdrawIfLate(GateAnswer& answer, std::int64_t now_us) const {
   const std::int64_t taken = now_us - answer.decision.utime;

@@ -33,6 +33,13 @@ struct GateAnswer {
   std::optional<certified_plan_t> certified;
 };
 
+/** Which controls of a certified plan stand: 0 .. steps - 1. */
+struct Standing {
+  int steps = 0;
+  /** A certificate: all stand. Otherwise why not. Outcome kNone: the plan could not be judged. */
+  Decision verdict = {};
+};
+
 class Gate final {
  public:
   /** Microseconds since the Unix epoch. */
@@ -46,7 +53,7 @@ class Gate final {
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
   /** The reason why obstacles() may be incomplete at this time (obstacles_in_force.h); empty if it is complete. */
   [[nodiscard]] std::string WhyObstaclesUnknown(std::int64_t now_us) const { return obstacles_.WhyUnknown(now_us); }
-  /** The tube of the last candidate that reached the certifier. */
+  /** The tube of the last plan that reached the certifier. */
   [[nodiscard]] const Tube& tube() const { return tube_; }
 
   /** Decides on one candidate. Never throws: an exception becomes a rejection. The caller sets elapsed_us; all other
@@ -55,6 +62,18 @@ class Gate final {
   [[nodiscard]] GateAnswer Decide(Bytes candidate, const TimeSource& clock) noexcept;
   /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
+
+  /** Judges a plan that was certified under what is in force now. The controls that stand are those whose motions are
+  all proven safe, from sample `first_step` on; earlier ones are past. They are found from the first failure, at step t:
+  - D: X_t is proven, but no step from it. Control t does not stand: t controls stand. If only the end of the plan is
+  not at rest (kNoStop), all its controls stand, and no hold after them is certified.
+  - S with Problem::between: the motion under control t may touch: t controls stand.
+  - S at the samples: X_t may touch, and control t - 1 leads there: t - 1 controls stand, and none for t = 0.
+  - F: the declaration is false: none stands.
+  If D and S both fail, the fewer. The tube is computed again from the plan's X_0, with all observations so far.
+  @param plan a candidate that this gate or one before a reload has certified. @param first_step 0..num_steps.
+  Cost as Certify's. */
+  [[nodiscard]] Standing JudgeAgain(const candidate_plan_t& plan, int first_step) noexcept;
 
   /** Answers a candidate without certifying it, for a cause outside the candidate. The candidate's own defects take
   precedence over `cause`. */

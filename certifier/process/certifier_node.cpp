@@ -66,6 +66,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       charge_({clocks_.wall(), RandomInstance()}, listen_us),
       has_begun_(is_in_charge()),
       issued_(config.gate, clocks_.steady()),
+      plans_(config.gate),
       reload_(config.path, channels_),
       contradictions_(config_),
       latch_(watch_, contradictions_, std::move(latch)),
@@ -85,6 +86,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
   bus.Subscribe(channels_.obstacles, [this](const Received& received) { OnObstacles(received); });
   bus.Subscribe(channels_.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(channels_.transition, [this](const Received& received) { OnTransition(received); });
+  bus.Subscribe(channels_.event, [this](const Received& received) { OnEvent(received); });
   bus.Subscribe(channels_.command, [this](const Received& received) { OnCommand(received); });
 }
 
@@ -174,6 +176,7 @@ void CertifierNode::StandBy() {
   logging::Warn("{}", WhyNotInCharge());
   LeaveWaiting();
   watch_.RobotHasFinished();
+  plans_.Clear();
   if (!std::exchange(has_begun_, false) || gate_->certifier().violation()) return;
   if (compaction_.valid()) compaction_.wait();  // it works on *gate_
   gate_ = std::make_unique<Gate>(config_);
@@ -227,6 +230,7 @@ void CertifierNode::OnRobotState(const Received& received) {
   const std::string error = gate_->CheckRobotState(state, received.utime);
   if (!error.empty()) return Refuse(channels_.robot_state, error);
   last_state_ = state;
+  if (is_in_charge() && !gate_->options().shadow) plans_.SeeRobot(state, clocks_.steady());
   if (state.mode == robot_state_t::FINISHED) return watch_.RobotHasFinished();
   watch_.SeeRobot(received.utime);
   if (!is_in_charge()) return;  // the robot may execute another's plans
@@ -256,6 +260,14 @@ void CertifierNode::Learn(Bytes transition) {
     contradictions_.Add({gate_->grounds().model, gate_->certifier().Contradiction()});
   Fail(DeclarationFalsified(*violation));
   latch_.Store();  // also where another fault stays
+}
+
+// The robot answers a withdrawal. Its other events are for people and records.
+void CertifierNode::OnEvent(const Received& received) {
+  LookAtCharge();
+  const auto event = Decoded<execution_event_t>(received.bytes);
+  if (!event) return Refuse(channels_.event, "not an execution_event_t");
+  if (is_in_charge()) plans_.TakeAnswer(*event);
 }
 
 void CertifierNode::OnCommand(const Received& received) {
@@ -321,9 +333,25 @@ void CertifierNode::Tick(std::int64_t now_us) {
     Announce(PlainFault(fault->cause, fault->why).fault, *fault);
   }
   TakeReload();
+  WithdrawPlans(now_us);
   AnswerWaiting();
   CompactIfDue();
   if (reporter_.IsDue(clocks_.steady())) Heartbeat(now_us);
+}
+
+void CertifierNode::WithdrawPlans(std::int64_t now_us) {
+  withdraws_more_ = false;
+  if (!is_in_charge()) return;
+  plans_.Judge(*gate_, now_us);
+  for (int i = 0; i < kAtOnce && plans_.withdraws(); ++i) {
+    const auto due = plans_.TakeDue(clocks_.wall(), clocks_.steady());
+    if (!due) return;
+    sender_.Send(channels_.withdrawn, due->message);
+    if (due->is_repetition || due->message.cause == withdrawal_t::NOT_JUDGED) continue;
+    logging::Warn("plan {} is withdrawn, cause {}, {} of its controls stand: {}", due->message.plan_id,
+                  WithdrawalName(due->message.cause), due->message.valid_steps, GetText(due->message.message));
+  }
+  withdraws_more_ = plans_.withdraws();
 }
 
 void CertifierNode::AnswerWaiting() {
@@ -354,6 +382,9 @@ GateAnswer CertifierNode::Decide(Bytes candidate) {
     return gate_->Refuse(candidate, now, decision_t::CAUSE_PAIRWISE,
                          "a transition that was seen before contradicts the declaration; another has to be declared",
                          decision_t::ABSTAIN_FALSIFIED);
+  if (plans_.IsFull())
+    return gate_->Refuse(candidate, now, decision_t::CAUSE_QUEUE_FULL,
+                         "so many certified plans may be executed that another could not be withdrawn");
   const std::int64_t before = PageFaults();
   GateAnswer answer = gate_->Decide(candidate, clocks_.wall);
   reporter_.CountPageFaults(PageFaults() - before);
@@ -373,6 +404,7 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
   if (answer.certified) {
     conformance_.Remember(*answer.certified);
     issued_.Add(*answer.certified, clocks_.steady());
+    plans_.Add(*answer.certified, clocks_.steady());
   }
   reporter_.CountDecision(elapsed.count());
 }
@@ -401,6 +433,7 @@ void CertifierNode::TakeReload() {
   config_ = std::move(loaded->config);
   watch_.Follow(OptionsOf(gate_->options()));
   issued_.Follow(gate_->options());
+  plans_.Follow(gate_->options());
   contradictions_.Follow(config_);
   LookForObstacles(clocks_.wall());
 }

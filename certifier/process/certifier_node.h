@@ -6,6 +6,7 @@ The node wires the classes that each answer one question; how they work is said 
     watch.h             whether anything may be certified now, and which fault is latched
     fault_latch.h       the latched fault as a message, and what outlives the process (latch_file.h)
     contradictions.h    which declarations are known to be false
+    plans_in_force.h    which certified plans may be executed, and what of them is withdrawn
     charge.h            which of several certifiers on one bus decides
     task_reload.h       which task is in force
     status_reporter.h   what the heartbeat reports, and when
@@ -13,6 +14,10 @@ The node wires the classes that each answer one question; how they work is said 
 Every candidate is answered once. The newest is decided first. The others are answered before their deadline passes, and
 of more than `gate.queue` the oldest are rejected. Obstacles, the robot's state, executed transitions and commands take
 effect as they arrive.
+
+When obstacles, the task or the truth of the declaration change, the certified plans that may be executed are judged
+again before any waiting candidate. What no longer holds of them is sent on bus.channels.withdrawn until the robot
+answers.
 
 A fault is handed to the kernel, sent on bus.channels.fault, then written to the disk. It is sent again with every
 heartbeat, and every candidate is rejected, until a person sends a reset that is later than the fault. A candidate under
@@ -37,6 +42,7 @@ that the plan was handed to the bus before. */
 #include "certifier/gate/conformance.h"
 #include "certifier/gate/gate.h"
 #include "certifier/gate/issued_plans.h"
+#include "certifier/gate/plans_in_force.h"
 #include "certifier/gate/watch.h"
 #include "certifier/process/candidate_queue.h"
 #include "certifier/process/contradictions.h"
@@ -73,7 +79,7 @@ class CertifierNode final : public Node {
   ~CertifierNode() override;
 
   void Tick(std::int64_t now_us) override;
-  [[nodiscard]] bool busy() const override { return !queue_.empty() && is_in_charge(); }
+  [[nodiscard]] bool busy() const override { return (!queue_.empty() || withdraws_more_) && is_in_charge(); }
   void Reload() override;
   /** Answers what waits still, and prints the counts as one line of JSON on standard output. */
   void Stop() override;
@@ -99,9 +105,11 @@ class CertifierNode final : public Node {
   void OnObstacles(const Received& received);
   void OnRobotState(const Received& received);
   void OnTransition(const Received& received);
+  void OnEvent(const Received& received);
   void OnCommand(const Received& received);
   void Obey(const command_t& command, std::int64_t now_us);
 
+  void WithdrawPlans(std::int64_t now_us);
   void AnswerWaiting();
   void AnswerDue();
   [[nodiscard]] GateAnswer Decide(Bytes candidate);
@@ -130,6 +138,8 @@ class CertifierNode final : public Node {
   std::optional<Watch::Fault> fault_of_other_;  // of the one in charge, by its last heartbeat
   Conformance conformance_;
   IssuedPlans issued_;
+  PlansInForce plans_;
+  bool withdraws_more_ = false;  // than one tick sends
 
   CandidateQueue queue_;
   robot_state_t last_state_{};

@@ -43,12 +43,13 @@ int main(int argc, char** argv) {
   Supervisor supervisor({.guard = {.num_states = 4, .num_inputs = 2, .step_us = 150'000}}, robot);
   using Handler = void (*)(const ReceiveBuffer*, const std::string&, Supervisor*);
   const Handler certified = [](auto* m, auto&, auto* to) { to->OnCertified(BytesOf(m), Now()); };
+  const Handler withdrawn = [](auto* m, auto&, auto* to) { to->OnWithdrawn(BytesOf(m), Now()); };
   const Handler fault = [](auto* m, auto&, auto* to) { to->OnFault(BytesOf(m), Now()); };
   const Handler command = [](auto* m, auto&, auto* to) {
     if (const std::string why = to->OnCommand(BytesOf(m), Now()); !why.empty()) std::cerr << why << '\n';
   };
   for (const auto& [channel, handler] :
-       {std::pair("PLAN_CERTIFIED", certified), {"FAULT", fault}, {"COMMAND", command}})
+       {std::pair("PLAN_CERTIFIED", certified), {"PLAN_WITHDRAWN", withdrawn}, {"FAULT", fault}, {"COMMAND", command}})
     lcm.subscribeFunction(channel, handler, &supervisor);
   std::int64_t boundary = Now();
   for (int left = argc > 2 ? std::stoi(argv[2]) : -1; left != 0; --left, boundary += 150'000) {

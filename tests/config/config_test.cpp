@@ -82,7 +82,7 @@ TEST(LoadConfig, ReadsEveryOption) {
       "bus:\n"
       "  url: memq://\n"
       "  channels: {candidate: A, decision: B, certified: C, robot_state: D, obstacles: E, transition: F, status: G, "
-      "event: H, logger_status: I, fault: J, command: K}\n"
+      "event: H, logger_status: I, fault: J, command: K, withdrawn: L}\n"
       "planner: {source: policy, policy: p/own.json, algorithm: rrt, goal: [1, 2], goal_radius: 3, clearance: 4,\n"
       "  clearance_step: 5, progress_steps: 6,\n"
       "  tail_steps: 7, lead_steps: 8, candidates: 9, cruise_speed: 10, braking: 11, time_limit_ms: 12, seed: 13,\n"
@@ -100,8 +100,8 @@ TEST(LoadConfig, ReadsEveryOption) {
   const BusOptions& bus = config.bus;
   EXPECT_EQ(bus.url, "memq://");
   EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
-                bus.status + bus.event + bus.logger_status + bus.fault + bus.command,
-            "ABCDEFGHIJK");
+                bus.status + bus.event + bus.logger_status + bus.fault + bus.command + bus.withdrawn,
+            "ABCDEFGHIJKL");
   const PlannerOptions& planner = config.planner;
   EXPECT_EQ(planner.source, "policy");
   EXPECT_EQ(planner.policy, files.directory() / "p/own.json");

@@ -21,6 +21,7 @@
 #include "forereach/obstacles_v2_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 
 namespace forereach {
 namespace {
@@ -47,6 +48,7 @@ const std::map<std::string, Contract> kContracts = {
     {"certifier_status_v3_t", {0xf224554c7bae02b5, 1220}},
     {"obstacle_v2_t", {0xbbad85e96469971b, 488}},
     {"obstacles_v2_t", {0xc1a2a66356f23f34, 30746}},
+    {"withdrawal_t", {0x143744ac67af3ba6, 482}},
 };
 
 template <class Message>
@@ -66,7 +68,7 @@ class MessageTest : public testing::Test {
 
 using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_v2_t, certifier_status_v3_t,
                                 command_t, decision_t, execution_event_t, fault_t, logger_status_t, obstacle_t,
-                                obstacle_v2_t, obstacles_t, obstacles_v2_t, robot_state_t, transition_t>;
+                                obstacle_v2_t, obstacles_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {

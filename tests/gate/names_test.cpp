@@ -70,6 +70,8 @@ TEST(NamesTest, EveryCauseHasItsName) { ExpectNamed(OutcomesAndCauses().second, 
 
 TEST(NamesTest, EveryFaultHasItsName) { ExpectNamed(ConstantsOf("fault_t"), FaultName); }
 
+TEST(NamesTest, EveryWithdrawalHasItsName) { ExpectNamed(ConstantsOf("withdrawal_t"), WithdrawalName); }
+
 TEST(NamesTest, EveryFaultHasAnAdvice) {
   for (const auto& [name, number] : ConstantsOf("fault_t")) {
     const std::string advice(FaultAdvice(static_cast<std::int16_t>(number)));
@@ -164,7 +166,16 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                          {"CONTACT", 9},
                                                          {"HALTED", 10},
                                                          {"RESET", 11},
+                                                         {"WITHDRAWN", 12},
+                                                         {"EMERGENCY_STOP", 13},
                                                          {"OFF_SCHEDULE", 14}}));
+  EXPECT_EQ(ConstantsOf("withdrawal_t"), (Constants{{"FALSIFIED", 1},
+                                                    {"DOMAIN_EXIT", 2},
+                                                    {"NO_FINITE_ENCLOSURE", 3},
+                                                    {"OBSTACLE", 4},
+                                                    {"NO_STOP", 5},
+                                                    {"NOT_JUDGED", 6},
+                                                    {"UNKNOWN_PLAN", 7}}));
   EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},

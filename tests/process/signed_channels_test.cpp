@@ -22,6 +22,7 @@
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 #include "logger/logger_node.h"
 #include "planner_bridge/planner_node.h"
 #include "robot/sim_node.h"
@@ -132,17 +133,13 @@ class SignedChannelsTest : public testing::TestWithParam<std::string> {
   Listener listener_;
 };
 
-const std::map<std::string, Role> kSpeakers{{"PLAN_CANDIDATE", Role::kPlanner},
-                                            {"PLAN_DECISION", Role::kCertifier},
-                                            {"PLAN_CERTIFIED", Role::kCertifier},
-                                            {"ROBOT_STATE", Role::kRobot},
-                                            {"OBSTACLES", Role::kPerception},
-                                            {"TRANSITION", Role::kRobot},
-                                            {"CERTIFIER_STATUS", Role::kCertifier},
-                                            {"EXECUTION_EVENT", Role::kRobot},
-                                            {"LOGGER_STATUS", Role::kLogger},
-                                            {"FAULT", Role::kCertifier},
-                                            {"COMMAND", Role::kOperator}};
+const std::map<std::string, Role> kSpeakers{
+    {"PLAN_CANDIDATE", Role::kPlanner},   {"PLAN_DECISION", Role::kCertifier},
+    {"PLAN_CERTIFIED", Role::kCertifier}, {"PLAN_WITHDRAWN", Role::kCertifier},
+    {"ROBOT_STATE", Role::kRobot},        {"OBSTACLES", Role::kPerception},
+    {"TRANSITION", Role::kRobot},         {"CERTIFIER_STATUS", Role::kCertifier},
+    {"EXECUTION_EVENT", Role::kRobot},    {"LOGGER_STATUS", Role::kLogger},
+    {"FAULT", Role::kCertifier},          {"COMMAND", Role::kOperator}};
 
 Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
   if (channel == "PLAN_CANDIDATE")
@@ -197,6 +194,12 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
       certified_plan_t certified{};
       certified.plan.plan_id = certified.sequence = number;
       return Encode(certified);
+    });
+  if (channel == "PLAN_WITHDRAWN")
+    return Robot([](int number) {
+      withdrawal_t withdrawal{};
+      withdrawal.plan_id = withdrawal.sequence = number;
+      return Encode(withdrawal);
     });
   if (channel == "FAULT" || channel == "COMMAND")
     return Robot([channel](int number) {

@@ -1,0 +1,376 @@
+// Certified plans that are judged again: how many controls stand, and when withdrawals are sent.
+#include "certifier/gate/plans_in_force.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/gate/obstacle_message.h"
+#include "forereach/transition_t.hpp"
+#include "tests/gate/small_task.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr int kSteps = 10;  // of Candidate
+
+class PlansInForceTest : public testing::Test {
+ protected:
+  PlansInForceTest() {
+    EXPECT_EQ(See({}), "");
+    plans_.Judge(gate_, now_);
+  }
+
+  std::string See(const std::vector<Obstacle>& obstacles) {
+    obstacles_t message = ToMessage(obstacles);
+    message.utime = now_;
+    message.sequence = sequence_++;
+    return gate_.UpdateObstacles(Encode(message), now_);
+  }
+  // Unsafe where px >= offset.
+  void SeeWall(double offset) {
+    EXPECT_EQ(See({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), offset)}), "");
+    plans_.Judge(gate_, now_);
+  }
+  certified_plan_t Certify(std::int64_t plan_id) {
+    const GateAnswer answer = gate_.Decide(Encode(Candidate(plan_id, kAccelerationThatCertifies, now_)), now_);
+    EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
+    plans_.Add(answer.certified.value(), now_);
+    return *answer.certified;
+  }
+  void SeeRobot(std::int64_t plan_id, int step) {
+    robot_state_t state{};
+    state.utime = now_;
+    state.sequence = states_++;
+    state.executing_plan_id = plan_id;
+    state.executing_step = static_cast<std::int16_t>(step);
+    state.mode = plan_id < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
+    plans_.SeeRobot(state, now_);
+  }
+  void Answer(std::int64_t plan_id, int step, double value) {
+    execution_event_t event{};
+    event.kind = execution_event_t::WITHDRAWN;
+    event.plan_id = plan_id;
+    event.step = static_cast<std::int16_t>(step);
+    event.value = value;
+    plans_.TakeAnswer(event);
+  }
+  std::optional<withdrawal_t> Due() {
+    const auto due = plans_.TakeDue(now_, now_);
+    return due ? std::optional(due->message) : std::nullopt;
+  }
+  // The greatest px of slice t of the plan, by its certificate.
+  static double Reach(const certified_plan_t& certified, int t) { return certified.slice_upper[t][0]; }
+
+  std::int64_t now_ = kNow, sequence_ = 0, states_ = 0;
+  Config config_ = SmallTaskOnTheBus();
+  Gate gate_{config_};
+  PlansInForce plans_{config_.gate};
+};
+
+TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt) {
+  for (int t = 1; t <= kSteps; ++t) {
+    const certified_plan_t plan = Certify(t);
+    // 1e-9: the separation's own rounding
+    SeeWall(Reach(plan, t) + 1e-9);
+    const auto just_outside = Due();
+    if (t == kSteps) {
+      EXPECT_FALSE(just_outside) << "it stays clear of it, so it stands";
+    } else {
+      ASSERT_TRUE(just_outside);
+      EXPECT_EQ(just_outside->step, t + 1);
+      EXPECT_EQ(just_outside->valid_steps, t);
+    }
+    SeeWall(Reach(plan, t) - 1e-9);
+    const auto just_inside = Due();
+    ASSERT_TRUE(just_inside);
+    EXPECT_EQ(just_inside->step, t);
+    EXPECT_EQ(just_inside->valid_steps, t - 1);
+    plans_.Clear();
+    See({});
+    plans_.Judge(gate_, now_);
+  }
+}
+
+// The motion under control t ends at sample t + 1, so the step that fails is the first control that does not stand.
+TEST_F(PlansInForceTest, BetweenTheSamplesTheStepThatMayTouchIsTheFirstToFall) {
+  Problem problem = *config_.problem;
+  problem.between = Between{Eigen::Vector2d(8, 8), 0, 0, 0.15};
+  config_.problem = std::make_shared<const Problem>(problem);
+  const double bulge = 8 * 0.15 * 0.15 / 8;
+  for (int t = 1; t <= kSteps; ++t) {
+    Gate gate(config_);
+    PlansInForce plans(config_.gate);
+    obstacles_t message = ToMessage({});
+    message.utime = now_;
+    const auto see = [&](double wall) {
+      message = ToMessage({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), wall)});
+      message.utime = now_;
+      message.sequence = sequence_++;
+      EXPECT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
+      plans.Judge(gate, now_);
+      const auto due = plans.TakeDue(now_, now_);
+      return due ? std::optional(due->message) : std::nullopt;
+    };
+    see(15);
+    const auto certified = gate.Decide(Encode(Candidate(t, kAccelerationThatCertifies, now_)), now_).certified;
+    ASSERT_TRUE(certified);
+    plans.Add(*certified, now_);
+    const auto outside = see(Reach(*certified, t) + bulge + 1e-9);
+    EXPECT_EQ(outside ? outside->valid_steps : kSteps, t);
+    const auto inside = see(Reach(*certified, t) + bulge - 1e-9);
+    ASSERT_TRUE(inside);
+    EXPECT_EQ(inside->step, t - 1);
+    EXPECT_EQ(inside->valid_steps, t - 1);
+  }
+}
+
+TEST_F(PlansInForceTest, AWithdrawalNamesThePlanTheWitnessAndWhatItRestsOn) {
+  const certified_plan_t plan = Certify(3);
+  now_ += 1000;
+  SeeWall(Reach(plan, 6) - 1e-9);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.utime, now_);
+  EXPECT_EQ(message.sequence, 0);
+  EXPECT_EQ(message.plan_id, 3);
+  EXPECT_EQ(GetText(message.source), "test");
+  EXPECT_EQ(message.expires_utime, plan.expires_utime);
+  EXPECT_EQ(message.cause, withdrawal_t::OBSTACLE);
+  EXPECT_EQ(message.first_step, 0);
+  EXPECT_EQ(message.obstacle, 1) << "after that of the task";
+  EXPECT_LE(message.margin, message.threshold);
+  EXPECT_EQ(GetDigest(message.plan_digest), GetDigest(plan.plan_digest));
+  EXPECT_EQ(GetDigest(message.certificate_digest), GetDigest(plan.certificate_digest));
+  EXPECT_EQ(GroundsOf(message), gate_.grounds());
+  EXPECT_NE(GroundsOf(message).obstacles, GroundsOf(plan).obstacles);
+  EXPECT_THAT(GetText(message.message), HasSubstr("the first 5 controls stand; now abstain S: at step 6"));
+  EXPECT_EQ(plans_.withdrawals(), 1);
+}
+
+TEST_F(PlansInForceTest, WhatIsPastIsNotJudged) {
+  const Obstacle behind = Obstacle::Circle(Eigen::Vector2d(0.15 * 3, 0.03), 0.01);
+  Certify(1);
+  SeeRobot(1, 6);
+  See({behind});
+  plans_.Judge(gate_, now_);
+  EXPECT_FALSE(Due());
+  plans_.Clear();
+  See({});
+  plans_.Judge(gate_, now_);
+  Certify(2);
+  SeeRobot(2, 3);
+  See({behind});
+  plans_.Judge(gate_, now_);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.first_step, 3);
+  EXPECT_EQ(message.step, 3) << "the robot may be there";
+  EXPECT_EQ(message.valid_steps, 2);
+}
+
+TEST_F(PlansInForceTest, IsRepeatedUntilItIsAnswered) {
+  Certify(1);
+  SeeWall(1);
+  const withdrawal_t first = Due().value();
+  EXPECT_FALSE(Due());
+  now_ += PlansInForce::kRepeatUs - 1;
+  EXPECT_FALSE(Due());
+  now_ += 1;
+  const withdrawal_t second = Due().value();
+  EXPECT_EQ(second.sequence, first.sequence + 1);
+  EXPECT_EQ(second.valid_steps, first.valid_steps);
+  EXPECT_EQ(plans_.withdrawals(), 1);
+  now_ += PlansInForce::kRepeatUs;
+  Answer(2, 0, 0);                      // another plan's
+  Answer(1, first.valid_steps + 1, 0);  // the guard lets more stand
+  Answer(1, first.valid_steps, -1);     // an answer to an earlier withdrawal
+  Answer(1, first.valid_steps, 2);      // to none that was sent
+  Answer(1, first.valid_steps, std::nan(""));
+  EXPECT_TRUE(Due());
+  Answer(1, first.valid_steps, 1);
+  now_ += PlansInForce::kRepeatUs;
+  EXPECT_FALSE(Due());
+}
+
+TEST_F(PlansInForceTest, NothingStandsAgainAndLessIsSaidAnew) {
+  const certified_plan_t plan = Certify(1);
+  SeeWall(Reach(plan, 6) - 1e-9);
+  EXPECT_EQ(Due()->valid_steps, 5);
+  Answer(1, 5, 0);
+  SeeWall(15);  // the wall was none
+  EXPECT_FALSE(Due());
+  SeeWall(Reach(plan, 8) - 1e-9);
+  EXPECT_FALSE(Due());
+  SeeWall(Reach(plan, 4) - 1e-9);
+  const withdrawal_t less = Due().value();
+  EXPECT_EQ(less.valid_steps, 3);
+  Answer(1, 3, 0);  // the late answer to the first
+  now_ += PlansInForce::kRepeatUs;
+  EXPECT_TRUE(Due());
+}
+
+TEST_F(PlansInForceTest, WithoutAChangeNothingIsJudged) {
+  const certified_plan_t plan = Certify(1);
+  See({});
+  plans_.Judge(gate_, now_);
+  EXPECT_FALSE(Due());
+  SeeWall(Reach(plan, kSteps) + 0.5);
+  EXPECT_FALSE(Due()) << "a plan that stays valid gets no message";
+}
+
+TEST_F(PlansInForceTest, APlanThatCannotBeExecutedAnyMoreIsForgotten) {
+  Certify(1);
+  Certify(2);
+  EXPECT_EQ(plans_.size(), 2u);
+  SeeRobot(1, 0);
+  EXPECT_EQ(plans_.size(), 2u);
+  SeeRobot(2, 0);
+  EXPECT_EQ(plans_.size(), 1u) << "the guard has left plan 1";
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 0u);
+  Certify(3);
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 1u) << "it may be pending";
+  now_ += 60'000'000;
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 0u) << "it has expired";
+}
+
+TEST_F(PlansInForceTest, ALateStateChangesNothing) {
+  Certify(1);
+  states_ = 5;
+  SeeRobot(1, 4);
+  states_ = 3;
+  SeeRobot(-1, -1);
+  EXPECT_EQ(plans_.size(), 1u);
+}
+
+TEST_F(PlansInForceTest, AWithdrawalIsNotSentAfterThePlansEnd) {
+  Certify(1);
+  SeeWall(1);
+  EXPECT_TRUE(Due());
+  now_ += 60'000'000;
+  EXPECT_FALSE(Due());
+}
+
+TEST_F(PlansInForceTest, OfManyPendingPlansTheNewestAreJudgedAndTheOthersWithdrawnWhole) {
+  const int many = static_cast<int>(PlansInForce::kJudged) + 1;
+  for (int id = 1; id <= many; ++id) Certify(id);
+  SeeWall(15);  // none of them comes near
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.plan_id, 1);
+  EXPECT_EQ(message.cause, withdrawal_t::NOT_JUDGED);
+  EXPECT_EQ(message.valid_steps, 0);
+  EXPECT_FALSE(Due());
+}
+
+TEST_F(PlansInForceTest, TheExecutingPlanIsJudgedHoweverManyArePending) {
+  Certify(1);
+  SeeRobot(1, 0);
+  for (int id = 2; id <= static_cast<int>(PlansInForce::kJudged) + 1; ++id) Certify(id);
+  SeeWall(15);
+  EXPECT_FALSE(Due());
+}
+
+TEST_F(PlansInForceTest, AFalsifiedDeclarationLeavesNothing) {
+  config_.gate.learns = true;
+  Certify(1);
+  SeeRobot(1, 2);
+  transition_t transition{};
+  transition.utime = now_;
+  transition.num_states = 4;
+  transition.num_inputs = 2;
+  transition.next_state[2] = 1;  // from rest, without a control
+  EXPECT_EQ(gate_.Learn(Encode(transition)), "");
+  ASSERT_TRUE(gate_.certifier().violation());
+  plans_.Judge(gate_, now_);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.cause, withdrawal_t::FALSIFIED);
+  EXPECT_EQ(message.valid_steps, 0);
+}
+
+TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
+  const certified_plan_t plan = Certify(1);
+  Config narrower = config_;
+  Problem problem = *config_.problem;
+  Eigen::VectorXd upper = problem.domain.state.upper();
+  upper(0) = Reach(plan, 8) - 1e-9;
+  problem.domain.state = Box(problem.domain.state.lower(), upper);
+  narrower.problem = std::make_shared<const Problem>(problem);
+  narrower.grounds.config = DigestOf("narrower");
+  Gate gate(narrower);
+  gate.Inherit(gate_);
+  plans_.Judge(gate, now_);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.cause, withdrawal_t::DOMAIN_EXIT);
+  EXPECT_EQ(message.step, 8) << "control 8 may begin outside the domain";
+  EXPECT_EQ(message.valid_steps, 8);
+}
+
+TEST_F(PlansInForceTest, AnObstacleBeforeTheStepThatLeavesTheDomainCounts) {
+  const certified_plan_t plan = Certify(1);
+  Config narrower = config_;
+  Problem problem = *config_.problem;
+  Eigen::VectorXd upper = problem.domain.state.upper();
+  upper(0) = Reach(plan, 8) - 1e-9;
+  problem.domain.state = Box(problem.domain.state.lower(), upper);
+  narrower.problem = std::make_shared<const Problem>(problem);
+  narrower.obstacles.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, 4) - 1e-9));
+  narrower.grounds.config = DigestOf("narrower");
+  Gate gate(narrower);
+  gate.Inherit(gate_);
+  plans_.Judge(gate, now_);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.cause, withdrawal_t::OBSTACLE);
+  EXPECT_EQ(message.valid_steps, 3);
+}
+
+TEST_F(PlansInForceTest, AnEndThatIsNotAtRestKeepsItsControls) {
+  Certify(1);
+  Config resting = config_;
+  Problem problem = *config_.problem;
+  problem.rest = {{2, 0.1}};  // it ends at 1 m/s
+  resting.problem = std::make_shared<const Problem>(problem);
+  resting.grounds.config = DigestOf("resting");
+  Gate gate(resting);
+  gate.Inherit(gate_);
+  plans_.Judge(gate, now_);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.cause, withdrawal_t::NO_STOP);
+  EXPECT_EQ(message.valid_steps, kSteps);
+}
+
+TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfterEachChange) {
+  Gate restarted(config_);
+  const auto judge = [&] { plans_.Judge(restarted, now_); };
+  judge();
+  SeeRobot(77, 4);
+  judge();
+  EXPECT_FALSE(Due()) << "the obstacles are not known yet";
+  obstacles_t message = ToMessage({});
+  message.utime = now_;
+  message.sequence = 1;
+  ASSERT_EQ(restarted.UpdateObstacles(Encode(message), now_), "");
+  judge();
+  const withdrawal_t withdrawal = Due().value();
+  EXPECT_EQ(withdrawal.plan_id, 77);
+  EXPECT_EQ(withdrawal.cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_EQ(GetDigest(withdrawal.certificate_digest), Digest{});
+  EXPECT_EQ(GroundsOf(withdrawal), restarted.grounds());
+  Answer(77, 20, 0);  // it stands: the guard found equal grounds
+  now_ += PlansInForce::kRepeatUs;
+  EXPECT_FALSE(Due());
+  message = ToMessage({Obstacle::Circle(Eigen::Vector2d(9, 9), 1)});
+  message.utime = now_;
+  message.sequence = 2;
+  ASSERT_EQ(restarted.UpdateObstacles(Encode(message), now_), "");
+  judge();
+  EXPECT_EQ(Due()->plan_id, 77);
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,293 @@
+// The certifier's node and the simulated robot on one bus and a simulated clock: a wall appears while the robot drives.
+#include <cstring>
+#include <functional>
+#include <map>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/gate/obstacle_message.h"
+#include "certifier/process/certifier_node.h"
+#include "forereach/transition_t.hpp"
+#include "forereach/withdrawal_t.hpp"
+#include "robot/sim_node.h"
+#include "tests/gate/small_task.h"
+
+namespace forereach {
+namespace {
+
+using testing::Contains;
+using testing::Not;
+
+constexpr std::int64_t kStepUs = 150'000;
+constexpr int kSteps = 34, kProgress = 24;
+
+// Loses messages as a test wants it.
+class LossyBus final : public Bus {
+ public:
+  using Bus::Publish;
+  explicit LossyBus(Bus& bus) : bus_(bus) {}
+  void Subscribe(const std::string& channel, Handler handler) override { bus_.Subscribe(channel, std::move(handler)); }
+  bool Publish(const std::string& channel, Bytes bytes) override {
+    if (const auto lost = to_lose.find(channel); lost != to_lose.end() && lost->second > 0) return --lost->second, true;
+    return bus_.Publish(channel, bytes);
+  }
+  int Dispatch(int timeout_ms) override { return bus_.Dispatch(timeout_ms); }
+  std::int64_t dropped() const override { return 0; }
+
+  std::map<std::string, int> to_lose;  // the next so many, by channel
+
+ private:
+  Bus& bus_;
+};
+
+Config Task() {
+  Config config = SmallTaskOnTheBus();
+  config.obstacles.clear();
+  config.grounds = GroundsOf(DigestOf(std::string_view("drive")), *config.problem, config.obstacles);
+  config.gate.needs_robot_state = true;
+  config.robot.start = {0, 0, 1, 0};
+  config.robot.step_period_ms = kStepUs / 1e3;
+  return config;
+}
+
+class WithdrawnDriveTest : public testing::Test {
+ protected:
+  WithdrawnDriveTest() {
+    const auto keep = [this](const std::string& channel, auto& messages) {
+      bus_->Subscribe(channel, [&messages](const Received& r) {
+        using Message = typename std::remove_reference_t<decltype(messages)>::value_type;
+        messages.push_back(Decoded<Message>(r.bytes).value());
+      });
+    };
+    keep("PLAN_WITHDRAWN", withdrawn_);
+    keep("PLAN_CERTIFIED", certified_);
+    keep("PLAN_DECISION", decisions_);
+    keep("EXECUTION_EVENT", events_);
+    keep("ROBOT_STATE", states_);
+    keep("FAULT", faults_);
+  }
+
+  void Begin() { certifier_ = std::make_unique<CertifierNode>(config_, lossy_, Clocks{clock_, clock_}); }
+
+  void SendObstacles() {
+    obstacles_t message = ToMessage(obstacles_);
+    message.utime = now_;
+    message.sequence = sequence_++;
+    bus_->Publish("OBSTACLES", message);
+  }
+  void RunFor(std::int64_t us) {
+    for (const std::int64_t end = now_ + us; now_ < end; now_ += 2000) {
+      if (now_ >= next_obstacles_) {
+        next_obstacles_ = now_ + 100'000;
+        SendObstacles();
+      }
+      robot_.Tick(now_);
+      bus_->Dispatch(0);
+      if (certifier_) certifier_->Tick(now_);
+      bus_->Dispatch(0);
+    }
+  }
+  // 1 m/s, then ten steps to rest. From `state` at a step boundary.
+  candidate_plan_t Plan(std::int64_t plan_id, std::int64_t start_utime, const double (&state)[4], int progress) const {
+    candidate_plan_t plan = Candidate(plan_id, 0, now_);
+    plan.sequence = plan_id;
+    plan.start_utime = start_utime;
+    plan.progress_steps = static_cast<std::int16_t>(progress);
+    plan.num_steps = static_cast<std::int16_t>(progress + kSteps - kProgress);
+    std::memcpy(plan.initial_center, state, sizeof state);
+    for (int k = 0; k < 4; ++k) plan.initial_half_width[k] = 0.01;
+    for (int t = progress; t < plan.num_steps; ++t) plan.control[t][0] = -1 / (0.15 * (kSteps - kProgress));
+    return plan;
+  }
+  // The robot drives its plan 1 since step 0.
+  void Drive() {
+    Begin();
+    RunFor(20'000);
+    const std::int64_t first = states_.front().utime;
+    bus_->Publish("PLAN_CANDIDATE", Plan(1, first + 3 * kStepUs, {0, 0, 1, 0}, kProgress));
+    while (Step() < 0 && now_ < kNow + 2'000'000) RunFor(2000);
+    ASSERT_EQ(Step(), 0);
+  }
+  void SeeWall(double offset) {
+    obstacles_.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), offset));
+    SendObstacles();
+  }
+  int Step() const { return states_.empty() ? -1 : states_.back().executing_step; }
+  double Place() const { return robot_.state()[0]; }
+  std::vector<int> Kinds() const {
+    std::vector<int> kinds;
+    for (const execution_event_t& event : events_) kinds.push_back(event.kind);
+    return kinds;
+  }
+  // The first slice that reaches the wall.
+  int FirstTouch(double offset) const {
+    int t = 0;
+    while (certified_.at(0).slice_upper[t][0] < offset) ++t;
+    return t;
+  }
+
+  std::int64_t now_ = kNow, sequence_ = 0, next_obstacles_ = kNow;
+  const Clock clock_ = [this] { return now_; };
+  Config config_ = Task();
+  std::vector<Obstacle> obstacles_;
+  std::unique_ptr<Bus> bus_ = OpenBus("memq://", clock_);
+  LossyBus lossy_{*bus_};
+  std::ostringstream out_;
+  RobotSimNode robot_{config_, *bus_, out_};
+  std::unique_ptr<CertifierNode> certifier_;
+  std::vector<withdrawal_t> withdrawn_;
+  std::vector<certified_plan_t> certified_;
+  std::vector<decision_t> decisions_;
+  std::vector<execution_event_t> events_;
+  std::vector<robot_state_t> states_;
+  std::vector<fault_t> faults_;
+};
+
+TEST_F(WithdrawnDriveTest, AWallThatAppearsOnTheWayStopsTheRobotBeforeIt) {
+  Drive();
+  RunFor(200'000);
+  SeeWall(2);
+  RunFor(4'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u) << "answered at once";
+  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::OBSTACLE);
+  EXPECT_EQ(withdrawn_[0].first_step, 1);
+  EXPECT_EQ(withdrawn_[0].valid_steps, FirstTouch(2) - 1);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::WITHDRAWN).Times(1));
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::CONTACT)));
+  EXPECT_LT(Place(), 2);
+  EXPECT_GT(Place(), 2 - 0.15 - 0.15) << "it has used what stood";
+  EXPECT_EQ(states_.back().mode, robot_state_t::STANDING);
+  EXPECT_EQ(decisions_.size(), 1u) << "no second decision for a candidate";
+}
+
+TEST_F(WithdrawnDriveTest, AWallBehindTheEndOfThePlanWithdrawsNothing) {
+  Drive();
+  RunFor(200'000);
+  SeeWall(certified_.at(0).slice_upper[kSteps][0] + 0.01);
+  RunFor(6'000'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+}
+
+TEST_F(WithdrawnDriveTest, AWallInFrontOfTheRobotStopsItBeforeTheNextBoundary) {
+  Drive();
+  RunFor(200'000);
+  const int step = Step();
+  SeeWall(certified_.at(0).slice_upper[step + 1][0] - 0.001);
+  RunFor(4000);
+  EXPECT_EQ(withdrawn_.at(0).valid_steps, step);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP));
+  EXPECT_EQ(robot_.state()[2], 0);
+}
+
+TEST_F(WithdrawnDriveTest, LostWithdrawalsAreRepeated) {
+  Drive();
+  RunFor(200'000);
+  lossy_.to_lose["PLAN_WITHDRAWN"] = 3;
+  SeeWall(2);
+  RunFor(4'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  EXPECT_EQ(withdrawn_[0].sequence, 3);
+  EXPECT_LT(Place(), 2);
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::CONTACT)));
+}
+
+TEST_F(WithdrawnDriveTest, APlanThatHasNotBegunIsDropped) {
+  Begin();
+  RunFor(20'000);
+  bus_->Publish("PLAN_CANDIDATE", Plan(1, states_.front().utime + 8 * kStepUs, {0, 0, 1, 0}, kProgress));
+  RunFor(20'000);
+  ASSERT_EQ(certified_.size(), 1u);
+  SeeWall(2);
+  RunFor(3'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  EXPECT_EQ(Place(), 0);
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::STARTED)));
+}
+
+TEST_F(WithdrawnDriveTest, ANewerCertificateTakesOverWithinWhatStands) {
+  Drive();
+  RunFor(200'000);
+  SeeWall(2);
+  RunFor(10'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  const int handover = Step() + 2;
+  ASSERT_LT(handover, withdrawn_[0].valid_steps);
+  bus_->Publish("PLAN_CANDIDATE",
+                Plan(2, certified_[0].plan.start_utime + handover * kStepUs, {0.15 * handover, 0, 1, 0}, 0));
+  RunFor(4'000'000);
+  ASSERT_EQ(certified_.size(), 2u) << GetText(decisions_.back().message);
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
+  EXPECT_LT(Place(), 2);
+  EXPECT_EQ(withdrawn_.size(), 1u);
+}
+
+TEST_F(WithdrawnDriveTest, AFalsifiedDeclarationStopsTheRobotEvenIfItsFaultIsLost) {
+  Drive();
+  RunFor(200'000);
+  lossy_.to_lose["FAULT"] = 1000;
+  transition_t transition{};
+  transition.utime = now_;
+  transition.num_states = 4;
+  transition.num_inputs = 2;
+  transition.next_state[2] = 1;
+  bus_->Publish("TRANSITION", transition);
+  RunFor(10'000);
+  ASSERT_FALSE(withdrawn_.empty());
+  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::FALSIFIED);
+  EXPECT_EQ(withdrawn_[0].valid_steps, 0);
+  EXPECT_EQ(robot_.state()[2], 0);
+}
+
+// The certifier restarts while the robot executes what its predecessor certified.
+class RestartedCertifierTest : public WithdrawnDriveTest {
+ protected:
+  void Drive() {
+    Gate predecessor(config_);
+    obstacles_t message = ToMessage(obstacles_);
+    message.utime = now_;
+    ASSERT_EQ(predecessor.UpdateObstacles(Encode(message), now_), "");
+    RunFor(20'000);
+    const auto plan = Plan(1, states_.front().utime + 3 * kStepUs, {0, 0, 1, 0}, kProgress);
+    bus_->Publish("PLAN_CERTIFIED", predecessor.Decide(Encode(plan), now_).certified.value());
+    while (Step() < 0 && now_ < kNow + 2'000'000) RunFor(2000);
+    RunFor(200'000);
+  }
+};
+
+TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereNothingHasChanged) {
+  obstacles_ = {Obstacle::Circle(Eigen::Vector2d(3, 3), 0.5)};
+  Drive();
+  Begin();
+  RunFor(6'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+}
+
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereSomethingHasChangedMeanwhile) {
+  Drive();
+  obstacles_ = {Obstacle::Circle(Eigen::Vector2d(3, 3), 0.5)};
+  Begin();
+  RunFor(300'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP));
+}
+
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereSomethingChangesLater) {
+  Drive();
+  Begin();
+  RunFor(500'000);
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+  obstacles_ = {Obstacle::Circle(Eigen::Vector2d(3, 3), 0.5)};
+  RunFor(200'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP));
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,363 @@
+// Withdrawals at the guard and the supervisor: no withdrawn control is ever applied, and each message is answered.
+#include <array>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forereach/robot_state_t.hpp"
+#include "lcmtypes/grounds.h"
+#include "robot/supervisor.h"
+#include "tests/keys.h"
+#include "tests/robot/sealed_plan.h"
+
+namespace forereach {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using State = std::array<double, 2>;
+
+constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs, kNow = kStart - 3 * kStep;
+constexpr State kInside{1, -2};
+
+GuardOptions TwoStates() {
+  GuardOptions options{2, 1, kStep, {}, {}};
+  options.config_digest = DigestOf("config");
+  options.model_digest = DigestOf("model");
+  return options;
+}
+
+// Of a plan of SmallPlan's kind.
+withdrawal_t Withdrawal(const certified_plan_t& plan, int valid_steps, std::int16_t cause = withdrawal_t::OBSTACLE) {
+  certified_plan_t sealed = plan;
+  Seal(sealed);
+  withdrawal_t message{};
+  message.utime = kNow;
+  message.plan_id = plan.plan.plan_id;
+  message.expires_utime = plan.expires_utime;
+  message.cause = cause;
+  message.valid_steps = static_cast<std::int16_t>(valid_steps);
+  SetGrounds(message, GroundsOf(plan));
+  if (cause != withdrawal_t::UNKNOWN_PLAN) SetDigest(message.certificate_digest, GetDigest(sealed.certificate_digest));
+  return message;
+}
+
+class GuardWithdrawTest : public testing::Test {
+ protected:
+  void Accept(std::int64_t plan_id = 7) { EXPECT_TRUE(guard_.Accept(Sealed(SmallPlan(plan_id)), kNow).ok()); }
+  void Start(std::int64_t plan_id = 7) {
+    Accept(plan_id);
+    EXPECT_TRUE(guard_.TryStart(kStart, kStart, kInside).ok());
+  }
+  int Withdraw(int valid_steps, std::int64_t plan_id = 7) {
+    const GuardWithdrawal answer = guard_.Withdraw(Encode(Withdrawal(SmallPlan(plan_id), valid_steps)));
+    EXPECT_TRUE(answer.verdict.ok()) << answer.verdict.message;
+    return answer.standing_steps;
+  }
+
+  Guard guard_{TwoStates()};
+};
+
+TEST_F(GuardWithdrawTest, TheFirstWithdrawnControlIsNotGivenAndTheOneBeforeIs) {
+  Start();
+  EXPECT_EQ(guard_.standing_steps(), std::nullopt);
+  EXPECT_EQ(Withdraw(1), 1);
+  EXPECT_EQ(guard_.standing_steps(), 1);
+  EXPECT_EQ(guard_.control().size(), 1u) << "control 0 stands";
+  EXPECT_TRUE(guard_.Check(1, kInside, kStart + kStep).ok()) << "it was applied";
+  EXPECT_TRUE(guard_.control().empty());
+  EXPECT_EQ(guard_.Check(2, kInside, kStart + 2 * kStep).cause, GuardCause::kWithdrawn)
+      << "somebody has applied control 1";
+  EXPECT_EQ(guard_.executing(), nullptr);
+}
+
+TEST_F(GuardWithdrawTest, WithoutAWithdrawalEachControlIsGiven) {
+  Start();
+  for (int t = 0; t < 3; ++t) {
+    EXPECT_EQ(guard_.control().size(), 1u);
+    EXPECT_TRUE(guard_.Check(t + 1, kInside, kStart + (t + 1) * kStep).ok());
+  }
+  EXPECT_TRUE(guard_.control().empty());
+}
+
+TEST_F(GuardWithdrawTest, NoMessageExtendsWhatStands) {
+  Start();
+  EXPECT_EQ(Withdraw(2), 2);
+  EXPECT_EQ(Withdraw(3), 2);
+  EXPECT_EQ(Withdraw(1), 1);
+  EXPECT_EQ(Withdraw(2), 1);
+  EXPECT_EQ(Withdraw(-32768), 0);
+  EXPECT_TRUE(guard_.control().empty());
+}
+
+TEST_F(GuardWithdrawTest, MoreStepsThanThePlanHasAreAllOfThem) {
+  Start();
+  EXPECT_EQ(Withdraw(32767), 3);
+  EXPECT_EQ(guard_.standing_steps(), 3);
+}
+
+TEST_F(GuardWithdrawTest, APendingPlanIsDroppedHoweverManyStepsStand) {
+  for (const int valid : {0, 2, 3}) {
+    Accept(7 + valid);
+    EXPECT_EQ(Withdraw(valid, 7 + valid), 0);
+    EXPECT_EQ(guard_.pending(), nullptr);
+  }
+}
+
+TEST_F(GuardWithdrawTest, ItTakesNoOtherPlan) {
+  Start(7);
+  certified_plan_t next = SmallPlan(8);
+  next.plan.start_utime += 2 * kStep;
+  EXPECT_TRUE(guard_.Accept(Sealed(next), kNow).ok());
+  EXPECT_EQ(Withdraw(0, 6), 0);
+  EXPECT_EQ(guard_.standing_steps(), std::nullopt);
+  EXPECT_NE(guard_.pending(), nullptr);
+  certified_plan_t namesake = SmallPlan(7);  // of another source
+  namesake.plan.control[0][0] = 1;
+  EXPECT_TRUE(guard_.Withdraw(Encode(Withdrawal(namesake, 0))).verdict.ok());
+  EXPECT_EQ(guard_.standing_steps(), std::nullopt);
+}
+
+TEST_F(GuardWithdrawTest, AWithdrawalThatOvertakesItsPlanKeepsItOut) {
+  EXPECT_EQ(Withdraw(2), 0);
+  EXPECT_EQ(guard_.Accept(Sealed(SmallPlan(7)), kNow).cause, GuardCause::kReplayed);
+  EXPECT_EQ(guard_.Accept(Sealed(SmallPlan(6)), kNow).cause, GuardCause::kReplayed) << "ids count upwards";
+  Accept(8);
+}
+
+TEST_F(GuardWithdrawTest, ItCountsWhileHalted) {
+  guard_.Halt();
+  EXPECT_EQ(Withdraw(2), 0);
+  guard_.Reset();
+  EXPECT_EQ(guard_.Accept(Sealed(SmallPlan(7)), kNow).cause, GuardCause::kReplayed);
+}
+
+TEST_F(GuardWithdrawTest, ThePlanAfterItIsWhole) {
+  Start(7);
+  EXPECT_EQ(Withdraw(1), 1);
+  Start(8);
+  EXPECT_EQ(guard_.standing_steps(), std::nullopt);
+  EXPECT_EQ(guard_.control().size(), 1u);
+}
+
+TEST_F(GuardWithdrawTest, AnUnknownPlanStandsOnlyUnderTheGroundsOfItsCertificate) {
+  Start();
+  withdrawal_t unknown = Withdrawal(SmallPlan(), 0, withdrawal_t::UNKNOWN_PLAN);
+  SetDigest(unknown.observations_digest, DigestOf("more observations"));
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 3);
+  EXPECT_EQ(guard_.standing_steps(), std::nullopt);
+  const auto standing_after = [&](std::uint8_t(withdrawal_t::*digest)[32]) {
+    Guard guard(TwoStates());
+    EXPECT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok() && guard.TryStart(kStart, kStart, kInside).ok());
+    withdrawal_t changed = unknown;
+    SetDigest(changed.*digest, DigestOf("another"));
+    return guard.Withdraw(Encode(changed)).standing_steps;
+  };
+  EXPECT_EQ(standing_after(&withdrawal_t::config_digest), 0);
+  EXPECT_EQ(standing_after(&withdrawal_t::model_digest), 0);
+  EXPECT_EQ(standing_after(&withdrawal_t::declaration_digest), 0);
+  EXPECT_EQ(standing_after(&withdrawal_t::obstacles_digest), 0);
+  unknown.cause = withdrawal_t::FALSIFIED;
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 0) << "only an unknown plan may stand";
+}
+
+TEST_F(GuardWithdrawTest, BytesThatAreNoWithdrawalChangeNothing) {
+  Start();
+  std::vector<std::uint8_t> bytes = Encode(Withdrawal(SmallPlan(), 0));
+  bytes.push_back(0);
+  EXPECT_EQ(guard_.Withdraw(bytes).verdict.cause, GuardCause::kTrailingBytes);
+  bytes.resize(bytes.size() - 2);
+  EXPECT_EQ(guard_.Withdraw(bytes).verdict.cause, GuardCause::kWrongLength);
+  bytes[0] ^= 1;
+  EXPECT_EQ(guard_.Withdraw(bytes).verdict.cause, GuardCause::kUnknownFingerprint);
+  EXPECT_EQ(guard_.standing_steps(), std::nullopt);
+}
+
+TEST(GuardWithdrawKeys, OnlyTheCertifierWithdraws) {
+  GuardOptions options = TwoStates();
+  options.keys = TestKeys();
+  options.bus_name = "the bus";
+  Guard guard(options);
+  Signer signer(TestKeys(), "the bus"), stranger(TestKeys("stranger"), "the bus"), elsewhere(TestKeys(), "another bus");
+  ASSERT_TRUE(guard.Accept(signer.Sign(Role::kCertifier, "PLAN_CERTIFIED", Sealed(SmallPlan()), kNow), kNow).ok());
+  const auto message = Encode(Withdrawal(SmallPlan(), 0));
+  const auto cause = [&](Signer& who, Role role, const char* channel = "PLAN_WITHDRAWN") {
+    return guard.Withdraw(who.Sign(role, channel, message, kNow)).verdict.cause;
+  };
+  EXPECT_EQ(guard.Withdraw(message).verdict.cause, GuardCause::kUnsigned);
+  for (const Role role : kAllRoles)
+    if (role != Role::kCertifier) {
+      EXPECT_EQ(cause(signer, role), GuardCause::kForged) << RoleName(role);
+    }
+  EXPECT_EQ(cause(stranger, Role::kCertifier), GuardCause::kForged);
+  EXPECT_EQ(cause(signer, Role::kCertifier, "PLAN_CERTIFIED"), GuardCause::kForged);
+  EXPECT_EQ(cause(elsewhere, Role::kCertifier), GuardCause::kForeign);
+  ASSERT_NE(guard.pending(), nullptr) << "none of these counted";
+  const auto good = signer.Sign(Role::kCertifier, "PLAN_WITHDRAWN", message, kNow);
+  EXPECT_TRUE(guard.Withdraw(good).verdict.ok());
+  EXPECT_EQ(guard.pending(), nullptr);
+  EXPECT_EQ(guard.Withdraw(good).verdict.cause, GuardCause::kSignatureReplayed);
+}
+
+enum : std::int16_t {
+  kAccepted = execution_event_t::ACCEPTED,
+  kStarted = execution_event_t::STARTED,
+  kInsideSlice = execution_event_t::STEP_INSIDE,
+  kTailBegun = execution_event_t::TAIL_BEGUN,
+  kWithdrawn = execution_event_t::WITHDRAWN,
+  kStop = execution_event_t::EMERGENCY_STOP,
+};
+
+// A robot whose state is always inside. Boundary j lies at kStart + j * kStep.
+class SupervisorWithdrawTest : public testing::Test, protected Supervisor::Robot {
+ protected:
+  std::span<const double> state() const override { return kInside; }
+  void Hold() override { ++holds_; }
+  void Reload() override {}
+  void Send(const std::string& channel, Bytes message) override {
+    if (channel == "EXECUTION_EVENT") events_.push_back(*Decoded<execution_event_t>(message));
+    if (channel == "ROBOT_STATE") last_state_ = *Decoded<robot_state_t>(message);
+  }
+
+  void Make(int emergency_stop_steps = 0) {
+    SupervisorOptions options;
+    options.guard = TwoStates();
+    options.emergency_stop_steps = emergency_stop_steps;
+    Supervisor::Robot& robot = *this;
+    supervisor_.emplace(options, robot);
+  }
+  static std::int64_t At(int boundary) { return kStart + boundary * kStep; }
+  static certified_plan_t PlanFrom(int boundary, std::int64_t plan_id) {
+    certified_plan_t plan = SmallPlan(plan_id);
+    plan.plan.start_utime = At(boundary);
+    plan.expires_utime = At(boundary + 1);
+    return plan;
+  }
+  void Accept(const certified_plan_t& plan) { supervisor_->OnCertified(Sealed(plan), kNow); }
+  void Withdraw(const certified_plan_t& plan, int valid_steps, std::int64_t sequence = 4) {
+    withdrawal_t message = Withdrawal(plan, valid_steps);
+    message.sequence = sequence;
+    SetText(message.message, "a wall");
+    supervisor_->OnWithdrawn(Encode(message), kNow);
+  }
+  // Whether a control is applied.
+  bool Boundary(int j) { return !supervisor_->Boundary(At(j), At(j)).empty(); }
+  std::vector<std::int16_t> Events() const {
+    std::vector<std::int16_t> kinds;
+    for (const execution_event_t& event : events_) kinds.push_back(event.kind);
+    return kinds;
+  }
+
+  int holds_ = 0;
+  std::vector<execution_event_t> events_;
+  robot_state_t last_state_{};
+  std::optional<Supervisor> supervisor_;
+};
+
+TEST_F(SupervisorWithdrawTest, GoesOnWithinWhatStandsThenStopsWithoutACertificate) {
+  Make();
+  Accept(PlanFrom(0, 7));
+  EXPECT_TRUE(Boundary(0));
+  Withdraw(PlanFrom(0, 7), 2);
+  EXPECT_EQ(holds_, 0) << "control 0 stands, and control 1";
+  EXPECT_TRUE(Boundary(1));
+  EXPECT_FALSE(Boundary(2));
+  EXPECT_EQ(holds_, 1);
+  EXPECT_THAT(Events(), ElementsAre(kAccepted, kStarted, kWithdrawn, kInsideSlice, kTailBegun, kInsideSlice, kStop));
+  EXPECT_EQ(events_[2].plan_id, 7);
+  EXPECT_EQ(events_[2].step, 2);
+  EXPECT_EQ(events_[2].value, 4) << "the withdrawal's sequence";
+  EXPECT_EQ(GetText(events_[2].message), "a wall");
+  EXPECT_EQ(events_[6].step, 2);
+  EXPECT_THAT(GetText(events_[6].message), HasSubstr("not certified"));
+  EXPECT_EQ(last_state_.mode, robot_state_t::STANDING);
+  EXPECT_EQ(supervisor_->counts().emergency_stops, 1);
+  EXPECT_FALSE(supervisor_->halted()) << "no assumption was false";
+  Accept(PlanFrom(4, 8));
+  EXPECT_TRUE(Boundary(4));
+}
+
+TEST_F(SupervisorWithdrawTest, AControlThatIsBeingAppliedIsStoppedAtOnce) {
+  for (const int valid : {1, 0}) {
+    Make();
+    const int holds_before = holds_;
+    Accept(PlanFrom(0, 7));
+    EXPECT_TRUE(Boundary(0));
+    Withdraw(PlanFrom(0, 7), valid);
+    EXPECT_EQ(holds_ - holds_before, valid == 0) << valid;
+    EXPECT_EQ(supervisor_->control().empty(), valid == 0);
+    EXPECT_FALSE(Boundary(1));
+    EXPECT_EQ(holds_ - holds_before, 1);
+  }
+}
+
+TEST_F(SupervisorWithdrawTest, EachMessageIsAnswered) {
+  Make();
+  Accept(PlanFrom(0, 7));
+  Withdraw(PlanFrom(0, 7), 2, 11);
+  Withdraw(PlanFrom(0, 7), 2, 12);
+  Withdraw(PlanFrom(0, 99), 1, 13);
+  EXPECT_THAT(Events(), ElementsAre(kAccepted, kWithdrawn, kWithdrawn, kWithdrawn));
+  EXPECT_EQ(events_[2].value, 12);
+  EXPECT_EQ(events_[2].step, 0) << "it had not begun, so it is dropped";
+  EXPECT_EQ(events_[3].plan_id, 99);
+  EXPECT_FALSE(Boundary(0));
+  EXPECT_EQ(holds_, 0);
+}
+
+TEST_F(SupervisorWithdrawTest, ANewerPlanTakesOverAtTheLastBoundaryThatStands) {
+  Make();
+  Accept(PlanFrom(0, 7));
+  Boundary(0);
+  Withdraw(PlanFrom(0, 7), 2);
+  Accept(PlanFrom(2, 8));
+  for (int j = 1; j <= 4; ++j) EXPECT_TRUE(Boundary(j)) << j;
+  EXPECT_EQ(last_state_.executing_plan_id, 8);
+  EXPECT_EQ(supervisor_->counts().emergency_stops, 0);
+}
+
+TEST_F(SupervisorWithdrawTest, ANewerPlanThatStartsLaterComesTooLate) {
+  Make();
+  Accept(PlanFrom(0, 7));
+  Boundary(0);
+  Withdraw(PlanFrom(0, 7), 2);
+  Accept(PlanFrom(3, 8));
+  EXPECT_TRUE(Boundary(1));
+  EXPECT_FALSE(Boundary(2));
+  EXPECT_EQ(supervisor_->counts().emergency_stops, 1);
+}
+
+// A brake of last resort that takes a step begins a step earlier, unless a plan takes over in time.
+TEST_F(SupervisorWithdrawTest, ABrakeThatTakesTimeBeginsBeforeTheEnd) {
+  for (const int start_of_next : {2, 3}) {
+    Make(1);
+    Accept(PlanFrom(0, 7));
+    EXPECT_TRUE(Boundary(0));
+    Withdraw(PlanFrom(0, 7), 2);
+    Accept(PlanFrom(start_of_next, 8));
+    EXPECT_EQ(Boundary(1), start_of_next == 2);
+    EXPECT_EQ(Boundary(2), start_of_next == 2);
+    EXPECT_EQ(supervisor_->counts().emergency_stops, start_of_next != 2);
+  }
+}
+
+TEST_F(SupervisorWithdrawTest, AnEndThatIsNotAtRestIsNoCertifiedStand) {
+  Make();
+  Accept(PlanFrom(0, 7));
+  Boundary(0);
+  Withdraw(PlanFrom(0, 7), 3);
+  EXPECT_TRUE(Boundary(1));
+  EXPECT_TRUE(Boundary(2));
+  EXPECT_FALSE(Boundary(3));
+  EXPECT_EQ(events_.back().kind, kStop);
+}
+
+TEST_F(SupervisorWithdrawTest, OptionsOutOfRangeThrow) {
+  EXPECT_NO_THROW(Make(128));
+  EXPECT_THROW(Make(129), std::invalid_argument);
+  EXPECT_THROW(Make(-1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace forereach
