@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdlib>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -103,6 +104,47 @@ void RegisterNominalTube() {
   })->Unit(benchmark::kMicrosecond);
 }
 
+// The paper's bicycle with 400 observations among what a robot meets: the same tube, another test of it.
+struct World {
+  const char* name;
+  Body body;
+  std::optional<Between> between;
+  bool moves = false;
+};
+
+std::vector<World> Worlds() {
+  using Eigen::Vector3d;
+  const Body disc{2, {{{Vector3d(1.4, 0, 0)}, 0.9}}};
+  const Body rectangle{2, {{{{-0.6, -0.6, 0}, {2.4, -0.6, 0}, {2.4, 0.6, 0}, {-0.6, 0.6, 0}}, 0}}};
+  const Between between{Eigen::Vector2d(4, 4), 0.8, 1.5, 0.1};
+  return {{"point", {}, {}},
+          {"disc", disc, {}},
+          {"rectangle", rectangle, {}},
+          {"point_swept", {}, between},
+          {"disc_swept", disc, between},
+          {"rectangle_swept", rectangle, between},
+          {"disc_moving", disc, between, true}};
+}
+
+void RegisterWorlds() {
+  for (const World& world : Worlds())
+    benchmark::RegisterBenchmark((std::string("world/") + world.name).c_str(), [world](State& state) {
+      Task task = CachedTask(Scenario::kBicycle, 400);
+      Problem problem = *task.problem;
+      problem.body = world.body;
+      problem.between = world.between;
+      task.problem = std::make_shared<const Problem>(std::move(problem));
+      if (world.moves) {
+        ObstacleMotion motion;
+        motion.velocity = {0.5, 0, 0};
+        motion.growth = 0.1;
+        task.obstacles[0] = task.obstacles[0].Moving(motion);
+        task.schedule = {0, 100'000, 5'000};
+      }
+      RunCertify(state, Certifier(task.problem), task);
+    })->Unit(benchmark::kMicrosecond);
+}
+
 void RegisterBatch() {
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   for (unsigned threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1)
@@ -120,6 +162,7 @@ void RegisterAll(int largest) {
     RegisterStages(observations);
   }
   RegisterNominalTube();
+  RegisterWorlds();
   RegisterBatch();
 }
 

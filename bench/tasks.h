@@ -17,12 +17,20 @@ struct Task {
   Eigen::VectorXd center, half_width;  ///< X0
   Eigen::MatrixXd controls;            ///< m-by-T, a column a step
   std::vector<Obstacle> obstacles;
+  Schedule schedule{};
 
   [[nodiscard]] Zonotope initial_set() const { return Zonotope::FromBox(center, half_width); }
-  [[nodiscard]] Plan plan() const { return PlanOf(controls); }
+  [[nodiscard]] Plan plan() const {
+    Plan plan = PlanOf(controls);
+    plan.schedule = schedule;
+    return plan;
+  }
   [[nodiscard]] static Plan PlanOf(const Eigen::MatrixXd& controls) {
-    return {controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
-            static_cast<int>(controls.rows())};
+    return {controls.data(),
+            static_cast<int>(controls.rows()),
+            static_cast<int>(controls.cols()),
+            static_cast<int>(controls.rows()),
+            {}};
   }
 };
 

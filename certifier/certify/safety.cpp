@@ -8,20 +8,6 @@
 namespace forereach {
 namespace {
 
-// Contains both hulls.
-Hull Join(const Hull& a, const Hull& b, int dim) noexcept {
-  Hull joined{};
-  for (std::size_t k = 0; k < ToSize(dim); ++k) {
-    const auto range = [k](const Hull& hull) {
-      return Interval(SubDown(hull.center[k], hull.half_width[k]), AddUp(hull.center[k], hull.half_width[k]));
-    };
-    const Interval both = forereach::Join(range(a), range(b));
-    joined.center[k] = both.Middle();
-    joined.half_width[k] = both.DistanceUpper(joined.center[k]);
-  }
-  return joined;
-}
-
 Hull Shifted(Hull hull, const std::array<Interval, kMaxSafetyDim>& shift, int dim) noexcept {
   for (std::size_t k = 0; k < ToSize(dim); ++k) {
     const Interval center = Interval(hull.center[k]) - shift[k];
@@ -83,17 +69,27 @@ class SafetyTest::Unit {
     hull_ = Join(hulls_[0], hulls_[1], placement().dim());
   }
 
-  // By interval hulls: sound, not tight.
+  // By the interval hulls of the frame and a ball around the body: sound, not tight.
   [[nodiscard]] PartSeparation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
-    const int p = placement().dim();
-    Separation found = SeparateHulls(hull_, obstacle);
-    if (obstacle.motion()) {
-      const Hull first = Shifted(hulls_[0], meeting.shift[0], p);
-      found =
-          SeparateHulls(last_ == first_ ? first : Join(first, Shifted(hulls_[1], meeting.shift[1], p), p), obstacle);
-    }
+    Separation found = SeparateHulls(meeting.moves ? Seen(hulls_[0], hulls_[1], meeting) : hull_, obstacle);
     found.threshold = AddUp(found.threshold, AddUp(meeting.growth, placement().reach()));
     return {found, IsOnePart() ? 0 : -1};
+  }
+
+  // By the interval hulls of the parts, or as given if that is better.
+  [[nodiscard]] PartSeparation ByParts(const PartSeparation& by_hulls, const Obstacle& obstacle,
+                                       const Encounter& meeting) noexcept {
+    if (placement().is_point()) return by_hulls;
+    const auto parts = placement().parts();
+    const auto& first = PartsAt(first_);
+    const auto& last = first_ == last_ ? first : PartsAt(last_);
+    PartSeparation closest{{kInfinity, 0}, -1};
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      Separation found = SeparateHulls(Seen(first[i], last[i], meeting), obstacle);
+      found.threshold = AddUp(found.threshold, AddUp(meeting.growth, parts[i].radius));
+      if (i == 0 || IsBetter(closest.separation, found)) closest = {found, static_cast<int>(i)};
+    }
+    return IsBetter(closest.separation, by_hulls.separation) ? closest : by_hulls;
   }
 
   // The better of the bound by hulls and that of the best directions.
@@ -120,10 +116,26 @@ class SafetyTest::Unit {
     return placement().EncloseHull(tube_.slice(t), tube_.half_width(t));
   }
 
+  // The hull of both samples, seen from the obstacle.
+  [[nodiscard]] Hull Seen(const Hull& first, const Hull& last, const Encounter& meeting) const noexcept {
+    const int p = placement().dim();
+    if (!meeting.moves) return first_ == last_ ? first : Join(first, last, p);
+    const Hull seen = Shifted(first, meeting.shift[0], p);
+    return first_ == last_ ? seen : Join(seen, Shifted(last, meeting.shift[1], p), p);
+  }
+
+  [[nodiscard]] const std::array<Hull, kMaxBodyParts>& PartsAt(int t) noexcept {
+    const std::size_t half = ToSize(t % 2);
+    if (parts_of_[half] != t)
+      placement().EncloseParts(tube_.slice(t), tube_.half_width(t), parts_[half].data(), test_.instructions_);
+    parts_of_[half] = t;
+    return parts_[half];
+  }
+
   [[nodiscard]] const Zonotope* PlacesAt(int t) noexcept {
     const std::size_t half = ToSize(t % 2);
     Zonotope* places = places_.data() + half * ToSize(placement().num_points());
-    if (sample_[half] != t) placement().Enclose(tube_.slice(t), tube_.half_width(t), places);
+    if (sample_[half] != t) placement().Enclose(tube_.slice(t), tube_.half_width(t), places, test_.instructions_);
     sample_[half] = t;
     return places;
   }
@@ -145,7 +157,8 @@ class SafetyTest::Unit {
   const Schedule& schedule_;
   const Tube& tube_;
   std::span<Zonotope> places_;
-  std::array<int, 2> sample_{-1, -1};
+  std::array<int, 2> sample_{-1, -1}, parts_of_{-1, -1};
+  std::array<std::array<Hull, kMaxBodyParts>, 2> parts_;
   int first_ = -1, last_ = -1;
   std::array<Hull, 2> hulls_;
   Hull hull_;
@@ -161,7 +174,7 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
   unit.Enter(t);
   const Encounter meeting = unit.MeetIn(obstacle);
   if (!meeting.is_there) return {{kInfinity, 0}, -1};
-  return unit.Best(unit.ByHulls(obstacle, meeting), obstacle, meeting);
+  return unit.Best(unit.ByParts(unit.ByHulls(obstacle, meeting), obstacle, meeting), obstacle, meeting);
 }
 
 // Interval hulls settle what is far away. What they do not prove, and then what they leave as possibly closest, is
@@ -178,7 +191,8 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
       const Obstacle& obstacle = obstacles[ToSize(o)];
       const Encounter meeting = unit.MeetIn(obstacle);
       if (!meeting.is_there) continue;
-      const PartSeparation by_hulls = unit.ByHulls(obstacle, meeting);
+      PartSeparation by_hulls = unit.ByHulls(obstacle, meeting);
+      if (!by_hulls.separation.IsProven()) by_hulls = unit.ByParts(by_hulls, obstacle, meeting);
       if (by_hulls.separation.IsProven()) {
         const double clearance = by_hulls.separation.clearance();
         next_by_hull = std::min(next_by_hull, std::max(clearance, by_hull.clearance));
@@ -203,8 +217,13 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
       const Obstacle& obstacle = obstacles[ToSize(o)];
       const Encounter meeting = unit.MeetIn(obstacle);
       if (!meeting.is_there || (t == closest.step && o == closest.obstacle)) continue;
-      const PartSeparation by_hulls = unit.ByHulls(obstacle, meeting);
-      if (by_hulls.separation.IsProven() && by_hulls.separation.clearance() < closest.clearance)
+      const auto is_farther = [&](const PartSeparation& found) {
+        return found.separation.clearance() >= closest.clearance;
+      };
+      PartSeparation by_hulls = unit.ByHulls(obstacle, meeting);
+      if (is_farther(by_hulls)) continue;
+      by_hulls = unit.ByParts(by_hulls, obstacle, meeting);
+      if (by_hulls.separation.IsProven() && !is_farther(by_hulls))
         closest.Consider(unit.Best(by_hulls, obstacle, meeting), t, o);
     }
   }

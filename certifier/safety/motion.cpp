@@ -19,6 +19,7 @@ Interval Seconds(std::int64_t us) noexcept {
 
 Encounter Meet(const ObstacleMotion& motion, const Schedule& schedule, int first, int last) noexcept {
   Encounter encounter;
+  encounter.moves = true;
   const std::int64_t error = schedule.clock_error_us;
   const std::array at{schedule.start_us + first * schedule.step_us, schedule.start_us + last * schedule.step_us};
   encounter.is_there = at[0] - error <= motion.until_us && motion.from_us <= at[1] + error;

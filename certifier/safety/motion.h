@@ -41,6 +41,8 @@ struct Schedule {
 struct Encounter {
   /** False: the obstacle is nowhere during the step. */
   bool is_there = true;
+  /** False: the obstacle stands, and the shift is zero. */
+  bool moves = false;
   /** velocity * tau at the first and at the last sample of the step, metres. The clock is taken to be exact. */
   std::array<std::array<Interval, kMaxSafetyDim>, 2> shift{};
   /** An upper bound on what is added to the obstacle's radius: its growth and |velocity| * clock error, metres. */

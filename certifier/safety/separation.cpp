@@ -205,6 +205,21 @@ Vector NearestOnSegment(const Vector& a, const Vector& b) {
   return a + edge * std::clamp(-a.dot(edge) / length_square, 0.0, 1.0);
 }
 
+// When a search ends. Of several pieces the nearest face may join two of them, so the normals of one are not all there
+// are, and their balls have no faces: such a search takes more steps and ends near its best.
+struct Effort {
+  int steps;
+  double tolerance, threshold;
+
+  static Effort For(std::span<const Piece> pieces, double threshold) {
+    return pieces.size() == 1 && pieces.front().ball == 0 ? Effort{12, 1e-15, threshold} : Effort{50, 1e-7, threshold};
+  }
+  // A point of the set has been found at `length`, and a proof for `value`.
+  [[nodiscard]] bool Suffices(double value, double length) const {
+    return value >= length * (1 - (value > threshold ? tolerance : 1e-15));
+  }
+};
+
 // The point of the triangle a, b, c next to the origin.
 Vector NearestOnTriangle(const Vector& a, const Vector& b, const Vector& c) {
   const Vector normal = (b - a).cross(c - a);
@@ -224,13 +239,13 @@ Vector NearestOnTriangle(const Vector& a, const Vector& b, const Vector& c) {
 // Gilbert, Johnson and Keerthi's search for the point of {core - set} next to the origin: from one point found towards
 // it, the lowest point in that direction, and the nearest point of the simplices between it and those kept. A few steps
 // do for one zonotope.
-void DescendInPlane(Search& search, int most_steps) noexcept {
+void DescendInPlane(Search& search, const Effort& effort) noexcept {
   Vector nearest = search.Offset(), kept[2] = {nearest, nearest};
-  for (int step = 0; step < most_steps; ++step) {
+  for (int step = 0; step < effort.steps; ++step) {
     const double length = nearest.norm();
     if (!IsSafeLength(length)) return;
     const Vector lowest = search.Lowest(nearest / length);
-    if (search.value() >= length * (1 - 1e-15)) return;
+    if (effort.Suffices(search.value(), length)) return;
     const Vector first = NearestOnSegment(lowest, kept[0]), second = NearestOnSegment(lowest, kept[1]);
     const bool with_first = first.squaredNorm() < second.squaredNorm();
     nearest = with_first ? first : second;
@@ -239,13 +254,13 @@ void DescendInPlane(Search& search, int most_steps) noexcept {
 }
 
 // The same with triangles.
-void DescendInSpace(Search& search, int most_steps) noexcept {
+void DescendInSpace(Search& search, const Effort& effort) noexcept {
   Vector nearest = search.Offset(), kept[3] = {nearest, nearest, nearest};
-  for (int step = 0; step < most_steps; ++step) {
+  for (int step = 0; step < effort.steps; ++step) {
     const double length = nearest.norm();
     if (!IsSafeLength(length)) return;
     const Vector lowest = search.Lowest(nearest / length);
-    if (search.value() >= length * (1 - 1e-15)) return;
+    if (effort.Suffices(search.value(), length)) return;
     int left_out = 0;
     for (int i = 0; i < 3; ++i) {
       const Vector other = NearestOnTriangle(lowest, kept[(i + 1) % 3], kept[(i + 2) % 3]);
@@ -254,9 +269,6 @@ void DescendInSpace(Search& search, int most_steps) noexcept {
     kept[left_out] = lowest;
   }
 }
-
-// Of several pieces, the nearest face may join two of them, so the normals of one piece are not all there are.
-constexpr int kStepsForOne = 12, kStepsForSeveral = 50;
 
 // In the plane the distance is attained along the normal of an edge of {core - slice}, or towards a corner next to the
 // best such edge: the dual bound is concave in d, so it rises to its maximum and falls after it.
@@ -271,7 +283,7 @@ constexpr int kStepsForOne = 12, kStepsForSeveral = 50;
 
 Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, double threshold) noexcept {
   Search search(pieces, obstacle);
-  DescendInPlane(search, pieces.size() == 1 ? kStepsForOne : kStepsForSeveral);
+  DescendInPlane(search, Effort::For(pieces, threshold));
   if (pieces.size() == 1 && !(search.value() > threshold)) TryAllNormals(search, obstacle.hull());
   return search.best();
 }
@@ -283,7 +295,7 @@ Vector BestPlanar(std::span<const Piece> pieces, const Obstacle& obstacle, doubl
   Search search(pieces, obstacle);
   for (int k = 0; k < 3; ++k) search.Consider(Vector::Unit(k));
   if (pieces.size() > 1 || threshold > 0) {  // such a normal may separate and still not show the distance
-    DescendInSpace(search, kStepsForSeveral);
+    DescendInSpace(search, {50, 1e-7, threshold});
     return search.best();
   }
   for (int j = 0; j < search.num_generators(); ++j) {
@@ -313,6 +325,19 @@ Vector BestDirection(std::span<const Piece> pieces, const Obstacle& obstacle, do
 }
 
 }  // namespace
+
+Hull Join(const Hull& a, const Hull& b, int dim) noexcept {
+  Hull joined{};
+  for (std::size_t k = 0; k < ToSize(dim); ++k) {
+    const auto range = [k](const Hull& hull) {
+      return Interval(SubDown(hull.center[k], hull.half_width[k]), AddUp(hull.center[k], hull.half_width[k]));
+    };
+    const Interval both = forereach::Join(range(a), range(b));
+    joined.center[k] = both.Middle();
+    joined.half_width[k] = both.DistanceUpper(joined.center[k]);
+  }
+  return joined;
+}
 
 Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
   constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands

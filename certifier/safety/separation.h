@@ -36,6 +36,9 @@ struct Hull {
   std::array<double, kMaxSafetyDim> center, half_width;
 };
 
+/** A hull that contains both, in the first `dim` coordinates. */
+[[nodiscard]] Hull Join(const Hull& a, const Hull& b, int dim) noexcept;
+
 /** One of the sets whose convex hull is separated from an obstacle: {y - v : y in set, v in shift} + {y : |y|_2 <=
 ball}. The shift is that of the obstacle, since its motion is seen from the obstacle. */
 struct Piece {
@@ -59,7 +62,7 @@ nothing; for p = 3, O(m^3).
 
 /** Separates the convex hull of 1 to kMaxPieces pieces and the core, likewise. The search for several pieces, or in
 space with a threshold, approaches the nearest point of {core - hull}; its distance is exact up to the search's
-tolerance, about 1e-9 of the distance. Cost O(m) for the generators of all pieces and each of at most some fifty
+tolerance, about 1e-7 of the distance. Cost O(m) for the generators of all pieces and each of at most some fifty
 directions.
 @param added what is added to the obstacle's radius as the threshold, metres, not negative. */
 [[nodiscard]] Separation Separate(std::span<const Piece> pieces, const Obstacle& obstacle, double added,

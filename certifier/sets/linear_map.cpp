@@ -43,20 +43,16 @@ void MapGenerators(std::span<const MatrixEntry> matrix, const Zonotope& set, std
 
 void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
                         int rows, Zonotope& image) noexcept {
+  std::array<double, kMaxStates> error{};
+  MapGenerators(matrix, set, half_widths, rows, image, error);
+
   std::array<Interval, kMaxStates> center;
   center.fill(Interval(0));
   for (const MatrixEntry& entry : matrix) center[ToSize(entry.row)] += entry.value * Interval(set.center(entry.column));
-  EncloseAffineImage({center.data(), ToSize(rows)}, matrix, set, half_widths, image);
-}
-
-void EncloseAffineImage(std::span<const Interval> value, std::span<const MatrixEntry> matrix, const Zonotope& set,
-                        std::span<const double> half_widths, Zonotope& image) noexcept {
-  std::array<double, kMaxStates> error{};
-  const int rows = static_cast<int>(value.size());
-  MapGenerators(matrix, set, half_widths, rows, image, error);
   for (int k = 0; k < rows; ++k) {
-    image.mutable_center(k) = value[ToSize(k)].Middle();
-    image.mutable_slack(k) = AddUp(error[ToSize(k)], value[ToSize(k)].DistanceUpper(image.center(k)));
+    const Interval& value = center[ToSize(k)];
+    image.mutable_center(k) = value.Middle();
+    image.mutable_slack(k) = AddUp(error[ToSize(k)], value.DistanceUpper(image.center(k)));
   }
 }
 

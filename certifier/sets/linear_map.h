@@ -21,10 +21,4 @@ struct MatrixEntry {
 void EncloseLinearImage(std::span<const MatrixEntry> matrix, const Zonotope& set, std::span<const double> half_widths,
                         int rows, Zonotope& image) noexcept;
 
-/** The same for an affine map: `image` contains {v + M (x - c) : x in set, v in `value`, M in the matrix}, where c is
-the center of `set`. M has as many rows as `value` has entries. A matrix may list an entry several times; they are
-added. */
-void EncloseAffineImage(std::span<const Interval> value, std::span<const MatrixEntry> matrix, const Zonotope& set,
-                        std::span<const double> half_widths, Zonotope& image) noexcept;
-
 }  // namespace forereach

@@ -151,7 +151,7 @@ TEST(Body, APlaceIsCorrelatedWithTheSlice) {
   };
   EXPECT_TRUE(judge(1, 0, 3 + kHair));
   EXPECT_FALSE(judge(1, 0, 3 - kHair));
-  EXPECT_TRUE(judge(0, 1, 3 * (0.1 + 0.1 * 0.005) + kHair));
+  EXPECT_TRUE(judge(0, 1, 3 * (0.1 + (0.1 + 0.005) * 0.005) + kHair));
   EXPECT_FALSE(judge(0, 1, 3 * std::sin(0.1) - kHair));
   EXPECT_TRUE(judge(-1, 0, -3 * std::cos(0.1) + 0.001));
   EXPECT_FALSE(judge(-1, 0, -3 * std::cos(0.1) - kHair));
