@@ -17,7 +17,11 @@ constexpr double kInside = 20, kNear = 2, kMargin = 2;
 double Slowness(const Box& region, const std::vector<Obstacle>& obstacles, double clearance, const Eigen::VectorXd& y) {
   const double from_edge = std::min((y - region.lower()).minCoeff(), (region.upper() - y).minCoeff());
   double room = std::min(kMargin, from_edge - clearance);
-  for (const Obstacle& obstacle : obstacles) room = std::min(room, ApproximateDistance(obstacle, y) - clearance);
+  for (const Obstacle& obstacle : obstacles) {
+    const auto& motion = obstacle.motion();
+    if (motion && !motion->velocity.isZero(0)) continue;
+    room = std::min(room, ApproximateDistance(obstacle, y) - (motion ? motion->uncertainty : 0) - clearance);
+  }
   return room < 0 ? kInside : kNear - (kNear - 1) * room / kMargin;
 }
 

@@ -11,8 +11,9 @@
 namespace forereach {
 
 /** For p = 2: the travel distance from y to the goal inside a region and around obstacles grown by a clearance, with a
-small penalty close to either. It is computed once on a grid by the fast marching method. For p = 1 and p = 3: the
-straight distance. Use it for planning, not for bounds. It keeps no reference to its arguments. */
+small penalty close to either. Obstacles with a velocity are left out. It is computed once on a grid by the fast
+marching method. For p = 1 and p = 3: the straight distance. Use it for planning, not for bounds. It keeps no reference
+to its arguments. */
 class NavigationField final {
  public:
   /** @param region the region of the robot's positions, metres; a point outside has the value at the nearest edge.

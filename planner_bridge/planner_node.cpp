@@ -153,9 +153,12 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
 
 PlanRequest PlannerNode::RequestOf(const Round& round) const {
   constexpr std::uint32_t kSpread = 1'000'003;
-  return {round.center, round.lessons.clearance(), round.lessons.DomainMargin(half_width_, config_.problem->projection),
+  return {round.center,
+          round.lessons.clearance(),
+          round.lessons.DomainMargin(half_width_, config_.problem->projection),
           static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
-          round.searches - 1};
+          round.searches - 1,
+          {round.start_utime, period_us_, Microseconds(config_.gate.max_clock_error_ms.value_or(0))}};
 }
 
 candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us) {
@@ -209,7 +212,9 @@ void PlannerNode::OnObstacles(const Received& received) {
     ++ignored_;
     return;
   }
+  if (obstacles_.digest() == planned_among_) return;  // the message before said the same
   proposer_->SetObstacles(obstacles_.all());
+  planned_among_ = obstacles_.digest();
 }
 
 void PlannerNode::Stop() { out_ << Summary() << std::endl; }

@@ -97,6 +97,7 @@ class PlannerNode final : public Node {
   StreamOrder states_;                              // the robot's
   std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
   ObstaclesInForce obstacles_;
+  Digest planned_among_{};  // the digest of the obstacles that proposer_ has from a message
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,

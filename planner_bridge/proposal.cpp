@@ -23,6 +23,7 @@
 #include <ompl/util/Console.h>
 #include <ompl/util/RandomNumbers.h>
 
+#include "certifier/safety/clearance.h"
 #include "planner_bridge/navigation.h"
 #include "planner_bridge/reference.h"
 
@@ -88,6 +89,56 @@ MakeAlgorithm AlgorithmNamed(const std::string& name) {
     throw std::invalid_argument("planner.algorithm: " + name + " is not kpiece, est, pdst, rrt or sst");
   return found->second;
 }
+
+// How far the body reaches to the sides of its way, metres. A body that turns with a heading drives along its first
+// axis.
+double HalfBreadth(const Body& body) {
+  double breadth = 0;
+  for (const BodyPart& part : body.parts)
+    for (const Eigen::Vector3d& point : part.points)
+      breadth = std::max(breadth, (body.heading >= 0 ? std::abs(point.y()) : point.norm()) + part.radius);
+  return breadth;
+}
+
+// The body at a sample, or what it sweeps from one to the next, as seen from obstacles.
+class Sweep {
+ public:
+  using Parts = std::vector<BodyPart>;
+
+  // At sample t.
+  Sweep(Parts at, int t) : from_(std::move(at)), first_(t), last_(t) {}
+  // From sample t to the next. Each part is widened by its deviation.
+  Sweep(Parts from, Parts to, const std::vector<double>& deviation, int t)
+      : from_(std::move(from)), to_(std::move(to)), first_(t), last_(t + 1) {
+    for (std::size_t i = 0; i < from_.size(); ++i) from_[i].radius += deviation[i];
+  }
+
+  // Whether it keeps more than `clearance` from the obstacle.
+  [[nodiscard]] bool Keeps(double clearance, const Obstacle& obstacle, const Schedule& schedule) const {
+    for (std::size_t i = 0; i < from_.size(); ++i)
+      if (!IsFar(i, clearance, obstacle) &&
+          !(ApproximateDistance(obstacle, from_[i], To(i), schedule, first_, last_) > clearance))
+        return false;
+    return true;
+  }
+
+ private:
+  // By a ball around the part that settles most of them in less time.
+  [[nodiscard]] bool IsFar(std::size_t i, double clearance, const Obstacle& obstacle) const {
+    const BodyPart &from = from_[i], &to = To(i);
+    if (obstacle.motion() || (first_ == last_ && from.points.size() == 1)) return false;
+    const Eigen::Vector3d middle = (from.points[0] + to.points[0]) / 2;
+    double reach = 0;
+    for (const auto* part : {&from, &to})
+      for (const Eigen::Vector3d& point : part->points) reach = std::max(reach, (point - middle).norm());
+    return ApproximateDistance(obstacle, middle.head(obstacle.dim())) > clearance + reach + from.radius;
+  }
+
+  [[nodiscard]] const BodyPart& To(std::size_t i) const { return first_ == last_ ? from_[i] : to_[i]; }
+
+  Parts from_, to_;
+  int first_, last_;
+};
 
 /** Mostly follows a hint, for a step at a time and with some error; sometimes any control, held for longer. */
 class HintedSampler final : public oc::ControlSampler {
@@ -161,7 +212,7 @@ class Planner final : public Proposer {
   const NavigationField& Field(double clearance) {
     constexpr std::size_t kKept = 64;
     if (fields_.size() > kKept) fields_.clear();
-    return fields_.try_emplace(clearance, region_, obstacles_, clearance, goal_).first->second;
+    return fields_.try_emplace(clearance, region_, obstacles_, clearance + half_breadth_, goal_).first->second;
   }
 
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
@@ -175,6 +226,7 @@ class Planner final : public Proposer {
   std::unique_ptr<RobotMotion> motion_;
   Box region_;
   Eigen::VectorXd goal_;
+  double half_breadth_ = HalfBreadth(problem_->body);
   std::vector<Obstacle> obstacles_;
   std::map<double, NavigationField> fields_;  // by clearance
 };
@@ -188,22 +240,31 @@ class Planner::Search {
         model_(*planner.problem_->model),
         n_(static_cast<std::size_t>(model_.num_states())),
         m_(static_cast<std::size_t>(model_.num_inputs())),
-        start_(request.state) {
+        start_(request.state),
+        schedule_(request.schedule) {
     const Box& box = planner.problem_->domain.state;
     const Eigen::VectorXd margin =
         request.domain_margin.size() == 0 ? Eigen::VectorXd::Zero(start_.size()) : request.domain_margin;
     lower_ = (box.lower() + margin).cwiseMin(start_).cwiseMax(box.lower());
     upper_ = (box.upper() - margin).cwiseMax(start_).cwiseMin(box.upper());
     const std::span<const double> x(start_.data(), n_);
-    const Eigen::VectorXd position = Position(x);
-    for (const Obstacle& obstacle : planner.obstacles_)
-      clearances_.push_back(std::clamp(ApproximateDistance(obstacle, position) - kTouch, 0.0, request.clearance));
-    start_distance_ = field.DistanceToGo(position);
+    if (planner.problem_->between)
+      for (const BodyPart& part : planner.problem_->body.parts)
+        deviation_.push_back(Deviation(*planner.problem_->between, part));
+    const Sweep::Parts body = BodyAt(x);
+    for (const Obstacle& obstacle : planner.obstacles_) {
+      double distance = kInfinity;
+      for (std::size_t i = 0; i < body.size(); ++i)
+        distance = std::min(distance, ApproximateDistance(obstacle, body[i], body[i], schedule_, 0, 0) -
+                                          (deviation_.empty() ? 0 : deviation_[i]));
+      clearances_.push_back(std::clamp(distance - kTouch, 0.0, request.clearance));
+    }
+    start_distance_ = field.DistanceToGo(Position(x));
     gain_ = IdealGain();
     top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
     least_speed_ = std::min(-kReverse, planner.motion_->Speed(x));
     at_rest_ = std::abs(planner.motion_->Speed(x)) <= kReverse;
-    start_valid_ = Allowed(x);
+    start_valid_ = Allowed(x, 0);
   }
 
   /** False if the start itself is not allowed. */
@@ -264,28 +325,39 @@ class Planner::Search {
     ++work_;
   }
 
-  [[nodiscard]] bool Allowed(std::span<const double> x) const {
+  [[nodiscard]] Sweep::Parts BodyAt(std::span<const double> x) const {
+    return PlaceBody(planner_.problem_->body, planner_.problem_->projection, x);
+  }
+
+  // A state at sample t.
+  [[nodiscard]] bool Allowed(std::span<const double> x, int t) const {
     const Eigen::Map<const Eigen::ArrayXd> state(x.data(), start_.size());
     if (!((lower_.array() <= state).all() && (state <= upper_.array()).all())) return false;
     const double speed = planner_.motion_->Speed(x);
     if (!(least_speed_ <= speed && speed <= top_speed_)) return false;
-    return Clear(Position(x));
+    return Clear(Sweep(BodyAt(x), t));
   }
 
-  [[nodiscard]] bool Clear(const Eigen::VectorXd& position) const {
+  [[nodiscard]] bool Clear(const Sweep& sweep) const {
     for (std::size_t o = 0; o < clearances_.size(); ++o)
-      if (!(ApproximateDistance(planner_.obstacles_[o], position) > clearances_[o])) return false;
+      if (!sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_)) return false;
     return true;
   }
 
-  // False outside the certification domain or past the progress part; then `to` is not a state of the search.
+  // Whether the way from sample t to the next is clear, if that is to be certified.
+  [[nodiscard]] bool WayIsClear(std::span<const double> x, std::span<const double> next, int t) const {
+    return deviation_.empty() || Clear(Sweep(BodyAt(x), BodyAt(next), deviation_, t));
+  }
+
+  // False outside the certification domain, past the progress part or if the way is not clear; then `to` is not a state
+  // of the search.
   [[nodiscard]] bool Propagate(const double* from, const double* u, double* to) const {
     std::array<double, kMaxVariables> z;
     std::copy_n(u, m_, std::copy_n(from, n_, z.begin()));
     const double steps = StepsOf(from) + 1, best = BestOf(from);  // `to` may be `from`
-    const bool inside =
-        steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
+    bool inside = steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
     Step({z.data(), n_}, z.data() + n_, {to, n_});
+    inside = inside && WayIsClear({z.data(), n_}, {to, n_}, static_cast<int>(steps) - 1);
     to[n_] = inside ? steps : planner_.options_.progress_steps + 1;
     to[n_ + 1] = std::min(best, field_.DistanceToGo(Position({to, n_})));
     return inside;
@@ -358,19 +430,29 @@ class Planner::Search {
       if (!planner_.problem_->domain.Contains({z.data(), n_ + m_})) return false;
       std::array<double, kMaxStates> next;
       Step({z.data(), n_}, z.data() + n_, {next.data(), n_});
-      if (!Allowed({next.data(), n_})) return false;
+      const int sample = planner_.options_.progress_steps + t;
+      if (!Allowed({next.data(), n_}, sample + 1) || !WayIsClear({z.data(), n_}, {next.data(), n_}, sample))
+        return false;
       std::copy_n(next.begin(), n_, z.begin());
       const Eigen::VectorXd moved = Position({z.data(), n_}) - position;
       position += moved;
       if (moved.norm() > kReverse) direction = moved.normalized();
     }
-    return !ambition.room || HasRoom(position, direction);
+    return !ambition.room || HasRoom({z.data(), n_}, position, direction);
   }
 
-  // Whether a robot at rest here can drive on. A robot that cannot reverse could otherwise not leave the place.
-  [[nodiscard]] bool HasRoom(const Eigen::VectorXd& position, const Eigen::VectorXd& direction) const {
-    for (double ahead = 1; ahead <= kRoomAhead; ++ahead)
-      if (!Clear(position + ahead * direction)) return false;
+  // Whether a robot at rest in x, at `position`, can drive on. A robot that cannot reverse could otherwise not leave
+  // the place. What moves may have gone by then.
+  [[nodiscard]] bool HasRoom(std::span<const double> x, const Eigen::VectorXd& position,
+                             const Eigen::VectorXd& direction) const {
+    const Body& body = planner_.problem_->body;
+    const double heading = body.heading >= 0 ? x[static_cast<std::size_t>(body.heading)] : 0;
+    for (double ahead = 1; ahead <= kRoomAhead; ++ahead) {
+      const Sweep sweep(PlaceBody(body, position + ahead * direction, heading), 0);
+      for (std::size_t o = 0; o < clearances_.size(); ++o)
+        if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
+          return false;
+    }
     return planner_.region_.Contains(position + kRoomAhead * direction);
   }
 
@@ -406,7 +488,7 @@ class Planner::Search {
     });
     setup->setStateValidityChecker([this](const ob::State* state) {
       const double* s = Values(state);
-      return StepsOf(s) <= planner_.options_.progress_steps && Allowed(StateOf(s));
+      return StepsOf(s) <= planner_.options_.progress_steps && Allowed(StateOf(s), static_cast<int>(StepsOf(s)));
     });
     ob::ScopedState<ob::RealVectorStateSpace> start(states);
     std::copy_n(start_.data(), n_, start->values);
@@ -437,8 +519,10 @@ class Planner::Search {
   const NominalModel& model_;
   const std::size_t n_, m_;
   const Eigen::VectorXd start_;
+  const Schedule schedule_;
   Eigen::VectorXd lower_, upper_;
   std::vector<double> clearances_;  // to each obstacle
+  std::vector<double> deviation_;   // of each part between two samples; empty: only the samples count
   double start_distance_, gain_, top_speed_, least_speed_;
   bool at_rest_, start_valid_;
   mutable std::int64_t work_ = 0;  // model steps

@@ -2,7 +2,9 @@
 
 The progress part is not a path to the goal. It has exactly `progress_steps` controls that reduce the travel distance to
 the goal around the obstacles, and a braking tail fits after it. The whole nominal rollout is checked in the certifier's
-discretisation, against obstacles grown by a clearance and against the domain. */
+discretisation, against obstacles grown by a clearance and against the domain: the body, from sample to sample if the
+problem has bounds between them, and each moving obstacle at the time of the step. The travel distance takes moving
+obstacles into account only if their velocity is zero. */
 #pragma once
 
 #include <memory>

@@ -21,7 +21,8 @@ struct PlanRequest {
   Eigen::VectorXd
       domain_margin;  ///< Distance to keep from the bounds of the state domain: n entries, or empty for none.
   std::uint32_t seed = 1;
-  int attempt = 0;  ///< Number of earlier requests for this start.
+  int attempt = 0;      ///< Number of earlier requests for this start.
+  Schedule schedule{};  ///< Of the plan: it is where moving obstacles are at each step.
 };
 
 struct Proposal {

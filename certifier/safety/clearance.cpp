@@ -122,6 +122,7 @@ double ApproximateDistance(const Obstacle& obstacle, const BodyPart& part, std::
 
 double ApproximateDistance(const Obstacle& obstacle, const BodyPart& from, const BodyPart& to, const Schedule& schedule,
                            int first, int last) {
+  if (first == last && !obstacle.motion()) return ApproximateDistance(obstacle, from);
   BodyPart seen = from;  // from the obstacle
   seen.points.insert(seen.points.end(), to.points.begin(), to.points.end());
   if (first == last) seen.points.resize(from.points.size());

@@ -1,9 +1,11 @@
 #include "planner_bridge/proposal.h"
 
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
+#include "certifier/safety/clearance.h"
 #include "tests/planner/tasks.h"
 
 namespace forereach {
@@ -155,6 +157,85 @@ TEST(Planner, ObstaclesCanBeReplaced) {
   const auto proposal = planner->Propose(blocked);
   ASSERT_TRUE(proposal);
   ExpectSound(config, blocked, *proposal, {3, 4, 5});
+}
+
+// The bicycle with a car's rectangle, to be certified at all times.
+Config Car() {
+  Config config = Bicycle();
+  Problem problem = *config.problem;
+  problem.body = {.heading = 2, .parts = {{{{-1, -0.9, 0}, {3.3, -0.9, 0}, {3.3, 0.9, 0}, {-1, 0.9, 0}}, 0}}};
+  problem.between = Between{Vec({25, 25}), 1.8, 6, 0.1};
+  config.problem = std::make_shared<const Problem>(problem);
+  return config;
+}
+
+// At twenty times in each step the body, moved along the chord of its poses, keeps the clearance and its own deviation.
+void ExpectClear(const Config& config, const PlanRequest& request, const Proposal& proposal) {
+  const Problem& problem = *config.problem;
+  const auto pose = [&](int t, double s) -> Eigen::VectorXd {
+    return (1 - s) * proposal.states.col(t) + s * proposal.states.col(t + 1);
+  };
+  for (int t = 0; t < proposal.controls.cols(); ++t)
+    for (int i = 0; i <= 20; ++i) {
+      const double s = i / 20.0;
+      const Eigen::VectorXd x = pose(t, s);
+      const auto placed = PlaceBody(problem.body, problem.projection, {x.data(), static_cast<std::size_t>(x.size())});
+      const auto time =
+          request.schedule.start_us + std::llround((t + s) * static_cast<double>(request.schedule.step_us));
+      for (const Obstacle& obstacle : config.obstacles)
+        for (std::size_t part = 0; part < placed.size(); ++part)
+          ASSERT_GT(ApproximateDistance(obstacle, placed[part], time),
+                    request.clearance + (problem.between ? Deviation(*problem.between, problem.body.parts[part]) : 0) -
+                        1e-3)  // the chord of the poses is not that of the points
+              << "step " << t << " + " << s;
+    }
+}
+
+TEST(Planner, KeepsTheBodyAwayFromObstaclesFromSampleToSample) {
+  const Config config = Car();
+  const auto planner = PlannerOf(config);
+  int found = 0;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    for (const Eigen::VectorXd& state : {Vec({0, 0, 0, 7, 0, 0}), Vec({16, -3, -0.2, 5, 0, 0})}) {
+      const PlanRequest request = From(state, seed);
+      const auto proposal = planner->Propose(request);
+      if (!proposal) continue;
+      ++found;
+      ExpectClear(config, request, *proposal);
+      ExpectSound(config, request, *proposal, {3, 4, 5});
+    }
+  }
+  EXPECT_GT(found, 25);
+}
+
+TEST(Planner, TheBodyCountsAndNotOnlyItsPoint) {
+  const Eigen::VectorXd beside = Vec({25, -2.6, 0, 2, 0, 0});  // the point is 0.6 m away, the body reaches 0.9 m
+  EXPECT_TRUE(PlannerOf(Bicycle())->Propose(From(beside, 5)));
+  EXPECT_FALSE(PlannerOf(Car())->Propose(From(beside, 5)));
+}
+
+// A wall ahead that drives on leaves the way free; one that comes towards the robot does not.
+TEST(Planner, MeetsMovingObstaclesWhereTheyAreAtEachStep) {
+  Config config = Car();
+  const Obstacle ahead = Obstacle::AxisBox(Vec({14, -15}), Vec({16, 15}));
+  ObstacleMotion motion;
+  motion.stamp_us = 5'000'000;
+  motion.velocity = {10, 0, 0};
+  PlanRequest request = From(Vec({0, 0, 0, 10, 0, 0}), 1);
+  request.schedule = {5'000'000, 100'000, 10'000};
+  const auto proposed = [&](const std::vector<Obstacle>& obstacles) {
+    config.obstacles = obstacles;
+    return PlannerOf(config)->Propose(request);
+  };
+  EXPECT_FALSE(proposed({ahead}));
+  const auto behind_it = proposed({ahead.Moving(motion)});
+  ASSERT_TRUE(behind_it);
+  ExpectClear(config, request, *behind_it);
+  motion.velocity = {-30, 0, 0};
+  EXPECT_FALSE(proposed({Obstacle::AxisBox(Vec({60, -15}), Vec({62, 15})).Moving(motion)}));
+  motion.until_us = 5'400'000;  // gone before they meet
+  EXPECT_TRUE(proposed({Obstacle::AxisBox(Vec({60, -15}), Vec({62, 15})).Moving(motion)}));
 }
 
 TEST(Planner, RefusesOptionsThatDoNotFit) {
