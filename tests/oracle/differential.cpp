@@ -16,8 +16,10 @@
 #include <vector>
 
 #include "command_line/command_line.h"
+#include "tests/oracle/motions.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
+#include "tests/oracle/worlds.h"
 #include "tests/verifier/record.h"
 
 namespace forereach {
@@ -29,6 +31,7 @@ struct Options {
   int calls = 50;  ///< Of each problem.
   bool wide =
       false;  ///< Problems and queries are then changed as Tighten and Widen do, by random numbers of their own.
+  bool worlds = false;  ///< Bodies, bounds between samples and obstacles that move, instead of the problems above.
 };
 
 // What AnyProblem leaves out: any safety dimension, dense rows of L, high orders, domains cut by inequalities.
@@ -205,6 +208,8 @@ Obstacle Touching(Random& random, const Certifier& certifier, const Tube& tube) 
 
 struct Counts {
   long calls = 0, certified = 0, confirmed = 0, refuted = 0, cannot_verify = 0, problems = 0, refused = 0;
+  long contacts = 0, contacts_refuted = 0, contacts_confirmed = 0;
+  long inside = 0, inside_refuted = 0;
 
   void Add(const Counts& other) {
     calls += other.calls;
@@ -214,6 +219,11 @@ struct Counts {
     cannot_verify += other.cannot_verify;
     problems += other.problems;
     refused += other.refused;
+    contacts += other.contacts;
+    contacts_refuted += other.contacts_refuted;
+    contacts_confirmed += other.contacts_confirmed;
+    inside += other.inside;
+    inside_refuted += other.inside_refuted;
   }
 };
 
@@ -223,6 +233,112 @@ std::string Describe(const verifier::Verdict& verdict) {
   text << "step " << failure.step << ": " << failure.what << ": found " << failure.found << ", bound " << failure.bound
        << ", excess " << failure.excess;
   return text.str();
+}
+
+void Count(const Options& options, long number, int call, const verifier::Verdict& verdict, std::mutex& output,
+           Counts& counts) {
+  counts.confirmed += verdict.status == verifier::Status::kConfirmed;
+  counts.refuted += verdict.status == verifier::Status::kRefuted;
+  counts.cannot_verify += verdict.status == verifier::Status::kCannotVerify;
+  if (verdict.status == verifier::Status::kConfirmed) return;
+  const std::lock_guard lock(output);
+  std::cerr << (verdict.status == verifier::Status::kRefuted ? "REFUTED" : "cannot verify") << ": --seed "
+            << options.seed << " --problem " << number << ", call " << call << ": " << Describe(verdict) << std::endl;
+}
+
+// An obstacle that a motion within all declared bounds just meets, in a step of the plan.
+std::optional<Obstacle> Met(Random& random, const Problem& problem, const Query& query, const Tube& tube) {
+  const bool bicycle = problem.model->num_states() == 6;
+  const MotionJudge judge(problem, query.schedule);
+  const AdmissibleResidual residual(random, problem);
+  std::vector<exact::Real> x = PointOf(random, query.initial_set), next;
+  const int t = random.Below(query.plan().num_steps);
+  for (int step = 0; step <= t; ++step) {
+    if (step > 0) x = next;
+    std::vector<exact::Real> z = x;
+    for (const double u : query.plan().input(step)) z.emplace_back(u);
+    next = NominalSuccessor(bicycle, z);
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k));
+  }
+  const Chord chord = judge.ChordOf(x, next);
+  std::optional<Path> path;
+  double s = random.Below(2);
+  if (problem.between) {
+    path = judge.AnyPath(random, chord);
+    if (!path) return std::nullopt;
+    s = random.Integer(0, 16) / 16.0;
+  }
+  const std::int64_t most = query.schedule.clock_error_us, error = most == 0 ? 0 : random.Coin() ? most : -most;
+  const auto approach = AnyApproach(random, problem, tube, query.schedule);
+  if (!approach) return std::nullopt;
+  const auto parts = judge.Place<double>(chord, path ? &*path : nullptr, s);
+  const auto away =
+      JustAccepted([&](double far) { return !judge.Meet(parts, approach->At(far), t, s, error, 0, 1e-13); });
+  if (!away) return std::nullopt;
+  Obstacle met = approach->At(*away - 1e-9);
+  const auto exactly = judge.Place<exact::Real>(chord, path ? &*path : nullptr, s);
+  if (!judge.Meet(exactly, met, t, s, error, 0, 1e-60)) return std::nullopt;
+  return met;
+}
+
+// The certificate with another obstacle, without its slices: only whether it is safe is the claim.
+verifier::Certificate Among(verifier::Certificate certificate, const Obstacle& obstacle) {
+  certificate.obstacles = {obstacle};
+  certificate.slices.clear();
+  return certificate;
+}
+
+// Obstacles that the certifier just accepts; the same a micrometre further in, where no body turns (what a turn sweeps
+// the verifier encloses more tightly); and obstacles that are met.
+Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& output) {
+  Random random(options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number));
+  Counts counts;
+  counts.problems = 1;
+  const bool bicycle = random.Coin();
+  const auto problem = AnyWorld(random, bicycle);
+  problem->method = options.method;
+  const Certifier certifier(problem);
+  const verifier::Verifier judge(problem, verifier::MethodOf(*problem));
+  for (int i = 0; i < options.calls; ++i) {
+    Query query = AnyDrive(random, *problem);
+    if (!bicycle || random.Coin()) query.controls *= random.Uniform(0, 1);
+    ++counts.calls;
+    if (certifier.Certify(query.plan(), query.initial_set, {}, tube).outcome != Outcome::kCertified) continue;
+    std::vector<Obstacle> further_in;
+    for (int o = random.Integer(1, 3); o > 0; --o) {
+      const auto approach = AnyApproach(random, *problem, tube, query.schedule);
+      if (!approach) continue;
+      const auto away = JustAccepted([&](double far) {
+        const std::vector<Obstacle> alone{approach->At(far)};
+        return certifier.JudgeSafety(alone, query.schedule, tube, 0).outcome == Outcome::kCertified;
+      });
+      if (!away) continue;
+      query.obstacles.push_back(approach->At(*away));
+      if (problem->body.heading < 0 && *away > 1e-5) further_in.push_back(approach->At(*away - 1e-6 * (1 + *away)));
+    }
+    certifier.Require(query.plan(), query.initial_set, query.obstacles);
+    if (certifier.Certify(query.plan(), query.initial_set, query.obstacles, tube).outcome != Outcome::kCertified)
+      throw std::logic_error("a tube that is judged alone is certified among the same obstacles");
+    ++counts.certified;
+    const verifier::Certificate certificate =
+        CertificateOf(certifier, query.plan(), query.initial_set, query.obstacles, tube);
+    Count(options, number, i, judge.Verify(certificate), output, counts);
+    for (const Obstacle& obstacle : further_in) {
+      ++counts.inside;
+      counts.inside_refuted += judge.Verify(Among(certificate, obstacle)).status == verifier::Status::kRefuted;
+    }
+    const auto met = Met(random, *problem, query, tube);
+    if (!met) continue;
+    ++counts.contacts;
+    const verifier::Verdict verdict = judge.Verify(Among(certificate, *met));
+    counts.contacts_refuted += verdict.status == verifier::Status::kRefuted;
+    counts.contacts_confirmed += verdict.status == verifier::Status::kConfirmed;
+    if (verdict.status != verifier::Status::kConfirmed) continue;
+    const std::lock_guard lock(output);
+    std::cerr << "CONFIRMED A CONTACT: --seed " << options.seed << " --problem " << number << ", call " << i
+              << std::endl;
+  }
+  return counts;
 }
 
 // All that follows from one seed and one problem's number.
@@ -263,13 +379,7 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
     if (!judge) judge = std::make_unique<verifier::Verifier>(problem, verifier::MethodOf(*problem));
     const auto verdict =
         judge->Verify(CertificateOf(*certifier, query.plan(), query.initial_set, query.obstacles, tube));
-    counts.confirmed += verdict.status == verifier::Status::kConfirmed;
-    counts.refuted += verdict.status == verifier::Status::kRefuted;
-    counts.cannot_verify += verdict.status == verifier::Status::kCannotVerify;
-    if (verdict.status == verifier::Status::kConfirmed) continue;
-    const std::lock_guard lock(output);
-    std::cerr << (verdict.status == verifier::Status::kRefuted ? "REFUTED" : "cannot verify") << ": --seed "
-              << options.seed << " --problem " << number << ", call " << i << ": " << Describe(verdict) << std::endl;
+    Count(options, number, i, verdict, output, counts);
   }
   return counts;
 }
@@ -302,6 +412,9 @@ int main(int argc, char** argv) {
                   {.name = "--wide",
                    .variable = &options.wide,
                    .help = "Wider initial sets, and domains whose inequalities the data just meet"},
+                  {.name = "--worlds",
+                   .variable = &options.worlds,
+                   .help = "Bodies, bounds between samples and obstacles that move, just accepted and just met"},
                   {.name = "--problem", .variable = &only, .help = "This problem only; negative: all"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   options.method = method == "paper" ? Method::kPaper : Method::kCentred;
@@ -315,7 +428,8 @@ int main(int argc, char** argv) {
     while (called < count) {
       const long number = next++;
       if (only >= 0 && number > only) break;
-      const Counts counts = RunProblem(options, number, tube, mutex);
+      const Counts counts =
+          options.worlds ? RunWorld(options, number, tube, mutex) : RunProblem(options, number, tube, mutex);
       called += counts.calls;
       const std::lock_guard lock(mutex);
       total.Add(counts);
@@ -330,8 +444,16 @@ int main(int argc, char** argv) {
             << total.refused << " refused), " << total.certified << " certified, " << total.confirmed << " confirmed, "
             << total.refuted << " refuted, " << total.cannot_verify << " cannot verify; " << seconds << " s"
             << std::endl;
+  if (options.worlds)
+    std::cout << total.inside << " obstacles a micrometre further in, " << total.inside_refuted << " refuted; "
+              << total.contacts << " that are met, " << total.contacts_refuted << " refuted, "
+              << total.contacts_confirmed << " confirmed" << std::endl;
   const bool enough = only >= 0 || total.certified * 20 >= total.calls;  // a fuzz that certifies nothing tests nothing
   // Of wide sets the reduction's choices are now and then too close for the verifier to follow: it then says so.
-  const bool followed = total.cannot_verify * (options.wide ? 200 : total.calls + 1) <= total.certified;
-  return total.refuted == 0 && followed && enough ? 0 : 1;
+  const bool is_wide = options.wide || options.worlds;
+  const bool followed = total.cannot_verify * (is_wide ? 200 : total.calls + 1) <= total.certified;
+  return total.refuted == 0 && total.contacts_confirmed == 0 && total.inside_refuted == total.inside && followed &&
+                 enough
+             ? 0
+             : 1;
 }

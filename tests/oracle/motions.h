@@ -280,37 +280,19 @@ class MotionTrial {
   // An obstacle near the path that the certifier just accepts.
   std::optional<Neighbour> PlaceNeighbour(const Certifier& certifier, const Problem& problem, const Schedule& schedule,
                                           const Schedule& told_schedule) {
-    const int p = static_cast<int>(problem.projection.rows()), t = random_.Integer(0, tube_.length());
-    const auto shape = AnyShape(random_, p);
-    std::optional<ObstacleMotion> motion;
-    if (random_.Coin(0.7)) motion = AnyMotion(random_, p, schedule, tube_.length());
-    const Eigen::VectorXd center =
-        Eigen::Map<const Eigen::VectorXd>(tube_.slice(t).center().data(), tube_.slice(t).dim());
-    Eigen::VectorXd place = problem.projection * center;
-    if (motion) {
-      const std::int64_t at = schedule.start_us + t * schedule.step_us;
-      place -= motion->velocity.head(p) * (static_cast<double>(at - motion->stamp_us) * 1e-6);
-    }
-    Eigen::VectorXd direction = random_.Vector(p);
-    if (direction.norm() < 1e-3) return std::nullopt;
-    direction.normalize();
-    const auto made = [&](double away, bool told) {
-      Obstacle obstacle = shape(place + away * direction);
-      if (!motion) return obstacle;
-      ObstacleMotion moves = *motion;
-      if (told && untold_ == Untold::kVelocity) moves.velocity.setZero();
-      if (told && untold_ == Untold::kGrowth) moves.uncertainty = moves.growth = moves.growth_rate = 0;
-      return obstacle.Moving(moves);
-    };
+    const std::optional<Approach> approach = AnyApproach(random_, problem, tube_, schedule);
+    if (!approach) return std::nullopt;
+    Approach told = *approach;
+    if (told.motion && untold_ == Untold::kVelocity) told.motion->velocity.setZero();
+    if (told.motion && untold_ == Untold::kGrowth)
+      told.motion->uncertainty = told.motion->growth = told.motion->growth_rate = 0;
     const auto accepted = [&](double away) {
-      const std::vector<Obstacle> alone{made(away, true)};
+      const std::vector<Obstacle> alone{told.At(away)};
       return certifier.JudgeSafety(alone, told_schedule, tube_, 0).outcome == Outcome::kCertified;
     };
-    double near = 0, far = 1;
-    while (far < 500 && !accepted(far)) far *= 2;
-    if (far >= 500) return std::nullopt;
-    for (int i = 0; i < 45; ++i) (accepted((near + far) / 2) ? far : near) = (near + far) / 2;
-    return Neighbour{made(far, false), made(far, true)};
+    const std::optional<double> away = JustAccepted(accepted);
+    if (!away) return std::nullopt;
+    return Neighbour{approach->At(*away), told.At(*away)};
   }
 
   void Rollout(const MotionJudge& judge, const Query& query, const std::vector<Obstacle>& obstacles, bool bicycle) {

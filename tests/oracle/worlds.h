@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
+#include "certifier/certify/decision.h"
 #include "certifier/certify/problem.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/problems.h"
@@ -110,6 +112,48 @@ inline std::function<Obstacle(const Eigen::VectorXd& place)> AnyShape(Random& ra
       };
     }
   }
+}
+
+/** Obstacles of one shape on a line: `away` metres from where the robot is at a sample of a tube. */
+struct Approach {
+  std::function<Obstacle(const Eigen::VectorXd& place)> shape;
+  std::optional<ObstacleMotion> motion;
+  Eigen::VectorXd place, direction;
+
+  [[nodiscard]] Obstacle At(double away) const {
+    const Obstacle obstacle = shape(place + away * direction);
+    return motion ? obstacle.Moving(*motion) : obstacle;
+  }
+};
+
+/** Any shape and any unit direction, seven in ten with a motion. Nothing if no direction is found. */
+inline std::optional<Approach> AnyApproach(Random& random, const Problem& problem, const Tube& tube,
+                                           const Schedule& schedule) {
+  const int p = static_cast<int>(problem.projection.rows()), t = random.Integer(0, tube.length());
+  Approach approach;
+  approach.shape = AnyShape(random, p);
+  if (random.Coin(0.7)) approach.motion = AnyMotion(random, p, schedule, tube.length());
+  approach.place =
+      problem.projection * Eigen::Map<const Eigen::VectorXd>(tube.slice(t).center().data(), tube.slice(t).dim());
+  if (approach.motion) {
+    const std::int64_t at = schedule.start_us + t * schedule.step_us;
+    approach.place -= approach.motion->velocity.head(p) * (static_cast<double>(at - approach.motion->stamp_us) * 1e-6);
+  }
+  approach.direction = random.Vector(p);
+  if (approach.direction.norm() < 1e-3) return std::nullopt;
+  approach.direction.normalize();
+  return approach;
+}
+
+/** The edge between two answers, found by halving: accepted(away) holds at the result, and not 1e-11 m before it.
+Nothing if it holds nowhere up to some hundred metres. */
+template <class Accepted>
+std::optional<double> JustAccepted(Accepted accepted) {
+  double near = 0, far = 1;
+  while (far < 500 && !accepted(far)) far *= 2;
+  if (far >= 500) return std::nullopt;
+  for (int i = 0; i < 45; ++i) (accepted((near + far) / 2) ? far : near) = (near + far) / 2;
+  return far;
 }
 
 /** A problem of problems.h in 1, 2 or 3 safety coordinates, with a body and mostly with bounds between the samples. In

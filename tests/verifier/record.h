@@ -12,7 +12,7 @@
 namespace forereach {
 
 [[nodiscard]] inline verifier::RecordedSlice RecordOf(const Certifier& certifier, const Tube& tube, int t,
-                                                      std::span<const Obstacle> obstacles) {
+                                                      std::span<const Obstacle> obstacles, const Schedule& schedule) {
   const Zonotope& slice = tube.slice(t);
   const int n = slice.dim();
   verifier::RecordedSlice record;
@@ -29,8 +29,9 @@ namespace forereach {
   record.has_generators = true;
   Zonotope projected;
   certifier.projection().Enclose(slice, tube.half_width(t), projected);
-  for (const Obstacle& obstacle : obstacles)
-    record.clearance.push_back(certifier.SeparateSlice(tube, t, obstacle).clearance());
+  if (t < certifier.safety().NumUnits(tube))
+    for (const Obstacle& obstacle : obstacles)
+      record.clearance.push_back(certifier.SeparateSlice(tube, t, obstacle, schedule).clearance());
   record.radius = RadiusUpper(projected);
   if (t == tube.length()) return record;
   const StepRecord& step = tube.step(t);
@@ -50,7 +51,9 @@ namespace forereach {
   for (int t = 0; t < plan.num_steps; ++t)
     for (int i = 0; i < plan.num_inputs; ++i) certificate.controls(i, t) = plan.input(t)[static_cast<std::size_t>(i)];
   certificate.obstacles = obstacles;
-  for (int t = 0; t <= tube.length(); ++t) certificate.slices.push_back(RecordOf(certifier, tube, t, obstacles));
+  certificate.schedule = plan.schedule;
+  for (int t = 0; t <= tube.length(); ++t)
+    certificate.slices.push_back(RecordOf(certifier, tube, t, obstacles, plan.schedule));
   return certificate;
 }
 
