@@ -64,6 +64,8 @@ class BicycleMotion final : public RobotMotion {
   }
 
  private:
+  void HoldSteering(Eigen::MatrixXd& controls) const override { controls.row(1).setZero(); }
+
   static constexpr std::size_t kTheta = 2, kV = 3, kA = 4, kDelta = 5;
 
   static double WheelbaseOf(const NominalModel& model, double dt) {
@@ -161,6 +163,8 @@ class PointMassMotion final : public RobotMotion {
   }
 
  private:
+  void HoldSteering(Eigen::MatrixXd&) const override {}
+
   double dt_, deceleration_;
 };
 

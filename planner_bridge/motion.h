@@ -37,10 +37,25 @@ class RobotMotion {
   @return false, with `controls` unspecified, if this takes more than max_steps. */
   [[nodiscard]] virtual bool Brake(std::span<const double> x, int tail, int max_steps,
                                    Eigen::MatrixXd& controls) const = 0;
+
+  /** The number of ways to stop. Way 0 holds the steering as it is; the others are the braking tails, which evade. */
+  [[nodiscard]] int num_stops() const { return 1 + num_tails(); }
+
+  /** The same as Brake, in one of the ways to stop, 0 .. num_stops() - 1. */
+  [[nodiscard]] bool Stop(std::span<const double> x, int way, int max_steps, Eigen::MatrixXd& controls) const {
+    if (!Brake(x, way == 0 ? 0 : way - 1, max_steps, controls)) return false;
+    if (way == 0) HoldSteering(controls);
+    return true;
+  }
+
+ private:
+  /** Changes the controls of a braking tail so that the wheels keep their angle; nothing without wheels. */
+  virtual void HoldSteering(Eigen::MatrixXd& controls) const = 0;
 };
 
 /** The motion of the problem's model: kinematic_bicycle or point_mass.
-@param braking deceleration of a braking tail, m/s^2, positive; less if the domain does not allow it.
+@param braking deceleration of a braking tail, m/s^2, positive; less if the domain does not allow it, so infinity is the
+hardest that it allows.
 @throws std::invalid_argument for any other model. */
 [[nodiscard]] std::unique_ptr<RobotMotion> MakeMotion(const Problem& problem, double braking);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <ostream>
 
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/task/json_text.h"
+#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 
 namespace forereach {
@@ -33,9 +35,11 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       half_width_(HalfWidth(config)),
       residual_(config.problem),
       proposer_(MakeProposer(config)),
+      hardest_(MakeMotion(*config.problem, std::numeric_limits<double>::infinity())),
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
+  bus.Subscribe(config_.bus.withdrawn, [this](const Received& received) { OnWithdrawn(received); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
 }
 
@@ -56,7 +60,7 @@ void PlannerNode::OnRobotState(const Received& received) {
   Follow(*state);
   if (!arrived_ && !finished_ && !round_ && !waiting_start_ && obstacles_.WhyUnknown(received.utime).empty() &&
       NextPlanIsDue(*state))
-    BeginRound(*state);
+    BeginRound(*state, config_.planner.lead_steps, false);
 }
 
 bool PlannerNode::IsUsable(const robot_state_t& state, std::int64_t now_us) const {
@@ -83,6 +87,7 @@ bool PlannerNode::IsAtGoal(const robot_state_t& state) const {
 
 // Updates the earlier plans from the state: the executing plan, and the starts that have passed.
 void PlannerNode::Follow(const robot_state_t& state) {
+  last_state_ = state;
   finished_ = state.mode == robot_state_t::FINISHED;
   arrived_ = arrived_ || IsAtGoal(state);
   if (round_ && (arrived_ || finished_ || round_->start_utime <= state.utime)) EndRound(false);
@@ -91,23 +96,25 @@ void PlannerNode::Follow(const robot_state_t& state) {
     plans_.erase(plans_.begin(), plans_.lower_bound(state.executing_plan_id));
   else if (!round_ && !waiting_start_)
     plans_.clear();
+  std::erase_if(withdrawn_, [this](const auto& withdrawn) { return !plans_.contains(withdrawn.first); });
 }
 
 bool PlannerNode::NextPlanIsDue(const robot_state_t& state) const {
   if (state.mode == robot_state_t::STANDING) return true;
   const auto plan = plans_.find(state.executing_plan_id);
   return plan != plans_.end() && 0 <= state.executing_step && state.executing_step < plan->second.num_steps &&
-         state.executing_step + config_.planner.lead_steps >= plan->second.progress_steps;
+         (withdrawn_.contains(plan->first) ||
+          state.executing_step + config_.planner.lead_steps >= plan->second.progress_steps);
 }
 
 // Simulates from the measured state through the controls that will be applied before the start.
-std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& state) const {
+std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& state, std::int64_t lead_steps) const {
   const std::size_t n = static_cast<std::size_t>(state.num_states);
   Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
   const bool executing = state.mode == robot_state_t::EXECUTING;
   const candidate_plan_t* plan = executing ? &plans_.at(state.executing_plan_id) : nullptr;
-  const int first = state.executing_step, start = first + config_.planner.lead_steps;
-  for (int step = first; executing && step < std::min<int>(start, plan->num_steps); ++step) {
+  const std::int64_t first = state.executing_step, start = first + lead_steps;
+  for (std::int64_t step = first; executing && step < std::min<std::int64_t>(start, plan->num_steps); ++step) {
     std::array<double, kMaxVariables> z;
     std::copy_n(plan->control[step], plan->num_inputs, std::copy_n(x.data(), n, z.begin()));
     residual_.Predict({z.data(), n + static_cast<std::size_t>(plan->num_inputs)}, {x.data(), n});
@@ -117,11 +124,53 @@ std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& st
   return x;
 }
 
-void PlannerNode::BeginRound(const robot_state_t& state) {
-  const std::optional<Eigen::VectorXd> center = PredictStart(state);
+void PlannerNode::BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops) {
+  const std::optional<Eigen::VectorXd> center = PredictStart(state, lead_steps);
   if (!center) return;
-  ++rounds_;
-  round_ = Round{state.utime + config_.planner.lead_steps * period_us_, *center, Lessons(config_.planner)};
+  ++(stops ? stopping_rounds_ : rounds_);
+  round_ = Round{state.utime + lead_steps * period_us_, *center, Lessons(config_.planner), stops};
+}
+
+// ---- Withdrawals.
+
+void PlannerNode::OnWithdrawn(const Received& received) {
+  const auto withdrawal = Decoded<withdrawal_t>(received.bytes);
+  if (!withdrawal || GetText(withdrawal->source) != kSource) {
+    ++ignored_;
+    return;
+  }
+  const auto plan = plans_.find(withdrawal->plan_id);
+  if (plan == plans_.end()) return;  // it is over
+  const int valid_steps = std::max<int>(withdrawal->valid_steps, 0);
+  const auto [known, is_first] = withdrawn_.try_emplace(withdrawal->plan_id, valid_steps);
+  if (!is_first && valid_steps >= known->second) return;  // a repetition
+  known->second = valid_steps;
+  ++withdrawals_;
+  if (waiting_start_ && waiting_plan_ == withdrawal->plan_id) waiting_start_.reset();
+  const bool executes = last_state_.mode == robot_state_t::EXECUTING && last_state_.executing_plan_id == plan->first &&
+                        0 <= last_state_.executing_step && last_state_.executing_step < plan->second.num_steps;
+  if (executes && !finished_ && !TakesOver(valid_steps)) BeginStop(valid_steps, received.utime);
+}
+
+// Whether a certified plan starts while the executing one stands.
+bool PlannerNode::TakesOver(int valid_steps) const {
+  return waiting_start_ &&
+         *waiting_start_ <= last_state_.utime + (valid_steps - last_state_.executing_step) * period_us_;
+}
+
+// Steps from the last state to the first boundary for which a candidate that is sent now can be decided on. A part of
+// the time is for the way there and back.
+std::int64_t PlannerNode::StepsToAStop(std::int64_t now_us) const {
+  const std::int64_t earliest = now_us + 2 * Microseconds(config_.gate.decision_budget_ms) - last_state_.utime;
+  return std::max<std::int64_t>((earliest + period_us_ - 1) / period_us_, 1);
+}
+
+void PlannerNode::BeginStop(int valid_steps, std::int64_t now_us) {
+  if (round_) EndRound(false);
+  const std::int64_t lead_steps = StepsToAStop(now_us);
+  if (last_state_.executing_step + lead_steps > valid_steps) return;  // the guard stops the robot before
+  waiting_start_.reset();
+  BeginRound(last_state_, lead_steps, true);
 }
 
 void PlannerNode::EndRound(bool certified) {
@@ -134,12 +183,13 @@ void PlannerNode::EndRound(bool certified) {
 }
 
 void PlannerNode::SearchOnce(std::int64_t now_us) {
-  const auto search_us = static_cast<std::int64_t>(config_.planner.time_limit_ms * 1e3);
-  if (round_->searches == config_.planner.candidates || now_us + search_us >= round_->start_utime)
-    return EndRound(false);
+  const std::int64_t takes_us =
+      round_->stops ? Microseconds(config_.gate.decision_budget_ms) : Microseconds(config_.planner.time_limit_ms);
+  const int most = round_->stops ? hardest_->num_stops() : config_.planner.candidates;
+  if (round_->searches == most || now_us + takes_us >= round_->start_utime) return EndRound(false);
   ++round_->searches;
   ++searches_;
-  const std::optional<Proposal> proposal = proposer_->Propose(RequestOf(*round_));
+  const std::optional<Proposal> proposal = Propose();
   if (!proposal) {
     ++fruitless_searches_;
     return;
@@ -149,6 +199,15 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
   ++proposed_;
   round_->awaited_plan = candidate.plan_id;
   plans_[candidate.plan_id] = candidate;
+}
+
+std::optional<Proposal> PlannerNode::Propose() {
+  if (!round_->stops) return proposer_->Propose(RequestOf(*round_));
+  Proposal proposal;
+  const std::span<const double> state(round_->center.data(), static_cast<std::size_t>(round_->center.size()));
+  if (!hardest_->Stop(state, round_->searches - 1, kMaxSteps, proposal.controls) || proposal.controls.cols() == 0)
+    return std::nullopt;
+  return proposal;
 }
 
 PlanRequest PlannerNode::RequestOf(const Round& round) const {
@@ -194,6 +253,7 @@ void PlannerNode::OnDecision(const Received& received) {
 void PlannerNode::Learn(const decision_t& decision) {
   if (decision.outcome == decision_t::CERTIFIED) {
     ++certified_;
+    waiting_plan_ = decision.plan_id;
     return EndRound(true);
   }
   plans_.erase(decision.plan_id);
@@ -225,7 +285,9 @@ std::string PlannerNode::Summary() const {
                                          {"abstained", abstained_},
                                          {"rejected", rejected_},
                                          {"unanswered", unanswered_},
+                                         {"withdrawn", withdrawals_},
                                          {"rounds", rounds_},
+                                         {"stopping_rounds", stopping_rounds_},
                                          {"rounds_without_certificate", fruitless_rounds_},
                                          {"searches_without_result", fruitless_searches_},
                                          {"messages_ignored", ignored_},

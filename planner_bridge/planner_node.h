@@ -1,4 +1,4 @@
-/** The planner's node: it receives robot states and decisions, and sends candidates.
+/** The planner's node: it receives robot states, decisions and withdrawals, and sends candidates.
 
 A round searches for a certified plan in response to one robot state. The plan starts lead_steps boundaries later, at
 the state that the executing plan will have reached by then. A round begins while the robot holds still, or when that
@@ -13,6 +13,12 @@ A round ends without a certificate after `candidates` searches, or when too litt
 next state begins another round. With gate.obstacles bus, no round begins before the obstacles are known, and a round
 ends when they become unknown (obstacles_in_force.h). All planning runs in Tick, one search at a time. After the robot
 has reached the goal, or has reported FINISHED, no round begins.
+
+If the executing plan is withdrawn, the round ends, and a stopping round begins at once, unless a certified plan takes
+over while the plan still stands. Its candidates start at the first boundary for which a decision is in time, and not
+after what stands. They have no progress part: they brake as hard as the domain allows, first with the steering held,
+then in the other ways to stop (RobotMotion::Stop). Obstacles do not select them; the certifier does. If a plan that
+waits for its start is withdrawn, or no stop is certified, the next state begins another round.
 
 Some messages are counted and ignored: those that do not decode, that contain a number that is not finite, or that are
 stamped ahead of the clock by more than gate.max_ahead_ms; obstacles that the gate would refuse (obstacles_in_force.h);
@@ -53,8 +59,8 @@ class PlannerNode final : public Node {
   /** Prints Summary() on one line. */
   void Stop() override;
 
-  /** One JSON object: proposed, certified, abstained and rejected (counts by cause), unanswered, rounds,
-  rounds_without_certificate, searches_without_result, messages_ignored, messages_not_sent. */
+  /** One JSON object: proposed, certified, abstained and rejected (counts by cause), unanswered, withdrawn (plans),
+  rounds, stopping_rounds, rounds_without_certificate, searches_without_result, messages_ignored, messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 
  private:
@@ -62,21 +68,27 @@ class PlannerNode final : public Node {
     std::int64_t start_utime;
     Eigen::VectorXd center;  // of X_0
     Lessons lessons;
+    bool stops = false;  // a stopping round
     int searches = 0;
     std::int64_t awaited_plan = -1;  // the plan whose decision is outstanding, -1 if none
   };
 
   void OnRobotState(const Received& received);
   void OnDecision(const Received& received);
+  void OnWithdrawn(const Received& received);
   void OnObstacles(const Received& received);
 
   [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
   [[nodiscard]] bool TakeOrder(const robot_state_t& state, std::int64_t now_us);
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
-  [[nodiscard]] std::optional<Eigen::VectorXd> PredictStart(const robot_state_t& state) const;
+  [[nodiscard]] std::optional<Eigen::VectorXd> PredictStart(const robot_state_t& state, std::int64_t lead_steps) const;
+  [[nodiscard]] std::int64_t StepsToAStop(std::int64_t now_us) const;
+  [[nodiscard]] bool TakesOver(int valid_steps) const;
+  void BeginStop(int valid_steps, std::int64_t now_us);
+  [[nodiscard]] std::optional<Proposal> Propose();
   void Follow(const robot_state_t& state);
-  void BeginRound(const robot_state_t& state);
+  void BeginRound(const robot_state_t& state, std::int64_t lead_steps, bool stops);
   void EndRound(bool certified);
   void SearchOnce(std::int64_t now_us);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
@@ -90,10 +102,14 @@ class PlannerNode final : public Node {
   const Eigen::VectorXd half_width_;  // of X_0
   const ResidualEstimate residual_;
   const std::unique_ptr<Proposer> proposer_;
+  const std::unique_ptr<RobotMotion> hardest_;  // braking as hard as the domain allows
 
   std::optional<Round> round_;
   std::map<std::int64_t, candidate_plan_t> plans_;  // sent, undecided or certified, and not superseded
   std::optional<std::int64_t> waiting_start_;       // start of a certified plan that has not begun yet
+  std::int64_t waiting_plan_ = -1;                  // its plan_id
+  robot_state_t last_state_{};                      // of the robot, the newest; num_states 0: none yet
+  std::map<std::int64_t, int> withdrawn_;           // valid_steps, of plans in plans_
   StreamOrder states_;                              // the robot's
   std::int64_t next_plan_id_ = 0;                   // 0 before the first tick
   ObstaclesInForce obstacles_;
@@ -101,7 +117,7 @@ class PlannerNode final : public Node {
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
-               fruitless_rounds_ = 0, ignored_ = 0;
+               stopping_rounds_ = 0, withdrawals_ = 0, fruitless_rounds_ = 0, ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
 };
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -9,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/obstacle_message.h"
+#include "forereach/withdrawal_t.hpp"
 #include "tests/planner/tasks.h"
 
 namespace forereach {
@@ -509,6 +511,152 @@ TEST_F(PlannerNodeTest, TheSameMessagesGetTheSameCandidates) {
   const auto first = run();
   EXPECT_EQ(first.size(), 4u);
   EXPECT_EQ(first, run());
+}
+
+class WithdrawnPlanTest : public PlannerNodeTest {
+ protected:
+  // The robot executes the first candidate, at this step.
+  void Execute(int step) {
+    Say(Standing());
+    Run(3);
+    Certify();
+    now_ = candidates_[0].start_utime + step * kPeriod;
+    Say(Executing(candidates_[0], step));
+    Run(3);
+    ASSERT_EQ(candidates_.size(), 1u) << "no other is due";
+  }
+  void Withdraw(int valid_steps, std::size_t which = 0) {
+    withdrawal_t withdrawal{};
+    withdrawal.utime = now_;
+    withdrawal.sequence = sequence_++;
+    withdrawal.plan_id = candidates_[which].plan_id;
+    withdrawal.valid_steps = static_cast<std::int16_t>(valid_steps);
+    std::copy(std::begin(candidates_[which].source), std::end(candidates_[which].source), withdrawal.source);
+    ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, withdrawal));
+    Deliver();
+  }
+
+  std::int64_t sequence_ = 0;
+};
+
+TEST_F(WithdrawnPlanTest, AStopIsProposedAtOnceFromTheNextHandover) {
+  Execute(3);
+  Withdraw(6);
+  Run(1);
+  ASSERT_EQ(candidates_.size(), 2u);
+  const candidate_plan_t& stop = candidates_[1];
+  EXPECT_EQ(stop.start_utime, candidates_[0].start_utime + 4 * kPeriod);
+  EXPECT_EQ(stop.progress_steps, 0);
+  const robot_state_t begin = Executing(candidates_[0], 4), end = Executing(stop, stop.num_steps);
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(stop.initial_center[k], begin.state[k], 1e-12);
+  EXPECT_NEAR(end.state[3], 0, 1e-9);
+  EXPECT_NEAR(end.state[4], 0, 1e-9);
+  for (int t = 0; t < stop.num_steps; ++t) EXPECT_EQ(stop.control[t][1], 0) << "the steering is held";
+  EXPECT_EQ(Summary()["withdrawn"], 1);
+  EXPECT_EQ(Summary()["stopping_rounds"], 1);
+}
+
+TEST_F(WithdrawnPlanTest, OtherWaysToStopFollowAnAbstention) {
+  Execute(3);
+  Withdraw(6);
+  Run(1);
+  for (std::size_t count = 2; count <= 7; ++count) {
+    ASSERT_EQ(candidates_.size(), count);
+    AbstainS();
+    Run(1);
+  }
+  EXPECT_EQ(candidates_.size(), 7u) << "there are six ways";
+  std::set<std::vector<double>> steering;
+  for (std::size_t i = 1; i < candidates_.size(); ++i) {
+    auto& rates = candidates_[i].control;
+    std::vector<double> its;
+    for (int t = 0; t < candidates_[i].num_steps; ++t) its.push_back(rates[t][1]);
+    steering.insert(its);
+  }
+  EXPECT_GE(steering.size(), 3u) << "held, to the left, to the right";
+}
+
+TEST_F(WithdrawnPlanTest, NoStopIsProposedBeyondWhatStands) {
+  Execute(3);
+  Withdraw(3);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u);
+  Withdraw(4);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u) << "what was withdrawn does not stand again";
+}
+
+TEST_F(WithdrawnPlanTest, TheLastBoundaryThatStandsIsStillGood) {
+  Execute(3);
+  Withdraw(4);
+  Run(1);
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(WithdrawnPlanTest, ARepetitionBeginsNoOtherRound) {
+  Execute(3);
+  Withdraw(6);
+  Run(1);
+  Certify();
+  Withdraw(6);
+  Withdraw(6);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["withdrawn"], 1);
+}
+
+TEST_F(WithdrawnPlanTest, ARoundUnderWayGivesWayToTheStop) {
+  Execute(3);
+  const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
+  now_ = candidates_[0].start_utime + due * kPeriod;
+  Say(Executing(candidates_[0], due));
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  Withdraw(due + 2);
+  Run(1);
+  ASSERT_EQ(candidates_.size(), 3u);
+  EXPECT_EQ(candidates_[2].progress_steps, 0);
+}
+
+TEST_F(WithdrawnPlanTest, ACertifiedPlanThatTakesOverInTimeIsEnough) {
+  Execute(3);
+  const int due = candidates_[0].progress_steps - config_.planner.lead_steps;
+  now_ = candidates_[0].start_utime + due * kPeriod;
+  Say(Executing(candidates_[0], due));
+  Run(3);
+  Certify();
+  Withdraw(due + config_.planner.lead_steps);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  Withdraw(due + config_.planner.lead_steps - 1);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 3u) << "now it comes too late";
+}
+
+TEST_F(WithdrawnPlanTest, AWithdrawnPlanThatHasNotBegunIsReplaced) {
+  Say(Standing());
+  Run(3);
+  Certify();
+  Withdraw(0);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u) << "it needs a state to begin from";
+  now_ += kPeriod;
+  Say(Standing());
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+}
+
+TEST_F(WithdrawnPlanTest, WithdrawalsOfOthersAreIgnored) {
+  Execute(3);
+  withdrawal_t withdrawal{};
+  withdrawal.plan_id = candidates_[0].plan_id;
+  SetText(withdrawal.source, "another");
+  ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, withdrawal));
+  ASSERT_TRUE(bus_->Publish(config_.bus.withdrawn, Bytes(std::vector<std::uint8_t>{1, 2, 3})));
+  Deliver();
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u);
+  EXPECT_EQ(Summary()["messages_ignored"], 2);
 }
 
 TEST_F(PlannerNodeTest, WorksForThePointMassToo) {
