@@ -107,7 +107,18 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
   if (std::string why = WhyNoSchedule(candidate, options_); !why.empty())
     return Rejection{decision_t::CAUSE_WRONG_DIMENSION, std::move(why)};
+  if (auto rejection = CheckStep(candidate)) return rejection;
   return CheckSource(candidate, now_us);
+}
+
+std::optional<Gate::Rejection> Gate::CheckStep(const candidate_plan_t& candidate) const {
+  const std::optional<Between>& between = certifier_.problem().between;
+  if (!between) return std::nullopt;
+  const std::int64_t longest = Microseconds(between->period * 1e3);
+  if (1 <= candidate.step_us && candidate.step_us <= longest) return std::nullopt;
+  return Rejection{decision_t::CAUSE_WRONG_DIMENSION, "step_us is " + std::to_string(candidate.step_us) +
+                                                          ", must be 1 to " + std::to_string(longest) +
+                                                          ", model.dt: task.between bounds the motion in this time"};
 }
 
 std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const {

@@ -89,6 +89,10 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   config.path = path;
   config.grounds = GroundsOf(DigestOf(file.text()), problem, config.obstacles);
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
+  if (problem.between && config.robot.step_period_ms > config.period * 1e3)
+    file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", longer than model.dt, " +
+                                          ToText(config.period * 1e3) +
+                                          " ms, the time in which task.between bounds the motion");
   config.problem = std::make_shared<const Problem>(std::move(problem));
   return std::move(config);
 }

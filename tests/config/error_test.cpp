@@ -27,7 +27,7 @@ TEST_F(ErrorTest, UnknownKeys) {
   EXPECT_EQ(ErrorAfter("gate: {colour: 3}\n"),
             "task.yaml:20: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
             "decision_budget_ms, queue, mode, arming, robot_timeout_ms, max_clock_jump_ms, "
-            "obstacles, obstacles_timeout_ms, learn, require_stop, state");
+            "max_clock_error_ms, obstacles, obstacles_timeout_ms, learn, require_stop, state");
   EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
             "task.yaml:9: declaration.lipschitz.theta: unknown key; known here: px, py, vx, vy");
   EXPECT_EQ(files_.ErrorWith("{vx: 0.1, vy", "{vx: 0.1, v_y"),
@@ -142,6 +142,9 @@ TEST_F(ErrorTest, BoundsBetweenSamples) {
             "task.yaml:19: task.between.turn_acceleration: is for a body with a heading, the last name of "
             "task.body.pose");
 
+  EXPECT_THAT(files_.Error(Replaced(kTask, "between: samples", "between: {acceleration: [1, 1]}") +
+                           "robot: {step_period_ms: 150.001}\n"),
+              HasSubstr(": robot.step_period_ms: is 150.001, longer than model.dt, 150 ms, the time in which"));
   const auto turning = [&](const std::string& between) {
     const std::string body = "  body: {pose: [px, py, vx], parts: [{disc: {at: [1, 0], radius: 1}}]}";
     return files_.Error(Replaced(Replaced(kTask, "  projection: [px, py]", body), "between: samples",

@@ -180,6 +180,23 @@ TEST_F(GateRefusalTest, WrongDimension) {
     ExpectRefused(decision_t::CAUSE_WRONG_DIMENSION, [progress](auto& c) { c.progress_steps = progress; });
 }
 
+TEST_F(GateRefusalTest, ALongerStepThanItsMotionIsBoundedFor) {
+  Config config = SmallTask();
+  Problem problem = *config.problem;
+  problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, 0.15};
+  config.problem = std::make_shared<const Problem>(std::move(problem));
+  Gate gate(config);
+  const auto cause_of = [&](std::int64_t step_us) {
+    candidate_plan_t candidate = Candidate(next_plan_id_++);
+    candidate.step_us = step_us;
+    return gate.Decide(Encode(candidate), kNow).decision.cause;
+  };
+  for (const std::int64_t step_us : {std::int64_t{1}, std::int64_t{150'000}})
+    EXPECT_EQ(cause_of(step_us), decision_t::CAUSE_NONE) << step_us;
+  for (const std::int64_t step_us : {kMin, std::int64_t{0}, std::int64_t{150'001}, kMax})
+    EXPECT_EQ(cause_of(step_us), decision_t::CAUSE_WRONG_DIMENSION) << step_us;
+}
+
 TEST_F(GateRefusalTest, SmallestAndLargestDimensionsAreAdmitted) {
   ExpectAdmitted([](auto& c) { c.num_steps = 1, c.progress_steps = 0; });
   ExpectAdmitted([](auto& c) { c.num_steps = 1, c.progress_steps = 1; });
