@@ -26,6 +26,7 @@
 #include "forereach/command_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/obstacles_t.hpp"
+#include "forereach/obstacles_v2_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "tests/faults/demo_task.h"
@@ -677,7 +678,7 @@ class Campaign final {
     return rig.witness().CauseOf(digest);
   }
 
-  // The obstacles that are sent are not known to the certifier: every candidate is rejected for that.
+  // The obstacles that are sent are not known to the certifier: every candidate is refused for that.
   void DemandUnknown(Row& row, Rig& rig, const std::string& when) {
     const auto cause = CauseOfACandidate(rig);
     const bool rejected = cause == decision_t::CAUSE_NO_OBSTACLES || cause == decision_t::CAUSE_NOT_ARMED ||
@@ -691,12 +692,12 @@ class Campaign final {
   void ObstacleTries(const std::string& fault, const std::function<void(Row&, Rig&, int)>& hurt) {
     const Config world = LoadConfig(world_.Write("world.yaml", DemoTask()));
     Rig rig(DemoTaskOnTheBus(), {.seen = world.obstacles});
-    rig.witness().SetWorld(world.grounds.obstacles);
+    rig.witness().SetWorld({world.grounds.obstacles});
     Row& row = Begin(fault, options_.others);
     told_unknown_ = 0;
     Tries(
         row, rig, [&](int i) { hurt(row, rig, i); }, options_.others);
-    if (told_unknown_ > 0) Remark(row, std::to_string(told_unknown_) + " candidates rejected as no_obstacles");
+    if (told_unknown_ > 0) Remark(row, std::to_string(told_unknown_) + " candidates answered no_obstacles");
   }
 
   void Obstacles() {
@@ -753,6 +754,98 @@ class Campaign final {
     });
   }
 
+  // Beside the course, slowly away from it: so it heals for as long as the tries take.
+  static Obstacle Drifting(double x, double y) {
+    ObstacleMotion motion;
+    motion.stamp_us = WallClockUs();
+    motion.velocity.y() = 0.02;
+    motion.uncertainty = 0.1;
+    return Obstacle::Circle(Eigen::Vector2d(x, y), 0.5).Moving(motion);
+  }
+
+  // The same where one of the obstacles moves. `hurt` is told all of them.
+  void MovingTries(const std::string& fault, const std::function<void(Row&, Rig&, int, std::vector<Obstacle>&)>& hurt) {
+    std::vector<Obstacle> seen = LoadConfig(world_.Write("world.yaml", DemoTask())).obstacles;
+    seen.push_back(Drifting(60, 14));
+    Rig rig(DemoTaskOnTheBus(", max_clock_error_ms: 400"), {.seen = seen});
+    rig.witness().SetWorld({ObstaclesDigest(seen)});
+    Row& row = Begin(fault, options_.others);
+    told_unknown_ = 0;
+    Tries(
+        row, rig, [&](int i) { hurt(row, rig, i, seen); }, options_.others);
+    if (told_unknown_ > 0) Remark(row, std::to_string(told_unknown_) + " candidates answered no_obstacles");
+  }
+
+  // Of a piece of a prediction: each is refused as a whole message.
+  static void Garble(obstacles_v2_t& message, int way) {
+    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+    obstacle_v2_t& piece = message.obstacle[message.num_obstacles - 1];  // the one that moves
+    switch (way) {
+      case 0: piece.from_utime = message.utime + 1; return;  // it appears from nowhere
+      case 1: piece.from_utime = kMost, piece.until_utime = -kMost; return;
+      case 2: piece.growth = -1; return;
+      case 3: piece.velocity[0] = std::numeric_limits<double>::quiet_NaN(); return;
+      case 4: piece.utime = kMost; return;
+      case 5: piece.uncertainty = std::numeric_limits<double>::infinity(); return;
+      case 6: piece.gone = 2; return;
+      default:  // a gap between two pieces
+        obstacle_v2_t& next = message.obstacle[message.num_obstacles++];
+        next = piece;
+        piece.until_utime = message.utime + 1'000'000;
+        next.from_utime = message.utime + 1'000'001;
+    }
+  }
+
+  void Moving() {
+    MovingTries("Moving OBSTACLES fall silent", [&](Row& row, Rig& rig, int, auto&) {
+      rig.perception().SetSilent(true);
+      rig.Listen(milliseconds(1100));  // gate.obstacles_timeout_ms is 1000
+      const std::int64_t before = rig.witness().certificates();
+      for (int j = 0; j < 3; ++j) DemandUnknown(row, rig, "after the timeout");
+      Demand(row, rig.witness().certificates() == before, "it certified after the timeout");
+      rig.perception().SetSilent(false);
+    });
+    MovingTries("Moving OBSTACLES come too late (signed)", [&](Row& row, Rig& rig, int, auto&) {
+      rig.perception().SetSilent(true);
+      rig.perception().SayNow([](obstacles_v2_t& message) {
+        message.utime -= 600'000;  // gate.max_age_ms is 500
+        return true;
+      });
+      rig.Listen(milliseconds(50));
+      DemandUnknown(row, rig, "after a message that was too late");
+      rig.perception().SetSilent(false);
+    });
+    MovingTries("Moving OBSTACLES with garbage in windows, motion and stamps, or of another type (signed)",
+                [&](Row& row, Rig& rig, int i, auto&) {
+                  rig.perception().SetSilent(true);
+                  if (i % 9 == 8)
+                    rig.bus().Publish(rig.config().bus.obstacles, transition_t{});
+                  else
+                    rig.perception().SayNow([&](obstacles_v2_t& message) {
+                      Garble(message, i % 9);
+                      return true;
+                    });
+                  rig.Listen(milliseconds(50));
+                  DemandUnknown(row, rig, "after a message that was garbage");
+                  rig.perception().SetSilent(false);
+                });
+    MovingTries("A moving obstacle jumps in front of the robot, and away again", [&](Row&, Rig& rig, int, auto& seen) {
+      const certified_plan_t* plan = rig.witness().last_certified();
+      const double ahead = plan ? plan->plan.initial_center[0] + 8 + Below(12) : 20;
+      const auto jump = [&](const Obstacle& to) {
+        const Digest before = ObstaclesDigest(seen);
+        seen.back() = to;
+        rig.witness().SetWorld({before, ObstaclesDigest(seen)});
+        rig.perception().See(seen);
+        rig.Listen(milliseconds(500));  // what was decided before it was heard has arrived
+        rig.witness().SetWorld({ObstaclesDigest(seen)});
+        rig.Listen(milliseconds(500 + Below(500)));
+      };
+      jump(Drifting(ahead, Below(9) - 4.0));
+      jump(Drifting(60, 14));
+    });
+  }
+
   void Disks();
   void Gone();
   void Routes() { NoNetwork(), LostRoute(); }
@@ -778,10 +871,10 @@ const std::vector<Campaign::Kind> Campaign::kKinds{
     {"lies", &Campaign::Lies},           {"nonsense", &Campaign::Nonsense},
     {"latch", &Campaign::LatchedKills},  {"statedisk", &Campaign::StateDisks},
     {"strangers", &Campaign::Strangers}, {"obstacles", &Campaign::Obstacles},
-    {"forgeries", &Campaign::Forgeries}, {"flood", &Campaign::Flood},
-    {"datagrams", &Campaign::Datagrams}, {"disks", &Campaign::Disks},
-    {"gone", &Campaign::Gone},           {"route", &Campaign::Routes},
-    {"reload", &Campaign::BadReload}};
+    {"moving", &Campaign::Moving},       {"forgeries", &Campaign::Forgeries},
+    {"flood", &Campaign::Flood},         {"datagrams", &Campaign::Datagrams},
+    {"disks", &Campaign::Disks},         {"gone", &Campaign::Gone},
+    {"route", &Campaign::Routes},        {"reload", &Campaign::BadReload}};
 
 // A small file system of its own for the log, filled, made read-only, and given back.
 void Campaign::Disks() {

@@ -24,9 +24,9 @@ inline std::string DemoTaskWithGate(const std::string& gate) {
   return task.replace(task.find(demos), demos.size(), gate);
 }
 
-/** The same with its obstacles taken out: they are on the bus only. */
-inline std::string DemoTaskOnTheBus() {
-  std::string task = DemoTaskWithGate("{obstacles: bus}");
+/** The same with its obstacles taken out: they are on the bus only. @param more YAML of the gate that is added. */
+inline std::string DemoTaskOnTheBus(const std::string& more = "") {
+  std::string task = DemoTaskWithGate("{obstacles: bus" + more + "}");
   const std::size_t begin = task.find("  obstacles:\n"), end = task.find("\n\n", begin);
   return task.replace(begin, end - begin, "  obstacles: []");
 }

@@ -40,13 +40,19 @@ class Perception final {
     const std::lock_guard lock(mutex_);
     silent_ = silent;
   }
+  /** What is seen from now on. */
+  void See(const std::vector<Obstacle>& obstacles) {
+    const std::lock_guard lock(mutex_);
+    sender_.Set(obstacles);
+  }
   /** The next message now, as `spoil` leaves it; true if it was sent. */
   template <class Spoil>
   void SayNow(Spoil spoil) {
     const std::lock_guard lock(mutex_);
     auto message = sender_.Due(--set_back_us_).value();  // due: each time the clock was set back, once more
     message.utime = WallClockUs();
-    for (obstacle_v2_t& obstacle : message.obstacle) obstacle.utime = message.utime;
+    for (obstacle_v2_t& obstacle : message.obstacle)
+      if (obstacle.utime == set_back_us_) obstacle.utime = message.utime;  // it stands
     if (spoil(message)) bus_->Publish(channel_, message);
   }
 

@@ -72,7 +72,7 @@ void Witness::OnFault(const Received& received) {
 void Witness::OnCertified(const Received& received) {
   const auto plan = Decoded<certified_plan_t>(received.bytes);
   if (!plan || !FindSealFaults(*plan).empty()) return;
-  if (world_ && GetDigest(plan->obstacles_digest) != *world_)
+  if (!world_.empty() && !world_.contains(GetDigest(plan->obstacles_digest)))
     Violate("plan " + std::to_string(plan->plan.plan_id) + " was certified under other obstacles than there are");
   Certified& certified = plans_[plan->plan.plan_id];
   certified = {*plan, ++certificates_};

@@ -43,8 +43,8 @@ class Witness final {
     const auto answer = answers_.find(candidate);
     return answer == answers_.end() ? std::nullopt : std::optional(answer->second.cause);
   }
-  /** From now on it may not happen either that a plan is certified under any other obstacles than these. */
-  void SetWorld(const Digest& obstacles) { world_ = obstacles; }
+  /** From now on it may not happen either that a plan is certified under any other obstacles than one of these sets. */
+  void SetWorld(std::set<Digest> obstacles) { world_ = std::move(obstacles); }
 
   /** Candidates that the certifiers had counted one heartbeat ago and whose decisions were not heard: never sent, or
   lost on the way. */
@@ -99,7 +99,7 @@ class Witness final {
   };
   std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
   std::set<std::int64_t> unjudged_;          // plan ids
-  std::optional<Digest> world_;
+  std::set<Digest> world_;                   // empty: any
   std::optional<certifier_status_v3_t> status_;
   std::optional<logger_status_t> logger_status_;
   std::chrono::steady_clock::time_point robot_heard_{};

@@ -1147,8 +1147,10 @@ TEST_F(ReloadTest, IsTakenWholeOrNotAtAll) {
     EXPECT_THAT(GetText(status_.message), testing::HasSubstr(what + std::string(" cannot change while")));
   }
 
-  for (const auto& [gate, what] : {std::pair{"gate: {obstacles: bus}", "gate.obstacles cannot change while"},
-                                   std::pair{"gate: {}", "gate.obstacles: missing"}}) {
+  for (const auto& [gate, what] :
+       {std::pair{"gate: {obstacles: bus}", "gate.obstacles cannot change while"},
+        std::pair{"gate: {obstacles: task, max_clock_error_ms: 5}", "gate.max_clock_error_ms cannot change while"},
+        std::pair{"gate: {}", "gate.obstacles: missing"}}) {
     const std::int64_t failed = status_.failed_reloads;
     Copy([&](const std::string& text) {
       return std::regex_replace(text, std::regex("gate: \\{obstacles: task\\}"), gate);

@@ -253,6 +253,38 @@ TEST_F(ReplayTest, ObstaclesThatAreRepeatedAndASecondCertifierReplay) {
   EXPECT_EQ(result.circumstances, 2);
 }
 
+// Each message has other stamps; the sender changes its type between them.
+TEST_F(ReplayTest, ObstaclesThatMoveReplay) {
+  Config config = SmallTaskOnTheBus();
+  config.gate.max_clock_error_ms = 20;
+  const std::string path = NewLog();
+  {
+    EventLogWriter writer(path);
+    certifier_status_v3_t status{};
+    status.state = certifier_status_v3_t::ARMED;
+    Gate gate(config);
+    writer.Append(kNow, config.bus.status, Encode(status));
+    for (int i = 0; i < 12; ++i) {
+      ObstacleMotion motion;
+      motion.stamp_us = kNow - 12 + i;
+      motion.velocity.y() = -1;
+      const bool is_met = i % 3 == 1, is_old_type = i % 3 == 2;
+      const std::vector<Obstacle> seen{Obstacle::Circle(Eigen::Vector2d(0.75, is_met ? 1.25 : 5), 0.2)};
+      obstacles_v2_t moving = ToMessageV2({seen[0].Moving(motion)}, kNow + i);
+      obstacles_t standing = ToMessage(seen);
+      standing.utime = kNow + i;
+      moving.sequence = standing.sequence = i;
+      const std::vector<std::uint8_t> bytes = is_old_type ? Encode(standing) : Encode(moving);
+      writer.Append(kNow, config.bus.obstacles, bytes);
+      EXPECT_EQ(gate.UpdateObstacles(bytes, kNow), "");
+      DecideAndLog(gate, Encode(Candidate(i + 1)), is_met ? decision_t::ABSTAIN_SAFETY : decision_t::CERTIFIED, config,
+                   writer);
+    }
+    EXPECT_TRUE(writer.Flush());
+  }
+  ExpectAgreed(path, config, 12);
+}
+
 TEST_F(ReplayTest, WithTheKeyWhatIsNotAuthenticIsPassedOver) {
   const ScratchDirectory scratch;
   const auto [key, log] = SignedLog(scratch, kLog);
