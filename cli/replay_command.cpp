@@ -33,6 +33,7 @@ int RunReplay(const Options& options) {
   if (options.json) {
     std::cout << JsonText({{"candidates", result.candidates},
                            {"agreed", result.agreed},
+                           {"withdrawals", result.withdrawals},
                            {"circumstances", result.circumstances},
                            {"corruptions", result.corruptions},
                            {"passed_over", ToJson(result.passed_over)},
@@ -42,6 +43,7 @@ int RunReplay(const Options& options) {
     for (const std::string& difference : result.differences) std::cout << Printable(difference) << "\n";
     std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
               << result.differences.size() << " differ";
+    if (result.withdrawals > 0) std::cout << ", " << result.withdrawals << " withdrawals agree";
     if (result.circumstances > 0)
       std::cout << ", " << result.circumstances
                 << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";

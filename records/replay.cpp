@@ -1,5 +1,7 @@
 #include "records/replay.h"
 
+#include <algorithm>
+#include <deque>
 #include <memory>
 #include <utility>
 
@@ -48,7 +50,10 @@ bool IsCircumstance(const decision_t& decision) {
 
 class Replayer final : public TimelineUser {
  public:
-  void OnStart(const Config& task) override { gate_ = std::make_unique<Gate>(task); }
+  void OnStart(const Config& task) override {
+    gate_ = std::make_unique<Gate>(task);
+    plans_.clear();
+  }
 
   void OnReload(const Config& task) override {
     const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(task));
@@ -86,6 +91,21 @@ class Replayer final : public TimelineUser {
     for (const SealFault& fault : FindSealFaults(recorded.certified))
       Differ(recorded.event, recorded.certified.plan.plan_id,
              "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
+    if (plans_.size() == kPlans) plans_.pop_front();
+    plans_.emplace_back(GetDigest(recorded.certified.certificate_digest), recorded.certified.plan);
+  }
+
+  void OnWithdrawn(const RecordedWithdrawal& recorded) override {
+    const withdrawal_t& withdrawal = recorded.withdrawal;
+    if (withdrawal.cause == withdrawal_t::NOT_JUDGED || withdrawal.cause == withdrawal_t::UNKNOWN_PLAN) {
+      ++result_.circumstances;
+      return;
+    }
+    const std::string difference = JudgeAgain(recorded);
+    if (difference.empty())
+      ++result_.withdrawals;
+    else
+      Differ(recorded.event, withdrawal.plan_id, difference);
   }
 
   ReplayResult Finish(const Timeline& timeline) {
@@ -98,11 +118,35 @@ class Replayer final : public TimelineUser {
   }
 
  private:
+  static constexpr std::size_t kPlans = 4096;  // more than a robot can have at one time
+
+  // Empty if the plan's judgement is made again.
+  [[nodiscard]] std::string JudgeAgain(const RecordedWithdrawal& recorded) {
+    const withdrawal_t& withdrawal = recorded.withdrawal;
+    if (!recorded.is_of_known_task) return "withdrawn under another task, which is not kept next to the log";
+    const Grounds named = GroundsOf(withdrawal);
+    for (const auto& [name, digest] : kGrounds)
+      if (named.*digest != recorded.basis.grounds.*digest) return "withdrawn under other " + std::string(name);
+    const auto plan = std::ranges::find(plans_, GetDigest(withdrawal.certificate_digest), &Plan::first);
+    if (plan == plans_.end()) return "withdrawn, but its certified plan is not in the log";
+    const Standing standing = gate_->JudgeAgain(plan->second, withdrawal.first_step);
+    const Decision& verdict = standing.verdict;
+    if (standing.steps == withdrawal.valid_steps && static_cast<int>(verdict.cause) == withdrawal.cause &&
+        verdict.step == withdrawal.step && verdict.obstacle == withdrawal.obstacle)
+      return {};
+    return "withdrawn with " + std::to_string(withdrawal.valid_steps) + " steps that stand, cause " +
+           std::string(WithdrawalName(withdrawal.cause)) + "; replayed " + std::to_string(standing.steps) +
+           " steps, cause " + std::string(WithdrawalName(static_cast<std::int16_t>(verdict.cause)));
+  }
+
   void Differ(const std::string& event, std::int64_t plan_id, const std::string& what) {
     result_.differences.push_back(event + ", plan " + std::to_string(plan_id) + ": " + what);
   }
 
+  using Plan = std::pair<Digest, candidate_plan_t>;  // by its certificate
+
   std::unique_ptr<Gate> gate_;
+  std::deque<Plan> plans_;  // the last ones
   ReplayResult result_;
 };
 

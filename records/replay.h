@@ -11,23 +11,25 @@
 namespace forereach {
 
 struct ReplayResult {
-  std::int64_t candidates = 0;  ///< Candidates in the log.
-  std::int64_t agreed = 0;      ///< Decisions with the recorded outcome, step, cause and digests.
+  std::int64_t candidates = 0;   ///< Candidates in the log.
+  std::int64_t agreed = 0;       ///< Decisions with the recorded outcome, step, cause and digests.
+  std::int64_t withdrawals = 0;  ///< Withdrawals with the recorded steps, cause and obstacle.
   /** Decisions that depend on the moment and not on the plan, which are not compared: displaced, out of time, not
-  armed, obstacles unknown, in fault. */
+  armed, obstacles unknown, in fault. Withdrawals without a judgement. */
   std::int64_t circumstances = 0;
   std::int64_t corruptions = 0;  ///< Damaged places in the log.
   PassedOver passed_over;
-  /** A line for each decision that differs, each candidate without a recorded decision, each recorded decision without
-  a candidate, and each fault of a certified plan's seal. */
+  /** A line for each decision and withdrawal that differs, each candidate without a recorded decision, each recorded
+  decision without a candidate, and each fault of a certified plan's seal. */
   std::vector<std::string> differences;
 };
 
 /** Gives the candidates of consecutive logs to a new gate, each at the time of its recorded decision and with the
-obstacles and executed transitions that the decision names by digest, and compares the results. It also checks the seals
-of certified plans (lcmtypes/seal.h). Where the certifier restarted or reloaded, replay starts with a new gate. With
-bus.key only authentic messages count. Each decision is compared under the task of its config digest; a decision of an
-unknown digest differs. With a single task, every decision is compared under that task.
+obstacles and executed transitions that the decision names by digest, and compares the results. Plans that were
+withdrawn are judged again under the grounds that the withdrawal names. It also checks the seals of certified plans
+(lcmtypes/seal.h). Where the certifier restarted or reloaded, replay starts with a new gate. With bus.key only authentic
+messages count. Each decision is compared under the task of its config digest; a decision of an unknown digest differs.
+With a single task, every decision is compared under that task.
 @param tasks at least one; channels and key are those of the first.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks);

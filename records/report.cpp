@@ -151,7 +151,7 @@ class PictureMaker final : public TimelineUser {
       executed_.insert({event.plan_id, event.step});
     if (event.kind == execution_event_t::GOAL_REACHED) arrived_ = true;
     const bool stops = event.kind == execution_event_t::STANDING || event.kind == execution_event_t::STEP_OUTSIDE ||
-                       event.kind == execution_event_t::OFF_SCHEDULE;
+                       event.kind == execution_event_t::OFF_SCHEDULE || event.kind == execution_event_t::EMERGENCY_STOP;
     const auto position = PositionOf(event.state, event.num_states);
     if (stops && !arrived_ && position) result_.picture.stops.push_back(*position);
   }

@@ -71,6 +71,9 @@ std::string ToText(const Summary& summary) {
   line("steps in certified slice",
        fmt::format("{} of {}", summary.steps_inside, summary.steps_inside + summary.steps_outside));
   line("stops", fmt::format("{} ({} braking tails begun)", summary.stops, summary.tails));
+  if (summary.withdrawals > 0)
+    line("withdrawals",
+         fmt::format("{} ({} emergency stops, not certified)", summary.withdrawals, summary.emergency_stops));
   line("refused by the guard", std::to_string(summary.refused));
   line("messages", std::to_string(Total(summary.messages)) + Listed(summary.messages));
   line("messages lost", std::to_string(Total(summary.lost)) + Listed(summary.lost));
@@ -100,6 +103,8 @@ nlohmann::json ToJson(const Summary& summary) {
   json["steps"] = {{"inside", summary.steps_inside}, {"outside", summary.steps_outside}};
   json["tails"] = summary.tails;
   json["stops"] = summary.stops;
+  json["withdrawals"] = summary.withdrawals;
+  json["emergency_stops"] = summary.emergency_stops;
   json["refused"] = summary.refused;
   json["messages"] = summary.messages;
   json["lost"] = summary.lost;
@@ -161,7 +166,12 @@ void SummaryBuilder::Add(const EventRow& row) {
   if (row.kind == "goal_reached") summary_.goal_reached = true;
   if (!summary_.goal_reached) {
     if (row.kind == "tail_begun") ++summary_.tails;
-    if (row.kind == "standing" || row.kind == "step_outside") ++summary_.stops;
+    if (row.kind == "standing" || row.kind == "step_outside" || row.kind == "emergency_stop") ++summary_.stops;
+  }
+  if (row.kind == "emergency_stop") ++summary_.emergency_stops;
+  if (row.kind == "withdrawn" && withdrawn_ != std::pair(row.plan_id, static_cast<int>(row.step))) {
+    ++summary_.withdrawals;
+    withdrawn_ = {row.plan_id, static_cast<int>(row.step)};
   }
   if (row.kind == "contact") ++summary_.contacts;
   if (!row.state.empty()) state_ = row.state;

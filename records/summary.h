@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -43,9 +44,12 @@ struct Summary {
   bool goal_reached = false;                 ///< At any time of the run.
   std::int64_t contacts = 0;
   std::int64_t steps_inside = 0, steps_outside = 0;  ///< Executed steps by whether the state lay in its slice.
-  /** Before the goal: braking tails that began, and stops at a plan's end or after a step outside its slice. */
+  /** Before the goal: braking tails that began, and stops at a plan's end, after a step outside its slice or for a
+  withdrawal. */
   std::int64_t tails = 0, stops = 0;
   std::int64_t refused = 0;                  ///< Certified plans that the guard refused.
+  std::int64_t withdrawals = 0;              ///< Withdrawals that the robot has answered, without repetitions.
+  std::int64_t emergency_stops = 0;          ///< Stops for a withdrawal that no certificate covers.
   std::map<std::string, std::int64_t> lost;  ///< Messages missing, by reason.
   std::int64_t backlog = 0;                  ///< Messages that the bus discarded before the logger took them (rows.h).
   std::int64_t restarts = 0;                 ///< Restarts of senders.
@@ -91,6 +95,7 @@ class SummaryBuilder final {
   std::optional<std::int64_t> first_utime_;
   std::int64_t last_utime_ = 0;
   std::vector<double> state_;
+  std::optional<std::pair<std::int64_t, int>> withdrawn_;  // the last plan, and how many steps stand
 };
 
 /** The summary of consecutive logs, the files of one run. With bus.key only authentic messages count. Damage is skipped

@@ -10,6 +10,8 @@
 namespace forereach {
 namespace {
 
+constexpr std::size_t kWithdrawals = 4096;  // which may be repeated at one time
+
 // How many entries at the front of `ahead` were taken before a decision: see "Grounds".
 template <class Ahead, class DigestOfEntry>
 std::ptrdiff_t CountTaken(const Ahead& ahead, const Digest& now, const Digest& named, std::int64_t candidate_place,
@@ -64,6 +66,8 @@ void Timeline::Take(const LogEvent& event, const std::string& name) {
     TakeDecision(event, name);
   } else if (event.channel == channels_.certified) {
     TakeCertified(event, name);
+  } else if (event.channel == channels_.withdrawn) {
+    TakeWithdrawal(event, name);
   } else if (event.channel == channels_.status) {
     TakeStatus(event);
   } else if (event.channel == channels_.obstacles) {
@@ -249,6 +253,24 @@ void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
     recorded.basis = Current();
   }
   user_.OnCertified(recorded);
+}
+
+void Timeline::TakeWithdrawal(const LogEvent& event, const std::string& name) {
+  const auto withdrawal = Decoded<withdrawal_t>(event.message());
+  if (!withdrawal) return;
+  withdrawal_t repeated = *withdrawal;
+  repeated.utime = repeated.sequence = 0;
+  const Digest digest = DigestOf(Encode(repeated));
+  if (std::ranges::find(withdrawals_, digest) != withdrawals_.end()) return;
+  if (withdrawals_.size() == kWithdrawals) withdrawals_.pop_front();
+  withdrawals_.push_back(digest);
+  RecordedWithdrawal recorded{*withdrawal, name, true, {}};
+  const Grounds named = GroundsOf(*withdrawal);
+  const Config* task = TaskOf(named.config);
+  recorded.is_of_known_task = task != nullptr;
+  if (task) FollowReload(*task);
+  recorded.basis = task ? Advance(named, -1) : Current();
+  user_.OnWithdrawn(recorded);
 }
 
 }  // namespace forereach

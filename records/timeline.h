@@ -31,6 +31,7 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "certifier/task/config.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/grounds.h"
 #include "lcmtypes/stream_order.h"
 #include "records/event_log.h"
@@ -73,6 +74,14 @@ struct RecordedPlan {
   Basis basis;
 };
 
+/** The first message of a withdrawal. Its repetitions are passed over. */
+struct RecordedWithdrawal {
+  withdrawal_t withdrawal;
+  std::string event;
+  bool is_of_known_task = true;
+  Basis basis;  ///< What the plan was judged under.
+};
+
 /** Receives the events of a timeline in the order in which the certifier acted. */
 class TimelineUser {
  public:
@@ -88,6 +97,7 @@ class TimelineUser {
   virtual void OnTransition(const ExecutedTransition&, Bytes /*message*/) {}  ///< A transition is learned.
   virtual void OnDecision(const RecordedDecision&) {}
   virtual void OnCertified(const RecordedPlan&) {}
+  virtual void OnWithdrawn(const RecordedWithdrawal&) {}
 };
 
 /** Pointers for Timeline, which does not own its tasks. */
@@ -148,6 +158,7 @@ class Timeline final {
   void TakeStatus(const LogEvent& event);
   void TakeDecision(const LogEvent& event, const std::string& name);
   void TakeCertified(const LogEvent& event, const std::string& name);
+  void TakeWithdrawal(const LogEvent& event, const std::string& name);
 
   [[nodiscard]] Told Heed(Count& count, const StreamPosition& message, const LogEvent& event);
   void Start();
@@ -177,6 +188,8 @@ class Timeline final {
   LogDamage damage_;
   Undecided<RecordedCandidate> undecided_;
   std::map<Digest, Decided> decided_;  // by plan; of several decisions on one plan the last CERTIFIED, if there is one
+
+  std::deque<Digest> withdrawals_;  // of the last ones, without what differs in a repetition
 
   // State at the last decision, and by everything that was logged; what lies between the two.
   std::shared_ptr<const std::vector<Obstacle>> obstacles_;

@@ -8,6 +8,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/plans_in_force.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
@@ -69,6 +70,77 @@ TEST_F(ReplayTest, RecordedLogAgreesOnEveryDecision) {
   EXPECT_EQ(result.agreed, result.candidates);
   EXPECT_GE(result.candidates, 10);
   EXPECT_EQ(result.corruptions, 0);
+}
+
+// A log of a plan that is certified, then withdrawn because of a wall, then because of a nearer one; `alter` changes
+// each withdrawal before it is logged.
+class WithdrawnReplayTest : public ReplayTest {
+ protected:
+  template <class Alter>
+  ReplayResult Replayed(Alter alter) {
+    const std::string path = NewLog();
+    EventLogWriter log(path);
+    const Config config = SmallTaskOnTheBus();
+    Gate gate(config);
+    PlansInForce plans(config.gate);
+    std::int64_t sequence = 0;
+    const auto see = [&](const std::vector<Obstacle>& obstacles) {
+      obstacles_t message = ToMessage(obstacles);
+      message.utime = kNow;
+      message.sequence = sequence++;
+      EXPECT_EQ(gate.UpdateObstacles(Encode(message), kNow), "");
+      log.Append(kNow, config.bus.obstacles, Encode(message));
+      plans.Judge(gate, kNow);
+    };
+    const auto send_due = [&](std::int64_t now_us) {
+      while (auto due = plans.TakeDue(now_us, now_us)) {
+        alter(due->message);
+        log.Append(now_us, config.bus.withdrawn, Encode(due->message));
+        ++sent_;
+      }
+    };
+    see({});
+    const auto candidate = Encode(Candidate(1));
+    log.Append(kNow, config.bus.candidate, candidate);
+    const GateAnswer answer = gate.Decide(candidate, kNow);
+    log.Append(kNow, config.bus.certified, Encode(answer.certified.value()));
+    log.Append(kNow, config.bus.decision, Encode(answer.decision));
+    plans.Add(*answer.certified, kNow);
+    see({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 1.2)});
+    send_due(kNow);
+    send_due(kNow + PlansInForce::kRepeatUs);
+    see({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.8)});
+    send_due(kNow + PlansInForce::kRepeatUs);
+    EXPECT_TRUE(log.Flush());
+    return Replay({path}, {config});
+  }
+
+  int sent_ = 0;
+};
+
+TEST_F(WithdrawnReplayTest, EachWithdrawalIsJudgedAgainOnce) {
+  const ReplayResult result = Replayed([](withdrawal_t&) {});
+  EXPECT_EQ(sent_, 3) << "one is a repetition";
+  EXPECT_EQ(result.withdrawals, 2);
+  EXPECT_EQ(result.agreed, 1);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
+}
+
+TEST_F(WithdrawnReplayTest, AnotherNumberOfStepsAnotherObstacleOrOtherGroundsDiffer) {
+  const auto differences = [this](auto alter) { return Replayed(alter).differences; };
+  EXPECT_THAT(differences([](withdrawal_t& message) { ++message.valid_steps; }),
+              testing::Each(HasSubstr("steps that stand, cause obstacle; replayed")));
+  EXPECT_EQ(differences([](withdrawal_t& message) { ++message.obstacle; }).size(), 2u);
+  EXPECT_THAT(differences([](withdrawal_t& message) { SetDigest(message.obstacles_digest, DigestOf("another")); }),
+              testing::Each(HasSubstr("withdrawn under other obstacles")));
+  EXPECT_THAT(differences([](withdrawal_t& message) { SetDigest(message.certificate_digest, DigestOf("another")); }),
+              testing::Each(HasSubstr("its certified plan is not in the log")));
+}
+
+TEST_F(WithdrawnReplayTest, AWithdrawalWithoutAJudgementIsACircumstance) {
+  const ReplayResult result = Replayed([](withdrawal_t& message) { message.cause = withdrawal_t::NOT_JUDGED; });
+  EXPECT_EQ(result.circumstances, 2);
+  EXPECT_THAT(result.differences, testing::IsEmpty());
 }
 
 TEST_F(ReplayTest, RecordedLogHasCertificatesAndBothAbstentions) {

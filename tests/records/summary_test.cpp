@@ -75,6 +75,27 @@ TEST(Summary, CountsAHandMadeLog) {
   EXPECT_EQ(summary.messages.at("PLAN_CANDIDATE"), 100);
 }
 
+TEST(Summary, CountsAWithdrawalOnceHoweverOftenItIsAnswered) {
+  const ScratchDirectory scratch;
+  EventLogWriter writer(scratch / "log");
+  int sequence = 0;
+  const auto answer = [&](std::int64_t plan_id, std::int16_t kind, std::int16_t step) {
+    execution_event_t event = MakeEvent(sequence++, kind);
+    event.plan_id = plan_id;
+    event.step = step;
+    writer.Append(1'000'000, "EXECUTION_EVENT", Encode(event));
+  };
+  for (const std::int16_t step : {5, 5, 3, 3}) answer(7, execution_event_t::WITHDRAWN, step);
+  answer(7, execution_event_t::EMERGENCY_STOP, 3);
+  answer(8, execution_event_t::WITHDRAWN, 3);
+  ASSERT_TRUE(writer.Flush());
+  const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
+  EXPECT_EQ(summary.withdrawals, 3);
+  EXPECT_EQ(summary.emergency_stops, 1);
+  EXPECT_EQ(summary.stops, 1);
+  EXPECT_THAT(ToText(summary), testing::HasSubstr("withdrawals               3 (1 emergency stops, not certified)"));
+}
+
 TEST(Summary, OfTheDatabaseAgreesWithThatOfTheLog) {
   const ScratchDirectory scratch;
   WriteRun(scratch / "log");
