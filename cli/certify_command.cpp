@@ -35,8 +35,8 @@ int Certify(const Options& options) {
   RequireForCertifying(config);
   const Certifier certifier(config.problem);
   const Eigen::MatrixXd controls = LoadPlan(options.plan, *config.problem->model);
-  const Plan plan{controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
-                  static_cast<int>(controls.rows())};
+  const auto inputs = static_cast<int>(controls.rows()), steps = static_cast<int>(controls.cols());
+  const Plan plan{controls.data(), inputs, steps, inputs, ScheduleFromZero(config, steps)};
   const Zonotope initial_set = Zonotope::Enclose(config.initial_set);
   try {
     certifier.Require(plan, initial_set, config.obstacles);
@@ -49,6 +49,7 @@ int Certify(const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
   result.decision = certifier.Certify(plan, initial_set, config.obstacles, tube);
   result.elapsed_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count();
+  result.schedule = plan.schedule;
   result.controls = controls;
 
   if (options.json)

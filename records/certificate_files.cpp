@@ -123,7 +123,8 @@ class CertificateReader final : public TimelineUser {
       certificate.mismatches.push_back({kAltered + fault.field, fault.expected, fault.found});
     CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(certified));
     if (!recorded.has_candidate) certificate.Compare("its candidate is in the log", "a candidate", "none");
-    of_plan_.insert({DigestOf(Encode(certified.plan)), {&file, file.certificates.size() - 1, certified}});
+    of_plan_.insert(
+        {DigestOf(Encode(certified.plan)), {&file, file.certificates.size() - 1, task.problem.get(), certified}});
   }
 
   // Holds decisions and certified plans of the logs read since the last call against each other.
@@ -164,6 +165,7 @@ class CertificateReader final : public TimelineUser {
   struct Plan {
     CertificateFile* file;
     std::size_t certificate;  // its place
+    const Problem* problem;
     certified_plan_t certified;
   };
 
@@ -231,45 +233,59 @@ class CertificateReader final : public TimelineUser {
       compare(field, "-1", std::to_string(value));
 
     verifier::Certificate& derived = certificate.certificate;
+    const Problem& problem = *plan.problem;
     const int count = static_cast<int>(derived.obstacles.size());
-    if (count == 0 ? decision.obstacle != -1 : decision.obstacle < 0 || decision.obstacle >= count)
+    // An obstacle that moves need not be there during the plan.
+    const bool may_be_none =
+        std::ranges::all_of(derived.obstacles, [](const Obstacle& obstacle) { return obstacle.motion().has_value(); });
+    if (decision.obstacle < (may_be_none ? -1 : 0) || decision.obstacle >= count)
       return compare("obstacle", count == 0 ? "-1" : "0 to " + std::to_string(count - 1),
                      std::to_string(decision.obstacle));
     double clearance = kInfinity;
-    if (count > 0) {
-      const double radius = derived.obstacles[static_cast<std::size_t>(decision.obstacle)].radius();
-      compare("threshold", ToText(radius), ToText(decision.threshold));
-      clearance = SubDown(decision.margin, radius);
+    if (decision.obstacle >= 0) {
+      const Obstacle& closest = derived.obstacles[static_cast<std::size_t>(decision.obstacle)];
+      if (!IsDistanceToKeep(decision.threshold, closest, problem))
+        compare("threshold", ToText(closest.radius()), ToText(decision.threshold));
+      clearance = SubDown(decision.margin, decision.threshold);
       if (!(clearance > 0 && clearance < kInfinity))
-        compare("margin", "above " + ToText(radius), ToText(decision.margin));
+        compare("margin", "above " + ToText(decision.threshold), ToText(decision.margin));
     } else {
       compare("margin", ToText(kInfinity), ToText(decision.margin));
       compare("threshold", "0", ToText(decision.threshold));
     }
-    // The closest slice of all is no closer than that.
-    for (verifier::RecordedSlice& slice : derived.slices)
-      slice.clearance.assign(static_cast<std::size_t>(count), clearance);
-    CompareMessage(decision, static_cast<int>(certified.plan.num_steps), clearance, certificate);
+    // The closest approach of all is no closer than that.
+    for (std::size_t t = 0; t + (problem.between ? 1 : 0) < derived.slices.size(); ++t)
+      derived.slices[t].clearance.assign(static_cast<std::size_t>(count), clearance);
+    CompareMessage(decision, problem, static_cast<int>(certified.plan.num_steps), clearance, certificate);
   }
 
-  // Only the message of a log says which slice is the closest. Older records have the clearance rounded to nearest.
-  static void CompareMessage(const decision_t& decision, int steps, double clearance,
+  // Only the message of a log says which step and which part is the closest.
+  static void CompareMessage(const decision_t& decision, const Problem& problem, int steps, double clearance,
                              RecordedCertificate& certificate) {
     const std::string found = GetText(decision.message);
+    const auto is = [&](const std::string& sentence) { return found == sentence || found == sentence + kCapped; };
+    for (int t = 0; t <= steps; ++t)
+      for (int part = -1; part < static_cast<int>(problem.body.parts.size()); ++part)
+        if (is(ExplainCertificate(problem, {t, decision.obstacle, part, clearance}))) return;
+    if (!problem.between && problem.body == Body{})
+      for (int t = 0; t <= steps; ++t)
+        if (std::ranges::any_of(OlderSentences(t, decision.obstacle, clearance), is)) return;
+    certificate.Compare(kAltered + std::string("its decision's message"),
+                        ExplainCertificate(problem, {0, decision.obstacle, -1, clearance}) +
+                            (decision.obstacle < 0 ? "" : ", or another step"),
+                        found);
+  }
+
+  // In records from before task.between. The oldest have the clearance rounded to nearest.
+  static std::vector<std::string> OlderSentences(int step, int obstacle, double clearance) {
+    if (obstacle < 0) return {"certified: no obstacles"};
     char nearest[32];
     std::snprintf(nearest, sizeof nearest, "%.6g", clearance);
-    const auto is = [&](const std::string& sentence) { return found == sentence || found == sentence + kCapped; };
-    for (int t = 0; t <= steps; ++t) {
-      std::string sentence = ExplainCertificate(t, decision.obstacle, clearance);
-      if (is(sentence)) return;
-      const std::string down = " " + RoundedDown(clearance) + " m ";
-      const std::size_t at = sentence.find(down);
-      if (at != std::string::npos && is(sentence.replace(at, down.size(), " " + std::string(nearest) + " m "))) return;
-    }
-    certificate.Compare(
-        kAltered + std::string("its decision's message"),
-        ExplainCertificate(0, decision.obstacle, clearance) + (decision.obstacle < 0 ? "" : ", or another step"),
-        found);
+    std::vector<std::string> sentences;
+    for (const std::string& distance : {RoundedDown(clearance), std::string(nearest)})
+      sentences.push_back("certified: every slice stays clear, closest at step " + std::to_string(step) + ", " +
+                          distance + " m from obstacle " + std::to_string(obstacle));
+    return sentences;
   }
 
   std::deque<CertificateFile> files_;             // references to them stay

@@ -16,7 +16,11 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json SliceJson(const Tube& tube, int t, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+Json IndexJson(int index) { return index < 0 ? Json(nullptr) : Json(index); }
+Json NumberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json SliceJson(const Tube& tube, int t, const Certifier& certifier, std::span<const Obstacle> obstacles,
+               const Schedule& schedule) {
   const Zonotope& slice = tube.slice(t);
   Json half_width = Json::array(), generators = Json::array(), clearance = Json::array();
   for (int k = 0; k < slice.dim(); ++k) half_width.push_back(slice.HalfWidthUpper(k));
@@ -25,7 +29,9 @@ Json SliceJson(const Tube& tube, int t, const Certifier& certifier, std::span<co
   Zonotope projected;
   certifier.projection().Enclose(slice, tube.half_width(t), projected);
   for (const Obstacle& obstacle : obstacles)
-    clearance.push_back(std::max(certifier.SeparateSlice(tube, t, obstacle).clearance(), -kMaxDouble));
+    if (t < certifier.safety().NumUnits(tube))
+      clearance.push_back(
+          NumberJson(std::max(certifier.SeparateSlice(tube, t, obstacle, schedule).clearance(), -kMaxDouble)));
   return {{"center", slice.center()},
           {"half_width", half_width},
           {"generators", generators},
@@ -33,11 +39,12 @@ Json SliceJson(const Tube& tube, int t, const Certifier& certifier, std::span<co
           {"radius", RadiusUpper(projected)}};
 }
 
-Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obstacle> obstacles) {
+Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obstacle> obstacles,
+              const Schedule& schedule) {
   Json slices = Json::array();
   const auto n = static_cast<std::size_t>(certifier.problem().model->num_states());
   for (int t = 0; t <= tube.length(); ++t) {
-    Json slice = SliceJson(tube, t, certifier, obstacles);
+    Json slice = SliceJson(tube, t, certifier, obstacles, schedule);
     if (t < tube.length()) {
       const StepRecord& step = tube.step(t);
       slice["envelope"] = {{"lower", std::span(step.envelope.lower.data(), n)},
@@ -48,9 +55,6 @@ Json TubeJson(const Tube& tube, const Certifier& certifier, std::span<const Obst
   }
   return slices;
 }
-
-Json IndexJson(int index) { return index < 0 ? Json(nullptr) : Json(index); }
-Json NumberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 const char* KindName(DomainExit::Kind kind) {
   switch (kind) {
@@ -72,19 +76,24 @@ void AddWitness(const Decision& decision, Json& document) {
   document["first_observation"] = IndexJson(decision.first_observation);
   document["second_observation"] = IndexJson(decision.second_observation);
   document["obstacle"] = IndexJson(decision.obstacle);
+  document["part"] = IndexJson(decision.part);
   document["closest_step"] = IndexJson(decision.closest_step);
   document["margin"] = NumberJson(decision.margin);
   const bool without_obstacles = decision.outcome == Outcome::kCertified && decision.obstacle < 0;
   document["threshold"] = without_obstacles ? Json(nullptr) : NumberJson(decision.threshold);
 }
 
-Json InputsJson(const Eigen::MatrixXd& controls, const Config& config) {
+Json InputsJson(const CertifyResult& result, const Config& config) {
   Json steps = Json::array();
-  for (const auto column : controls.colwise()) steps.push_back(std::vector(column.begin(), column.end()));
+  for (const auto column : result.controls.colwise()) steps.push_back(std::vector(column.begin(), column.end()));
   const Box& set = config.initial_set;
   return {{"config",
            {{"given", config.path}, {"absolute", std::filesystem::absolute(config.path).lexically_normal().string()}}},
           {"controls", steps},
+          {"schedule",
+           {{"start_us", result.schedule.start_us},
+            {"step_us", result.schedule.step_us},
+            {"clock_error_us", result.schedule.clock_error_us}}},
           {"initial_set",
            {{"lower", std::vector(set.lower().begin(), set.lower().end())},
             {"upper", std::vector(set.upper().begin(), set.upper().end())}}}};
@@ -112,6 +121,15 @@ void Append(CanonicalBytes& bytes, const Json& value) {
 
 }  // namespace
 
+Schedule ScheduleFromZero(const Config& config, int steps) {
+  const double step_us = config.period * 1e6;
+  const auto whole = std::max(std::int64_t{1}, static_cast<std::int64_t>(std::llround(step_us)));
+  const double off = AddUp(std::abs(static_cast<double>(whole) - MulUp(config.period, 1e6)),
+                           std::abs(MulUp(config.period, 1e6) - MulDown(config.period, 1e6)));
+  const double error = AddUp(MulUp(off, steps), MulUp(config.gate.max_clock_error_ms.value_or(0), 1e3));
+  return {0, whole, static_cast<std::int64_t>(std::ceil(error))};
+}
+
 Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set) {
   CanonicalBytes bytes("plan");
   bytes.Numbers(controls);
@@ -131,13 +149,14 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   const bool before_any_step = decision.outcome == Outcome::kFalsified && decision.step < 0;
   Json document;
   document["outcome"] = OutcomeName(static_cast<std::int16_t>(decision.outcome));
+  document["holds"] = HoldsName(certifier.problem());
   AddWitness(decision, document);
   document["cause"] =
       decision.cause == Cause::kNone ? Json(nullptr) : Json(CauseName(static_cast<std::int16_t>(decision.cause)));
   document["capped"] = decision.capped;
   document["message"] = Explain(decision, certifier.problem());
-  document["inputs"] = InputsJson(result.controls, config);
-  document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles);
+  document["inputs"] = InputsJson(result, config);
+  document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles, result.schedule);
   document["digests"] = {{"plan", ToHex(PlanDigest(result.controls, config.initial_set))},
                          {"tube", ToHex(TubeDigest(document["tube"]))}};
   const Grounds grounds = config.grounds;

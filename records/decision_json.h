@@ -13,9 +13,14 @@ namespace forereach {
 /** A certified or refused plan and its decision. */
 struct CertifyResult {
   Decision decision;
+  Schedule schedule;
   Eigen::MatrixXd controls;  ///< A column a step.
   double elapsed_us = 0;
 };
+
+/** The schedule of a plan of `steps` steps that begins at time 0, with steps of model.dt and the declared clock error.
+If model.dt is no whole number of microseconds, its rounding counts as clock error. */
+[[nodiscard]] Schedule ScheduleFromZero(const Config& config, int steps);
 
 /** The digest of the controls and X0. */
 [[nodiscard]] Digest PlanDigest(const Eigen::MatrixXd& controls, const Box& initial_set);

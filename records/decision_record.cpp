@@ -30,8 +30,8 @@ class Reading {
  public:
   Reading(const std::string& path, const JsonField& document, const Config& config)
       : document_(document), config_(config), record_{path, {}, {}, {}} {
-    document_.RequireFields({"outcome", "cause", "step", "coordinate", "exit", "first_observation",
-                             "second_observation", "obstacle", "closest_step", "margin", "threshold", "message",
+    document_.RequireFields({"outcome", "holds", "cause", "step", "coordinate", "exit", "first_observation",
+                             "second_observation", "obstacle", "part", "closest_step", "margin", "threshold", "message",
                              "capped", "inputs", "tube", "digests", "elapsed_us"});
     if (!(document_["elapsed_us"].Number() >= 0)) document_["elapsed_us"].Fail("is negative");
     ReadInputs();
@@ -50,7 +50,7 @@ class Reading {
 
   void ReadInputs() {
     const JsonField inputs = document_["inputs"];
-    inputs.RequireFields({"config", "controls", "initial_set"});
+    inputs.RequireFields({"config", "controls", "initial_set", "schedule"});
     inputs["config"].RequireFields({"given", "absolute"});
     inputs["initial_set"].RequireFields({"lower", "upper"});
     const NominalModel& model = *config_.problem->model;
@@ -64,6 +64,11 @@ class Reading {
       record_.mismatches.push_back(
           {kOtherInput + std::string("inputs.initial_set"), "that of " + config_.path, "another"});
     record_.certificate.obstacles = config_.obstacles;
+    const Schedule& schedule = record_.certificate.schedule =
+        ScheduleFromZero(config_, static_cast<int>(record_.certificate.controls.cols()));
+    Compare(
+        inputs["schedule"],
+        {{"start_us", schedule.start_us}, {"step_us", schedule.step_us}, {"clock_error_us", schedule.clock_error_us}});
   }
 
   void ReadTube() {
@@ -84,8 +89,11 @@ class Reading {
     recorded.half_width = slice["half_width"].Numbers(n);
     recorded.generators = Columns(slice["generators"], config_.problem->model->num_states());
     recorded.has_generators = true;
-    const Eigen::VectorXd clearance = slice["clearance"].Numbers(config_.obstacles.size());
-    recorded.clearance.assign(clearance.begin(), clearance.end());
+    // From this sample to the next there is nothing after the last. Null: the obstacle is nowhere at that time.
+    const JsonField clearance = slice["clearance"];
+    clearance.RequireCount(completed || !config_.problem->between ? config_.obstacles.size() : 0);
+    for (std::size_t o = 0; o < clearance.Count(); ++o)
+      recorded.clearance.push_back(clearance[o].json().is_null() ? kInfinity : clearance[o].Number());
     recorded.radius = slice["radius"].Number();
     if (!completed) return recorded;
     const JsonField envelope = slice["envelope"];
@@ -117,6 +125,7 @@ class Reading {
 
   // What follows from the clearances, which the verifier derives: the closest slice, and the sentence about it.
   void CompareWitness() {
+    Compare(document_["holds"], HoldsName(*config_.problem));
     for (const char* of_abstentions :
          {"cause", "step", "coordinate", "exit", "first_observation", "second_observation"})
       Compare(document_[of_abstentions], nullptr);
@@ -131,25 +140,34 @@ class Reading {
     // Of several that are equally close the record may name any.
     const Json &named_step = document_["closest_step"].json(), &named_obstacle = document_["obstacle"].json();
     if (named_step.is_number_unsigned() && named_obstacle.is_number_unsigned() && named_step < slices.size() &&
-        named_obstacle < config_.obstacles.size())
+        named_obstacle < slices[named_step.get<std::size_t>()].clearance.size())
       consider(named_step.get<std::size_t>(), named_obstacle.get<std::size_t>());
     for (std::size_t t = 0; t < slices.size(); ++t)
-      for (std::size_t o = 0; o < config_.obstacles.size(); ++o) consider(t, o);
+      for (std::size_t o = 0; o < slices[t].clearance.size(); ++o) consider(t, o);
 
     const JsonField margin = document_["margin"], threshold = document_["threshold"];
+    int part = -1;
     if (obstacle < 0) {
-      for (const char* key : {"obstacle", "closest_step", "margin", "threshold"}) Compare(document_[key], nullptr);
+      for (const char* key : {"obstacle", "part", "closest_step", "margin", "threshold"})
+        Compare(document_[key], nullptr);
     } else {
-      const double radius = config_.obstacles[static_cast<std::size_t>(obstacle)].radius();
+      // Which of several parts is the closest is not derived. Null: the bound is that of the whole body.
+      const int parts = static_cast<int>(config_.problem->body.parts.size());
+      if (parts == 1)
+        Compare(document_["part"], 0);
+      else if (!document_["part"].json().is_null())
+        part = document_["part"].Integer(0, parts - 1);
       Compare(document_["obstacle"], obstacle);
       Compare(document_["closest_step"], step);
-      Compare(threshold, Json(radius));
-      const double claimed = SubDown(margin.Number(), radius);
+      const Obstacle& closest = config_.obstacles[static_cast<std::size_t>(obstacle)];
+      if (!IsDistanceToKeep(threshold.Number(), closest, *config_.problem))
+        record_.Compare(kAltered + threshold.name(), JsonText(Json(closest.radius())), JsonText(threshold.json()));
+      const double claimed = SubDown(margin.Number(), threshold.Number());
       if (claimed != clearance)
-        record_.Compare(kAltered + margin.name() + " less the radius", JsonText(Json(clearance)),
+        record_.Compare(kAltered + margin.name() + " less the distance to be kept", JsonText(Json(clearance)),
                         JsonText(Json(claimed)));
     }
-    const std::string sentence = ExplainCertificate(step, obstacle, clearance);
+    const std::string sentence = ExplainCertificate(*config_.problem, {step, obstacle, part, clearance});
     Compare(document_["message"], sentence + (document_["capped"].Bool() ? kCapped : ""));
   }
 
@@ -159,6 +177,11 @@ class Reading {
 };
 
 }  // namespace
+
+bool IsDistanceToKeep(double threshold, const Obstacle& closest, const Problem& problem) {
+  if (problem.body == Body{} && !closest.motion()) return threshold == closest.radius();
+  return closest.radius() <= threshold && threshold < kInfinity;
+}
 
 std::string TaskOf(const std::string& path, const Json& document) {
   const JsonField config = JsonField(path, document)["inputs"]["config"];

@@ -32,6 +32,11 @@ struct RecordedCertificate {
   }
 };
 
+/** Whether the threshold of a certificate can be right for its closest obstacle. It is the obstacle's radius if the
+robot is a point and the obstacle stands. Otherwise it also has the part's radius and the motion's growth, which only
+the verifier derives; then it is at least the radius. */
+[[nodiscard]] bool IsDistanceToKeep(double threshold, const Obstacle& closest, const Problem& problem);
+
 /** The task file that a document names: its absolute path if that file exists, otherwise the path as it was given.
 @throws ConfigError with file and field. */
 [[nodiscard]] std::string TaskOf(const std::string& path, const nlohmann::json& document);

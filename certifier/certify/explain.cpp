@@ -39,13 +39,21 @@ std::string ExplainFalsified(const Decision& decision, const NominalModel& model
          RoundedDown(decision.margin) + ", the declaration allows " + RoundedUp(decision.threshold);
 }
 
-std::string ExplainSafety(const Decision& decision) {
-  const std::string obstacle = "obstacle " + std::to_string(decision.obstacle);
+// A sample, or the time from it to the next.
+std::string TimeText(const Problem& problem, int step) {
+  if (!problem.between) return "at step " + std::to_string(step);
+  return "between steps " + std::to_string(step) + " and " + std::to_string(step + 1);
+}
+
+bool NamesPart(const Problem& problem, int part) { return problem.body.parts.size() > 1 && part >= 0; }
+
+std::string ExplainSafety(const Decision& decision, const Problem& problem) {
   const double clearance = SubDown(decision.margin, decision.threshold);
-  if (decision.outcome == Outcome::kSafety)
-    return "abstain S: at step " + std::to_string(decision.step) + " the tube may touch " + obstacle + " (by " +
-           RoundedUp(-clearance) + " m)";
-  return ExplainCertificate(decision.closest_step, decision.obstacle, clearance);
+  if (decision.outcome == Outcome::kCertified)
+    return ExplainCertificate(problem, {decision.closest_step, decision.obstacle, decision.part, clearance});
+  const std::string who = NamesPart(problem, decision.part) ? "part " + std::to_string(decision.part) : "the robot";
+  return "abstain S: " + TimeText(problem, decision.step) + " " + who + " may touch obstacle " +
+         std::to_string(decision.obstacle) + " (by " + RoundedUp(-clearance) + " m)";
 }
 
 std::string Sentence(const Decision& decision, const Problem& problem) {
@@ -64,7 +72,7 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
       return where + "the next " + VariableName(model, decision.coordinate) + " has no finite enclosure";
     }
     case Outcome::kSafety:
-    case Outcome::kCertified: return ExplainSafety(decision);
+    case Outcome::kCertified: return ExplainSafety(decision, problem);
     case Outcome::kNone: break;
   }
   return "no decision";
@@ -72,11 +80,16 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
 
 }  // namespace
 
-std::string ExplainCertificate(int closest_step, int obstacle, double clearance) {
-  if (obstacle < 0) return "certified: no obstacles";
-  return "certified: every slice stays clear, closest at step " + std::to_string(closest_step) + ", " +
-         RoundedDown(clearance) + " m from obstacle " + std::to_string(obstacle);
+std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest) {
+  if (closest.obstacle < 0) return "certified: no obstacle is there";
+  const std::string who = NamesPart(problem, closest.part) ? "part " + std::to_string(closest.part) + " " : "";
+  return std::string(problem.between ? "certified: the robot stays clear at all times"
+                                     : "certified at its sample instants only: the robot stays clear") +
+         ", closest " + TimeText(problem, closest.step) + ", " + who + RoundedDown(closest.clearance) +
+         " m from obstacle " + std::to_string(closest.obstacle);
 }
+
+const char* HoldsName(const Problem& problem) { return problem.between ? "all_times" : "samples"; }
 
 std::string Explain(const Decision& decision, const Problem& problem) {
   return Sentence(decision, problem) + (decision.capped ? kCapped : "");

@@ -12,10 +12,20 @@ namespace forereach {
 and are rounded so that the sentence stays true: a clearance down, a depth up. */
 [[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem);
 
-/** The sentence for a certificate, without kCapped. @param obstacle index of the closest obstacle, -1 without
-obstacles.
-@param closest_step step of the closest slice. @param clearance lower bound on their distance, in metres. */
-[[nodiscard]] std::string ExplainCertificate(int closest_step, int obstacle, double clearance);
+/** The closest approach of a certified plan, as Decision has it. */
+struct ClosestApproach {
+  int step = -1;         ///< Decision::closest_step
+  int obstacle = -1;     ///< -1: no obstacle is there during the plan.
+  int part = -1;         ///< Named only if the body has several; -1: not known.
+  double clearance = 0;  ///< A lower bound on the distance, metres.
+};
+
+/** The sentence for a certificate, without kCapped. It says when the certificate holds: at all times with
+Problem::between, otherwise at the sample instants only. */
+[[nodiscard]] std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest);
+
+/** "all_times" or "samples": when a decision of the problem holds. */
+[[nodiscard]] const char* HoldsName(const Problem& problem);
 
 /** Appended to the sentence if Decision::capped. */
 inline constexpr const char* kCapped = "; a search met max_leaf_visits";

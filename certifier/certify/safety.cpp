@@ -50,6 +50,12 @@ bool IsBetter(const Separation& a, const Separation& b) noexcept {
   return a.threshold == b.threshold ? a.distance > b.distance : a.clearance() > b.clearance();
 }
 
+// A bound for the whole body is one for its closest part.
+PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other) noexcept {
+  if (IsBetter(by_parts.separation, other.separation)) return by_parts;
+  return {other.separation, other.part < 0 ? by_parts.part : other.part};
+}
+
 }  // namespace
 
 // What is known of a tube in one unit. The places are enclosed when they are first needed, once for each sample: those
@@ -89,7 +95,7 @@ class SafetyTest::Unit {
       found.threshold = AddUp(found.threshold, AddUp(meeting.growth, parts[i].radius));
       if (i == 0 || IsBetter(closest.separation, found)) closest = {found, static_cast<int>(i)};
     }
-    return IsBetter(closest.separation, by_hulls.separation) ? closest : by_hulls;
+    return Better(closest, by_hulls);
   }
 
   // The better of the bound by hulls and that of the best directions.
@@ -101,7 +107,7 @@ class SafetyTest::Unit {
       const Separation found = SeparatePart(parts[i], obstacle, meeting);
       if (i == 0 || IsBetter(closest.separation, found)) closest = {found, static_cast<int>(i)};
     }
-    return IsBetter(closest.separation, by_hulls.separation) ? closest : by_hulls;
+    return Better(closest, by_hulls);
   }
 
   [[nodiscard]] Encounter MeetIn(const Obstacle& obstacle) const noexcept {

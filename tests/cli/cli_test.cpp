@@ -61,14 +61,54 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"point_mass", "point_mass_certified", "certified", nullptr, 0},
                     Case{"point_mass", "point_mass_domain", "abstain_domain", "domain_exit", 1},
                     Case{"point_mass", "point_mass_safety", "abstain_safety", "obstacle", 1},
-                    Case{"point_mass_falsified", "point_mass_certified", "abstain_falsified", "pairwise", 1}));
+                    Case{"point_mass_falsified", "point_mass_certified", "abstain_falsified", "pairwise", 1},
+                    Case{"post_samples", "straight", "certified", nullptr, 0},
+                    Case{"post", "straight", "abstain_safety", "obstacle", 1},
+                    Case{"truck", "truck_turn", "abstain_safety", "obstacle", 1},
+                    Case{"pedestrian", "pedestrian_go", "abstain_safety", "obstacle", 1},
+                    Case{"pedestrian", "pedestrian_brake", "certified", nullptr, 0}));
+
+TEST(CertifyJsonTest, SaysWhenItHoldsAndWhatItIsAbout) {
+  const Json samples = CertifyJson("post_samples", "straight"), post = CertifyJson("post", "straight"),
+             truck = CertifyJson("truck", "truck_turn"), brake = CertifyJson("pedestrian", "pedestrian_brake");
+  EXPECT_EQ(samples["holds"], "samples");
+  EXPECT_EQ(samples["tube"].back()["clearance"].size(), 1u);
+  for (const Json& decision : {post, truck, brake}) {
+    EXPECT_EQ(decision["holds"], "all_times");
+    EXPECT_EQ(decision["tube"].back()["clearance"].size(), 0u) << "there is nothing after the last sample";
+    EXPECT_EQ(decision["tube"][0]["clearance"].size(), 1u);
+  }
+  EXPECT_EQ(post["step"], 7) << "between 8.4 m and 9.6 m";
+  EXPECT_EQ(truck["part"], 1) << "the cab";
+  EXPECT_EQ(brake["part"], 0);
+  EXPECT_EQ(brake["inputs"]["schedule"], Json({{"start_us", 0}, {"step_us", 100'000}, {"clock_error_us", 5001}}))
+      << "0.1 is no double: the times of the samples are rounded";
+}
+
+// The pedestrian is seen only from 10 s on, when the plan has ended.
+TEST(CertifyJsonTest, AnObstacleThatIsNowhereHasNoClearance) {
+  const forereach::ScratchDirectory scratch;
+  std::string task = Read(FOREREACH_SOURCE_DIR "/config/pedestrian.yaml");
+  task = std::regex_replace(task, std::regex("growth: 0.2\\}"), "growth: 0.2, from: 10}");
+  task = std::regex_replace(task, std::regex("transitions: "), "transitions: " FOREREACH_SOURCE_DIR "/config/");
+  const std::string path = scratch.Write("task.yaml", task), decision_path = scratch / "decision.json";
+  const Output output = Forereach("certify --json --config " + path + " --plan config/plans/pedestrian_go.csv");
+  EXPECT_EQ(output.code, 0);
+  const Json decision = Json::parse(output.text);
+  EXPECT_EQ(decision["tube"][0]["clearance"], Json::array({nullptr}));
+  EXPECT_EQ(decision["message"], "certified: no obstacle is there");
+  for (const char* key : {"obstacle", "part", "closest_step", "margin", "threshold"})
+    EXPECT_EQ(decision[key], nullptr) << key;
+  scratch.Write("decision.json", output.text);
+  EXPECT_EQ(Forereach("verify " + decision_path).code, 0);
+}
 
 TEST(CertifyJsonTest, HasExactlyTheKeysOfTheContract) {
   const Json decision = CertifyJson("bicycle", "bicycle_certified");
   EXPECT_EQ(KeysOf(decision),
-            (std::set<std::string>{"outcome", "step", "cause", "coordinate", "exit", "first_observation",
-                                   "second_observation", "obstacle", "closest_step", "margin", "threshold", "message",
-                                   "capped", "inputs", "tube", "digests", "elapsed_us"}));
+            (std::set<std::string>{"outcome", "holds", "part", "step", "cause", "coordinate", "exit",
+                                   "first_observation", "second_observation", "obstacle", "closest_step", "margin",
+                                   "threshold", "message", "capped", "inputs", "tube", "digests", "elapsed_us"}));
   const std::string page = Read(FOREREACH_SOURCE_DIR "/docs/decision.md");
   for (const std::string& key : KeysOf(decision)) EXPECT_THAT(page, HasSubstr("\n| `" + key + "` |"));
   EXPECT_EQ(KeysOf(decision["digests"]),
@@ -464,7 +504,7 @@ TEST(Readme, CommandsPrintWhatItSays) {
     }
     check();
   }
-  EXPECT_GE(commands, 3);
+  EXPECT_GE(commands, 9);
 }
 
 TEST(Readme, CodeIsTheInstalledExample) {

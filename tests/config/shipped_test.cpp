@@ -117,7 +117,7 @@ TEST(Shipped, TheReadmesExampleGetsTheAnswerItQuotes) {
   const Config config = files.Load(Block("yaml"), Block("csv"));
   const Decision decision = Decide(config, Eigen::MatrixXd::Zero(2, 6));
   EXPECT_EQ(decision.outcome, Outcome::kCertified);
-  EXPECT_EQ(decision.closest_step, 6);
+  EXPECT_EQ(decision.closest_step, 5);
   EXPECT_THAT(Contents(kDirectory + "README.md"), testing::HasSubstr(Explain(decision, *config.problem)));
 }
 

@@ -530,5 +530,38 @@ TEST(Decision, WithoutAnswerIsNoCertificate) {
   EXPECT_EQ(Explain(Decision{}, PointMassProblem()), "no decision");
 }
 
+TEST(Explain, SaysWhenADecisionHoldsAndOfSeveralPartsWhich) {
+  Problem point = PointMassProblem(), body = point;
+  point.between.reset();
+  body.between = Between{.acceleration = Eigen::Vector2d(1, 1), .period = 0.1};
+  body.body.parts = {BodyPart{}, {{{1, 0, 0}}, 0.5}};
+  Problem swept = body;
+  swept.body = Body{};
+
+  Decision certified;
+  certified.outcome = Outcome::kCertified;
+  certified.closest_step = 3, certified.obstacle = 2, certified.part = 1;
+  certified.margin = 1.5, certified.threshold = 1;
+  EXPECT_EQ(Explain(certified, point),
+            "certified at its sample instants only: the robot stays clear, closest at step 3, 0.5 m from obstacle 2");
+  EXPECT_EQ(Explain(certified, swept),
+            "certified: the robot stays clear at all times, closest between steps 3 and 4, 0.5 m from obstacle 2");
+  EXPECT_EQ(
+      Explain(certified, body),
+      "certified: the robot stays clear at all times, closest between steps 3 and 4, part 1 0.5 m from obstacle 2");
+  certified.part = -1;
+  EXPECT_EQ(Explain(certified, body), Explain(certified, swept));
+  certified.obstacle = -1;
+  EXPECT_EQ(Explain(certified, body), "certified: no obstacle is there");
+
+  Decision abstention;
+  abstention.outcome = Outcome::kSafety;
+  abstention.step = 3, abstention.obstacle = 0, abstention.part = 1;
+  abstention.margin = 1, abstention.threshold = 1.5;
+  EXPECT_EQ(Explain(abstention, point), "abstain S: at step 3 the robot may touch obstacle 0 (by 0.5 m)");
+  EXPECT_EQ(Explain(abstention, swept), "abstain S: between steps 3 and 4 the robot may touch obstacle 0 (by 0.5 m)");
+  EXPECT_EQ(Explain(abstention, body), "abstain S: between steps 3 and 4 part 1 may touch obstacle 0 (by 0.5 m)");
+}
+
 }  // namespace
 }  // namespace forereach

@@ -69,12 +69,31 @@ TEST_F(VerifyDecision, AsItIsConfirmed) {
 }
 
 TEST_F(VerifyDecision, OfEveryShippedCertificateConfirmed) {
-  for (const char* task : {"bicycle", "point_mass"}) {
+  for (const auto& [task, plan] : {std::pair{"bicycle", "bicycle_certified"},
+                                   {"point_mass", "point_mass_certified"},
+                                   {"post_samples", "straight"},
+                                   {"pedestrian", "pedestrian_brake"}}) {
     const std::string file = scratch_ / task;
-    Forereach(std::string("certify --json --config config/") + task + ".yaml --plan config/plans/" + task +
-              "_certified.csv > " + file);
+    Forereach(std::string("certify --json --config config/") + task + ".yaml --plan config/plans/" + plan + ".csv > " +
+              file);
     EXPECT_EQ(Forereach("verify " + file).code, 0) << task;
   }
+}
+
+// A certificate of the samples does not become one of all times, and no certificate gets other times.
+TEST_F(VerifyDecision, WithOtherWordsOfWhenItHoldsIsRefuted) {
+  const Json before = decision_;
+  EXPECT_EQ(decision_["holds"], "samples");
+  decision_["holds"] = "all_times";
+  ExpectRefuted({"the record was altered after it was made: holds"});
+  decision_ = before;
+  decision_["message"] = std::regex_replace(decision_["message"].get<std::string>(),
+                                            std::regex("certified at its sample instants only: the robot stays clear"),
+                                            "certified: the robot stays clear at all times");
+  ExpectRefuted({"the record was altered after it was made: message"});
+  decision_ = before;
+  decision_["inputs"]["schedule"]["step_us"] = 1;
+  ExpectRefuted({"the record was altered after it was made: inputs.schedule"});
 }
 
 TEST_F(VerifyDecision, WhoseTaskHasANameThatNoFileHasIsBadInput) {
