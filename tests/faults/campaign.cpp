@@ -27,6 +27,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/obstacles_v2_t.hpp"
+#include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "tests/faults/demo_task.h"
@@ -421,6 +422,7 @@ class Campaign final {
   }
 
   using Sent = std::vector<std::uint8_t>;
+  static constexpr std::int64_t kForgedSequence = std::int64_t{1} << 40;
 
   // For each channel a message that would do harm if it were believed; what was heard last where that is harm enough.
   std::map<std::string, Sent> HarmfulOf(const Rig& rig, const std::map<std::string, Sent>& heard) const {
@@ -438,9 +440,15 @@ class Campaign final {
     fault.utime = WallClockUs();
     fault.cause = fault_t::SLICE_LEFT;
     harmful[channels.fault] = Encode(fault);
+    withdrawal_t withdrawal{};
+    withdrawal.sequence = kForgedSequence;
+    withdrawal.expires_utime = INT64_MAX;
+    if (const certified_plan_t* certified = rig.witness().last_certified())
+      withdrawal.plan_id = certified->plan.plan_id;
+    harmful[channels.withdrawn] = Encode(withdrawal);
     obstacles_t nothing_there{};
     nothing_there.utime = WallClockUs();
-    nothing_there.sequence = std::int64_t{1} << 40;
+    nothing_there.sequence = kForgedSequence;
     harmful[channels.obstacles] = Encode(nothing_there);
     if (const certified_plan_t* certified = rig.witness().last_certified())
       harmful[channels.certified] = Encode(Widened(*certified));
@@ -475,12 +483,13 @@ class Campaign final {
     rig.open_bus().Subscribe(Bus::kEveryChannel, [&](const Received& r) {
       if (speakers.contains(r.channel)) heard[r.channel].assign(r.raw.begin(), r.raw.end());
     });
-    std::int64_t obeyed = 0;  // by the robot: plans that nobody certified, faults that nobody latched
+    std::int64_t obeyed = 0;  // by the robot: plans that nobody certified or withdrew, faults that nobody latched
     rig.Hear(channels.event, [&](const Received& r) {
       const auto event = Decoded<execution_event_t>(r.bytes);
       obeyed +=
           event &&
           (event->kind == execution_event_t::HALTED || event->kind == execution_event_t::RESET ||
+           (event->kind == execution_event_t::WITHDRAWN && event->value == static_cast<double>(kForgedSequence)) ||
            (event->kind == execution_event_t::ACCEPTED && event->plan_id > WallClockUs() + (std::int64_t{1} << 31)));
     });
     Signer all(rig.keys(), channels.bus_name()), other_robot(TestKeys("another-robot"), channels.bus_name()),
@@ -519,7 +528,8 @@ class Campaign final {
           };
           Demand(row, rig.ListenUntil(refuses_all, kSaysSoon), "of unsigned, forged or replayed ones it refused none");
           Demand(row, !rig.witness().fault(), "a fault was believed or latched");
-          Demand(row, obeyed == obeyed_before, "the robot obeyed a fault, a reset or a certificate that nobody made");
+          Demand(row, obeyed == obeyed_before,
+                 "the robot obeyed a fault, a reset, a certificate or a withdrawal that nobody made");
           Demand(row, now && now->version == before.version && now->failed_reloads == before.failed_reloads,
                  "a reload was obeyed");
           Demand(row, now && GetDigest(now->obstacles_digest) == GetDigest(before.obstacles_digest),
