@@ -1,6 +1,6 @@
-// Candidates through the gate, under any of four tasks: each gets one decision, and a certified plan comes only with
+// Candidates through the gate, under any of five tasks: each gets one decision, and a certified plan comes only with
 // the outcome CERTIFIED, sealed, of a candidate that a certificate can be about, and with slices that its nominal run
-// is in.
+// is in. Where obstacles move, the nominal run is clear of them at the times of the plan.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -16,7 +16,16 @@ std::vector<Config> Tasks() {
   Config shadow = SmallTask(), open = SmallTask();
   shadow.gate.shadow = true;
   open.obstacles.clear();
-  return {SmallTask(), FalsifiedTask(), shadow, open};
+  Config timed = SmallTask();
+  timed.gate.max_clock_error_ms = 20;
+  ObstacleMotion motion;
+  motion.stamp_us = kNow;
+  motion.velocity.y() = -1;
+  motion.growth = motion.growth_rate = 0.01;
+  timed.obstacles.push_back(Obstacle::Circle(Eigen::Vector2d(0.75, 2.5), 0.2).Moving(motion));
+  motion.until_us = kNow + 1'000'000;
+  timed.obstacles.push_back(Obstacle::Circle(Eigen::Vector2d(0.4, 2), 0.2).Moving(motion));
+  return {SmallTask(), FalsifiedTask(), shadow, open, timed};
 }
 
 constexpr std::size_t kNeverCertify[] = {1, 2};  // the data contradict the declaration; shadow mode
@@ -47,7 +56,26 @@ void RequireNominalRunInside(const certified_plan_t& certified, const NominalMod
   }
 }
 
-void RequireCertificate(const GateAnswer& answer, Bytes bytes, const NominalModel& model) {
+// Of obstacles that stand, too.
+void RequireNominalRunClear(const certified_plan_t& certified, const Config& task) {
+  if (!task.gate.max_clock_error_ms) return;
+  const candidate_plan_t& plan = certified.plan;
+  Require(1 <= plan.step_us && plan.step_us <= 150'000);
+  double z[6], next[4];
+  std::copy_n(plan.initial_center, 4, next);
+  for (int t = 0; t <= plan.num_steps; ++t) {
+    for (const Obstacle& obstacle : task.obstacles)
+      for (const std::int64_t error : {-20'000, 0, 20'000})
+        Require(ApproximateDistance(obstacle, Eigen::Vector2d(next[0], next[1]),
+                                    plan.start_utime + t * plan.step_us + error) > 0);
+    if (t == plan.num_steps) return;
+    std::copy_n(next, 4, z);
+    std::copy_n(plan.control[t], 2, z + 4);
+    task.problem->model->Evaluate({z, 6}, {next, 4});
+  }
+}
+
+void RequireCertificate(const GateAnswer& answer, Bytes bytes, const Config& task) {
   const certified_plan_t& certified = *answer.certified;
   Require(answer.decision.outcome == decision_t::CERTIFIED && answer.decision.cause == decision_t::CAUSE_NONE);
   Require(Encode(certified.plan) == std::vector(bytes.begin(), bytes.end()) && IsProper(certified.plan));
@@ -57,7 +85,8 @@ void RequireCertificate(const GateAnswer& answer, Bytes bytes, const NominalMode
     for (int k = 0; k < 4; ++k)
       Require(std::isfinite(certified.slice_lower[t][k]) &&
               certified.slice_lower[t][k] <= certified.slice_upper[t][k] && std::isfinite(certified.slice_upper[t][k]));
-  RequireNominalRunInside(certified, model);
+  RequireNominalRunInside(certified, *task.problem->model);
+  RequireNominalRunClear(certified, task);
 }
 
 std::vector<std::unique_ptr<Gate>> GatesFor(const std::vector<Config>& tasks) {
@@ -86,7 +115,7 @@ bool Try(Bytes data) {
     Require(answer.decision.cause != decision_t::CAUSE_INTERNAL_ERROR);
     if (!answer.certified) continue;
     Require(std::ranges::count(kNeverCertify, task) == 0);
-    RequireCertificate(answer, bytes, *tasks[task].problem->model);
+    RequireCertificate(answer, bytes, tasks[task]);
     ++certified;
   }
   Require(gate.Status(now).candidates == decided);
