@@ -54,6 +54,7 @@ Extent ExtentOf(const Picture& picture) {
   extent.Add(picture.path);
   for (const auto& circle : picture.circles) extent.Add(circle.center, circle.radius);
   for (const auto& polygon : picture.polygons) extent.Add(polygon);
+  for (const auto& body : picture.bodies) extent.Add(body);
   for (const auto& slice : picture.executed) extent.Add(slice);
   for (const auto& slice : picture.certified) extent.Add(slice);
   if (picture.goal) extent.Add(picture.goal->center, picture.goal->radius);
@@ -106,7 +107,9 @@ class Painter final {
     PaintTube(picture_.certified, kCertified, 0.30);
     PaintTube(picture_.executed, kExecuted, 0.55);
     PaintObstacles();
+    PaintOutlines(picture_.predictions, kObstacle);
     PaintAbstained();
+    PaintOutlines(picture_.bodies, kInk);
     PaintPath();
     cairo_restore(cairo_);
     PaintFrame();
@@ -244,6 +247,11 @@ class Painter final {
     FillAndStroke(kObstacle, 0.88, kInk, 0.8, 0.8);
   }
 
+  void PaintOutlines(const std::vector<Picture::Polygon>& polygons, const Color& color) {
+    for (const auto& polygon : polygons) TraceClosed(polygon);
+    Stroke(color, 1, 0.7);
+  }
+
   void PaintGoal() {
     if (!picture_.goal) return;
     TraceDisc(ToPixels(picture_.goal->center), std::max(scale_ * picture_.goal->radius, 3 * unit_));
@@ -293,6 +301,7 @@ class Painter final {
     entry(!picture_.certified.empty(), "certified, replaced", [&] { PaintSwatch(x, y, kCertified, 0.30, 0.6); });
     entry(!picture_.abstained.empty(), "abstained (S)", [&] { PaintSwatch(x, y, kAbstained, 0, 1); });
     entry(obstacles, "obstacle", [&] { PaintSwatch(x, y, kObstacle, 0.88, 1); });
+    entry(!picture_.predictions.empty(), "predicted", [&] { PaintSwatch(x, y, kObstacle, 0, 0.7); });
     entry(!picture_.path.empty(), "driven", [&] { PaintLine(x, y); });
     entry(!picture_.path.empty(), "start", [&] { PaintRing({x + 11 * unit_, y - 4 * unit_}, 5.5); });
     entry(!picture_.stops.empty(), "stop", [&] { PaintStop({x + 11 * unit_, y - 4 * unit_}); });

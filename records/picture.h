@@ -39,12 +39,15 @@ struct Picture {
   std::vector<Polygon> polygons;       ///< Obstacles.
   std::vector<HalfPlane> half_planes;  ///< Obstacles.
 
-  std::vector<Polygon> executed;                ///< Certified slices of executed steps.
-  std::vector<Polygon> certified;               ///< Certified slices that newer plans replaced.
+  std::vector<Polygon> predictions;  ///< Where obstacles that move will be, a polygon for each time.
+
+  std::vector<Polygon> executed;   ///< Certified slices of executed steps, or what the body sweeps in them.
+  std::vector<Polygon> certified;  ///< The same of steps that newer plans replaced.
   std::vector<std::vector<Polygon>> abstained;  ///< Tubes refused for an obstacle (S), each up to
                                                 ///< the slice that may touch it.
 
   std::vector<Eigen::Vector2d> path;   ///< Measured positions, from the start on.
+  std::vector<Polygon> bodies;         ///< The parts of the robot's body at some of them.
   std::vector<Eigen::Vector2d> stops;  ///< Positions of stops before the goal.
   std::optional<Circle> goal;
 };

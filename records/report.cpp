@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -17,18 +18,19 @@
 #include "certifier/certify/batch.h"
 #include "certifier/certify/certifier.h"
 #include "certifier/gate/candidate_message.h"
-#include "certifier/sets/zonogon.h"
 #include "certifier/task/json_text.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "records/log_tasks.h"
+#include "records/outlines.h"
 #include "records/timeline.h"
 
 namespace forereach {
 namespace {
 
 constexpr std::size_t kBatch = 256;
+constexpr double kBetweenBodies = 4;  // metres of the path from one drawn body to the next
 
 class PictureMaker final : public TimelineUser {
  public:
@@ -80,8 +82,9 @@ class PictureMaker final : public TimelineUser {
     Picture& picture = result_.picture;
     for (auto& [plan_id, tube] : tubes_)
       for (std::size_t t = 0; t < tube.size(); ++t)
-        (executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed : picture.certified)
-            .push_back(std::move(tube[t]));
+        std::ranges::move(tube[t],
+                          std::back_inserter(executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed
+                                                                                                : picture.certified));
     for (const Obstacle& obstacle : timeline.logged_obstacles()) AddObstacle(obstacle);
     return std::move(result_);
   }
@@ -109,10 +112,10 @@ class PictureMaker final : public TimelineUser {
       } catch (const std::invalid_argument&) {
         ++result_.disagreements;
       }
-    std::vector<std::vector<Picture::Polygon>> outlines(asked.size());
+    std::vector<std::vector<std::vector<Picture::Polygon>>> outlines(asked.size());
     const auto draw = [&](std::size_t i, const Decision& again, const Tube& tube) {
       if (static_cast<int>(again.outcome) == asked[i]->outcome && again.step == asked[i]->step)
-        outlines[i] = Outlines(tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
+        outlines[i] = Sweeps(*certifier_, tube, again.outcome == Outcome::kCertified ? tube.length() : again.step);
     };
     const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
     (void)CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads, draw);
@@ -122,19 +125,16 @@ class PictureMaker final : public TimelineUser {
       else if (asked[i]->outcome == decision_t::CERTIFIED)
         tubes_[asked[i]->candidate.plan_id] = std::move(outlines[i]);
       else
-        result_.picture.abstained.push_back(std::move(outlines[i]));
+        result_.picture.abstained.push_back(Joined(std::move(outlines[i])));
     }
     decided_.clear();
   }
 
-  std::vector<Picture::Polygon> Outlines(const Tube& tube, int last_step) const {
-    std::vector<Picture::Polygon> outlines;
-    Zonotope projected;
-    for (int t = 0; t <= std::min(last_step, tube.length()); ++t) {
-      certifier_->projection().Enclose(tube.slice(t), tube.half_width(t), projected);
-      outlines.push_back(Outline(projected));
-    }
-    return outlines;
+  // The last one is where it was found unsafe: with several parts, the last of them.
+  static std::vector<Picture::Polygon> Joined(std::vector<std::vector<Picture::Polygon>> tube) {
+    std::vector<Picture::Polygon> joined;
+    for (auto& unit : tube) std::ranges::move(unit, std::back_inserter(joined));
+    return joined;
   }
 
   std::optional<Eigen::Vector2d> PositionOf(const double* state, int num_states) const {
@@ -143,7 +143,14 @@ class PictureMaker final : public TimelineUser {
   }
 
   void AddState(const robot_state_t& message) {
-    if (const auto position = PositionOf(message.state, message.num_states)) result_.picture.path.push_back(*position);
+    const auto position = PositionOf(message.state, message.num_states);
+    if (!position) return;
+    Picture& picture = result_.picture;
+    picture.path.push_back(*position);
+    if (last_body_ && (*position - *last_body_).norm() < kBetweenBodies) return;
+    last_body_ = position;
+    std::ranges::move(BodyAt(*last_.problem, Eigen::Map<const Eigen::VectorXd>(message.state, message.num_states)),
+                      std::back_inserter(picture.bodies));
   }
 
   void AddExecution(const execution_event_t& event) {
@@ -162,32 +169,15 @@ class PictureMaker final : public TimelineUser {
     switch (obstacle.kind()) {
       case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
       case Obstacle::Kind::kBox:
-      case Obstacle::Kind::kPolygon: picture.polygons.push_back(InOrder(obstacle.hull())); break;
+      case Obstacle::Kind::kPolygon: {
+        std::vector<Eigen::Vector2d> corners;
+        for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
+        picture.polygons.push_back(HullOf(corners));
+        break;
+      }
       case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
     }
-  }
-
-  // The hull's corners counter-clockwise (Andrew's chain): a polygon obstacle may list its points in any order.
-  static Picture::Polygon InOrder(const std::vector<Eigen::Vector3d>& corners) {
-    Picture::Polygon points;
-    for (const Eigen::Vector3d& corner : corners) points.push_back(corner.head<2>());
-    std::ranges::sort(points,
-                      [](const auto& a, const auto& b) { return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y()); });
-    Picture::Polygon hull;
-    for (int pass = 0; pass < 2; ++pass) {
-      const std::size_t base = hull.size();
-      for (const Eigen::Vector2d& point : points) {
-        while (hull.size() >= base + 2) {
-          const Eigen::Vector2d edge = hull.back() - hull[hull.size() - 2], next = point - hull.back();
-          if (edge.x() * next.y() - edge.y() * next.x() > 0) break;
-          hull.pop_back();
-        }
-        hull.push_back(point);
-      }
-      hull.pop_back();
-      std::ranges::reverse(points);
-    }
-    return hull;
+    std::ranges::move(PredictionOf(obstacle), std::back_inserter(picture.predictions));
   }
 
   const Config& last_;  // task
@@ -195,8 +185,10 @@ class PictureMaker final : public TimelineUser {
   std::unique_ptr<Certifier> certifier_;  // as the one of the log was when it decided on those below
   std::vector<Decided> decided_;          // under the obstacles below, and not yet certified again
   std::shared_ptr<const std::vector<Obstacle>> obstacles_;
-  std::map<std::int64_t, std::vector<Picture::Polygon>> tubes_;  // of certified plans, by plan_id
-  std::set<std::pair<std::int64_t, int>> executed_;              // plan_id and step
+  // Of certified plans, by plan_id: the polygons of each step.
+  std::map<std::int64_t, std::vector<std::vector<Picture::Polygon>>> tubes_;
+  std::optional<Eigen::Vector2d> last_body_;         // where one was drawn
+  std::set<std::pair<std::int64_t, int>> executed_;  // plan_id and step
   bool arrived_ = false;
   LogPicture result_;
 };
@@ -205,7 +197,8 @@ std::string TitleOf(const Config& config) {
   std::string name = config.problem->model->name();
   std::ranges::replace(name, '_', ' ');
   if (!name.empty()) name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
-  return name + ": certified tubes and the driven path";
+  return name + (config.problem->between ? ": certified at all times, and the driven path"
+                                         : ": certified at the sample instants, and the driven path");
 }
 
 std::string DurationText(double microseconds) {

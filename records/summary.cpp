@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
+#include "certifier/certify/explain.h"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/printable.h"
 #include "records/log_authenticator.h"
@@ -61,7 +62,10 @@ std::string ToText(const Summary& summary) {
     text += fmt::format("{:<26}{}\n", name, value);
   };
   line("plans proposed", std::to_string(summary.proposed));
-  line("  certified", std::to_string(summary.certified));
+  line("  certified",
+       std::to_string(summary.certified) + (summary.holds.empty()          ? ""
+                                            : summary.holds == "all_times" ? " (at all times)"
+                                                                           : " (at the sample instants only)"));
   line("  abstained", std::to_string(Total(summary.abstained)) + Listed(summary.abstained));
   line("  rejected", std::to_string(Total(summary.rejected)) + Listed(summary.rejected));
   line("decision latency", Microseconds(summary.latency_us));
@@ -92,6 +96,7 @@ nlohmann::json ToJson(const Summary& summary) {
   json["plans"] = {{"proposed", summary.proposed},
                    {"decided", summary.decided},
                    {"certified", summary.certified},
+                   {"holds", summary.holds.empty() ? nlohmann::json(nullptr) : nlohmann::json(summary.holds)},
                    {"abstained", summary.abstained},
                    {"rejected", summary.rejected}};
   json["decision_latency_us"] = ToJson(summary.latency_us);
@@ -120,7 +125,9 @@ SummaryBuilder::SummaryBuilder(const Config& config)
     : channels_(config.bus), goal_(config.planner.goal), goal_radius_m_(config.planner.goal_radius) {
   latency_.values.reserve(kMaxSamples);
   certify_.values.reserve(kMaxSamples);
-  if (config.problem) projection_ = config.problem->projection;
+  if (!config.problem) return;
+  projection_ = config.problem->projection;
+  summary_.holds = HoldsName(*config.problem);
 }
 
 void SummaryBuilder::Samples::Add(double value) {

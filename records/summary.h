@@ -36,6 +36,7 @@ struct Summary {
   double duration_s = 0;      ///< From the first message to the last.
   std::int64_t proposed = 0;  ///< Candidates; from a database, decisions.
   std::int64_t decided = 0, certified = 0;
+  std::string holds;  ///< When certificates of the task hold, as HoldsName; empty if the task is not known.
   std::map<std::string, std::int64_t> abstained, rejected;  ///< By cause.
   Quantiles latency_us;                      ///< Time between the receipts of candidate and decision at the logger.
   Quantiles certify_us;                      ///< Time of the certify step only.

@@ -1,0 +1,28 @@
+/** Outlines of what a picture shows of a body and of obstacles that move, in plain arithmetic: for display, not for
+bounds. */
+#pragma once
+
+#include <vector>
+
+#include "certifier/certify/certifier.h"
+#include "records/picture.h"
+
+namespace forereach {
+
+/** The convex hull of points in the plane, each with a disc of this radius (a polygon of 16 corners),
+ * counter-clockwise.
+ */
+[[nodiscard]] Picture::Polygon HullOf(const std::vector<Eigen::Vector2d>& points, double radius = 0);
+
+/** What the robot sweeps in each unit of a tube (certifier/certify/safety.h) up to `last`: a polygon for each part. For
+a point at the samples it is the projected slice. @pre p = 2. */
+[[nodiscard]] std::vector<std::vector<Picture::Polygon>> Sweeps(const Certifier& certifier, const Tube& tube, int last);
+
+/** The parts of the body in the state x. Nothing for a point. @pre p = 2. */
+[[nodiscard]] std::vector<Picture::Polygon> BodyAt(const Problem& problem, const Eigen::VectorXd& x);
+
+/** An obstacle that moves, grown, each half second from its stamp for two seconds, as far as it is there. Nothing for
+one that stands and for a half-space. @pre p = 2. */
+[[nodiscard]] std::vector<Picture::Polygon> PredictionOf(const Obstacle& obstacle);
+
+}  // namespace forereach

@@ -1,0 +1,107 @@
+// What a picture shows of a body: a sweep contains the body at every sample that it spans, and predictions grow.
+#include "records/outlines.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/models.h"
+
+namespace forereach {
+namespace {
+
+using Eigen::Vector2d;
+
+// Counter-clockwise, with what rounding may cost.
+bool Contains(const Picture::Polygon& polygon, const Vector2d& point) {
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector2d edge = polygon[(i + 1) % polygon.size()] - polygon[i], away = point - polygon[i];
+    if (edge.x() * away.y() - edge.y() * away.x() < -1e-9) return false;
+  }
+  return true;
+}
+
+TEST(Outlines, HullsAreCounterClockwiseAndConvex) {
+  const Picture::Polygon square = HullOf({{1, 1}, {0, 0}, {0.5, 0.5}, {1, 0}, {0, 1}, {0.5, 0}});
+  EXPECT_EQ(square, (Picture::Polygon{{0, 0}, {1, 0}, {1, 1}, {0, 1}}));
+  EXPECT_EQ(HullOf({{1, 2}}), (Picture::Polygon{{1, 2}}));
+  const Picture::Polygon disc = HullOf({{1, 2}}, 0.5);
+  EXPECT_EQ(disc.size(), 16u);
+  for (const Vector2d& corner : disc) EXPECT_NEAR((corner - Vector2d(1, 2)).norm(), 0.5, 1e-12);
+}
+
+Problem Car() {
+  Problem problem;
+  problem.model = MakeKinematicBicycle(0.1, 2.5);
+  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -100), Eigen::VectorXd::Constant(6, 100));
+  problem.domain.state =
+      Box(Eigen::VectorXd{{-100, -100, -3, -20, -3, -0.5}}, Eigen::VectorXd{{100, 100, 3, 20, 3, 0.5}});
+  problem.domain.input = Box(Vector2d(-1, -1), Vector2d(1, 1));
+  problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6)};
+  problem.transitions.z = Eigen::MatrixXd::Zero(1, 8);
+  problem.transitions.x_next = Eigen::MatrixXd::Zero(1, 6);
+  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  problem.body = {.heading = 2, .parts = {{{{-1, -1, 0}, {3, -1, 0}, {3, 1, 0}, {-1, 1, 0}}, 0}, {{{4, 0, 0}}, 0.5}}};
+  return problem;
+}
+
+TEST(Outlines, AStandingBodyIsItsParts) {
+  const Problem car = Car();
+  const Eigen::VectorXd x{{10, 20, M_PI / 2, 0, 0, 0}};
+  const auto parts = BodyAt(car, x);
+  ASSERT_EQ(parts.size(), 2u);
+  ASSERT_EQ(parts[0].size(), 4u);
+  EXPECT_NEAR(parts[0][0].x(), 9, 1e-12);
+  EXPECT_NEAR(parts[0][0].y(), 19, 1e-12);
+  EXPECT_TRUE(Contains(parts[1], {10, 24.49}));
+  EXPECT_FALSE(Contains(parts[1], {10, 24.51}));
+  Problem point = car;
+  point.body = Body{};
+  EXPECT_TRUE(BodyAt(point, x).empty());
+}
+
+TEST(Outlines, ASweepContainsTheBodyAtItsSamples) {
+  for (const bool sweeps : {false, true}) {
+    auto problem = std::make_shared<Problem>(Car());
+    if (sweeps) problem->between = Between{Vector2d(5, 5), 2, 2, 0.1};
+    const Certifier certifier(problem);
+    const Eigen::VectorXd start{{0, 0, 0, 10, 0, 0.3}};
+    const std::vector<double> controls(2 * 5, 0.0);
+    const Plan plan{controls.data(), 2, 5, 2};
+    Tube tube;
+    ASSERT_EQ(certifier.Certify(plan, Zonotope::FromBox(start, Eigen::VectorXd::Zero(6)), {}, tube).outcome,
+              Outcome::kCertified);
+    const auto all = Sweeps(certifier, tube, tube.length());
+    ASSERT_EQ(all.size(), sweeps ? 5u : 6u);
+    EXPECT_EQ(Sweeps(certifier, tube, 2).size(), 3u);
+    for (std::size_t t = 0; t < all.size(); ++t) {
+      ASSERT_EQ(all[t].size(), 2u);
+      for (int sample = static_cast<int>(t); sample <= static_cast<int>(t) + (sweeps ? 1 : 0); ++sample) {
+        Eigen::VectorXd x(6);
+        for (int k = 0; k < 6; ++k) x[k] = tube.slice(sample).center(k);
+        const auto body = BodyAt(*problem, x);
+        for (std::size_t part = 0; part < 2; ++part)
+          for (const Vector2d& corner : body[part]) EXPECT_TRUE(Contains(all[t][part], corner)) << t << " " << sample;
+      }
+    }
+  }
+}
+
+TEST(Outlines, PredictionsGrowWhereTheObstacleIs) {
+  const Obstacle circle = Obstacle::Circle(Vector2d(1, 0), 0.5);
+  EXPECT_TRUE(PredictionOf(circle).empty());
+  const ObstacleMotion motion{.stamp_us = 1'000'000, .velocity = {2, 0, 0}, .uncertainty = 0.25, .growth = 0.5};
+  const auto seen = PredictionOf(circle.Moving(motion));
+  ASSERT_EQ(seen.size(), 5u) << "0, 0.5, .. 2 s";
+  EXPECT_TRUE(Contains(seen[0], {1.74, 0}));
+  EXPECT_FALSE(Contains(seen[0], {1.76, 0}));
+  EXPECT_TRUE(Contains(seen[4], {5 + 1.74, 0}));
+  EXPECT_FALSE(Contains(seen[4], {5 + 1.76, 0}));
+  ObstacleMotion brief = motion;
+  brief.from_us = 1'200'000, brief.until_us = 2'000'000;
+  EXPECT_EQ(PredictionOf(circle.Moving(brief)).size(), 2u) << "at 0.5 and 1 s";
+  EXPECT_TRUE(PredictionOf(Obstacle::HalfSpace(Vector2d(1, 0), 3).Moving(motion)).empty());
+}
+
+}  // namespace
+}  // namespace forereach
