@@ -49,6 +49,7 @@ inline Config PointMass() {
   problem->projection = Eigen::MatrixXd::Identity(2, 4);
   Config config;
   config.path = "point_mass";
+  config.says_between = true;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({5, 0.3}), 1.5)};
   config.planner.goal = {12, 0};

@@ -23,7 +23,6 @@ Config Task() {
   config.gate.obstacles = ObstaclesSource::kBus;
   config.grounds = GroundsOf(DigestOf(std::string_view("withdrawal run")), *config.problem, config.obstacles);
   config.robot.time_limit_s = 60;
-  config.says_between = true;
   return config;
 }
 
