@@ -1,6 +1,5 @@
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,7 +7,6 @@
 #include "bus/bus_options.h"
 #include "bus/log.h"
 #include "bus/process.h"
-#include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/obstacle_sender.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/task/config.h"
@@ -25,14 +23,8 @@ struct Options {
   std::optional<double> period_ms;
 };
 
-// What receivers would refuse in every message.
-void RequireTracks(const Config& config) try {
-  static_cast<void>(FromMessage(ToMessageV2(config.obstacles, 0), static_cast<int>(config.problem->projection.rows())));
-} catch (const std::invalid_argument& error) {
-  throw ConfigError(config.path + ": task.obstacles: " + error.what());
-}
-
-// Replaces perception: it sends the obstacles of a task file. Their motions begin when it starts.
+// Replaces perception: it sends the obstacles of a task file. Their motions begin when it starts, and it sees none
+// before its first window begins.
 class ObstaclesNode final : public Node {
  public:
   ObstaclesNode(const Config& config, Bus& bus, std::int64_t period_us)
@@ -40,7 +32,7 @@ class ObstaclesNode final : public Node {
 
   void Tick(std::int64_t now_us) override {
     if (!begin_us_) begin_us_ = now_us;
-    sender_.Set(BegunAt(*begin_us_, obstacles_));
+    sender_.Set(SeenBy(now_us, BegunAt(*begin_us_, obstacles_)));
     if (const auto message = sender_.Due(now_us); message && !bus_.Publish(channels_.obstacles, *message) && !warned_) {
       warned_ = true;
       logging::Warn("the bus refused a message; receivers see a gap");
@@ -51,7 +43,7 @@ class ObstaclesNode final : public Node {
     const Config config = LoadConfig(path_, TransitionsFile::kIgnore);
     const std::string why = WhyKeyCannotChange(channels_, config.bus, Role::kPerception);
     if (!why.empty()) throw ConfigError(path_ + ": " + why);
-    RequireTracks(config);
+    RequireSendable(config);
     obstacles_ = config.obstacles;
     logging::Info("the obstacles of {} from now on", path_);
   } catch (const std::exception& error) {
@@ -70,7 +62,7 @@ class ObstaclesNode final : public Node {
 
 int Send(const Options& options) {
   Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
-  RequireTracks(config);
+  RequireSendable(config);
   options.bus.Override(config.bus);
   config.bus = WithKeys(std::move(config.bus), Role::kPerception);
   if (!config.bus.keys) logging::Warn(kUnsignedWarning);
@@ -96,7 +88,7 @@ Command ObstaclesCommand() {
       .name = "obstacles",
       .purpose =
           "Send a task file's obstacles on the bus repeatedly until SIGTERM, in place of perception. Their "
-          "motions begin when it starts. SIGHUP reads the file again",
+          "motions begin when it starts, and none is sent before its motion.from. SIGHUP reads the file again",
       .footer =
           "Example:\n  forereach obstacles --config my_robot.yaml --key robot.key\n\nWith gate.obstacles: bus, a "
           "certifier certifies nothing before it receives obstacles, and nothing after they stop.",

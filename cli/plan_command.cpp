@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/offline.h"
 #include "planner_bridge/certified_plan.h"
+#include "records/decision_json.h"
 
 namespace forereach {
 namespace {
@@ -52,7 +53,8 @@ int MakePlan(const Options& options) {
   RequireForCertifying(config);
   const auto proposer = MakeProposer(config);
   const Certifier certifier(config.problem);
-  const CertifiedPlan plan = FindCertifiedPlan(*proposer, certifier, config, options.seed);
+  const CertifiedPlan plan =
+      FindCertifiedPlan(*proposer, certifier, config, options.seed, ScheduleFromZero(config, kMaxSteps));
   if (plan.controls.cols() == 0) return ReportFailure(options, config, plan);
   SavePlan(options.out, *config.problem->model, plan.controls);
   const auto& goal = config.planner.goal;

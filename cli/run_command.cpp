@@ -16,7 +16,7 @@ namespace {
 constexpr std::int64_t kClockStepUs = 1000;
 
 struct Options {
-  std::string config, directory, key;
+  std::string config, directory, key, obstacles;
 };
 
 void Deliver(Bus& bus) {
@@ -40,11 +40,15 @@ int Run(const Options& options) {
   PlannerNode planner(config, *bus);
   RobotSimNode robot(config, *bus);
   ObstacleSender perception(ObstacleSender::PeriodUs(config.gate));  // this bus has no other sender
-  if (config.gate.obstacles == ObstaclesSource::kBus) perception.Set(config.obstacles);
+  const bool perceives = config.gate.obstacles == ObstaclesSource::kBus;
+  const Config world = options.obstacles.empty() ? config : LoadConfig(options.obstacles, TransitionsFile::kIgnore);
+  if (perceives) RequireSendable(world);
+  const std::vector<Obstacle> perceived = BegunAt(now, world.obstacles);
   certifier.Tick(now);  // as a process does before it hears anything
   Deliver(*bus);
   const auto last = now + static_cast<std::int64_t>((config.robot.time_limit_s + 60) * 1e6);
   for (; !robot.done() && now < last; now += kClockStepUs) {
+    if (perceives) perception.Set(SeenBy(now, perceived));
     if (const auto seen = perception.Due(now)) static_cast<void>(bus->Publish(config.bus.obstacles, *seen));
     for (Node* node : std::initializer_list<Node*>{&robot, &planner, &certifier, &logger}) {
       node->Tick(now);
@@ -59,13 +63,17 @@ int Run(const Options& options) {
 
 Command RunCommand() {
   const auto options = std::make_shared<Options>();
-  return {.name = kRun.name,
-          .purpose = kRun.purpose,
-          .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
-          .options = {ConfigOption(options->config),
-                      {"--directory", &options->directory, "DIR", "The logger's directory"},
-                      {"--key", &options->key, "DIR", "Directory of keys; by default the task file's bus.key"}},
-          .run = [options] { return Run(*options); }};
+  return {
+      .name = kRun.name,
+      .purpose = kRun.purpose,
+      .footer = "Example:\n  forereach run --config config/demo.yaml --directory run/log",
+      .options = {ConfigOption(options->config),
+                  {"--directory", &options->directory, "DIR", "The logger's directory"},
+                  {"--obstacles", &options->obstacles, "FILE",
+                   "Task file whose obstacles are sent on OBSTACLES, as `forereach obstacles` does, if the task has "
+                   "gate.obstacles: bus; by default the same task file"},
+                  {"--key", &options->key, "DIR", "Directory of keys; by default the task file's bus.key"}},
+      .run = [options] { return Run(*options); }};
 }
 
 }  // namespace forereach

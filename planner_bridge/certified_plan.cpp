@@ -15,12 +15,14 @@ constexpr std::uint32_t kSpread = 1'000'003;  // so that two seeds share no sear
 
 class PlanSearch final {
  public:
-  PlanSearch(Proposer& proposer, const Certifier& certifier, const Config& config, std::uint32_t seed)
+  PlanSearch(Proposer& proposer, const Certifier& certifier, const Config& config, std::uint32_t seed,
+             const Schedule& schedule)
       : proposer_(proposer),
         certifier_(certifier),
         config_(config),
         initial_set_(Zonotope::Enclose(config.initial_set)),
         half_width_((config.initial_set.upper() - config.initial_set.lower()) / 2),
+        schedule_(schedule),
         seed_(seed * kSpread),
         lessons_(config.planner) {}
 
@@ -36,8 +38,10 @@ class PlanSearch final {
   // the next.
   bool Extend(const Eigen::VectorXd& start) {
     for (int attempt = 0; attempt < config_.planner.candidates; ++attempt) {
-      const PlanRequest request{start, lessons_.clearance(),
-                                lessons_.DomainMargin(half_width_, config_.problem->projection), seed_++, attempt};
+      PlanRequest request{start, lessons_.clearance(), lessons_.DomainMargin(half_width_, config_.problem->projection),
+                          seed_++, attempt};
+      request.schedule = schedule_;
+      request.schedule.start_us += found_.progress_steps * schedule_.step_us;
       const std::optional<Proposal> part = proposer_.Propose(request);
       if (!part) continue;
       const int before = found_.progress_steps, after = before + static_cast<int>(part->controls.cols());
@@ -60,7 +64,7 @@ class PlanSearch final {
 
   Decision Certify(const Eigen::MatrixXd& controls) {
     const Plan plan{controls.data(), static_cast<int>(controls.rows()), static_cast<int>(controls.cols()),
-                    static_cast<int>(controls.rows())};
+                    static_cast<int>(controls.rows()), schedule_};
     certifier_.Require(plan, initial_set_, config_.obstacles);
     return certifier_.Certify(plan, initial_set_, config_.obstacles, candidate_tube_);
   }
@@ -88,6 +92,7 @@ class PlanSearch final {
   const Config& config_;
   const Zonotope initial_set_;
   const Eigen::VectorXd half_width_;
+  const Schedule schedule_;
   std::uint32_t seed_;
   Lessons lessons_;
   Tube tube_, candidate_tube_;  // of found_; of the candidate at hand
@@ -97,8 +102,8 @@ class PlanSearch final {
 }  // namespace
 
 CertifiedPlan FindCertifiedPlan(Proposer& proposer, const Certifier& certifier, const Config& config,
-                                std::uint32_t seed) {
-  return PlanSearch(proposer, certifier, config, seed).Run();
+                                std::uint32_t seed, const Schedule& schedule) {
+  return PlanSearch(proposer, certifier, config, seed, schedule).Run();
 }
 
 }  // namespace forereach

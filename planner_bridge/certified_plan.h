@@ -25,8 +25,9 @@ progress part and a braking tail. Each further progress part begins at the cente
 the last one, and is kept only if the whole plan with it is certified. The search ends at the goal, at kMaxSteps, or
 after planner.candidates searches for one part.
 @param certifier the certifier of config.problem. @param seed equal seeds give equal plans.
+@param schedule of the plan, for obstacles that move.
 Cost: at most planner.candidates searches and certify calls for each part. */
 [[nodiscard]] CertifiedPlan FindCertifiedPlan(Proposer& proposer, const Certifier& certifier, const Config& config,
-                                              std::uint32_t seed);
+                                              std::uint32_t seed, const Schedule& schedule = {});
 
 }  // namespace forereach

@@ -161,11 +161,6 @@ obstacle_t ShapeOf(const Obstacle& from) {
   return to;
 }
 
-bool Continues(const Obstacle& obstacle, const Obstacle& before) {
-  return obstacle.motion() && before.motion() && obstacle.motion()->from_us != -ObstacleMotion::kAlways &&
-         obstacle.motion()->from_us == before.motion()->until_us;
-}
-
 }  // namespace
 
 std::vector<Obstacle> FromMessage(const obstacles_t& message, int dim) {
@@ -191,6 +186,11 @@ obstacles_t ToMessage(const std::vector<Obstacle>& obstacles) {
   message.num_obstacles = static_cast<std::int16_t>(obstacles.size());
   std::ranges::transform(obstacles, message.obstacle, ShapeOf);
   return message;
+}
+
+bool Continues(const Obstacle& obstacle, const Obstacle& before) {
+  return obstacle.motion() && before.motion() && obstacle.motion()->from_us != -ObstacleMotion::kAlways &&
+         obstacle.motion()->from_us == before.motion()->until_us;
 }
 
 obstacles_v2_t ToMessageV2(const std::vector<Obstacle>& obstacles, std::int64_t utime,

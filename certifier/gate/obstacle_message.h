@@ -33,9 +33,12 @@ A piece that neither moves nor grows and has neither beginning nor end is an obs
 /** Of standing obstacles. @pre at most kMaxObstacles, and none moves. */
 [[nodiscard]] obstacles_t ToMessage(const std::vector<Obstacle>& obstacles);
 
+/** Whether the window of an obstacle begins where that of the one before it ends. */
+[[nodiscard]] bool Continues(const Obstacle& obstacle, const Obstacle& before);
+
 /** Of obstacles that may move, with the stamp `utime` of the message and of those that stand.
-@param tracks one for each obstacle. If empty, an obstacle whose window begins where the window of the one before it
-ends continues its track, and every other is a track of its own. The last piece of a track with an end is `gone` there.
+@param tracks one for each obstacle. If empty, an obstacle that Continues the one before it is of its track, and
+every other is a track of its own. The last piece of a track with an end is `gone` there.
 @pre at most kMaxObstacles. */
 [[nodiscard]] obstacles_v2_t ToMessageV2(const std::vector<Obstacle>& obstacles, std::int64_t utime,
                                          std::span<const std::int64_t> tracks = {});

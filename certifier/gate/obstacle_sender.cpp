@@ -1,6 +1,7 @@
 #include "certifier/gate/obstacle_sender.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -54,6 +55,28 @@ std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>
     begun.push_back(obstacle.Moving(motion));
   }
   return begun;
+}
+
+std::vector<Obstacle> SeenBy(std::int64_t now_us, const std::vector<Obstacle>& obstacles) {
+  std::vector<Obstacle> seen;
+  bool is_seen = true;
+  for (std::size_t i = 0; i < obstacles.size(); ++i) {
+    const auto& motion = obstacles[i].motion();
+    if (i == 0 || !Continues(obstacles[i], obstacles[i - 1])) is_seen = !motion || motion->from_us <= now_us;
+    if (is_seen) seen.push_back(obstacles[i]);
+  }
+  return seen;
+}
+
+void RequireSendable(const Config& config) try {
+  std::set<std::int64_t> changes{0};
+  for (const Obstacle& obstacle : config.obstacles)
+    if (obstacle.motion()) changes.insert(std::max<std::int64_t>(obstacle.motion()->from_us, 0));
+  for (const std::int64_t time_us : changes)
+    static_cast<void>(FromMessage(ToMessageV2(SeenBy(time_us, config.obstacles), time_us),
+                                  static_cast<int>(config.problem->projection.rows())));
+} catch (const std::invalid_argument& error) {
+  throw ConfigError(config.path + ": task.obstacles: " + error.what());
 }
 
 }  // namespace forereach

@@ -13,6 +13,7 @@ A bus has one sender. A restarted sender begins at sequence 0, which receivers a
 #include <vector>
 
 #include "certifier/safety/obstacle.h"
+#include "certifier/task/config.h"
 #include "certifier/task/gate_options.h"
 #include "forereach/obstacles_v2_t.hpp"
 #include "lcmtypes/codec.h"
@@ -54,5 +55,14 @@ class ObstacleSender final {
 /** Obstacles of a task file, whose motions begin at time 0, as they move from `begin_us` on.
 @pre |begin_us| and the obstacles' finite times are at most Schedule::kLatest. */
 [[nodiscard]] std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles);
+
+/** Those of `obstacles` that perception has seen by `now_us`: not a track whose first window begins later. Its other
+windows are seen with the first: they are predictions. Obstacles of one track follow each other, as ToMessageV2 has it.
+*/
+[[nodiscard]] std::vector<Obstacle> SeenBy(std::int64_t now_us, const std::vector<Obstacle>& obstacles);
+
+/** Checks that receivers take what SeenBy gives of the task's obstacles, at every time from 0 on.
+@throws ConfigError with the obstacle and the rule that it breaks. */
+void RequireSendable(const Config& config);
 
 }  // namespace forereach

@@ -415,15 +415,15 @@ TEST(Plan, TheSameSeedGivesTheSamePlan) {
 
 using Replacements = std::vector<std::pair<std::string, std::string>>;
 
-// The demo with parts of its text replaced.
+// The field of circles with parts of its text replaced.
 std::string DemoWith(const forereach::ScratchDirectory& scratch, const Replacements& replacements) {
-  std::string text = Read(FOREREACH_SOURCE_DIR "/config/demo.yaml");
+  std::string text = Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml");
   const auto replace = [&text](const std::string& what, const std::string& with) {
     const std::size_t at = text.find(what);
     ASSERT_NE(at, std::string::npos) << what;
     text.replace(at, what.size(), with);
   };
-  replace("transitions: data/", "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
+  replace("transitions: ../../config/data/", "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
   for (const auto& [what, with] : replacements) replace(what, with);
   return scratch.Write("task.yaml", text);
 }

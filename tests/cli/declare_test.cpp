@@ -95,11 +95,11 @@ TEST_F(DeclareTest, ItsLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
 }
 
 TEST_F(DeclareTest, BetweenProposesProvenBoundsFromTheEquations) {
-  const Output output = Forereach("declare --config config/demo.yaml --between");
+  const Output output = Forereach("declare --config tests/data/field.yaml --between");
   EXPECT_EQ(output.code, 0);
   EXPECT_THAT(output.text, HasSubstr("from the equations of kinematic_bicycle\n"));
   EXPECT_THAT(output.text, HasSubstr("The residual is not included"));
-  const Json document = Json::parse(Forereach("declare --config config/demo.yaml --between --json").text);
+  const Json document = Json::parse(Forereach("declare --config tests/data/field.yaml --between --json").text);
   EXPECT_EQ(document["source"], "equations");
   EXPECT_TRUE(document["proven"]);
   ASSERT_EQ(document["entries"].size(), 2u) << "the task has no body with a heading";
@@ -112,7 +112,7 @@ TEST_F(DeclareTest, BetweenProposesProvenBoundsFromTheEquations) {
 
 TEST_F(DeclareTest, BetweensLineGoesIntoATaskFileAndBoundsAtLeastAsMuch) {
   const std::string body = "  body: {pose: [x, y, theta], parts: [{disc: {at: [1, 0], radius: 1}}]}\n",
-                    unsaid = std::regex_replace(Read(FOREREACH_SOURCE_DIR "/config/demo.yaml"),
+                    unsaid = std::regex_replace(Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml"),
                                                 std::regex("  between: .*\n"), ""),
                     demo = Replaced(unsaid, "  projection: [x, y]\n", body);
   std::ofstream(task_) << demo;
@@ -155,7 +155,7 @@ TEST_F(DeclareTest, BetweenTakesLoggedPositionsIfAsked) {
 TEST_F(DeclareTest, BetweenExcludesWhatBelongsToTheResidual) {
   for (const char* options : {"--between --cover cover.json", "--between --check cover.json", "--from positions"})
     EXPECT_EQ(Forereach("declare --config config/demo.yaml " + std::string(options) + " 2>&1").code, 2) << options;
-  std::ofstream(task_) << Replaced(Read(FOREREACH_SOURCE_DIR "/config/demo.yaml"), "-0.36]", "-1.5]");
+  std::ofstream(task_) << Replaced(Read(FOREREACH_SOURCE_DIR "/tests/data/field.yaml"), "-0.36]", "-1.5]");
   const Output output = Declare("--between");
   EXPECT_EQ(output.code, 1) << output.text;
   EXPECT_THAT(output.text, HasSubstr("no finite bound on the motion between two samples"));

@@ -44,12 +44,12 @@ class KeptTaskTest : public testing::Test {
     fs::create_directories(*scratch_ / "tasks_of_mine");
     fs::create_directories(*scratch_ / "data");
     fs::copy(kSource + "/config/data/demo_transitions.csv", *scratch_ / "data/demo.csv");
-    std::string text = Read(kSource + "/config/demo.yaml");
+    std::string text = Read(kSource + "/tests/data/field.yaml");
     const auto replace = [&text](const std::string& old, const std::string& by) {
       ASSERT_NE(text.find(old), std::string::npos) << old;
       text.replace(text.find(old), old.size(), by);
     };
-    replace("transitions: data/demo_transitions.csv", "transitions: ../data/demo.csv");
+    replace("transitions: ../../config/data/demo_transitions.csv", "transitions: ../data/demo.csv");
     replace("time_limit_s: 45", "time_limit_s: 2");
     replace("gate: {obstacles: task}", "gate: {obstacles: task, learn: none}");
     for (const char* name : {"one", "two"}) {

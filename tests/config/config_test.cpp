@@ -175,12 +175,13 @@ TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   EXPECT_EQ(bounds.problem->between->turn_acceleration, 0);
 }
 
-// The bicycle of a shipped task with this for its projection.
+// The bicycle of tests/data/field.yaml with this for its projection.
 std::string BicycleWith(const std::string& body) {
   std::ostringstream text;
-  text << std::ifstream(FOREREACH_SOURCE_DIR "/config/demo.yaml").rdbuf();
+  text << std::ifstream(FOREREACH_SOURCE_DIR "/tests/data/field.yaml").rdbuf();
   const std::string task = std::regex_replace(text.str(), std::regex("  between: .*\n"), "");
-  return Replaced(Replaced(task, "  projection: [x, y]\n", body), "\ntransitions: data/demo_transitions.csv",
+  return Replaced(Replaced(task, "  projection: [x, y]\n", body),
+                  "\ntransitions: ../../config/data/demo_transitions.csv",
                   "\ntransitions: " FOREREACH_SOURCE_DIR "/config/data/demo_transitions.csv");
 }
 

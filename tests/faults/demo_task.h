@@ -1,4 +1,4 @@
-/** The demo's task for processes of a test. */
+/** The task of tests/data/field.yaml for processes of a test. */
 #pragma once
 
 #include <fstream>
@@ -10,9 +10,9 @@ namespace forereach {
 /** Its files named absolutely. @param more YAML that is added. */
 inline std::string DemoTask(const std::string& more = "") {
   std::ostringstream text;
-  text << std::ifstream(FOREREACH_SOURCE_DIR "/config/demo.yaml").rdbuf();
+  text << std::ifstream(FOREREACH_SOURCE_DIR "/tests/data/field.yaml").rdbuf();
   std::string task = text.str();
-  const std::string relative = "transitions: data/";
+  const std::string relative = "transitions: ../../config/data/";
   task.replace(task.find(relative), relative.size(), "transitions: " FOREREACH_SOURCE_DIR "/config/data/");
   return task + "\n" + more;
 }

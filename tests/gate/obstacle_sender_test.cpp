@@ -97,6 +97,36 @@ TEST(ObstacleSenderTest, MotionsOfAFileBeginWithTheSender) {
   EXPECT_EQ(begun[2].motion()->until_us, ObstacleMotion::kAlways);
 }
 
+// Two pieces of one track that begins at 100, one that began before, and one that stands.
+std::vector<Obstacle> SeenFrom100() {
+  ObstacleMotion first, second, before;
+  first.from_us = 100;
+  first.until_us = second.from_us = 200;
+  before.until_us = 50;
+  return {kOne[0].Moving(first), kOne[0].Moving(second), kOne[0].Moving(before), kOne[0]};
+}
+
+TEST(ObstacleSenderTest, ATrackThatBeginsLaterIsSeenFromThenOnWithItsPredictions) {
+  const std::vector<Obstacle> all = SeenFrom100();
+  EXPECT_EQ(ObstaclesDigest(SeenBy(99, all)), ObstaclesDigest({all[2], all[3]}));
+  EXPECT_EQ(ObstaclesDigest(SeenBy(100, all)), ObstaclesDigest(all));
+  EXPECT_EQ(ObstaclesDigest(SeenBy(1000, all)), ObstaclesDigest(all));
+}
+
+TEST(ObstacleSenderTest, SendableIsWhatReceiversTakeAtAllTimes) {
+  Config config = SmallTaskOnTheBus();
+  config.obstacles = SeenFrom100();
+  EXPECT_NO_THROW(RequireSendable(config));
+  config.obstacles.erase(config.obstacles.begin());  // the second piece is now a track of its own, which begins at 200
+  EXPECT_NO_THROW(RequireSendable(config));
+  config.obstacles = {Obstacle::AxisBox(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones())};
+  EXPECT_THROW(RequireSendable(config), ConfigError);
+  ObstacleMotion far;
+  far.from_us = 2 * kFarthestStampUs;  // sent with a stamp that is a day older than its message
+  config.obstacles = {kOne[0].Moving(far)};
+  EXPECT_THROW(RequireSendable(config), ConfigError);
+}
+
 TEST(ObstacleSenderTest, AtItsPeriodAGateKnowsWhereTwoMessagesInARowAreLost) {
   const Config config = SmallTaskOnTheBus();
   Gate gate(config);

@@ -63,7 +63,8 @@ class RandomCandidates final {
 TEST(GuardDomainProperty, EveryHonestCertificatePasses) {
   const unsigned seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
-  for (const char* path : {FOREREACH_SOURCE_DIR "/config/demo.yaml", FOREREACH_SOURCE_DIR "/config/point_mass.yaml"}) {
+  for (const char* path :
+       {FOREREACH_SOURCE_DIR "/tests/data/field.yaml", FOREREACH_SOURCE_DIR "/config/point_mass.yaml"}) {
     Config config = LoadConfig(path);
     config.obstacles.clear();
     Problem problem = *config.problem;
