@@ -26,6 +26,7 @@ inline Config Bicycle() {
   problem->projection = Eigen::MatrixXd::Identity(2, 6);
   Config config;
   config.path = "bicycle";
+  config.says_between = true;
   config.problem = problem;
   config.obstacles = {Obstacle::Circle(Vec({25, 1}), 3), Obstacle::Circle(Vec({45, -4}), 3)};
   config.planner.goal = {65, 0};
