@@ -854,6 +854,49 @@ class Campaign final {
       jump(Drifting(ahead, Below(9) - 4.0));
       jump(Drifting(60, 14));
     });
+    Walls();
+  }
+
+  // The plan that the robot drives is withdrawn, and what of it stands is used up.
+  void Walls() {
+    std::vector<Obstacle> seen = LoadConfig(world_.Write("world.yaml", DemoTask())).obstacles;
+    Rig rig(DemoTaskOnTheBus(""), {.seen = seen});
+    rig.witness().SetWorld({ObstaclesDigest(seen)});
+    std::int64_t last_withdrawn = 0, withdrawn = 0, stops = 0;
+    rig.Hear(rig.config().bus.withdrawn, [&](const Received& r) {
+      const auto message = Decoded<withdrawal_t>(r.bytes);
+      if (message && std::exchange(last_withdrawn, message->plan_id) != message->plan_id) ++withdrawn;
+    });
+    rig.Hear(rig.config().bus.event, [&](const Received& r) {
+      const auto event = Decoded<execution_event_t>(r.bytes);
+      stops += event && event->kind == execution_event_t::EMERGENCY_STOP;
+    });
+    Row& row = Begin("A wall appears across the way of the robot, and goes", options_.others);
+    Tries(
+        row, rig,
+        [&](int) {
+          // A robot that has just begun to drive may end its plan before the wall.
+          const std::int64_t before = withdrawn;
+          for (int walls = 0; walls < 5 && withdrawn == before; ++walls) {
+            rig.Listen(milliseconds(1500));
+            const certified_plan_t* plan = rig.witness().last_certified();
+            std::vector<Obstacle> walled = seen;
+            const double ahead = (plan ? plan->plan.initial_center[0] : 0) + 2 + Below(6);
+            walled.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), ahead));
+            rig.witness().SetWorld({ObstaclesDigest(seen), ObstaclesDigest(walled)});
+            rig.perception().See(walled);
+            rig.Listen(milliseconds(1000));
+            rig.witness().SetWorld({ObstaclesDigest(walled)});
+            rig.Listen(milliseconds(500));
+            rig.witness().SetWorld({ObstaclesDigest(seen), ObstaclesDigest(walled)});
+            rig.perception().See(seen);
+            rig.Listen(milliseconds(500));
+            rig.witness().SetWorld({ObstaclesDigest(seen)});
+          }
+        },
+        options_.others);
+    Demand(row, withdrawn > 0, "no plan was withdrawn");
+    Remark(row, std::to_string(withdrawn) + " plans withdrawn, " + std::to_string(stops) + " emergency stops");
   }
 
   void Disks();
@@ -1219,8 +1262,8 @@ std::string Table(const std::vector<Row>& rows, const Options& options) {
   text << "Made by `scripts/faults --kills " << options.kills << " --others " << options.others << " --flood "
        << options.floods << " --seed " << options.seed << (options.only.empty() ? "" : " --only " + options.only)
        << (options.allow_untried ? " --allow-untried" : "") << "`. *Forbidden* counts tries with one of these:\n"
-       << "- the robot executed an uncertified plan, a control that is not of its plan, or a control outside its "
-          "slice;\n"
+       << "- the robot executed an uncertified plan, a control that is not of its plan, a control outside its "
+          "slice, or one that was withdrawn;\n"
        << "- a candidate was answered twice, or was counted and not answered (not checked where messages are made to "
           "be lost);\n"
        << "- a process ended unexpectedly, or did not end properly within 5 s of SIGTERM;\n"

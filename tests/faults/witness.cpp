@@ -13,6 +13,7 @@ Witness::Witness(Bus& bus, const BusOptions& channels, bool spoiled)
     : bus_(bus), channels_(channels), spoiled_(spoiled) {
   bus.Subscribe(channels_.decision, [this](const Received& r) { OnDecision(r); });
   bus.Subscribe(channels_.certified, [this](const Received& r) { OnCertified(r); });
+  bus.Subscribe(channels_.event, [this](const Received& r) { OnEvent(r); });
   bus.Subscribe(channels_.robot_state, [this](const Received& r) { OnState(r); });
   bus.Subscribe(channels_.transition, [this](const Received& r) { OnTransition(r); });
   bus.Subscribe(channels_.fault, [this](const Received& r) { OnFault(r); });
@@ -84,6 +85,11 @@ void Witness::OnState(const Received& received) {
   const auto state = Decoded<robot_state_t>(received.bytes);
   if (!state || state->mode != robot_state_t::EXECUTING) return;
   applied_[state->utime] = {state->executing_plan_id, state->executing_step};
+  const auto withdrawn = withdrawn_.find(state->executing_plan_id);
+  if (withdrawn != withdrawn_.end() && state->utime > withdrawn->second.utime &&
+      state->executing_step >= withdrawn->second.standing_steps)
+    Violate("step " + std::to_string(state->executing_step) + " of plan " + std::to_string(state->executing_plan_id) +
+            " is executing, and was withdrawn");
   const auto plan = plans_.find(state->executing_plan_id);
   if (plan == plans_.end() && bus_.dropped() > 0) {
     unjudged_.insert(state->executing_plan_id);
@@ -92,6 +98,13 @@ void Witness::OnState(const Received& received) {
   if (plan == plans_.end())
     return Violate("plan " + std::to_string(state->executing_plan_id) + " is executing, and was never passed on");
   executed_ = std::max(executed_, plan->second.number);
+}
+
+void Witness::OnEvent(const Received& received) {
+  const auto event = Decoded<execution_event_t>(received.bytes);
+  if (!event || event->kind != execution_event_t::WITHDRAWN) return;
+  const auto [known, is_new] = withdrawn_.try_emplace(event->plan_id, Withdrawn{event->utime, event->step});
+  if (!is_new && event->step < known->second.standing_steps) known->second = {event->utime, event->step};
 }
 
 void Witness::OnTransition(const Received& received) {

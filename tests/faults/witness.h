@@ -15,6 +15,7 @@
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -73,6 +74,7 @@ class Witness final {
   void OnFault(const Received& received);
   void OnCertified(const Received& received);
   void OnState(const Received& received);
+  void OnEvent(const Received& received);
   void OnTransition(const Received& received);
   void Violate(const std::string& what) { violations_.push_back(what); }
 
@@ -97,9 +99,14 @@ class Witness final {
     std::int64_t plan_id;
     int step;
   };
-  std::map<std::int64_t, Applied> applied_;  // by the boundary from which it is applied
-  std::set<std::int64_t> unjudged_;          // plan ids
-  std::set<Digest> world_;                   // empty: any
+  struct Withdrawn {
+    std::int64_t utime;
+    int standing_steps;
+  };
+  std::map<std::int64_t, Withdrawn> withdrawn_;  // by plan_id, as the robot has answered
+  std::map<std::int64_t, Applied> applied_;      // by the boundary from which it is applied
+  std::set<std::int64_t> unjudged_;              // plan ids
+  std::set<Digest> world_;                       // empty: any
   std::optional<certifier_status_v3_t> status_;
   std::optional<logger_status_t> logger_status_;
   std::chrono::steady_clock::time_point robot_heard_{};
