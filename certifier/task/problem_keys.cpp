@@ -11,6 +11,7 @@
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
+#include "certifier/safety/placement.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
@@ -327,13 +328,16 @@ void ReadObstacle(const Document& file, const std::string& key, TaskDraft& draft
   if (moves) ReadMotion(file, key + ".motion", draft);
 }
 
-void RequirePosition(const Document& file, const std::string& key, TaskDraft& draft) {
+void CheckTask(const Document& file, const std::string& key, TaskDraft& draft) {
+  const Problem& problem = draft.problem;
   if (draft.scope.safety_dim == 0) file.Fail(key + ".projection", "missing: the task needs this key, or task.body");
+  // Numbers that are each in their range may still be too large together. @throws std::invalid_argument.
+  static_cast<void>(Placement(problem.projection, problem.body, problem.between, problem.model->num_states()));
 }
 
 std::vector<Key> TaskKeys() {
   return {
-      Required(Map("task", "The certification task. It has either projection or body.", RequirePosition)),
+      Required(Map("task", "The certification task. It has either projection or body.", CheckTask)),
       Required(Map("task.initial_set", "X0, the set of initial states. A candidate on the bus has its own.",
                    ReadInitialSet)),
       Required(Vector("task.initial_set.center", "of the state", kReal, Size::kStates, "Its middle.")),

@@ -87,6 +87,8 @@ TEST_F(ErrorTest, Bodies) {
   EXPECT_THAT(parts("[{disc: {at: [1, 0]}}]"), StartsWith("task.yaml:17: task.body.parts[0].disc.radius: missing: "));
   EXPECT_EQ(parts("[{disc: {at: [1, 0], radius: -1e-300}}]"),
             "task.yaml:17: task.body.parts[0].disc.radius: -1e-300 is outside [0, inf)");
+  EXPECT_EQ(parts("[{disc: {at: [1e153, 0], radius: 1e307}}]"), "");
+  EXPECT_EQ(parts("[{disc: {at: [1e308, 1e308], radius: 1e308}}]"), "task.yaml:14: task: body: its size is not finite");
   EXPECT_EQ(parts("[{disc: {at: [1, .inf], radius: 0}}]"),
             "task.yaml:17: task.body.parts[0].disc.at[1]: .inf is not a finite number; write a number in (-inf, inf), "
             "its unit is m");
@@ -151,6 +153,8 @@ TEST_F(ErrorTest, BoundsBetweenSamples) {
                                  "between: {acceleration: [1, 1]" + between + "}"));
   };
   EXPECT_EQ(turning(", turn_rate: 0, turn_acceleration: 0"), "");
+  EXPECT_EQ(turning(", turn_rate: 1e100, turn_acceleration: 0"), "");
+  EXPECT_EQ(turning(", turn_rate: 1e200, turn_acceleration: 0"), "task.yaml:14: task: body: its size is not finite");
   EXPECT_EQ(turning(", turn_rate: 0"),
             "task.yaml:19: task.between.turn_acceleration: missing: task.body has a heading, so the bound is needed");
   EXPECT_EQ(turning(""),
