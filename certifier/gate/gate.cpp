@@ -80,7 +80,7 @@ GateAnswer Gate::Answer(Bytes bytes, const TimeSource& clock, std::optional<Reje
               (rejection->outcome == decision_t::REJECTED ? "rejected: " : "abstained: ") + rejection->why);
     } else {
       Certify(candidate, initial_set, answer);
-      WithdrawIfLate(answer, clock());
+      DropIfLate(answer, clock());
     }
   } catch (const std::exception& error) {
     decision.outcome = decision_t::REJECTED;
@@ -248,7 +248,7 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noe
 }
 
 // Should the budget not have been enough: its execution might begin before the robot has it.
-void Gate::WithdrawIfLate(GateAnswer& answer, std::int64_t now_us) const {
+void Gate::DropIfLate(GateAnswer& answer, std::int64_t now_us) const {
   const std::int64_t taken = now_us - answer.decision.utime;
   if (!answer.certified || taken <= Microseconds(options_.decision_budget_ms)) return;
   answer.certified.reset();

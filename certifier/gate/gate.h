@@ -58,7 +58,7 @@ class Gate final {
 
   /** Decides on one candidate. Never throws: an exception becomes a rejection. The caller sets elapsed_us; all other
   fields of both messages are complete. Reads the clock twice. The first reading is the decision's utime. By the second,
-  a certificate that took longer than gate.decision_budget_ms is withdrawn. */
+  a certificate that took longer than gate.decision_budget_ms is dropped. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, const TimeSource& clock) noexcept;
   /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
@@ -128,7 +128,7 @@ class Gate final {
   [[nodiscard]] std::optional<Rejection> CheckSource(const candidate_plan_t& candidate, std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const;
   void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer);
-  void WithdrawIfLate(GateAnswer& answer, std::int64_t now_us) const;
+  void DropIfLate(GateAnswer& answer, std::int64_t now_us) const;
   /** Sets all fields of a message of zeros, and its seal. */
   void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
   void Count(const decision_t& decision);
