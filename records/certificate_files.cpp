@@ -15,6 +15,7 @@
 #include "bus/bus_options.h"
 #include "certifier/certify/explain.h"
 #include "certifier/gate/candidate_message.h"
+#include "certifier/gate/stamp.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/files.h"
 #include "certifier/task/json_text.h"
@@ -116,6 +117,12 @@ class CertificateReader final : public TimelineUser {
     }
     certificate.name += ", plan " + std::to_string(certified.plan.plan_id) + " of " + GetText(certified.plan.source);
     if (certificate.missing = WhyNoSchedule(certified.plan, task.gate); !certificate.missing.empty()) return;
+    if (const auto& between = task.problem->between;
+        between && certified.plan.step_us > Microseconds(between->period * 1e3)) {
+      certificate.missing = "step_us is " + std::to_string(certified.plan.step_us) + ", longer than model.dt, " +
+                            ToText(between->period) + " s: task.between bounds the motion in this time";
+      return;
+    }
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);
     certificate.certificate.known = KnownRowsOf(recorded.basis);
@@ -243,9 +250,7 @@ class CertificateReader final : public TimelineUser {
                      std::to_string(decision.obstacle));
     double clearance = kInfinity;
     if (decision.obstacle >= 0) {
-      const Obstacle& closest = derived.obstacles[static_cast<std::size_t>(decision.obstacle)];
-      if (!IsDistanceToKeep(decision.threshold, closest, problem))
-        compare("threshold", ToText(closest.radius()), ToText(decision.threshold));
+      CompareThreshold(decision, problem, static_cast<int>(certified.plan.num_steps), certificate);
       clearance = SubDown(decision.margin, decision.threshold);
       if (!(clearance > 0 && clearance < kInfinity))
         compare("margin", "above " + ToText(decision.threshold), ToText(decision.margin));
@@ -257,6 +262,19 @@ class CertificateReader final : public TimelineUser {
     for (std::size_t t = 0; t + (problem.between ? 1 : 0) < derived.slices.size(); ++t)
       derived.slices[t].clearance.assign(static_cast<std::size_t>(count), clearance);
     CompareMessage(decision, problem, static_cast<int>(certified.plan.num_steps), clearance, certificate);
+  }
+
+  // The threshold is the distance to be kept in some step, by some part or by the whole body.
+  static void CompareThreshold(const decision_t& decision, const Problem& problem, int steps,
+                               RecordedCertificate& certificate) {
+    const Obstacle& obstacle = certificate.certificate.obstacles[static_cast<std::size_t>(decision.obstacle)];
+    double least = kInfinity;
+    for (int t = 0; t < steps + (problem.between ? 0 : 1); ++t)
+      for (const double threshold : ThresholdsOf(problem, obstacle, certificate.certificate.schedule, t)) {
+        if (threshold == decision.threshold) return;
+        least = std::min(least, threshold);
+      }
+    certificate.Compare(kAltered + std::string("its decision's threshold"), ToText(least), ToText(decision.threshold));
   }
 
   // Only the message of a log says which step and which part is the closest.

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/certify/explain.h"
+#include "certifier/safety/placement.h"
 #include "certifier/task/json_field.h"
 #include "certifier/task/json_text.h"
 #include "forereach/decision_t.hpp"
@@ -159,9 +160,12 @@ class Reading {
         part = document_["part"].Integer(0, parts - 1);
       Compare(document_["obstacle"], obstacle);
       Compare(document_["closest_step"], step);
-      const Obstacle& closest = config_.obstacles[static_cast<std::size_t>(obstacle)];
-      if (!IsDistanceToKeep(threshold.Number(), closest, *config_.problem))
-        record_.Compare(kAltered + threshold.name(), JsonText(Json(closest.radius())), JsonText(threshold.json()));
+      const std::vector<double> thresholds = ThresholdsOf(
+          *config_.problem, config_.obstacles[static_cast<std::size_t>(obstacle)], record_.certificate.schedule, step);
+      const double by_body = thresholds.back(),
+                   by_part = part < 0 ? by_body : thresholds[static_cast<std::size_t>(part)];
+      const bool is_kept_by_one = parts == 1 && threshold.json() == thresholds.front();
+      if (!is_kept_by_one) Compare(threshold, by_part);
       const double claimed = SubDown(margin.Number(), threshold.Number());
       if (claimed != clearance)
         record_.Compare(kAltered + margin.name() + " less the distance to be kept", JsonText(Json(clearance)),
@@ -178,9 +182,15 @@ class Reading {
 
 }  // namespace
 
-bool IsDistanceToKeep(double threshold, const Obstacle& closest, const Problem& problem) {
-  if (problem.body == Body{} && !closest.motion()) return threshold == closest.radius();
-  return closest.radius() <= threshold && threshold < kInfinity;
+std::vector<double> ThresholdsOf(const Problem& problem, const Obstacle& obstacle, const Schedule& schedule, int t) {
+  const Placement placement(problem.projection, problem.body, problem.between, problem.model->num_states());
+  const double growth =
+      obstacle.motion() ? Meet(*obstacle.motion(), schedule, t, t + (placement.sweeps() ? 1 : 0)).growth : 0;
+  std::vector<double> thresholds;
+  for (const Placement::Part& part : placement.parts())
+    thresholds.push_back(AddUp(obstacle.radius(), AddUp(part.radius, growth)));
+  thresholds.push_back(AddUp(obstacle.radius(), AddUp(growth, placement.reach())));
+  return thresholds;
 }
 
 std::string TaskOf(const std::string& path, const Json& document) {
@@ -196,7 +206,8 @@ bool IsCertificate(const std::string& path, const Json& document) {
   for (const std::int16_t abstention :
        {decision_t::ABSTAIN_FALSIFIED, decision_t::ABSTAIN_DOMAIN, decision_t::ABSTAIN_SAFETY})
     if (name == OutcomeName(abstention)) return false;
-  if (name != OutcomeName(decision_t::CERTIFIED)) outcome.Fail("'" + name.substr(0, 40) + "' is no outcome");
+  if (name != OutcomeName(decision_t::CERTIFIED))
+    outcome.Fail(std::string("'").append(name, 0, 40) + "' is no outcome");
   return true;
 }
 

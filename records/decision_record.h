@@ -32,10 +32,10 @@ struct RecordedCertificate {
   }
 };
 
-/** Whether the threshold of a certificate can be right for its closest obstacle. It is the obstacle's radius if the
-robot is a point and the obstacle stands. Otherwise it also has the part's radius and the motion's growth, which only
-the verifier derives; then it is at least the radius. */
-[[nodiscard]] bool IsDistanceToKeep(double threshold, const Obstacle& closest, const Problem& problem);
+/** The distances to be kept that a certifier may name for an obstacle in unit t of a plan (certify/safety.h), metres:
+that of each part of the body, then that of the whole body. @pre the certifier accepts the problem. */
+[[nodiscard]] std::vector<double> ThresholdsOf(const Problem& problem, const Obstacle& obstacle,
+                                               const Schedule& schedule, int t);
 
 /** The task file that a document names: its absolute path if that file exists, otherwise the path as it was given.
 @throws ConfigError with file and field. */

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <regex>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -317,6 +318,137 @@ TEST_F(VerifyObstacles, AlteredDecisionsAreRefused) {
   });
   EXPECT_EQ(count, 0u);
   EXPECT_EQ(status, Status::kRefuted);
+}
+
+// A body that turns, bounds between the samples, and an obstacle of the bus that moves.
+class VerifyMovingObstacles : public VerifyObstacles {
+ protected:
+  VerifyMovingObstacles() {
+    std::string text = Read(kConfig);
+    text = std::regex_replace(text, std::regex("  projection:[^\n]*"), R"(  body:
+    pose: [x, y, theta]
+    parts: [{hull: {points: [[-1, -1], [-1, 1], [3, -1], [3, 1]]}}, {disc: {at: [3, 0], radius: 0.5}}]
+  between: {acceleration: [12, 12], turn_rate: 2, turn_acceleration: 4})");
+    text = std::regex_replace(text, std::regex("  obstacles:\n(    - [^\n]*\n)*"), "  obstacles: []\n");
+    std::filesystem::copy(FOREREACH_SOURCE_DIR "/tests/data/course_transitions.csv",
+                          scratch_ / "course_transitions.csv");
+    Load(text + "\ngate: {max_clock_error_ms: 20}\n");
+    motion_.stamp_us = kStart;
+    motion_.velocity = {-1, 0.5, 0};
+    motion_.uncertainty = 0.125;
+    motion_.growth = 0.25;
+    motion_.growth_rate = 0.125;
+  }
+
+  void Load(const std::string& text) {
+    task_ = scratch_.Write("task.yaml", text);
+    config_ = LoadConfig(task_);
+  }
+
+  [[nodiscard]] static obstacles_v2_t Message(const Obstacle& obstacle) {
+    obstacles_v2_t message = ToMessageV2({obstacle}, kStart);
+    message.sequence = 0;
+    return message;
+  }
+  [[nodiscard]] Obstacle Mover(double x) const { return Obstacle::Circle(Eigen::Vector2d(x, 0), 1).Moving(motion_); }
+
+  // A log of a decision among `decided`, in which `logged` is written and named instead.
+  CertificateFile Decide(const Obstacle& decided, const Obstacle& logged,
+                         const std::function<void(decision_t&)>& edit = {}) {
+    Gate gate(config_);
+    EXPECT_EQ(gate.UpdateObstacles(Encode(Message(decided)), kStart + 1), "");
+    const auto bytes = Encode(candidate_);
+    GateAnswer answer = gate.Decide(bytes, kStart + 3);
+    EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
+    certified_plan_t certified = answer.certified.value_or(certified_plan_t{});
+    const Digest digest = ObstaclesDigest(FromMessage(Message(logged), 2));
+    SetDigest(answer.decision.obstacles_digest, digest);
+    SetDigest(certified.obstacles_digest, digest);
+    SetDigest(certified.certificate_digest, CertificateDigest(certified));
+    if (edit) edit(answer.decision);
+    const std::string path = scratch_ / "log.lcmlog";
+    std::filesystem::remove(path);
+    EventLogWriter writer(path);
+    writer.Append(kStart + 1, config_.bus.obstacles, Encode(Message(logged)));
+    writer.Append(kStart + 3, config_.bus.candidate, bytes);
+    writer.Append(kStart + 4, config_.bus.decision, Encode(answer.decision));
+    writer.Append(kStart + 6, config_.bus.certified, Encode(certified));
+    EXPECT_TRUE(writer.Flush());
+    return ReadCertificates(path, task_);
+  }
+
+  std::string task_;
+  ObstacleMotion motion_;
+};
+
+TEST_F(VerifyMovingObstacles, AreMetAtTheTimesOfThePlan) {
+  const CertificateFile file = Decide(Mover(80), Mover(80));
+  ASSERT_EQ(file.certificates.size(), 1u);
+  for (const Mismatch& mismatch : file.certificates[0].mismatches)
+    ADD_FAILURE() << mismatch.what << ": " << mismatch.expected << ", found " << mismatch.found;
+  const Schedule& schedule = file.certificates[0].certificate.schedule;
+  EXPECT_EQ(schedule.start_us, candidate_.start_utime);
+  EXPECT_EQ(schedule.step_us, candidate_.step_us);
+  EXPECT_EQ(schedule.clock_error_us, 20'000);
+  const Verdict verdict = Judge(file, 0);
+  EXPECT_EQ(verdict.status, Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
+}
+
+TEST_F(VerifyMovingObstacles, AnotherMotionIsRefuted) {
+  const Obstacle decided = Mover(80);
+  motion_.velocity[0] = -2;
+  Verdict verdict = Judge(Decide(decided, Mover(80)), 0);
+  EXPECT_EQ(verdict.status, Status::kRefuted);
+  EXPECT_THAT(verdict.failure.what, HasSubstr("the motion to the next sample keeps clear of obstacle 0"));
+  motion_.velocity[0] = -1;
+  motion_.growth_rate = 0.25;
+  verdict = Judge(Decide(decided, Mover(80)), 0);
+  EXPECT_THAT(verdict.failure.what, HasSubstr("keeps clear of obstacle 0"));
+}
+
+TEST_F(VerifyMovingObstacles, TheDistanceToBeKeptIsThatOfAStep) {
+  const auto first_mismatch = [&](double change) {
+    const auto file = Decide(Mover(80), Mover(80), [&](decision_t& decision) {
+      decision.threshold += change;
+      decision.margin += change;
+    });
+    return file.certificates[0].mismatches.empty() ? "" : file.certificates[0].mismatches[0].what;
+  };
+  EXPECT_EQ(first_mismatch(0), "");
+  EXPECT_THAT(first_mismatch(0.001), HasSubstr("its decision's threshold"));
+  EXPECT_THAT(first_mismatch(-0.5), HasSubstr("its decision's threshold"));
+}
+
+// The gate rejects such a plan. A certificate of one says nothing of the motion between its samples.
+TEST_F(VerifyMovingObstacles, AStepLongerThanTheBoundedTimeIsNotDerived) {
+  Load(std::regex_replace(Read(task_), std::regex("\ngate:.*"), ""));  // without a clock error, so nothing may move
+  const Obstacle standing = Obstacle::Circle(Eigen::Vector2d(80, 0), 1);
+  ASSERT_EQ(Decide(standing, standing).certificates.size(), 1u);
+  const auto missing = [&](std::int64_t step_us) {
+    const std::string path = scratch_ / ("step" + std::to_string(step_us) + ".lcmlog");
+    CopyLog(scratch_ / "log.lcmlog", path, [&](LogEvent& event) {
+      if (auto certified = Decoded<certified_plan_t>(event.data)) {
+        certified->plan.step_us = step_us;
+        event.data = Encode(*certified);
+      }
+      return true;
+    });
+    return ReadCertificates(path, task_).certificates.at(0).missing;
+  };
+  EXPECT_EQ(missing(100'000), "");
+  EXPECT_THAT(missing(100'001), HasSubstr("step_us is 100001, longer than model.dt"));
+}
+
+// A track that ended before the plan begins: the certificate names no obstacle.
+TEST_F(VerifyMovingObstacles, WhatIsNowhereDuringThePlanIsNotNamed) {
+  motion_.until_us = kStart + 10;
+  candidate_.start_utime = kStart + 200'000;
+  const CertificateFile file = Decide(Mover(0), Mover(0));
+  EXPECT_TRUE(file.certificates.at(0).mismatches.empty());
+  EXPECT_EQ(Judge(file, 0).status, Status::kConfirmed);
+  motion_.until_us = ObstacleMotion::kAlways;
+  EXPECT_EQ(Judge(Decide(Mover(900), Mover(900), [](decision_t& decision) { decision.obstacle = -1; }), 0).status,
+            Status::kRefuted);
 }
 
 TEST_F(VerifyObstacles, StaleOnesWereNeverInForce) {

@@ -195,7 +195,75 @@ TEST_F(VerifyDecision, MovedObstacle) {
   WriteTask(center.prefix().str() + moved.str() + center.suffix().str());
   ExpectRefuted({"digest of the config", "digest of the obstacles", "clear of obstacle 0"});
   Reseal(LoadConfig(scratch_ / "task.yaml"));
-  ExpectRefuted({"not so: the slice keeps clear of obstacle 0"});
+  ExpectRefuted({"not so: the ", " keeps clear of obstacle 0"});
+}
+
+// A body of two parts that turns, bounds between the samples, an obstacle that moves, and one that comes a minute
+// later.
+class VerifyWorld : public VerifyDecision {
+ protected:
+  VerifyWorld() {
+    task_ = std::regex_replace(task_, std::regex("\n  (projection|between):[^\n]*"), "");
+    task_ = std::regex_replace(task_, std::regex("\n  obstacles:\n    - circle:[^\n]*"), R"(
+  body:
+    pose: [x, y, theta]
+    parts:
+      - hull: {points: [[-1, -0.9], [3.5, -0.9], [3.5, 0.9], [-1, 0.9]]}
+      - disc: {at: [2, 0], radius: 1}
+  between: {acceleration: [12, 12], turn_rate: 2, turn_acceleration: 4}
+  obstacles:
+    - circle: {center: [11.4, 19], radius: 1}
+      motion: {velocity: [0.5, -1], uncertainty: 0.1, growth: 0.2, growth_rate: 0.1}
+    - circle: {center: [0, 0], radius: 9}
+      motion: {velocity: [0, 0], from: 60})");
+    WriteTask(task_);
+    decision_ = Certify("bicycle_certified");
+  }
+
+  void ExpectAltered(const char* field) { ExpectRefuted({"the record was altered after it was made: ", field}); }
+};
+
+TEST_F(VerifyWorld, AsItIsConfirmed) {
+  EXPECT_EQ(decision_["holds"], "all_times");
+  EXPECT_EQ(decision_["inputs"]["schedule"]["step_us"], 100'000);
+  EXPECT_TRUE(decision_["tube"].back()["clearance"].empty());
+  EXPECT_TRUE(decision_["tube"][0]["clearance"][1].is_null()) << "nowhere";
+  const Output output = Verify();
+  EXPECT_EQ(output.code, 0) << output.text;
+}
+
+TEST_F(VerifyWorld, AChangedWitnessIsRefuted) {
+  const Json before = decision_;
+  decision_["holds"] = "samples";
+  ExpectAltered("holds");
+  decision_ = before;
+  decision_["part"] = 1 - decision_["part"].get<int>();
+  ExpectAltered("threshold");
+  decision_ = before;
+  decision_["inputs"]["schedule"]["step_us"] = 100'001;
+  ExpectAltered("inputs.schedule");
+  decision_ = before;
+  for (const char* number : {"margin", "threshold"}) decision_[number] = decision_[number].get<double>() + 0.25;
+  ExpectAltered("threshold");
+}
+
+TEST_F(VerifyWorld, AClearanceIsThatOfTheStepAfterItsSample) {
+  const auto t = decision_["closest_step"].get<std::size_t>();
+  Json& clearance = decision_["tube"][t]["clearance"][0];
+  const double proven = clearance;
+  clearance = proven * 1.001;
+  Reseal();
+  ExpectRefuted({"not so: the motion to the next sample keeps clear of obstacle 0"});
+  clearance = nullptr;  // nowhere
+  Reseal();
+  ExpectRefuted({"not so: the motion to the next sample keeps clear of obstacle 0"});
+}
+
+TEST_F(VerifyWorld, AnotherMotionIsRefuted) {
+  WriteTask(std::regex_replace(task_, std::regex("growth: 0.2"), "growth: 0.3"));
+  ExpectRefuted({"digest of the obstacles", "not so: the motion to the next sample keeps clear of obstacle 0"});
+  WriteTask(std::regex_replace(task_, std::regex("from: 60"), "until: 60"));
+  ExpectRefuted({"digest of the obstacles", "obstacle 1"});
 }
 
 TEST_F(VerifyDecision, ChangedObservation) {
