@@ -225,6 +225,22 @@ class Report:
         lost = sum(self.bus_data[name]["lost"] for name in ("certified", "abstained"))
         return table(["", "p50", "p99"], rows) + f"\n\n{sum(counts):,} round trips each, {lost} lost."
 
+    def worlds(self):
+        point = self.benchmarks.get("world/point")
+        rows = []
+        for name, label in (
+            ("point", "point, at the samples"),
+            ("disc", "disc, at the samples"),
+            ("rectangle", "rectangle, at the samples"),
+            ("point_swept", "point, at all times"),
+            ("disc_swept", "disc, at all times"),
+            ("rectangle_swept", "rectangle, at all times"),
+            ("disc_moving", "disc, at all times, the circle moves"),
+        ):
+            if benchmark := self.benchmarks.get("world/" + name):
+                rows.append([label, number(benchmark.cpu), f"{benchmark.cpu / point.cpu:.2f}"])
+        return table(["", "us", "beside the point"], rows)
+
     def nominal(self):
         rows = []
         for name, label, rigorous in (
