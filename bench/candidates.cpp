@@ -12,6 +12,7 @@ Config MakeConfig(const Task& task) {
   config.problem = task.problem;
   config.obstacles = task.obstacles;
   config.gate.needs_robot_state = false;
+  config.gate.obstacles = ObstaclesSource::kTask;
   config.grounds = GroundsOf(DigestOf(std::string_view("benchmark")), *task.problem, task.obstacles);
   return config;
 }

@@ -134,6 +134,40 @@ class CertificateReader final : public TimelineUser {
         {DigestOf(Encode(certified.plan)), {&file, file.certificates.size() - 1, task.problem.get(), certified}});
   }
 
+  // What a withdrawal leaves of a plan is safe from the robot's step on, under what is in force then.
+  void OnWithdrawn(const RecordedWithdrawal& recorded) override {
+    const withdrawal_t& withdrawal = recorded.withdrawal;
+    if (withdrawal.valid_steps <= std::max<int>(withdrawal.first_step, 0)) return;  // nothing is claimed
+    CertificateFile& file = FileOf(*recorded.basis.task);
+    RecordedCertificate& certificate = file.certificates.emplace_back();
+    certificate.name = recorded.event + ", withdrawal of plan " + std::to_string(withdrawal.plan_id) + " of " +
+                       GetText(withdrawal.source) + ", its first " + std::to_string(withdrawal.valid_steps) +
+                       " controls";
+    certificate.certificate.is_remainder = true;
+    const auto plan = std::ranges::find_if(of_plan_, [&](const auto& entry) {
+      return GetDigest(entry.second.certified.certificate_digest) == GetDigest(withdrawal.certificate_digest);
+    });
+    if (plan == of_plan_.end() || !recorded.is_of_known_task) {
+      certificate.missing = plan == of_plan_.end() ? "its certified plan is not in the log"
+                                                   : "it was judged under a task that is not kept next to the log";
+      return;
+    }
+    const certified_plan_t& certified = plan->second.certified;
+    if (withdrawal.valid_steps > certified.plan.num_steps) {
+      certificate.missing = "its plan has " + std::to_string(certified.plan.num_steps) + " controls";
+      return;
+    }
+    verifier::Certificate& derived = certificate.certificate;
+    derived = CertificateOf(certified, *recorded.basis.obstacles);
+    derived.slices.clear();  // those of the certificate; under other observations the tube is another
+    derived.controls.conservativeResize(Eigen::NoChange, withdrawal.valid_steps);
+    derived.schedule = ScheduleOf(certified.plan, recorded.basis.task->gate);
+    derived.known = KnownRowsOf(recorded.basis);
+    derived.is_remainder = true;
+    derived.first_step = withdrawal.first_step;
+    CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(withdrawal));
+  }
+
   // Holds decisions and certified plans of the logs read since the last call against each other.
   // @param rows of a database, or null.
   void EndRun(const Config& first_task, const std::vector<DecisionRow>* rows) {

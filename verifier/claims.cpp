@@ -56,9 +56,9 @@ class SliceCheck {
     for (int k = 0; k < slice_.dim() && !failure_; ++k) CheckHull(k);
     if (!failure_ && recorded_.has_generators) CheckGenerators();
     for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
-    if (!step_) CheckRest();
+    if (!step_ && !certificate_.is_remainder) CheckRest();
     if (!failure_) CheckRadius();
-    if (!failure_) CheckSafety();
+    if (!failure_ && t_ >= certificate_.first_step) CheckSafety();
     return failure_;
   }
 

@@ -74,6 +74,8 @@ std::optional<Failure> FindMisfit(const Problem& problem, const Certificate& cer
   if (problem.between)
     if (const char* what = FindMisfit(*problem.between, problem.projection.rows(), *problem.model)) return misfit(what);
   if (const char* what = FindMisfit(certificate.schedule, certificate.obstacles)) return misfit(what);
+  if (certificate.first_step < 0 || (certificate.first_step > 0 && !certificate.is_remainder))
+    return misfit("the first step is the plan's first");
   if (certificate.slices.empty()) return std::nullopt;
   const auto steps = ToSize(certificate.controls.cols());
   if (certificate.slices.size() != steps + 1)

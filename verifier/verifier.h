@@ -45,6 +45,10 @@ struct Certificate {
   Schedule schedule;                  ///< Needed where obstacles move.
   KnownRows known;                    ///< The problem's transitions that the certifier knew.
   std::vector<RecordedSlice> slices;  ///< T + 1 slices, or none. Without them only safety is checked.
+  /** Of what a withdrawal leaves of a plan, `controls` are those that stand: nothing is claimed before the sample or
+  step `first_step`, nor that the plan ends at rest. */
+  bool is_remainder = false;
+  int first_step = 0;
 };
 
 enum class Status { kConfirmed, kRefuted, kCannotVerify };

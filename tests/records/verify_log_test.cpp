@@ -12,6 +12,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/gate/plans_in_force.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
@@ -321,6 +322,79 @@ TEST_F(VerifyObstacles, AlteredDecisionsAreRefused) {
 }
 
 // A body that turns, bounds between the samples, and an obstacle of the bus that moves.
+// What is left of a plan after an obstacle has appeared on its way.
+class VerifyWithdrawal : public VerifyObstacles {
+ protected:
+  std::string Recorded(const std::function<void(withdrawal_t&)>& edit = {}) {
+    const std::string path = Record();
+    Gate gate(config_);
+    PlansInForce plans(config_.gate);
+    EXPECT_EQ(gate.UpdateObstacles(Encode(Message(80, 0, kStart)), kStart + 1), "");
+    plans.Judge(gate, kStart + 1);
+    const auto certified = gate.Decide(Encode(candidate_), kStart + 3).certified.value();
+    plans.Add(certified, kStart + 6);
+    obstacles_t wall = Message(certified.slice_lower[12][0], 2, kStart + 7);
+    wall.obstacle[0].point[0][1] = certified.slice_lower[12][1];
+    wall.obstacle[0].value = 0.05;  // a post: the plan's end is clear of it
+    EXPECT_EQ(gate.UpdateObstacles(Encode(wall), kStart + 7), "");
+    plans.Judge(gate, kStart + 7);
+    withdrawal_ = plans.TakeDue(kStart + 8, kStart + 8).value().message;
+    if (edit) edit(withdrawal_);
+    EventLogWriter writer(path);
+    writer.Append(kStart + 7, config_.bus.obstacles, Encode(wall));
+    writer.Append(kStart + 8, config_.bus.withdrawn, Encode(withdrawal_));
+    EXPECT_TRUE(writer.Flush());
+    return path;
+  }
+
+  withdrawal_t withdrawal_{};
+};
+
+TEST_F(VerifyWithdrawal, WhatItLeavesIsClearOfTheNewObstacle) {
+  const auto file = ReadCertificates(Recorded(), kConfig);
+  ASSERT_EQ(file.certificates.size(), 2u);
+  EXPECT_GT(withdrawal_.valid_steps, 2);
+  EXPECT_LT(withdrawal_.valid_steps, 12);
+  EXPECT_TRUE(file.certificates[1].mismatches.empty());
+  EXPECT_EQ(file.certificates[1].missing, "");
+  EXPECT_EQ(Judge(file, 1).status, Status::kConfirmed) << Judge(file, 1).failure.what;
+}
+
+TEST_F(VerifyWithdrawal, OneControlTooManyIsRefuted) {
+  const auto file = ReadCertificates(Recorded([](withdrawal_t& message) { ++message.valid_steps; }), kConfig);
+  EXPECT_EQ(Judge(file, 1).status, Status::kRefuted);
+  EXPECT_THAT(Judge(file, 1).failure.what, HasSubstr("clear of obstacle 0"));
+}
+
+// A robot that is said to be past the obstacle is judged from its step on.
+TEST_F(VerifyWithdrawal, StepsThatArePastAreNotJudged) {
+  const auto all = [&](withdrawal_t& message) {
+    message.first_step = candidate_.num_steps - 1;
+    message.valid_steps = candidate_.num_steps;
+  };
+  const auto file = ReadCertificates(Recorded(all), kConfig);
+  EXPECT_EQ(Judge(file, 1).status, Status::kConfirmed) << Judge(file, 1).failure.what;
+  const auto from_the_start = ReadCertificates(Recorded([&](withdrawal_t& message) {
+                                                 all(message);
+                                                 message.first_step = 0;
+                                               }),
+                                               kConfig);
+  EXPECT_EQ(Judge(from_the_start, 1).status, Status::kRefuted);
+}
+
+TEST_F(VerifyWithdrawal, OfAnotherPlanOrUnderOtherGroundsIsNoticed) {
+  const auto other = ReadCertificates(
+      Recorded([](withdrawal_t& message) { SetDigest(message.certificate_digest, DigestOf("another")); }), kConfig);
+  EXPECT_THAT(other.certificates[1].missing, HasSubstr("its certified plan is not in the log"));
+  const auto grounds = ReadCertificates(
+      Recorded([](withdrawal_t& message) { SetDigest(message.obstacles_digest, DigestOf("another")); }), kConfig);
+  EXPECT_THAT(grounds.certificates[1].mismatches.at(0).what, HasSubstr("obstacles in force"));
+  const auto longer = ReadCertificates(Recorded([](withdrawal_t& message) { message.valid_steps = 200; }), kConfig);
+  EXPECT_THAT(longer.certificates[1].missing, HasSubstr("its plan has"));
+  const auto none = ReadCertificates(Recorded([](withdrawal_t& message) { message.valid_steps = 0; }), kConfig);
+  EXPECT_EQ(none.certificates.size(), 1u) << "nothing is claimed";
+}
+
 class VerifyMovingObstacles : public VerifyObstacles {
  protected:
   VerifyMovingObstacles() {
