@@ -277,7 +277,7 @@ TEST(ObstaclesV2Test, RandomWindowsLeaveNoGap) {
         is_there = true;
         if (piece.gone != 0) gone_at = piece.until_utime;
       }
-      for (std::int64_t half = 2 * (kNow - 4); is_there && half <= 2 * (kNow + 20) && half <= 2 * gone_at; ++half) {
+      for (std::int64_t half = 2 * (kNow - 4); is_there && half <= 2 * std::min(kNow + 20, gone_at); ++half) {
         bool covered = false;  // half microseconds: between two times, too
         for (std::size_t i = 0; i < pieces.size(); ++i) {
           const auto [from, until] = WindowOf(obstacles[i]);

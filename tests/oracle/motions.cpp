@@ -51,6 +51,7 @@ int main(int argc, char** argv) {
         std::cerr << "broken promise: --seed " << seed << " --problem " << number << ": " << error.what() << std::endl;
       }
     }
+    mpfr_free_cache2(MPFR_FREE_LOCAL_CACHE);  // of this thread
   };
   std::vector<std::thread> threads;
   for (unsigned j = 0; j < jobs; ++j) threads.emplace_back(work);
