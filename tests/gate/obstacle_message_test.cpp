@@ -1,6 +1,7 @@
 // Obstacles as messages: shapes, and predictions in pieces.
 #include "certifier/gate/obstacle_message.h"
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <random>

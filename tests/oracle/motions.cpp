@@ -9,6 +9,8 @@
 #include <thread>
 #include <vector>
 
+#include <mpfr.h>
+
 #include "command_line/command_line.h"
 #include "tests/oracle/motions.h"
 
