@@ -332,9 +332,12 @@ Hull Join(const Hull& a, const Hull& b, int dim) noexcept {
     const auto range = [k](const Hull& hull) {
       return Interval(SubDown(hull.center[k], hull.half_width[k]), AddUp(hull.center[k], hull.half_width[k]));
     };
-    const Interval both = forereach::Join(range(a), range(b));
-    joined.center[k] = both.Middle();
-    joined.half_width[k] = both.DistanceUpper(joined.center[k]);
+    const Interval of_a = range(a), of_b = range(b);
+    bool is_finite = true;  // a minimum may drop NaN
+    for (const double end : {of_a.lower, of_a.upper, of_b.lower, of_b.upper}) is_finite &= std::isfinite(end);
+    const Interval both = is_finite ? forereach::Join(of_a, of_b) : Interval::Entire();
+    joined.center[k] = is_finite ? both.Middle() : 0;
+    joined.half_width[k] = is_finite ? both.DistanceUpper(joined.center[k]) : kInfinity;
   }
   return joined;
 }

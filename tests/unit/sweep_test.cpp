@@ -434,6 +434,23 @@ TEST(SeparatePieces, FindsTheDistanceOfTheirHull) {
   }
 }
 
+TEST(HullJoin, ContainsBothAndForgetsNoNumberThatIsNone) {
+  const Hull a{{0, 1, 0}, {1, 0.5, 0}}, b{{3, 1, 0}, {0.5, 0.25, 0}};
+  const Hull joined = Join(a, b, 2);
+  EXPECT_EQ(joined.center[0] - joined.half_width[0], -1);
+  EXPECT_EQ(joined.center[0] + joined.half_width[0], 3.5);
+  EXPECT_EQ(joined.half_width[1], 0.5);
+  const Obstacle far = Obstacle::Circle(Vec({100, 0}), 1);
+  EXPECT_TRUE(SeparateHulls(joined, far).IsProven());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double none : {nan, kInfinity, -kInfinity})
+    for (const Hull& bad : {Hull{{none, 1, 0}, {1, 1, 0}}, Hull{{0, 1, 0}, {none, 1, 0}}})
+      for (const Hull& both : {Join(a, bad, 2), Join(bad, a, 2)}) {
+        EXPECT_EQ(both.half_width[0], kInfinity);
+        EXPECT_FALSE(SeparateHulls(both, far).IsProven());
+      }
+}
+
 // Two points 1.7 m apart in space: their segment passes the obstacle, a point, at a distance of sqrt(2 / 3).
 TEST(SeparatePieces, ASegmentInSpace) {
   Problem problem = PointMassProblem();
