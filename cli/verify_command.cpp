@@ -135,7 +135,7 @@ void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& ver
     std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
   const auto remainders = std::ranges::count_if(
       file.certificates, [](const RecordedCertificate& recorded) { return recorded.certificate.is_remainder; });
-  if (remainders > 0) std::cout << "; " << remainders << " of the certificates are what a withdrawal leaves of a plan";
+  if (remainders > 0) std::cout << "; " << remainders << " of the certificates: what a withdrawal leaves";
   std::cout << DescribePassedOver(file.passed_over) << "\n" << Extent(file) << std::endl;
 }
 
