@@ -66,7 +66,7 @@ void RequireNominalRunClear(const certified_plan_t& certified, const Config& tas
   for (int t = 0; t <= plan.num_steps; ++t) {
     for (const Obstacle& obstacle : task.obstacles)
       for (const std::int64_t error : {-20'000, 0, 20'000})
-        Require(ApproximateDistance(obstacle, Eigen::Vector2d(next[0], next[1]),
+        Require(ApproximateDistance(obstacle, BodyPart{{{next[0], next[1], 0}}, 0},
                                     plan.start_utime + t * plan.step_us + error) > 0);
     if (t == plan.num_steps) return;
     std::copy_n(next, 4, z);

@@ -117,12 +117,8 @@ class CertificateReader final : public TimelineUser {
     }
     certificate.name += ", plan " + std::to_string(certified.plan.plan_id) + " of " + GetText(certified.plan.source);
     if (certificate.missing = WhyNoSchedule(certified.plan, task.gate); !certificate.missing.empty()) return;
-    if (const auto& between = task.problem->between;
-        between && certified.plan.step_us > Microseconds(between->period * 1e3)) {
-      certificate.missing = "step_us is " + std::to_string(certified.plan.step_us) + ", longer than model.dt, " +
-                            ToText(between->period) + " s: task.between bounds the motion in this time";
-      return;
-    }
+    certificate.missing = WhyNotBounded(certified.plan, task.problem->between);
+    if (!certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);
     certificate.certificate.known = KnownRowsOf(recorded.basis);

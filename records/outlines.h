@@ -9,9 +9,7 @@ bounds. */
 
 namespace forereach {
 
-/** The convex hull of points in the plane, each with a disc of this radius (a polygon of 16 corners),
- * counter-clockwise.
- */
+/** The convex hull, counter-clockwise, of points in the plane, each with a disc of this radius: 16 corners. */
 [[nodiscard]] Picture::Polygon HullOf(const std::vector<Eigen::Vector2d>& points, double radius = 0);
 
 /** What the robot sweeps in each unit of a tube (certifier/certify/safety.h) up to `last`: a polygon for each part. For

@@ -57,14 +57,9 @@ class Certifier final {
   index. */
   void Compact() { observed_->store.Compact(); }
 
-  /** The test of a tube against obstacles, and the distances of a tube to them (safety.h). */
+  /** The last test of Certify alone, for a tube that Certify has completed: among other obstacles, or from a later step
+  on, and the distances to them (safety.h). */
   [[nodiscard]] const SafetyTest& safety() const { return safety_; }
-  /** The last test of Certify alone, from the unit `first_step` on, for a tube of this certifier that Certify has
-  completed: whether the remaining steps of a plan hold, too, among other obstacles. @pre as Certify. */
-  [[nodiscard]] Decision JudgeSafety(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
-                                     int first_step) const noexcept {
-    return safety_.Judge(obstacles, schedule, tube, first_step);
-  }
   /** SafetyTest::Separate. */
   [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle,
                                          const Schedule& schedule = {}) const {
@@ -77,8 +72,7 @@ class Certifier final {
     std::string what;
   };
   /** The first misfit of a plan: sizes other than the problem's, not 1..kMaxSteps steps or a schedule out of its bounds
-  (motion.h), then a control that is not finite. Nothing if there is none. Its controls are read only if the sizes fit.
-*/
+  (motion.h), then a control that is not finite. Nothing if there is none. Controls are read only if the sizes fit. */
   [[nodiscard]] std::optional<Misfit> FindMisfit(const Plan& plan) const;
 
   /** Checks the preconditions of Certify: a plan without a misfit, X_0 in the states with at most order * n generators,

@@ -77,37 +77,27 @@ class SafetyTest::Unit {
 
   // By the interval hulls of the frame and a ball around the body: sound, not tight.
   [[nodiscard]] PartSeparation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
-    Separation found = SeparateHulls(meeting.moves ? Seen(hulls_[0], hulls_[1], meeting) : hull_, obstacle);
-    found.threshold = AddUp(found.threshold, AddUp(meeting.growth, placement().reach()));
-    return {found, IsOnePart() ? 0 : -1};
+    const Hull& seen = meeting.moves ? Seen(hulls_[0], hulls_[1], meeting) : hull_;
+    return {SeparateHulls(seen, obstacle, AddUp(meeting.growth, placement().reach())), -1};
   }
 
   // By the interval hulls of the parts, or as given if that is better.
   [[nodiscard]] PartSeparation ByParts(const PartSeparation& by_hulls, const Obstacle& obstacle,
                                        const Encounter& meeting) noexcept {
     if (placement().is_point()) return by_hulls;
-    const auto parts = placement().parts();
     const auto& first = PartsAt(first_);
     const auto& last = first_ == last_ ? first : PartsAt(last_);
-    PartSeparation closest{{kInfinity, 0}, -1};
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      Separation found = SeparateHulls(Seen(first[i], last[i], meeting), obstacle);
-      found.threshold = AddUp(found.threshold, AddUp(meeting.growth, parts[i].radius));
-      if (i == 0 || IsBetter(closest.separation, found)) closest = {found, static_cast<int>(i)};
-    }
-    return Better(closest, by_hulls);
+    const auto separate = [&](std::size_t i, double added) {
+      return SeparateHulls(Seen(first[i], last[i], meeting), obstacle, added);
+    };
+    return Better(ClosestPart(meeting, separate), by_hulls);
   }
 
   // The better of the bound by hulls and that of the best directions.
   [[nodiscard]] PartSeparation Best(const PartSeparation& by_hulls, const Obstacle& obstacle,
                                     const Encounter& meeting) noexcept {
-    PartSeparation closest{{kInfinity, 0}, -1};
-    const auto parts = placement().parts();
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      const Separation found = SeparatePart(parts[i], obstacle, meeting);
-      if (i == 0 || IsBetter(closest.separation, found)) closest = {found, static_cast<int>(i)};
-    }
-    return Better(closest, by_hulls);
+    const auto separate = [&](std::size_t i, double added) { return SeparatePart(i, obstacle, added, meeting); };
+    return Better(ClosestPart(meeting, separate), by_hulls);
   }
 
   [[nodiscard]] Encounter MeetIn(const Obstacle& obstacle) const noexcept {
@@ -116,7 +106,18 @@ class SafetyTest::Unit {
 
  private:
   [[nodiscard]] const Placement& placement() const { return test_.placement_; }
-  [[nodiscard]] bool IsOnePart() const { return placement().parts().size() == 1; }
+
+  // The least of separate(part, what its distance has to exceed the obstacle's radius by).
+  template <class Separate>
+  [[nodiscard]] PartSeparation ClosestPart(const Encounter& meeting, Separate separate) const noexcept {
+    PartSeparation closest{{kInfinity, 0}, -1};
+    const auto parts = placement().parts();
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const Separation found = separate(i, AddUp(parts[i].radius, meeting.growth));
+      if (i == 0 || IsBetter(closest.separation, found)) closest = {found, static_cast<int>(i)};
+    }
+    return closest;
+  }
 
   [[nodiscard]] Hull HullAt(int t) const noexcept {
     return placement().EncloseHull(tube_.slice(t), tube_.half_width(t));
@@ -146,8 +147,9 @@ class SafetyTest::Unit {
     return places;
   }
 
-  [[nodiscard]] Separation SeparatePart(const Placement::Part& part, const Obstacle& obstacle,
+  [[nodiscard]] Separation SeparatePart(std::size_t number, const Obstacle& obstacle, double added,
                                         const Encounter& meeting) noexcept {
+    const Placement::Part& part = placement().parts()[number];
     std::array<Piece, kMaxPieces> pieces;
     std::size_t count = 0;
     for (int t = first_; t <= last_; ++t) {
@@ -155,8 +157,7 @@ class SafetyTest::Unit {
       for (int i = part.first; i < part.first + part.count; ++i)
         pieces[count++] = {&places[i], placement().turn(i), meeting.shift[ToSize(t - first_)]};
     }
-    return forereach::Separate({pieces.data(), count}, obstacle, AddUp(part.radius, meeting.growth),
-                               test_.instructions_);
+    return forereach::Separate({pieces.data(), count}, obstacle, added, test_.instructions_);
   }
 
   const SafetyTest& test_;

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "certifier/gate/stamp.h"
+#include "certifier/numerics/text.h"
 
 namespace forereach {
 
@@ -24,6 +25,15 @@ std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& 
   if (candidate.start_utime < -Schedule::kLatest || candidate.start_utime > Schedule::kLatest)
     return "start_utime is " + std::to_string(candidate.start_utime) + ", must be within 2^60 of the epoch";
   return {};
+}
+
+std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between) {
+  if (!between) return {};
+  const std::string step = "step_us is " + std::to_string(candidate.step_us);
+  if (candidate.step_us < 1) return step + ", must be at least 1";
+  if (candidate.step_us <= Microseconds(between->period * 1e3)) return {};
+  return step + ", longer than model.dt, " + ToText(between->period) +
+         " s: task.between bounds the motion in this time";
 }
 
 Zonotope InitialSetOf(const candidate_plan_t& candidate) {

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "certifier/certify/decision.h"
+#include "certifier/safety/body.h"
 #include "certifier/task/gate_options.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "lcmtypes/codec.h"
@@ -22,6 +24,10 @@ schedule. Whether the candidate's times are within the bounds of a schedule is f
 /** Why the candidate's times are no schedule: step_us is not 1 to the task's longest step, or start_utime is further
 than Schedule::kLatest from the epoch. Empty if they are one, and without gate.max_clock_error_ms. */
 [[nodiscard]] std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options);
+
+/** Why the task's bounds between samples do not hold for the candidate's steps: step_us is not 1 to `between`'s period.
+Empty if they hold, and without bounds. */
+[[nodiscard]] std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between);
 
 /** X_0. @throws std::invalid_argument if num_states is not 1 to 16, or as Zonotope::FromBox does. */
 [[nodiscard]] Zonotope InitialSetOf(const candidate_plan_t& candidate);

@@ -105,20 +105,10 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   sources_.Hear(candidate, now_us);
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
-  if (std::string why = WhyNoSchedule(candidate, options_); !why.empty())
-    return Rejection{decision_t::CAUSE_WRONG_DIMENSION, std::move(why)};
-  if (auto rejection = CheckStep(candidate)) return rejection;
+  for (const std::string& why :
+       {WhyNoSchedule(candidate, options_), WhyNotBounded(candidate, certifier_.problem().between)})
+    if (!why.empty()) return Rejection{decision_t::CAUSE_WRONG_DIMENSION, why};
   return CheckSource(candidate, now_us);
-}
-
-std::optional<Gate::Rejection> Gate::CheckStep(const candidate_plan_t& candidate) const {
-  const std::optional<Between>& between = certifier_.problem().between;
-  if (!between) return std::nullopt;
-  const std::int64_t longest = Microseconds(between->period * 1e3);
-  if (1 <= candidate.step_us && candidate.step_us <= longest) return std::nullopt;
-  return Rejection{decision_t::CAUSE_WRONG_DIMENSION, "step_us is " + std::to_string(candidate.step_us) +
-                                                          ", must be 1 to " + std::to_string(longest) +
-                                                          ", model.dt: task.between bounds the motion in this time"};
 }
 
 std::optional<Gate::Rejection> Gate::CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const {
@@ -238,7 +228,7 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noe
     const Standing whole = standing(verdict);
     if (verdict.outcome == Outcome::kCertified || verdict.outcome == Outcome::kFalsified) return whole;
     // Certify has not tested S after D. A failure of S before first_step is past.
-    const Decision rest = certifier_.JudgeSafety(obstacles_.all(), plan.schedule, tube_, first_step);
+    const Decision rest = certifier_.safety().Judge(obstacles_.all(), plan.schedule, tube_, first_step);
     if (verdict.outcome == Outcome::kSafety) return standing(rest);
     const Standing safe = standing(rest);
     return rest.outcome == Outcome::kSafety && safe.steps < whole.steps ? safe : whole;

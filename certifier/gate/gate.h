@@ -123,8 +123,6 @@ class Gate final {
                                                std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckContent(const candidate_plan_t& candidate, Zonotope& initial_set) const;
   [[nodiscard]] std::optional<Rejection> CheckTimes(const candidate_plan_t& candidate, std::int64_t now_us) const;
-  /** A step that is longer than the period between whose ends the task's bounds hold. */
-  [[nodiscard]] std::optional<Rejection> CheckStep(const candidate_plan_t& candidate) const;
   [[nodiscard]] std::optional<Rejection> CheckSource(const candidate_plan_t& candidate, std::int64_t now_us);
   [[nodiscard]] std::optional<Rejection> CheckDeadline(const candidate_plan_t& candidate, std::int64_t now_us) const;
   void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer);

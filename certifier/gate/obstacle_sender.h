@@ -57,8 +57,7 @@ class ObstacleSender final {
 [[nodiscard]] std::vector<Obstacle> BegunAt(std::int64_t begin_us, const std::vector<Obstacle>& obstacles);
 
 /** Those of `obstacles` that perception has seen by `now_us`: not a track whose first window begins later. Its other
-windows are seen with the first: they are predictions. Obstacles of one track follow each other, as ToMessageV2 has it.
-*/
+windows are seen with the first, as predictions. Obstacles of one track follow each other, as for ToMessageV2. */
 [[nodiscard]] std::vector<Obstacle> SeenBy(std::int64_t now_us, const std::vector<Obstacle>& obstacles);
 
 /** Checks that receivers take what SeenBy gives of the task's obstacles, at every time from 0 on.

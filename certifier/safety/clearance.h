@@ -29,8 +29,7 @@ point of the obstacle's core, it is minus both radii. A motion is ignored. For a
 ApproximateDistance of the point. Cost: a few passes over the points of both. */
 [[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const BodyPart& part);
 
-/** The same at a time in microseconds: of a moving obstacle with its growth at that time; infinite outside its window.
- */
+/** The same at a time in microseconds, of a moving obstacle with its growth then; infinite outside its window. */
 [[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const BodyPart& part, std::int64_t time_us);
 
 /** The least distance between the obstacle and the hull of a part's places, while the part moves in a straight line

@@ -128,15 +128,6 @@ Obstacle Obstacle::Moving(const ObstacleMotion& motion) const {
   return moving;
 }
 
-double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y, std::int64_t time_us) {
-  if (!obstacle.motion()) return ApproximateDistance(obstacle, y);
-  const ObstacleMotion& motion = *obstacle.motion();
-  if (time_us < motion.from_us || motion.until_us < time_us) return kInfinity;
-  const double tau = static_cast<double>(time_us - motion.stamp_us) * 1e-6;
-  return ApproximateDistance(obstacle, y - motion.velocity.head(y.size()) * tau) - motion.uncertainty -
-         motion.growth * std::abs(tau) - motion.growth_rate * tau * tau / 2;
-}
-
 double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y) {
   switch (obstacle.kind()) {
     case Obstacle::Kind::kCircle: return (y - obstacle.points()[0]).norm() - obstacle.radius();

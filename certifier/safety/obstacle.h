@@ -69,8 +69,4 @@ class Obstacle final {
 ignored. Use it for planning, simulation and display, not for bounds. */
 [[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y);
 
-/** The same at a time in microseconds: of a moving obstacle with its growth at that time; infinite outside its window.
- */
-[[nodiscard]] double ApproximateDistance(const Obstacle& obstacle, const Eigen::VectorXd& y, std::int64_t time_us);
-
 }  // namespace forereach

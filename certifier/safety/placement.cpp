@@ -94,7 +94,7 @@ struct Placement::Offset {
     offset = {rotation.cosine * q[0] - rotation.sine * q[1], rotation.sine * q[0] + rotation.cosine * q[1], q[2]};
     spread = bulge;
     size = length + std::abs(q[2]) + point.turn + std::max({bulge[0], bulge[1], bulge[2]});
-    if (!(r > 0) || length == 0) return;
+    if (r == 0 || length == 0) return;  // NaN goes on, and proves nothing
     slope = {-offset[1], offset[0], 0};
     const double half_square = 0.5 * r * r;
     for (std::size_t k = 0; k < 2; ++k) {

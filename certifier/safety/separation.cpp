@@ -342,9 +342,10 @@ Hull Join(const Hull& a, const Hull& b, int dim) noexcept {
   return joined;
 }
 
-Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
+Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle, double added) noexcept {
   constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
   const int p = obstacle.dim();
+  const double threshold = AddUp(obstacle.radius(), added);
   double square = 0;
   if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
     const Eigen::VectorXd& normal = obstacle.points()[0];
@@ -357,7 +358,7 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
       square += d * d;
     }
     const double distance = (gap - RoundingError(kMargin, size)) / std::sqrt(square) * (1 - kMargin);
-    return {distance > 0x1p-400 && distance < kInfinity && square > 0x1p-400 ? distance : -kInfinity, 0};
+    return {distance > 0x1p-400 && distance < kInfinity && square > 0x1p-400 ? distance : -kInfinity, threshold};
   }
   for (int i = 0; i < p; ++i) {
     const auto k = ToSize(i);
@@ -368,7 +369,7 @@ Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept {
     square += gap > 0 ? gap * gap : 0;
   }
   const double distance = std::sqrt(square) * (1 - kMargin);
-  return {distance > 0x1p-400 && distance < kInfinity ? distance : -kInfinity, obstacle.radius()};
+  return {distance > 0x1p-400 && distance < kInfinity ? distance : -kInfinity, threshold};
 }
 
 namespace {

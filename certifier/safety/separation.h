@@ -49,8 +49,8 @@ struct Piece {
 inline constexpr int kMaxPieces = 2 * kMaxBodyPoints;  ///< The points of a body at two samples.
 
 /** Separates the interval hulls of slice and core; for a half-space it uses the normal. Sound but not tight. Cost
-O(p). */
-[[nodiscard]] Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle) noexcept;
+O(p). @param added is added to the obstacle's radius as the threshold, metres, not negative. */
+[[nodiscard]] Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle, double added = 0) noexcept;
 
 /** Separates slice and core by the best direction that the search finds. For p <= 2 the distance is exact up to
 rounding. For p = 3 the search tries the normals of faces and of pairs of edges, and so proves every separation that

@@ -689,6 +689,14 @@ class Campaign final {
   }
 
   // The obstacles that are sent are not known to the certifier: every candidate is refused for that.
+  void FallSilent(Row& row, Rig& rig) {
+    rig.perception().SetSilent(true);
+    rig.Listen(milliseconds(1100));  // gate.obstacles_timeout_ms is 1000
+    const std::int64_t before = rig.witness().certificates();
+    for (int j = 0; j < 3; ++j) DemandUnknown(row, rig, "after the timeout");
+    Demand(row, rig.witness().certificates() == before, "it certified after the timeout");
+    rig.perception().SetSilent(false);
+  }
   void DemandUnknown(Row& row, Rig& rig, const std::string& when) {
     const auto cause = CauseOfACandidate(rig);
     const bool rejected = cause == decision_t::CAUSE_NO_OBSTACLES || cause == decision_t::CAUSE_NOT_ARMED ||
@@ -723,14 +731,7 @@ class Campaign final {
       Demand(row, rig.witness().certificates() == before, "it certified before it had heard the obstacles");
       rig.perception().SetSilent(false);
     });
-    ObstacleTries("OBSTACLES fall silent", [&](Row& row, Rig& rig, int) {
-      rig.perception().SetSilent(true);
-      rig.Listen(milliseconds(1100));  // gate.obstacles_timeout_ms is 1000
-      const std::int64_t before = rig.witness().certificates();
-      for (int j = 0; j < 3; ++j) DemandUnknown(row, rig, "after the timeout");
-      Demand(row, rig.witness().certificates() == before, "it certified after the timeout");
-      rig.perception().SetSilent(false);
-    });
+    ObstacleTries("OBSTACLES fall silent", [&](Row& row, Rig& rig, int) { FallSilent(row, rig); });
     ObstacleTries("OBSTACLES with gaps, NaN, wrong counts, from the future (signed)", [&](Row& row, Rig& rig, int i) {
       rig.perception().SetSilent(true);
       rig.perception().SayNow([](obstacles_v2_t&) { return true; });
@@ -807,14 +808,7 @@ class Campaign final {
   }
 
   void Moving() {
-    MovingTries("Moving OBSTACLES fall silent", [&](Row& row, Rig& rig, int, auto&) {
-      rig.perception().SetSilent(true);
-      rig.Listen(milliseconds(1100));  // gate.obstacles_timeout_ms is 1000
-      const std::int64_t before = rig.witness().certificates();
-      for (int j = 0; j < 3; ++j) DemandUnknown(row, rig, "after the timeout");
-      Demand(row, rig.witness().certificates() == before, "it certified after the timeout");
-      rig.perception().SetSilent(false);
-    });
+    MovingTries("Moving OBSTACLES fall silent", [&](Row& row, Rig& rig, int, auto&) { FallSilent(row, rig); });
     MovingTries("Moving OBSTACLES come too late (signed)", [&](Row& row, Rig& rig, int, auto&) {
       rig.perception().SetSilent(true);
       rig.perception().SayNow([](obstacles_v2_t& message) {

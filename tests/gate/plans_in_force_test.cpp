@@ -43,6 +43,17 @@ class PlansInForceTest : public testing::Test {
     plans_.Add(answer.certified.value(), now_);
     return *answer.certified;
   }
+  // The task with a domain that the plan just leaves at a step.
+  Config NarrowerFrom(const certified_plan_t& plan, int step) const {
+    Config narrower = config_;
+    Problem problem = *config_.problem;
+    Eigen::VectorXd upper = problem.domain.state.upper();
+    upper(0) = Reach(plan, step) - 1e-9;
+    problem.domain.state = Box(problem.domain.state.lower(), upper);
+    narrower.problem = std::make_shared<const Problem>(problem);
+    narrower.grounds.config = DigestOf("narrower");
+    return narrower;
+  }
   void SeeRobot(std::int64_t plan_id, int step) {
     robot_state_t state{};
     state.utime = now_;
@@ -295,14 +306,7 @@ TEST_F(PlansInForceTest, AFalsifiedDeclarationLeavesNothing) {
 
 TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
   const certified_plan_t plan = Certify(1);
-  Config narrower = config_;
-  Problem problem = *config_.problem;
-  Eigen::VectorXd upper = problem.domain.state.upper();
-  upper(0) = Reach(plan, 8) - 1e-9;
-  problem.domain.state = Box(problem.domain.state.lower(), upper);
-  narrower.problem = std::make_shared<const Problem>(problem);
-  narrower.grounds.config = DigestOf("narrower");
-  Gate gate(narrower);
+  Gate gate(NarrowerFrom(plan, 8));
   gate.Inherit(gate_);
   plans_.Judge(gate, now_);
   const withdrawal_t message = Due().value();
@@ -313,14 +317,8 @@ TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
 
 TEST_F(PlansInForceTest, AnObstacleBeforeTheStepThatLeavesTheDomainCounts) {
   const certified_plan_t plan = Certify(1);
-  Config narrower = config_;
-  Problem problem = *config_.problem;
-  Eigen::VectorXd upper = problem.domain.state.upper();
-  upper(0) = Reach(plan, 8) - 1e-9;
-  problem.domain.state = Box(problem.domain.state.lower(), upper);
-  narrower.problem = std::make_shared<const Problem>(problem);
+  Config narrower = NarrowerFrom(plan, 8);
   narrower.obstacles.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, 4) - 1e-9));
-  narrower.grounds.config = DigestOf("narrower");
   Gate gate(narrower);
   gate.Inherit(gate_);
   plans_.Judge(gate, now_);

@@ -311,7 +311,7 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
       if (!approach) continue;
       const auto away = JustAccepted([&](double far) {
         const std::vector<Obstacle> alone{approach->At(far)};
-        return certifier.JudgeSafety(alone, query.schedule, tube, 0).outcome == Outcome::kCertified;
+        return certifier.safety().Judge(alone, query.schedule, tube, 0).outcome == Outcome::kCertified;
       });
       if (!away) continue;
       query.obstacles.push_back(approach->At(*away));

@@ -28,8 +28,7 @@ Point3<Scalar> Plus(const Point3<Scalar>& a, const Scalar& factor, const Point3<
   return {a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]};
 }
 
-/** The point of a face, 1 to 4 points, next to the origin, if it lies in the face: by Gram and Schmidt, then backwards.
- */
+/** The point of a face (1 to 4 points) next to the origin, if it lies in the face: by Gram and Schmidt. */
 template <class Scalar>
 bool NearestOfFace(const std::vector<Point3<Scalar>>& face, const Scalar& flat, Point3<Scalar>& nearest) {
   const std::size_t count = face.size() - 1;

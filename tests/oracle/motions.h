@@ -288,7 +288,7 @@ class MotionTrial {
       told.motion->uncertainty = told.motion->growth = told.motion->growth_rate = 0;
     const auto accepted = [&](double away) {
       const std::vector<Obstacle> alone{told.At(away)};
-      return certifier.JudgeSafety(alone, told_schedule, tube_, 0).outcome == Outcome::kCertified;
+      return certifier.safety().Judge(alone, told_schedule, tube_, 0).outcome == Outcome::kCertified;
     };
     const std::optional<double> away = JustAccepted(accepted);
     if (!away) return std::nullopt;

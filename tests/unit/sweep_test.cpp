@@ -340,7 +340,7 @@ TEST(Moving, RefusesAMotionThatIsNone) {
   refused([](ObstacleMotion& m) { m.from_us = 1, m.until_us = 0; });
 }
 
-TEST(JudgeSafety, BeginsWhereItIsTold) {
+TEST(SafetyTest, BeginsWhereItIsTold) {
   Problem problem = PointMassProblem();
   problem.between = Curving(0, 0);
   Certifier certifier(std::make_shared<Problem>(problem));
@@ -350,11 +350,11 @@ TEST(JudgeSafety, BeginsWhereItIsTold) {
   const auto start = Zonotope::FromBox(Vec({0, 0, 4, 0}), Vec({0, 0, 0, 0}));
   ASSERT_TRUE(IsCertified(certifier.Certify(plan, start, {}, tube)));
   const std::vector<Obstacle> behind{Obstacle::Circle(Vec({1, 0}), 0.5)};  // met in step 0 only
-  EXPECT_EQ(certifier.JudgeSafety(behind, {}, tube, 0).step, 0);
-  const Decision later = certifier.JudgeSafety(behind, {}, tube, 1);
+  EXPECT_EQ(certifier.safety().Judge(behind, {}, tube, 0).step, 0);
+  const Decision later = certifier.safety().Judge(behind, {}, tube, 1);
   EXPECT_TRUE(IsCertified(later));
   EXPECT_NEAR(later.margin - later.threshold, 0.5, 1e-9);
-  EXPECT_EQ(certifier.JudgeSafety(behind, {}, tube, 4).obstacle, -1);
+  EXPECT_EQ(certifier.safety().Judge(behind, {}, tube, 4).obstacle, -1);
 }
 
 // Against the best of many directions: what the search claims is a bound, and nearly the best one.
