@@ -75,6 +75,9 @@ void MoveInside(const Domain& domain, const Arguments& box, std::span<double> z)
 
 // ---- The search.
 
+// A residual that may be undefined has no slope.
+Interval Slope(const Jet& residual) { return residual.value.IsFinite() ? residual.slope : Interval::Entire(); }
+
 // At least 0. NaN bounds nothing.
 double NonNegative(double bound) { return std::isnan(bound) ? kInfinity : std::max(0.0, bound); }
 
@@ -188,10 +191,11 @@ class Search {
     double bound = kInfinity;
     while (true) {
       const Jet jet = slopes_.Enclose(result_.row, result_.column, rest, active_);
-      bound = std::min(bound, NonNegative(sign > 0 ? jet.slope.upper : -jet.slope.lower));
+      const Interval slope = Slope(jet);
+      bound = std::min(bound, NonNegative(sign > 0 ? slope.upper : -slope.lower));
       if (bound <= Enough()) return bound;
       const auto rises = std::span(jet.curvature).first(active_.size());
-      if (!std::ranges::all_of(rises, [](const Interval& c) { return c.IsFinite(); })) {
+      if (!slope.IsFinite() || !std::ranges::all_of(rises, [](const Interval& c) { return c.IsFinite(); })) {
         cut_ = WidestCut(box, inside);
         (void)At(Middle(box), inside, sign);
         return bound;
@@ -263,7 +267,7 @@ class Search {
   Interval Signed(const std::vector<double>& point, double sign) const {
     const Arguments w(point.begin(), point.end());
     const int column = result_.column;
-    const Interval slope = slopes_.Enclose(result_.row, column, w, {&column, 1}).slope;
+    const Interval slope = Slope(slopes_.Enclose(result_.row, column, w, {&column, 1}));
     return sign > 0 ? slope : -slope;
   }
 

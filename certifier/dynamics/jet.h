@@ -3,7 +3,10 @@ both, by the chain rule. ResidualSlopes uses them to bound a partial derivative 
 
 A kink (of abs, min or max) has no derivative. Over a box that contains a kink, `slope` and `gradient` contain Clarke's
 generalised gradient at every point, which is sufficient for a Lipschitz bound. The second derivatives are unbounded
-there, so `slope` cannot be expanded by the mean-value form. */
+there, so `slope` cannot be expanded by the mean-value form.
+
+If f may be undefined at a point of the box (a division by zero, a logarithm of a negative number), `value` is
+[-inf, inf], whatever the derivatives are. Derivatives count only where `value` is finite. */
 #pragma once
 
 #include <array>
@@ -46,9 +49,16 @@ struct Jet {
 [[nodiscard]] Jet max(const Jet& a, const Jet& b);
 [[nodiscard]] Jet sqrt(const Jet& a);
 [[nodiscard]] Jet exp(const Jet& a);
+[[nodiscard]] Jet log(const Jet& a);
 [[nodiscard]] Jet sin(const Jet& a);
 [[nodiscard]] Jet cos(const Jet& a);
 [[nodiscard]] Jet tan(const Jet& a);
+[[nodiscard]] Jet asin(const Jet& a);
+[[nodiscard]] Jet acos(const Jet& a);
+[[nodiscard]] Jet atan(const Jet& a);
+[[nodiscard]] Jet atan2(const Jet& y, const Jet& x);
+[[nodiscard]] Jet tanh(const Jet& a);
+[[nodiscard]] Jet pow(const Jet& a, int n);
 /** The functions of the same names in residuals.h. */
 [[nodiscard]] Jet SmoothGate(const Jet& a);
 [[nodiscard]] Jet Softplus(const Jet& x, const Jet& temperature);

@@ -35,15 +35,22 @@ class Occurrence final {
   FOREREACH_BOTH(operator/)
   FOREREACH_BOTH(min)
   FOREREACH_BOTH(max)
+  FOREREACH_BOTH(atan2)
   FOREREACH_BOTH(Softplus)
   FOREREACH_ONE(operator-)
   FOREREACH_ONE(abs)
   FOREREACH_ONE(sqrt)
   FOREREACH_ONE(exp)
+  FOREREACH_ONE(log)
   FOREREACH_ONE(sin)
   FOREREACH_ONE(cos)
   FOREREACH_ONE(tan)
+  FOREREACH_ONE(asin)
+  FOREREACH_ONE(acos)
+  FOREREACH_ONE(atan)
+  FOREREACH_ONE(tanh)
   FOREREACH_ONE(SmoothGate)
+  friend constexpr Occurrence pow(Occurrence a, int n) { return n == 0 ? Occurrence() : a; }
 #undef FOREREACH_BOTH
 #undef FOREREACH_ONE
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <initializer_list>
 
-#include "certifier/numerics/exponential.h"
+#include "certifier/numerics/elementary.h"
 
 namespace forereach {
 namespace {
@@ -62,8 +62,8 @@ Interval Entropy(const Interval& u) {
 }  // namespace
 
 DerivativeRanges SmoothGateRanges(const Interval& e) {
+  if (!e.IsFinite()) return {Interval::Entire(), Interval::Entire(), Interval::Entire()};
   if (e.upper <= 0) return {0.0, 0.0, 0.0};
-  if (!e.IsFinite()) return {{0, 1}, {0, 1}, {-1, 3}};
   // (e^(-1/e))''' = 0 where 1 - 6 e + 6 e^2 = 0.
   static const Interval kRoot = sqrt(Interval(3)), kBend = (Interval(3) - kRoot) / Interval(6),
                         kOtherBend = (Interval(3) + kRoot) / Interval(6);

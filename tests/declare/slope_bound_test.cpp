@@ -138,6 +138,30 @@ TEST(SlopeBound, OverAPoleNamesABoxAndEnds) {
   }
 }
 
+// r_0 = SmoothGate(z0 - 1) log(z0 + c): zero below 1, but for z0 <= -c it is undefined.
+struct GatedLogarithm {
+  using Nominal = TwoStates;
+  static constexpr const char* kName = "gated_logarithm";
+  static constexpr std::array<const char*, 1> kParameterNames{"c"};
+
+  template <class T>
+  static void Evaluate(std::span<const T> parameters, std::span<const T> z, std::span<T> residual) {
+    using std::log;
+    residual[0] = SmoothGate(z[0] - T(1)) * log(z[0] + parameters[0]);
+    residual[1] = z[1];
+  }
+};
+
+TEST(SlopeBound, OfWhatIsUndefinedIsInfiniteThoughItIsOff) {
+  const SlopeBound undefined = Bound<GatedLogarithm>(Square(2), 0, 0, {0, 0});
+  EXPECT_EQ(undefined.upper, kInfinity);
+  ASSERT_FALSE(undefined.unbounded.empty());
+  EXPECT_LE(undefined.unbounded[0].lower, 0);
+  const SlopeBound defined = Bound<GatedLogarithm>(Square(2), 0, 0, {2.5, 2.5});
+  EXPECT_TRUE(defined.reached);
+  EXPECT_GT(defined.upper, 0.1);
+}
+
 TEST(SlopeBound, OfAPoleAmongTheParametersNamesABoxAndEnds) {
   const SlopeBound bound = Bound<Pole>(Square(2), 0, 0, {1, 5});
   EXPECT_EQ(bound.upper, kInfinity);

@@ -68,7 +68,18 @@ class Real {
   friend Real tan(const Real& a) { return Apply(mpfr_tan, a); }
   friend Real sqrt(const Real& a) { return Apply(mpfr_sqrt, a); }
   friend Real exp(const Real& a) { return Apply(mpfr_exp, a); }
+  friend Real log(const Real& a) { return Apply(mpfr_log, a); }
   friend Real log1p(const Real& a) { return Apply(mpfr_log1p, a); }
+  friend Real asin(const Real& a) { return Apply(mpfr_asin, a); }
+  friend Real acos(const Real& a) { return Apply(mpfr_acos, a); }
+  friend Real atan(const Real& a) { return Apply(mpfr_atan, a); }
+  friend Real atan2(const Real& y, const Real& x) { return Apply(mpfr_atan2, y, x); }
+  friend Real tanh(const Real& a) { return Apply(mpfr_tanh, a); }
+  friend Real pow(const Real& a, int n) {
+    Real result;
+    mpfr_pow_si(result.value_, a.value_, n, MPFR_RNDN);
+    return result;
+  }
   friend Real abs(const Real& a) { return Apply(mpfr_abs, a); }
   Real& operator+=(const Real& b) {
     mpfr_add(value_, value_, b.value_, MPFR_RNDN);

@@ -281,9 +281,10 @@ TEST_P(Trigonometric, OfTinyArgumentsIsTight) {
 TEST_P(Trigonometric, OfArgumentsTooLargeToReduceIsEverything) {
   const Interval everything = GetParam() == Function::kTan ? Interval::Entire() : Interval(-1, 1);
   const double worst = std::ldexp(6381956970095103.0, 797);  // the double closest to a multiple of pi / 2
-  for (const Interval& x : {Interval(worst), Interval(NextUp(0x1p20)), Interval(-kMaxDouble, 0), Interval(kNan),
-                            Interval::Entire(), Interval(0, kInfinity)})
+  for (const Interval& x : {Interval(worst), Interval(NextUp(0x1p20)), Interval(-kMaxDouble, 0)})
     EXPECT_EQ(Enclose(GetParam(), x), everything);
+  for (const Interval& x : {Interval(kNan), Interval(1, kNan), Interval::Entire(), Interval(0, kInfinity)})
+    EXPECT_EQ(Enclose(GetParam(), x), Interval::Entire());
 }
 
 // What elementary.cpp assumes of the C library, two units in the last place, measured.
