@@ -1,5 +1,8 @@
 #include "verifier/equations.h"
+
 #include <map>
+
+#include "verifier/ranges.h"
 
 namespace forereach::verifier {
 namespace {
@@ -69,9 +72,7 @@ class BicycleEquations final : public Equations {
     const Real step(dt_), one(1.0), turn = step / Real(wheelbase_);
     const Real s = sin(z[2]), c = cos(z[2]), t = tan(z[5]);
     const Real& v = z[3];
-    // (tan)'' = 2 t (1 + t^2) grows with t, so its range is spanned by the ends.
-    const auto bend = [&](const Real& end) { return Real(2.0) * end * (one + sqr(end)); };
-    const Real bent = t.IsFinite() ? Real::FromTo(bend(t.lower()), bend(t.upper())) : t;
+    const Real bent = t.IsFinite() ? TangentBend(t) : t;
     return {{0, 2, 2, -(step * v * c)}, {0, 2, 3, -(step * s)},           {1, 2, 2, -(step * v * s)},
             {1, 2, 3, step * c},        {2, 3, 5, turn * (one + sqr(t))}, {2, 5, 5, turn * v * bent}};
   }

@@ -1,4 +1,5 @@
-/** The verifier's own equations of the nominal models, with hand-written first and second derivatives. */
+/** The verifier's own equations of the nominal models: those of the library with hand-written first and second
+derivatives, those of a text by its own parser and by the rules of differentiation over intervals. */
 #pragma once
 
 #include <memory>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include "certifier/dynamics/model.h"
+#include "certifier/dynamics/model_text.h"
 #include "verifier/real.h"
 
 namespace forereach::verifier {
@@ -16,13 +18,16 @@ struct FirstDerivative {
   Real value;
 };
 
-/** d^2 f0_output / d z_row d z_column, row <= column. */
+/** d^2 f0_output / d z_row d z_column, row <= column < the number of states: the inputs of a step are points. */
 struct SecondDerivative {
   int output, row, column;
   Real value;
 };
 
-/** f0 : z = (x, u) -> x+. Derivatives that are not listed are zero. For a box of z, each result contains the range. */
+/** f0 : z = (x, u) -> x+. Derivatives that are not listed are zero. For a box of z, each result contains the range. A
+result is not finite where it has no finite enclosure: where the box meets a pole or the edge of a function's domain
+and, for second derivatives, where it has a kink inside. With parameters that are intervals, each result contains those
+for all their values; then Value is an interval at a point, too. */
 class Equations {
  public:
   virtual ~Equations() = default;
@@ -33,5 +38,8 @@ class Equations {
 
 /** The equations for a model's name and parameters; null for a model that the verifier does not implement. */
 [[nodiscard]] std::unique_ptr<Equations> EquationsOf(const NominalModel& model);
+
+/** The equations of a text. @throws ExpressionError (expressions.h) if it is not a model in the language. */
+[[nodiscard]] std::unique_ptr<Equations> EquationsOf(const ModelText& model);
 
 }  // namespace forereach::verifier

@@ -74,6 +74,13 @@ Real Real::FromTo(const Real& a, const Real& b) {
   return result;
 }
 
+Real Real::Everything() {
+  Real result{Uninitialized{}};
+  mpfr_set_inf(&result.value_->left, -1);
+  mpfr_set_inf(&result.value_->right, 1);
+  return result;
+}
+
 Real Real::lower() const {
   Real result{Uninitialized{}};
   mpfi_set_fr(result.value_, &value_->left);
@@ -145,9 +152,14 @@ FOREREACH_UNARY(sqrt, mpfi_sqrt)
 FOREREACH_UNARY(abs, mpfi_abs)
 FOREREACH_UNARY(exp, mpfi_exp)
 FOREREACH_UNARY(log1p, mpfi_log1p)
+FOREREACH_UNARY(log, mpfi_log)
 FOREREACH_UNARY(sin, mpfi_sin)
 FOREREACH_UNARY(cos, mpfi_cos)
 FOREREACH_UNARY(tan, mpfi_tan)
+FOREREACH_UNARY(asin, mpfi_asin)
+FOREREACH_UNARY(acos, mpfi_acos)
+FOREREACH_UNARY(atan, mpfi_atan)
+FOREREACH_UNARY(tanh, mpfi_tanh)
 #undef FOREREACH_BINARY
 #undef FOREREACH_UNARY
 
@@ -161,6 +173,36 @@ Real min(const Real& a, const Real& b) {
   Real result{Real::Uninitialized{}};
   mpfr_min(&result.value_->left, &a.value_->left, &b.value_->left, MPFR_RNDD);
   mpfr_min(&result.value_->right, &a.value_->right, &b.value_->right, MPFR_RNDU);
+  return result;
+}
+
+// Seen from a point outside, the directions to a box lie between those to its corners.
+Real atan2(const Real& y, const Real& x) {
+  const bool right = mpfr_sgn(&x.value_->left) > 0;
+  const bool above = mpfr_sgn(&y.value_->left) > 0, below = mpfr_sgn(&y.value_->right) < 0;
+  if (!x.IsFinite() || !y.IsFinite() || !(right || above || below)) return Real::Everything();
+  const auto corner = [](const __mpfr_struct& height, const __mpfr_struct& width) {
+    Real angle{Real::Uninitialized{}};
+    mpfr_atan2(&angle.value_->left, &height, &width, MPFR_RNDD);
+    mpfr_atan2(&angle.value_->right, &height, &width, MPFR_RNDU);
+    return angle;
+  };
+  const __mpfi_struct &v = *y.value_, &h = *x.value_;
+  const Real corners[] = {corner(v.left, h.left), corner(v.left, h.right), corner(v.right, h.left),
+                          corner(v.right, h.right)};
+  return Real::FromTo(min(min(corners[0], corners[1]), min(corners[2], corners[3])),
+                      max(max(corners[0], corners[1]), max(corners[2], corners[3])));
+}
+
+Real power(const Real& a, int n) {
+  if (n < 0) {
+    const bool positive = mpfr_sgn(&a.value_->left) > 0, negative = mpfr_sgn(&a.value_->right) < 0;
+    return positive || negative ? Real(1.0) / power(a, -n) : Real::Everything();
+  }
+  const Real base = n % 2 == 0 ? abs(a) : a;  // x^n increases with the base
+  Real result{Real::Uninitialized{}};
+  mpfr_pow_ui(&result.value_->left, &base.value_->left, static_cast<unsigned long>(n), MPFR_RNDD);
+  mpfr_pow_ui(&result.value_->right, &base.value_->right, static_cast<unsigned long>(n), MPFR_RNDU);
   return result;
 }
 

@@ -47,6 +47,8 @@ class Real final {
 
   /** The interval from the lower end of a to the upper end of b. @pre a <= b. */
   [[nodiscard]] static Real FromTo(const Real& a, const Real& b);
+  /** All real numbers: what is known of a number that has no finite enclosure. */
+  [[nodiscard]] static Real Everything();
 
   /** The ends, as point intervals. */
   [[nodiscard]] Real lower() const;
@@ -79,10 +81,19 @@ class Real final {
   friend Real exp(const Real& a);
   /** log(1 + a). */
   friend Real log1p(const Real& a);
+  friend Real log(const Real& a);
   friend Real sin(const Real& a);
   friend Real cos(const Real& a);
   /** Unbounded over a pole. */
   friend Real tan(const Real& a);
+  friend Real asin(const Real& a);
+  friend Real acos(const Real& a);
+  friend Real atan(const Real& a);
+  friend Real tanh(const Real& a);
+  /** The angle of (x, y) in (-pi, pi). Everything if the box meets {y = 0, x <= 0}: there it jumps or is undefined. */
+  friend Real atan2(const Real& y, const Real& x);
+  /** a^n. Everything if n < 0 and a contains zero. */
+  friend Real power(const Real& a, int n);
   /** The larger and the smaller of two numbers. */
   friend Real max(const Real& a, const Real& b);
   friend Real min(const Real& a, const Real& b);

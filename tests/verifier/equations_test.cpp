@@ -1,11 +1,13 @@
-// Derivatives written by hand against difference quotients of the equations themselves, in high precision.
+// Derivatives, by hand or by rule, against difference quotients of the equations themselves, in high precision.
 #include <map>
+#include <ostream>
 
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/models.h"
 #include "tests/oracle/random.h"
+#include "tests/verifier/text_models.h"
 #include "verifier/equations.h"
 
 namespace forereach::verifier {
@@ -26,64 +28,94 @@ Real Slope(Function f, const std::vector<Real>& z, int variable) {
 
 bool Agree(const Real& a, const Real& b) { return CertainlyBelow(abs(a - b), kTolerance); }
 
-class Derivatives : public testing::TestWithParam<std::shared_ptr<const NominalModel>> {};
+struct Case {
+  const char* name;
+  std::shared_ptr<const Equations> equations;
+  int states, variables;
+
+  friend std::ostream& operator<<(std::ostream& out, const Case& test) { return out << test.name; }
+};
+
+Case Text(const char* name, const ModelText& model) {
+  const auto states = static_cast<int>(model.states.size());
+  return {name, EquationsOf(model), states, states + static_cast<int>(model.inputs.size())};
+}
+
+class Derivatives : public testing::TestWithParam<Case> {};
+
+using FirstEntries = std::map<std::pair<int, int>, Real>;
+using SecondEntries = std::map<std::array<int, 3>, Real>;
+
+FirstEntries FirstOf(const Equations& equations, const std::vector<Real>& z) {
+  FirstEntries entries;
+  for (const auto& [output, variable, value] : equations.First(z)) entries[{output, variable}] = value;
+  return entries;
+}
+SecondEntries SecondOf(const Equations& equations, const std::vector<Real>& z) {
+  SecondEntries entries;
+  for (const auto& [output, row, column, value] : equations.Second(z)) {
+    EXPECT_LE(row, column);
+    EXPECT_TRUE((entries.emplace(std::array{output, row, column}, value).second));
+  }
+  return entries;
+}
 
 TEST_P(Derivatives, AreThoseOfTheEquations) {
-  const NominalModel& model = *GetParam();
-  const auto equations = EquationsOf(model);
-  ASSERT_TRUE(equations);
+  const auto& [name, equations, states, variables] = GetParam();
   Random random(71);
   SCOPED_TRACE(random.trace());
-  for (int trial = 0; trial < 20; ++trial) {
+  for (int trial = 0; trial < 4; ++trial) {
     std::vector<Real> z;
-    for (int l = 0; l < model.num_variables(); ++l) z.emplace_back(random.Uniform(-1.4, 1.4));
-    std::map<std::pair<int, int>, Real> first;
-    for (const auto& [output, variable, value] : equations->First(z)) first[{output, variable}] = value;
-    std::map<std::array<int, 3>, Real> second;
-    for (const auto& [output, row, column, value] : equations->Second(z)) {
-      EXPECT_LE(row, column);
-      second[{output, row, column}] = value;
+    for (int l = 0; l < variables; ++l) z.emplace_back(random.Uniform(-1.4, 1.4));
+    FirstEntries first = FirstOf(*equations, z);
+    SecondEntries second = SecondOf(*equations, z);
+    for (int l = 0; l < variables; ++l) {
+      const auto value = [&](int k) {
+        return [&, k](const std::vector<Real>& at) { return equations->Value(at)[static_cast<std::size_t>(k)]; };
+      };
+      for (int k = 0; k < states; ++k) EXPECT_TRUE(Agree((first[{k, l}]), Slope(value(k), z, l))) << k << ", " << l;
     }
-    for (int k = 0; k < model.num_states(); ++k)
-      for (int l = 0; l < model.num_variables(); ++l) {
-        const auto value = [&](const std::vector<Real>& at) {
-          return equations->Value(at)[static_cast<std::size_t>(k)];
-        };
-        EXPECT_TRUE(Agree((first[{k, l}]), Slope(value, z, l))) << k << ", " << l;
-        for (int j = l; j < model.num_variables(); ++j) {
-          const auto slope = [&](const std::vector<Real>& at) {
-            for (const auto& [output, variable, entry] : equations->First(at))
-              if (output == k && variable == l) return entry;
-            return Real();
-          };
-          EXPECT_TRUE(Agree((second[{k, l, j}]), Slope(slope, z, j))) << k << ", " << l << ", " << j;
+    for (int j = 0; j < states; ++j) {
+      FirstEntries above = FirstOf(*equations, Moved(z, j, kStep)), below = FirstOf(*equations, Moved(z, j, -kStep));
+      for (int k = 0; k < states; ++k)
+        for (int l = 0; l <= j; ++l) {
+          const Real slope = (above[{k, l}] - below[{k, l}]) / (Real(2.0) * kStep);
+          EXPECT_TRUE(Agree((second[{k, l, j}]), slope)) << k << ", " << l << ", " << j;
         }
-      }
+    }
   }
 }
 
 TEST_P(Derivatives, BoundTheirRangeOverABox) {
-  const NominalModel& model = *GetParam();
-  const auto equations = EquationsOf(model);
+  const auto& [name, equations, states, variables] = GetParam();
   Random random(72);
   SCOPED_TRACE(random.trace());
-  for (int trial = 0; trial < 50; ++trial) {
+  for (int trial = 0; trial < 20; ++trial) {
     std::vector<Real> box, point;
-    for (int l = 0; l < model.num_variables(); ++l) {
+    for (int l = 0; l < variables; ++l) {
       const double lower = random.Uniform(-1.4, 1.2), upper = lower + random.Uniform(0, 0.2);
       box.push_back(Real::FromTo(lower, upper));
       point.emplace_back(random.Uniform(lower, upper));
     }
-    const auto ranges = equations->Second(box), values = equations->Second(point);
-    for (std::size_t i = 0; i < ranges.size(); ++i) {
-      EXPECT_TRUE(CertainlyAtMost(ranges[i].value.lower(), values[i].value));
-      EXPECT_TRUE(CertainlyAtMost(values[i].value, ranges[i].value.upper()));
+    SecondEntries ranges = SecondOf(*equations, box);
+    for (const auto& [place, value] : SecondOf(*equations, point)) {
+      EXPECT_TRUE(CertainlyAtMost(ranges[place].lower(), value));
+      EXPECT_TRUE(CertainlyAtMost(value, ranges[place].upper()));
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, Derivatives, testing::Values(MakePointMass(0.15), MakeKinematicBicycle(0.1, 2.5)),
-                         [](const auto& test) { return test.param->name(); });
+using Integrator = ModelText::Integrator;
+
+INSTANTIATE_TEST_SUITE_P(Models, Derivatives,
+                         testing::Values(Case{"point_mass", EquationsOf(*MakePointMass(0.15)), 4, 6},
+                                         Case{"kinematic_bicycle", EquationsOf(*MakeKinematicBicycle(0.1, 2.5)), 6, 8},
+                                         Text("point_mass_text", PointMassText(0.15)),
+                                         Text("bicycle_text", BicycleText(0.1, 2.5)),
+                                         Text("quadrotor_euler", QuadrotorText(Integrator::kEuler)),
+                                         Text("quadrotor_midpoint", QuadrotorText(Integrator::kMidpoint)),
+                                         Text("quadrotor_rk4", QuadrotorText(Integrator::kRk4))),
+                         [](const auto& test) { return test.param.name; });
 
 struct Unicycle {
   static constexpr int kStates = 1, kInputs = 1;

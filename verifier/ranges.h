@@ -1,0 +1,31 @@
+/** Ranges of functions over intervals, and of their derivatives: of each the least interval, up to rounding. */
+#pragma once
+
+#include "verifier/real.h"
+
+namespace forereach::verifier {
+
+/** From the least to the largest number of both. */
+[[nodiscard]] Real Hull(const Real& a, const Real& b);
+
+/** phi(e) = exp(-1/e) for e > 0 and 0 for e <= 0, phi' and phi''. */
+[[nodiscard]] Real Gate(const Real& e);
+[[nodiscard]] Real GateSlope(const Real& e);
+[[nodiscard]] Real GateBend(const Real& e);
+
+/** t log(1 + exp(x / t)), which increases in x and t. @pre t > 0. */
+[[nodiscard]] Real SoftRamp(const Real& x, const Real& t);
+/** With u = x / t: the derivative of SoftRamp by x, 1 / (1 + exp(-u)), that of this by u, and the derivative of
+SoftRamp by t. */
+[[nodiscard]] Real Logistic(const Real& u);
+[[nodiscard]] Real LogisticSlope(const Real& u);
+[[nodiscard]] Real SoftRampByTemperature(const Real& u);
+
+/** tan'' = 2 t (1 + t^2) and tanh'' = -2 t (1 - t^2), of the function's value t. */
+[[nodiscard]] Real TangentBend(const Real& t);
+[[nodiscard]] Real HyperbolicTangentBend(const Real& t);
+/** asin''(x) = x / (1 - x^2)^(3/2), |x| < 1, and atan''(x) = -2 x / (1 + x^2)^2. */
+[[nodiscard]] Real ArcsineBend(const Real& x);
+[[nodiscard]] Real ArctangentBend(const Real& x);
+
+}  // namespace forereach::verifier

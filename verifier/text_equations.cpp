@@ -1,0 +1,160 @@
+// Equations of a text: one tape from z to x+, the integrator's stages included.
+#include <cmath>
+#include <utility>
+
+#include "certifier/numerics/size.h"
+#include "verifier/equations.h"
+#include "verifier/expressions.h"
+#include "verifier/jet.h"
+
+namespace forereach::verifier {
+namespace {
+
+// Expressions, and where on their tape the wanted ones are.
+struct Formulas {
+  Tape tape;
+  std::vector<int> results;
+};
+
+void Define(const std::string& name, int place, Names& names) {
+  if (IsReserved(name)) throw ExpressionError("the language has a meaning of its own for the name " + name);
+  if (!names.try_emplace(name, place).second) throw ExpressionError("the name " + name + " has two meanings");
+}
+
+// The model's equations, each one on the line of its state.
+Formulas FormulasOf(const ModelText& model) {
+  Formulas formulas;
+  Names names;
+  int variable = 0, parameter = 0;
+  for (const auto* const group : {&model.states, &model.inputs})
+    for (const ModelText::Variable& named : *group)
+      Define(named.name, formulas.tape.Add({Op::kVariable, -1, -1, variable++}), names);
+  for (const ModelText::Parameter& named : model.parameters)
+    Define(named.name, formulas.tape.Add({Op::kParameter, -1, -1, parameter++}), names);
+  for (const ModelText::Definition& named : model.definitions)
+    Define(named.name, Parse(named.value, names, formulas.tape), names);
+  for (const ExpressionText& equation : model.equations)
+    formulas.results.push_back(Parse(equation, names, formulas.tape));
+  return formulas;
+}
+
+// One evaluation of the rates: at x + before dt k, with the rates k of the evaluation before. Its own rates count in x+
+// with weight dt. Both are fractions.
+struct Stage {
+  std::pair<int, int> before, weight;
+};
+
+std::vector<Stage> StagesOf(ModelText::Integrator integrator) {
+  switch (integrator) {
+    case ModelText::Integrator::kNone: return {};
+    case ModelText::Integrator::kEuler: return {{{0, 1}, {1, 1}}};
+    case ModelText::Integrator::kMidpoint: return {{{0, 1}, {0, 1}}, {{1, 2}, {1, 1}}};
+    case ModelText::Integrator::kRk4: return {{{0, 1}, {1, 6}}, {{1, 2}, {1, 3}}, {{1, 2}, {1, 3}}, {{1, 1}, {1, 6}}};
+  }
+  throw ExpressionError("the integrator is unknown");
+}
+
+class TextEquations final : public Equations {
+ public:
+  explicit TextEquations(const ModelText& model)
+      : formulas_(FormulasOf(model)), stages_(StagesOf(model.integrator)), num_states_(model.states.size()) {
+    for (const auto& [name, lower, upper] : model.parameters) {
+      if (!(lower <= upper) || !std::isfinite(lower) || !std::isfinite(upper))
+        throw ExpressionError("the parameter " + name + " has to lie between two finite numbers");
+      if (name == "dt") dt_ = static_cast<int>(parameters_.size());
+      parameters_.emplace_back(lower, upper);
+    }
+    if (!stages_.empty() && dt_ < 0) throw ExpressionError("an integrator needs the parameter dt");
+  }
+
+  std::vector<Real> Value(std::span<const Real> z) const override {
+    const std::vector<Real> parameters = Parameters();
+    if (stages_.empty()) return Evaluate(formulas_.tape, formulas_.results, RealArithmetic(z, parameters));
+    std::vector<Real> at(z.begin(), z.end()), next(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(num_states_)),
+        rates;
+    for (const Stage& stage : stages_) {
+      const Real before = Length(stage.before), weight = Length(stage.weight);
+      for (std::size_t k = 0; k < rates.size(); ++k) at[k] = z[k] + before * rates[k];
+      rates = Evaluate(formulas_.tape, formulas_.results, RealArithmetic(at, parameters));
+      for (std::size_t k = 0; k < num_states_; ++k) next[k] += weight * rates[k];
+    }
+    return next;
+  }
+
+  std::vector<FirstDerivative> First(std::span<const Real> z) const override {
+    const std::vector<Jet> jets = Step(z, z.size(), JetArithmetic::Order::kFirst);
+    std::vector<FirstDerivative> derivatives;
+    for (std::size_t k = 0; k < num_states_; ++k)
+      for (const auto& [variable, value] : jets[k].first)
+        if (!value.IsZero()) derivatives.push_back({static_cast<int>(k), variable, value});
+    return derivatives;
+  }
+
+  std::vector<SecondDerivative> Second(std::span<const Real> z) const override {
+    const std::vector<Jet> jets = Step(z, num_states_, JetArithmetic::Order::kSecond);
+    std::vector<SecondDerivative> derivatives;
+    for (std::size_t k = 0; k < num_states_; ++k)
+      for (const auto& [key, value] : jets[k].second)
+        if (!value.IsZero())
+          derivatives.push_back(
+              {static_cast<int>(k), key / JetArithmetic::kStride, key % JetArithmetic::kStride, value});
+    return derivatives;
+  }
+
+ private:
+  [[nodiscard]] std::vector<Real> Parameters() const {
+    std::vector<Real> ranges;
+    for (const auto& [lower, upper] : parameters_) ranges.push_back(Real::FromTo(lower, upper));
+    return ranges;
+  }
+  // That part of dt.
+  [[nodiscard]] Real Length(const std::pair<int, int>& part) const {
+    const auto& [lower, upper] = parameters_[ToSize(dt_)];
+    return Real::FromTo(lower, upper) * Real::Integer(part.first) / Real::Integer(part.second);
+  }
+
+  // x+ with its derivatives by the first `count` variables. Each stage's arguments are jets, whose derivatives those of
+  // the rates by the arguments are composed with.
+  [[nodiscard]] std::vector<Jet> Step(std::span<const Real> z, std::size_t count, JetArithmetic::Order order) const {
+    const std::vector<Real> parameters = Parameters();
+    const auto formulas = [&](std::span<const Real> at) {
+      const JetArithmetic arithmetic(at, parameters, static_cast<int>(count), order);
+      return Evaluate(formulas_.tape, formulas_.results, arithmetic);
+    };
+    if (stages_.empty()) return formulas(z);
+    std::vector<Jet> start;
+    for (std::size_t l = 0; l < z.size(); ++l) {
+      start.push_back({z[l], {}, {}});
+      if (l < count) start[l].first.emplace_back(static_cast<int>(l), 1.0);
+    }
+    std::vector<Jet> argument = start, next = start, rates;
+    std::vector<Real> at(z.begin(), z.end());
+    for (const Stage& stage : stages_) {
+      const Real before = Length(stage.before), weight = Length(stage.weight);
+      for (std::size_t k = 0; k < rates.size(); ++k) {
+        argument[k] = AddScaled(start[k], before, rates[k]);
+        at[k] = argument[k].value;
+      }
+      rates = formulas(at);
+      for (Jet& rate : rates) rate = Compose(rate, argument, order);
+      for (std::size_t k = 0; k < num_states_; ++k) next[k] = AddScaled(next[k], weight, rates[k]);
+    }
+    return next;
+  }
+
+  Formulas formulas_;
+  std::vector<Stage> stages_;
+  std::size_t num_states_;
+  std::vector<std::pair<double, double>> parameters_;
+  int dt_ = -1;  // its place among them
+};
+
+}  // namespace
+
+std::unique_ptr<Equations> EquationsOf(const ModelText& model) {
+  if (model.states.empty() || model.equations.size() != model.states.size())
+    throw ExpressionError("a model has states and an equation for each");
+  return std::make_unique<TextEquations>(model);
+}
+
+}  // namespace forereach::verifier
