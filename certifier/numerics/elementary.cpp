@@ -17,8 +17,14 @@ constexpr Interval kPi(0x1.921fb54442d18p+1, 0x1.921fb54442d19p+1);
 constexpr double kPiUp = kPi.upper, kHalfPiUp = kPiUp / 2;
 constexpr double kLargestArgument = 0x1p20;
 
-// Whether x may contain (offset + j * period) * pi / 2 for some integer j.
+// Whether x may contain (offset + j * period) * pi / 2 for some integer j. Plain arithmetic decides if it is not close:
+// up to the largest argument its error is below 2^-31 turns.
 bool MayContain(const Interval& x, double offset, double period) {
+  constexpr double kPerQuarterTurn = 0x1.45f306dc9c883p-1, kClose = 0x1p-29;
+  const double first = (x.lower * kPerQuarterTurn - offset) / period,
+               last = (x.upper * kPerQuarterTurn - offset) / period;
+  if (std::ceil(first - kClose) > last + kClose) return false;
+  if (std::ceil(first + kClose) <= last - kClose) return true;
   const Interval turns = (x - Interval(offset / 2) * kPi) / (Interval(period / 2) * kPi);
   return !(std::ceil(turns.lower) > turns.upper);
 }
