@@ -31,6 +31,8 @@ for all their values; then Value is an interval at a point, too. */
 class Equations {
  public:
   virtual ~Equations() = default;
+  /** Whether f0 is one function: no parameter is an interval. */
+  [[nodiscard]] virtual bool IsExact() const { return true; }
   [[nodiscard]] virtual std::vector<Real> Value(std::span<const Real> z) const = 0;
   [[nodiscard]] virtual std::vector<FirstDerivative> First(std::span<const Real> z) const = 0;
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;

@@ -1,4 +1,5 @@
 // Equations of a text: one tape from z to x+, the integrator's stages included.
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -65,6 +66,10 @@ class TextEquations final : public Equations {
       parameters_.emplace_back(lower, upper);
     }
     if (!stages_.empty() && dt_ < 0) throw ExpressionError("an integrator needs the parameter dt");
+  }
+
+  bool IsExact() const override {
+    return std::ranges::all_of(parameters_, [](const auto& range) { return range.first == range.second; });
   }
 
   std::vector<Real> Value(std::span<const Real> z) const override {

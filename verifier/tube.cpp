@@ -254,6 +254,16 @@ bool AllFinite(const std::vector<SecondDerivative>& hessian) {
   return std::ranges::all_of(hessian, [](const SecondDerivative& entry) { return entry.value.IsFinite(); });
 }
 
+// The ends of what encloses either bound.
+Bounds Outermost(const Bounds& bounds) { return {bounds.lower.lower(), bounds.upper.upper()}; }
+
+// Replaces a number by a point, and adds to `slack` how far it may be away.
+void Round(Real& number, Real& slack) {
+  const Real point = number.middle();
+  slack += (number - point).magnitude();
+  number = point;
+}
+
 }  // namespace
 
 Real Slice::HalfWidth(int k) const {
@@ -313,12 +323,14 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
       const double x_next = data.x_next(i, k);
       const Real allowed = Real(UlpOf(x_next)) + Real(problem.declaration.noise_bound[k]);
       const Real observed = Real(x_next) - nominal[ToSize(k)];
-      row.push_back({observed - allowed, observed + allowed});
+      const Bounds bounds{observed - allowed, observed + allowed};
+      // A transition for which the model has no value says nothing.
+      row.push_back(!observed.IsFinite() ? Bounds{-kNone, kNone} : equations.IsExact() ? bounds : Outermost(bounds));
     }
     std::vector<Real>& sizes = sizes_.emplace_back();
     for (const double x_next : data.x_next.row(i)) sizes.push_back(abs(Real(x_next)));
     for (const auto& [output, variable, value] : equations.First(z))
-      sizes[ToSize(output)] += abs(value * z[ToSize(variable)]);
+      sizes[ToSize(output)] += value.IsFinite() ? abs(value * z[ToSize(variable)]) : Real(kNone);
   }
 }
 
@@ -366,18 +378,11 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     if (contradiction)
       return Failure{query.t, "some residual is consistent with data and declaration", bounds.lower.text(),
                      "at most " + bounds.upper.text()};
-    step.envelope.push_back(bounds);
+    step.envelope.push_back(equations_.IsExact() ? bounds : Outermost(bounds));
   }
 
-  Slice next;
-  next.center = equations_.Value(query.center);
-  const std::vector<FirstDerivative> jacobian = equations_.First(query.center);
-  for (const auto& column : query.slice.columns) {
-    std::vector<Real> image(ToSize(n));
-    for (const auto& [output, variable, value] : jacobian)
-      if (variable < n && !column[ToSize(variable)].IsZero()) image[ToSize(output)] += value * column[ToSize(variable)];
-    if (!IsZeroColumn(image)) next.columns.push_back(std::move(image));
-  }
+  std::vector<Real> slack(ToSize(n));
+  Slice next = Image(query, slack);
   const Real half(0.5);
   for (int k = 0; k < n; ++k) {  // diag(q)
     const auto& [lower, upper] = step.remainder[ToSize(k)];
@@ -390,15 +395,46 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
     if (const Real h = half * abs(upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
-    if (!next.center[ToSize(k)].IsFinite()) return no_bound("the successor");
+    if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
   }
   const bool followed = options.follow && tube.slices.size() < options.follow->size() &&
                         ReduceAs(next, problem_.zonotope_order, (*options.follow)[tube.slices.size()]);
   if (options.reduce && !followed)
     tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
+  for (int k = 0; k < n; ++k)
+    if (!slack[ToSize(k)].IsZero()) {
+      next.columns.push_back(Axis(n, k, slack[ToSize(k)]));
+      ++next.num_slack;
+    }
   tube.steps.push_back(std::move(step));
   tube.slices.push_back(std::move(next));
   return std::nullopt;
+}
+
+// <f0(c), J G>. With parameters that are intervals, the middles; `slack` then is set to what they may be off,
+// coordinate by coordinate, the slice's own slack included.
+Slice TubeMaker::Image(const Query& query, std::vector<Real>& slack) const {
+  const std::size_t n = slack.size(), num_columns = query.slice.columns.size() - query.slice.num_slack;
+  Slice next;
+  next.center = equations_.Value(query.center);
+  const std::vector<FirstDerivative> jacobian = equations_.First(query.center);
+  for (std::size_t j = 0; j < query.slice.columns.size(); ++j) {
+    const std::vector<Real>& column = query.slice.columns[j];
+    std::vector<Real> image(n);
+    for (const auto& [output, variable, value] : jacobian)
+      if (ToSize(variable) < n && !column[ToSize(variable)].IsZero())
+        image[ToSize(output)] += value * column[ToSize(variable)];
+    if (j >= num_columns)
+      for (std::size_t k = 0; k < n; ++k) slack[k] += image[k].magnitude();
+    else if (!IsZeroColumn(image))
+      next.columns.push_back(std::move(image));
+  }
+  if (equations_.IsExact()) return next;
+  for (std::size_t k = 0; k < n; ++k) {
+    Round(next.center[k], slack[k]);
+    for (std::vector<Real>& column : next.columns) Round(column[k], slack[k]);
+  }
+  return next;
 }
 
 std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {

@@ -28,6 +28,9 @@ enum class Method { kPaper, kCentred };
 struct Slice {
   std::vector<Real> center;
   std::vector<std::vector<Real>> columns;
+  /** The last columns, each along an axis, are what the others are off because a parameter is an interval. A reduction
+  never counts them. */
+  std::size_t num_slack = 0;
 
   [[nodiscard]] int dim() const { return static_cast<int>(center.size()); }
   /** sum_j |G_kj|. */
@@ -100,6 +103,7 @@ class TubeMaker final {
   [[nodiscard]] std::vector<Bounds> Remainder(const Query& query, bool split) const;
   struct Known;
   [[nodiscard]] Known Envelope(const Query& query, int k, const KnownRows& known) const;
+  [[nodiscard]] Slice Image(const Query& query, std::vector<Real>& slack) const;
   [[nodiscard]] std::optional<Failure> Advance(Tube& tube, const Query& query, const TubeOptions& options) const;
 
   const Problem& problem_;
