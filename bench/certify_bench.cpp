@@ -18,6 +18,7 @@
 #include "bench/stages.h"
 #include "bench/straightforward.h"
 #include "bench/tasks.h"
+#include "bench/text_models.h"
 #include "bench/without_rounding.h"
 #include "certifier/certify/batch.h"
 
@@ -145,6 +146,22 @@ void RegisterWorlds() {
     })->Unit(benchmark::kMicrosecond);
 }
 
+// The bicycle as text beside the compiled one, its integrators, and a large model.
+void RegisterTextModels() {
+  using Integrator = ModelText::Integrator;
+  const auto add = [](const char* name, auto make) {
+    benchmark::RegisterBenchmark((std::string("model/") + name).c_str(), [make](State& state) {
+      const Task task = make();
+      RunCertify(state, Certifier(task.problem), task);
+    })->Unit(benchmark::kMicrosecond);
+  };
+  add("bicycle_compiled", [] { return CachedTask(Scenario::kBicycle, 400); });
+  add("bicycle_text", [] { return MakeBicycleTextTask(Integrator::kNone, 400); });
+  add("bicycle_midpoint", [] { return MakeBicycleTextTask(Integrator::kMidpoint, 400); });
+  add("bicycle_rk4", [] { return MakeBicycleTextTask(Integrator::kRk4, 400); });
+  add("quadrotor_rk4_20_steps", [] { return MakeQuadrotorTask(); });
+}
+
 void RegisterBatch() {
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   for (unsigned threads = 1; threads <= cores; threads = threads < cores ? std::min(2 * threads, cores) : cores + 1)
@@ -163,6 +180,7 @@ void RegisterAll(int largest) {
   }
   RegisterNominalTube();
   RegisterWorlds();
+  RegisterTextModels();
   RegisterBatch();
 }
 

@@ -7,15 +7,14 @@
 - parameters(): the values of the parameters, in the units of the equations;
 - Step<T>(parameters, z, next): the equations x+ = f0(x, u) over any scalar type T, with z = (x, u).
 
-The program of operations and derivatives is a compile-time constant, so each function below is straight-line code. A
-program that exceeds the limits of program.h does not compile. */
+The program of operations and derivatives is a compile-time constant, so each function below is straight-line code. */
 #pragma once
 
 #include <array>
 
 #include "certifier/dynamics/expand.h"
 #include "certifier/dynamics/image.h"
-#include "certifier/dynamics/model.h"
+#include "certifier/dynamics/program_model.h"
 #include "certifier/dynamics/remainder.h"
 
 FOREREACH_ARITHMETIC_BEGIN
@@ -23,13 +22,13 @@ FOREREACH_ARITHMETIC_BEGIN
 namespace forereach {
 
 template <class Equations>
-class EquationsModel final : public NominalModel {
+class EquationsModel final : public ProgramModel {
  public:
-  static constexpr Program kProgram = MakeProgram<Equations>();
+  static constexpr Program kProgram = ProgramOf<Equations>::kProgram;
   static_assert(Equations::kStates <= kMaxStates && Equations::kInputs <= kMaxInputs);
 
   explicit EquationsModel(const Equations& equations)
-      : NominalModel(kProgram, List<double>(equations.parameters()),
+      : ProgramModel(kProgram, List<Interval>(equations.parameters()),
                      {Equations::kName, List<std::string>(Equations::kStateNames),
                       List<std::string>(Equations::kInputNames), List<std::string>(Equations::kParameterNames)}) {}
 
@@ -41,7 +40,7 @@ class EquationsModel final : public NominalModel {
   void EncloseRemainder(Method method, const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
                         const double* error, Remainder& out,
                         InstructionSet instructions = BestInstructionSet()) const noexcept override {
-    Dispatch<&internal::EncloseBy<kProgram>>(instructions, method, slice, half_width, hessian, error, out);
+    Dispatch<&internal::EncloseConstant<kProgram>>(instructions, method, slice, half_width, hessian, error, out);
   }
 
   void Map(const Expansion& expansion, const StepError& error, const Zonotope& slice, Zonotope& next, ImageSums& sums,

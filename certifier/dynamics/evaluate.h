@@ -2,11 +2,13 @@
 certify step uses expand.h instead. */
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <span>
 
 #include "certifier/dynamics/program.h"
+#include "certifier/dynamics/saturation.h"
+#include "certifier/numerics/elementary.h"
 #include "certifier/numerics/interval.h"
 #include "certifier/numerics/size.h"
 
@@ -14,10 +16,11 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
-template <class T>
-using NodeValues = std::array<T, Program::kMaxOperations>;
-
 inline long double sqr(long double x) { return x * x; }
+inline long double step(long double x) { return x > 0 ? 1 : 0; }
+inline long double sign(long double x) { return x > 0 ? 1 : x < 0 ? -1 : 0; }
+inline long double kink(long double) { return 0; }
+inline long double cut(long double, long double) { return 0; }
 
 /** 2 t (1 + t^2). It increases in t, so its range over an interval follows from the ends. */
 inline long double TanCurvature(long double t) { return 2 * t * (1 + t * t); }
@@ -27,29 +30,49 @@ inline Interval TanCurvature(const Interval& t) {
   return {at(t.lower).lower, at(t.upper).upper};
 }
 
-/** Sets values[i] for every node i with needed[i]. @param parameters the program's. @param z d_z entries. */
-template <class T>
-void Evaluate(const Program& program, const std::array<bool, Program::kMaxOperations>& needed,
-              std::span<const double> parameters, std::span<const T> z, NodeValues<T>& values) noexcept {
-  using std::sin, std::cos, std::tan;
+/** Sets values[i] for every node i with needed[i] != 0. P is double or Interval; T is made of it.
+@param parameters the program's. @param z d_z entries. @param values program.size entries. */
+template <class T, class P>
+void Evaluate(const Program& program, std::span<const unsigned char> needed, std::span<const P> parameters,
+              std::span<const T> z, std::span<T> values) noexcept {
+  using std::pow, std::sin, std::cos, std::tan, std::sqrt, std::exp, std::log, std::asin, std::acos, std::atan,
+      std::atan2, std::tanh, std::abs, std::min, std::max;
   for (std::size_t i = 0; i < ToSize(program.size); ++i) {
-    if (!needed[i]) continue;
+    if (needed[i] == 0) continue;
     const Operation& node = program.nodes[i];
-    const auto operand = [&](short j) -> const T& { return values[ToSize(j)]; };
+    const T &a = values[node.has_first() ? ToSize(node.a) : 0], &b = values[node.has_second() ? ToSize(node.b) : 0];
     switch (node.op) {
       case Op::kVariable: values[i] = z[ToSize(node.a)]; break;
       case Op::kParameter: values[i] = T(parameters[ToSize(node.a)]); break;
       case Op::kConstant: values[i] = T(node.constant); break;
-      case Op::kAdd: values[i] = operand(node.a) + operand(node.b); break;
-      case Op::kSubtract: values[i] = operand(node.a) - operand(node.b); break;
-      case Op::kMultiply: values[i] = operand(node.a) * operand(node.b); break;
-      case Op::kDivide: values[i] = operand(node.a) / operand(node.b); break;
-      case Op::kNegate: values[i] = -operand(node.a); break;
-      case Op::kSquare: values[i] = sqr(operand(node.a)); break;
-      case Op::kSin: values[i] = sin(operand(node.a)); break;
-      case Op::kCos: values[i] = cos(operand(node.a)); break;
-      case Op::kTan: values[i] = tan(operand(node.a)); break;
-      case Op::kTanCurvature: values[i] = TanCurvature(operand(node.a)); break;
+      case Op::kAdd: values[i] = a + b; break;
+      case Op::kSubtract: values[i] = a - b; break;
+      case Op::kMultiply: values[i] = a * b; break;
+      case Op::kDivide: values[i] = a / b; break;
+      case Op::kNegate: values[i] = -a; break;
+      case Op::kSquare: values[i] = sqr(a); break;
+      case Op::kSin: values[i] = sin(a); break;
+      case Op::kCos: values[i] = cos(a); break;
+      case Op::kTan: values[i] = tan(a); break;
+      case Op::kTanCurvature: values[i] = TanCurvature(a); break;
+      case Op::kPower: values[i] = pow(a, node.b); break;
+      case Op::kSqrt: values[i] = sqrt(a); break;
+      case Op::kExp: values[i] = exp(a); break;
+      case Op::kLog: values[i] = log(a); break;
+      case Op::kAsin: values[i] = asin(a); break;
+      case Op::kAcos: values[i] = acos(a); break;
+      case Op::kAtan: values[i] = atan(a); break;
+      case Op::kAtan2: values[i] = atan2(a, b); break;
+      case Op::kTanh: values[i] = tanh(a); break;
+      case Op::kAbs: values[i] = abs(a); break;
+      case Op::kMin: values[i] = min(a, b); break;
+      case Op::kMax: values[i] = max(a, b); break;
+      case Op::kSign: values[i] = sign(a); break;
+      case Op::kStep: values[i] = step(a); break;
+      case Op::kKink: values[i] = kink(a); break;
+      case Op::kCut: values[i] = cut(a, b); break;
+      case Op::kSoftplus: values[i] = Softplus(a, b); break;
+      case Op::kSmoothGate: values[i] = SmoothGate(a); break;
     }
   }
 }

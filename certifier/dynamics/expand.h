@@ -8,10 +8,13 @@ each. The code is straight-line code for a program that is known at compile time
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
 #include "certifier/dynamics/expansion.h"
+#include "certifier/dynamics/saturation.h"
+#include "certifier/numerics/elementary.h"
 #include "certifier/numerics/instruction_set.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/numerics/size.h"
@@ -91,62 +94,129 @@ FOREREACH_INLINE PlainInterval TanRange(double tangent, const Turns& turns) {
   return {range[0], range[1]};
 }
 
-template <const Program& kProgram, std::size_t I>
-inline void EvaluateAtPoint(const double* parameters, const double* z, double* v) {
-  if constexpr (kProgram.at_point[I]) {
-    constexpr Operation n = kProgram.nodes[I];
-    if constexpr (n.op == Op::kVariable) v[I] = z[n.a];
-    if constexpr (n.op == Op::kParameter) v[I] = parameters[n.a];
-    if constexpr (n.op == Op::kConstant) v[I] = n.constant;
-    if constexpr (n.op == Op::kAdd) v[I] = v[n.a] + v[n.b];
-    if constexpr (n.op == Op::kSubtract) v[I] = v[n.a] - v[n.b];
-    if constexpr (n.op == Op::kMultiply) v[I] = v[n.a] * v[n.b];
-    if constexpr (n.op == Op::kDivide) v[I] = v[n.a] / v[n.b];
-    if constexpr (n.op == Op::kNegate) v[I] = -v[n.a];
-    if constexpr (n.op == Op::kSquare) v[I] = v[n.a] * v[n.a];
-    if constexpr (n.op == Op::kSin) v[I] = std::sin(v[n.a]);
-    if constexpr (n.op == Op::kCos) v[I] = std::cos(v[n.a]);
-    if constexpr (n.op == Op::kTan) v[I] = v[n.b] / v[n.b + 1];
-    static_assert(n.op != Op::kTanCurvature, "a second derivative in the Jacobian");
+/** The value of an operation on numbers; not that of a variable, a parameter or a constant. */
+FOREREACH_INLINE double ValueOf(const Operation& n, double a, double b) {
+  switch (n.op) {
+    case Op::kVariable:
+    case Op::kParameter: break;
+    case Op::kConstant: return n.constant;
+    case Op::kAdd: return a + b;
+    case Op::kSubtract: return a - b;
+    case Op::kMultiply: return a * b;
+    case Op::kDivide: return a / b;
+    case Op::kNegate: return -a;
+    case Op::kSquare: return a * a;
+    case Op::kSin: return std::sin(a);
+    case Op::kCos: return std::cos(a);
+    case Op::kTan: return std::tan(a);
+    case Op::kTanCurvature: return 2 * a * (1 + a * a);
+    case Op::kPower: return std::pow(a, n.b);
+    case Op::kSqrt: return std::sqrt(a);
+    case Op::kExp: return std::exp(a);
+    case Op::kLog: return std::log(a);
+    case Op::kAsin: return std::asin(a);
+    case Op::kAcos: return std::acos(a);
+    case Op::kAtan: return std::atan(a);
+    case Op::kAtan2: return std::atan2(a, b);
+    case Op::kTanh: return std::tanh(a);
+    case Op::kAbs: return std::abs(a);
+    case Op::kMin: return std::min(a, b);
+    case Op::kMax: return std::max(a, b);
+    case Op::kSign: return a > 0 ? 1 : a < 0 ? -1 : 0;
+    case Op::kStep: return a > 0 ? 1 : 0;
+    case Op::kKink:
+    case Op::kCut: return 0;
+    case Op::kSoftplus: return Softplus(a, b);
+    case Op::kSmoothGate: return SmoothGate(a);
   }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+FOREREACH_INLINE PlainInterval Plain(const Interval& x) { return {x.lower, x.upper}; }
+
+/** The range of an operation over ranges, by plain arithmetic where that is quick; not that of a variable, a parameter,
+a sine, a cosine or a tangent. */
+FOREREACH_INLINE PlainInterval RangeOf(const Operation& n, const PlainInterval& a, const PlainInterval& b,
+                                       bool a_is_number, bool b_is_number) {
+  const auto exact = [](const PlainInterval& x) __attribute__((always_inline)) { return Interval(x.lower, x.upper); };
+  switch (n.op) {
+    case Op::kConstant: return {n.constant, n.constant};
+    case Op::kAdd: return a + b;
+    case Op::kSubtract: return a - b;
+    case Op::kMultiply:
+      if (a_is_number) return Scaled(a.lower, b);
+      if (b_is_number) return Scaled(b.lower, a);
+      return a * b;
+    case Op::kDivide: return Divide(a, b);
+    case Op::kNegate: return -a;
+    case Op::kSquare: return Square(a);
+    case Op::kTanCurvature: return TanCurvature(a);
+    case Op::kPower: return Plain(pow(exact(a), n.b));
+    case Op::kSqrt: return Plain(sqrt(exact(a)));
+    case Op::kExp: return Plain(exp(exact(a)));
+    case Op::kLog: return Plain(log(exact(a)));
+    case Op::kAsin: return Plain(asin(exact(a)));
+    case Op::kAcos: return Plain(acos(exact(a)));
+    case Op::kAtan: return Plain(atan(exact(a)));
+    case Op::kAtan2: return Plain(atan2(exact(a), exact(b)));
+    case Op::kTanh: return Plain(tanh(exact(a)));
+    case Op::kAbs: return Plain(abs(exact(a)));
+    case Op::kMin: return Plain(min(exact(a), exact(b)));
+    case Op::kMax: return Plain(max(exact(a), exact(b)));
+    case Op::kSign: return Plain(sign(exact(a)));
+    case Op::kStep: return Plain(step(exact(a)));
+    case Op::kKink: return Plain(kink(exact(a)));
+    case Op::kCut: return Plain(cut(exact(a), exact(b)));
+    case Op::kSoftplus: return Plain(Softplus(exact(a), exact(b)));
+    case Op::kSmoothGate: return Plain(SmoothGate(exact(a)));
+    case Op::kVariable:
+    case Op::kParameter:
+    case Op::kSin:
+    case Op::kCos:
+    case Op::kTan: break;
+  }
+  return Plain(Interval::Entire());
+}
+
+/** Sets v[i], the value of node i at a point. `program` may be a constant expression. */
+FOREREACH_INLINE void EvaluateAtPoint(const Operation& n, std::size_t i, const double* parameters, const double* z,
+                                      double* v) {
+  if (n.op == Op::kVariable)
+    v[i] = z[n.a];
+  else if (n.op == Op::kParameter)
+    v[i] = parameters[n.a];
+  else if (n.op == Op::kTan)  // sine over cosine
+    v[i] = v[n.b] / v[n.b + 1];
+  else
+    v[i] = ValueOf(n, n.has_first() ? v[n.a] : 0, n.has_second() ? v[n.b] : 0);
 }
 
 /** Whether the node is the same number over the whole box. */
-template <const Program& kProgram>
-constexpr bool IsNumber(int i) {
-  return kProgram.node(i).op == Op::kParameter || kProgram.node(i).op == Op::kConstant;
+constexpr bool IsNumber(const Program& program, int i) {
+  return i >= 0 && (program.node(i).op == Op::kParameter || program.node(i).op == Op::kConstant);
 }
 
-template <const Program& kProgram, std::size_t I>
-inline void EvaluateOverBox(const double* parameters, const PlainInterval* box, const double* v, PlainInterval* w) {
-  constexpr Operation n = kProgram.nodes[I];
-  // Sine and cosine of one argument share their ends: the first of them that is needed sets both.
-  constexpr bool kSecondOfPair = n.op == Op::kCos && kProgram.over_box[ToSize(n.b < 0 ? 0 : n.b)];
-  if constexpr (kProgram.over_box[I] && !kSecondOfPair) {
-    if constexpr (n.op == Op::kVariable) w[I] = box[n.a];
-    if constexpr (n.op == Op::kParameter) w[I] = {parameters[n.a], parameters[n.a]};
-    if constexpr (n.op == Op::kConstant) w[I] = {n.constant, n.constant};
-    if constexpr (n.op == Op::kAdd) w[I] = w[n.a] + w[n.b];
-    if constexpr (n.op == Op::kSubtract) w[I] = w[n.a] - w[n.b];
-    if constexpr (n.op == Op::kMultiply) {
-      if constexpr (IsNumber<kProgram>(n.a))
-        w[I] = Scaled(w[n.a].lower, w[n.b]);
-      else if constexpr (IsNumber<kProgram>(n.b))
-        w[I] = Scaled(w[n.b].lower, w[n.a]);
-      else
-        w[I] = w[n.a] * w[n.b];
-    }
-    if constexpr (n.op == Op::kDivide) w[I] = Divide(w[n.a], w[n.b]);
-    if constexpr (n.op == Op::kNegate) w[I] = -w[n.a];
-    if constexpr (n.op == Op::kSquare) w[I] = Square(w[n.a]);
-    if constexpr (n.op == Op::kTanCurvature) w[I] = TanCurvature(w[n.a]);
-    if constexpr (n.op == Op::kSin) {
-      const Wave wave(v[I], v[I + 1], Turns(v[n.a], w[n.a]));
-      w[I] = wave.SineRange();
-      w[I + 1] = wave.CosineRange();
-    }
-    if constexpr (n.op == Op::kCos) w[I] = Wave(v[I - 1], v[I], Turns(v[n.a], w[n.a])).CosineRange();
-    if constexpr (n.op == Op::kTan) w[I] = TanRange(v[I], Turns(v[n.a], w[n.a]));
+/** Sets w[i], the range of node i over a box; v has the values at its center. Sine and cosine of one argument share
+their ends: the first of them that is needed sets both. */
+FOREREACH_INLINE void EvaluateOverBox(const Program& program, std::size_t i, const double* parameters,
+                                      const PlainInterval* box, const double* v, PlainInterval* w) {
+  const Operation n = program.nodes[i];
+  if (n.op == Op::kVariable) {
+    w[i] = box[n.a];
+  } else if (n.op == Op::kParameter) {
+    w[i] = {parameters[n.a], parameters[n.a]};
+  } else if (n.op == Op::kSin) {
+    const Wave wave(v[i], v[i + 1], Turns(v[n.a], w[n.a]));
+    w[i] = wave.SineRange();
+    w[i + 1] = wave.CosineRange();
+  } else if (n.op == Op::kCos) {
+    if (program.over_box[ToSize(n.b)] == 0) w[i] = Wave(v[i - 1], v[i], Turns(v[n.a], w[n.a])).CosineRange();
+  } else if (n.op == Op::kTan) {
+    w[i] = TanRange(v[i], Turns(v[n.a], w[n.a]));
+  } else {
+    const PlainInterval none{0, 0};
+    w[i] = RangeOf(n, n.has_first() ? w[n.a] : none, n.has_second() ? w[n.b] : none, IsNumber(program, n.a),
+                   n.has_second() && IsNumber(program, n.b));
   }
 }
 
@@ -159,7 +229,6 @@ FOREREACH_INLINE void ForEachConstant(Visit visit) {
   (std::make_index_sequence<N>());
 }
 
-// @param z the center c. @param box contains c. Straight-line code, no branch but for angles above 1/4.
 /** NominalModel::Expand for one program, with a pointer for each span. Cost: the program's operations; no branch except
 for angles above 1/4. If the domain contains a pole, the ranges mean nothing, and the bounds of rounding.h are
 infinite. */
@@ -168,10 +237,12 @@ FOREREACH_INLINE void Expand(const double* parameters, const double* z, const Pl
   constexpr auto kSize = ToSize(kProgram.size);
   std::array<double, kSize> v;
   std::array<PlainInterval, kSize> w;
-  ForEachConstant<kSize>([&](auto i)
-                             __attribute__((always_inline)) { EvaluateAtPoint<kProgram, i>(parameters, z, v.data()); });
   ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) {
-    EvaluateOverBox<kProgram, i>(parameters, box, v.data(), w.data());
+    constexpr Operation n = kProgram.nodes[i];
+    if constexpr (kProgram.at_point[i] != 0) EvaluateAtPoint(n, i, parameters, z, v.data());
+  });
+  ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) {
+    if constexpr (kProgram.over_box[i] != 0) EvaluateOverBox(kProgram, i, parameters, box, v.data(), w.data());
   });
   ForEachConstant<kProgram.states>([&](auto k) __attribute__((always_inline)) { out.value[k] = v[kProgram.value[k]]; });
   ForEachConstant<kProgram.num_first>([&](auto e) __attribute__((always_inline)) {

@@ -13,7 +13,7 @@ Symbol, which records a program (program.h), or to numbers. */
 #include <vector>
 
 #include "certifier/dynamics/model_text.h"
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/saturation.h"
 #include "certifier/numerics/size.h"
 
 namespace forereach {

@@ -1,9 +1,16 @@
 #include "certifier/dynamics/model.h"
 
-#include "certifier/dynamics/evaluate.h"
+#include <array>
+#include <utility>
+
 #include "certifier/numerics/text.h"
 
 namespace forereach {
+
+NominalModel::NominalModel(const Program& program, std::vector<Interval> parameters, ModelNames names)
+    : program_(program), ranges_(std::move(parameters)), names_(std::move(names)) {
+  for (const Interval& range : ranges_) middles_.push_back(range.Middle());
+}
 
 std::vector<std::string> NominalModel::variable_names() const {
   std::vector<std::string> names = names_.states;
@@ -11,42 +18,27 @@ std::vector<std::string> NominalModel::variable_names() const {
   return names;
 }
 
+// Parameters without a range as for a compiled model. Units are for people.
 std::string NominalModel::description() const {
   std::string text = names_.name;
-  for (std::size_t p = 0; p < parameters_.size(); ++p)
-    text += " " + names_.parameters[p] + "=" + ToText(parameters_[p]);
+  for (std::size_t p = 0; p < ranges_.size(); ++p) {
+    const auto& [lower, upper] = ranges_[p];
+    text += " " + names_.parameters[p] + "=" +
+            (lower == upper ? ToText(lower) : "[" + ToText(lower) + "," + ToText(upper) + "]");
+  }
+  if (names_.text == nullptr) return text;
+  const auto add_names = [&](const char* kind, const std::vector<std::string>& names) {
+    text += std::string("; ") + kind;
+    for (const std::string& name : names) text += " " + name;
+  };
+  add_names("states", names_.states);
+  add_names("inputs", names_.inputs);
+  for (const auto& [name, value] : names_.text->definitions) text += "; let " + name + " = " + value.text;
+  constexpr std::array kKinds{"next", "euler", "midpoint", "rk4"};
+  for (std::size_t k = 0; k < names_.states.size(); ++k)
+    text += std::string("; ") + kKinds[static_cast<std::size_t>(names_.text->integrator)] + " " + names_.states[k] +
+            " = " + names_.text->equations[k].text;
   return text;
-}
-
-void NominalModel::Evaluate(std::span<const double> z, std::span<double> next) const noexcept {
-  std::array<long double, kMaxVariables> wide;
-  std::ranges::copy(z, wide.begin());
-  NodeValues<long double> values;
-  forereach::Evaluate<long double>(program_, program_.at_point, parameters_, {wide.data(), z.size()}, values);
-  for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(values[ToSize(program_.value[k])]);
-}
-
-void NominalModel::Linearize(std::span<const double> z, Linearization& out) const noexcept {
-  std::array<Interval, kMaxVariables> point;
-  std::ranges::copy(z, point.begin());
-  NodeValues<Interval> values;
-  forereach::Evaluate<Interval>(program_, program_.at_point, parameters_, {point.data(), z.size()}, values);
-  for (std::size_t k = 0; k < ToSize(num_states()); ++k) out.value[k] = values[ToSize(program_.value[k])];
-  out.count = program_.num_first;
-  for (std::size_t e = 0; e < ToSize(program_.num_first); ++e) {
-    const Program::First& entry = program_.jacobian[e];
-    out.entries[e] = {entry.row, entry.column, values[ToSize(entry.node)]};
-  }
-}
-
-void NominalModel::EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept {
-  NodeValues<Interval> values;
-  forereach::Evaluate<Interval>(program_, program_.over_box, parameters_, box, values);
-  out.count = program_.num_second;
-  for (std::size_t e = 0; e < ToSize(program_.num_second); ++e) {
-    const Program::Second& entry = program_.hessian[e];
-    out.entries[e] = {entry.output, entry.row, entry.column, values[ToSize(entry.node)]};
-  }
 }
 
 }  // namespace forereach

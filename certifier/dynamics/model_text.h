@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 /** One expression and where it stands, for error messages. Line and column count from 1. */

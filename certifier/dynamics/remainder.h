@@ -3,13 +3,16 @@
 for every d = x - c with x in the slice and every H_k in the interval Hessian over the slice's hull. Inputs are points,
 so their entries of d are zero. expansion.h describes the two methods.
 
-The code is straight-line code for a program that is known at compile time. It treats four terms at a time. */
+For a program that is a constant this is straight-line code, for one that was read from a text loops over its terms;
+both compute the same bits. Four terms are treated at a time. */
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
+#include <vector>
 
 #include "certifier/dynamics/expand.h"
 #include "certifier/dynamics/expansion.h"
@@ -42,47 +45,99 @@ struct RemainderTerms {
     std::size_t first = 0, second = 0;
     constexpr bool operator==(const Pair&) const = default;
   };
-  std::array<Single, Program::kMaxSecond> single{};
-  std::array<Joined, Program::kMaxSecond> joined{};
-  std::array<Pair, Program::kMaxSecond> pairs{};
-  std::size_t num_single = 0, num_joined = 0, num_pairs = 0;
+  static constexpr std::size_t kMaxPairs = kMaxStates * (kMaxStates - 1) / 2;
 
-  constexpr explicit RemainderTerms(const Program& program) {
+  std::vector<Single> single;
+  std::vector<Joined> joined;
+  std::vector<Pair> pairs;
+  std::size_t states = 0;
+
+  constexpr explicit RemainderTerms(const Program& program) : states(ToSize(program.states)) {
     for (int e = 0; e < program.num_second; ++e) {
       const Program::Second& entry = program.hessian[ToSize(e)];
-      if (entry.row >= program.states || entry.column >= program.states) continue;
-      single[num_single++] = {ToSize(entry.output), ToSize(entry.row), ToSize(entry.column), ToSize(e)};
+      single.push_back({ToSize(entry.output), ToSize(entry.row), ToSize(entry.column), ToSize(e)});
     }
-    for (std::size_t i = 0; i < num_single; ++i)
-      if (const auto& [output, first, second, entry] = single[i]; first != second)
-        joined[num_joined++] = {output, first, second, entry, Joined::kNone, PairOf(first, second)};
-    for (std::size_t i = 0; i < num_single; ++i)
-      if (single[i].first == single[i].second) Join(single[i]);
+    for (const auto& [output, first, second, entry] : single)
+      if (first != second) joined.push_back({output, first, second, entry, Joined::kNone, PairOf(first, second)});
+    for (const Single& term : single)
+      if (term.first == term.second) Join(term);
+  }
+
+  /** Calls visit(0), ..., visit(n - 1) for n terms, pairs or states. */
+  template <class Visit>
+  FOREREACH_INLINE void ForEachSingle(Visit visit) const {
+    for (std::size_t i = 0; i < single.size(); ++i) visit(i);
+  }
+  template <class Visit>
+  FOREREACH_INLINE void ForEachPair(Visit visit) const {
+    for (std::size_t p = 0; p < pairs.size(); ++p) visit(p);
+  }
+  /** Likewise for two pairs at a time, and for four joined terms. */
+  template <class Visit>
+  FOREREACH_INLINE void ForEachTwoPairs(Visit visit) const {
+    for (std::size_t g = 0; 2 * g < pairs.size(); ++g) visit(g);
+  }
+  template <class Visit>
+  FOREREACH_INLINE void ForEachFourJoined(Visit visit) const {
+    for (std::size_t g = 0; g * kLaneCount < joined.size(); ++g) visit(g);
   }
 
  private:
   constexpr void Join(const Single& diagonal) {
-    for (std::size_t i = 0; i < num_joined; ++i) {
-      Joined& term = joined[i];
+    for (Joined& term : joined) {
       if (term.output != diagonal.output || term.has_diagonal()) continue;
       if (term.first != diagonal.first && term.second != diagonal.first) continue;
       if (term.first != diagonal.first) std::swap(term.first, term.second);
       term.diagonal = diagonal.entry;
       return;
     }
-    joined[num_joined++] = {diagonal.output, diagonal.first, diagonal.first, Joined::kNone, diagonal.entry, 0};
+    joined.push_back({diagonal.output, diagonal.first, diagonal.first, Joined::kNone, diagonal.entry, 0});
   }
   constexpr std::size_t PairOf(std::size_t i, std::size_t l) {
     const Pair pair{std::min(i, l), std::max(i, l)};
-    std::size_t p = 0;
-    while (p < num_pairs && pairs[p] != pair) ++p;
-    if (p == num_pairs) pairs[num_pairs++] = pair;
-    return p;
+    const auto found = std::find(pairs.begin(), pairs.end(), pair);
+    if (found != pairs.end()) return static_cast<std::size_t>(found - pairs.begin());
+    pairs.push_back(pair);
+    return pairs.size() - 1;
   }
 };
 
+/** The same for a program that is a constant: each visit is inlined, with a constant index. */
 template <const Program& kProgram>
-inline constexpr RemainderTerms kRemainderTerms{kProgram};
+class ConstantTerms {
+  static constexpr std::size_t kNumSingle = RemainderTerms(kProgram).single.size(),
+                               kNumJoined = RemainderTerms(kProgram).joined.size(),
+                               kNumPairs = RemainderTerms(kProgram).pairs.size();
+  template <std::size_t N, class List>
+  static constexpr auto Fixed(const List& list) {
+    std::array<typename List::value_type, N> fixed{};
+    for (std::size_t i = 0; i < N; ++i) fixed[i] = list[i];
+    return fixed;
+  }
+
+ public:
+  static constexpr std::size_t states = ToSize(kProgram.states), kMaxPairs = kNumPairs;
+  static constexpr auto single = Fixed<kNumSingle>(RemainderTerms(kProgram).single);
+  static constexpr auto joined = Fixed<kNumJoined>(RemainderTerms(kProgram).joined);
+  static constexpr auto pairs = Fixed<kNumPairs>(RemainderTerms(kProgram).pairs);
+
+  template <class Visit>
+  FOREREACH_INLINE void ForEachSingle(Visit visit) const {
+    ForEachConstant<kNumSingle>(visit);
+  }
+  template <class Visit>
+  FOREREACH_INLINE void ForEachPair(Visit visit) const {
+    ForEachConstant<kNumPairs>(visit);
+  }
+  template <class Visit>
+  FOREREACH_INLINE void ForEachTwoPairs(Visit visit) const {
+    ForEachConstant<(kNumPairs + 1) / 2>(visit);
+  }
+  template <class Visit>
+  FOREREACH_INLINE void ForEachFourJoined(Visit visit) const {
+    ForEachConstant<(kNumJoined + kLaneCount - 1) / kLaneCount>(visit);
+  }
+};
 
 // kRemainderRelative exceeds the relative rounding error of the operations below, measured against the sum of the sizes
 // of their terms. kRemainderTiny exceeds the error by underflow. Its product with a derivative is a normal number
@@ -93,58 +148,63 @@ inline double CountedError(double error) { return kCountsRounding ? error : 0; }
 
 inline double Size(const PlainInterval& x) { return std::max(std::abs(x.lower), std::abs(x.upper)); }
 
-template <const Program& kProgram>
-FOREREACH_INLINE void EncloseSizes(const double* half_width, const PlainInterval* hessian, const double* error,
-                                   Remainder& out) {
-  constexpr auto kStates = ToSize(kProgram.states);
-  double sums[kStates] = {};
-  ForEachConstant<kRemainderTerms<kProgram>.num_single>([&](auto i) __attribute__((always_inline)) {
-    constexpr RemainderTerms::Single kTerm = kRemainderTerms<kProgram>.single[i];
-    constexpr double kWeight = kTerm.first == kTerm.second ? 0.5 : 1;
-    const double r = half_width[kTerm.first], other = half_width[kTerm.second];
+// Stores `count` numbers and zeros up to a multiple of four.
+template <class Terms>
+FOREREACH_INLINE void StoreStates(const Terms& terms, const double (&numbers)[kMaxStates], double* to) {
+  for (std::size_t k = 0; k < terms.states; k += kLaneCount) StoreLanes(LoadLanes(numbers + k), to + k);
+}
+
+template <class Terms>
+FOREREACH_INLINE void EncloseSizes(const Terms& terms, const double* half_width, const PlainInterval* hessian,
+                                   const double* error, Remainder& out) {
+  double sums[kMaxStates] = {};
+  terms.ForEachSingle([&](auto i) __attribute__((always_inline)) {
+    const RemainderTerms::Single term = terms.single[i];
+    const double weight = term.first == term.second ? 0.5 : 1;
+    const double r = half_width[term.first], other = half_width[term.second];
     if (r == 0 || other == 0) return;  // exactly zero
-    sums[kTerm.output] +=
-        kWeight * Size(hessian[kTerm.entry]) * (r * other + kRemainderTiny) * (1 + kRemainderRelative) +
-        CountedError(error[kTerm.entry]);
+    sums[term.output] += weight * Size(hessian[term.entry]) * (r * other + kRemainderTiny) * (1 + kRemainderRelative) +
+                         CountedError(error[term.entry]);
   });
-  constexpr double kZeros[kStates] = {};
-  StoreAll(kZeros, out.center.data());
-  StoreAll(sums, out.half_width.data());
+  constexpr double kZeros[kMaxStates] = {};
+  StoreStates(terms, kZeros, out.center.data());
+  StoreStates(terms, sums, out.half_width.data());
 }
 
 // The ends P, N of d_i d_l in [-N, P] for each pair of variables: P_0, N_0, P_1, N_1, ...
-template <const Program& kProgram>
-using ProductEnds = std::array<double, PaddedToLanes(2 * kRemainderTerms<kProgram>.num_pairs)>;
+template <class Terms>
+using ProductEnds = std::array<double, PaddedToLanes(2 * Terms::kMaxPairs)>;
 
-template <const Program& kProgram>
-FOREREACH_INLINE ProductEnds<kProgram> EncloseProducts(const Zonotope& slice, const double* half_width) {
-  constexpr std::size_t kPairs = kRemainderTerms<kProgram>.num_pairs;
-  ProductEnds<kProgram> ends;
-  std::array<Lanes, ends.size()> sums{};
+template <class Terms>
+FOREREACH_INLINE void EncloseProducts(const Terms& terms, const Zonotope& slice, const double* half_width,
+                                      ProductEnds<Terms>& ends) {
+  std::array<Lanes, PaddedToLanes(2 * Terms::kMaxPairs)> sums;
+  const auto clear = [&](auto g) __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) sums[4 * g + i] = AllLanes(0);
+  };
+  terms.ForEachTwoPairs(clear);
   for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount)
-    ForEachConstant<kPairs>([&](auto p) __attribute__((always_inline)) {
-      constexpr RemainderTerms::Pair kPair = kRemainderTerms<kProgram>.pairs[p];
+    terms.ForEachPair([&](auto p) __attribute__((always_inline)) {
+      const RemainderTerms::Pair pair = terms.pairs[p];
       const auto row = [&](std::size_t k) { return slice.padded_row(static_cast<int>(k)).data() + j; };
-      const Lanes a = LoadLanes(row(kPair.first)) * AllLanes(half_width[kPair.second]);
-      const Lanes b = LoadLanes(row(kPair.second)) * AllLanes(half_width[kPair.first]);
+      const Lanes a = LoadLanes(row(pair.first)) * AllLanes(half_width[pair.second]);
+      const Lanes b = LoadLanes(row(pair.second)) * AllLanes(half_width[pair.first]);
       sums[2 * p] += Abs(a + b);
       sums[2 * p + 1] += Abs(a - b);
     });
-  ForEachConstant<(kPairs + 1) / 2>([&](auto g) __attribute__((always_inline)) {  // two pairs at a time
-    constexpr RemainderTerms::Pair kOne = kRemainderTerms<kProgram>.pairs[2 * g];
-    constexpr RemainderTerms::Pair kTwo = kRemainderTerms<kProgram>.pairs[std::min<std::size_t>(2 * g + 1, kPairs - 1)];
+  terms.ForEachTwoPairs([&](auto g) __attribute__((always_inline)) {
+    const RemainderTerms::Pair one = terms.pairs[2 * g], two = terms.pairs[std::min(2 * g + 1, terms.pairs.size() - 1)];
     const double *r = half_width, *s = slice.slacks();
-    const Lanes r_i{r[kOne.first], r[kOne.first], r[kTwo.first], r[kTwo.first]};
-    const Lanes r_l{r[kOne.second], r[kOne.second], r[kTwo.second], r[kTwo.second]};
-    const Lanes s_i{s[kOne.first], s[kOne.first], s[kTwo.first], s[kTwo.first]};
-    const Lanes s_l{s[kOne.second], s[kOne.second], s[kTwo.second], s[kTwo.second]};
+    const Lanes r_i{r[one.first], r[one.first], r[two.first], r[two.first]};
+    const Lanes r_l{r[one.second], r[one.second], r[two.second], r[two.second]};
+    const Lanes s_i{s[one.first], s[one.first], s[two.first], s[two.first]};
+    const Lanes s_l{s[one.second], s[one.second], s[two.second], s[two.second]};
     const Lanes product = r_i * r_l, quarter = AllLanes(0.25) / product;
     const Lanes sum = SumEach(sums[4 * g], sums[4 * g + 1], sums[4 * g + 2], sums[4 * g + 3]) + (s_i * r_l + s_l * r_i);
     const LaneMask fits =
         (product > AllLanes(0x1p-400)) & (product < AllLanes(0x1p400));  // otherwise a factor could underflow
     StoreLanes(fits ? Min(product, sum * sum * quarter) : product, &ends[4 * g]);
   });
-  return ends;
 }
 
 // max over 0 <= s <= r of 1/2 a s^2 + h t s, with h and t >= 0. Multiplies by a and h last, so that an underflow before
@@ -154,14 +214,13 @@ FOREREACH_INLINE Lanes Peak(const Lanes& a, const Lanes& h, const Lanes& t, cons
   return a * (s * s * AllLanes(0.5)) + h * (t * s);
 }
 
-// get(term) of the joined terms kFirst .. kFirst + 3, and zero behind the last term.
-template <const Program& kProgram, std::size_t kFirst, class Get>
-FOREREACH_INLINE Lanes FourTerms(Get get) {
+// get(term) of the joined terms first .. first + 3, and zero behind the last term.
+template <class Terms, class Get>
+FOREREACH_INLINE Lanes FourTerms(const Terms& terms, std::size_t first, Get get) {
   const auto at = [&](std::size_t i) __attribute__((always_inline)) {
-    constexpr const RemainderTerms& kTerms = kRemainderTerms<kProgram>;
-    return i < kTerms.num_joined ? get(kTerms.joined[i]) : 0.0;
+    return i < terms.joined.size() ? get(terms.joined[i]) : 0.0;
   };
-  return Lanes{at(kFirst), at(kFirst + 1), at(kFirst + 2), at(kFirst + 3)};
+  return Lanes{at(first), at(first + 1), at(first + 2), at(first + 3)};
 }
 
 // The ranges of four joined terms 1/2 a d_i^2 + h d_i d_l, and bounds on their rounding errors.
@@ -169,10 +228,10 @@ struct TermRanges {
   Lanes lower, upper, rounding;
 };
 
-template <const Program& kProgram, std::size_t kFirst>
-FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainInterval* hessian, const double* error,
-                                         const double* products) {
-  const auto each = [](auto get) __attribute__((always_inline)) { return FourTerms<kProgram, kFirst>(get); };
+template <class Terms>
+FOREREACH_INLINE TermRanges EncloseTerms(const Terms& terms, std::size_t first, const double* half_width,
+                                         const PlainInterval* hessian, const double* error, const double* products) {
+  const auto each = [&](auto get) __attribute__((always_inline)) { return FourTerms(terms, first, get); };
   using Term = RemainderTerms::Joined;
   const Lanes r = each([&](const Term& t) { return half_width[t.first]; });
   const Lanes other = each([&](const Term& t) { return t.has_mixed() ? half_width[t.second] : 0; });
@@ -203,46 +262,50 @@ FOREREACH_INLINE TermRanges EncloseTerms(const double* half_width, const PlainIn
           AllLanes(RoundingError(kRemainderRelative, 1)) * size + margin * AllLanes(1 + kRemainderRelative)};
 }
 
-template <const Program& kProgram>
-FOREREACH_INLINE void EncloseCentred(const Zonotope& slice, const double* half_width, const PlainInterval* hessian,
-                                     const double* error, Remainder& out) {
-  constexpr auto kStates = ToSize(kProgram.states);
-  constexpr std::size_t kTerms = kRemainderTerms<kProgram>.num_joined;
-  const ProductEnds<kProgram> products = EncloseProducts<kProgram>(slice, half_width);
-  double lower[kStates] = {}, upper[kStates] = {}, rounding[kStates] = {};
-  ForEachConstant<(kTerms + kLaneCount - 1) / kLaneCount>([&](auto g) __attribute__((always_inline)) {
-    constexpr std::size_t kFirst = g * kLaneCount;
-    const TermRanges ranges = EncloseTerms<kProgram, kFirst>(half_width, hessian, error, products.data());
-    ForEachConstant<std::min(kLaneCount, kTerms - kFirst)>([&](auto i) __attribute__((always_inline)) {
-      constexpr std::size_t kLane = i, kOutput = kRemainderTerms<kProgram>.joined[kFirst + kLane].output;
-      lower[kOutput] += ranges.lower[kLane];
-      upper[kOutput] += ranges.upper[kLane];
-      rounding[kOutput] += ranges.rounding[kLane];
+template <class Terms>
+FOREREACH_INLINE void EncloseCentred(const Terms& terms, const Zonotope& slice, const double* half_width,
+                                     const PlainInterval* hessian, const double* error, Remainder& out) {
+  ProductEnds<Terms> products;
+  EncloseProducts(terms, slice, half_width, products);
+  double lower[kMaxStates] = {}, upper[kMaxStates] = {}, rounding[kMaxStates] = {};
+  terms.ForEachFourJoined([&](auto g) __attribute__((always_inline)) {
+    const std::size_t first = g * kLaneCount;
+    const TermRanges ranges = EncloseTerms(terms, first, half_width, hessian, error, products.data());
+    ForEachConstant<kLaneCount>([&](auto constant) __attribute__((always_inline)) {
+      constexpr std::size_t kLane = constant;
+      if (first + kLane >= terms.joined.size()) return;
+      const std::size_t output = terms.joined[first + kLane].output;
+      lower[output] += ranges.lower[kLane];
+      upper[output] += ranges.upper[kLane];
+      rounding[output] += ranges.rounding[kLane];
     });
   });
-  double center[kStates], half[kStates];
-  ForEachConstant<kStates>([&](auto k) __attribute__((always_inline)) {
-    center[k] = (lower[k] + upper[k]) * 0.5;
-    half[k] = (upper[k] - lower[k]) * 0.5 + rounding[k];
-  });
-  StoreAll(center, out.center.data());
-  StoreAll(half, out.half_width.data());
+  for (std::size_t k = 0; k < terms.states; k += kLaneCount) {
+    const Lanes low = LoadLanes(lower + k), high = LoadLanes(upper + k);
+    StoreLanes((low + high) * AllLanes(0.5), out.center.data() + k);
+    StoreLanes((high - low) * AllLanes(0.5) + LoadLanes(rounding + k), out.half_width.data() + k);
+  }
 }
 
-/** @param half_width r, n entries: inputs are points. @param hessian in the order of the program's.
-@param error of each term, StepError::remainder.
-Rounding is included. An entry that is not finite gives a half-width that is not. Cost O(second derivatives * m). */
-/** NominalModel::EncloseRemainder for one program: |rho_k(d) - out.center_k| <= out.half_width_k for every d and H_k as
-above, in real arithmetic. If an entry of `hessian` is not finite, neither is the half-width of its output, unless one
-of its two variables is a point. Cost O(second derivatives * m). */
-template <const Program& kProgram>
-FOREREACH_INLINE void EncloseBy(Method method, const Zonotope& slice, const double* half_width,
+/** NominalModel::EncloseRemainder: |rho_k(d) - out.center_k| <= out.half_width_k for every d and H_k as above, in real
+arithmetic. If an entry of `hessian` is not finite, neither is the half-width of its output, unless one of its two
+variables is a point. @param terms RemainderTerms or ConstantTerms of the program. @param half_width r, n entries:
+inputs are points. @param hessian in the order of the program's. @param error of each term, StepError::remainder. Cost
+O(second derivatives * m). */
+template <class Terms>
+FOREREACH_INLINE void EncloseBy(const Terms& terms, Method method, const Zonotope& slice, const double* half_width,
                                 const PlainInterval* hessian, const double* error, Remainder& out) {
   switch (method) {
-    case Method::kPaper: return EncloseSizes<kProgram>(half_width, hessian, error, out);
-    case Method::kCentred: return EncloseCentred<kProgram>(slice, half_width, hessian, error, out);
+    case Method::kPaper: return EncloseSizes(terms, half_width, hessian, error, out);
+    case Method::kCentred: return EncloseCentred(terms, slice, half_width, hessian, error, out);
   }
   out.half_width.fill(kInfinity);  // no method: no bound
+}
+
+template <const Program& kProgram>
+FOREREACH_INLINE void EncloseConstant(Method method, const Zonotope& slice, const double* half_width,
+                                      const PlainInterval* hessian, const double* error, Remainder& out) {
+  EncloseBy(ConstantTerms<kProgram>(), method, slice, half_width, hessian, error, out);
 }
 
 }  // namespace forereach::internal

@@ -12,26 +12,12 @@ overloads SmoothGate and Softplus. */
 
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/saturation.h"
 #include "certifier/numerics/compilation.h"
 
 FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
-
-/** exp(-1/e) for e > 0, and 0 for e <= 0. All derivatives vanish at 0. */
-template <class T>
-T SmoothGate(const T& e) {
-  using std::exp;
-  return e > T(0) ? exp(T(-1) / e) : T(0);
-}
-
-/** temperature log(1 + exp(x / temperature)), a smooth max(x, 0), without overflow. temperature > 0. */
-template <class T>
-T Softplus(const T& x, const T& temperature) {
-  using std::exp, std::log1p;
-  const T u = x / temperature;
-  return temperature * (u > T(0) ? u + log1p(exp(-u)) : log1p(exp(u)));
-}
 
 /** Saturation of lateral forces: the car turns less than the kinematic bicycle. Over z = (x, y, theta, v, a, delta,
 jerk, steer_rate), only the heading has a nonzero residual, Eq. (bicycle-residual-heading): r_theta = -(dt understeer /

@@ -1,7 +1,9 @@
 #include "certifier/dynamics/rounding.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "certifier/dynamics/evaluate.h"
 #include "certifier/numerics/size.h"
@@ -27,10 +29,9 @@ struct Error {
 class Analysis {
  public:
   Analysis(const Program& program, std::span<const double> parameters, std::span<const Interval> domain)
-      : program_(program) {
-    std::array<bool, Program::kMaxOperations> all;
-    all.fill(true);
-    Evaluate<Interval>(program, all, parameters, domain, range_);
+      : program_(program), range_(ToSize(program.size)), error_(range_.size()) {
+    const std::vector<unsigned char> all(range_.size(), 1);
+    Evaluate<Interval>(program, all, parameters, domain, std::span(range_));
     for (int i = 0; i < program.size; ++i) error_[ToSize(i)] = ErrorOf(program.node(i));
   }
 
@@ -86,6 +87,7 @@ class Analysis {
         const double t = AddUp(Size(n.a), error(n.a).box), slope = AddUp(2, MulUp(6, MulUp(t, t)));
         return {infinity, AddUp(MulUp(slope, error(n.a).box), Rounding(MulUp(4 * t, slope)))};
       }
+      default: break;  // evaluated by intervals
     }
     return {infinity, infinity};
   }
@@ -106,13 +108,21 @@ class Analysis {
   }
 
   const Program& program_;
-  NodeValues<Interval> range_;
-  std::array<Error, Program::kMaxOperations> error_;
+  std::vector<Interval> range_;
+  std::vector<Error> error_;
 };
 
 double FiniteOrInfinity(double error) { return error < kInfinity ? error : kInfinity; }
 
 }  // namespace
+
+ExpansionError ExpansionError::None(const Program& program) {
+  ExpansionError error;
+  std::fill_n(error.value.begin(), program.states, kInfinity);
+  std::fill_n(error.jacobian.begin(), program.num_first, kInfinity);
+  std::fill_n(error.hessian.begin(), program.num_second, kInfinity);
+  return error;
+}
 
 ExpansionError BoundExpansionError(const Program& program, std::span<const double> parameters,
                                    std::span<const Interval> domain) {
@@ -140,7 +150,7 @@ StepError BoundStepError(const Program& program, const ExpansionError& error,
     const Program::First& entry = program.jacobian[e];
     if (!is_state(entry)) continue;
     const auto k = ToSize(entry.row);
-    copies[k] = entries[k]++ == 0 && program.IsOne(entry.node);
+    copies[k] = entries[k]++ == 0 && entry.is_one;
   }
   for (std::size_t e = 0; e < ToSize(program.num_first); ++e) {
     const Program::First& entry = program.jacobian[e];

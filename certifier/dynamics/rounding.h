@@ -18,6 +18,9 @@ struct ExpansionError {
   std::array<double, Program::kMaxFirst> jacobian{};
   std::array<double, Program::kMaxSecond> hessian{};
   std::array<double, Program::kMaxFirst> jacobian_size{};  ///< upper bounds on |Expansion.jacobian_e|
+
+  /** No bound on anything. */
+  [[nodiscard]] static ExpansionError None(const Program& program);
 };
 
 /** The contributions of rounding to a step's slack and remainder that do not depend on the slice. */

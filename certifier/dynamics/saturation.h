@@ -1,12 +1,31 @@
-/** Ranges of the functions SmoothGate and Softplus (residuals.h) and of their first and second derivatives over
+/** The functions SmoothGate and Softplus, and the ranges of them and of their first and second derivatives over
 intervals.
 
 Each function is monotone between extrema with a closed form, so the ranges are exact up to outward rounding. */
 #pragma once
 
+#include <cmath>
+
 #include "certifier/numerics/interval.h"
 
+FOREREACH_ARITHMETIC_BEGIN
+
 namespace forereach {
+
+/** exp(-1/e) for e > 0, and 0 for e <= 0. All derivatives vanish at 0. */
+template <class T>
+T SmoothGate(const T& e) {
+  using std::exp;
+  return e > T(0) ? exp(T(-1) / e) : T(0);
+}
+
+/** temperature log(1 + exp(x / temperature)), a smooth max(x, 0), without overflow. temperature > 0. */
+template <class T>
+T Softplus(const T& x, const T& temperature) {
+  using std::exp, std::log1p;
+  const T u = x / temperature;
+  return temperature * (u > T(0) ? u + log1p(exp(-u)) : log1p(exp(u)));
+}
 
 struct DerivativeRanges {
   Interval value, first, second;
@@ -24,4 +43,11 @@ struct SoftplusRanges {
   SoftplusRanges(const Interval& x, const Interval& temperature);
 };
 
+inline Interval SmoothGate(const Interval& e) { return SmoothGateRanges(e).value; }
+inline Interval Softplus(const Interval& x, const Interval& temperature) {
+  return SoftplusRanges(x, temperature).value;
+}
+
 }  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

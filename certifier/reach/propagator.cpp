@@ -36,7 +36,7 @@ Propagator::Propagator(const NominalModel& model, const Domain& domain, const Re
   // The hull of every slice that passes the domain check has at most half the domain's width.
   std::vector<double> half_width(box.size(), 0.0);
   for (std::size_t l = 0; l < ToSize(domain.state.dim()); ++l) half_width[l] = box[l].HalfWidthUpper();
-  error_ = BoundStepError(model.program(), BoundExpansionError(model.program(), model.parameters(), box), half_width);
+  error_ = BoundStepError(model.program(), model.BoundError(box), half_width);
   plain_ = IsNegligible(error_);
 }
 

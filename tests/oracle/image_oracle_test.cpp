@@ -49,7 +49,7 @@ struct Case {
     for (int k = 0; k < program.states; ++k)
       if (random.Coin(0.3)) slice.mutable_slack(k) = random.Uniform(0, scale);
     for (std::size_t e = 0; e < static_cast<std::size_t>(program.num_first); ++e) {
-      const bool is_one = program.IsOne(program.jacobian[e].node);
+      const bool is_one = program.jacobian[e].is_one;
       expansion.jacobian[e] = is_one ? 1 : random.Coin(0.1) ? 0 : random.Uniform(-3, 3);
       off.jacobian[e] = is_one || random.Coin() ? 0 : random.Uniform(0, 1e-15);
       off.jacobian_size[e] = std::abs(expansion.jacobian[e]) * (random.Coin() ? 1 : 1.5);
