@@ -27,6 +27,12 @@ void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifi
     for (std::size_t k = 0; k < names.size(); ++k)
       std::cout << " " << names[k] << " " << RoundedUp(tube.slice(tube.length()).HalfWidthUpper(static_cast<int>(k)));
   }
+  if (const Declaration& declaration = certifier.problem().declaration; declaration.IsDisturbed()) {
+    std::cout << "\n  each step disturbed by up to:";
+    for (std::size_t k = 0; k < names.size(); ++k)
+      if (const double bound = declaration.DisturbanceBound(static_cast<Eigen::Index>(k)); bound != 0)
+        std::cout << " " << names[k] << " " << RoundedDown(bound);
+  }
   std::cout << "\n  took " << result.elapsed_us << " us" << std::endl;
 }
 

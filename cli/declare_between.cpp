@@ -22,6 +22,12 @@ using Json = nlohmann::json;
 
 constexpr int kDigits = 6;
 
+// Neither the equations nor a second difference say how a disturbance acts between two samples.
+constexpr const char* kDisturbed =
+    "\ndeclaration.disturbance is a bound at the samples. What disturbs the robot accelerates it, too: add the "
+    "largest\n"
+    "acceleration that the disturbance causes between two samples.";
+
 // One number of task.between.
 struct Row {
   std::string key, name, unit;
@@ -149,7 +155,8 @@ void PrintForPeople(const Proposal& proposal, const Config& config) {
       text << "  largest found " << RoundedDown(row.bound.lower, kDigits) << ", " << row.bound.boxes << " boxes";
     text << "\n";
   }
-  std::cout << text.str() << proposal.remark << "\n\ntask:\n  " << Yaml(proposal.rows) << std::endl;
+  std::cout << text.str() << proposal.remark << (config.problem->declaration.IsDisturbed() ? kDisturbed : "")
+            << "\n\ntask:\n  " << Yaml(proposal.rows) << std::endl;
 }
 
 }  // namespace

@@ -311,7 +311,10 @@ class CertificateReader final : public TimelineUser {
   static void CompareMessage(const decision_t& decision, const Problem& problem, int steps, double clearance,
                              RecordedCertificate& certificate) {
     const std::string found = GetText(decision.message);
-    const auto is = [&](const std::string& sentence) { return found == sentence || found == sentence + kCapped; };
+    const auto is = [&](const std::string& sentence) {
+      const auto fits = [&](const std::string& text) { return found == text.substr(0, sizeof decision.message - 1); };
+      return fits(sentence) || fits(sentence + kCapped);
+    };
     for (int t = 0; t <= steps; ++t)
       for (int part = -1; part < static_cast<int>(problem.body.parts.size()); ++part)
         if (is(ExplainCertificate(problem, {t, decision.obstacle, part, clearance}))) return;

@@ -12,6 +12,11 @@
 #include "lcmtypes/names.h"
 
 namespace forereach {
+
+nlohmann::json DisturbanceJson(const Declaration& declaration) {
+  return std::vector(declaration.disturbance.begin(), declaration.disturbance.end());
+}
+
 namespace {
 
 using Json = nlohmann::json;
@@ -150,6 +155,8 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   Json document;
   document["outcome"] = OutcomeName(static_cast<std::int16_t>(decision.outcome));
   document["holds"] = HoldsName(certifier.problem());
+  if (const Declaration& declaration = certifier.problem().declaration; declaration.IsDisturbed())
+    document["disturbance"] = DisturbanceJson(declaration);
   AddWitness(decision, document);
   document["cause"] =
       decision.cause == Cause::kNone ? Json(nullptr) : Json(CauseName(static_cast<std::int16_t>(decision.cause)));

@@ -31,9 +31,27 @@ class Reading {
  public:
   Reading(const std::string& path, const JsonField& document, const Config& config)
       : document_(document), config_(config), record_{path, {}, {}, {}} {
-    document_.RequireFields({"outcome", "holds", "cause", "step", "coordinate", "exit", "first_observation",
-                             "second_observation", "obstacle", "part", "closest_step", "margin", "threshold", "message",
-                             "capped", "inputs", "tube", "digests", "elapsed_us"});
+    std::set<std::string> keys{"outcome",
+                               "holds",
+                               "cause",
+                               "step",
+                               "coordinate",
+                               "exit",
+                               "first_observation",
+                               "second_observation",
+                               "obstacle",
+                               "part",
+                               "closest_step",
+                               "margin",
+                               "threshold",
+                               "message",
+                               "capped",
+                               "inputs",
+                               "tube",
+                               "digests",
+                               "elapsed_us"};
+    if (config_.problem->declaration.IsDisturbed()) keys.insert("disturbance");
+    document_.RequireFields(keys);
     if (!(document_["elapsed_us"].Number() >= 0)) document_["elapsed_us"].Fail("is negative");
     ReadInputs();
     ReadTube();
@@ -127,6 +145,8 @@ class Reading {
   // What follows from the clearances, which the verifier derives: the closest slice, and the sentence about it.
   void CompareWitness() {
     Compare(document_["holds"], HoldsName(*config_.problem));
+    if (const Declaration& declaration = config_.problem->declaration; declaration.IsDisturbed())
+      Compare(document_["disturbance"], DisturbanceJson(declaration));
     for (const char* of_abstentions :
          {"cause", "step", "coordinate", "exit", "first_observation", "second_observation"})
       Compare(document_[of_abstentions], nullptr);

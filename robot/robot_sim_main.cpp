@@ -68,7 +68,9 @@ void WriteTransitions(const std::string& config_path, const SampleOptions& optio
   for (const std::string& text : options.ranges) ranges.push_back(ParseRange(text));
   const Config config = LoadConfig(config_path, TransitionsFile::kIgnore);
   try {
-    const Transitions made = MakeTransitions(*MakeTarget(config), *config.problem, options.seed, options.count, ranges);
+    Disturbance disturbance(config.problem->declaration, config.robot);
+    const Transitions made =
+        MakeTransitions(*MakeTarget(config), *config.problem, options.seed, options.count, ranges, {}, &disturbance);
     SaveTransitions(options.output, *config.problem->model, made);
   } catch (const std::invalid_argument& error) {
     throw ConfigError(config_path + ": " + error.what());
@@ -105,7 +107,8 @@ int main(int argc, char** argv) {
       argc, argv,
       {kName,
        "The simulated robot: executes certified plans only, one step at a time, on a target that differs from the "
-       "nominal model by the task file's robot.residual. Ends at the goal or at robot.time_limit_s, and prints one "
+       "nominal model by the task file's robot.residual and robot.disturbance. Ends at the goal or at "
+       "robot.time_limit_s, and prints one "
        "line of JSON about the run.",
        "forereach-robot-sim --config config/demo.yaml\n"
        "  forereach-robot-sim --config config/demo.yaml --make-transitions made.csv --seed 1 --count 400 "

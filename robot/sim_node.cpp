@@ -87,6 +87,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
       sender_(bus),
       out_(out),
       target_(MakeTarget(config)),
+      disturbance_(config.problem->declaration, config.robot),
       period_us_(Microseconds(config.robot.step_period_ms)),
       rest_coordinates_(RestCoordinates(*config.problem->model)),
       reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
@@ -131,7 +132,10 @@ void RobotSimNode::TakeReload() {
 void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   const std::span<const double> control = supervisor_.control();
   const bool moves = !control.empty();
-  if (moves) target_->Step(state_, control, state_);
+  if (moves) {
+    target_->Step(state_, control, state_);
+    disturbance_.Add(state_);
+  }
   supervisor_.FinishStep(utime, now_us);
   ReportContacts(utime, moves);
   state_before_ = state_;
@@ -141,7 +145,7 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   LogProgress(utime);
 }
 
-// The hold mode: no control and no residual acts.
+// The hold mode: no control, residual or disturbance acts.
 void RobotSimNode::Hold() {
   for (const int k : rest_coordinates_) state_[ToSize(k)] = 0;
   if (!goal_reached_) ++stops_;

@@ -1,14 +1,15 @@
 /** The simulated robot: a Target that executes certified plans under the Supervisor, one step at a time.
 
 Step boundaries lie at t_j = t_0 + j * step_period, where t_0 is the first Tick. At each boundary, in this order:
- 1. The target takes the control of the step that has ended, and the supervisor finishes the step.
+ 1. The target takes the control of the step that has ended, is disturbed (disturbance.h), and the supervisor finishes
+    the step.
  2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h), and
     GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
  3. The supervisor starts the pending plan, continues the current one, or holds; then it reports (supervisor.h).
 
 While the robot holds, its speed and acceleration are set to zero (v and a of the bicycle, vx and vy of the point mass).
-Every other coordinate keeps its value, and neither control nor residual acts until the next plan starts. An emergency
-stop is the same hold at any speed.
+Every other coordinate keeps its value, and no control, residual or disturbance acts until the next plan starts. An
+emergency stop is the same hold at any speed.
 
 The run ends when the goal is reached or the time limit has passed. Then no further plan starts, and the current one
 runs to its end. Once the robot holds, it sends FINISHED for kFinishedBoundaries boundaries and is done.
@@ -31,6 +32,7 @@ accepts plans that are certified under the new file (Guard::Expect); its state a
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
 #include "robot/contacts.h"
+#include "robot/disturbance.h"
 #include "robot/supervisor.h"
 #include "robot/target.h"
 
@@ -77,6 +79,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   Sender sender_;
   std::ostream& out_;
   const std::unique_ptr<Target> target_;
+  Disturbance disturbance_;
   const std::int64_t period_us_;
   std::vector<int> rest_coordinates_;  // zero while standing
   Reloading<std::optional<Config>> reload_;

@@ -140,7 +140,8 @@ std::unique_ptr<Target> MakeTarget(const Config& config) {
 }
 
 Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,
-                            const std::vector<SampleRange>& ranges, const Eigen::VectorXd& noise_bound) {
+                            const std::vector<SampleRange>& ranges, const Eigen::VectorXd& noise_bound,
+                            Disturbance* disturbance) {
   const int n = problem.model->num_states(), d = problem.model->num_variables();
   if (count < 0) throw std::invalid_argument("count: " + std::to_string(count) + " is negative");
   if (noise_bound.size() != 0 && noise_bound.size() != n)
@@ -154,6 +155,7 @@ Transitions MakeTransitions(const Target& target, const Problem& problem, std::u
     const std::vector<double> z = SampleInside(problem.domain, bounds, random);
     const std::span<const double> point(z);
     target.Step(point.first(next.size()), point.subspan(next.size()), next);
+    if (disturbance) disturbance->Add(next);
     transitions.z.row(i) = Eigen::Map<const Eigen::RowVectorXd>(z.data(), d);
     transitions.x_next.row(i) = Eigen::Map<const Eigen::RowVectorXd>(next.data(), n);
     for (Eigen::Index k = 0; k < noise_bound.size(); ++k)

@@ -11,6 +11,7 @@
 
 #include "certifier/certify/problem.h"
 #include "certifier/task/config.h"
+#include "robot/disturbance.h"
 
 namespace forereach {
 
@@ -41,10 +42,11 @@ struct SampleRange {
 violate the domain's inequalities or balls are drawn again. The result depends on `seed` only, not on the standard
 library or compiler.
 @param noise_bound empty, or n entries: each successor gets an error uniform in [-bound, bound].
+@param disturbance what disturbs each step, or null.
 @throws std::invalid_argument for an unknown name, a range that is empty or not inside the domain, a wrong size, or if
 fewer than one point in 1000 lies inside the domain. */
 [[nodiscard]] Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,
                                           const std::vector<SampleRange>& ranges = {},
-                                          const Eigen::VectorXd& noise_bound = {});
+                                          const Eigen::VectorXd& noise_bound = {}, Disturbance* disturbance = nullptr);
 
 }  // namespace forereach

@@ -314,6 +314,8 @@ struct TubeMaker::Query {
 TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method method)
     : problem_(problem), equations_(equations), method_(method), remainder_rounding_(RemainderRounding()) {
   const Transitions& data = problem.transitions;
+  disturbance_.resize(ToSize(problem.model->num_states()));
+  std::ranges::copy(problem.declaration.disturbance, disturbance_.begin());
   for (int i = 0; i < data.size(); ++i) {
     std::vector<Real> z;
     for (Eigen::Index l = 0; l < data.z.cols(); ++l) z.emplace_back(data.z(i, l));
@@ -321,7 +323,7 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
-      const Real allowed = Real(UlpOf(x_next)) + Real(problem.declaration.noise_bound[k]);
+      const Real allowed = Real(UlpOf(x_next)) + Real(problem.declaration.noise_bound[k]) + disturbance_[ToSize(k)];
       const Real observed = Real(x_next) - nominal[ToSize(k)];
       const Bounds bounds{observed - allowed, observed + allowed};
       // A transition for which the model has no value says nothing.
@@ -389,12 +391,13 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
     next.center[ToSize(k)] += half * (lower + upper);
     if (const Real q = half * (upper - lower); !q.IsZero()) next.columns.push_back(Axis(n, k, q));
   }
-  for (int k = 0; k < n; ++k) {  // diag(h)
+  for (int k = 0; k < n; ++k) {  // diag(h + w)
     const auto& [lower, upper] = step.envelope[ToSize(k)];
     // lower > upper where observations contradict each other by so little that doubles do not show it. No residual is
     // admissible then. The certificate has to hold all the same, for those that err by so much more than is allowed.
     next.center[ToSize(k)] += half * (lower + upper);
-    if (const Real h = half * abs(upper - lower); !h.IsZero()) next.columns.push_back(Axis(n, k, h));
+    if (const Real h = half * abs(upper - lower) + disturbance_[ToSize(k)]; !h.IsZero())
+      next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
   }
   const bool followed = options.follow && tube.slices.size() < options.follow->size() &&

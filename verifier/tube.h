@@ -1,7 +1,9 @@
 /** The verifier's own reachable tube in high precision, from a problem's doubles: Eqs. (propagation), (order-reduction)
 and (set-envelope), implemented directly. It shares data types with the certifier, but no arithmetic.
 
-For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h)] >. */
+For t = 0 .. T-1:   X_{t+1} = red < f0(c) + mu + rho_mid, [J G, diag(q), diag(h + w)] >,
+with w the declared bound on the disturbance. It counts twice, for different steps: an observation's r~_i differs from
+r(z_i) by what disturbed that step, and the step from X_t is disturbed anew. */
 #pragma once
 
 #include <limits>
@@ -109,7 +111,9 @@ class TubeMaker final {
   const Problem& problem_;
   const Equations& equations_;
   Method method_;
-  /** r~_ik - sigma_k and r~_ik + sigma_k, one unit in the last place of the successor included;
+  /** The declared disturbance, one entry for each state. */
+  std::vector<Real> disturbance_;
+  /** r~_ik - sigma_k - w_k and r~_ik + sigma_k + w_k, one unit in the last place of the successor included;
   [observation][state]. */
   std::vector<std::vector<Bounds>> residuals_;
   /** |x_next_k| + sum_l |d f0_k / d z_l| |z_l|, the size of the operands of a residual; [observation][state]. */

@@ -21,6 +21,7 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   RequireThat(problem && problem->model, "problem: no model");
   const int n = problem->model->num_states();
   problem->domain.Validate(n, problem->model->num_inputs());
+  problem->declaration.ValidateDisturbance(n);
   // A successor adds up to 2 n columns before it is reduced, a projection up to p.
   const int highest_order = (kMaxGenerators - std::max(2 * n, kMaxSafetyDim)) / n;
   RequireThat(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
@@ -114,14 +115,14 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
       safety_(*problem_),
       observed_(std::in_place, *problem_),
       violation_(observed_->known.violation()),
-      propagator_(*problem_->model, problem_->domain, observed_->known, problem_->zonotope_order, problem_->method,
-                  problem_->instructions) {}
+      propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
+                  problem_->zonotope_order, problem_->method, problem_->instructions) {}
 
 Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
     : problem_((Validated(problem), std::move(problem))),
       safety_(*problem_),
-      propagator_(*problem_->model, problem_->domain, residual, problem_->zonotope_order, problem_->method,
-                  problem_->instructions) {}
+      propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
+                  problem_->zonotope_order, problem_->method, problem_->instructions) {}
 
 Learned Certifier::Learn(std::span<const double> z, std::span<const double> next) {
   Observations observed;

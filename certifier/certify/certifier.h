@@ -29,8 +29,9 @@ class Certifier final {
   Cost: about O(N log N) for a sparse L; the pairwise test of a dense L can take O(N^2). */
   explicit Certifier(std::shared_ptr<const Problem> problem);
 
-  /** Certifies with the bounds of `residual`: a certificate is as sound as they are. The problem's declaration,
-  transitions and limits on observations are not read. There are no observations and there is no violation.
+  /** Certifies with the bounds of `residual`: a certificate is as sound as they are. Of the problem's declaration only
+  the disturbance is read, and transitions and limits on observations are not. There are no observations and there is no
+  violation.
   @param residual must outlive the certifier. Errors as above, for the other parts of the problem. */
   Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual);
 
@@ -47,8 +48,8 @@ class Certifier final {
 
   using Learned = forereach::Learned;
   /** Adds one executed transition (z, x+) with d_z and n entries. Its observation error must be within the declared
-  noise bound. Do not call it while Certify runs. Cost: about a microsecond; if Compact has not been called for 256
-  transitions, it also builds an index.
+  noise bound, and its disturbance within the declared one. Do not call it while Certify runs. Cost: about a
+  microsecond; if Compact has not been called for 256 transitions, it also builds an index.
   @pre no ResidualEnclosure was supplied. The same holds for num_unindexed and Compact. */
   Learned Learn(std::span<const double> z, std::span<const double> next);
   /** Number of learned transitions that are not in the index yet. */
@@ -82,10 +83,10 @@ class Certifier final {
   /** The same without the plan, which FindMisfit has passed. */
   void Require(const Zonotope& initial_set, std::span<const Obstacle> obstacles) const;
 
-  /** Decides whether the plan is safe for every admissible residual and every initial state in `initial_set`. The
-  outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, `tube.slice(t)` contains every
-  reachable state and the body there is disjoint from every obstacle (Theorem "ForeReach containment"); with
-  Problem::between also at all times between these samples, for every motion within the declared bounds.
+  /** Decides whether the plan is safe for every admissible residual, every disturbance and every initial state in
+  `initial_set`. The outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, `tube.slice(t)`
+  contains every reachable state and the body there is disjoint from every obstacle (Theorem "ForeReach containment");
+  with Problem::between also at all times between these samples, for every motion within the declared bounds.
 
   The tests run in this order. First F. Then, for t < T, the domain, the remainder and the envelope; the first failure
   ends the run. After the horizon, the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then

@@ -85,8 +85,9 @@ std::string ExplainCertificate(const Problem& problem, const ClosestApproach& cl
   const std::string who = NamesPart(problem, closest.part) ? "part " + std::to_string(closest.part) + " " : "";
   return std::string(problem.between ? "certified: the robot stays clear at all times"
                                      : "certified at its sample instants only: the robot stays clear") +
-         ", closest " + TimeText(problem, closest.step) + ", " + who + RoundedDown(closest.clearance) +
-         " m from obstacle " + std::to_string(closest.obstacle);
+         (problem.declaration.IsDisturbed() ? " under the declared disturbance" : "") + ", closest " +
+         TimeText(problem, closest.step) + ", " + who + RoundedDown(closest.clearance) + " m from obstacle " +
+         std::to_string(closest.obstacle);
 }
 
 const char* HoldsName(const Problem& problem) { return problem.between ? "all_times" : "samples"; }

@@ -21,7 +21,7 @@ struct ClosestApproach {
 };
 
 /** The sentence for a certificate, without kCapped. It says when the certificate holds: at all times with
-Problem::between, otherwise at the sample instants only. */
+Problem::between, otherwise at the sample instants only; and that it allows for a disturbance, if one is declared. */
 [[nodiscard]] std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest);
 
 /** "all_times" or "samples": when a decision of the problem holds. */

@@ -28,7 +28,7 @@ struct RestBound {
 struct Problem {
   std::shared_ptr<const NominalModel> model;  ///< f0
   Domain domain;                              ///< Z_cert
-  Declaration declaration;                    ///< L and sigma
+  Declaration declaration;                    ///< L, sigma and the disturbance
   Transitions transitions;                    ///< D_N, all inside the domain
   Eigen::MatrixXd projection;                 ///< P, p-by-n: the position of the robot's frame
   Body body;                                  ///< By default the point P x

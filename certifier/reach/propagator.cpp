@@ -25,13 +25,15 @@ bool IsNegligible(const StepError& error) {
 }  // namespace
 
 Propagator::Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
-                       int zonotope_order, Method method, InstructionSet instructions)
+                       const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
+                       InstructionSet instructions)
     : model_(model),
       domain_(domain),
       residual_(residual),
       order_(zonotope_order),
       method_(method),
       instructions_(instructions) {
+  std::ranges::copy(disturbance, disturbance_.begin());
   const std::vector<Interval> box = domain.Ranges();
   // The hull of every slice that passes the domain check has at most half the domain's width.
   std::vector<double> half_width(box.size(), 0.0);
@@ -98,17 +100,19 @@ struct Surroundings {
 
 // Adds up centers, half-widths and slacks of the successor, four coordinates at a time. False unless all are finite and
 // no envelope is inverted. The middles, the half-widths and the center itself are rounded; so are the sums.
+// @param box_half_width is set to half the residual's width plus the disturbance: one axis for both.
 FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, const StepRecord& record,
-                           const ImageSums& sums, Zonotope& next, double* residual_half_width,
+                           const ImageSums& sums, const double* disturbance, Zonotope& next, double* box_half_width,
                            double* next_half_width) noexcept {
   const Lanes inflation = AllLanes(1 + (4.0 * next.num_generators() + 64) * kUnitRoundoff);
   return HoldsForFirst(
       ToSize(next.dim()), [&](std::size_t k) __attribute__((always_inline)) {
         const Lanes lower = LoadLanes(&record.envelope.lower[k]), upper = LoadLanes(&record.envelope.upper[k]);
         const Lanes value = LoadLanes(&expansion.value[k]), moved = LoadLanes(&record.remainder.center[k]);
-        const Lanes half = (upper - lower) * AllLanes(0.5);
+        const Lanes disturbed = LoadLanes(disturbance + k);
+        const Lanes half = (upper - lower) * AllLanes(0.5) + disturbed;
         const Lanes center = value + ((lower + upper) * AllLanes(0.5) + moved);
-        const Lanes added = Abs(lower) + Abs(upper) + Abs(moved);
+        const Lanes added = Abs(lower) + Abs(upper) + Abs(moved) + disturbed;
         const Lanes rounding = AllLanes(4 * kUnitRoundoff) * (Abs(value) + added) + AllLanes(kTiny);
         Lanes slack = (LoadLanes(next.mutable_slacks() + k) + LoadLanes(&error.value[k]) +
                        (added > AllLanes(0) ? rounding : AllLanes(0))) *
@@ -116,7 +120,7 @@ FOREREACH_INLINE bool Join(const Expansion& expansion, const StepError& error, c
         if constexpr (!kCountsRounding) slack = AllLanes(0);
         const Lanes hull =
             (LoadLanes(&sums.row[k]) + LoadLanes(&record.remainder.half_width[k]) + half + slack) * inflation;
-        StoreLanes(half, residual_half_width + k);
+        StoreLanes(half, box_half_width + k);
         StoreLanes(center, next.mutable_centers() + k);
         StoreLanes(slack, next.mutable_slacks() + k);
         StoreLanes(hull, next_half_width + k);
@@ -219,11 +223,10 @@ StepResult Propagator::Advance(const Zonotope& slice, std::span<const double> in
   ImageSums sums;
   model_.Map(expansion, error, slice, next, sums, instructions_);
   if (record.envelope.has_slope) AddSlope(record.envelope, slice, next, sums);
-  std::array<double, kMaxStates> residual_half_width;
-  if (!Join(expansion, error, record, sums, next, residual_half_width.data(), next_half_width))
+  std::array<double, kMaxStates> box_half_width;
+  if (!Join(expansion, error, record, sums, disturbance_.data(), next, box_half_width.data(), next_half_width))
     return Failed(record, next, next_half_width);
-  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), residual_half_width.data(), order_,
-                  instructions_);
+  AppendAndReduce(next, sums.scores, record.remainder.half_width.data(), box_half_width.data(), order_, instructions_);
   return {};
 }
 

@@ -1,11 +1,12 @@
 /** One step of the reachable tube, Eq. (propagation) and Eq. (order-reduction):
 
-    X_{t+1} = red < f0(c) + rho + mu, [(J + A) G, diag(q), diag(h)] > + [-s', s'],
+    X_{t+1} = red < f0(c) + rho + mu, [(J + A) G, diag(q), diag(h + w^)] > + [-s', s'],
 
 with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder over Box(Z_t), and mu, h and A the
 middle, half-width and slope of the residual's bounds. The slope is zero for the residual envelope, Eq. (set-envelope).
-The paper has rho = 0; docs/mathematics.md defines it. The slack s' contains (|J| + |A|) s of the previous slack and all
-rounding errors, including those of f0(c), J and (J + A) G. */
+w^ bounds the disturbance of the step
+(Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md defines them. The slack s' contains
+(|J| + |A|) s of the previous slack and all rounding errors, including those of f0(c), J and (J + A) G. */
 #pragma once
 
 #include <array>
@@ -45,9 +46,10 @@ class Propagator final {
  public:
   /** @param model, domain, residual must outlive this object. @param zonotope_order rho of Eq. (order-reduction): a
   slice has at most zonotope_order * n generators after a step. @param method bounds the remainder.
-  @param instructions changes the computing time only. */
-  Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual, int zonotope_order,
-             Method method, InstructionSet instructions = BestInstructionSet());
+  @param disturbance w^, n entries or none. @param instructions changes the computing time only. */
+  Propagator(const NominalModel& model, const Domain& domain, const ResidualEnclosure& residual,
+             const Eigen::VectorXd& disturbance, int zonotope_order, Method method,
+             InstructionSet instructions = BestInstructionSet());
 
   /** Computes `next` = X_{t+1} from `slice` = X_t under `input` = u_t (m entries). If the status is not kDone, `next`
   is unspecified. It allocates nothing.
@@ -79,6 +81,7 @@ class Propagator final {
   const NominalModel& model_;
   DomainTest domain_;
   const ResidualEnclosure& residual_;
+  std::array<double, kMaxStates> disturbance_{};
   int order_;
   Method method_;
   InstructionSet instructions_;

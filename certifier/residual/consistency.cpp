@@ -61,7 +61,7 @@ std::optional<Violation> TestRow(const Declaration& declaration, const Observati
 
 std::optional<Violation> TestPair(const Declaration& declaration, const Observations& o, int i, int j, int k) {
   const double difference = std::max(SubDown(o.lower(i, k), o.upper(j, k)), SubDown(o.lower(j, k), o.upper(i, k)));
-  double bound = MulUp(2, declaration.noise_bound[k]);
+  double bound = MulUp(2, declaration.ObservationError(k));
   for (Eigen::Index l = 0; l < o.z.cols(); ++l) {
     const double slope = declaration.lipschitz(k, l);
     if (slope == 0) continue;

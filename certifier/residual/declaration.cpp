@@ -16,6 +16,8 @@ void RequireBound(const std::string& name, double value) {
 
 }  // namespace
 
+double Declaration::ObservationError(Eigen::Index k) const { return AddUp(noise_bound[k], DisturbanceBound(k)); }
+
 void Declaration::Validate(int num_states, int num_variables) const {
   if (lipschitz.rows() != num_states || lipschitz.cols() != num_variables || noise_bound.size() != num_states)
     throw std::invalid_argument("declaration: lipschitz is " + std::to_string(lipschitz.rows()) + "-by-" +
@@ -27,6 +29,15 @@ void Declaration::Validate(int num_states, int num_variables) const {
     for (Eigen::Index l = 0; l < lipschitz.cols(); ++l)
       RequireBound("lipschitz " + std::to_string(k) + ", " + std::to_string(l), lipschitz(k, l));
   }
+  ValidateDisturbance(num_states);
+}
+
+void Declaration::ValidateDisturbance(int num_states) const {
+  if (disturbance.size() != 0 && disturbance.size() != num_states)
+    throw std::invalid_argument("declaration: disturbance has " + std::to_string(disturbance.size()) +
+                                " entries, must have " + std::to_string(num_states) + " or none");
+  for (Eigen::Index k = 0; k < disturbance.size(); ++k)
+    RequireBound("disturbance " + std::to_string(k), disturbance[k]);
 }
 
 }  // namespace forereach

@@ -7,17 +7,18 @@
 namespace forereach {
 
 EnvelopeTail::EnvelopeTail(const Declaration& declaration, const LipschitzEnvelope& envelope, int capacity)
-    : envelope_(envelope), noise_bound_(declaration.noise_bound), capacity_(capacity) {
+    : envelope_(envelope), capacity_(capacity) {
   const auto entries = ToSize(capacity), blocks = (entries + kPackSize - 1) / kPackSize;
   for (int k = 0; k < envelope.num_states(); ++k)
-    rows_.push_back({std::vector<Pack>(blocks * (envelope.row(k).num_coordinates() + 2)), std::vector<double>(entries),
+    rows_.push_back({declaration.ObservationError(k),
+                     std::vector<Pack>(blocks * (envelope.row(k).num_coordinates() + 2)), std::vector<double>(entries),
                      std::vector<double>(entries)});
 }
 
 bool EnvelopeTail::Covers(std::span<const double> lower, std::span<const double> upper) const {
   for (int k = 0; k < envelope_.num_states(); ++k) {
     const auto i = ToSize(k);
-    const double magnitude = AddUp(std::max(std::abs(lower[i]), std::abs(upper[i])), noise_bound_[k]);
+    const double magnitude = AddUp(std::max(std::abs(lower[i]), std::abs(upper[i])), rows_[i].observation_error);
     if (!envelope_.row(k).is_constant() && !(magnitude <= envelope_.value_limit(k))) return false;
   }
   return true;
@@ -29,8 +30,8 @@ void EnvelopeTail::Append(std::span<const double> z, std::span<const double> low
   for (int k = 0; k < envelope_.num_states(); ++k) {
     const LipschitzRow& distance = envelope_.row(k);
     Row& row = rows_[ToSize(k)];
-    const double floor = SubDown(lower[ToSize(k)], noise_bound_[k]);
-    const double negated_ceiling = -AddUp(upper[ToSize(k)], noise_bound_[k]);
+    const double floor = SubDown(lower[ToSize(k)], row.observation_error);
+    const double negated_ceiling = -AddUp(upper[ToSize(k)], row.observation_error);
     const std::size_t columns = distance.num_coordinates();
     Pack* block = row.blocks.data() + entry / kPackSize * (columns + 2);
     distance.Map([&](int l) { return z[ToSize(l)]; }, coordinates.data());

@@ -28,7 +28,8 @@ class EnvelopeTail final {
   [[nodiscard]] int capacity() const { return capacity_; }
 
   /** Whether the envelope's error bounds E_k hold for an observation with these enclosures of its residual, n entries
-  each: |lower_k| + sigma_k and |upper_k| + sigma_k are at most the envelope's value_limit(k). */
+  each: |lower_k| + eps_k and |upper_k| + eps_k, eps_k = Declaration::ObservationError, are at most the envelope's
+  value_limit(k). */
   [[nodiscard]] bool Covers(std::span<const double> lower, std::span<const double> upper) const;
 
   /** Adds an observation at z. Only one thread may call this. No allocation.
@@ -43,12 +44,12 @@ class EnvelopeTail final {
 
  private:
   struct Row {
+    double observation_error;
     std::vector<Pack> blocks;
     std::vector<double> floors, negated_ceilings;  // the highest of the first 1, 2, ... entries
   };
 
   const LipschitzEnvelope& envelope_;
-  Eigen::VectorXd noise_bound_;
   int capacity_;
   std::vector<Row> rows_;
   std::atomic<int> size_ = 0;

@@ -1,12 +1,13 @@
 /** The set-membership envelope of all observations, Eq. (set-envelope):
-    lower_k(Z) = max_i [r~_ik - sigma_k - D_ik(Z)],   upper_k(Z) = min_i [r~_ik + sigma_k + D_ik(Z)],
-with D_ik(Z) the worst-case Lipschitz distance from the query set to observation i, Eq. (zonotope-set-distance).
+    lower_k(Z) = max_i [r~_ik - eps_k - D_ik(Z)],   upper_k(Z) = min_i [r~_ik + eps_k + D_ik(Z)],
+with eps_k = sigma_k + w^_k, the error and the disturbance of the observed step (declaration.h), and D_ik(Z) the
+worst-case Lipschitz distance from the query set to observation i, Eq. (zonotope-set-distance).
 
 Rounding. A query runs in plain arithmetic; its error is bounded before there is a query, once per row, because the
 query's hull lies in the certification domain. The computed bound is an expression of sums, products of two, |.| and max
-whose leaves are r~_ik -+ sigma_k (rounded outward once, then taken as exact), L_kl c_l, L_kl z_il, L_kl G_lj and L_kl
+whose leaves are r~_ik -+ eps_k (rounded outward once, then taken as exact), L_kl c_l, L_kl z_il, L_kl G_lj and L_kl
 s_l. Over all queries their magnitudes add up to at most
-    V + 2 S + 3 W,   V = max_i |r~_ik| + sigma_k,  S = sum_l L_kl max |z_l|,  W = sum_l L_kl R_l,
+    V + 2 S + 3 W,   V = max_i |r~_ik| + eps_k,  S = sum_l L_kl max |z_l|,  W = sum_l L_kl R_l,
 with max |z_l| over the domain and the observations, and R_l half the domain's width, which bounds sum_j |G_lj| + s_l.
 (W counts three times because (w_s - w_0) + w_0 is computed in place of w_s.) In a row with a columns no leaf passes
 more than a + 24 roundings, because sums over generators run in eight lanes. With u = 2^-53 the error is below
@@ -37,7 +38,7 @@ struct EnvelopeOptions {
   int max_leaf_visits = 512;
   /** Up to this many blocks, a query scans all of them and skips the tree. */
   int max_flat_blocks = 32;
-  /** E_k holds for observations with |r~_ik| + sigma_k up to this many times the largest one given, >= 1. Choose more
+  /** E_k holds for observations with |r~_ik| + eps_k up to this many times the largest one given, >= 1. Choose more
   than 1 if an EnvelopeTail will be added. */
   double value_headroom = 1;
   InstructionSet instructions = BestInstructionSet();  ///< Changes the time a query takes, never a bit of its result.

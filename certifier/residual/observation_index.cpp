@@ -177,7 +177,7 @@ double LargestValue(const ObservationIndex::Entries& entries) {
 ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
                                     const Observations& observations, int coordinate) {
   const auto count = ToSize(observations.size());
-  const double sigma = declaration.noise_bound[coordinate];
+  const double error = declaration.ObservationError(coordinate);
   using Shape = ObservationIndex::Shape;
   ObservationIndex::Entries entries{row.has_patterns() ? Shape::kLifted : Shape::kBoxed,
                                     row.num_coordinates(),
@@ -187,8 +187,8 @@ ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& 
   for (int i = 0; i < observations.size(); ++i) {
     row.Map([&](int l) { return observations.z(i, l); },
             entries.coordinates.data() + ToSize(i) * row.num_coordinates());
-    entries.floors.push_back(SubDown(observations.lower(i, coordinate), sigma));
-    entries.ceilings.push_back(AddUp(observations.upper(i, coordinate), sigma));
+    entries.floors.push_back(SubDown(observations.lower(i, coordinate), error));
+    entries.ceilings.push_back(AddUp(observations.upper(i, coordinate), error));
   }
   return entries;
 }

@@ -88,7 +88,8 @@ class ObservationIndex final {
 /** The largest |floor| and |ceiling|. */
 [[nodiscard]] double LargestValue(const ObservationIndex::Entries& entries);
 
-/** The entries of coordinate k = `coordinate`: floors r~_ik - sigma_k and ceilings r~_ik + sigma_k, rounded outward,
+/** The entries of coordinate k = `coordinate`: floors r~_ik - eps_k and ceilings r~_ik + eps_k, eps_k =
+Declaration::ObservationError, rounded outward,
 and their coordinates in plain arithmetic. */
 [[nodiscard]] ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
                                                   const Observations& observations, int coordinate);

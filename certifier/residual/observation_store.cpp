@@ -249,10 +249,10 @@ class ObservationStore::PartnerSearch {
   using Point = PairSearch::Point;
   [[nodiscard]] Point PointIn(int k) const {
     const auto i = ToSize(k);
-    const double sigma = store_.declaration_.noise_bound[k];
+    const double error = store_.declaration_.ObservationError(k);
     const LipschitzRow& row = generation_.envelope.row(k);
-    Point point{std::vector<double>(row.num_coordinates()), SubDown(entry_.lower[i], sigma),
-                -AddUp(entry_.upper[i], sigma)};
+    Point point{std::vector<double>(row.num_coordinates()), SubDown(entry_.lower[i], error),
+                -AddUp(entry_.upper[i], error)};
     row.Map([&](int l) { return entry_.z[ToSize(l)]; }, point.coordinates.data());
     return point;
   }

@@ -1,8 +1,9 @@
 /** Enclosures of the observed residuals r~_i = x_i+ - f0(z_i), Eq. (data).
 
 A recorded successor is a rounded number. One unit in its last place counts as observation error in addition to sigma.
-So [lower, upper] contains x_i+ - f0(z_i) +- ulp(x_i+), and every admissible residual satisfies lower_ik - sigma_k <=
-r_k(z_i) <= upper_ik + sigma_k. */
+So [lower, upper] contains x_i+ - f0(z_i) +- ulp(x_i+), and every admissible residual satisfies lower_ik - eps_k <=
+r_k(z_i)
+<= upper_ik + eps_k, eps_k = Declaration::ObservationError. */
 #pragma once
 
 #include "certifier/dynamics/model.h"

@@ -51,6 +51,10 @@ Digest DeclarationDigest(const NominalModel& model, const Declaration& declarati
   CanonicalBytes bytes = Begin("forereach declaration", model);
   bytes.Numbers(declaration.lipschitz);
   bytes.Numbers(declaration.noise_bound);
+  if (declaration.IsDisturbed()) {  // none and zeros declare the same
+    bytes.Text("disturbance");
+    bytes.Numbers(declaration.disturbance);
+  }
   return bytes.digest();
 }
 

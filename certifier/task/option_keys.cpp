@@ -65,7 +65,8 @@ std::vector<Key> GateKeys() {
                   "Send the whole set at least three times in this period."),
       gate.Word<bool>("learn", {{"executed", true}, {"none", false}}, &GateOptions::learns,
                       "executed: transitions that the robot reports are added to the observations while it drives; "
-                      "declaration.noise_bound has to cover their errors. none: only the file's transitions are used."),
+                      "declaration.noise_bound has to cover their errors, and declaration.disturbance what disturbs "
+                      "them. none: only the file's transitions are used."),
       Optional(Word("gate.require_stop", {"true", "false"},
                     "true: only plans that provably end at rest, by task.rest, are certified. false: a plan may end in "
                     "motion.",
@@ -200,6 +201,19 @@ std::vector<Key> PlannerKeys() {
   };
 }
 
+Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
+  Key key = robot.OneOf("disturbance", {"none", "random", "adversarial"}, &RobotOptions::disturbance,
+                        "What disturbs each step, within declaration.disturbance. random: each state by a uniform "
+                        "value of its own. adversarial: each state by its bound, with signs that stay for 1 to 32 "
+                        "steps.");
+  key.read = [read = key.read](const Document& file, const std::string& at, TaskDraft& draft) {
+    read(file, at, draft);
+    if (draft.config.robot.disturbance != "none" && !draft.problem.declaration.IsDisturbed())
+      file.Fail(at, draft.config.robot.disturbance + ", and declaration.disturbance allows for none");
+  };
+  return key;
+}
+
 std::vector<Key> RobotKeys() {
   const OptionRows<RobotOptions> robot("robot", [](TaskDraft& draft) -> RobotOptions& { return draft.config.robot; });
   return {
@@ -211,6 +225,9 @@ std::vector<Key> RobotKeys() {
                    "longer than this or model.dt."),
       robot.Number("time_limit_s", "s", UpTo(1e6), &RobotOptions::time_limit_s,
                    "The run ends after this time, even if the goal is not reached."),
+      RobotDisturbance(robot),
+      robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
+                    "The seed of the disturbance's random numbers."),
       robot.OneOf("residual", {"none"}, &RobotOptions::residual, "none: the robot is the nominal model."),
   };
 }

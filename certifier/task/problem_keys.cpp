@@ -165,6 +165,13 @@ std::vector<Key> DeclarationKeys() {
                       [](const Document& file, const std::string& key, TaskDraft& draft) {
                         draft.problem.declaration.noise_bound = file.Vector(key);
                       })),
+      Optional(Vector("declaration.disturbance", "of the state", kNotNegative, Size::kStates,
+                      "w: in each step the true successor differs from f0 + r by at most this, by any value, which may "
+                      "be another in each step. It is apart from noise_bound, the error of measurement.",
+                      [](const Document& file, const std::string& key, TaskDraft& draft) {
+                        draft.problem.declaration.disturbance = file.Vector(key);
+                      }),
+               "zeros"),
       Required(Text("transitions",
                     "CSV of observed one-step transitions, relative to this file: a column for each state, "
                     "each input and each `<state>_next`, all inside the domain, at least one row.",

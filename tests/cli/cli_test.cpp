@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/program.h"
+#include "tests/config/task_files.h"
 #include "tests/scratch.h"
 
 namespace {
@@ -101,6 +102,39 @@ TEST(CertifyJsonTest, AnObstacleThatIsNowhereHasNoClearance) {
     EXPECT_EQ(decision[key], nullptr) << key;
   scratch.Write("decision.json", output.text);
   EXPECT_EQ(Forereach("verify " + decision_path).code, 0);
+}
+
+TEST(CertifyJsonTest, SaysWhichDisturbanceItAllowsFor) {
+  const forereach::ScratchDirectory scratch;
+  std::string task = Read(FOREREACH_SOURCE_DIR "/config/bicycle.yaml");
+  task = std::regex_replace(task, std::regex("transitions: "), "transitions: " FOREREACH_SOURCE_DIR "/config/");
+  const std::string noise = "  noise_bound: [0, 0, 0, 0, 0, 0]\n";
+  const auto with = [&](const std::string& bounds) {
+    return scratch.Write("task.yaml", forereach::Replaced(task, noise, noise + "  disturbance: [" + bounds + "]\n"));
+  };
+  const std::string plan = " --plan config/plans/bicycle_certified.csv", decision_path = scratch / "decision.json";
+  std::string path = with("0, 0, 1e-4, 0.01, 0, 0");
+  const Output output = Forereach("certify --json --config " + path + plan);
+  ASSERT_EQ(output.code, 0);
+  const Json decision = Json::parse(output.text), calm = CertifyJson("bicycle", "bicycle_certified");
+  EXPECT_EQ(decision["disturbance"], Json({0.0, 0.0, 1e-4, 0.01, 0.0, 0.0}));
+  EXPECT_THAT(decision["message"], HasSubstr("under the declared disturbance"));
+  EXPECT_NE(decision["digests"]["declaration"], calm["digests"]["declaration"]);
+  EXPECT_GT(decision["tube"][1]["half_width"][3], calm["tube"][1]["half_width"][3]);
+  scratch.Write("decision.json", output.text);
+  EXPECT_EQ(Forereach("verify " + decision_path).code, 0);
+  EXPECT_THAT(Forereach("certify --config " + path + plan).text,
+              HasSubstr("\n  each step disturbed by up to: theta 0.0001 v 0.01\n"));
+  Json altered = decision;
+  altered["disturbance"][2] = 0;
+  scratch.Write("decision.json", altered.dump());
+  EXPECT_EQ(Forereach("verify " + decision_path + " 2>&1").code, 1);
+
+  path = with("0, 0, 0, 0, 0, 0");
+  const Json zeros = Json::parse(Forereach("certify --json --config " + path + plan).text);
+  EXPECT_FALSE(zeros.contains("disturbance"));
+  for (const char* same : {"tube", "message"}) EXPECT_EQ(zeros[same], calm[same]);
+  EXPECT_EQ(zeros["digests"]["declaration"], calm["digests"]["declaration"]);
 }
 
 TEST(CertifyJsonTest, HasExactlyTheKeysOfTheContract) {

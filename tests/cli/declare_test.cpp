@@ -55,6 +55,18 @@ class DeclareTest : public testing::Test {
   const std::string task_ = scratch_ / "task.yaml", cover_ = scratch_ / "cover.json";
 };
 
+// A disturbance has no slope: the bounds, and a cover that was made before, stay what they are.
+TEST_F(DeclareTest, ADisturbanceLeavesTheCoverAlone) {
+  WriteTask("residual: {name: heading_saturation}");
+  ASSERT_EQ(Declare("--cover " + cover_).code, 0);
+  const std::string task = Read(task_), noise = "  noise_bound: [0, 0, 0, 0, 0, 0]\n";
+  std::ofstream(task_) << Replaced(task, noise, noise + "  disturbance: [0, 0, 0.01, 0.1, 0, 0]\n");
+  EXPECT_EQ(Check().code, 0);
+  EXPECT_THAT(Declare("--between").text, HasSubstr("declaration.disturbance is a bound at the samples."));
+  std::ofstream(task_) << task;
+  EXPECT_THAT(Declare("--between").text, testing::Not(HasSubstr("disturbance")));
+}
+
 TEST(Declare, GivesTheMatrixOfTheShippedTask) {
   const Output output = Forereach("declare --config config/bicycle.yaml --json");
   EXPECT_EQ(output.code, 0);

@@ -63,6 +63,26 @@ TEST(DeclarationDigest, DoesNotDependOnHowItIsWritten) {
   EXPECT_NE(files.Load(Replaced(kTask, "[0, 0, 0.01, 0.01]", "[0, 0, 0.01, 0.02]")).grounds.declaration, digest);
 }
 
+TEST(DeclarationDigest, NoDisturbanceAndZerosAreTheSame) {
+  const TaskFiles files;
+  const Digest digest = files.Load().grounds.declaration;
+  const auto with = [&](const std::string& disturbance) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files.Load(Replaced(kTask, line, line + "  disturbance: " + disturbance + "\n")).grounds.declaration;
+  };
+  EXPECT_EQ(with("[0, -0.0, 0, 0]"), digest);
+  EXPECT_NE(with("[0, 0, 0, 4.9e-324]"), digest);
+  EXPECT_NE(with("[0, 0, 0.1, 0]"), with("[0, 0, 0, 0.1]"));
+  EXPECT_NE(with("[0, 0, 0.01, 0.01]"), digest);
+}
+
+// What it was before disturbances: recorded logs and latched faults name it.
+TEST(DeclarationDigest, WithoutDisturbanceIsThatOfOlderRecords) {
+  const Declaration declaration{Eigen::MatrixXd::Ones(4, 6), Eigen::VectorXd::Zero(4)};
+  EXPECT_EQ(ToHex(DeclarationDigest(*MakePointMass(0.15), declaration)),
+            "13d8edfd9ab9f1a81d4d8912949996af9cff692d0ea4013b26bd69eb41059b6f");
+}
+
 TEST(ModelDigest, TellsModelsAndParametersApart) {
   const std::set<Digest> digests{
       ModelDigest(*MakePointMass(0.15)), ModelDigest(*MakePointMass(std::nextafter(0.15, 1))),

@@ -202,11 +202,25 @@ TEST_F(ErrorTest, KeysOfAnotherModel) {
             "task.yaml:20: robot.residual.name: heading_saturation is for kinematic_bicycle, the model is point_mass");
 }
 
+TEST_F(ErrorTest, Disturbances) {
+  const auto with = [&](const std::string& value) {
+    const std::string line = "  noise_bound: [0, 0, 0.01, 0.01]\n";
+    return files_.ErrorWith(line, line + "  disturbance: " + value + "\n");
+  };
+  EXPECT_EQ(with("[0, 0, -1e-9, 0]"), "task.yaml:12: declaration.disturbance[2]: -1e-9 is outside [0, inf)");
+  EXPECT_EQ(with("[0, 0, .inf, 0]"),
+            "task.yaml:12: declaration.disturbance[2]: .inf is not a finite number; write a number in [0, inf)");
+  EXPECT_EQ(with("[0, 0, 1]"), "task.yaml:12: declaration.disturbance: has 3 entries, has to have 4: px, py, vx, vy");
+  EXPECT_EQ(with("0.1"), "task.yaml:12: declaration.disturbance: 0.1 is not a list of numbers");
+}
+
 TEST_F(ErrorTest, MissingKeys) {
   EXPECT_THAT(files_.ErrorWith("transitions: steps.csv\n", ""), StartsWith("task.yaml:1: transitions: missing: "));
   EXPECT_THAT(files_.ErrorWith(", dt: 0.15", ""), StartsWith("task.yaml:1: model.dt: missing: "));
   EXPECT_THAT(files_.ErrorWith("  noise_bound: [0, 0, 0.01, 0.01]\n", ""),
               StartsWith("task.yaml:8: declaration.noise_bound: missing: "));
+  EXPECT_EQ(ErrorAfter("robot: {disturbance: random}\n"),
+            "task.yaml:20: robot.disturbance: random, and declaration.disturbance allows for none");
   EXPECT_THAT(files_.ErrorWith(", radius: 0.8", ""),
               StartsWith("task.yaml:18: task.obstacles[0].circle.radius: missing: "));
   EXPECT_EQ(ErrorAfter("planner: {source: policy}\n"),

@@ -26,7 +26,8 @@ class AdmissibleResidual {
         const auto coordinate = static_cast<Eigen::Index>(k);
         const double next = problem.transitions.x_next(i, coordinate);
         const exact::Real slack = exact::Real(NextUp(std::abs(next))) - exact::Real(std::abs(next)) +
-                                  exact::Real(declaration_.noise_bound[coordinate]);
+                                  exact::Real(declaration_.noise_bound[coordinate]) +
+                                  exact::Real(declaration_.DisturbanceBound(coordinate));
         lower.push_back(exact::Real(next) - nominal[k] - slack);
         upper.push_back(exact::Real(next) - nominal[k] + slack);
       }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <tuple>
 #include <vector>
 
 #include "certifier/certify/certifier.h"
@@ -112,16 +113,18 @@ bool Collides(const Obstacle& obstacle, const Eigen::MatrixXd& projection, const
   return left || right;
 }
 
-class Containment : public testing::TestWithParam<bool> {};
+// The model, and whether its steps are disturbed.
+class Containment : public testing::TestWithParam<std::tuple<bool, bool>> {};
 
 TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
-  const bool bicycle = GetParam();
-  Random random(801 + bicycle);
+  const auto [bicycle, disturbed] = GetParam();
+  Random random(801 + bicycle), winds(811 + bicycle);
   SCOPED_TRACE(random.trace());
   int certified = 0, rollouts = 0, slices = 0;
   for (int trial = 0; trial < 70; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
     const auto problem = AnyProblem(random, bicycle, random.Integer(1, 12));
+    if (disturbed) Disturb(winds, *problem);
     const Certifier certifier(problem);
     ASSERT_FALSE(certifier.violation()) << "the data come from a residual that satisfies the declaration";
     Tube tube;
@@ -151,6 +154,8 @@ TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
           for (const double u : query.plan().input(t)) z.emplace_back(u);
           std::vector<Real> next = NominalSuccessor(bicycle, z);
           for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k));
+          const std::vector<Real> wind = AnyDisturbance(winds, *problem);
+          for (std::size_t k = 0; k < next.size(); ++k) next[k] += wind[k];
           x = next;
         }
       }
@@ -163,7 +168,48 @@ TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
   EXPECT_GT(slices, 2000);
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, Containment, testing::Bool());
+INSTANTIATE_TEST_SUITE_P(Models, Containment, testing::Combine(testing::Bool(), testing::Bool()));
+
+// The rollouts reach the bounds of the disturbance: a tube that knows less of it does not contain them.
+TEST(ContainmentJudge, NoticesADisturbanceThatIsLargerThanDeclared) {
+  Random random(804);
+  SCOPED_TRACE(random.trace());
+  for (const bool bicycle : {false, true}) {
+    const auto problem = AnyProblem(random, bicycle, 1);
+    problem->declaration.lipschitz.setZero();
+    problem->declaration.noise_bound.setZero();
+    problem->declaration.disturbance = Eigen::VectorXd::Constant(problem->model->num_states(), 0.125);
+    const AdmissibleResidual residual(random, *problem);
+    problem->declaration.disturbance *= 1 - 0x1p-40;
+    const Certifier certifier(problem);
+    Tube tube;
+    const Query query = AnyQuery(random, *problem);
+    ASSERT_NE(certifier
+                  .Certify(query.plan(),
+                           Zonotope::FromBox(query.initial_set.CenterVector(), 0 * query.initial_set.CenterVector()),
+                           {}, tube)
+                  .step,
+              0);
+    const Membership first(random, tube.slice(1));
+    std::vector<Real> z(tube.slice(0).center().begin(), tube.slice(0).center().end());
+    for (const double u : query.plan().input(0)) z.emplace_back(u);
+    const std::vector<Real> nominal = NominalSuccessor(bicycle, z);
+    const auto at = [&](double share) {
+      std::vector<Real> next;
+      for (std::size_t k = 0; k < nominal.size(); ++k) {
+        const auto i = static_cast<Eigen::Index>(k);
+        // The step's bound beyond the highest residual that the observation allows.
+        const Real observed =
+            Real(problem->transitions.x_next(0, i)) -
+            NominalSuccessor(bicycle, {problem->transitions.z.row(0).begin(), problem->transitions.z.row(0).end()})[k];
+        next.push_back(nominal[k] + observed + Real(2 * 0.125 * share));
+      }
+      return next;
+    };
+    EXPECT_TRUE(first.Contains(at(1 - 0x1p-39)));
+    EXPECT_FALSE(first.Contains(at(1)));
+  }
+}
 
 // The judge itself: it has to notice a state just outside.
 TEST(ContainmentJudge, NoticesAStateJustOutside) {

@@ -258,7 +258,8 @@ std::optional<Obstacle> Met(Random& random, const Problem& problem, const Query&
     std::vector<exact::Real> z = x;
     for (const double u : query.plan().input(step)) z.emplace_back(u);
     next = NominalSuccessor(bicycle, z);
-    for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k));
+    const std::vector<exact::Real> wind = AnyDisturbance(random, problem);
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
   }
   const Chord chord = judge.ChordOf(x, next);
   std::optional<Path> path;
@@ -292,11 +293,14 @@ verifier::Certificate Among(verifier::Certificate certificate, const Obstacle& o
 // the verifier encloses more tightly); and obstacles that are met. Of very wide tubes the verifier's remainder is now
 // and then tighter, too, so that a few of those further in are clear of its own tube.
 Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& output) {
-  Random random(options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number));
+  const std::uint64_t start = options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number);
+  Random random(start);
   Counts counts;
   counts.problems = 1;
   const bool bicycle = random.Coin();
   const auto problem = AnyWorld(random, bicycle);
+  Random winds(~start);
+  if (winds.Coin(0.4)) Disturb(winds, *problem);
   problem->method = options.method;
   const Certifier certifier(problem);
   const verifier::Verifier judge(problem, verifier::MethodOf(*problem));
@@ -353,14 +357,18 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
 // All that follows from one seed and one problem's number.
 Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& output) {
   const std::uint64_t start = options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number);
-  Random random(start), wide(~start);
+  Random random(start), wide(~start), winds(start ^ 0x5851f42d4c957f2d);
   Counts counts;
   counts.problems = 1;
   const bool absurd = random.Coin(0.25);
   const auto problem = AnyProblem(random, random.Coin(), random.Integer(1, 20));
   problem->method = options.method;
   Vary(random, *problem);
+  if (winds.Coin(0.4)) Disturb(winds, *problem);
   if (absurd) Exaggerate(random, *problem);
+  if (absurd && winds.Coin(0.2))
+    problem->declaration.disturbance =
+        Eigen::VectorXd::Constant(problem->model->num_states(), std::ldexp(1, winds.Integer(-1074, 300)));
   if (options.wide) Tighten(wide, *problem);
   std::unique_ptr<Certifier> certifier;
   try {

@@ -232,12 +232,14 @@ class MotionJudge {
 /** One problem with all its plans. */
 class MotionTrial {
  public:
-  explicit MotionTrial(std::uint64_t seed, Untold untold = Untold::kNothing) : random_(seed), untold_(untold) {}
+  explicit MotionTrial(std::uint64_t seed, Untold untold = Untold::kNothing)
+      : random_(seed), winds_(~seed), untold_(untold) {}
 
   /** @throws Contradiction with the circumstances. */
   [[nodiscard]] Tally Run(int plans) {
     const bool bicycle = random_.Coin();
     const auto problem = AnyWorld(random_, bicycle);
+    if (winds_.Coin(0.4)) Disturb(winds_, *problem);
     const auto told = std::make_shared<Problem>(*problem);
     if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
     if (untold_ == Untold::kTurn && told->between) told->between->turn_rate = told->between->turn_acceleration = 0;
@@ -304,7 +306,8 @@ class MotionTrial {
       std::vector<exact::Real> z = x;
       for (const double u : query.plan().input(t)) z.emplace_back(u);
       std::vector<exact::Real> next = NominalSuccessor(bicycle, z);
-      for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k));
+      const std::vector<exact::Real> wind = AnyDisturbance(winds_, problem);
+      for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
       const Chord chord = judge.ChordOf(x, next);
       if (problem.between)
         Follow(judge, chord, obstacles, t);
@@ -349,7 +352,7 @@ class MotionTrial {
     }
   }
 
-  Random random_;
+  Random random_, winds_;
   Untold untold_;
   Tally tally_;
   Tube tube_;

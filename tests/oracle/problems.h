@@ -122,6 +122,30 @@ inline std::shared_ptr<Problem> AnyProblem(Random& random, bool bicycle, int cou
   return problem;
 }
 
+/** Declares a disturbance in about half of the coordinates, and disturbs every observation within it, many of them by
+the bound. The margin of 1e-6 is for the rounding of the successors. */
+inline void Disturb(Random& random, Problem& problem) {
+  const int n = problem.model->num_states();
+  Eigen::VectorXd& bound = problem.declaration.disturbance;
+  bound = Eigen::VectorXd::Zero(n);
+  for (int k = 0; k < n; ++k)
+    if (random.Coin()) bound[k] = std::ldexp(random.Uniform(0.5, 1), -random.Integer(6, 16));
+  for (int i = 0; i < problem.transitions.size(); ++i)
+    for (int k = 0; k < n; ++k)
+      problem.transitions.x_next(i, k) +=
+          (1 - 1e-6) * bound[k] * (random.Coin() ? random.Sign() : random.Uniform(-1, 1));
+}
+
+/** What disturbs one step: by the bound or by anything within it. */
+inline std::vector<exact::Real> AnyDisturbance(Random& random, const Problem& problem) {
+  std::vector<exact::Real> w(static_cast<std::size_t>(problem.model->num_states()));
+  const Eigen::VectorXd& bound = problem.declaration.disturbance;
+  for (Eigen::Index k = 0; k < bound.size(); ++k)
+    w[static_cast<std::size_t>(k)] =
+        exact::Real(bound[k]) * exact::Real(random.Coin(0.8) ? random.Sign() : random.Uniform(-1, 1));
+  return w;
+}
+
 inline Query AnyQuery(Random& random, const Problem& problem) {
   const bool bicycle = problem.model->num_states() == 6;
   const int n = problem.model->num_states();

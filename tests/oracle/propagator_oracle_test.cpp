@@ -24,10 +24,10 @@ constexpr int kStates = 4, kInputs = 2, kOrder = 5;
 // The point mass with a constant residual, observed once with an error of up to sigma.
 struct Task {
   std::shared_ptr<Problem> problem = std::make_shared<Problem>();
-  std::array<Rational, kStates> lowest, highest;  // of the residuals that are admissible
+  std::array<Rational, kStates> lowest, highest;  // of what an admissible residual and a disturbance add to a step
 
   // @param reach of the domain: beyond some size the expansion is made of intervals.
-  Task(Random& random, double reach) {
+  Task(Random& random, double reach, bool disturbed) {
     problem->model = MakePointMass(kDt);
     problem->domain.state = Box(Eigen::Vector4d::Constant(-reach), Eigen::Vector4d::Constant(reach));
     problem->domain.input = Box(Eigen::Vector2d(-3, -3), Eigen::Vector2d(3, 3));
@@ -44,10 +44,20 @@ struct Task {
       lowest[i] = Rational(residual) - Rational(sigma);
       highest[i] = Rational(residual) + Rational(sigma);
     }
+    if (!disturbed) return;
+    problem->declaration.disturbance = Eigen::Vector4d::Zero();
+    for (int k = 0; k < kStates; ++k) {
+      if (random.Coin(0.3)) continue;
+      const double bound = std::ldexp(random.Uniform(0, 1), -random.Integer(0, 60));
+      problem->declaration.disturbance[k] = bound;
+      const auto i = static_cast<std::size_t>(k);
+      lowest[i] -= 2 * Rational(bound);  // of the observed step, and of this one
+      highest[i] += 2 * Rational(bound);
+    }
   }
 };
 
-// max {d . x+ : x in slice, residual admissible}.
+// max {d . x+ : x in slice, residual and disturbance admissible}.
 Rational ImageSupport(const Task& task, const Zonotope& slice, std::span<const double> input,
                       std::span<const double> d) {
   const Rational dt(kDt), half_square = dt * dt / 2;
@@ -78,7 +88,7 @@ TEST_P(StepOracle, TheSuccessorContainsTheExactImage) {
   Random random(630);
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 200; ++trial) {
-    const Task task(random, GetParam());
+    const Task task(random, GetParam(), trial % 2 == 1);
     const Certifier certifier(task.problem);
     Eigen::VectorXd center = random.Vector(kStates, std::ldexp(1, random.Integer(-20, 3)));
     for (int axis = 0; axis < 2; ++axis)  // position and the way of a step often cancel

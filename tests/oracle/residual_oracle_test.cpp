@@ -121,15 +121,31 @@ TEST(FindViolation, DecidesAtTheLastBit) {
   }
 }
 
+// Each of the two observations has its own error and its own disturbance.
+TEST(FindViolation, AllowsTheDisturbanceOfBothToTheLastBit) {
+  for (const double slope : {0.5, 0.0}) {
+    const double bound = slope * 4 + 2 * (0.25 + 0.125);
+    const auto at = [&](double difference) {
+      Sample s = TwoPoints(slope, 4, difference, 0.25);
+      s.declaration.disturbance = Eigen::VectorXd::Constant(1, 0.125);
+      return FindViolation(s.declaration, s.observations);
+    };
+    EXPECT_FALSE(at(bound));
+    ASSERT_TRUE(at(bound + 0x1p-50));
+    EXPECT_EQ(at(bound + 0x1p-50)->bound, bound);
+  }
+}
+
 // The difference is as large as it may be: however the bound of many terms is rounded, it is no contradiction.
 TEST(TestPair, NoRoundingOfTheBoundMakesAContradiction) {
   Random random(617);
   SCOPED_TRACE(random.trace());
   for (int trial = 0; trial < 5000; ++trial) {
     const int variables = random.Integer(1, 8);
-    Declaration declaration{random.Matrix(1, variables).cwiseAbs(), random.Vector(1, 1e-3).cwiseAbs()};
+    Declaration declaration{random.Matrix(1, variables).cwiseAbs(), random.Vector(1, 1e-3).cwiseAbs(), {}};
+    if (trial % 2 == 1) declaration.disturbance = random.Vector(1, 1e-2).cwiseAbs();
     Observations two{random.Matrix(2, variables), Eigen::MatrixXd::Zero(2, 1), Eigen::MatrixXd::Zero(2, 1)};
-    Rational bound = 2 * Rational(declaration.noise_bound[0]);
+    Rational bound = 2 * (Rational(declaration.noise_bound[0]) + Rational(declaration.DisturbanceBound(0)));
     for (int l = 0; l < variables; ++l)
       bound += Rational(declaration.lipschitz(0, l)) * abs(Rational(two.z(0, l)) - Rational(two.z(1, l)));
     two.lower(0, 0) = two.upper(0, 0) = exact::Floor(bound);
@@ -157,7 +173,7 @@ std::optional<Violation> BruteForce(const Sample& s) {
   for (int k = 0; k < o.num_states(); ++k)
     for (int i = 0; i < o.size(); ++i)
       for (int j = i + 1; j < o.size(); ++j) {
-        Rational bound = 2 * Rational(s.declaration.noise_bound[k]);
+        Rational bound = 2 * (Rational(s.declaration.noise_bound[k]) + Rational(s.declaration.DisturbanceBound(k)));
         for (Eigen::Index l = 0; l < o.z.cols(); ++l)
           bound += Rational(s.declaration.lipschitz(k, l)) * abs(Rational(o.z(i, l)) - Rational(o.z(j, l)));
         const Rational up = Rational(o.lower(i, k)) - Rational(o.upper(j, k)),
@@ -178,6 +194,7 @@ TEST(FindViolation, FindsTheFirstPairOfRowsWithColumns) {
     Sample s = Exactly(Eigen::MatrixXd::NullaryExpr(2, columns, [&] { return random.Integer(1, 8) / 4.0; }),
                        Eigen::MatrixXd::NullaryExpr(count, columns, fraction),
                        Eigen::MatrixXd::NullaryExpr(count, 2, fraction) / 4, random.Integer(0, 2) / 4.0);
+    if (trial % 3 == 1) s.declaration.disturbance = Eigen::Vector2d(trial % 2 / 8.0, 0.25);
     s.observations.upper.array() += random.Integer(0, 1) / 8.0;
     const auto expected = BruteForce(s), violation = FindViolation(s.declaration, s.observations);
     ASSERT_EQ(violation.has_value(), expected.has_value());
@@ -310,12 +327,12 @@ void ExpectEnvelope(const Sample& s, const Zonotope& slice, const Eigen::VectorX
   Enclose(EnvelopeFor(s.declaration, s.observations, slice, View(input), one_leaf), slice, View(input), all[2]);
   ASSERT_FALSE(all[0].capped || all[1].capped);
   for (int k = 0; k < s.observations.num_states(); ++k) {
-    const Rational sigma(s.declaration.noise_bound[k]);
+    const Rational error = Rational(s.declaration.noise_bound[k]) + Rational(s.declaration.DisturbanceBound(k));
     std::vector<Rational> lower, upper;
     for (int i = 0; i < s.observations.size(); ++i) {
       const Rational distance = Distance(s, k, i, slice, input);
-      lower.push_back(Rational(s.observations.lower(i, k)) - sigma - distance);
-      upper.push_back(Rational(s.observations.upper(i, k)) + sigma + distance);
+      lower.push_back(Rational(s.observations.lower(i, k)) - error - distance);
+      upper.push_back(Rational(s.observations.upper(i, k)) + error + distance);
     }
     const Rational highest = *std::max_element(lower.begin(), lower.end()),
                    lowest = *std::min_element(upper.begin(), upper.end());
@@ -342,6 +359,7 @@ TEST_P(Envelope, IsTheExactOneRoundedOutward) {
     Sample s = Exactly(Eigen::MatrixXd::Zero(1, variables), random.Matrix(count, variables),
                        random.Matrix(count, 1, 0.1), random.Coin() ? 0 : 0.01);
     s.observations.upper.array() += 1e-6;
+    if (trial % 2 == 1) s.declaration.disturbance = Eigen::VectorXd::Constant(1, 0.003 * trial);
     std::vector<int> columns(static_cast<std::size_t>(variables));
     for (int l = 0; l < variables; ++l) columns[static_cast<std::size_t>(l)] = l;
     for (int a = 0; a < active; ++a) {

@@ -80,7 +80,7 @@ TEST(SlopeOracle, TheSuccessorContainsTheImageAndIsNotMuchWider) {
   for (int trial = 0; trial < 3000; ++trial) {
     const Sloped residual(random);
     const int order = random.Integer(1, 5);
-    const Propagator propagator(*model, domain, residual, order, Method::kCentred);
+    const Propagator propagator(*model, domain, residual, {}, order, Method::kCentred);
     Zonotope slice(random.Vector(4), random.Matrix(4, random.Integer(0, 4 * order)));
     const bool has_slack = random.Coin();
     for (int k = 0; k < 4; ++k)

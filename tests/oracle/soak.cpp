@@ -117,6 +117,7 @@ class Soak {
     while (called_ < count) {
       const bool bicycle = random_.Coin(), absurd = random_.Coin(0.3);
       const auto problem = AnyProblem(random_, bicycle, random_.Integer(1, 25));
+      if (random_.Coin(0.3)) Disturb(random_, *problem);
       if (absurd) Exaggerate(random_, *problem);
       std::unique_ptr<Certifier> certifier;
       try {

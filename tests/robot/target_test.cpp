@@ -7,11 +7,13 @@
 #include <utility>
 
 #include <gmock/gmock.h>
+#include <gmpxx.h>
 #include <gtest/gtest.h>
 #include <mpfr.h>
 
 #include "certifier/dynamics/models.h"
 #include "certifier/dynamics/residuals.h"
+#include "certifier/residual/consistency.h"
 
 namespace forereach {
 namespace {
@@ -358,6 +360,54 @@ TEST(MakeTransitionsTest, NoiseStaysWithinItsBoundAndOnItsChannels) {
   EXPECT_LE(largest, 0.25 * (1 + 1e-15));
   EXPECT_GT(largest, 0.24);
 }
+
+class DisturbanceTest : public testing::TestWithParam<std::string> {};
+
+// Declared for vx and, so small that a double does not show it, for vy.
+TEST_P(DisturbanceTest, StaysWithinItsBoundAndReachesIt) {
+  Config config = PointMassTask();
+  Problem problem = *config.problem;
+  config.robot.residual = "none";
+  problem.declaration.lipschitz = Eigen::MatrixXd::Zero(4, 6);
+  problem.declaration.noise_bound = Eigen::VectorXd::Zero(4);
+  problem.declaration.disturbance = Eigen::Vector4d(0, 0, 0.25, 1e-300);
+  config.robot.disturbance = GetParam();
+  const std::unique_ptr<Target> target = MakeTarget(config);
+  const auto make = [&](int seed) {
+    config.robot.disturbance_seed = seed;
+    Disturbance disturbance(problem.declaration, config.robot);
+    return MakeTransitions(*target, problem, 8, 4000, {}, {}, &disturbance);
+  };
+  const Transitions made = make(3);
+  double largest = 0;
+  int changes = 0, highest = 0, run = 0;
+  bool was_positive = true;
+  for (int i = 0; i < made.size(); ++i) {
+    const Eigen::VectorXd row = made.z.row(i);
+    const std::vector<double> next = Step(*target, {row.begin(), row.end()}, 4);
+    for (int k : {0, 1, 3}) EXPECT_EQ(made.x_next(i, k), next[static_cast<std::size_t>(k)]);
+    const mpq_class moved = mpq_class(made.x_next(i, 2)) - mpq_class(next[2]);
+    EXPECT_TRUE(-0.25 <= moved && moved <= 0.25) << i;
+    largest = std::max(largest, std::abs(moved.get_d()));
+    const bool is_positive = moved > 0;
+    run = is_positive == was_positive ? run + 1 : 1;
+    changes += is_positive != was_positive;
+    highest = std::max(highest, run);
+    was_positive = is_positive;
+  }
+  EXPECT_GT(largest, 0.2499);
+  if (GetParam() == "adversarial") {
+    EXPECT_GT(highest, Disturbance::kLongestHold);
+    EXPECT_NEAR(changes, 4000 / 33, 60);
+  } else {
+    EXPECT_NEAR(changes, 2000, 150);
+  }
+  EXPECT_EQ(made.x_next, make(3).x_next);
+  EXPECT_NE(made.x_next, make(4).x_next);
+  EXPECT_FALSE(FindViolation(problem.declaration, Observe(*problem.model, made)));
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, DisturbanceTest, testing::Values("random", "adversarial"));
 
 TEST(MakeTransitionsTest, RefusesWhatIsNotInsideTheDomain) {
   const Config config = Bicycle();

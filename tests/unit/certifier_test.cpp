@@ -330,6 +330,53 @@ TEST(Certifier, ConstantResidualMovesTheTube) {
   EXPECT_EQ(judge.tube().step(0).remainder.half_width[0], 0) << "an affine model has no remainder";
 }
 
+// It widens what an observation says of the residual, and each step anew: each of t steps by twice the bound.
+TEST(Certifier, ADisturbanceCountsForTheObservationAndForEachStep) {
+  Problem problem = PointMassProblem();
+  problem.transitions.x_next(0, kVx) += 0.25;
+  problem.declaration.noise_bound[kVx] = 0.125;
+  problem.declaration.disturbance = Vec({0, 0, 0.0625, 0});
+  Judge judge(problem);
+  EXPECT_EQ(judge(PointSet(Vec({0, 0, 1, 0})), Coast(2), {}).outcome, Outcome::kCertified);
+  for (const int t : {1, 2}) {
+    const Interval hull = judge.tube().slice(t).Hull(kVx);
+    const double middle = 1 + t * 0.25, width = t * (0.125 + 0.0625 + 0.0625);
+    EXPECT_NEAR(hull.lower, middle - width, 1e-14);
+    EXPECT_NEAR(hull.upper, middle + width, 1e-14);
+    EXPECT_LE(hull.lower, middle - width);
+    EXPECT_GE(hull.upper, middle + width);
+    EXPECT_NEAR(judge.tube().half_width(t)[kVx], width, 1e-14);
+  }
+  EXPECT_NEAR(judge.tube().step(0).envelope.lower[kVx], 0.25 - 0.1875, 1e-14) << "the residual's, without the step's";
+}
+
+TEST(Certifier, ZerosAreTheSameAsNoDisturbance) {
+  Problem problem = PointMassProblem();
+  problem.transitions.x_next(0, kVx) += 0.25;
+  problem.declaration.noise_bound[kVx] = 0.1;
+  Judge without(problem);
+  problem.declaration.disturbance = Vec({0, 0, 0, 0});
+  Judge zeros(problem);
+  const auto set = PointSet(Vec({0, 0.1, 1, 0.3}));
+  static_cast<void>(without(set, Coast(5), {}));
+  static_cast<void>(zeros(set, Coast(5), {}));
+  for (int t = 0; t <= 5; ++t) {
+    EXPECT_EQ(without.tube().slice(t).CenterVector(), zeros.tube().slice(t).CenterVector());
+    EXPECT_EQ(without.tube().slice(t).GeneratorMatrix(), zeros.tube().slice(t).GeneratorMatrix());
+  }
+}
+
+TEST(Certifier, ADisturbanceExplainsDataThatContradictEachOtherWithoutIt) {
+  Problem problem = PointMassProblem();
+  problem.transitions = {Eigen::MatrixXd::Zero(2, 6), Eigen::MatrixXd::Zero(2, 4)};
+  problem.transitions.x_next(1, kVx) = 0.5;
+  EXPECT_TRUE(Judge(problem).certifier().violation());
+  problem.declaration.disturbance = Vec({0, 0, 0.25, 0});
+  EXPECT_FALSE(Judge(problem).certifier().violation());
+  problem.declaration.disturbance[kVx] = 0.25 * (1 - 0x1p-50);
+  EXPECT_TRUE(Judge(problem).certifier().violation());
+}
+
 TEST(Certifier, UsesTheHullDistanceOnlyAboveTwelveColumns) {
   EXPECT_FALSE(Judge(BicycleProblem()).certifier().uses_hull_distance());
 }
@@ -447,6 +494,13 @@ TEST(Certifier, NamesThePartThatDoesNotFit) {
   ExpectRefused([](Problem& p) { p.declaration.lipschitz.resize(4, 5); }, "declaration: lipschitz");
   ExpectRefused([](Problem& p) { p.declaration.lipschitz(1, 2) = -1; }, "lipschitz 1, 2");
   ExpectRefused([](Problem& p) { p.declaration.noise_bound[3] = kNan; }, "noise_bound 3");
+  ExpectRefused(
+      [](Problem& p) {
+        p.declaration.disturbance = Vec({0, 0, 0});
+      },
+      "disturbance has 3 entries, must have 4");
+  for (const double bad : {-0.5, kNan, kInfinity})
+    ExpectRefused([bad](Problem& p) { p.declaration.disturbance = Vec({0, 0, bad, 0}); }, "disturbance 2");
   ExpectRefused([](Problem& p) { p.transitions = {}; }, "transitions: none given");
   ExpectRefused([](Problem& p) { p.transitions.z.conservativeResize(1, 5); }, "transitions: 5 columns");
   ExpectRefused([](Problem& p) { p.transitions.x_next.conservativeResize(1, 3); }, "transitions");
@@ -553,6 +607,15 @@ TEST(Explain, SaysWhenADecisionHoldsAndOfSeveralPartsWhich) {
   EXPECT_EQ(Explain(certified, body), Explain(certified, swept));
   certified.obstacle = -1;
   EXPECT_EQ(Explain(certified, body), "certified: no obstacle is there");
+
+  certified.obstacle = 2;
+  Problem windy = swept;
+  windy.declaration.disturbance = Vec({0, 0, 0.1, 0});
+  EXPECT_EQ(Explain(certified, windy),
+            "certified: the robot stays clear at all times under the declared disturbance, closest between steps 3 and "
+            "4, 0.5 m from obstacle 2");
+  windy.declaration.disturbance.setZero();
+  EXPECT_EQ(Explain(certified, windy), Explain(certified, swept));
 
   Decision abstention;
   abstention.outcome = Outcome::kSafety;

@@ -66,6 +66,19 @@ class LearnTest : public testing::Test {
   Problem problem_;
 };
 
+// Two steps from the same place that differ by twice the bound, and by little more.
+TEST_F(LearnTest, ALearnedStepMayHaveBeenDisturbedAsAnyOther) {
+  problem_.declaration.disturbance = Eigen::VectorXd::Zero(6);
+  problem_.declaration.disturbance[2] = 0.125;
+  const Eigen::VectorXd z = Draw();
+  Add(problem_, z, Next(z, -0.125));
+  for (const double beyond : {-1e-9, 1e-9}) {
+    Certifier certifier(std::make_shared<Problem>(problem_));
+    EXPECT_EQ(Learn(certifier, z, Next(z, 0.125 + beyond)), Certifier::Learned::kAdded);
+    EXPECT_EQ(certifier.violation().has_value(), beyond > 0);
+  }
+}
+
 TEST_F(LearnTest, SaysWhatOneSaysThatKnewAllFromTheBeginning) {
   Problem all = problem_;
   std::vector<Eigen::VectorXd> points;

@@ -236,6 +236,27 @@ TEST(HandMade, EnvelopeAndRadius) {
   ExpectRefuted(Judge(Halves(), certificate), 0, "residual of vx");
 }
 
+// Once for the observed step, and once for this one.
+TEST(HandMade, ADisturbanceCountsForBothSteps) {
+  const auto problem = Halves();
+  problem->declaration.disturbance = Eigen::Vector4d(0.125, 0, 0, 0);
+  const auto certificate = [](double lower, double upper) {
+    Certificate one_step = OneStep();
+    one_step.slices[0].envelope_lower = Eigen::Vector4d(Down(-0.125), -kTiny, -kTiny, -kTiny);
+    one_step.slices[0].envelope_upper = Eigen::Vector4d(Up(0.125), kTiny, kTiny, kTiny);
+    one_step.slices[1].lower[0] = lower;
+    one_step.slices[1].upper[0] = upper;
+    return one_step;
+  };
+  const double lower = -1.375 - 0.25, upper = 1.625 + 0.25;
+  ExpectConfirmed(Judge(problem, certificate(Down(lower), Up(upper))));
+  ExpectRefuted(Judge(problem, certificate(lower, Up(upper))), 1, "hull contains px");
+  ExpectRefuted(Judge(problem, certificate(Down(lower), upper)), 1, "hull contains px");
+  Certificate sure_of_the_residual = certificate(Down(lower), Up(upper));
+  sure_of_the_residual.slices[0].envelope_upper[0] = 0.125;
+  ExpectRefuted(Judge(problem, sure_of_the_residual), 0, "residual of px");
+}
+
 TEST(HandMade, DistanceFromSetToSampleIsExact) {
   const auto problem = Halves();
   problem->declaration.lipschitz(0, 2) = 0.25;  // two columns: over the unit box D = 1/4 + 1/2 at the sample 0
@@ -436,6 +457,13 @@ TEST_F(Tampered, DroppedGenerator) {
 
 TEST_F(Tampered, ChangedSigma) {
   problem_->declaration.noise_bound[2] = 1e-12;
+  ExpectRefuted(Verdict_(), 0, "residual of theta");
+}
+
+TEST_F(Tampered, ChangedDisturbance) {
+  problem_->declaration.disturbance = Eigen::VectorXd::Zero(6);
+  EXPECT_EQ(Verdict_().status, Status::kConfirmed) << "zeros change nothing";
+  problem_->declaration.disturbance[2] = 1e-12;
   ExpectRefuted(Verdict_(), 0, "residual of theta");
 }
 
