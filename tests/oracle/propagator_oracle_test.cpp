@@ -116,6 +116,43 @@ TEST_P(StepOracle, TheSuccessorContainsTheExactImage) {
 
 INSTANTIATE_TEST_SUITE_P(DomainsOfAnySize, StepOracle, testing::Values(100.0, 1e12));
 
+// Bounds of the residual that somebody supplies, and that know nothing of the disturbance.
+class Given final : public ResidualEnclosure {
+ public:
+  explicit Given(double bound) : bound_(bound) {}
+  void Enclose(const QuerySet&, ResidualBounds& bounds) const noexcept override {
+    bounds.lower.fill(-bound_);
+    bounds.upper.fill(bound_);
+    bounds.capped = false;
+  }
+
+ private:
+  double bound_;
+};
+
+// The sum of both does not fit into a double, and the residual's part of it is what would be rounded away.
+TEST(PropagatorOracle, ADisturbanceFarAboveTheResidualIsRoundedOutward) {
+  Random random(632);
+  const Task task(random, 0x1p-40, false);  // so small that the rounding of the model hides nothing
+  task.problem->domain.input = Box(Eigen::Vector2d::Constant(-0x1p-40), Eigen::Vector2d::Constant(0x1p-40));
+  for (const double small : {0x1.8p-55, 0x1p-54, 0x1p-300, 0.1}) {
+    const Given residual(small);
+    const Propagator propagator(*task.problem->model, task.problem->domain, residual, Eigen::Vector4d::Ones(), kOrder,
+                                Method::kCentred);
+    const Zonotope origin = Zonotope::FromBox(Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero());
+    StepRecord record{};
+    std::array<double, kMaxStates> half_width{};
+    Zonotope next;
+    const std::array<double, kInputs> input{};
+    ASSERT_EQ(propagator.Step(origin, input, record, next, half_width.data()).status, StepResult::Status::kDone);
+    for (int k = 0; k < kStates; ++k) {
+      const Rational exactly = Rational(1) + Rational(small);
+      EXPECT_GE(exact::HalfWidth(next, k), exactly) << small;
+      EXPECT_LE(exact::HalfWidth(next, k), exactly * (Rational(1) + Rational(0x1p-48))) << small;
+    }
+  }
+}
+
 TEST(PropagatorOracle, HalfWidthsAreNeverBelowTheExactOnes) {
   Random random(631);
   SCOPED_TRACE(random.trace());
