@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char *kTasks = "tasks", *kTask = "task.yaml";
+constexpr const char *kTasks = "tasks", *kTask = "task.yaml", *kModel = "model.yaml";
 constexpr std::string_view kTransitions = "transitions-", kTransitionsEnding = ".csv", kPolicy = "policy-";
 constexpr std::int64_t kLargestFile = 256 * kMegabyte;
 constexpr std::size_t kHexDigits = 64;
@@ -88,9 +88,12 @@ std::string PolicyFileOf(const std::string& directory, const std::string& digest
 
 TaskCopy CopyTask(const Config& config) {
   TaskCopy copy{
-      config.grounds.config, config.grounds.observations, config.problem->model, BytesOf(config.path), {}, {}};
-  if (DigestOf(copy.task) != config.grounds.config) throw ConfigError(config.path + ": has changed since it was read");
+      config.grounds.config, config.grounds.observations, config.problem->model, BytesOf(config.path), {}, {}, {}};
   const NamedFiles named = FilesNamedBy(config.path);
+  if (!named.model.empty()) copy.model_file = BytesOf(named.model);
+  if (TaskDigest(copy.task, copy.model_file) != config.grounds.config)
+    throw ConfigError(config.path + ": has changed since it was read" +
+                      (named.model.empty() ? "" : ", or " + named.model + " has"));
   copy.transitions = BytesOf(named.transitions);
   if (!named.policy.empty()) copy.policy = BytesOf(named.policy);
   return copy;
@@ -113,6 +116,7 @@ void KeptTasks::Keep(const TaskCopy& copy) const {
     throw ConfigError("the transitions of the task have changed since they were read");
   data.Finish();
   if (!policy.empty()) Part(policy, copy.policy).Finish();
+  if (!copy.model_file.empty()) Part(directory + "/" + kModel, copy.model_file).Finish();
   Part(task, copy.task).Finish();  // last: with it the task is there
   Confirm(directory);
   Confirm(path_);
@@ -139,7 +143,8 @@ std::optional<Config> KeptTasks::Find(const Digest& digest, const std::set<Diges
 Config KeptTasks::Load(const std::string& digest, const std::string& version) const {
   const std::string directory = path_ + "/" + digest, task = directory + "/" + kTask;
   const std::string transitions = TransitionsFileOf(directory, version);
-  NamedFiles instead{transitions, {}};
+  const std::string model = directory + "/" + kModel;
+  NamedFiles instead{transitions, {}, fs::exists(model) ? model : ""};
   for (const std::string& policy : DigestsOfNames(directory, kPolicy, "")) {
     instead.policy = PolicyFileOf(directory, policy);
     if (ToHex(DigestOf(BytesOf(instead.policy))) != policy)
@@ -173,7 +178,7 @@ void KeptTasks::Remove(const std::string& digest) const {
   if (!IsDigest(digest)) return;
   const std::string directory = path_ + "/" + digest;
   std::error_code ignored;
-  fs::remove(directory + "/" + kTask, ignored);
+  for (const char* name : {kTask, kModel}) fs::remove(directory + "/" + name, ignored);
   for (const std::string& version : DigestsOfNames(directory, kTransitions, kTransitionsEnding))
     fs::remove(TransitionsFileOf(directory, version), ignored);
   for (const std::string& version : DigestsOfNames(directory, kPolicy, ""))

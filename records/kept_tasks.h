@@ -1,6 +1,7 @@
 /** The tasks of a directory's logs: copies of task files and of the files that they name, stored by digest.
 
     tasks/<config digest>/task.yaml                             the task file's bytes
+    tasks/<config digest>/model.yaml                            those of the model file that it includes, if it does
     tasks/<config digest>/transitions-<observations digest>.csv the transitions that it names
     tasks/<config digest>/policy-<digest>                       the policy that it names, if it does
 
@@ -23,7 +24,7 @@ namespace forereach {
 struct TaskCopy {
   Digest digest{}, observations_digest{};
   std::shared_ptr<const NominalModel> model;
-  std::string task, transitions, policy;  ///< `policy` is empty if the task names none.
+  std::string task, transitions, policy, model_file;  ///< The last two are empty if the task names none.
 };
 
 /** Reads the files of a loaded task again. @throws ConfigError if they cannot be read, or the task file has changed. */

@@ -18,6 +18,16 @@ std::vector<std::string> NominalModel::variable_names() const {
   return names;
 }
 
+namespace {
+
+// How an expression is laid out in its file does not matter. No two names or numbers stand side by side in one.
+std::string WithoutBlanks(std::string text) {
+  std::erase_if(text, [](char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; });
+  return text;
+}
+
+}  // namespace
+
 // Parameters without a range as for a compiled model. Units are for people.
 std::string NominalModel::description() const {
   std::string text = names_.name;
@@ -33,11 +43,12 @@ std::string NominalModel::description() const {
   };
   add_names("states", names_.states);
   add_names("inputs", names_.inputs);
-  for (const auto& [name, value] : names_.text->definitions) text += "; let " + name + " = " + value.text;
+  for (const auto& [name, value] : names_.text->definitions)
+    text += "; let " + name + " = " + WithoutBlanks(value.text);
   constexpr std::array kKinds{"next", "euler", "midpoint", "rk4"};
   for (std::size_t k = 0; k < names_.states.size(); ++k)
     text += std::string("; ") + kKinds[static_cast<std::size_t>(names_.text->integrator)] + " " + names_.states[k] +
-            " = " + names_.text->equations[k].text;
+            " = " + WithoutBlanks(names_.text->equations[k].text);
   return text;
 }
 

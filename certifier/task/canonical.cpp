@@ -41,6 +41,14 @@ void CanonicalBytes::Numbers(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
     for (Eigen::Index j = 0; j < matrix.cols(); ++j) Number(matrix(i, j));
 }
 
+Digest TaskDigest(std::string_view task, std::string_view model) {
+  if (model.empty()) return DigestOf(task);
+  CanonicalBytes bytes("forereach task");
+  bytes.Text(task);
+  bytes.Text(model);
+  return bytes.digest();
+}
+
 Digest ModelDigest(const NominalModel& model) {
   CanonicalBytes bytes = Begin("forereach model", model);
   bytes.Text(model.description());

@@ -35,6 +35,9 @@ class CanonicalBytes final {
   std::string bytes_;
 };
 
+/** Of the bytes of a task file, and those of the model file that it includes; without one, `model` is empty. */
+[[nodiscard]] Digest TaskDigest(std::string_view task, std::string_view model);
+
 /** Of the model's description and its coordinates' names. */
 [[nodiscard]] Digest ModelDigest(const NominalModel& model);
 
@@ -47,7 +50,7 @@ class CanonicalBytes final {
 /** Of the obstacles in their order, which a decision's witness refers to. */
 [[nodiscard]] Digest ObstaclesDigest(const std::vector<Obstacle>& obstacles);
 
-/** Of a task with these, before anything is heard or learned. `config` is the digest of its file. */
+/** Of a task with these, before anything is heard or learned. `config` is its TaskDigest. */
 [[nodiscard]] Grounds GroundsOf(const Digest& config, const Problem& problem, const std::vector<Obstacle>& obstacles);
 
 }  // namespace forereach

@@ -77,8 +77,9 @@ void ReadKeys(Document& file, TaskDraft& draft) {
 Config Load(const std::string& path, TransitionsFile transitions, const NamedFiles& instead) {
   Document file(path);
   TaskDraft draft;
+  draft.model_file.path = instead.model;
   ReadKeys(file, draft);
-  auto& [config, problem, scope, transitions_path] = draft;
+  auto& [config, problem, scope, transitions_path, model_file] = draft;
   const NominalModel& model = *problem.model;
   if (!instead.transitions.empty()) transitions_path = instead.transitions;
   if (!instead.policy.empty() && !config.planner.policy.empty()) config.planner.policy = instead.policy;
@@ -87,7 +88,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
   }
   config.path = path;
-  config.grounds = GroundsOf(DigestOf(file.text()), problem, config.obstacles);
+  config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
   if (problem.between && config.robot.step_period_ms > config.period * 1e3)
     file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", longer than model.dt, " +
@@ -109,7 +110,7 @@ NamedFiles FilesNamedBy(const std::string& path) {
   Document file(path);
   TaskDraft draft;
   ReadKeys(file, draft);
-  return {draft.transitions, draft.config.planner.policy};
+  return {draft.transitions, draft.config.planner.policy, draft.model_file.path};
 }
 
 void RequireForCertifying(const Config& config) {

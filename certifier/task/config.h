@@ -50,7 +50,7 @@ number that is not finite or out of range, a transition outside the domain. */
 /** The paths of the data files of a task, which belong to the task but not to the bytes of its file. Empty if the task
 file names no such file. A key file is not listed: it is a secret, not data. */
 struct NamedFiles {
-  std::string transitions, policy;
+  std::string transitions, policy, model;
 };
 
 /** The files that a task file names, relative to its directory. @throws ConfigError if it is not a task file. */

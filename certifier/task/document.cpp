@@ -12,6 +12,7 @@
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
+#include "certifier/dynamics/expression.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/config_error.h"
 #include "certifier/task/draft.h"
@@ -79,6 +80,7 @@ bool HasForm(const YAML::Node& node, Type type) {
     case Type::kInteger: return node.IsScalar() && node.Tag() == "?";  // not quoted
     case Type::kWord:
     case Type::kText:
+    case Type::kExpression:
     case Type::kChannel: return node.IsScalar();
   }
   return false;
@@ -93,6 +95,7 @@ std::string FormName(Type type) {
     case Type::kNames: return "a list of names";
     case Type::kNumber: return "a number";
     case Type::kInteger: return "an integer";
+    case Type::kExpression: return "an expression";
     case Type::kWord:
     case Type::kText:
     case Type::kChannel: return "a word";
@@ -163,8 +166,9 @@ std::string Correction(const std::string& token, const Key& row) {
 
 class Checker {
  public:
-  Checker(const std::string& path, const SchemaScope& scope, const Document::Visitor& visit, Values& values)
-      : path_(path), scope_(scope), visit_(visit), values_(values) {}
+  Checker(const std::string& path, std::span<const Key> schema, const SchemaScope& scope,
+          const Document::Visitor& visit, Values& values)
+      : path_(path), schema_(schema), scope_(scope), visit_(visit), values_(values) {}
 
   // `pattern` is the path in the schema, `key` the same with names and indices filled in.
   void Check(const YAML::Node& node, const std::string& pattern, const std::string& key) {
@@ -192,6 +196,7 @@ class Checker {
       case Type::kNames: return CheckNames(node, row, key);
       case Type::kWord:
       case Type::kText:
+      case Type::kExpression:
       case Type::kChannel: return CheckText(node, row, key);
     }
   }
@@ -210,7 +215,7 @@ class Checker {
   const Key& RowFor(const YAML::Node& node, const std::string& pattern, const std::string& key) const {
     const Key* last = nullptr;
     std::string forms;
-    for (const Key& row : Schema()) {
+    for (const Key& row : schema_) {
       if (row.path != pattern) continue;
       if (HasForm(node, row.type)) return row;
       forms += (last ? " or " : "") + FormName(row.type);
@@ -236,11 +241,12 @@ class Checker {
       if (!is_new)
         Fail(entry.first, child,
              "duplicate key, first in line " + std::to_string(first->second) + "; delete one of them");
-      if (!row.only.empty() && row.only != kind) Fail(entry.first, child, "is for " + row.only + ", not for " + kind);
+      if (!row.only.empty() && row.only != kind)
+        Fail(entry.first, child, "is for " + row.only + (kind.empty() ? "" : ", not for " + kind));
       children.emplace(&row, Child{child, entry.second});
     }
     // A row's reader relies on the rows before it.
-    for (const Key& row : Schema()) {
+    for (const Key& row : schema_) {
       if (!IsChild(row, pattern)) continue;
       if (row.required && (row.only.empty() || row.only == kind) && !seen.contains(std::string(Leaf(row.path))) &&
           !Leaf(row.path).starts_with('<'))
@@ -253,9 +259,13 @@ class Checker {
   const Key& ChildRow(const YAML::Node& entry, const std::string& pattern, const std::string& key) const {
     const std::string& word = entry.Scalar();
     std::vector<std::string> known;
-    for (const Key& row : Schema()) {
+    for (const Key& row : schema_) {
       if (!IsChild(row, pattern)) continue;
       const std::string leaf(Leaf(row.path));
+      if (leaf == "<name>") {
+        RequireName(entry, key);
+        return row;
+      }
       if (leaf.starts_with('<')) {
         known = leaf == "<state>" ? scope_.states : scope_.variables;
         if (known.empty() || Contains(known, word)) return row;
@@ -268,8 +278,28 @@ class Checker {
     if (const std::size_t colon = word.find(':'); colon != std::string::npos && Contains(known, word.substr(0, colon)))
       Fail(entry, Below(key, word),
            "unknown key; write a space after the colon: " + word.substr(0, colon) + ": " + word.substr(colon + 1));
-    Fail(entry, Below(key, word), "unknown key; " + Suggestion(word, known));
+    Fail(entry, Below(key, word), "unknown key; " + CommaAdvice(word) + Suggestion(word, known));
   }
+
+  void RequireName(const YAML::Node& entry, const std::string& key) const {
+    const std::string& word = entry.Scalar();
+    const std::string at = Below(key, word.substr(0, kLongestName));
+    if (!IsName(word))
+      Fail(entry, at,
+           "is not a name; " + CommaAdvice(word) +
+               "a name has letters, digits and underscores, and does not begin with a digit");
+    if (word.size() > kLongestName)
+      Fail(entry, at,
+           "...: the name has " + std::to_string(word.size()) + " letters, at most " + std::to_string(kLongestName) +
+               " are allowed");
+  }
+
+  // In { }, a comma ends an expression, and YAML takes the rest for a key.
+  static std::string CommaAdvice(const std::string& word) {
+    return word.find(')') == std::string::npos ? "" : "put an expression with a comma inside { } into quotes; ";
+  }
+
+  static constexpr std::size_t kLongestName = 64;
 
   void CheckNumber(const YAML::Node& node, const Key& row, const std::string& key) {
     const std::string not_one = " is not " + NumberName(row.type);
@@ -348,6 +378,7 @@ class Checker {
   static constexpr const char* kChannelLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
 
   const std::string& path_;
+  const std::span<const Key> schema_;
   const SchemaScope& scope_;
   const Document::Visitor& visit_;
   Values& values_;
@@ -394,6 +425,65 @@ YAML::Node Parse(const std::string& path, const std::string& text) {
   }
 }
 
+// Where a scalar's characters stand in its file, so far as they can be found.
+class Layout final {
+ public:
+  Layout(const std::string& file, const YAML::Mark& mark) : file_(file), line_(mark.line + 1) {
+    for (int left = mark.line; left > 0 && at_ < file.size(); --left) at_ = LineEnd() + 1;
+    at_ += ToSize(mark.column);
+    column_ = mark.column + 1;
+    const char style = at_ < file.size() ? file[at_] : '\0';
+    if (style == '"' || style == '\'') Advance();
+    if (style == '|' || style == '>')  // the text begins in the next line
+      while (at_ < file.size() && line_ == mark.line + 1) Advance();
+  }
+
+  [[nodiscard]] int line() const { return line_; }
+  [[nodiscard]] int column() const { return column_; }
+
+  /** Skips blanks up to this character. False if another one stands there. */
+  [[nodiscard]] bool Find(char c) {
+    while (at_ < file_.size() && file_[at_] != c && IsBlank(file_[at_])) Advance();
+    return at_ < file_.size() && file_[at_] == c;
+  }
+  void Advance() {
+    ++column_;
+    if (file_[at_++] == '\n') {
+      ++line_;
+      column_ = 1;
+    }
+  }
+  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+ private:
+  [[nodiscard]] std::size_t LineEnd() const { return std::min(file_.find('\n', at_), file_.size()); }
+
+  const std::string& file_;
+  std::size_t at_ = 0;
+  int line_, column_ = 1;
+};
+
+// A scalar as it is laid out in its file. YAML has joined its lines, or cut off their indentation.
+ExpressionText Laid(const std::string& scalar, const std::string& file, const YAML::Mark& mark) {
+  ExpressionText laid{"", LineOf(mark), mark.column + 1};
+  Layout layout(file, mark);
+  int line = 0, column = 0;  // behind what is laid
+  for (const char c : scalar) {
+    if (Layout::IsBlank(c)) continue;
+    if (!layout.Find(c)) return {scalar, LineOf(mark), mark.column + 1};  // an escape
+    if (laid.text.empty()) {
+      laid.line = line = layout.line();
+      laid.column = column = layout.column();
+    }
+    for (; line < layout.line(); ++line, column = 1) laid.text += '\n';
+    laid.text.append(ToSize(layout.column() - column), ' ');
+    laid.text += c;
+    layout.Advance();
+    column = layout.column();
+  }
+  return laid;
+}
+
 Eigen::VectorXd VectorOf(const YAML::Node& node) {
   std::vector<double> entries;
   for (const auto& entry : node) entries.push_back(ParseNumber(entry.Scalar()).value);
@@ -416,15 +506,15 @@ struct Document::Tree {
   }
 };
 
-Document::Document(const std::string& path)
+Document::Document(const std::string& path, const std::string& named_by)
     : path_(path),
-      text_(ReadWhole(path, kLargestTaskFile)),
+      text_(ReadWhole(path, kLargestTaskFile, named_by)),
       tree_(std::make_unique<Tree>(Tree{Parse(path, text_), {}})) {}
 
 Document::~Document() = default;
 
-void Document::Check(const SchemaScope& scope, const Visitor& visit) {
-  Checker(path_, scope, visit, tree_->values).Check(tree_->root, "", "");
+void Document::Check(const SchemaScope& scope, const Visitor& visit, std::span<const Key> schema) {
+  Checker(path_, schema, scope, visit, tree_->values).Check(tree_->root, "", "");
 }
 
 int Document::Count(std::string_view key) const {
@@ -455,6 +545,11 @@ std::vector<std::string> Document::Names(std::string_view key) const {
   std::vector<std::string> names;
   for (const auto& entry : tree_->Get(key)) names.push_back(entry.Scalar());
   return names;
+}
+
+ExpressionText Document::Expression(std::string_view key) const {
+  const YAML::Node& node = tree_->Get(key);
+  return Laid(node.Scalar(), text_, node.Mark());
 }
 
 void Document::Read(std::string_view key, double& value) const { value = Number(key); }

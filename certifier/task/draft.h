@@ -20,6 +20,11 @@ struct TaskDraft {
   Problem problem;
   SchemaScope scope;
   std::string transitions;  ///< Path.
+  /** The model file that `model.file` names, and its bytes. If `path` is not empty before the file is read, it is read
+  instead of the one that is named. */
+  struct {
+    std::string path, bytes;
+  } model_file;
 };
 
 }  // namespace forereach

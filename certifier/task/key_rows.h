@@ -120,6 +120,15 @@ const T& ValueNamed(const std::vector<Named<T>>& all, std::string_view name) {
   return found->value;
 }
 
+inline Key Expression(std::string path, std::string meaning) {
+  return Of(Key::Type::kExpression, std::move(path), std::move(meaning));
+}
+
+inline bool Has(const Document& file, const std::string& map, std::string_view name) {
+  const std::vector<std::string> keys = file.KeysOf(map);
+  return std::ranges::find(keys, name) != keys.end();
+}
+
 /** The path of a file that a task file names, relative to the task file's directory. */
 inline std::string RelativeTo(const std::string& file, const std::string& path) {
   return (std::filesystem::path(file).parent_path() / path).string();
@@ -213,7 +222,9 @@ class OptionRows final {
 
 // ---- The parts of the schema, in its order.
 
-std::vector<Key> ProblemKeys();        ///< model, domain, declaration, residual, task, certifier
+std::vector<Key> ModelKeys();          ///< model
+std::vector<Key> ModelFileKeys();      ///< model, of a model file
+std::vector<Key> ProblemKeys();        ///< domain, declaration, residual, task, certifier
 std::vector<Key> ResidualKeys();       ///< residual, among those
 std::vector<Key> OptionKeys();         ///< gate, realtime, bus, planner, robot, logger
 std::vector<Key> RobotResidualKeys();  ///< robot.residual, among those

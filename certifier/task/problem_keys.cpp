@@ -1,13 +1,10 @@
-// The rows of a task file that say what is certified: model, domain, declaration, residual, task, certifier.
+// The rows of a task file that say what is certified: domain, declaration, residual, task, certifier.
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <span>
 
-#include "certifier/dynamics/kinematic_bicycle.h"
-#include "certifier/dynamics/models.h"
-#include "certifier/dynamics/point_mass.h"
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
@@ -39,37 +36,6 @@ Eigen::MatrixXd ReadMatrix(const Document& file, const std::string& key) {
   Eigen::MatrixXd matrix(std::ssize(rows), rows.front().size());
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) matrix.row(i) = rows[ToSize(i)].transpose();
   return matrix;
-}
-
-using ModelMaker = std::shared_ptr<const NominalModel> (*)(const Document& file);
-
-const std::vector<Named<ModelMaker>>& Models() {
-  static const std::vector<Named<ModelMaker>> models{
-      {KinematicBicycle::kName,
-       [](const Document& file) {
-         return MakeKinematicBicycle(file.Number("model.dt"), file.Number("model.wheelbase"));
-       }},
-      {PointMass::kName, [](const Document& file) { return MakePointMass(file.Number("model.dt")); }},
-  };
-  return models;
-}
-
-void ReadModel(const Document& file, const std::string& key, TaskDraft& draft) {
-  draft.problem.model = ValueNamed(Models(), file.Text(key + ".name"))(file);
-  const NominalModel& model = *draft.problem.model;
-  draft.scope = {model.state_names(), model.input_names(), model.variable_names()};
-  draft.config.period = file.Number(key + ".dt");
-  draft.config.gate.longest_step_ms = draft.config.period * 1e3;
-}
-
-std::vector<Key> ModelKeys() {
-  return {
-      Required(Map("model", "The nominal model f0.", ReadModel)),
-      Required(Word("model.name", NamesIn(Models()), "The equations.")),
-      Required(Number("model.dt", "s", UpTo(60), "The time from one control to the next.")),
-      OnlyFor(KinematicBicycle::kName,
-              Required(Number("model.wheelbase", "m", UpTo(1000), "Distance between the axles."))),
-  };
 }
 
 void ReadBall(const Document& file, const std::string& key, TaskDraft& draft) {
@@ -215,11 +181,6 @@ void ReadProjectionByNames(const Document& file, const std::string& key, TaskDra
 
 void ReadProjectionMatrix(const Document& file, const std::string& key, TaskDraft& draft) {
   SetProjection(file, key, ReadMatrix(file, key), draft);
-}
-
-bool Has(const Document& file, const std::string& map, std::string_view name) {
-  const std::vector<std::string> keys = file.KeysOf(map);
-  return std::ranges::find(keys, name) != keys.end();
 }
 
 // @throws ConfigError unless `of` is the size of a part's point.
@@ -465,7 +426,7 @@ std::vector<Key> CertifierKeys() {
 
 std::vector<Key> ProblemKeys() {
   std::vector<Key> keys;
-  for (const auto part : {ModelKeys, DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys})
+  for (const auto part : {DomainKeys, DeclarationKeys, ResidualKeys, TaskKeys, CertifierKeys})
     std::ranges::move(part(), std::back_inserter(keys));
   return keys;
 }

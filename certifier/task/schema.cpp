@@ -39,6 +39,7 @@ std::string TypeText(const Key& key) {
       return CountText(key.count) + (key.size == Size::kStates ? " names of states" : " names of states and inputs");
     case Type::kWord: return (key.words.size() > 1 ? "one of " : "") + Joined({key.words.begin(), key.words.end()});
     case Type::kText: return "text";
+    case Type::kExpression: return "expression";
     case Type::kChannel: return "channel";
   }
   return "";
@@ -62,17 +63,21 @@ std::string DefaultText(const Key& key) {
   return key.fallback;
 }
 
-std::vector<Key> MakeSchema() {
-  std::vector<Key> keys{key_rows::Map("", "The task file.")};
-  for (const auto part : {key_rows::ProblemKeys, key_rows::OptionKeys})
-    std::ranges::move(part(), std::back_inserter(keys));
+std::vector<Key> MakeSchema(std::initializer_list<std::vector<Key> (*)()> parts) {
+  std::vector<Key> keys{key_rows::Map("", "The file.")};
+  for (const auto part : parts) std::ranges::move(part(), std::back_inserter(keys));
   return keys;
 }
 
 }  // namespace
 
 std::span<const Key> Schema() {
-  static const std::vector<Key> keys = MakeSchema();
+  static const std::vector<Key> keys = MakeSchema({key_rows::ModelKeys, key_rows::ProblemKeys, key_rows::OptionKeys});
+  return keys;
+}
+
+std::span<const Key> ModelFileSchema() {
+  static const std::vector<Key> keys = MakeSchema({key_rows::ModelFileKeys});
   return keys;
 }
 
@@ -87,9 +92,9 @@ std::string SchemaMarkdown() {
       "## Keys\n\n"
       "A dot leads one map down. `[]` means every entry of a list, `<state>` the name of a state, `<variable>` the "
       "name of a\n"
-      "state or an input. Lists of numbers are in the model's order. A range with `(` or `)` does not contain its end. "
-      "If the\n"
-      "default is empty, the key may be left out and has no value.\n"
+      "state or an input, `<name>` any name. Lists of numbers are in the model's order. A range with `(` or `)` does "
+      "not contain\n"
+      "its end. If the default is empty, the key may be left out and has no value.\n"
       "\n"
       "| Key | Type | Unit | Range | Default | Meaning |\n"
       "| --- | --- | --- | --- | --- | --- |\n";

@@ -31,7 +31,8 @@ struct Range {
 inline constexpr Range kReal{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
 
 /** One row. In a path, a dot precedes each key, `[]` stands for every entry of a list, `<state>` for the name of every
-state, and `<variable>` for the name of every state or input. A path has several rows if its value has several forms. */
+state, `<variable>` for the name of every state or input, and `<name>` for any name. A path has several rows if its
+value has several forms. */
 struct Key {
   enum class Type {
     kMap,
@@ -43,7 +44,8 @@ struct Key {
     kNames,    ///< A list of different coordinates.
     kWord,     ///< One of `words`.
     kText,
-    kChannel,  ///< Letters, digits and underscores, at most 63.
+    kExpression,  ///< See docs/expressions.md. Its text is parsed by the reader.
+    kChannel,     ///< Letters, digits and underscores, at most 63.
   };
   /** The number of entries of a vector, or of every vector of kVectors. kPoint: 2 or 3. */
   enum class Size { kAny, kStates, kInputs, kVariables, kSafety, kPoint };
@@ -65,9 +67,12 @@ struct Key {
   Reader read = {};  ///< Empty if the reader of the enclosing map or list reads it.
 };
 
-/** All rows, in the order in which a file is read. The model, and the projection or body, precede the keys whose names
-or sizes depend on them. */
+/** All rows of a task file, in the order in which it is read. The model, and the projection or body, precede the keys
+whose names or sizes depend on them. */
 [[nodiscard]] std::span<const Key> Schema();
+
+/** All rows of a model file, which a task file includes by `model.file`. */
+[[nodiscard]] std::span<const Key> ModelFileSchema();
 
 /** The section "Keys" of config/README.md. */
 [[nodiscard]] std::string SchemaMarkdown();

@@ -44,8 +44,10 @@ TEST_F(ErrorTest, ErrorsComeInTheSchemasOrder) {
 }
 
 TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
-  EXPECT_EQ(files_.ErrorWith("dt: 0.15", "dt: 0.15, \"a\\nb\\e[2J\": 1"),
-            "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase");
+  EXPECT_EQ(
+      files_.ErrorWith("dt: 0.15", "dt: 0.15, \"a\\nb\\e[2J\": 1"),
+      "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase, file, states, inputs, parameters, "
+      "let, next, rate, integrator");
   EXPECT_EQ(files_.ErrorWith("name: point_mass", "name: \"point\\nmass\""),
             "task.yaml:1: model.name: point?mass is not known; did you mean point_mass?");
 }

@@ -8,6 +8,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "certifier/certify/explain.h"
+#include "certifier/dynamics/text_model.h"
 #include "certifier/task/config.h"
 #include "certifier/task/schema.h"
 #include "robot/target.h"
@@ -87,6 +88,78 @@ TEST(Shipped, EachPlanGetsTheAnswerItIsNamedAfter) {
     EXPECT_EQ(Certify(task, task + "_domain"), Outcome::kDomain) << task;
     EXPECT_EQ(Certify(task, task + "_safety"), Outcome::kSafety) << task;
     EXPECT_EQ(Certify(task + "_falsified", task + "_certified"), Outcome::kFalsified) << task;
+  }
+}
+
+// Whether two tubes are the same to the last bit.
+void ExpectSameTube(const Tube& a, const Tube& b, const std::string& what) {
+  ASSERT_EQ(a.length(), b.length()) << what;
+  for (int t = 0; t <= a.length(); ++t) {
+    EXPECT_THAT(a.half_width(t), testing::ElementsAreArray(b.half_width(t))) << what << ", step " << t;
+    EXPECT_THAT(a.slice(t).center(), testing::ElementsAreArray(b.slice(t).center())) << what << ", step " << t;
+    ASSERT_EQ(a.slice(t).num_generators(), b.slice(t).num_generators()) << what << ", step " << t;
+    for (int k = 0; k < a.slice(t).dim(); ++k)
+      EXPECT_THAT(a.slice(t).row(k), testing::ElementsAreArray(b.slice(t).row(k))) << what << ", step " << t;
+  }
+}
+
+void ExpectSameDecision(const Config& compiled, const Config& text, const Eigen::MatrixXd& controls,
+                        const std::string& what) {
+  const auto decide = [&](const Config& config, Tube& tube) {
+    const auto inputs = static_cast<int>(controls.rows());
+    const Plan plan{controls.data(), inputs, static_cast<int>(controls.cols()), inputs};
+    return Certifier(config.problem).Certify(plan, Zonotope::Enclose(config.initial_set), config.obstacles, tube);
+  };
+  Tube tube, text_tube;
+  const Decision a = decide(compiled, tube), b = decide(text, text_tube);
+  EXPECT_EQ(a.outcome, b.outcome) << what;
+  EXPECT_EQ(a.cause, b.cause) << what;
+  EXPECT_EQ(a.step, b.step) << what;
+  EXPECT_EQ(a.coordinate, b.coordinate) << what;
+  EXPECT_EQ(a.obstacle, b.obstacle) << what;
+  EXPECT_EQ(a.closest_step, b.closest_step) << what;
+  EXPECT_EQ(a.margin, b.margin) << what;
+  EXPECT_EQ(a.threshold, b.threshold) << what;
+  ExpectSameTube(tube, text_tube, what);
+}
+
+TEST(Shipped, AModelAsTextGivesTheDecisionsOfTheCompiledOne) {
+  for (const std::string task : {"bicycle", "point_mass"}) {
+    const Config compiled = LoadConfig(kDirectory + task + ".yaml");
+    Config text = LoadConfig(kDirectory + task + "_text.yaml");
+    EXPECT_NE(text.grounds.model, compiled.grounds.model);
+    EXPECT_EQ(text.grounds.declaration, compiled.grounds.declaration);
+    EXPECT_EQ(text.grounds.observations, compiled.grounds.observations);
+    for (const Method method : {Method::kCentred, Method::kPaper})
+      for (const char* end : {"_certified", "_domain", "_safety"}) {
+        Config one = compiled, other = text;
+        for (Config* config : {&one, &other}) {
+          Problem problem = *config->problem;
+          problem.method = method;
+          config->problem = std::make_shared<const Problem>(std::move(problem));
+        }
+        const std::string plan = task + end;
+        ExpectSameDecision(one, other, LoadPlan(kDirectory + "plans/" + plan + ".csv", *text.problem->model), plan);
+      }
+  }
+}
+
+// Tasks with a body, and with bounds between the samples.
+TEST(Shipped, AModelAsTextDecidesAsTheCompiledOneInOtherTasks) {
+  for (const auto& [task, plan] :
+       {std::pair{"truck", "truck_turn"}, {"post", "straight"}, {"post_samples", "straight"}}) {
+    const Config compiled = LoadConfig(kDirectory + task + ".yaml");
+    const NominalModel& model = *compiled.problem->model;
+    ModelText text = *LoadConfig(kDirectory + "bicycle_text.yaml").problem->model->text();
+    for (std::size_t p = 0; p < text.parameters.size(); ++p) {
+      ASSERT_EQ(text.parameters[p].name, model.parameter_names()[p]);
+      text.parameters[p].lower = text.parameters[p].upper = model.parameters()[p];
+    }
+    Config other = compiled;
+    Problem problem = *compiled.problem;
+    problem.model = MakeTextModel(text);
+    other.problem = std::make_shared<const Problem>(std::move(problem));
+    ExpectSameDecision(compiled, other, LoadPlan(kDirectory + "plans/" + plan + ".csv", model), task);
   }
 }
 

@@ -43,6 +43,22 @@ inline std::string Replaced(std::string text, const std::string& from, const std
   return text.replace(at, from.size(), to);
 }
 
+/** A task for the line or lines of a model, with the box [-1, 1] for a domain. */
+inline std::string TaskFor(const std::string& model, std::size_t states, std::size_t inputs,
+                           const std::string& projection) {
+  const auto list = [](std::size_t count, const std::string& entry) {
+    std::string text;
+    for (std::size_t i = 0; i < count; ++i) text += (i == 0 ? "[" : ", ") + entry;
+    return text + "]";
+  };
+  return model + "domain:\n  state: {lower: " + list(states, "-1") + ", upper: " + list(states, "1") +
+         "}\n  input: {lower: " + list(inputs, "-1") + ", upper: " + list(inputs, "1") +
+         "}\ndeclaration: {lipschitz: {}, noise_bound: " + list(states, "0") +
+         "}\ntransitions: steps.csv\ntask:\n  initial_set: {center: " + list(states, "0") +
+         ", half_width: " + list(states, "0") + "}\n  projection: [" + projection +
+         "]\n  obstacles: []\n  between: samples\n";
+}
+
 /** Writes task and transitions into a scratch directory and loads them. */
 class TaskFiles {
  public:

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "forereach/certifier_status_v2_t.hpp"
+#include "tests/config/task_files.h"
 #include "tests/logger/disk_fixture.h"
 
 namespace forereach {
@@ -69,6 +70,36 @@ TEST_F(KeptTest, AReloadedTaskIsKeptIfItIsTheOneThatTheHeartbeatNames) {
   EXPECT_TRUE(IsKept(second));
   EXPECT_FALSE(IsKept(unknown));
   Stop();
+}
+
+TEST(KeptTasks, AModelFileIsKeptWithItsTask) {
+  const ScratchDirectory scratch;
+  const std::string model =
+      "model: {states: {x: m}, inputs: {u: m/s}, parameters: {dt: 0.1, gain: 2}, next: {x: x + dt*gain*u}}\n";
+  scratch.Write("model.yaml", "no model");  // the name of the copy
+  scratch.Write("gain.yaml", model);
+  scratch.Write("steps.csv", "x,u,x_next\n0,1,0.2\n");
+  const Config config =
+      LoadConfig(scratch.Write("task.yaml", TaskFor("model: {file: gain.yaml, parameters: {dt: 0.2}}\n", 1, 1, "x")));
+  const KeptTasks kept(scratch / "log");
+  kept.Keep(CopyTask(config));
+  scratch.Write("gain.yaml", "model: {}\n");
+  EXPECT_THROW((void)CopyTask(config), ConfigError) << "the task is another one now";
+  fs::remove(scratch / "gain.yaml");
+
+  const std::optional<Config> found = kept.Find(config.grounds.config, {});
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->grounds.model, config.grounds.model);
+  EXPECT_EQ(found->problem->model->text()->equations, config.problem->model->text()->equations);
+  EXPECT_EQ(found->period, 0.2);
+  const std::string hex = ToHex(config.grounds.config), copy = kept.PathOf(config.grounds.config) + "/model.yaml";
+  EXPECT_TRUE(kept.FindDamage(hex).empty());
+  std::ofstream(copy, std::ios::app) << "# more\n";
+  EXPECT_FALSE(kept.FindDamage(hex).empty());
+  fs::remove(copy);
+  EXPECT_FALSE(kept.FindDamage(hex).empty());
+  kept.Remove(hex);
+  EXPECT_FALSE(fs::exists(kept.PathOf(config.grounds.config)));
 }
 
 TEST_F(KeptTest, ADeletedDirectoryGetsItsTasksAgain) {

@@ -1,0 +1,287 @@
+// The rows of the nominal model: one of the library, or equations as text, in the task file or in a model file.
+#include <filesystem>
+#include <iterator>
+#include <map>
+
+#include "certifier/dynamics/expression.h"
+#include "certifier/dynamics/kinematic_bicycle.h"
+#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/point_mass.h"
+#include "certifier/dynamics/text_model.h"
+#include "certifier/numerics/size.h"
+#include "certifier/task/config_error.h"
+#include "certifier/task/key_rows.h"
+#include "certifier/task/model_file.h"
+#include "command_line/nearest.h"
+
+namespace forereach::key_rows {
+namespace {
+
+using Integrator = ModelText::Integrator;
+
+constexpr Range kStep = UpTo(60);
+constexpr int kMostNames = 1000;  // of parameters, and of definitions
+constexpr const char *kStepName = "dt", *kNextEnding = "_next";
+
+using ModelMaker = std::shared_ptr<const NominalModel> (*)(const Document& file);
+
+const std::vector<Named<ModelMaker>>& Models() {
+  static const std::vector<Named<ModelMaker>> models{
+      {KinematicBicycle::kName,
+       [](const Document& file) {
+         return MakeKinematicBicycle(file.Number("model.dt"), file.Number("model.wheelbase"));
+       }},
+      {PointMass::kName, [](const Document& file) { return MakePointMass(file.Number("model.dt")); }},
+  };
+  return models;
+}
+
+const std::vector<Named<Integrator>>& Integrators() {
+  static const std::vector<Named<Integrator>> integrators{
+      {"euler", Integrator::kEuler}, {"midpoint", Integrator::kMidpoint}, {"rk4", Integrator::kRk4}};
+  return integrators;
+}
+
+// Reads the map `model` of a document as text. The document is a task file or a model file.
+class TextReader final {
+ public:
+  explicit TextReader(const Document& file) : file_(file) {}
+
+  ModelText Read() {
+    text_.file = file_.path();
+    ReadVariables("states", kMaxStates, text_.states);
+    ReadVariables("inputs", kMaxInputs, text_.inputs);
+    ReadParameters();
+    ReadDefinitions();
+    ReadEquations();
+    return std::move(text_);
+  }
+
+ private:
+  // The names of a map that is there.
+  std::vector<std::string> NamesOf(const std::string& map, int least, int most) {
+    const std::string key = "model." + map;
+    const std::vector<std::string> names = file_.KeysOf(key);
+    if (const Range count = Between(least, most); !count.Contains(static_cast<double>(names.size())))
+      file_.Fail(key, "has " + std::to_string(names.size()) + " entries, which is outside " + count.text());
+    for (const std::string& name : names) Take(map, name);
+    return names;
+  }
+
+  // No name has two meanings.
+  void Take(const std::string& map, const std::string& name) {
+    const std::string key = "model." + map + "." + name;
+    if (IsReserved(name))
+      file_.Fail(key,
+                 name + (name == "pi" ? " is a number" : " is a function") + " of the language; choose another name");
+    const auto [other, is_new] = meanings_.emplace(name, map);
+    if (!is_new) file_.Fail(key, "is a name of model." + other->second + " already; choose another name");
+  }
+
+  void ReadVariables(const std::string& map, int most, std::vector<ModelText::Variable>& variables) {
+    if (!Has(file_, "model", map)) file_.Fail("model." + map, "missing: a model as text needs this key");
+    for (const std::string& name : NamesOf(map, 1, most))
+      variables.push_back({name, file_.Text("model." + map + "." + name)});
+    if (&variables == &text_.states) return;
+    for (const ModelText::Variable& state : text_.states)  // a column of transitions
+      if (const std::string next = state.name + kNextEnding; meanings_.contains(next))
+        file_.Fail("model." + meanings_[next] + "." + next,
+                   "is the column of the state " + state.name + " after a step; choose another name");
+  }
+
+  void ReadParameters() {
+    if (!Has(file_, "model", "parameters")) file_.Fail("model.parameters.dt", "missing: the step of the model, in s");
+    for (const std::string& name : NamesOf("parameters", 1, kMostNames)) {
+      const std::string key = "model.parameters." + name;
+      text_.parameters.push_back(ReadParameter(file_, key, name));
+    }
+    if (!meanings_.contains(kStepName) || meanings_[kStepName] != "parameters")
+      file_.Fail("model.parameters.dt", "missing: the step of the model, in s");
+  }
+
+  void ReadDefinitions() {
+    for (const std::string& name : NamesOf("let", 0, kMostNames))
+      text_.definitions.push_back({name, file_.Expression("model.let." + name)});
+  }
+
+  void ReadEquations() {
+    const bool is_rate = Has(file_, "model", "rate"), has_integrator = Has(file_, "model", "integrator");
+    if (is_rate == Has(file_, "model", "next"))
+      file_.Fail("model", is_rate ? "has both next and rate; delete one of them"
+                                  : "has neither next, the states after a step, nor rate, their derivatives");
+    if (is_rate != has_integrator)
+      file_.Fail("model.integrator", is_rate ? "missing: how the rates give the next state, one of euler, midpoint, rk4"
+                                             : "is for model.rate; model.next is the next state itself");
+    if (is_rate) text_.integrator = ValueNamed(Integrators(), file_.Text("model.integrator"));
+    const std::string map = is_rate ? "model.rate" : "model.next";
+    for (const ModelText::Variable& state : text_.states) {
+      if (!Has(file_, map, state.name)) file_.Fail(map + "." + state.name, "missing: each state needs its equation");
+      text_.equations.push_back(file_.Expression(map + "." + state.name));
+    }
+  }
+
+  const Document& file_;
+  ModelText text_;
+  std::map<std::string, std::string> meanings_;  // of each name the map that has it
+
+ public:
+  /** A number, or a list of two. The step is a number in its range. */
+  static ModelText::Parameter ReadParameter(const Document& file, const std::string& key, const std::string& name) {
+    if (file.Count(key) == 0) {
+      const double value = file.Number(key);
+      if (name == kStepName && !kStep.Contains(value))
+        file.Fail(key, ToText(value) + " is outside " + kStep.text() + ", its unit is s");
+      return {name, value, value};
+    }
+    if (name == kStepName) file.Fail(key, "is a list, has to be one number: the step is exact");
+    const Eigen::VectorXd ends = file.Vector(key);
+    RequireOrdered(file, ends[0], ends[1], Entry(key, 0), Entry(key, 1));
+    return {name, ends[0], ends[1]};
+  }
+};
+
+// The parameters of a task file replace those of the model file that it includes.
+void Override(const Document& task, ModelText& text) {
+  const std::string map = "model.parameters";
+  std::vector<std::string> known;
+  for (const ModelText::Parameter& parameter : text.parameters) known.push_back(parameter.name);
+  for (const std::string& name : task.KeysOf(map)) {
+    const std::string key = map + "." + name;
+    const auto parameter = std::ranges::find(text.parameters, name, &ModelText::Parameter::name);
+    if (parameter == text.parameters.end())
+      task.Fail(key, "is not a parameter of " + text.file + "; " + Suggestion(name, known));
+    *parameter = TextReader::ReadParameter(task, key, name);
+  }
+}
+
+// The names that equations may use are those of the map `model` so far.
+void ReadStates(const Document& file, const std::string& key, TaskDraft& draft) {
+  draft.scope.states = file.KeysOf(key);
+}
+
+ModelText ReadModelFile(const Document& task, TaskDraft& draft) {
+  const std::string key = "model.file", name = task.Text(key), place = task.Place(key);
+  std::string& path = draft.model_file.path;
+  if (path.empty()) path = FindModelFile(task.path(), name, place);
+  Document file(path, place);
+  TaskDraft inner;
+  file.Check(
+      inner.scope,
+      [&](const Key& row, const std::string& at) {
+        if (row.read) row.read(file, at, inner);
+      },
+      ModelFileSchema());
+  draft.model_file.bytes = file.text();
+  ModelText text = TextReader(file).Read();
+  text.name = std::filesystem::path(name).stem().string();
+  Override(task, text);
+  return text;
+}
+
+// Beside what says which model it is, `model` has only what belongs to it.
+void RequireOnly(const Document& file, const std::vector<std::string>& allowed, const std::string& why) {
+  for (const std::string& name : file.KeysOf("model"))
+    if (std::ranges::find(allowed, name) == allowed.end()) file.Fail("model." + name, why);
+}
+
+std::shared_ptr<const NominalModel> MakeFromText(const ModelText& text) {
+  try {
+    return MakeTextModel(text);
+  } catch (const ExpressionError& error) {
+    throw ConfigError(text.file + ":" + std::to_string(error.line()) + ":" + std::to_string(error.column()) + ": " +
+                      error.what() + (error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())));
+  }
+}
+
+std::shared_ptr<const NominalModel> ReadNamedModel(const Document& file) {
+  RequireOnly(file, {"name", "dt", "wheelbase"}, "is for a model as text, this one has a name");
+  if (!Has(file, "model", kStepName)) file.Fail("model.dt", "missing: The time from one control to the next.");
+  return ValueNamed(Models(), file.Text("model.name"))(file);
+}
+
+std::shared_ptr<const NominalModel> ReadTextModel(const Document& file, TaskDraft& draft) {
+  if (Has(file, "model", "file")) {
+    RequireOnly(file, {"file", "parameters"}, "stands in the model file, not beside its name");
+    return MakeFromText(ReadModelFile(file, draft));
+  }
+  if (Has(file, "model", kStepName)) file.Fail("model.dt", "is model.parameters.dt of a model as text");
+  ModelText text = TextReader(file).Read();
+  text.name = "equations";
+  return MakeFromText(text);
+}
+
+double StepOf(const NominalModel& model) {
+  const auto& names = model.parameter_names();
+  return model.parameters()[ToSize(std::ranges::find(names, kStepName) - names.begin())];
+}
+
+void ReadModel(const Document& file, const std::string& key, TaskDraft& draft) {
+  const bool has_kind = Has(file, key, "name") || Has(file, key, "file") || Has(file, key, "states");
+  if (!has_kind) file.Fail(key, "has no model: write name, file, or states with their equations");
+  draft.problem.model = Has(file, key, "name") ? ReadNamedModel(file) : ReadTextModel(file, draft);
+  const NominalModel& model = *draft.problem.model;
+  draft.scope = {model.state_names(), model.input_names(), model.variable_names()};
+  draft.config.period = StepOf(model);
+  draft.config.gate.longest_step_ms = draft.config.period * 1e3;
+}
+
+Key ParameterRange() {
+  Key key = Vector("model.parameters.<name>", "", kReal, Key::Size::kAny,
+                   "The least and the largest value; it is the same at all times.");
+  key.count = Between(2, 2);
+  return key;
+}
+
+// Of a model as text.
+std::vector<Key> TextKeys() {
+  return {
+      Map("model.states", "The states of a model as text, 1 to 16 names with their units, in this order.", ReadStates),
+      Text("model.states.<name>", "Its unit, for people: `m`, `rad/s`; `1` for a pure number."),
+      Map("model.inputs", "Its inputs, 1 to 8 names with their units, in this order."),
+      Text("model.inputs.<name>", "Its unit."),
+      Map("model.parameters",
+          "Its parameters, in the units of the equations. `dt` is required: the time from one control to the next, in "
+          "(0, 60] s. Beside `model.file`: those whose values differ from the file's."),
+      Number("model.parameters.<name>", "", kReal, "The value."),
+      ParameterRange(),
+      Map("model.let", "Intermediate definitions, which the expressions behind them may use."),
+      Expression("model.let.<name>",
+                 "See [docs/expressions.md](../docs/expressions.md). It may use states, inputs, parameters and the "
+                 "definitions before it."),
+      Map("model.next", "The states after a step. A model as text has either this or `model.rate`."),
+      Expression("model.next.<state>", "The state after a step. It may use all definitions too."),
+      Map("model.rate", "The derivatives of the states in continuous time."),
+      Expression("model.rate.<state>", "The derivative of the state, in its unit per second."),
+      Word("model.integrator", NamesIn(Integrators()),
+           "The formula that makes the next state of the rates. The model is this formula, not the solution of the "
+           "differential equation: its error belongs to the residual. Required with `model.rate`."),
+  };
+}
+
+}  // namespace
+
+std::vector<Key> ModelKeys() {
+  std::vector<Key> keys{
+      Required(
+          Map("model",
+              "The nominal model f0: `name`, one that is compiled in, or `file`, or `states` with their equations.",
+              ReadModel)),
+      Word("model.name", NamesIn(Models()), "A compiled model."),
+      Number("model.dt", "s", kStep, "The time from one control to the next. Required with `model.name`."),
+      OnlyFor(KinematicBicycle::kName,
+              Required(Number("model.wheelbase", "m", UpTo(1000), "Distance between the axles."))),
+      Text("model.file",
+           "A model file, relative to this file's directory or to the installed config directory, for example "
+           "`models/unicycle.yaml`. It has one map, `model`, with a model as text."),
+  };
+  std::ranges::move(TextKeys(), std::back_inserter(keys));
+  return keys;
+}
+
+std::vector<Key> ModelFileKeys() {
+  std::vector<Key> keys{Required(Map("model", "A model as text."))};
+  std::ranges::move(TextKeys(), std::back_inserter(keys));
+  return keys;
+}
+
+}  // namespace forereach::key_rows

@@ -1,0 +1,109 @@
+// docs/expressions.md is true: its models load, its expressions have their values, its errors are what is said.
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/expression.h"
+#include "certifier/numerics/limits.h"
+#include "command_line/nearest.h"
+#include "tests/config/task_files.h"
+
+namespace forereach {
+namespace {
+
+std::string Document() {
+  std::ifstream file(FOREREACH_SOURCE_DIR "/docs/expressions.md");
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+// The rows of the table below the line `head`, without their bars; each has `columns` cells.
+std::vector<std::vector<std::string>> Rows(const std::string& head) {
+  const std::string document = Document();
+  const std::size_t begin = document.find(head + "\n");
+  EXPECT_NE(begin, std::string::npos) << head;
+  std::istringstream lines(document.substr(begin));
+  std::string line;
+  std::getline(lines, line);
+  std::getline(lines, line);
+  std::vector<std::vector<std::string>> rows;
+  while (std::getline(lines, line) && line.starts_with("| ")) {
+    std::vector<std::string> cells;
+    for (std::size_t at = 2, bar; (bar = line.find(" |", at)) != std::string::npos; at = bar + 3)
+      cells.push_back(line.substr(at, bar - at));
+    rows.push_back(cells);
+  }
+  return rows;
+}
+
+std::string Code(const std::string& cell) { return cell.substr(1, cell.size() - 2); }
+
+TEST(ExpressionsDocument, ValuesAreThoseOfTheTable) {
+  const auto rows = Rows("| text | stands for | value |");
+  const std::vector<std::string> names{"x", "y"};
+  const std::vector<long double> values{2, -0.5L};
+  std::set<Function> seen;
+  for (const auto& row : rows) {
+    ASSERT_EQ(row.size(), 3u);
+    const Expression expression = ParseExpression({Code(row[0])}, names);
+    const auto value = Evaluate<long double>(expression, values, [](double x) -> long double { return x; });
+    EXPECT_DOUBLE_EQ(static_cast<double>(value), std::stod(row[2])) << row[0];
+    for (const auto& node : expression.nodes)
+      if (node.kind == Expression::Kind::kCall) seen.insert(node.function);
+  }
+  EXPECT_EQ(seen.size(), Functions().size()) << "each function has a row";
+}
+
+TEST(ExpressionsDocument, ErrorsAreThoseOfTheTable) {
+  const std::vector<std::string> names{"theta"};
+  const auto rows = Rows("| text | error |");
+  EXPECT_GE(rows.size(), 5u);
+  for (const auto& row : rows) {
+    ASSERT_EQ(row.size(), 2u);
+    try {
+      static_cast<void>(ParseExpression({Code(row[0])}, names));
+      ADD_FAILURE() << row[0] << " is taken";
+    } catch (const ExpressionError& error) {
+      EXPECT_EQ(error.what() + (error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())), row[1]);
+    }
+  }
+}
+
+TEST(ExpressionsDocument, LimitsAreThoseOfTheCode) {
+  const auto rows = Rows("| what | at most |");
+  ASSERT_EQ(rows.size(), 7u);
+  EXPECT_EQ(rows[0][1], std::to_string(kMaxStates) + ", at least 1");
+  EXPECT_EQ(rows[1][1], std::to_string(kMaxInputs) + ", at least 1");
+  EXPECT_EQ(rows[4][1], std::to_string(kLargestExpression));
+  EXPECT_EQ(rows[5][1], std::to_string(kDeepestExpression));
+  EXPECT_THAT(Document(), testing::HasSubstr("from -" + std::to_string(kLargestWholePower) + " to " +
+                                             std::to_string(kLargestWholePower)));
+}
+
+TEST(ExpressionsDocument, ModelsLoad) {
+  const std::string document = Document();
+  const std::regex block("```yaml\n([^`]*)```");
+  const struct {
+    std::size_t states, inputs;
+    const char* projection;
+  } sizes[] = {{5, 2, "x, y"}, {2, 1, "angle"}, {5, 2, "x, y"}};
+  const ScratchDirectory directory;
+  std::size_t count = 0;
+  for (std::sregex_iterator at(document.begin(), document.end(), block), end; at != end; ++at, ++count) {
+    ASSERT_LT(count, std::size(sizes));
+    const std::string model =
+        std::regex_replace((*at)[1].str(), std::regex("models/"), FOREREACH_SOURCE_DIR "/config/models/");
+    const auto& [states, inputs, projection] = sizes[count];
+    const Config config =
+        LoadConfig(directory.Write("task.yaml", TaskFor(model, states, inputs, projection)), TransitionsFile::kIgnore);
+    EXPECT_EQ(config.problem->model->num_states(), static_cast<int>(states));
+  }
+  EXPECT_EQ(count, std::size(sizes));
+}
+
+}  // namespace
+}  // namespace forereach

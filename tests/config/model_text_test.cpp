@@ -1,0 +1,293 @@
+// Models as text in task files: what they mean, and what is said of those that mean nothing.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/expression.h"
+#include "certifier/task/canonical.h"
+#include "tests/config/task_files.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+
+// In the place of the first line of the good task. Errors are asserted by line and column.
+constexpr const char* kModel =
+    "model:\n"                                               // 1
+    "  states: {px: m, py: m, vx: m/s, vy: m/s}\n"           // 2
+    "  inputs: {ax: m/s^2, ay: m/s^2}\n"                     // 3
+    "  parameters: {dt: 0.15, drag: 0.5, mass: [1, 1.2]}\n"  // 4
+    "  let:\n"                                               // 5
+    "    half: dt*dt/2\n"                                    // 6
+    "    loss: drag/mass\n"                                  // 7
+    "  next:\n"                                              // 8
+    "    px: px + dt*vx + half*ax\n"                         // 9
+    "    py: py + dt*vy + half*ay\n"                         // 10
+    "    vx: vx + dt*(ax - loss*vx)\n"                       // 11
+    "    vy: vy + dt*(ay - loss*vy)\n";                      // 12
+
+std::string WithoutModel() {
+  const std::string task = kTask;
+  return task.substr(task.find('\n') + 1);
+}
+
+class ModelTextTest : public testing::Test {
+ protected:
+  std::string Error(const std::string& model) const { return files_.Error(model + WithoutModel()); }
+  std::string ErrorWith(const std::string& from, const std::string& to) const {
+    return Error(Replaced(kModel, from, to));
+  }
+  Config Load(const std::string& model) const { return files_.Load(model + WithoutModel()); }
+
+  TaskFiles files_;
+};
+
+TEST_F(ModelTextTest, SaysWhatTheModelIs) {
+  const Config config = Load(kModel);
+  const NominalModel& model = *config.problem->model;
+  EXPECT_EQ(model.state_names(), (std::vector<std::string>{"px", "py", "vx", "vy"}));
+  EXPECT_EQ(model.input_names(), (std::vector<std::string>{"ax", "ay"}));
+  EXPECT_EQ(model.parameter_names(), (std::vector<std::string>{"dt", "drag", "mass"}));
+  EXPECT_EQ(config.period, 0.15);
+  EXPECT_EQ(config.gate.longest_step_ms, 150);
+  ASSERT_NE(model.text(), nullptr);
+  const ModelText& text = *model.text();
+  EXPECT_EQ(text.states[2], (ModelText::Variable{"vx", "m/s"}));
+  EXPECT_EQ(text.parameters[2], (ModelText::Parameter{"mass", 1, 1.2}));
+  EXPECT_EQ(text.definitions[1], (ModelText::Definition{"loss", {"drag/mass", 7, 11}}));
+  EXPECT_EQ(text.equations[3], (ExpressionText{"vy + dt*(ay - loss*vy)", 12, 9}));
+  EXPECT_EQ(text.integrator, ModelText::Integrator::kNone);
+}
+
+TEST_F(ModelTextTest, EquationsAreInTheOrderOfTheStates) {
+  const std::string other =
+      Replaced(Replaced(kModel, "    px: px + dt*vx + half*ax\n", ""), "    vy: vy + dt*(ay - loss*vy)\n",
+               "    vy: vy + dt*(ay - loss*vy)\n    px: px + dt*vx + half*ax\n");
+  EXPECT_EQ(Load(other).grounds.model, Load(kModel).grounds.model);
+}
+
+TEST_F(ModelTextTest, TheDigestIsOfWhatTheTextMeans) {
+  const Digest digest = Load(kModel).grounds.model;
+  for (const auto& [from, to] : {std::pair{"{dt: 0.15,", "{dt: 1.5e-1,"},
+                                 {"    half: dt*dt/2\n", "    # a comment\n    half: dt*dt/2\n"},
+                                 {"px: px + dt*vx", "px: px  +  dt * vx"}})
+    EXPECT_EQ(Load(Replaced(kModel, from, to)).grounds.model, digest) << to;
+  for (const auto& [from, to] : {std::pair{"{dt: 0.15,", "{dt: 0.2,"},
+                                 {"mass: [1, 1.2]", "mass: [1, 1.3]"},
+                                 {"dt*dt/2", "dt*dt/3"},
+                                 {"vx + dt*(ax", "vx - dt*(ax"}})
+    EXPECT_NE(Load(Replaced(kModel, from, to)).grounds.model, digest) << to;
+}
+
+TEST_F(ModelTextTest, RatesNeedAnIntegrator) {
+  const std::string rates = Replaced(std::string(kModel).substr(0, std::string(kModel).find("  next:")), "  let:\n",
+                                     "  integrator: rk4\n  let:\n") +
+                            "  rate: {px: vx, py: vy, vx: ax - loss*vx, vy: ay}\n";
+  EXPECT_EQ(Load(rates).problem->model->text()->integrator, ModelText::Integrator::kRk4);
+  EXPECT_EQ(Load(Replaced(rates, "rk4", "midpoint")).problem->model->text()->integrator,
+            ModelText::Integrator::kMidpoint);
+  EXPECT_EQ(Load(Replaced(rates, "rk4", "euler")).problem->model->text()->integrator, ModelText::Integrator::kEuler);
+  EXPECT_EQ(Error(Replaced(rates, "rk4", "rk5")), "task.yaml:5: model.integrator: rk5 is not known; did you mean rk4?");
+  EXPECT_EQ(Error(Replaced(rates, "  integrator: rk4\n", "")),
+            "task.yaml:2: model.integrator: missing: how the rates give the next state, one of euler, midpoint, rk4");
+  EXPECT_EQ(Error(std::string(kModel) + "  integrator: rk4\n"),
+            "task.yaml:13: model.integrator: is for model.rate; model.next is the next state itself");
+  EXPECT_EQ(Error(std::string(kModel) + "  rate: {px: 1}\n  integrator: rk4\n"),
+            "task.yaml:2: model: has both next and rate; delete one of them");
+}
+
+TEST_F(ModelTextTest, ErrorsInExpressionsNameLineAndColumn) {
+  EXPECT_EQ(ErrorWith("vx + dt*(ax", "vx + dt*(axx"),
+            "task.yaml:11:18: axx is not a name that is known here; did you mean ax?");
+  EXPECT_EQ(ErrorWith("dt*dt/2", "dtt*dt/2"), "task.yaml:6:11: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*sn(ax)"),
+            "task.yaml:11:17: sn is not a function; did you mean sin?");
+  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*sin(ax, vx)"),
+            "task.yaml:11:17: sin has more arguments, has to have 1");
+  EXPECT_EQ(ErrorWith("vx + dt*(ax - loss*vx)", "vx + dt*(ax"), "task.yaml:11:17: ( has no )");
+  // A definition is known behind it only.
+  EXPECT_EQ(ErrorWith("half: dt*dt/2", "half: loss"),
+            "task.yaml:6:11: loss is not a name that is known here; did you mean mass?");
+  EXPECT_EQ(ErrorWith("half: dt*dt/2", "half: acceleration"),
+            "task.yaml:6:11: acceleration is not a name that is known here; known here: px, py, vx, vy, ax, ay, dt, "
+            "drag, mass, pi");
+}
+
+TEST_F(ModelTextTest, PlacesAreRightHoweverYamlWritesAText) {
+  const std::string line = "    vx: vx + dt*(ax - loss*vx)\n";
+  const auto error = [&](const std::string& other) { return ErrorWith(line, other); };
+  EXPECT_EQ(error("    vx: \"vx + dtt\"\n"), "task.yaml:11:15: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: 'vx + dtt'\n"), "task.yaml:11:15: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: vx\n      + dtt\n"),
+            "task.yaml:12:9: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: |\n      vx\n        + dtt\n"),
+            "task.yaml:13:11: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: >-\n      vx +\n\n      dtt\n"),
+            "task.yaml:14:7: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: |\n      vx +\n"), "task.yaml:12:11: expected a number, a name or (, found the end");
+  // Behind an escape the place of the whole text is given.
+  EXPECT_EQ(error("    vx: \"vx\\t+ dtt\"\n"),
+            "task.yaml:11:14: dtt is not a name that is known here; did you mean dt?");
+  EXPECT_EQ(error("    vx: 0\n"), "");
+  EXPECT_EQ(error("    vx: |\n      vx\n        + dt*(\n        ax)\n"), "");
+}
+
+TEST_F(ModelTextTest, ACommaInsideBracesEndsAnExpression) {
+  const std::string next = "  next:\n    px: px + dt*vx + half*ax\n";
+  const std::string flow = std::string(kModel).substr(0, std::string(kModel).find("  next:"));
+  EXPECT_EQ(Error(flow + "  next: {px: hypot(px, vx), py: py, vx: vx, vy: vy}\n"),
+            "task.yaml:8: model.next.vx): unknown key; put an expression with a comma inside { } into quotes; did you "
+            "mean vx?");
+  EXPECT_EQ(Error(flow + "  next: {px: \"hypot(px, vx)\", py: py, vx: vx, vy: vy}\n"), "");
+}
+
+TEST_F(ModelTextTest, Names) {
+  EXPECT_EQ(ErrorWith("{px: m,", "{p-x: m,"),
+            "task.yaml:2: model.states.p-x: is not a name; a name has letters, digits and underscores, and does not "
+            "begin with a digit");
+  EXPECT_EQ(ErrorWith("drag: 0.5", "sin: 0.5"),
+            "task.yaml:4: model.parameters.sin: sin is a function of the language; choose another name");
+  EXPECT_EQ(ErrorWith("drag: 0.5", "pi: 3"),
+            "task.yaml:4: model.parameters.pi: pi is a number of the language; choose another name");
+  EXPECT_EQ(ErrorWith("drag: 0.5", "px: 0.5"),
+            "task.yaml:4: model.parameters.px: is a name of model.states already; choose another name");
+  EXPECT_EQ(ErrorWith("{ax: m/s^2, ay", "{vx: m/s^2, ay"),
+            "task.yaml:3: model.inputs.vx: is a name of model.states already; choose another name");
+  EXPECT_EQ(ErrorWith("    half: dt*dt/2", "    drag: dt*dt/2"),
+            "task.yaml:6: model.let.drag: is a name of model.parameters already; choose another name");
+  EXPECT_EQ(ErrorWith("{ax: m/s^2, ay", "{px_next: m/s^2, ay"),
+            "task.yaml:3: model.inputs.px_next: is the column of the state px after a step; choose another name");
+  EXPECT_EQ(ErrorWith("{px: m,", "{px: m, px: m,"),
+            "task.yaml:2: model.states.px: duplicate key, first in line 2; delete one of them");
+  const std::string longest(64, 'a');
+  EXPECT_EQ(ErrorWith("drag: 0.5", "drag: 0.5, " + longest + ": 1"), "");
+  EXPECT_EQ(ErrorWith("drag: 0.5", "drag: 0.5, a" + longest + ": 1"),
+            "task.yaml:4: model.parameters." + longest + ": ...: the name has 65 letters, at most 64 are allowed");
+}
+
+TEST_F(ModelTextTest, EachStateHasItsEquation) {
+  EXPECT_EQ(ErrorWith("    vx: vx + dt*(ax - loss*vx)\n", ""),
+            "task.yaml:9: model.next.vx: missing: each state needs its equation");
+  EXPECT_EQ(ErrorWith("    vx: vx +", "    vz: vx +"), "task.yaml:11: model.next.vz: unknown key; did you mean vx?");
+  EXPECT_EQ(ErrorWith("    vx: vx + dt*(ax - loss*vx)\n", "    vx: [1, 2]\n"),
+            "task.yaml:11: model.next.vx: a list is not an expression");
+  EXPECT_THAT(ErrorWith("    vx: vx + dt*(ax - loss*vx)\n", "    vx:\n"),
+              HasSubstr("model.next.vx: nothing is not an expression"));
+}
+
+TEST_F(ModelTextTest, WhatIsRequired) {
+  EXPECT_EQ(ErrorWith("dt: 0.15, ", ""), "task.yaml:4: model.parameters.dt: missing: the step of the model, in s");
+  EXPECT_EQ(ErrorWith("  parameters: {dt: 0.15, drag: 0.5, mass: [1, 1.2]}\n", ""),
+            "task.yaml:2: model.parameters.dt: missing: the step of the model, in s");
+  EXPECT_EQ(ErrorWith("  inputs: {ax: m/s^2, ay: m/s^2}\n", ""),
+            "task.yaml:2: model.inputs: missing: a model as text needs this key");
+  EXPECT_EQ(ErrorWith("{ax: m/s^2, ay: m/s^2}", "{}"),
+            "task.yaml:3: model.inputs: has 0 entries, which is outside [1, 8]");
+  EXPECT_EQ(Error("model: {dt: 0.15}\n"),
+            "task.yaml:1: model: has no model: write name, file, or states with their equations");
+  EXPECT_EQ(Error("model: {name: point_mass}\n"),
+            "task.yaml:1: model.dt: missing: The time from one control to the next.");
+}
+
+TEST_F(ModelTextTest, TheStepIsOneNumberInItsRange) {
+  const auto error = [&](const std::string& step) { return ErrorWith("dt: 0.15", "dt: " + step); };
+  EXPECT_EQ(error("60"), "");
+  EXPECT_EQ(error("60.001"), "task.yaml:4: model.parameters.dt: 60.001 is outside (0, 60], its unit is s");
+  EXPECT_EQ(error("1e-300"), "");
+  EXPECT_EQ(error("0"), "task.yaml:4: model.parameters.dt: 0 is outside (0, 60], its unit is s");
+  EXPECT_EQ(error("-0.1"), "task.yaml:4: model.parameters.dt: -0.1 is outside (0, 60], its unit is s");
+  EXPECT_EQ(error("[0.1, 0.2]"),
+            "task.yaml:4: model.parameters.dt: is a list, has to be one number: the step is exact");
+}
+
+TEST_F(ModelTextTest, ParametersAreNumbersOrRanges) {
+  const auto error = [&](const std::string& mass) { return ErrorWith("mass: [1, 1.2]", "mass: " + mass); };
+  EXPECT_EQ(error("[1, 1]"), "");
+  EXPECT_EQ(error("[1, 0.9]"),
+            "task.yaml:4: model.parameters.mass[1]: 0.9 is outside [1, inf), below model.parameters.mass[0]");
+  EXPECT_EQ(error("[1, 2, 3]"), "task.yaml:4: model.parameters.mass: has 3 entries, which is outside [2, 2]");
+  EXPECT_EQ(error(".inf"),
+            "task.yaml:4: model.parameters.mass: .inf is not a finite number; write a number in (-inf, inf)");
+  EXPECT_EQ(error("heavy"), "task.yaml:4: model.parameters.mass: heavy is not a number; write a number in (-inf, inf)");
+}
+
+std::string ManyStates(int count) {
+  std::string states, next;
+  for (int k = 0; k < count; ++k) {
+    const std::string name = "s" + std::to_string(k), comma = k == 0 ? "" : ", ";
+    states += comma + name + ": m";
+    next += comma + name + ": " + name + " + u";
+  }
+  return "model: {states: {" + states + "}, inputs: {u: m}, parameters: {dt: 0.1}, next: {" + next + "}}\n";
+}
+
+TEST_F(ModelTextTest, AtMostSixteenStates) {
+  EXPECT_THAT(Error(ManyStates(16)), HasSubstr("domain.state.lower: has 4 entries, has to have 16"));
+  EXPECT_EQ(Error(ManyStates(17)), "task.yaml:1: model.states: has 17 entries, which is outside [1, 16]");
+}
+
+TEST_F(ModelTextTest, FormsDoNotMix) {
+  EXPECT_EQ(Error(std::string(kModel) + "  dt: 0.15\n"),
+            "task.yaml:13: model.dt: is model.parameters.dt of a model as text");
+  EXPECT_EQ(Error(std::string(kModel) + "  name: point_mass\n  dt: 0.15\n"),
+            "task.yaml:2: model.states: is for a model as text, this one has a name");
+  EXPECT_EQ(Error(std::string(kModel) + "  wheelbase: 1\n"), "task.yaml:13: model.wheelbase: is for kinematic_bicycle");
+  EXPECT_EQ(Error("model: {file: drag.yaml, states: {x: m}}\n"),
+            "task.yaml:1: model.states: stands in the model file, not beside its name");
+}
+
+class ModelFileTest : public ModelTextTest {
+ protected:
+  ModelFileTest() { files_.directory().Write("drag.yaml", kModel); }
+};
+
+TEST_F(ModelFileTest, IsTheModelThatStandsInIt) {
+  const Config here = Load(kModel), included = Load("model: {file: drag.yaml}\n");
+  EXPECT_EQ(included.problem->model->text()->equations, here.problem->model->text()->equations);
+  EXPECT_EQ(included.problem->model->text()->name, "drag");
+  EXPECT_EQ(included.period, 0.15);
+}
+
+TEST_F(ModelFileTest, TheTaskReplacesParameters) {
+  const Config config = Load("model: {file: drag.yaml, parameters: {dt: 0.2, mass: 2, drag: [0, 1]}}\n");
+  EXPECT_EQ(config.period, 0.2);
+  const std::vector<ModelText::Parameter> expected{{"dt", 0.2, 0.2}, {"drag", 0, 1}, {"mass", 2, 2}};
+  EXPECT_EQ(config.problem->model->text()->parameters, expected);
+  EXPECT_EQ(Error("model: {file: drag.yaml, parameters: {mas: 2}}\n"),
+            "task.yaml:1: model.parameters.mas: is not a parameter of drag.yaml; did you mean mass?");
+  EXPECT_EQ(Error("model: {file: drag.yaml, parameters: {dt: 61}}\n"),
+            "task.yaml:1: model.parameters.dt: 61 is outside (0, 60], its unit is s");
+}
+
+TEST_F(ModelFileTest, ItsBytesBelongToTheTask) {
+  const std::string task = "model: {file: drag.yaml}\n" + WithoutModel();
+  const Digest digest = files_.Load(task).grounds.config;
+  EXPECT_EQ(digest, TaskDigest(task, kModel));
+  files_.directory().Write("drag.yaml", std::string(kModel) + "# a comment\n");
+  EXPECT_NE(files_.Load(task).grounds.config, digest);
+}
+
+TEST_F(ModelFileTest, ErrorsNameTheFileThatIsWrong) {
+  const std::string path = files_.directory() / "", directory = path.substr(0, path.size() - 1);
+  EXPECT_EQ(Error("model: {file: drg.yaml}\n"),
+            "task.yaml:1: model.file: drg.yaml is not in " + directory + "; did you mean drag.yaml?");
+  files_.directory().Write("drag.yaml", Replaced(kModel, "vx + dt*(ax", "vx + dt*(axx"));
+  EXPECT_EQ(Error("model: {file: drag.yaml}\n"),
+            "drag.yaml:11:18: axx is not a name that is known here; did you mean ax?");
+  files_.directory().Write("drag.yaml", "model: {file: drag.yaml}\n");
+  EXPECT_EQ(
+      Error("model: {file: drag.yaml}\n"),
+      "drag.yaml:1: model.file: unknown key; known here: states, inputs, parameters, let, next, rate, integrator");
+  files_.directory().Write("drag.yaml", std::string(kModel) + "domain: {}\n");
+  EXPECT_EQ(Error("model: {file: drag.yaml}\n"), "drag.yaml:13: domain: unknown key; known here: model");
+}
+
+TEST_F(ModelFileTest, AnotherFileCanBeReadInstead) {
+  const std::string task = files_.directory().Write("task.yaml", "model: {file: gone.yaml}\n" + WithoutModel());
+  files_.directory().Write("steps.csv", kTransitions);
+  const Config config = LoadConfig(task, NamedFiles{{}, {}, files_.directory() / "drag.yaml"});
+  EXPECT_EQ(config.problem->model->text()->name, "gone");
+}
+
+}  // namespace
+}  // namespace forereach
