@@ -69,7 +69,8 @@ const Midway& CachedMidway(Scenario scenario, int observations) {
 
 void RunStep(State& state, const Midway& midway) {
   const Problem& problem = *midway.task.problem;
-  const Propagator propagator(*problem.model, problem.domain, midway.envelope, problem.zonotope_order, problem.method);
+  const Propagator propagator(*problem.model, problem.domain, midway.envelope, problem.declaration.disturbance,
+                              problem.zonotope_order, problem.method);
   Zonotope next;
   StepRecord record;
   record.half_width = midway.half_width;

@@ -16,9 +16,6 @@ namespace {
 using internal::EvaluateAtPoint;
 using internal::EvaluateOverBox;
 
-// Room for `count` values on the stack: a step has no heap. A draft has at most ProgramDraft::kMaxOperations nodes.
-#define FOREREACH_ON_STACK(T, count) static_cast<T*>(__builtin_alloca_with_align(sizeof(T) * ToSize(count), 128))
-
 std::vector<int> Indices(std::span<const unsigned char> marks) {
   std::vector<int> indices;
   for (std::size_t i = 0; i < marks.size(); ++i)

@@ -120,9 +120,7 @@ class StagedModel::Stages final {
     std::array<long double, kMaxVariables> at{};
     std::array<long double, kMaxStates> k{}, sum{};
     std::ranges::copy(z, at.begin());
-    const std::span values(
-        static_cast<long double*>(__builtin_alloca_with_align(sizeof(long double) * ToSize(rates_.size), 128)),
-        ToSize(rates_.size));
+    const std::span values(FOREREACH_ON_STACK(long double, rates_.size), ToSize(rates_.size));
     const long double dt = dt_;
     const bool is_rk4 = tableau_.size() == 4;
     const std::array<long double, 4> before{0, dt / 2, is_rk4 ? dt / 2 : 0, dt};
@@ -138,9 +136,10 @@ class StagedModel::Stages final {
   void Linearize(std::span<const double> z, std::span<const Interval> parameters, Linearization& out) const noexcept {
     std::array<Interval, kMaxVariables> point;
     std::ranges::copy(z, point.begin());
+    const std::span values(FOREREACH_ON_STACK(Interval, rates_.size), ToSize(rates_.size));
     Forward forward;
     const bool is_finite =
-        Dispatch<&Stages::Run>(BestInstructionSet(), *this, point, parameters, all_columns_, false, forward);
+        Dispatch<&Stages::Run>(BestInstructionSet(), *this, point, parameters, all_columns_, false, values, forward);
     for (std::size_t k = 0; k < ToSize(rates_.states); ++k)
       out.value[k] = is_finite ? forward.sum.value[k] : Interval::Entire();
     out.count = static_cast<int>(jacobian_.size());
@@ -155,10 +154,12 @@ class StagedModel::Stages final {
 
   void EncloseHessian(std::span<const Interval> box, std::span<const Interval> parameters,
                       HessianEnclosure& out) const noexcept {
+    const std::span values(FOREREACH_ON_STACK(Interval, rates_.size), ToSize(rates_.size));
     Forward forward;
     std::array<Interval, kMaxVariables> z;
     std::ranges::copy(box, z.begin());
-    const bool is_finite = Dispatch<&Stages::Run>(BestInstructionSet(), *this, z, parameters, bent_, true, forward);
+    const bool is_finite =
+        Dispatch<&Stages::Run>(BestInstructionSet(), *this, z, parameters, bent_, true, values, forward);
     out.count = static_cast<int>(hessian_.size());
     for (std::size_t e = 0; e < hessian_.size(); ++e) {
       const Program::Second& entry = hessian_[e];
@@ -248,15 +249,13 @@ class StagedModel::Stages final {
 
   // Value and derivatives of the successor by the columns, in forward.sum. False if a number is not moderate.
   [[nodiscard]] bool Run(const std::array<Interval, kMaxVariables>& z, std::span<const Interval> parameters,
-                         const std::vector<int>& columns, bool second, Forward& forward) const noexcept {
+                         const std::vector<int>& columns, bool second, std::span<Interval> values,
+                         Forward& forward) const noexcept {
     const auto n = ToSize(rates_.states);
     const Extent extent{PaddedToLanes(columns.size()), second ? blocks_.size() * kLaneCount : 0};
     auto& [start, argument, rate, sum, product, product_radius] = forward;
     for (Numbers* numbers : {&start, &argument, &sum}) SetState(z, columns, extent, *numbers);
     std::array<Interval, kMaxVariables> at = z;
-    const std::span values(
-        static_cast<Interval*>(__builtin_alloca_with_align(sizeof(Interval) * ToSize(rates_.size), 128)),
-        ToSize(rates_.size));
     for (std::size_t s = 0; s < tableau_.size(); ++s) {
       if (s > 0) AddScaled(start, rate, tableau_[s].before, extent, argument);
       std::copy_n(argument.value.begin(), n, at.begin());
