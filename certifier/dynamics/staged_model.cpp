@@ -361,7 +361,8 @@ class StagedModel::Stages final {
 
   // g_a g_b^T + g_b g_a^T, or g_a g_a^T, in blocks, g the first derivatives of the argument.
   FOREREACH_INLINE void MultiplySlopes(std::size_t a, std::size_t b, Forward& forward) const noexcept {
-    const auto& [slope, radius] = std::tie(forward.argument.slope, forward.argument.slope_radius);
+    const auto& slope = forward.argument.slope;
+    const auto& radius = forward.argument.slope_radius;
     for (std::size_t k = 0; k < blocks_.size(); ++k) {
       const auto i = ToSize(blocks_[k].i), l = ToSize(blocks_[k].first_l);
       Lanes center = AllLanes(0), spread = AllLanes(0);
