@@ -230,7 +230,8 @@ class Report:
         rows = []
         for name, label in (
             ("point", "point, at the samples"),
-            ("disc", "disc, at the samples"),
+            ("disc_at_frame", "disc around the point, at the samples"),
+            ("disc", "disc ahead of the point, at the samples"),
             ("rectangle", "rectangle, at the samples"),
             ("point_swept", "point, at all times"),
             ("disc_swept", "disc, at all times"),

@@ -123,9 +123,11 @@ void RunReduction(State& state, const Midway& midway) {
 void RunSeparationByHulls(State& state, const Midway& midway) {
   const Projection projection(midway.task.problem->projection, midway.slice.dim());
   const std::span<const double> half_width(midway.half_width.data(), static_cast<std::size_t>(midway.slice.dim()));
-  for (auto _ : state)
-    benchmark::DoNotOptimize(
-        SeparateHulls(projection.EncloseHull(midway.slice, half_width), midway.task.obstacles.front()));
+  for (auto _ : state) {
+    Hull hull;
+    projection.EncloseHull(midway.slice, half_width, hull);
+    benchmark::DoNotOptimize(SeparateHulls(hull, midway.task.obstacles.front()));
+  }
 }
 
 void RunSeparation(State& state, const Midway& midway) {

@@ -52,9 +52,11 @@ Picture::Polygon HullOf(const std::vector<Vector2d>& points, double radius) {
 std::vector<std::vector<Picture::Polygon>> Sweeps(const Certifier& certifier, const Tube& tube, int last) {
   const Placement& placement = certifier.safety().placement();
   std::vector<Zonotope> places(ToSize(placement.num_points()));
+  const auto sample = std::make_unique<Placement::Sample>();
   // The corners of the places of each part's points at a sample.
   const auto corners_at = [&](int t) {
-    placement.Enclose(tube.slice(t), tube.half_width(t), places.data());
+    placement.Observe(tube.slice(t), tube.half_width(t), *sample);
+    placement.Enclose(*sample, places.data());
     std::vector<std::vector<Vector2d>> corners;
     for (const Placement::Part& part : placement.parts()) {
       std::vector<Vector2d>& of_part = corners.emplace_back();

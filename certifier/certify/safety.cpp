@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <functional>
+#include <span>
+#include <tuple>
 
 #include "certifier/numerics/size.h"
 
@@ -31,6 +35,69 @@ struct Closest {
   }
 };
 
+// A unit and an obstacle that are proven to be apart.
+struct Pair {
+  PartSeparation bound;
+  double clearance;
+  int step, obstacle;
+  bool is_direct;  // by the best of what is cheaper than a search
+
+  void Improve(const PartSeparation& found) noexcept {
+    bound = found;
+    clearance = found.separation.clearance();
+    is_direct = true;
+  }
+};
+
+// The pairs of least clearance, as many as there is room for.
+class Nearest {
+ public:
+  void Add(const Separation& found, int part, int t, int o, bool is_direct) noexcept {
+    const double clearance = found.clearance();
+    if (count_ == pairs_.size()) {
+      left_out_ = std::min(left_out_, std::max(pairs_[farthest_].clearance, clearance));
+      if (!(clearance < pairs_[farthest_].clearance)) return;
+    }
+    Pair* pair = &pairs_[count_ == pairs_.size() ? farthest_ : count_++];
+    pair->bound.separation = found;  // one by one: what is written so can be read so without waiting
+    pair->bound.part = part;
+    pair->clearance = clearance;
+    pair->step = t;
+    pair->obstacle = o;
+    pair->is_direct = is_direct;
+    if (count_ == pairs_.size())
+      farthest_ = ToSize(std::ranges::max_element(pairs_, {}, &Pair::clearance) - pairs_.begin());
+  }
+
+  /** The first of those with the least clearance; null if there is none. */
+  [[nodiscard]] Pair* Least() noexcept {
+    const auto is_less = [](const Pair& a, const Pair& b) {
+      return std::tie(a.clearance, a.step, a.obstacle) < std::tie(b.clearance, b.step, b.obstacle);
+    };
+    return count_ > 0 ? &*std::ranges::min_element(pairs(), is_less) : nullptr;
+  }
+  /** The least clearance for which there was no room. */
+  [[nodiscard]] double left_out() const { return left_out_; }
+  /** Keeps what is closer than `clearance`, but not `other`: by step, then by obstacle. */
+  [[nodiscard]] std::span<Pair> InOrder(double clearance, const Pair* other) noexcept {
+    std::size_t kept = 0;
+    for (const Pair& pair : pairs())
+      if (pair.clearance < clearance && &pair != other) pairs_[kept++] = pair;
+    count_ = kept;
+    std::ranges::sort(pairs(), [](const Pair& a, const Pair& b) {
+      return std::tie(a.step, a.obstacle) < std::tie(b.step, b.obstacle);
+    });
+    return pairs();
+  }
+
+ private:
+  [[nodiscard]] std::span<Pair> pairs() noexcept { return {pairs_.data(), count_}; }
+
+  std::array<Pair, 12> pairs_;
+  std::size_t count_ = 0, farthest_ = 0;  // the latter once all are in use
+  double left_out_ = kInfinity;
+};
+
 Decision Judged(Outcome outcome, const Closest& closest) {
   Decision decision;
   decision.outcome = outcome;
@@ -50,6 +117,15 @@ bool IsBetter(const Separation& a, const Separation& b) noexcept {
   return a.threshold == b.threshold ? a.distance > b.distance : a.clearance() > b.clearance();
 }
 
+// NaN goes on.
+double Larger(double a, double b) noexcept { return b <= a ? a : std::isnan(a) ? a : b; }
+
+Eigen::Vector3d Spatial(const Eigen::VectorXd& y) noexcept {
+  Eigen::Vector3d spatial = Eigen::Vector3d::Zero();
+  for (Eigen::Index k = 0; k < y.size(); ++k) spatial[k] = y[k];
+  return spatial;
+}
+
 // A bound for the whole body is one for its closest part.
 PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& other) noexcept {
   if (IsBetter(by_parts.separation, other.separation)) return by_parts;
@@ -58,37 +134,43 @@ PartSeparation Better(const PartSeparation& by_parts, const PartSeparation& othe
 
 }  // namespace
 
-// What is known of a tube in one unit. The places are enclosed when they are first needed, once for each sample: those
-// of sample t are kept in the half t % 2 of the scratch memory.
+// What is known of a tube in one unit. Samples are observed and places enclosed when they are first needed, once for
+// each sample t, and kept in the half t % 2 of the memory.
 class SafetyTest::Unit {
  public:
   Unit(const SafetyTest& test, const Schedule& schedule, const Tube& tube, std::span<Zonotope> places) noexcept
       : test_(test), schedule_(schedule), tube_(tube), places_(places) {}
 
   void Enter(int t) noexcept {
-    hulls_[0] = t == last_ && t != first_ ? hulls_[1] : HullAt(t);
     first_ = t;
     last_ = t + (placement().sweeps() ? 1 : 0);
-    hull_ = hulls_[0];
-    if (last_ == first_) return;
-    hulls_[1] = HullAt(last_);
+  }
+  void EncloseHulls() noexcept {
+    if (first_ == last_) return EncloseHull(first_, hull_);
+    if (first_ == hulls_until_)
+      hulls_[0] = hulls_[1];
+    else
+      EncloseHull(first_, hulls_[0]);
+    EncloseHull(last_, hulls_[1]);
+    hulls_until_ = last_;
     hull_ = Join(hulls_[0], hulls_[1], placement().dim());
   }
 
-  // By the interval hulls of the frame and a ball around the body: sound, not tight.
-  [[nodiscard]] PartSeparation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
-    const Hull& seen = meeting.moves ? Seen(hulls_[0], hulls_[1], meeting) : hull_;
-    return {SeparateHulls(seen, obstacle, AddUp(meeting.growth, placement().reach())), -1};
+  // By the interval hulls of the frame and a ball around the body: sound, not tight. @pre EncloseHulls.
+  [[nodiscard]] Separation ByHulls(const Obstacle& obstacle, const Encounter& meeting) const noexcept {
+    const Hull& seen = meeting.moves ? Seen(meeting) : hull_;
+    return SeparateHulls(seen, obstacle, AddUp(meeting.growth, placement().reach()));
   }
 
-  // By the interval hulls of the parts, or as given if that is better.
-  [[nodiscard]] PartSeparation ByParts(const PartSeparation& by_hulls, const Obstacle& obstacle,
-                                       const Encounter& meeting) noexcept {
-    if (placement().is_point()) return by_hulls;
-    const auto& first = PartsAt(first_);
-    const auto& last = first_ == last_ ? first : PartsAt(last_);
+  // By one direction for each part, from its middle to the obstacle, or as given if that is better.
+  [[nodiscard]] PartSeparation ByDirections(const PartSeparation& by_hulls, const Obstacle& obstacle,
+                                            const Encounter& meeting) noexcept {
+    if (placement().is_at_frame()) return by_hulls;
     const auto separate = [&](std::size_t i, double added) {
-      return SeparateHulls(Seen(first[i], last[i], meeting), obstacle, added);
+      const Eigen::Vector3d d = Towards(obstacle, placement().parts()[i], meeting);
+      double support = -kInfinity;
+      for (int t = first_; t <= last_; ++t) support = Larger(support, Support(t, placement().parts()[i], d, meeting));
+      return Separation{DistanceLower(obstacle, d, support), AddUp(obstacle.radius(), added)};
     };
     return Better(ClosestPart(meeting, separate), by_hulls);
   }
@@ -100,8 +182,10 @@ class SafetyTest::Unit {
     return Better(ClosestPart(meeting, separate), by_hulls);
   }
 
-  [[nodiscard]] Encounter MeetIn(const Obstacle& obstacle) const noexcept {
-    return obstacle.motion() ? Meet(*obstacle.motion(), schedule_, first_, last_) : Encounter{};
+  // Valid until the next.
+  [[nodiscard]] const Encounter& MeetIn(const Obstacle& obstacle) noexcept {
+    static constexpr Encounter kStands;
+    return obstacle.motion() ? meeting_ = Meet(*obstacle.motion(), schedule_, first_, last_) : kStands;
   }
 
  private:
@@ -110,41 +194,86 @@ class SafetyTest::Unit {
   // The least of separate(part, what its distance has to exceed the obstacle's radius by).
   template <class Separate>
   [[nodiscard]] PartSeparation ClosestPart(const Encounter& meeting, Separate separate) const noexcept {
-    PartSeparation closest{{kInfinity, 0}, -1};
     const auto parts = placement().parts();
-    for (std::size_t i = 0; i < parts.size(); ++i) {
+    Separation closest = separate(0, AddUp(parts[0].radius, meeting.growth));
+    int part = 0;
+    for (std::size_t i = 1; i < parts.size(); ++i) {
       const Separation found = separate(i, AddUp(parts[i].radius, meeting.growth));
-      if (i == 0 || IsBetter(closest.separation, found)) closest = {found, static_cast<int>(i)};
+      if (!IsBetter(closest, found)) continue;
+      closest = found;
+      part = static_cast<int>(i);
     }
-    return closest;
+    return {closest, part};
   }
 
-  [[nodiscard]] Hull HullAt(int t) const noexcept {
-    return placement().EncloseHull(tube_.slice(t), tube_.half_width(t));
+  void EncloseHull(int t, Hull& hull) const noexcept {
+    placement().EncloseHull(tube_.slice(t), tube_.half_width(t), hull);
   }
 
   // The hull of both samples, seen from the obstacle.
-  [[nodiscard]] Hull Seen(const Hull& first, const Hull& last, const Encounter& meeting) const noexcept {
+  [[nodiscard]] Hull Seen(const Encounter& meeting) const noexcept {
     const int p = placement().dim();
-    if (!meeting.moves) return first_ == last_ ? first : Join(first, last, p);
-    const Hull seen = Shifted(first, meeting.shift[0], p);
-    return first_ == last_ ? seen : Join(seen, Shifted(last, meeting.shift[1], p), p);
+    if (first_ == last_) return Shifted(hull_, meeting.shift[0], p);
+    return Join(Shifted(hulls_[0], meeting.shift[0], p), Shifted(hulls_[1], meeting.shift[1], p), p);
   }
 
-  [[nodiscard]] const std::array<Hull, kMaxBodyParts>& PartsAt(int t) noexcept {
+  [[nodiscard]] const Placement::Sample& SampleAt(int t) noexcept {
     const std::size_t half = ToSize(t % 2);
-    if (parts_of_[half] != t)
-      placement().EncloseParts(tube_.slice(t), tube_.half_width(t), parts_[half].data(), test_.instructions_);
-    parts_of_[half] = t;
-    return parts_[half];
+    if (observed_[half] != t) placement().Observe(tube_.slice(t), tube_.half_width(t), samples_[half]);
+    observed_[half] = t;
+    return samples_[half];
   }
 
   [[nodiscard]] const Zonotope* PlacesAt(int t) noexcept {
     const std::size_t half = ToSize(t % 2);
     Zonotope* places = places_.data() + half * ToSize(placement().num_points());
-    if (sample_[half] != t) placement().Enclose(tube_.slice(t), tube_.half_width(t), places, test_.instructions_);
-    sample_[half] = t;
+    if (placed_[half] != t) placement().Enclose(SampleAt(t), places, test_.instructions_);
+    placed_[half] = t;
     return places;
+  }
+
+  // The gap between the boxes around the middles of a part's points and around the core; if they meet, from middle to
+  // middle. Any direction proves something; this one most of what there is, if the slices are small.
+  [[nodiscard]] Eigen::Vector3d Towards(const Obstacle& obstacle, const Placement::Part& part,
+                                        const Encounter& meeting) noexcept {
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) return Spatial(obstacle.points()[0]);
+    std::array<double, kMaxSafetyDim> lower, upper;
+    lower.fill(kInfinity);
+    upper.fill(-kInfinity);
+    const auto p = ToSize(placement().dim());
+    for (int t = first_; t <= last_; ++t) {
+      const Placement::Sample& sample = SampleAt(t);
+      for (int i = part.first; i < part.first + part.count; ++i)
+        for (std::size_t k = 0; k < p; ++k) {
+          const double middle = sample.middle(i, k) - meeting.shift[ToSize(t - first_)][k].lower;
+          lower[k] = std::min(lower[k], middle);
+          upper[k] = std::max(upper[k], middle);
+        }
+    }
+    Eigen::Vector3d gap = Eigen::Vector3d::Zero();
+    const auto set = [&](auto size) {
+      bool meets = true;
+      for (std::size_t k = 0; k < p; ++k) {
+        const auto i = static_cast<Eigen::Index>(k);
+        gap[i] = size(obstacle.lower()[i] - upper[k], obstacle.upper()[i] - lower[k]);
+        meets &= gap[i] == 0;
+      }
+      return !meets;
+    };
+    if (!set([](double below, double above) { return std::max(below, 0.0) + std::min(above, 0.0); }))
+      set(std::plus<>());
+    return gap;
+  }
+
+  // The support of a part at one sample along d, seen from the obstacle.
+  [[nodiscard]] double Support(int t, const Placement::Part& part, const Eigen::Vector3d& d,
+                               const Encounter& meeting) noexcept {
+    const double support = placement().SupportUpper(SampleAt(t), part, d, test_.instructions_);
+    if (!meeting.moves) return support;
+    Interval shifted(0);
+    for (int k = 0; k < placement().dim(); ++k)
+      shifted += Interval(d[k]) * meeting.shift[ToSize(t - first_)][ToSize(k)];
+    return SubUp(support, shifted.lower);
   }
 
   [[nodiscard]] Separation SeparatePart(std::size_t number, const Obstacle& obstacle, double added,
@@ -164,11 +293,12 @@ class SafetyTest::Unit {
   const Schedule& schedule_;
   const Tube& tube_;
   std::span<Zonotope> places_;
-  std::array<int, 2> sample_{-1, -1}, parts_of_{-1, -1};
-  std::array<std::array<Hull, kMaxBodyParts>, 2> parts_;
-  int first_ = -1, last_ = -1;
-  std::array<Hull, 2> hulls_;
-  Hull hull_;
+  std::array<int, 2> observed_{-1, -1}, placed_{-1, -1};
+  std::array<Placement::Sample, 2> samples_;
+  int first_ = -1, last_ = -1, hulls_until_ = -1;
+  std::array<Hull, 2> hulls_{};  // at both samples, where there are two
+  Hull hull_;                    // of both
+  Encounter meeting_;
 };
 
 SafetyTest::SafetyTest(const Problem& problem)
@@ -179,59 +309,74 @@ PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obs
   std::vector<Zonotope> places(2 * ToSize(placement_.num_points()));
   Unit unit(*this, schedule, tube, places);
   unit.Enter(t);
-  const Encounter meeting = unit.MeetIn(obstacle);
+  unit.EncloseHulls();
+  const Encounter& meeting = unit.MeetIn(obstacle);
   if (!meeting.is_there) return {{kInfinity, 0}, -1};
-  return unit.Best(unit.ByParts(unit.ByHulls(obstacle, meeting), obstacle, meeting), obstacle, meeting);
+  return unit.Best(unit.ByDirections({unit.ByHulls(obstacle, meeting), -1}, obstacle, meeting), obstacle, meeting);
 }
 
-// Interval hulls settle what is far away. What they do not prove, and then what they leave as possibly closest, is
-// settled by the best direction.
+// Interval hulls settle what is far away, and single directions what is near. What they do not prove, and then what
+// they leave as possibly closest, is settled by the best direction.
 Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& schedule, Tube& tube,
                            int first) const noexcept {
-  Closest by_hull, closest;
-  double next_by_hull = kInfinity;  // the second smallest clearance by hulls
+  Closest closest;
+  Nearest nearest;
   Unit unit(*this, schedule, tube, tube.places_);
   const int count = static_cast<int>(obstacles.size()), units = NumUnits(tube);
   for (int t = first; t < units; ++t) {
     unit.Enter(t);
+    unit.EncloseHulls();
     for (int o = 0; o < count; ++o) {
       const Obstacle& obstacle = obstacles[ToSize(o)];
-      const Encounter meeting = unit.MeetIn(obstacle);
+      const Encounter& meeting = unit.MeetIn(obstacle);
       if (!meeting.is_there) continue;
-      PartSeparation by_hulls = unit.ByHulls(obstacle, meeting);
-      if (!by_hulls.separation.IsProven()) by_hulls = unit.ByParts(by_hulls, obstacle, meeting);
-      if (by_hulls.separation.IsProven()) {
-        const double clearance = by_hulls.separation.clearance();
-        next_by_hull = std::min(next_by_hull, std::max(clearance, by_hull.clearance));
-        by_hull.Consider(by_hulls, clearance, t, o);
+      const Separation by_hulls = unit.ByHulls(obstacle, meeting);
+      if (by_hulls.IsProven()) {
+        nearest.Add(by_hulls, -1, t, o, placement_.is_at_frame());
         continue;
       }
-      const PartSeparation best = unit.Best(by_hulls, obstacle, meeting);
+      const PartSeparation direct = unit.ByDirections({by_hulls, -1}, obstacle, meeting);
+      if (direct.separation.IsProven()) {
+        nearest.Add(direct.separation, direct.part, t, o, true);
+        continue;
+      }
+      const PartSeparation best = unit.Best(direct, obstacle, meeting);
       if (!best.separation.IsProven())
         return Judged(Outcome::kSafety, {best.separation.clearance(), t, o, best.part, best.separation});
       closest.Consider(best, t, o);
     }
   }
-  if (by_hull.clearance < closest.clearance) {
-    const Obstacle& obstacle = obstacles[ToSize(by_hull.obstacle)];
-    unit.Enter(by_hull.step);
-    closest.Consider(unit.Best({by_hull.separation, by_hull.part}, obstacle, unit.MeetIn(obstacle)), by_hull.step,
-                     by_hull.obstacle);
+  const auto is_closer = [&](const Pair* pair) { return pair != nullptr && pair->clearance < closest.clearance; };
+  const auto direct = [&](Pair& pair) {
+    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
+    unit.Enter(pair.step);
+    pair.Improve(unit.ByDirections(pair.bound, obstacle, unit.MeetIn(obstacle)));
+  };
+  const auto consider = [&](const Pair& pair) {
+    const Obstacle& obstacle = obstacles[ToSize(pair.obstacle)];
+    unit.Enter(pair.step);
+    closest.Consider(unit.Best(pair.bound, obstacle, unit.MeetIn(obstacle)), pair.step, pair.obstacle);
+  };
+  Pair* least = nearest.Least();
+  for (; is_closer(least) && !least->is_direct; least = nearest.Least()) direct(*least);
+  if (is_closer(least)) consider(*least);
+  const auto consider_if_closer = [&](Pair& pair) {
+    if (is_closer(&pair) && !pair.is_direct) direct(pair);
+    if (is_closer(&pair) && pair.bound.separation.IsProven()) consider(pair);  // otherwise it was, above
+  };
+  if (nearest.left_out() >= closest.clearance) {
+    for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);
+    return Judged(Outcome::kCertified, closest);
   }
-  for (int t = first; t < units && next_by_hull < closest.clearance; ++t) {
+  for (int t = first; t < units; ++t) {
     unit.Enter(t);
+    unit.EncloseHulls();
     for (int o = 0; o < count; ++o) {
-      const Obstacle& obstacle = obstacles[ToSize(o)];
-      const Encounter meeting = unit.MeetIn(obstacle);
-      if (!meeting.is_there || (t == closest.step && o == closest.obstacle)) continue;
-      const auto is_farther = [&](const PartSeparation& found) {
-        return found.separation.clearance() >= closest.clearance;
-      };
-      PartSeparation by_hulls = unit.ByHulls(obstacle, meeting);
-      if (is_farther(by_hulls)) continue;
-      by_hulls = unit.ByParts(by_hulls, obstacle, meeting);
-      if (by_hulls.separation.IsProven() && !is_farther(by_hulls))
-        closest.Consider(unit.Best(by_hulls, obstacle, meeting), t, o);
+      const Encounter& meeting = unit.MeetIn(obstacles[ToSize(o)]);
+      if (!meeting.is_there) continue;
+      const Separation found = unit.ByHulls(obstacles[ToSize(o)], meeting);
+      Pair pair{{found, -1}, found.clearance(), t, o, placement_.is_at_frame()};
+      consider_if_closer(pair);
     }
   }
   return Judged(Outcome::kCertified, closest);

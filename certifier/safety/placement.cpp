@@ -81,32 +81,31 @@ struct Placement::Rotation {
   }
 };
 
-// Where a point of the body is, relative to the frame: the linear part and, besides it, offset +- spread.
-struct Placement::Offset {
-  std::array<double, kMaxSafetyDim> offset, spread, slope{};
-  double size;  // of what these are computed from
-
-  // With d = theta - c:  R(theta) q = R(c) q + R'(c) q d - d^2 / 2 R(theta') q,  and in each coordinate R(theta') q
-  // lies within |R'(c) q| r + |q| r^2 / 2 of R(c) q.
-  Offset(const Point& point, const Rotation& rotation, const std::array<double, kMaxSafetyDim>& bulge) noexcept {
-    const Eigen::Vector3d& q = point.place;
-    const double r = rotation.half_width, length = point.length;
-    offset = {rotation.cosine * q[0] - rotation.sine * q[1], rotation.sine * q[0] + rotation.cosine * q[1], q[2]};
-    spread = bulge;
-    size = length + std::abs(q[2]) + point.turn + std::max({bulge[0], bulge[1], bulge[2]});
-    if (r == 0 || length == 0) return;  // NaN goes on, and proves nothing
-    slope = {-offset[1], offset[0], 0};
-    const double half_square = 0.5 * r * r;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const double range = std::abs(slope[k]) * r + length * half_square;
-      const double below = -std::max(0.0, offset[k] + range) * half_square;
-      const double above = std::max(0.0, range - offset[k]) * half_square;
-      offset[k] += 0.5 * (below + above);
-      spread[k] += 0.5 * (above - below);
-    }
-    size += length * (r + (1 + r + half_square) * half_square);
+// With d = theta - c:  R(theta) q = R(c) q + R'(c) q d - d^2 / 2 R(theta') q,  and in each coordinate R(theta') q lies
+// within |R'(c) q| r + |q| r^2 / 2 of R(c) q.
+void Placement::OverSlice(const Point& point, const Rotation& rotation, Sample::Point& over) const noexcept {
+  const Eigen::Vector3d& q = point.place;
+  const double r = rotation.half_width, length = point.length;
+  const std::array turned{rotation.cosine * q[0] - rotation.sine * q[1], rotation.sine * q[0] + rotation.cosine * q[1]};
+  over.size = point.size;
+  for (std::size_t k = 0; k < kMaxSafetyDim; ++k) {
+    over.offset[k] = k < 2 ? turned[k] : q[2];
+    over.spread[k] = bulge_[k];
+    over.slope[k] = 0;
   }
-};
+  if (r == 0 || length == 0) return;  // NaN goes on, and proves nothing
+  const double half_square = 0.5 * r * r;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double slope = k == 0 ? -turned[1] : turned[0];
+    const double range = std::abs(slope) * r + length * half_square;
+    const double below = -std::max(0.0, turned[k] + range) * half_square;
+    const double above = std::max(0.0, range - turned[k]) * half_square;
+    over.slope[k] = slope;
+    over.offset[k] = turned[k] + 0.5 * (below + above);
+    over.spread[k] = bulge_[k] + 0.5 * (above - below);
+  }
+  over.size += length * (r + (1 + r + half_square) * half_square);
+}
 
 Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const std::optional<Between>& between,
                      int num_states)
@@ -124,98 +123,112 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
     parts_.push_back({num_points(), static_cast<int>(part.points.size()), part.radius});
     for (const Eigen::Vector3d& q : part.points) {
       const double length = LengthUpper(q[0], q[1]);
-      points_.push_back({q, length, heading_ < 0 ? 0 : MulUp(length, turn)});
+      is_at_frame_ &= q.isZero(0);
+      const double turned = heading_ < 0 ? 0 : MulUp(length, turn);
+      points_.push_back(
+          {q, length, turned, length + std::abs(q[2]) + turned + std::max({bulge_[0], bulge_[1], bulge_[2]})});
       reach_ = std::max(reach_, AddUp(AddUp(LengthUpper(q[0], q[1], q[2]), points_.back().turn), part.radius));
     }
   }
   Require(reach_ < kInfinity, "body: its size is not finite");
 }
 
-Hull Placement::EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept {
-  Hull hull = projection_.EncloseHull(slice, half_width);
+void Placement::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
+  projection_.EncloseHull(slice, half_width, hull);
   for (std::size_t k = 0; k < ToSize(dim()); ++k) hull.half_width[k] = AddUp(hull.half_width[k], bulge_[k]);
-  return hull;
 }
 
-// The linear images of one slice.
-struct Placement::Image {
-  const Placement& placement;
-  const Zonotope& slice;
-  Rotation rotation;
-  std::array<double, kMaxSafetyDim> center{}, slack{}, size{};  // of P X
+void Placement::Observe(const Zonotope& slice, std::span<const double> half_width, Sample& sample) const noexcept {
+  sample.slice = &slice;
+  sample.half_width = half_width;
+  sample.center = sample.slack = sample.size = {};
+  for (const MatrixEntry& entry : projection_.entries()) {
+    const auto k = ToSize(entry.row);
+    const double weight = entry.value.lower, x = slice.center(entry.column);
+    sample.center[k] += weight * x;
+    sample.slack[k] += std::abs(weight) * slice.slack(entry.column);
+    sample.size[k] += std::abs(weight) * (std::abs(x) + half_width[ToSize(entry.column)]);
+  }
+  const Rotation rotation(is_at_frame_ ? -1 : heading_, slice, half_width);
+  for (std::size_t i = 0; i < points_.size(); ++i) OverSlice(points_[i], rotation, sample.points[i]);
+}
 
-  Image(const Placement& of, const Zonotope& of_slice, std::span<const double> half_width) noexcept
-      : placement(of), slice(of_slice), rotation(of.heading_, of_slice, half_width) {
-    for (const MatrixEntry& entry : of.projection_.entries()) {
-      const auto k = ToSize(entry.row);
-      const double weight = entry.value.lower, x = slice.center(entry.column);
-      center[k] += weight * x;
-      slack[k] += std::abs(weight) * slice.slack(entry.column);
-      size[k] += std::abs(weight) * (std::abs(x) + half_width[ToSize(entry.column)]);
+// The slack of the image, and the errors of center, generators, their sum and the slack itself.
+double Placement::Slack(const Sample& sample, const Sample::Point& point, std::size_t k) const noexcept {
+  const double turned = point.slope[k] == 0 ? 0 : std::abs(point.slope[k]) * sample.slice->slack(heading_);
+  return sample.slack[k] + turned + RoundingError(kMargin, sample.size[k] + point.size) + kTiny;
+}
+
+double Placement::SupportUpper(const Sample& sample, const Part& part, const Eigen::Vector3d& d,
+                               InstructionSet instructions) const noexcept {
+  return Dispatch<&Placement::SupportInline>(instructions, *this, sample, part, d);
+}
+
+void Placement::Enclose(const Sample& sample, Zonotope* places, InstructionSet instructions) const noexcept {
+  Dispatch<&Placement::EncloseInline>(instructions, *this, sample, places);
+}
+
+// The generators of the image of the slice along d are sums over the states of a weight times a row each.
+double Placement::SupportInline(const Sample& sample, const Part& part, const Eigen::Vector3d& d) const noexcept {
+  struct Term {
+    double weight;
+    const double* row;
+  };
+  const Zonotope& slice = *sample.slice;
+  std::array<Term, kMaxSafetyDim * kMaxStates + 1> terms;
+  std::size_t count = 0;
+  for (const MatrixEntry& entry : projection_.entries())
+    terms[count++] = {d[entry.row] * entry.value.lower, slice.padded_row(entry.column).data()};
+  if (heading_ >= 0) terms[count++] = {0, slice.padded_row(heading_).data()};
+  const double length = d.norm();
+  double largest = -kInfinity;
+  for (int i = part.first; i < part.first + part.count; ++i) {
+    const Sample::Point& point = sample.points[ToSize(i)];
+    const double turn = length * points_[ToSize(i)].turn;
+    double turned = 0, support = 0, size = 0;
+    for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+      const double along = d[static_cast<Eigen::Index>(k)], magnitude = std::abs(along);
+      turned += along * point.slope[k];
+      support += along * sample.middle(i, k) + magnitude * (Slack(sample, point, k) + point.spread[k]);
+      size += magnitude * (sample.size[k] + point.size);
     }
+    if (heading_ >= 0) terms[count - 1].weight = turned;
+    Lanes spread = AllLanes(0);
+    for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
+      Lanes sum = AllLanes(terms[0].weight) * LoadLanes(terms[0].row + j);
+      for (std::size_t l = 1; l < count; ++l) sum += AllLanes(terms[l].weight) * LoadLanes(terms[l].row + j);
+      spread += Abs(sum);
+    }
+    support += Sum(spread) + (turn + RoundingError(kMargin, size + turn)) + kTiny;
+    if (!(support <= largest)) largest = support;
+    if (std::isnan(support)) break;
   }
-
-  // Coordinate k of the images of the generators j .. j + 3.
-  FOREREACH_INLINE Lanes Generators(std::size_t k, const Offset& point, std::size_t j) const noexcept {
-    Lanes sum = AllLanes(0);
-    for (const MatrixEntry& entry : placement.rows_[k])
-      sum += AllLanes(entry.value.lower) * LoadLanes(slice.padded_row(entry.column).data() + j);
-    if (point.slope[k] != 0)
-      sum += AllLanes(point.slope[k]) * LoadLanes(slice.padded_row(placement.heading_).data() + j);
-    return sum;
-  }
-  // The slack of the image, and the errors of center, generators, their sum and the slack itself.
-  [[nodiscard]] double Slack(std::size_t k, const Offset& point) const noexcept {
-    const double turned = point.slope[k] == 0 ? 0 : std::abs(point.slope[k]) * slice.slack(placement.heading_);
-    return slack[k] + turned + RoundingError(kMargin, size[k] + point.size) + kTiny;
-  }
-};
-
-void Placement::Enclose(const Zonotope& slice, std::span<const double> half_width, Zonotope* places,
-                        InstructionSet instructions) const noexcept {
-  Dispatch<&Placement::EncloseInline>(instructions, *this, slice, half_width, places);
+  return largest;
 }
 
-void Placement::EncloseParts(const Zonotope& slice, std::span<const double> half_width, Hull* hulls,
-                             InstructionSet instructions) const noexcept {
-  Dispatch<&Placement::EnclosePartsInline>(instructions, *this, slice, half_width, hulls);
-}
-
-void Placement::EncloseInline(const Zonotope& slice, std::span<const double> half_width,
-                              Zonotope* places) const noexcept {
-  if (is_point() && !sweeps_) return projection_.Enclose(slice, half_width, places[0]);
-  const Image image(*this, slice, half_width);
+void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noexcept {
+  const Zonotope& slice = *sample.slice;
+  if (is_at_frame_ && !sweeps_) {
+    for (int i = 0; i < num_points(); ++i) projection_.Enclose(slice, sample.half_width, places[i]);
+    return;
+  }
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Offset point(points_[i], image.rotation, bulge_);
+    const Sample::Point& point = sample.points[i];
     Zonotope& place = places[i];
     place.Reset(dim(), slice.num_generators());
     for (int k = 0; k < dim(); ++k) {
       const auto row = ToSize(k);
-      for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount)
-        StoreLanes(image.Generators(row, point, j), place.mutable_row(k) + j);
-      place.mutable_center(k) = image.center[row] + point.offset[row];
-      place.mutable_slack(k) = image.Slack(row, point);
+      for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
+        Lanes sum = AllLanes(0);
+        for (const MatrixEntry& entry : rows_[row])
+          sum += AllLanes(entry.value.lower) * LoadLanes(slice.padded_row(entry.column).data() + j);
+        if (point.slope[row] != 0) sum += AllLanes(point.slope[row]) * LoadLanes(slice.padded_row(heading_).data() + j);
+        StoreLanes(sum, place.mutable_row(k) + j);
+      }
+      place.mutable_center(k) = sample.center[row] + point.offset[row];
+      place.mutable_slack(k) = Slack(sample, point, row);
     }
     for (int k = 0; k < dim(); ++k) place.AppendAxis(k, point.spread[ToSize(k)]);
-  }
-}
-
-void Placement::EnclosePartsInline(const Zonotope& slice, std::span<const double> half_width,
-                                   Hull* hulls) const noexcept {
-  const Image image(*this, slice, half_width);
-  for (std::size_t part = 0; part < parts_.size(); ++part) {
-    for (int i = 0; i < parts_[part].count; ++i) {
-      const Point& of_body = points_[ToSize(parts_[part].first + i)];
-      const Offset point(of_body, image.rotation, bulge_);
-      Hull place{};
-      for (std::size_t k = 0; k < ToSize(dim()); ++k) {
-        Lanes sum = AllLanes(0);
-        for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) sum += Abs(image.Generators(k, point, j));
-        place.center[k] = image.center[k] + point.offset[k];
-        place.half_width[k] = Sum(sum) + image.Slack(k, point) + point.spread[k] + of_body.turn;
-      }
-      hulls[part] = i == 0 ? place : Join(hulls[part], place, dim());
-    }
   }
 }
 

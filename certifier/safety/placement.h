@@ -38,28 +38,49 @@ class Placement final {
   /** True if a certificate holds between the samples, too. */
   [[nodiscard]] bool sweeps() const { return sweeps_; }
 
-  /** True if the body is the point P x. */
-  [[nodiscard]] bool is_point() const { return reach_ == 0; }
+  /** True if all points of the body are P x: it is a point or a ball around it. */
+  [[nodiscard]] bool is_at_frame() const { return is_at_frame_; }
 
   /** An upper bound on the distance of any point of the body from P x, and of the deviation of its path: metres. */
   [[nodiscard]] double reach() const { return reach_; }
   /** The largest deviation of point i from its chord because the body turns: |q| (w^2 + alpha) period^2 / 8, metres. */
   [[nodiscard]] double turn(int i) const { return points_[ToSize(i)].turn; }
 
-  /** A hull that contains Box(P X) + [-e, e]. @param half_width n upper bounds on the half-widths of Box(X). Cost
-  O(nonzeros of P). */
-  [[nodiscard]] Hull EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept;
+  /** Sets `hull` to one that contains Box(P X) + [-e, e]. @param half_width n upper bounds on the half-widths of
+  Box(X). Cost O(nonzeros of P). */
+  void EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept;
 
-  /** Sets hulls[i] to a hull that contains the places of all points of part i, widened by [-e, e] and by the points'
-  turns, but not by the part's radius. @param hulls one for each part. Cost as Enclose. */
-  void EncloseParts(const Zonotope& slice, std::span<const double> half_width, Hull* hulls,
-                    InstructionSet instructions = BestInstructionSet()) const noexcept;
+  /** The linear map and what is left over of every g_i over one slice: what all bounds on places are made of. */
+  struct Sample {
+    struct Point {
+      // g_i(x) - P x, as offset + slope (x_heading - c_heading) +- spread
+      std::array<double, kMaxSafetyDim> offset, spread, slope;
+      double size;  // of what these are computed from
+    };
+
+    const Zonotope* slice;
+    std::span<const double> half_width;
+    std::array<double, kMaxSafetyDim> center, slack, size;  // of P X
+    std::array<Point, kMaxBodyPoints> points;
+
+    /** About where point i is in the middle of the slice, coordinate k. */
+    [[nodiscard]] double middle(int i, std::size_t k) const { return center[k] + points[ToSize(i)].offset[k]; }
+  };
+
+  /** The sample of a slice, which has to stay as it is while the sample is in use. @param half_width as above. Cost
+  O(nonzeros of P) and O(1) for each point, and a sine and a cosine if the body turns. */
+  void Observe(const Zonotope& slice, std::span<const double> half_width, Sample& sample) const noexcept;
+
+  /** An upper bound on max {d . y : y in g_i(X) + [-e, e] + turn(i) ball, i a point of the part}: the support of what
+  Enclose gives, without making it. Infinite or NaN if there is no bound. @param d finite, its unused entries are 0.
+  @param instructions changes the computing time only, here and below. Cost O(m) for m generators for each point. */
+  [[nodiscard]] double SupportUpper(const Sample& sample, const Part& part, const Eigen::Vector3d& d,
+                                    InstructionSet instructions = BestInstructionSet()) const noexcept;
 
   /** Sets places[i] to a zonotope that contains g_i(X) + [-e, e] for each point i. @param places num_points() sets.
-  @param half_width as above. @param instructions changes the computing time only, here and above. Cost O(m) for m
-  generators for each point, and a sine and a cosine if the body turns. @pre X has at most kMaxGenerators - p
-  generators. */
-  void Enclose(const Zonotope& slice, std::span<const double> half_width, Zonotope* places,
+  Cost O(m) for m generators for each point. @pre X has at most
+  kMaxGenerators - p generators. */
+  void Enclose(const Sample& sample, Zonotope* places,
                InstructionSet instructions = BestInstructionSet()) const noexcept;
 
  private:
@@ -67,21 +88,21 @@ class Placement final {
     Eigen::Vector3d place;  // in the robot's frame
     double length;          // |q| in the plane in which the body turns, from above
     double turn;
+    double size;  // of these and the bulge
   };
 
-  FOREREACH_INLINE void EncloseInline(const Zonotope& slice, std::span<const double> half_width,
-                                      Zonotope* places) const noexcept;
-  FOREREACH_INLINE void EnclosePartsInline(const Zonotope& slice, std::span<const double> half_width,
-                                           Hull* hulls) const noexcept;
-
   struct Rotation;
-  struct Offset;
-  struct Image;
+
+  void OverSlice(const Point& point, const Rotation& rotation, Sample::Point& over) const noexcept;
+  FOREREACH_INLINE double SupportInline(const Sample& sample, const Part& part,
+                                        const Eigen::Vector3d& d) const noexcept;
+  FOREREACH_INLINE void EncloseInline(const Sample& sample, Zonotope* places) const noexcept;
+  [[nodiscard]] double Slack(const Sample& sample, const Sample::Point& point, std::size_t k) const noexcept;
 
   Projection projection_;
   std::array<std::vector<MatrixEntry>, kMaxSafetyDim> rows_;  // of P
   int heading_;
-  bool sweeps_;
+  bool sweeps_, is_at_frame_ = true;
   double reach_ = 0;
   std::array<double, kMaxSafetyDim> bulge_{};  // e
   std::vector<Part> parts_;

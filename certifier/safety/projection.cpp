@@ -19,9 +19,9 @@ Projection::Projection(const Eigen::MatrixXd& matrix, int num_states) : dim_(sta
       if (matrix(k, l) != 0) entries_.push_back({k, l, Interval(matrix(k, l))});
 }
 
-Hull Projection::EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept {
+void Projection::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
   constexpr double kMargin = 0x1p-47;  // above the rounding of both sums
-  Hull hull{};
+  hull = {};
   std::array<double, kMaxSafetyDim> size{};
   for (const MatrixEntry& entry : entries_) {
     const auto k = ToSize(entry.row), l = ToSize(entry.column);
@@ -32,7 +32,6 @@ Hull Projection::EncloseHull(const Zonotope& slice, std::span<const double> half
   }
   for (std::size_t k = 0; k < ToSize(dim_); ++k)
     hull.half_width[k] += RoundingError(kMargin, size[k]) + std::numeric_limits<double>::min();
-  return hull;
 }
 
 }  // namespace forereach

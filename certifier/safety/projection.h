@@ -20,7 +20,7 @@ class Projection final {
 
   /** A hull that contains Box(P X). It depends only on the center of X and on the half-widths of its hull.
   @param half_width n upper bounds on the half-widths of Box(X). Cost O(nonzeros of P). */
-  [[nodiscard]] Hull EncloseHull(const Zonotope& slice, std::span<const double> half_width) const noexcept;
+  void EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept;
 
   /** Sets `projected` to a zonotope that contains P X. It equals P X if each row of P copies a coordinate.
   @param half_width as in EncloseHull. Cost O(nonzeros of P * generators). */

@@ -342,6 +342,23 @@ Hull Join(const Hull& a, const Hull& b, int dim) noexcept {
   return joined;
 }
 
+double DistanceLower(const Obstacle& obstacle, const Vector& d, double support) noexcept {
+  constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
+  double core = kInfinity, size = std::abs(support) + 0x1p-900;
+  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+    core = obstacle.offset();
+    size += std::abs(core);
+  } else {
+    for (const Vector& point : obstacle.hull()) {
+      core = std::min(core, d.dot(point));
+      size += d.cwiseAbs().dot(point.cwiseAbs());
+    }
+  }
+  const double square = d.squaredNorm(),
+               distance = (core - support - RoundingError(kMargin, size)) / std::sqrt(square) * (1 - kMargin);
+  return distance > 0x1p-400 && distance < kInfinity && square > 0x1p-801 && square < 0x1p801 ? distance : -kInfinity;
+}
+
 Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle, double added) noexcept {
   constexpr double kMargin = 0x1p-47;  // larger than the rounding error of these operations, relative to their operands
   const int p = obstacle.dim();

@@ -52,6 +52,12 @@ inline constexpr int kMaxPieces = 2 * kMaxBodyPoints;  ///< The points of a body
 O(p). @param added is added to the obstacle's radius as the threshold, metres, not negative. */
 [[nodiscard]] Separation SeparateHulls(const Hull& slice, const Obstacle& obstacle, double added = 0) noexcept;
 
+/** The dual bound of one direction d: a lower bound on the distance from any set Y to the core, in metres; -infinity if
+it is not positive. Cost O(1) for each point of the core.
+@param support an upper bound on max {d . y : y in Y}; NaN and infinity prove nothing. @param d its unused entries are 0
+and its length is between 2^-400 and 2^400; any length proves the same. For a half-space its normal. */
+[[nodiscard]] double DistanceLower(const Obstacle& obstacle, const Eigen::Vector3d& d, double support) noexcept;
+
 /** Separates slice and core by the best direction that the search finds. For p <= 2 the distance is exact up to
 rounding. For p = 3 the search tries the normals of faces and of pairs of edges, and so proves every separation that
 exists, up to rounding. Cost for m generators: for p <= 2, O(m) if a few directions suffice and O(m^2) if these prove

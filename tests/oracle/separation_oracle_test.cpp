@@ -498,7 +498,8 @@ TEST(ProjectionOracle, HullsContainTheExactProjectionWhereItCancels) {
     const Zonotope slice(center, random.Coin() ? Eigen::MatrixXd(n, 0)
                                                : random.Matrix(n, random.Integer(1, 12), random.Coin() ? 1e-17 : 1));
     const std::vector<double> half_width = HalfWidths(slice);
-    const forereach::Hull hull = Projection(matrix, n).EncloseHull(slice, half_width);
+    forereach::Hull hull;
+    Projection(matrix, n).EncloseHull(slice, half_width, hull);
     for (int k = 0; k < p; ++k) {
       Rational middle = 0, reach = 0;
       for (int l = 0; l < n; ++l) {

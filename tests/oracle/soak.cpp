@@ -71,7 +71,8 @@ void CheckCertificate(const Certifier& certifier, const Query& query, const Deci
   Promise(decision.margin > decision.threshold, "a certificate has its margin");
   Zonotope projected;
   for (int t = 0; t <= tube.length(); ++t) {
-    const Hull hull = certifier.projection().EncloseHull(tube.slice(t), tube.half_width(t));
+    Hull hull;
+    certifier.projection().EncloseHull(tube.slice(t), tube.half_width(t), hull);
     certifier.projection().Enclose(tube.slice(t), tube.half_width(t), projected);
     for (const Obstacle& obstacle : query.obstacles) {
       const bool proven = Separate(projected, obstacle).IsProven() || SeparateHulls(hull, obstacle).IsProven();

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -355,6 +356,135 @@ TEST(SafetyTest, BeginsWhereItIsTold) {
   EXPECT_TRUE(IsCertified(later));
   EXPECT_NEAR(later.margin - later.threshold, 0.5, 1e-9);
   EXPECT_EQ(certifier.safety().Judge(behind, {}, tube, 4).obstacle, -1);
+}
+
+// Bodies and obstacles, more pairs of them than the search for the closest keeps, and fewer.
+TEST(SafetyTest, NamesTheClosestOfAllStepsAndObstacles) {
+  const std::uint64_t seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random(seed);
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+  const std::vector<Body> bodies{
+      {},
+      Parts({{{Vector3d::Zero()}, 0.6}}, 2),
+      Parts({{{Vector3d(1.4, 0, 0)}, 0.9}}, 2),
+      Parts({{{Vector3d(2, 1, 0), Vector3d(-1, 1, 0), Vector3d(2, -1, 0), Vector3d(-1, -1, 0)}, 0.1},
+             {{Vector3d(-3, 0, 0)}, 0.8}},
+            2)};
+  std::array<int, 3> certified{};
+  for (int round = 0; round < 240; ++round) {
+    Problem problem = BicycleProblem();
+    problem.body = bodies[static_cast<std::size_t>(round % 4)];
+    const bool is_point = round % 4 == 0, sweeps = round % 3 == 0;
+    if (sweeps) problem.between = Curving(0.5, 0.5);
+    const std::size_t size = static_cast<std::size_t>(round) % certified.size();
+    std::vector<Obstacle> obstacles;
+    for (int o = 0; o < std::array{1, 4, 40}[size]; ++o) {
+      const double angle = uniform(-3, 3), away = uniform(8, 25);
+      const Eigen::VectorXd at = Vec({5 + away * std::cos(angle), away * std::sin(angle)});
+      obstacles.push_back(o % 2 == 0 ? Obstacle::Circle(at, uniform(0, 1))
+                                     : Obstacle::AxisBox(at, at + Vec({uniform(0, 2), uniform(0, 2)})));
+    }
+    const Certifier certifier(std::make_shared<Problem>(problem));
+    Tube tube;
+    const std::vector<double> controls(8, 0.0);
+    const auto set =
+        Zonotope::FromBox(Vec({0, 0, 0, uniform(0, 6), 0, uniform(-0.2, 0.2)}), Vec({0.1, 0.1, 0.02, 0.1, 0, 0}));
+    const Decision found = certifier.Certify({controls.data(), 2, 4, 2}, set, obstacles, tube);
+    if (!IsCertified(found)) continue;
+    ++certified[size];
+    const auto clearance = [&](int t, int o) {
+      return certifier.SeparateSlice(tube, t, obstacles[static_cast<std::size_t>(o)]).clearance();
+    };
+    double least = kInfinity;
+    for (int t = 0; t < certifier.safety().NumUnits(tube); ++t)
+      for (int o = 0; o < static_cast<int>(obstacles.size()); ++o) least = std::min(least, clearance(t, o));
+    const double named = Separation{found.margin, found.threshold}.clearance();
+    if (is_point) EXPECT_EQ(named, least) << round;
+    EXPECT_NEAR(named, least, 1e-5) << round;  // how close to the distance a search for several pieces comes
+    EXPECT_NEAR(clearance(found.closest_step, found.obstacle), least, 1e-5) << round;
+  }
+  EXPECT_THAT(certified, testing::Each(testing::Gt(10)));
+}
+
+// The support along any direction is above that of every place, and not above that of what encloses them.
+TEST(Body, TheSupportOfAPartContainsItsPlaces) {
+  const std::uint64_t seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random(seed);
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
+  for (int round = 0; round < 300; ++round) {
+    Body body = Parts({{{Vector3d(3, 1, 0), Vector3d(-1, uniform(-1, 1), 0)}, 0.3}, {{Vector3d(uniform(-3, 3), 0, 0)}}},
+                      round % 3 == 0 ? -1 : 2);
+    Between between = Curving(uniform(0, 1), uniform(0, 1));
+    between.turn_rate = uniform(0, 1);
+    const std::optional<Between> sweep = round % 2 == 0 ? std::optional(between) : std::nullopt;
+    Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(2, 4);
+    projection(1, 3) = round % 5 == 0 ? 0.5 : 0;
+    const Placement placement(projection, body, sweep, 4);
+    const int m = round % 12;
+    const Eigen::VectorXd center = Eigen::VectorXd::NullaryExpr(4, [&] { return uniform(-3, 3); });
+    const Eigen::MatrixXd generators = Eigen::MatrixXd::NullaryExpr(4, m, [&] { return uniform(-0.1, 0.1); });
+    const Zonotope slice(center, generators);
+    std::array<double, 4> half_width;
+    for (int k = 0; k < 4; ++k) half_width[static_cast<std::size_t>(k)] = slice.HalfWidthUpper(k);
+    Placement::Sample sample;
+    placement.Observe(slice, half_width, sample);
+    std::vector<Zonotope> places(3);
+    placement.Enclose(sample, places.data());
+    const double scale = std::exp2(uniform(-20, 20));
+    const Vector3d d(scale * uniform(-1, 1), scale * uniform(-1, 1), 0);
+    for (const Placement::Part& part : placement.parts()) {
+      const double support = placement.SupportUpper(sample, part, d);
+      double of_places = -kInfinity;
+      for (int i = part.first; i < part.first + part.count; ++i)
+        of_places = std::max(
+            of_places, places[static_cast<std::size_t>(i)].SupportUpper({d.data(), 2}) + d.norm() * placement.turn(i));
+      EXPECT_NEAR(support, of_places, 1e-11 * scale) << round;
+      EXPECT_EQ(placement.SupportUpper(sample, part, d, InstructionSet::kBaseline), support);
+      const BodyPart& points = body.parts[part.first == 0 ? 0 : 1];
+      for (int trial = 0; trial < 20; ++trial) {
+        const Eigen::VectorXd signs = Eigen::VectorXd::NullaryExpr(m, [&] { return uniform(0, 1) < 0.5 ? -1.0 : 1.0; });
+        using Wide = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
+        const Wide x = center.cast<long double>() + generators.cast<long double>() * signs.cast<long double>();
+        const long double theta = body.heading < 0 ? 0 : x[2], c = std::cos(theta), s = std::sin(theta);
+        const Wide p = projection.cast<long double>() * x;
+        for (const Vector3d& q : points.points)
+          EXPECT_LE(d[0] * (p[0] + c * q[0] - s * q[1]) + d[1] * (p[1] + s * q[0] + c * q[1]), support) << round;
+      }
+    }
+  }
+}
+
+TEST(Body, AHeadingThatIsFarOffHasNoSupport) {
+  const Placement placement(Eigen::MatrixXd::Identity(2, 3), Parts({{{Vector3d(1, 0, 0)}, 0}}, 2), std::nullopt, 3);
+  const std::array<double, 3> half_width{};
+  Placement::Sample sample;
+  for (const double heading : {0x1p20, 0x1.1p20}) {
+    const auto slice = Zonotope::FromBox(Vec({0, 0, heading}), Vec({0, 0, 0}));
+    placement.Observe(slice, half_width, sample);
+    EXPECT_EQ(placement.SupportUpper(sample, placement.parts()[0], Vector3d(1, 0, 0)) < 2, heading == 0x1p20);
+  }
+}
+
+TEST(SeparateAlong, IsABoundForAnyDirectionOfAnyLength) {
+  const Obstacle circle = Obstacle::Circle(Vec({3, 4}), 1);
+  for (const double scale : {1.0, 1e-30, 1e30, 0.3}) {
+    const Vector3d d(3 * scale, 4 * scale, 0);
+    EXPECT_LE(DistanceLower(circle, d, 0), 5);
+    EXPECT_NEAR(DistanceLower(circle, d, 0), 5, 1e-12);
+    EXPECT_NEAR(DistanceLower(circle, d, 20 * scale), 1, 1e-12);
+    EXPECT_EQ(DistanceLower(circle, d, 25 * scale), -kInfinity);
+    EXPECT_EQ(DistanceLower(circle, -d, 0), -kInfinity);
+    const Obstacle wall = Obstacle::HalfSpace(Vec({3 * scale, 4 * scale}), 10 * scale);
+    EXPECT_LE(DistanceLower(wall, d, 0), 2);
+    EXPECT_NEAR(DistanceLower(wall, d, 0), 2, 1e-12);
+  }
+  for (const double none : {std::nan(""), kInfinity})
+    EXPECT_EQ(DistanceLower(circle, Vector3d(3, 4, 0), none), -kInfinity);
+  for (const double bad : {0.0, 0x1p-420, 0x1p420, kInfinity, std::nan("")})
+    EXPECT_EQ(DistanceLower(circle, Vector3d(bad, 0, 0), -1), -kInfinity) << bad;
+  EXPECT_EQ(DistanceLower(circle, Vector3d(1, 0, 0), -kInfinity), -kInfinity) << "no bound is infinite";
 }
 
 // Against the best of many directions: what the search claims is a bound, and nearly the best one.
