@@ -400,7 +400,9 @@ TEST(SafetyTest, NamesTheClosestOfAllStepsAndObstacles) {
     for (int t = 0; t < certifier.safety().NumUnits(tube); ++t)
       for (int o = 0; o < static_cast<int>(obstacles.size()); ++o) least = std::min(least, clearance(t, o));
     const double named = Separation{found.margin, found.threshold}.clearance();
-    if (is_point) EXPECT_EQ(named, least) << round;
+    if (is_point) {
+      EXPECT_EQ(named, least) << round;
+    }
     EXPECT_NEAR(named, least, 1e-5) << round;  // how close to the distance a search for several pieces comes
     EXPECT_NEAR(clearance(found.closest_step, found.obstacle), least, 1e-5) << round;
   }
