@@ -1,7 +1,6 @@
 #include "robot/sim_node.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 
 #include <nlohmann/json.hpp>
@@ -59,13 +58,18 @@ SupervisorOptions OptionsOf(const Config& config) {
   return options;
 }
 
-std::vector<int> RestCoordinates(const NominalModel& model) {
-  constexpr std::array<std::string_view, 4> kMotion{"v", "a", "vx", "vy"};
+// The states that are zero while the robot stands. @throws ConfigError if nobody says which.
+std::vector<int> RestCoordinates(const Config& config) {
+  const NominalModel& model = *config.problem->model;
+  const std::vector<std::string> of_library{"v", "a", "vx", "vy"}, &given = config.robot.hold;
+  if (given.empty() && model.text() != nullptr)
+    throw ConfigError(config.path +
+                      ": robot.hold: missing: it names the states that are zero while the robot stands, and a model as "
+                      "text does not say which");
+  const std::vector<std::string>& names = given.empty() ? of_library : given;
   std::vector<int> rest;
-  for (int k = 0; k < model.num_states(); ++k) {
-    const std::string& name = model.state_names()[ToSize(k)];
-    if (std::find(kMotion.begin(), kMotion.end(), name) != kMotion.end()) rest.push_back(k);
-  }
+  for (int k = 0; k < model.num_states(); ++k)
+    if (std::ranges::find(names, model.state_names()[ToSize(k)]) != names.end()) rest.push_back(k);
   return rest;
 }
 
@@ -89,7 +93,7 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
       target_(MakeTarget(config)),
       disturbance_(config.problem->declaration, config.robot),
       period_us_(Microseconds(config.robot.step_period_ms)),
-      rest_coordinates_(RestCoordinates(*config.problem->model)),
+      rest_coordinates_(RestCoordinates(config_)),
       reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
       obstacles_(config),
       state_(config.robot.start),

@@ -220,6 +220,13 @@ std::vector<Key> RobotKeys() {
       Optional(Map("robot", "The simulated robot."), "all defaults"),
       Optional(robot.Vector("start", "of the state", kReal, Size::kStates, &RobotOptions::start, "Its initial state."),
                "the center of task.initial_set"),
+      Optional(Names("robot.hold", Between(1, kMaxStates), Size::kStates,
+                     "The states that are zero while the robot stands: it holds its position and sets these to zero. "
+                     "The simulated robot requires the key with a model as text.",
+                     [](const Document& file, const std::string& key, TaskDraft& draft) {
+                       draft.config.robot.hold = file.Names(key);
+                     }),
+               "v and a of kinematic_bicycle, vx and vy of point_mass"),
       robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
                    "Wall-clock time of one step of the model. The certifier assumes that no step of a plan takes "
                    "longer than this or model.dt."),

@@ -9,6 +9,7 @@
 
 #include "bus/authentic_bus.h"
 #include "certifier/dynamics/models.h"
+#include "certifier/dynamics/text_model.h"
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
@@ -23,7 +24,9 @@ namespace forereach {
 namespace {
 
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::ThrowsMessage;
 
 constexpr std::int64_t kT0 = 1'700'000'000'000'000, kPeriod = 40'000;
 
@@ -252,6 +255,31 @@ TEST(RobotSim, StartsAtTheBoundaryThePlanNamesAndExecutesItsControls) {
     EXPECT_EQ(std::vector<double>(transition.next_state, transition.next_state + 4), rig.StateAt(4 + i));
     EXPECT_EQ(transition.input[0], i < 2 ? 1 : -1);
   }
+}
+
+// A model as text has names of its own, so the task says what is zero while the robot stands.
+TEST(RobotSim, OfATextStandsByRobotHold) {
+  Config config = PointMassTask();
+  ModelText text{.name = "text"};
+  for (const char* state : {"px", "py", "vx", "vy"}) text.states.push_back({state, ""});
+  for (const char* input : {"ax", "ay"}) text.inputs.push_back({input, ""});
+  text.parameters = {{"dt", 0.25, 0.25}};
+  text.equations = {{"px + dt*vx + dt^2/2*ax"}, {"py + dt*vy + dt^2/2*ay"}, {"vx + dt*ax"}, {"vy + dt*ay"}};
+  Problem problem = *config.problem;
+  problem.model = MakeTextModel(text);
+  config.problem = std::make_shared<const Problem>(problem);
+  EXPECT_THAT([&] { Rig rig(config); }, ThrowsMessage<ConfigError>(HasSubstr("task.yaml: robot.hold: missing")));
+  config.robot.hold = {"vx"};
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t first = Plan(config, 1, 1, kOrigin);
+  first.plan.control[3][0] = -0.75;
+  first.plan.control[3][1] = 0.1;
+  rig.Send(first);
+  rig.RunTo(8);
+  EXPECT_NE(rig.First(kStanding).state[2], 0) << "measured, before the hold mode";
+  EXPECT_EQ(rig.StateAt(5)[2], 0);
+  EXPECT_EQ(rig.StateAt(5)[3], rig.First(kStanding).state[3]) << "not named";
 }
 
 TEST(RobotSim, WithoutANewerPlanItRunsTheTailStandsAndGoesOnFromThere) {

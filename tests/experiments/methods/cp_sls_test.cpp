@@ -111,7 +111,7 @@ TEST(CpSls, EveryPlugInIsStarvedOrVacuousOnTheCorridor) {
     for (const Covariance covariance : kAll) {
       const Task task = BicycleTask(count, 6);
       const CpSls method(task.setting(), With(covariance));
-      const Propagator propagator(*task.model, task.domain, method, 5, forereach::Method::kPaper);
+      const Propagator propagator(*task.model, task.domain, method, {}, 5, forereach::Method::kPaper);
       Eigen::VectorXd center(6), half_width(6);
       center << 0, 0, 0, 12, 0, 0.32;
       half_width << 0.025, 0.025, 0.005, 0.025, 0.01, 0.002;
