@@ -84,6 +84,7 @@ class BicycleEquations final : public Equations {
 }  // namespace
 
 std::unique_ptr<Equations> EquationsOf(const NominalModel& model) {
+  if (model.text() != nullptr) return EquationsOf(*model.text());
   std::map<std::string, double> parameters;
   for (std::size_t p = 0; p < model.parameters().size(); ++p)
     parameters[model.parameter_names()[p]] = model.parameters()[p];

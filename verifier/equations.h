@@ -38,7 +38,8 @@ class Equations {
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;
 };
 
-/** The equations for a model's name and parameters; null for a model that the verifier does not implement. */
+/** The equations of a model's text or, if it has none, for its name and parameters; null for a model that the verifier
+does not implement. @throws ExpressionError (expressions.h) if the text is not a model in the language. */
 [[nodiscard]] std::unique_ptr<Equations> EquationsOf(const NominalModel& model);
 
 /** The equations of a text. @throws ExpressionError (expressions.h) if it is not a model in the language. */

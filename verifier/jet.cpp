@@ -85,7 +85,7 @@ class Terms {
   void AddSquare(const Real& factor, const Sparse& g) {
     for (auto i = g.begin(); i != g.end(); ++i)
       for (auto j = i; j != g.end(); ++j) {
-        const Real product = i == j && i->second.IsFinite() ? sqr(i->second) : Times(i->second, j->second);
+        const Real product = Times(i->second, j->second);
         terms_.emplace_back(JetArithmetic::Key(i->first, j->first), Times(factor, product));
       }
   }
@@ -187,20 +187,6 @@ class Rules {
                     [&](Terms& terms, const Sparse&) { terms.Add(a.second); });
   }
 
-  // With the second derivatives that both bounds allow.
-  template <class Other>
-  [[nodiscard]] Jet Meet(Jet jet, const Other& other) const {
-    if (!second_) return jet;
-    const Sparse others = other().second;
-    for (std::size_t i = 0; i < others.size(); ++i) {
-      Real& entry = jet.second[i].second;
-      if (entry.IsFinite() && others[i].second.IsFinite())
-        entry =
-            Real::FromTo(max(entry.lower(), others[i].second.lower()), min(entry.upper(), others[i].second.upper()));
-    }
-    return jet;
-  }
-
   [[nodiscard]] Jet Negative(const Jet& a) const { return {-a.value, Negated(a.first), Negated(a.second)}; }
 
   [[nodiscard]] Jet SumOf(Real value, const Jet& a, const Jet& b) const {
@@ -246,15 +232,13 @@ class Rules {
   [[nodiscard]] Jet Arcsine(Real value, const Jet& a) const {
     const Real cosine = sqrt(Real(1.0) - sqr(a.value));
     const Sparse cosine_slopes = Each(a.first, [&](const Real& slope) { return Over(-Times(a.value, slope), cosine); });
-    return Meet(Quotient(std::move(value), a, cosine, cosine_slopes),
-                [&] { return Chain({}, Over(1.0, cosine), ArcsineBend(a.value), a); });
+    return Quotient(std::move(value), a, cosine, cosine_slopes);
   }
 
   // a_j / (1 + a^2).
   [[nodiscard]] Jet Arctangent(Real value, const Jet& a) const {
     const Real size = Real(1.0) + sqr(a.value);
-    return Meet(Quotient(std::move(value), a, size, Scaled(Real(2.0) * a.value, a.first)),
-                [&] { return Chain({}, Over(1.0, size), ArctangentBend(a.value), a); });
+    return Quotient(std::move(value), a, size, Scaled(Real(2.0) * a.value, a.first));
   }
 
   // (b a_j - a b_j) / (a^2 + b^2).
@@ -318,7 +302,10 @@ Jet Rules::Derive(const Tape::Operation& operation, Real value, const Jet& a) co
     case Op::kSqrt: return SquareRoot(value, a);
     case Op::kExp: return Chain(value, value, value, a);
     case Op::kLog: return Quotient(std::move(value), a, a.value, a.first);
-    case Op::kTanh: return Chain(value, one - sqr(value), HyperbolicTangentBend(value), a);
+    case Op::kTanh: {
+      const Real slope = one - sqr(value);
+      return Chain(value, slope, Real(-2.0) * value * slope, a);
+    }
     case Op::kAbs: return Larger(std::move(value), a, Negative(a));
     case Op::kSmoothGate: return Chain(std::move(value), GateSlope(a.value), GateBend(a.value), a);
     default: break;
@@ -368,25 +355,49 @@ Jet JetArithmetic::Apply(const Tape::Operation& operation, const Jet* a, const J
            : rules.Derive(operation, std::move(result.value), *a);
 }
 
+namespace {
+
+// The product of centers and radii, which contains that of the intervals.
+Real CentredTimes(const Real& a, const Real& b) {
+  if (!a.IsFinite() || !b.IsFinite()) return Real::Everything();
+  const Real a_center = a.middle(), b_center = b.middle();
+  const Real a_radius = (a - a_center).magnitude(), b_radius = (b - b_center).magnitude();
+  const Real center = a_center * b_center;
+  const Real radius = abs(a_center) * b_radius + a_radius * (abs(b_center) + b_radius);
+  return Real::FromTo(center - radius, center + radius);
+}
+
+Sparse CentredScaled(const Real& factor, const Sparse& entries) {
+  return Each(entries, [&](const Real& value) { return CentredTimes(factor, value); });
+}
+
+// a_i b_j + b_i a_j, or a_i a_j if both are the same.
+Sparse SymmetricProducts(const Sparse& a, const Sparse& b) {
+  Sparse terms;
+  const auto add = [&](const Sparse& rows, const Sparse& columns) {
+    for (const auto& [i, by_row] : rows)
+      for (const auto& [j, by_column] : columns)
+        if (i <= j) terms.emplace_back(JetArithmetic::Key(i, j), CentredTimes(by_row, by_column));
+  };
+  add(a, b);
+  if (&a != &b) add(b, a);
+  Terms sum;
+  sum.Add(terms);
+  return sum.Gather();
+}
+
+}  // namespace
+
 Jet Compose(const Jet& outer, std::span<const Jet> inner, JetArithmetic::Order order) {
   Jet result{outer.value, {}, {}};
   Terms first, second;
-  for (const auto& [l, slope] : outer.first) first.AddScaled(slope, inner[ToSize(l)].first);
+  for (const auto& [l, slope] : outer.first) first.Add(CentredScaled(slope, inner[ToSize(l)].first));
   result.first = first.Gather();
   if (order == JetArithmetic::Order::kFirst) return result;
-  for (const auto& [l, slope] : outer.first) second.AddScaled(slope, inner[ToSize(l)].second);
-  for (const auto& [key, bend] : outer.second) {
-    const Sparse &a = inner[ToSize(key / JetArithmetic::kStride)].first,
-                 &b = inner[ToSize(key % JetArithmetic::kStride)].first;
-    if (&a == &b) {
-      second.AddSquare(bend, a);
-      continue;
-    }
-    Terms products;
-    products.AddProducts(a, b);
-    products.AddProducts(b, a);
-    second.AddScaled(bend, products.Gather());
-  }
+  for (const auto& [l, slope] : outer.first) second.Add(CentredScaled(slope, inner[ToSize(l)].second));
+  for (const auto& [key, bend] : outer.second)
+    second.Add(CentredScaled(bend, SymmetricProducts(inner[ToSize(key / JetArithmetic::kStride)].first,
+                                                     inner[ToSize(key % JetArithmetic::kStride)].first)));
   result.second = second.Gather();
   return result;
 }

@@ -1,7 +1,9 @@
 /** Values of a tape over a box of variables, with first and second derivatives, as intervals.
 
-Derivatives go forward with the values, by the rules of the sum, product and quotient, as docs/mathematics.md writes
-them. Where a quantity has no finite enclosure (a pole, the edge of a function's domain), it and all that is computed
+Derivatives go forward with the values, by the rules of the sum, product and quotient. Over a box the order of the
+operations matters, and it is that of the certifier's derivatives: a tighter range moves the center of a centred
+remainder, and then the condition of containment.h may no longer show that the record's generators span the slice.
+Where a quantity has no finite enclosure (a pole, the edge of a function's domain), it and all that is computed
 from it is Real::Everything(). Where a function has a kink (abs, min, max) inside the box, its first derivatives are the
 hulls of those of both sides, and its second derivatives are Real::Everything(). */
 #pragma once
@@ -61,7 +63,7 @@ class JetArithmetic final {
 
 /** outer(inner): the jet of a function of the variables that are the inner jets, by what those have derivatives by.
 With H the second derivatives of outer, grouped as sum_l f_l D^2 y_l + sum_{a <= b} H_ab (D y_a D y_b^T + D y_b D
-y_a^T), where the second product is left out if a = b. */
+y_a^T), where the second product is left out if a = b. Each product is that of centers and radii. */
 [[nodiscard]] Jet Compose(const Jet& outer, std::span<const Jet> inner, JetArithmetic::Order order);
 
 /** a + factor b. */

@@ -30,12 +30,6 @@ Real LogisticSlopeAt(const Real& u) { return LogisticAt(u) * LogisticAt(-u); }
 Real EntropyAt(const Real& u) { return LogAt(u) - u * LogisticAt(u); }
 
 Real TangentBendAt(const Real& t) { return Real(2.0) * t * (Real(1.0) + sqr(t)); }
-Real HyperbolicTangentBendAt(const Real& t) { return Real(2.0) * t * (sqr(t) - Real(1.0)); }
-Real ArcsineBendAt(const Real& x) {
-  const Real square = Real(1.0) - sqr(x);
-  return x / (square * sqrt(square));
-}
-Real ArctangentBendAt(const Real& x) { return Real(-2.0) * x / sqr(Real(1.0) + sqr(x)); }
 
 }  // namespace
 
@@ -58,14 +52,5 @@ Real LogisticSlope(const Real& u) { return RangeOf(LogisticSlopeAt, u, {0.0}); }
 Real SoftRampByTemperature(const Real& u) { return RangeOf(EntropyAt, u, {0.0}); }
 
 Real TangentBend(const Real& t) { return RangeOf(TangentBendAt, t, {}); }
-Real HyperbolicTangentBend(const Real& t) {
-  const Real extremum = sqrt(Real(1.0) / Real(3.0));
-  return RangeOf(HyperbolicTangentBendAt, t, {-extremum, extremum});
-}
-Real ArcsineBend(const Real& x) { return RangeOf(ArcsineBendAt, x, {}); }
-Real ArctangentBend(const Real& x) {
-  const Real extremum = sqrt(Real(1.0) / Real(3.0));
-  return RangeOf(ArctangentBendAt, x, {-extremum, extremum});
-}
 
 }  // namespace forereach::verifier

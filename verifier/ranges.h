@@ -21,11 +21,7 @@ SoftRamp by t. */
 [[nodiscard]] Real LogisticSlope(const Real& u);
 [[nodiscard]] Real SoftRampByTemperature(const Real& u);
 
-/** tan'' = 2 t (1 + t^2) and tanh'' = -2 t (1 - t^2), of the function's value t. */
+/** tan'' = 2 t (1 + t^2) of the tangent t. */
 [[nodiscard]] Real TangentBend(const Real& t);
-[[nodiscard]] Real HyperbolicTangentBend(const Real& t);
-/** asin''(x) = x / (1 - x^2)^(3/2), |x| < 1, and atan''(x) = -2 x / (1 + x^2)^2. */
-[[nodiscard]] Real ArcsineBend(const Real& x);
-[[nodiscard]] Real ArctangentBend(const Real& x);
 
 }  // namespace forereach::verifier

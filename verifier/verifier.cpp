@@ -8,6 +8,7 @@
 
 #include "certifier/numerics/size.h"
 #include "verifier/claims.h"
+#include "verifier/expressions.h"
 
 namespace forereach::verifier {
 namespace {
@@ -106,7 +107,13 @@ Method MethodOf(const Problem& problem) {
 }
 
 Verifier::Verifier(std::shared_ptr<const Problem> problem, Method method)
-    : problem_(std::move(problem)), method_(method), equations_(EquationsOf(*problem_->model)) {}
+    : problem_(std::move(problem)), method_(method) {
+  try {
+    equations_ = EquationsOf(*problem_->model);
+  } catch (const ExpressionError& error) {
+    reason_ = std::string(", ") + error.what();
+  }
+}
 
 const TubeMaker& Verifier::MakerOf(int bits) const {
   const std::lock_guard lock(mutex_);
@@ -126,7 +133,7 @@ Tube Verifier::Derive(const Certificate& certificate) const {
 Verdict Verifier::Verify(const Certificate& certificate) const {
   if (!equations_)
     return {Status::kCannotVerify,
-            {-1, "cannot verify: no equations for the model " + problem_->model->name(), "", ""}};
+            {-1, "cannot verify: no equations for the model " + problem_->model->name() + reason_, "", ""}};
   if (const auto misfit = FindMisfit(*problem_, certificate)) return {Status::kRefuted, *misfit};
   std::optional<Failure> failure;
   for (const int bits : kBits) {

@@ -77,7 +77,8 @@ class Verifier final {
 
   std::shared_ptr<const Problem> problem_;
   Method method_;
-  std::unique_ptr<Equations> equations_;
+  std::unique_ptr<Equations> equations_;  // null if there are none
+  std::string reason_;                    // then: why a text gives none
   mutable std::mutex mutex_;
   mutable std::map<int, std::unique_ptr<TubeMaker>> makers_;  // by bits
 };

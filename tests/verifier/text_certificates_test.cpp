@@ -1,0 +1,95 @@
+// Certificates of models that are texts: what the certifier claims, the verifier derives by its own parser.
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/text_model.h"
+#include "tests/oracle/random.h"
+#include "tests/verifier/record.h"
+#include "tests/verifier/text_models.h"
+
+namespace forereach::verifier {
+namespace {
+
+using Integrator = ModelText::Integrator;
+
+std::shared_ptr<Problem> ProblemOf(const ModelText& text, double reach) {
+  auto problem = std::make_shared<Problem>();
+  problem->model = MakeTextModel(text);
+  const int n = problem->model->num_states(), m = problem->model->num_inputs();
+  const Eigen::VectorXd state = Eigen::VectorXd::Constant(n, reach), input = Eigen::VectorXd::Constant(m, 10);
+  problem->domain.state = Box(-state, state);
+  problem->domain.input = Box(-input, input);
+  problem->declaration = {Eigen::MatrixXd::Zero(n, n + m), Eigen::VectorXd::Zero(n)};
+  problem->declaration.lipschitz.diagonal().setConstant(0.002);
+  problem->projection = Eigen::MatrixXd::Identity(2, n);
+  problem->zonotope_order = 3;
+  problem->transitions = {Eigen::MatrixXd::Zero(1, n + m), Eigen::MatrixXd::Zero(1, n)};
+  std::vector<double> next(static_cast<std::size_t>(n));
+  problem->model->Evaluate(std::vector<double>(static_cast<std::size_t>(n + m)), next);
+  for (int k = 0; k < n; ++k) problem->transitions.x_next(0, k) = next[static_cast<std::size_t>(k)];
+  problem->declaration.noise_bound.setConstant(1e-6);
+  return problem;
+}
+
+// Certifies random plans. All of what is certified has to be confirmed.
+void ExpectConfirmed(const ModelText& text, Random& random, const Eigen::VectorXd& input, int steps) {
+  for (const auto method : {forereach::Method::kPaper, forereach::Method::kCentred}) {
+    const auto problem = ProblemOf(text, 1.3);
+    problem->method = method;
+    const Certifier certifier(problem);
+    const Verifier judge(problem, MethodOf(*problem));
+    forereach::Tube tube;
+    int certified = 0;
+    for (int trial = 0; trial < 6; ++trial) {
+      const int n = problem->model->num_states();
+      const Zonotope initial = Zonotope::FromBox(random.Vector(n, 0.1), random.Vector(n, 0.01).cwiseAbs());
+      Eigen::MatrixXd controls = input.replicate(1, steps);
+      const Plan plan{controls.data(), static_cast<int>(controls.rows()), steps, static_cast<int>(controls.rows()), {}};
+      if (certifier.Certify(plan, initial, {}, tube).outcome != Outcome::kCertified) continue;
+      ++certified;
+      const Certificate certificate = CertificateOf(certifier, plan, initial, {}, tube);
+      const Verdict verdict = judge.Verify(certificate);
+      EXPECT_EQ(verdict.status, Status::kConfirmed)
+          << "step " << verdict.failure.step << ": " << verdict.failure.what << ": " << verdict.failure.found << ", "
+          << verdict.failure.bound << ", excess " << verdict.failure.excess;
+      Certificate smaller = certificate;  // the last hull, a hair too narrow
+      smaller.slices.back().upper[0] -= 1e-6;
+      EXPECT_EQ(judge.Verify(smaller).status, Status::kRefuted);
+    }
+    EXPECT_GT(certified, 0);
+  }
+}
+
+class TextCertificates : public testing::TestWithParam<Integrator> {};
+
+TEST_P(TextCertificates, OfAQuadrotorAreConfirmed) {
+  Random random(91);
+  SCOPED_TRACE(random.trace());
+  ExpectConfirmed(QuadrotorText(GetParam()), random, Eigen::Vector4d(4.9, 0, 0, 0), 8);
+}
+
+TEST_P(TextCertificates, OfManyFunctionsAreConfirmed) {
+  Random random(92);
+  SCOPED_TRACE(random.trace());
+  const Lines equations{{"x", "0.5*tanh(y) + 0.1*atan(x*y) - 0.2*x*exp(-y^2)"},
+                        {"y", "0.3*sin(x)*sqrt(2 + x^2 + y^2) - 0.1*log(3 + x) + 0.2*asin(x/2)"},
+                        {"w", "0.2*atan2(y, 2 + x) + 0.1*max(x, y - 9)*hypot(x, 1 + y^2) - w/(2 + cos(x)) + u"}};
+  ExpectConfirmed(TextModel(equations, {"u"}, {{"dt", 0.1, 0.1}}, {}, GetParam()), random,
+                  Eigen::VectorXd::Constant(1, 0.1), 8);
+}
+
+TEST_P(TextCertificates, WithAParameterThatIsAnIntervalAreConfirmed) {
+  Random random(93);
+  SCOPED_TRACE(random.trace());
+  ExpectConfirmed(TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "k*u"}, {"v", "-k*v*abs(v + 2)"}}, {"u"},
+                            {{"dt", 0.1, 0.1}, {"k", 0.19, 0.21}}, {}, GetParam()),
+                  random, Eigen::VectorXd::Constant(1, 0.1), 8);
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, TextCertificates,
+                         testing::Values(Integrator::kEuler, Integrator::kMidpoint, Integrator::kRk4));
+
+}  // namespace
+}  // namespace forereach::verifier
