@@ -71,9 +71,9 @@ struct Operation {
     return op != Op::kVariable && op != Op::kParameter && op != Op::kConstant;
   }
 
-  friend constexpr bool operator==(const Operation& a, const Operation& b) {
-    return a.op == b.op && a.a == b.a && a.b == b.b &&
-           std::bit_cast<std::uint64_t>(a.constant) == std::bit_cast<std::uint64_t>(b.constant);
+  friend constexpr bool operator==(const Operation& one, const Operation& other) {
+    return one.op == other.op && one.a == other.a && one.b == other.b &&
+           std::bit_cast<std::uint64_t>(one.constant) == std::bit_cast<std::uint64_t>(other.constant);
   }
 };
 
