@@ -72,6 +72,7 @@ class Report:
             self.benchmarks |= read_benchmarks(results / f"{name}.json")
         self.tail_data = json.loads((results / "tail.json").read_text())
         self.bus_data = json.loads((results / "bus_round_trip.json").read_text())
+        self.withdrawal_data = json.loads((results / "withdrawal.json").read_text())
 
     def cpu(self, name):
         return self.benchmarks[name].cpu if name in self.benchmarks else None
@@ -241,6 +242,27 @@ class Report:
             if benchmark := self.benchmarks.get("world/" + name):
                 rows.append([label, number(benchmark.cpu), f"{benchmark.cpu / point.cpu:.2f}"])
         return table(["", "us", "beside the point"], rows)
+
+    def models(self):
+        compiled = self.benchmarks.get("model/bicycle_compiled")
+        rows = []
+        for name, label in (
+            ("bicycle_compiled", "bicycle, compiled"),
+            ("bicycle_text", "bicycle, text"),
+            ("bicycle_midpoint", "bicycle, text, midpoint"),
+            ("bicycle_rk4", "bicycle, text, Runge-Kutta"),
+            ("quadrotor_rk4_20_steps", "quadrotor, text, Runge-Kutta, 20 steps"),
+        ):
+            if benchmark := self.benchmarks.get("model/" + name):
+                rows.append([label, number(benchmark.cpu), f"{benchmark.cpu / compiled.cpu:.2f}"])
+        return table(["", "us", "beside the compiled bicycle"], rows)
+
+    def withdrawals(self):
+        rows = []
+        for name, label in (("withdrawn", "withdrawal"), ("answered", "the robot's answer")):
+            data = self.withdrawal_data[name]
+            rows.append([label, number(data["count"], 1), *(number(data[p]) for p in ("p50", "p99", "max"))])
+        return table(["", "count", "p50", "p99", "max"], rows) + f"\n\n{self.withdrawal_data['lost']} were lost."
 
     def nominal(self):
         rows = []

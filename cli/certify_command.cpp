@@ -17,8 +17,21 @@ struct Options {
   bool json = false;
 };
 
-void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifier& certifier) {
-  std::cout << Explain(result.decision, certifier.problem()) << "\n";
+// What the limits' functions reach at the samples of the tube.
+void PrintLimits(const Plan& plan, const Tube& tube, const Certifier& certifier) {
+  const std::span<const Limit> limits = certifier.limits().limits();
+  for (std::size_t i = 0; i < limits.size(); ++i) {
+    const auto& [name, that, at_least, at_most] = limits[i];
+    const auto reach = certifier.limits().Reach(static_cast<int>(i), plan, tube);
+    if (!reach) continue;
+    std::cout << (i == 0 ? "\n  limits: " : ", ") << name;
+    if (at_least > -kInfinity) std::cout << " from " << RoundedDown(reach->lower) << " (at least " << at_least << ")";
+    if (at_most < kInfinity) std::cout << " to " << RoundedUp(reach->upper) << " (at most " << at_most << ")";
+  }
+}
+
+void PrintForPeople(const CertifyResult& result, const Plan& plan, const Tube& tube, const Certifier& certifier) {
+  std::cout << Explain(result.decision, certifier.problem(), plan, tube) << "\n";
   const auto& names = certifier.problem().model->state_names();
   if (result.decision.outcome == Outcome::kFalsified && result.decision.step < 0) {
     std::cout << "  no tube";
@@ -27,6 +40,7 @@ void PrintForPeople(const CertifyResult& result, const Tube& tube, const Certifi
     for (std::size_t k = 0; k < names.size(); ++k)
       std::cout << " " << names[k] << " " << RoundedUp(tube.slice(tube.length()).HalfWidthUpper(static_cast<int>(k)));
   }
+  if (tube.length() > 0) PrintLimits(plan, tube, certifier);
   if (const Declaration& declaration = certifier.problem().declaration; declaration.IsDisturbed()) {
     std::cout << "\n  each step disturbed by up to:";
     for (std::size_t k = 0; k < names.size(); ++k)
@@ -61,7 +75,7 @@ int Certify(const Options& options) {
   if (options.json)
     std::cout << JsonText(ToJson(result, tube, certifier, config)) << std::endl;
   else
-    PrintForPeople(result, tube, certifier);
+    PrintForPeople(result, plan, tube, certifier);
   return result.decision.outcome == Outcome::kCertified ? 0 : 1;
 }
 

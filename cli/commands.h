@@ -24,7 +24,12 @@ inline constexpr const char* kTaskOfLogs =
 [[nodiscard]] inline Option JobsOption(unsigned& jobs) { return {"--jobs", &jobs, "", "Threads", NumberRange{1, 256}}; }
 
 [[nodiscard]] Command CertifyCommand();
+[[nodiscard]] Command InitCommand();
+[[nodiscard]] Command CheckCommand();
+[[nodiscard]] Command ExportModelCommand();
 [[nodiscard]] Command PlanCommand();
+[[nodiscard]] Command ImportCommand();
+[[nodiscard]] Command FitCommand();
 [[nodiscard]] Command DeclareCommand();
 [[nodiscard]] Command VerifyCommand();
 [[nodiscard]] Command ReplayCommand();

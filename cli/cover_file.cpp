@@ -78,8 +78,17 @@ void Append(CanonicalBytes& bytes, const Cover& cover) {
 
 std::vector<std::string> ArgumentNames(const Config& config) {
   std::vector<std::string> names = config.problem->model->variable_names();
-  for (const auto& parameter : config.residual->parameters) names.push_back(parameter.name);
+  for (const auto& parameter : config.residual->names.parameters) names.push_back(parameter.name);
   return names;
+}
+
+nlohmann::json ResidualJson(const Config& config) {
+  const ParametricResidual& residual = *config.residual;
+  Json parameters = Json::object(), definitions = Json::object(), values = Json::object();
+  for (const auto& [name, lower, upper] : residual.names.parameters) parameters[name] = {lower, upper};
+  for (const auto& [name, value] : residual.names.definitions) definitions[name] = value.text;
+  for (std::size_t k = 0; k < residual.values.size(); ++k) values[residual.names.states[k]] = residual.values[k].text;
+  return {{"name", residual.name}, {"parameters", parameters}, {"let", definitions}, {"add", values}};
 }
 
 Digest ResidualDigest(const Config& config) {
@@ -101,11 +110,16 @@ Digest ResidualDigest(const Config& config) {
     bytes.Numbers(center);
     bytes.Number(radius);
   }
-  bytes.Text(config.residual->name);
-  for (const auto& [name, lower, upper] : config.residual->parameters) {
+  for (const auto& [name, lower, upper] : config.residual->names.parameters) {
     bytes.Number(lower);
     bytes.Number(upper);
   }
+  bytes.Count(static_cast<std::int64_t>(config.residual->names.definitions.size()));
+  for (const auto& [name, value] : config.residual->names.definitions) {
+    bytes.Text(name);
+    bytes.Text(value.text);
+  }
+  for (const auto& [text, line, column] : config.residual->values) bytes.Text(text);
   return bytes.digest();
 }
 
@@ -123,15 +137,14 @@ Digest CoverDigest(const std::vector<SlopeClaim>& claims) {
 
 void SaveCover(const std::string& path, const Config& config, const std::vector<SlopeClaim>& claims) {
   const std::vector<std::string> names = ArgumentNames(config);
-  Json parameters = Json::object(), entries = Json::array();
-  for (const auto& [name, lower, upper] : config.residual->parameters) parameters[name] = {lower, upper};
+  Json entries = Json::array();
   for (const SlopeClaim& claim : claims)
     entries.push_back({{"row", names[static_cast<std::size_t>(claim.row)]},
                        {"column", names[static_cast<std::size_t>(claim.column)]},
                        {"bound", claim.bound},
                        {"cover", TreeJson(claim.cover, 0, names)}});
   const Json document{
-      {"residual", {{"name", config.residual->name}, {"parameters", parameters}}},
+      {"residual", ResidualJson(config)},
       {"entries", entries},
       {"digests", {{"residual", ToHex(ResidualDigest(config))}, {"cover", ToHex(CoverDigest(claims))}}}};
   std::ofstream file(path, std::ios::binary);

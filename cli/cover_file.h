@@ -1,16 +1,21 @@
 /** The file in which `forereach declare --cover` leaves the proof of its bounds. JSON: `residual` (its name, the range
-of each parameter), `entries` (row, column, bound, cover), `digests` (residual, cover). A cover is a tree: a leaf is a
-number, the bound over its box, or null where that lies outside the domain; else it is [name, at, below, above], the
-argument that is cut, where, and the two parts. */
+of each parameter, definitions, and what it adds to each state), `entries` (row, column, bound, cover), `digests`
+(residual, cover). A cover is a tree: a leaf is a number, the bound over its box, or null where that lies outside the
+domain; else it is [name, at, below, above], the argument that is cut, where, and the two parts. */
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "certifier/task/config.h"
 #include "verifier/cover_check.h"
 
 namespace forereach {
+
+/** The residual as `forereach declare` shows it. @pre the config has one. */
+[[nodiscard]] nlohmann::json ResidualJson(const Config& config);
 
 /** Of all that the bounds depend on: the coordinates' names, the domain, the residual.
 @pre the config has a residual. */

@@ -24,9 +24,8 @@ constexpr int kDigits = 6;
 
 // Neither the equations nor a second difference say how a disturbance acts between two samples.
 constexpr const char* kDisturbed =
-    "\ndeclaration.disturbance is a bound at the samples. What disturbs the robot accelerates it, too: add the "
-    "largest\n"
-    "acceleration that the disturbance causes between two samples.";
+    "\ndeclaration.disturbance is a bound at the samples. What disturbs the robot accelerates it, too:\n"
+    "add the largest acceleration that the disturbance causes between two samples.";
 
 // One number of task.between.
 struct Row {
@@ -60,8 +59,15 @@ std::vector<Row> RowsOf(const Config& config, const std::vector<MotionBound>& ac
   return rows;
 }
 
+void RequireFrame(const Config& config) {
+  if (config.problem->body.HasPlaces())
+    throw ConfigError(config.path +
+                      ": task.body: has parts at expressions (place, places); no bounds on their motion are proposed");
+}
+
 Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
   const Problem& problem = *config.problem;
+  RequireFrame(config);
   const auto flow = MakeFlow(*problem.model);
   if (!flow)
     throw ConfigError(config.path + ": model: the equations of " + problem.model->name() +
@@ -87,6 +93,7 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
 
 Proposal FromPositions(const Config& config) {
   const Problem& problem = *config.problem;
+  RequireFrame(config);
   const MeasuredMotion measured =
       MeasureMotion(problem.transitions, problem.projection, problem.body.heading, config.period);
   if (measured.triples == 0)

@@ -10,13 +10,13 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/declare/slope_bound.h"
-#include "certifier/dynamics/residuals.h"
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/json_text.h"
 #include "cli/commands.h"
 #include "cli/cover_file.h"
 #include "cli/declare_between.h"
+#include "cli/declare_data.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
 
@@ -28,27 +28,24 @@ using Json = nlohmann::json;
 struct Options {
   std::string config, cover, check;
   std::string from = "equations";
-  bool json = false, between = false;
+  bool json = false, between = false, from_data = false;
+  std::string noise = "declared";
+  DataCommand data;
   SlopeBoundOptions search;
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
-// A residual of the model, as a task file may write it. Empty if there is none.
+// A residual of the model, as a task file may write it.
 std::string ExampleFor(const NominalModel& model) {
-  const std::pair<const char*, const char*> examples[] = {
-      {HeadingSaturation::Nominal::kName, "heading_saturation, friction: [0.8, 1.0]"},
-      {VelocityKnee::Nominal::kName, "velocity_knee, damping: [0.38, 0.42]"}};
-  for (const auto& [name, example] : examples)
-    if (model.name() == name) return std::string("; for example  residual: {name: ") + example + "}";
-  return "";
+  const std::string& state = model.state_names().back();
+  return "residual: {parameters: {c: [0.1, 0.2]}, add: {" + state + ": -c*abs(" + state + ")}}";
 }
 
 Config LoadWithResidual(const std::string& path) {
   Config config = LoadConfig(path, TransitionsFile::kIgnore);
   if (!config.residual)
     throw ConfigError(path +
-                      ":1: residual: missing: its equations by name, with a number or [least, largest] for each "
-                      "parameter that is not the paper's" +
+                      ":1: residual: missing: what the robot's next state has beyond the model's; for example  " +
                       ExampleFor(*config.problem->model));
   return config;
 }
@@ -58,12 +55,12 @@ Config LoadWithResidual(const std::string& path) {
 constexpr std::size_t kSteps = 100;  // of the progress bar, for each derivative
 
 std::vector<SlopeBound> BoundAll(const Config& config, const Options& options) {
-  const auto slopes = MakeResidualSlopes(config.residual->name);
-  const std::vector<Interval> parameters = ParameterRanges(*slopes, *config.residual);
+  const TextSlopes slopes(*config.residual);
+  const std::vector<Interval> parameters = ParameterRanges(*config.residual);
   std::vector<SlopeBound> bounds;
-  for (int k = 0; k < slopes->num_states(); ++k)
-    for (int l = 0; l < slopes->num_variables(); ++l)
-      if (slopes->Occurs(k, l)) bounds.emplace_back().row = k, bounds.back().column = l;
+  for (int k = 0; k < slopes.num_states(); ++k)
+    for (int l = 0; l < slopes.num_variables(); ++l)
+      if (slopes.Occurs(k, l)) bounds.emplace_back().row = k, bounds.back().column = l;
   Progress progress("hundredths of a bound", kSteps * bounds.size());
   ForEachInParallel(bounds.size(), options.jobs, [&](std::size_t i, std::size_t) {
     std::size_t shown = 0;
@@ -72,7 +69,7 @@ std::vector<SlopeBound> BoundAll(const Config& config, const Options& options) {
         progress.Advance();
     };
     bounds[i] =
-        BoundSlope(*slopes, config.problem->domain, parameters, bounds[i].row, bounds[i].column, options.search, show);
+        BoundSlope(slopes, config.problem->domain, parameters, bounds[i].row, bounds[i].column, options.search, show);
   });
   return bounds;
 }
@@ -81,7 +78,7 @@ constexpr int kDigits = 10;  // of a bound
 
 // The arguments that the slopes of a row depend on and that are not parameters with one value.
 std::vector<std::size_t> FreeArguments(const ResidualSlopes& slopes, const Config& config, int row) {
-  const std::vector<ParametricResidual::Parameter>& parameters = config.residual->parameters;
+  const std::vector<Interval> parameters = ParameterRanges(*config.residual);
   const auto num_variables = static_cast<std::size_t>(config.problem->model->num_variables());
   std::vector<std::size_t> free;
   for (std::size_t i = 0; i < num_variables + parameters.size(); ++i)
@@ -145,7 +142,7 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
   const auto columns = static_cast<std::size_t>(model.num_variables());
   Json zero = Json::array();
   for (int k = 0; k < model.num_states(); ++k) zero.push_back(std::vector<double>(columns, 0.0));
-  Json lipschitz = zero, lower = zero, entries = Json::array(), parameters = Json::object();
+  Json lipschitz = zero, lower = zero, entries = Json::array();
   std::size_t boxes = 0;
   for (const SlopeBound& bound : bounds) {
     const auto row = static_cast<std::size_t>(bound.row), column = static_cast<std::size_t>(bound.column);
@@ -163,8 +160,7 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
                        {"reached", bound.reached}});
     boxes += bound.boxes;
   }
-  for (const auto& [name, least, largest] : config.residual->parameters) parameters[name] = {least, largest};
-  return {{"residual", {{"name", config.residual->name}, {"parameters", parameters}}},
+  return {{"residual", ResidualJson(config)},
           {"rows", model.state_names()},
           {"columns", std::vector(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(columns))},
           {"lipschitz", lipschitz},
@@ -182,7 +178,7 @@ Json ToJson(const std::vector<SlopeBound>& bounds, const Config& config, double 
 }
 
 void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config, double seconds) {
-  const auto slopes = MakeResidualSlopes(config.residual->name);
+  const TextSlopes slopes(*config.residual);
   const std::vector<std::string> names = ArgumentNames(config);
   const auto name = [&](int i) { return names[static_cast<std::size_t>(i)]; };
   std::ostringstream text;
@@ -196,7 +192,7 @@ void PrintForPeople(const std::vector<SlopeBound>& bounds, const Config& config,
          << RoundedUp(bound.upper, kDigits) << std::setw(18) << RoundedDown(bound.lower, kDigits) << std::setw(10)
          << RoundedUp(bound.gap(), 2) << std::setw(9) << bound.boxes << std::setprecision(6);
     if (!bound.point.empty())
-      for (const std::size_t i : FreeArguments(*slopes, config, bound.row))
+      for (const std::size_t i : FreeArguments(slopes, config, bound.row))
         text << " " << names[i] << " " << bound.point[i];
     text << "\n";
   }
@@ -209,7 +205,7 @@ int Declare(const Options& options) {
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<SlopeBound> bounds = BoundAll(config, options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  RequireFinite(bounds, config, *MakeResidualSlopes(config.residual->name));
+  RequireFinite(bounds, config, TextSlopes(*config.residual));
   if (!options.cover.empty()) {
     std::vector<verifier::SlopeClaim> claims;
     for (const SlopeBound& bound : bounds) claims.push_back({bound.row, bound.column, bound.upper, bound.cover});
@@ -301,19 +297,27 @@ Command DeclareCommand() {
       .name = kDeclare.name,
       .purpose = kDeclare.purpose,
       .footer =
-          "In the task file, each parameter is a number or an interval; dt and wheelbase are the model's:\n"
-          "  residual: {name: heading_saturation, friction: [0.81, 0.99], understeer: 0.32}\n"
+          "In the task file, `add` is what the next state has beyond the model's. Each parameter is a number or an "
+          "interval:\n"
+          "  residual: {parameters: {c: [0.1, 0.2]}, add: {v: -c*v*abs(v)}}\n"
           "Boxes are cut until the bound over every one, in interval arithmetic, is close to the largest slope "
           "found.\n"
           "Copy the last line of the output into the task file.\n\n"
           "--between needs no residual. It bounds how far the robot's path curves from one sample to the next, for the "
           "key\n"
           "task.between.\n\n"
+          "--from-data needs no residual either. It proposes a declaration from the task's transitions, and proves "
+          "nothing; "
+          "see\n"
+          "docs/data.md. With --hold-out it shows how often fresh transitions contradict what the others propose.\n\n"
           "Examples:\n"
           "  forereach declare --config config/bicycle.yaml\n"
           "  forereach declare --config config/point_mass.yaml --cover cover.json\n"
           "  forereach declare --config config/point_mass.yaml --check cover.json\n"
-          "  forereach declare --config config/demo.yaml --between",
+          "  forereach declare --config config/demo.yaml --between\n"
+          "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha\n"
+          "  forereach declare --config config/drive/unicycle.yaml --from-data --by v,omega,a,alpha "
+          "--hold-out --picture trade_off",
       .options = {ConfigOption(options->config, "Task file (YAML) with a section `residual`"),
                   {"--gap", &options->search.gap, "",
                    "Stop when no bound exceeds the largest slope found by more than this fraction",
@@ -342,11 +346,63 @@ Command DeclareCommand() {
                            "continuous time; positions: largest second differences of the task's transitions",
                    .one_of = {"equations", "positions"},
                    .needs = "--between"},
+                  {.name = "--from-data",
+                   .variable = &options->from_data,
+                   .help = "Propose a declaration from the task's transitions instead",
+                   .excludes = "--between"},
+                  {.name = "--by",
+                   .variable = &options->data.by,
+                   .type = "[STATE=]NAMES",
+                   .help = "The states and inputs on which the residual may depend, with commas between, of one state "
+                           "or of all; by default on all. May be repeated",
+                   .needs = "--from-data"},
+                  {.name = "--factor",
+                   .variable = &options->data.factor,
+                   .help = "Proposed slopes over the smallest ones that no transitions contradict",
+                   .range = NumberRange{1, 1000},
+                   .needs = "--from-data"},
+                  {.name = "--noise",
+                   .variable = &options->noise,
+                   .help = "The task's noise_bound, or that raised to what the transitions show of their error",
+                   .one_of = {"declared", "estimated"},
+                   .needs = "--from-data"},
+                  {.name = "--hold-out",
+                   .variable = &options->data.hold_out,
+                   .help = "Learn from every other block of time, and judge by those between",
+                   .needs = "--from-data"},
+                  {.name = "--blocks",
+                   .variable = &options->data.blocks,
+                   .help = "With --hold-out: the number of blocks",
+                   .range = NumberRange{2, 100'000},
+                   .needs = "--hold-out"},
+                  {.name = "--steps",
+                   .variable = &options->data.steps,
+                   .help = "With --hold-out: the length of the stretches of recorded commands that are certified",
+                   .range = NumberRange{1, kMaxSteps},
+                   .needs = "--hold-out"},
+                  {.name = "--confidence",
+                   .variable = &options->data.confidence,
+                   .help = "With --hold-out: of the bound on the rate of blocks with a contradiction",
+                   .range = NumberRange{0.5, 0.999999},
+                   .needs = "--hold-out"},
+                  {.name = "--picture",
+                   .variable = &options->data.picture,
+                   .type = "NAME",
+                   .help = "With --hold-out: the trade-off as NAME.svg and NAME.png, or as one of .svg, .png, .pdf",
+                   .needs = "--hold-out"},
                   JobsOption(options->jobs),
                   JsonFlag(options->json, "One JSON document on standard output; the matrix is `lipschitz`")},
       .run = [options] {
         if (options->between)
           return DeclareBetween({options->config, options->from == "positions", options->json, options->search});
+        if (options->from_data) {
+          DataCommand& data = options->data;
+          data.config = options->config;
+          data.estimate_noise = options->noise == "estimated";
+          data.json = options->json;
+          data.jobs = options->jobs;
+          return data.hold_out ? DeclareHoldOut(data) : DeclareFromData(data);
+        }
         return options->check.empty() ? Declare(*options) : CheckCover(*options);
       }};
 }

@@ -9,9 +9,26 @@ struct OfflineCommand {
   const char* purpose;
 };
 
+inline constexpr OfflineCommand kInit{
+    "init",
+    "Write a commented task file to begin with, from a model of the library or the header of a transitions file"};
+inline constexpr OfflineCommand kCheck{
+    "check",
+    "Examine one task file, say what to change, and draw it: exit 0 if a plan could be certified in principle, 1 with "
+    "findings, 2 bad input"};
+inline constexpr OfflineCommand kExportModel{
+    "export-model", "Write the equations of a task's model as a C++ header, for a certifier with compiled equations"};
 inline constexpr OfflineCommand kPlan{"plan",
                                       "Make a certified plan from task.initial_set towards planner.goal: exit 0 with a "
                                       "CSV file, 1 if none was found, 2 bad input"};
+inline constexpr OfflineCommand kImport{
+    "import",
+    "Make the transitions of a task from logs of states and inputs: exit 0 with a CSV file, 1 if there is none, 2 bad "
+    "input"};
+inline constexpr OfflineCommand kFit{
+    "fit",
+    "Fit the parameters of a model as text to the task's transitions: exit 0 if the search converged, 1 if not, 2 bad "
+    "input"};
 inline constexpr OfflineCommand kDeclare{
     "declare",
     "Prove a declaration: bound the slopes of an analytic residual over the whole domain and all its parameters. Exit "
@@ -30,6 +47,7 @@ inline constexpr OfflineCommand kCheckLog{
 inline constexpr OfflineCommand kRun{
     "run", "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock"};
 
-inline constexpr OfflineCommand kOfflineCommands[] = {kPlan, kDeclare, kVerify, kReplay, kReport, kCheckLog, kRun};
+inline constexpr OfflineCommand kOfflineCommands[] = {kInit,    kImport, kCheck,  kFit,    kExportModel, kPlan,
+                                                      kDeclare, kVerify, kReplay, kReport, kCheckLog,    kRun};
 
 }  // namespace forereach

@@ -3,7 +3,8 @@
 
 int main(int argc, char** argv) {
   using namespace forereach;
-  return RunCommands({PlanCommand(), DeclareCommand(), VerifyCommand(), ReplayCommand(), ReportCommand(),
-                      CheckLogCommand(), RunCommand()},
-                     argc, argv);
+  return RunCommands(
+      {InitCommand(), ImportCommand(), CheckCommand(), FitCommand(), ExportModelCommand(), PlanCommand(),
+       DeclareCommand(), VerifyCommand(), ReplayCommand(), ReportCommand(), CheckLogCommand(), RunCommand()},
+      argc, argv);
 }

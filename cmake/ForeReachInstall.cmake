@@ -14,13 +14,20 @@ install(TARGETS forereach_options forereach_certifier forereach_lcmtypes forerea
   forereach_supervisor EXPORT ForeReachTargets)
 install(EXPORT ForeReachTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
 
+# For certifiers with compiled equations, find_package(ForeReach COMPONENTS process): the process as a library.
+set_target_properties(forereach_certifier_process PROPERTIES EXPORT_NAME certifier_process)
+install(TARGETS forereach_command_line forereach_bus forereach_process forereach_task forereach_gate
+  forereach_certifier_node forereach_certifier_process EXPORT ForeReachProcessTargets)
+install(EXPORT ForeReachProcessTargets NAMESPACE ForeReach:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/ForeReach)
+
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/forereach)
 foreach(floor numerics sets dynamics residual safety reach declare certify)
   install(DIRECTORY certifier/${floor} DESTINATION ${headers}/certifier FILES_MATCHING PATTERN "*.h")
 endforeach()
-install(FILES lcmtypes/bad_input.h lcmtypes/codec.h lcmtypes/freshness.h lcmtypes/names.h lcmtypes/seal.h DESTINATION ${headers}/lcmtypes)
+install(FILES certifier/process/certifier_process.h DESTINATION ${headers}/certifier/process)
+install(FILES lcmtypes/angle.h lcmtypes/bad_input.h lcmtypes/codec.h lcmtypes/freshness.h lcmtypes/names.h lcmtypes/seal.h DESTINATION ${headers}/lcmtypes)
 install(FILES bus/authentic.h bus/keys.h DESTINATION ${headers}/bus)
-install(FILES robot/guard.h robot/supervisor.h DESTINATION ${headers}/robot)
+install(FILES robot/brake.h robot/guard.h robot/supervisor.h DESTINATION ${headers}/robot)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/generated/forereach DESTINATION ${headers}/messages)
 install(DIRECTORY lcmtypes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach/lcmtypes FILES_MATCHING PATTERN "*.lcm")
 install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/forereach)

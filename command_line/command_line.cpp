@@ -105,6 +105,9 @@ CLI::Option* AddValue(CLI::App& app, const Option& declared, T& variable) {
     if constexpr (std::is_arithmetic_v<Value>)
       if (declared.range) option->check(Inside<Value>(*declared.range));
     if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>) option->capture_default_str();
+    // One value each time it is given: the next argument may be a file.
+    if constexpr (std::is_same_v<T, std::vector<std::string>>)
+      if (declared.name.starts_with("--")) option->allow_extra_args(false);
     return option;
   }
 }

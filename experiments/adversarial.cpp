@@ -7,8 +7,8 @@
 #include "certifier/residual/observations.h"
 #include "experiments/experiment.h"
 #include "experiments/methods/envelope.h"
-#include "experiments/methods/slopes.h"
 #include "experiments/variants.h"
+#include "identify/slopes.h"
 
 namespace forereach::experiments {
 namespace {

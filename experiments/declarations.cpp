@@ -9,6 +9,7 @@
 #include "certifier/dynamics/residuals.h"
 #include "certifier/residual/consistency.h"
 #include "certifier/residual/observations.h"
+#include "experiments/equations_slopes.h"
 #include "experiments/experiment.h"
 #include "experiments/norm_ratio.h"
 #include "experiments/paper_grids.h"
@@ -104,7 +105,7 @@ constexpr int kPercents[] = {5, 10, 20};
 // some per cent of the paper's. The paper does not say which parameters its boxes hold.
 Eigen::MatrixXd BoundAnew(int percent) {
   const System& bicycle = BicycleSystem();
-  const auto slopes = MakeResidualSlopes(HeadingSaturation::kName);
+  const EquationsSlopes<HeadingSaturation> slopes;
   std::vector<Interval> parameters;
   for (const double value : HeadingSaturation{0.1, 2.5}.parameters()) parameters.push_back({value, value});
   for (std::size_t i = 2; i < parameters.size(); ++i) {
@@ -114,7 +115,7 @@ Eigen::MatrixXd BoundAnew(int percent) {
   Eigen::MatrixXd lipschitz = Eigen::MatrixXd::Zero(bicycle.deployed.rows(), bicycle.deployed.cols());
   for (int k = 0; k < lipschitz.rows(); ++k)
     for (int l = 0; l < lipschitz.cols(); ++l)
-      if (slopes->Occurs(k, l)) lipschitz(k, l) = BoundSlope(*slopes, bicycle.domain, parameters, k, l).upper;
+      if (slopes.Occurs(k, l)) lipschitz(k, l) = BoundSlope(slopes, bicycle.domain, parameters, k, l).upper;
   return lipschitz;
 }
 

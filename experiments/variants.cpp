@@ -1,11 +1,11 @@
 #include "experiments/variants.h"
+#include "experiments/equations_slopes.h"
 
 #include <array>
 #include <cmath>
 #include <map>
 #include <vector>
 
-#include "certifier/declare/residual_slopes.h"
 #include "certifier/declare/slope_bound.h"
 #include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/kinematic_bicycle.h"

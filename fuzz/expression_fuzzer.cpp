@@ -1,11 +1,15 @@
 // Expressions: any text is an expression whose value does not change when every operation is put into parentheses, or
-// it is refused at a place inside it.
+// it is refused at a place inside it. The verifier's parser takes the same texts and gives them the same values.
 #include "certifier/dynamics/expression.h"
 
 #include <bit>
 #include <charconv>
+#include <optional>
 
+#include "certifier/dynamics/jet.h"
 #include "fuzz/fuzz.h"
+#include "verifier/expressions.h"
+#include "verifier/jet.h"
 
 namespace forereach {
 namespace {
@@ -56,8 +60,9 @@ std::string Parenthesised(const Expression& expression) {
   return texts.back();
 }
 
+constexpr double kValues[] = {0.75, -1.25, 0.5, 3, -0.1, 0.05};
+
 double ValueOf(const Expression& expression) {
-  constexpr double kValues[] = {0.75, -1.25, 0.5, 3, -0.1, 0.05};
   return Evaluate<double>(expression, kValues, [](double x) { return x; });
 }
 
@@ -66,21 +71,47 @@ bool AreSame(double a, double b) {
   return (a != a && b != b) || std::bit_cast<std::uint64_t>(a + 0.0) == std::bit_cast<std::uint64_t>(b + 0.0);
 }
 
+// The value by the verifier's parser and arithmetic; none if it refuses the text.
+std::optional<verifier::Real> VerifiersValue(const std::string& text) {
+  verifier::Tape tape;
+  verifier::Names names;
+  for (std::size_t i = 0; i < kNames.size(); ++i)
+    names[kNames[i]] = tape.Add({verifier::Op::kVariable, -1, -1, static_cast<int>(i)});
+  try {
+    const std::vector<int> result{verifier::Parse({text}, names, tape)};
+    const std::vector<verifier::Real> z(std::begin(kValues), std::end(kValues));
+    return verifier::Evaluate(tape, result, verifier::RealArithmetic(z, {})).front();
+  } catch (const verifier::ExpressionError& error) {
+    Require(*error.what() != '\0');
+    return std::nullopt;
+  }
+}
+
+// Two enclosures of one number.
+bool Overlap(const Interval& a, const verifier::Real& b) {
+  return !CertainlyBelow(a.upper, b) && !CertainlyBelow(b, a.lower);
+}
+
 int NumLines(const std::string& text) { return 1 + static_cast<int>(std::ranges::count(text, '\n')); }
 
 }  // namespace
 
 bool Try(Bytes data) {
   const std::string text(data.begin(), data.end());
+  const std::optional<verifier::Real> verified = VerifiersValue(text);
   Expression expression;
   try {
     expression = ParseExpression({text}, kNames);
   } catch (const ExpressionError& error) {
+    Require(!verified);
     Require(*error.what() != '\0' && 1 <= error.line() && error.line() <= NumLines(text) && 1 <= error.column() &&
             error.column() <= static_cast<int>(text.size()) + 1);
     return false;
   }
   Require(!expression.nodes.empty() && expression.nodes.size() <= text.size());
+  const std::vector<Jet> at(std::begin(kValues), std::end(kValues));
+  Require(verified &&
+          Overlap(Evaluate<Jet>(expression, at, [](double number) { return Jet(number); }).value, *verified));
   const std::string again = Parenthesised(expression);
   if (!again.empty()) try {
       Require(AreSame(ValueOf(ParseExpression({again}, kNames)), ValueOf(expression)));

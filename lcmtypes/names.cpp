@@ -29,6 +29,7 @@ std::string_view CauseName(std::int16_t cause) {
     case decision_t::CAUSE_NO_FINITE_ENCLOSURE: return "no_finite_enclosure";
     case decision_t::CAUSE_OBSTACLE: return "obstacle";
     case decision_t::CAUSE_NO_STOP: return "no_stop";
+    case decision_t::CAUSE_LIMIT: return "limit";
     case decision_t::CAUSE_STALE: return "stale";
     case decision_t::CAUSE_FUTURE: return "future";
     case decision_t::CAUSE_DUPLICATE: return "duplicate";
@@ -114,6 +115,7 @@ std::string_view WithdrawalName(std::int16_t cause) {
     case withdrawal_t::NO_STOP: return "no_stop";
     case withdrawal_t::NOT_JUDGED: return "not_judged";
     case withdrawal_t::UNKNOWN_PLAN: return "unknown_plan";
+    case withdrawal_t::LIMIT: return "limit";
     default: return "unknown";
   }
 }

@@ -3,7 +3,7 @@
 namespace forereach {
 
 void Lessons::Learn(Outcome outcome, Cause cause) {
-  if (cause == Cause::kNoStop) return;
+  if (cause == Cause::kNoStop || cause == Cause::kLimit) return;
   if (outcome == Outcome::kSafety) clearance_ += step_;
   if (outcome == Outcome::kDomain) ++domain_exits_;
 }

@@ -14,7 +14,8 @@ class Lessons final {
   explicit Lessons(const PlannerOptions& options) : clearance_(options.clearance), step_(options.clearance_step) {}
 
   /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. No other outcome
-  changes anything. Neither does the cause kNoStop: it says nothing about the domain's bounds. */
+  changes anything. Neither do the causes kNoStop and kLimit: they
+  say nothing about the domain's bounds and the obstacles. */
   void Learn(Outcome outcome, Cause cause);
 
   /** The distance that the next candidate keeps from obstacles, metres. */

@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <stdexcept>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/numerics/size.h"
 
 namespace forereach {
 namespace {
@@ -19,9 +23,162 @@ constexpr double kShareOfBound = 0.95;
 // The largest magnitude that the bounds allow for both signs of a coordinate.
 double Reach(const Box& box, int k) { return std::min(-box.lower()(k), box.upper()(k)); }
 
+constexpr double kStandstill = 1e-3;  // m/s
+
+double StepOf(const NominalModel& model) {
+  const auto& names = model.parameter_names();
+  return model.parameters()[ToSize(std::ranges::find(names, "dt") - names.begin())];
+}
+
+/** Driving and braking by the laws of the task. */
+class LawMotion final : public RobotMotion {
+ public:
+  LawMotion(const Config& config, Braking braking)
+      : problem_(config.problem), held_(HeldStates(config)), at_rest_(*config.laws.at_rest) {
+    const Laws& laws = config.laws;
+    const NominalModel& model = *problem_->model;
+    for (const Law& law :
+         braking == Braking::kHardest && !laws.emergency_stop.empty() ? laws.emergency_stop : laws.stop)
+      stops_.push_back(MakeStopLaw(model, laws, law));
+    if (!laws.hints.empty()) hints_.emplace(MakeHints(model, laws));
+    if (laws.speed) speed_.emplace(MakeSpeed(model, laws));
+  }
+
+  double dt() const override { return StepOf(*problem_->model); }
+
+  // Without an expression: along the way of one step.
+  double Speed(std::span<const double> x) const override {
+    if (speed_) {
+      long double speed;
+      speed_->Evaluate(x, {&speed, 1});
+      return static_cast<double>(speed);
+    }
+    std::array<double, kMaxInputs> u;
+    std::array<double, kMaxStates> next;
+    Coast(x, {u.data(), inputs()});
+    Step(x, {u.data(), inputs()}, {next.data(), x.size()});
+    const auto states = std::ssize(x);
+    const Eigen::Map<const Eigen::VectorXd> from(x.data(), states), to(next.data(), states);
+    return (problem_->projection * (to - from)).norm() / dt();
+  }
+
+  bool IsAtRest(std::span<const double> x) const override { return !at_rest_.empty() && Rests(x); }
+
+  // The control that holds the robot where it is: the law, as if it stood.
+  void Coast(std::span<const double> x, std::span<double> u) const override {
+    std::array<double, kMaxStates> held;
+    std::ranges::copy(x, held.begin());
+    Hold({held.data(), x.size()});
+    Control(stops_[0], {held.data(), x.size()}, u);
+  }
+
+  bool has_hints() const override { return hints_.has_value(); }
+  void Pursue(std::span<const double> x, const DesiredMotion& desired, std::span<double> u) const override {
+    std::array<double, kMaxStates + kDesired> z;
+    const auto end = std::ranges::copy(x, z.begin()).out;
+    *end = desired.heading;
+    *(end + 1) = desired.speed;
+    *(end + 2) = desired.climb;
+    Control(*hints_, {z.data(), x.size() + kDesired}, u);
+  }
+
+  // Between the one that was drawn and the hint, or the control that stops the robot: either keeps upright one that
+  // would fall.
+  void Explore(std::span<const double> x, const DesiredMotion& desired, double share,
+               std::span<double> u) const override {
+    std::array<double, kMaxInputs> base;
+    if (has_hints())
+      Pursue(x, desired, {base.data(), u.size()});
+    else
+      Control(stops_[0], x, {base.data(), u.size()});
+    for (std::size_t k = 0; k < u.size(); ++k) u[k] = Clipped(k, base[k] + share * (u[k] - base[k]));
+  }
+
+  void Hold(std::span<double> x) const override {
+    for (const int k : held_) x[ToSize(k)] = 0;
+  }
+
+  int num_tails() const override { return static_cast<int>(stops_.size()); }
+
+  bool Brake(std::span<const double> x, int tail, int max_steps, Eigen::MatrixXd& controls) const override {
+    std::array<double, kMaxStates> state, next;
+    std::ranges::copy(x, state.begin());
+    const std::size_t n = x.size();
+    std::vector<double> steps;
+    for (int t = 0; at_rest_.empty() ? t < max_steps : !Rests({state.data(), n}); ++t) {
+      if (t == max_steps) return false;
+      steps.resize(steps.size() + inputs());
+      const std::span<double> u = std::span(steps).last(inputs());
+      Control(stops_[ToSize(tail)], {state.data(), n}, u);
+      Step({state.data(), n}, u, {next.data(), n});
+      std::copy_n(next.begin(), n, state.begin());
+    }
+    controls = Eigen::Map<const Eigen::MatrixXd>(steps.data(), static_cast<Eigen::Index>(inputs()),
+                                                 std::ssize(steps) / static_cast<Eigen::Index>(inputs()));
+    return controls.allFinite();
+  }
+
+  int num_stops() const override { return num_tails(); }
+  bool Stop(std::span<const double> x, int way, int max_steps, Eigen::MatrixXd& controls) const override {
+    return Brake(x, way, max_steps, controls);
+  }
+
+ private:
+  [[nodiscard]] std::size_t inputs() const { return ToSize(problem_->model->num_inputs()); }
+
+  // Not for a state that is no number.
+  [[nodiscard]] bool Rests(std::span<const double> x) const {
+    return std::ranges::all_of(
+        at_rest_, [&](const RestBound& bound) { return std::abs(x[ToSize(bound.coordinate)]) <= bound.tolerance; });
+  }
+
+  [[nodiscard]] double Clipped(std::size_t k, double value) const {
+    const Box& box = problem_->domain.input;
+    const auto i = static_cast<Eigen::Index>(k);
+    return std::clamp(value, box.lower()[i], box.upper()[i]);
+  }
+
+  void Control(const TextFunction& law, std::span<const double> z, std::span<double> u) const {
+    std::array<long double, kMaxInputs> values;
+    law.Evaluate(z, {values.data(), u.size()});
+    for (std::size_t k = 0; k < u.size(); ++k) u[k] = Clipped(k, static_cast<double>(values[k]));
+  }
+
+  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const {
+    std::array<double, kMaxVariables> z;
+    std::ranges::copy(u, std::ranges::copy(x, z.begin()).out);
+    problem_->model->Evaluate({z.data(), x.size() + u.size()}, next);
+  }
+
+  const std::shared_ptr<const Problem> problem_;
+  const std::vector<int> held_;
+  const std::vector<RestBound> at_rest_;
+  std::vector<TextFunction> stops_;
+  std::optional<TextFunction> hints_, speed_;
+};
+
+/** What the compiled models have in common. Way 0 to stop holds the steering as it is; the others are the tails. */
+class CompiledMotion : public RobotMotion {
+ public:
+  bool IsAtRest(std::span<const double> x) const override { return std::abs(Speed(x)) <= kStandstill; }
+  void Coast(std::span<const double>, std::span<double> u) const override { std::ranges::fill(u, 0); }
+  bool has_hints() const override { return true; }
+  void Explore(std::span<const double>, const DesiredMotion&, double, std::span<double>) const override {}
+  int num_stops() const override { return 1 + num_tails(); }
+  bool Stop(std::span<const double> x, int way, int max_steps, Eigen::MatrixXd& controls) const override {
+    if (!Brake(x, way == 0 ? 0 : way - 1, max_steps, controls)) return false;
+    if (way == 0) HoldSteering(controls);
+    return true;
+  }
+
+ private:
+  // Changes the controls of a braking tail so that the wheels keep their angle; nothing without wheels.
+  virtual void HoldSteering(Eigen::MatrixXd& controls) const = 0;
+};
+
 /** Jerk-limited deceleration to v = a = 0, while the wheels go to a bend, stay there for half of the time and then
 return to straight ahead. */
-class BicycleMotion final : public RobotMotion {
+class BicycleMotion final : public CompiledMotion {
  public:
   BicycleMotion(const Problem& problem, double braking)
       : dt_(problem.model->parameters()[0]),
@@ -37,12 +194,12 @@ class BicycleMotion final : public RobotMotion {
   void Hold(std::span<double> x) const override { x[kV] = x[kA] = 0; }
 
   // Steers along the arc that meets the heading's line a little ahead (pure pursuit).
-  void Pursue(std::span<const double> x, double heading, double speed, std::span<double> u) const override {
+  void Pursue(std::span<const double> x, const DesiredMotion& desired, std::span<double> u) const override {
     constexpr double kAhead = 0.8, kLeastAhead = 4, kRelax = 0.6;  // s, m, s
-    const double error = std::clamp(std::remainder(heading - x[kTheta], 2 * std::numbers::pi), -1.5, 1.5);
+    const double error = std::clamp(std::remainder(desired.heading - x[kTheta], 2 * std::numbers::pi), -1.5, 1.5);
     const double ahead = std::max(kAhead * x[kV], kLeastAhead);
     const double delta = std::clamp(std::atan(2 * wheelbase_ * std::sin(error) / ahead), -steering_, steering_);
-    const double a = std::clamp((speed - x[kV]) / kRelax, -deceleration_, deceleration_);
+    const double a = std::clamp((desired.speed - x[kV]) / kRelax, -deceleration_, deceleration_);
     u[0] = std::clamp((a - x[kA]) / dt_, -jerk_, jerk_);
     u[1] = std::clamp((delta - x[kDelta]) / dt_, -steer_rate_, steer_rate_);
   }
@@ -135,7 +292,7 @@ class BicycleMotion final : public RobotMotion {
 };
 
 /** Constant deceleration against the velocity. */
-class PointMassMotion final : public RobotMotion {
+class PointMassMotion final : public CompiledMotion {
  public:
   PointMassMotion(const Problem& problem, double braking)
       : dt_(problem.model->parameters()[0]),
@@ -146,8 +303,9 @@ class PointMassMotion final : public RobotMotion {
   double Speed(std::span<const double> x) const override { return std::hypot(x[2], x[3]); }
   void Hold(std::span<double> x) const override { x[2] = x[3] = 0; }
 
-  void Pursue(std::span<const double> x, double heading, double speed, std::span<double> u) const override {
-    const std::array<double, 2> velocity{speed * std::cos(heading), speed * std::sin(heading)};
+  void Pursue(std::span<const double> x, const DesiredMotion& desired, std::span<double> u) const override {
+    const std::array<double, 2> velocity{desired.speed * std::cos(desired.heading),
+                                         desired.speed * std::sin(desired.heading)};
     for (std::size_t axis = 0; axis < 2; ++axis)
       u[axis] = std::clamp((velocity[axis] - x[axis + 2]) / dt_, -deceleration_, deceleration_);
   }
@@ -170,11 +328,24 @@ class PointMassMotion final : public RobotMotion {
 
 }  // namespace
 
-std::unique_ptr<RobotMotion> MakeMotion(const Problem& problem, double braking) {
+std::unique_ptr<RobotMotion> MakeMotion(const Config& config, Braking braking) {
+  const Problem& problem = *config.problem;
+  if (!config.laws.stop.empty()) {
+    if (!config.laws.at_rest)
+      throw ConfigError(
+          config.path +
+          ": planner.at_rest: missing: it says where a braking tail ends; by default where task.rest does, "
+          "which is missing, too");
+    return std::make_unique<LawMotion>(config, braking);
+  }
+  const double deceleration =
+      braking == Braking::kHardest ? std::numeric_limits<double>::infinity() : config.planner.braking;
   const std::string& name = problem.model->name();
-  if (name == KinematicBicycle::kName) return std::make_unique<BicycleMotion>(problem, braking);
-  if (name == PointMass::kName) return std::make_unique<PointMassMotion>(problem, braking);
-  throw std::invalid_argument("model " + name + ": the planner does not know how it brakes");
+  if (name == KinematicBicycle::kName) return std::make_unique<BicycleMotion>(problem, deceleration);
+  if (name == PointMass::kName) return std::make_unique<PointMassMotion>(problem, deceleration);
+  throw ConfigError(config.path +
+                    ": planner.stop: missing: how the robot brakes, an expression for each input, for example {" +
+                    problem.model->input_names()[0] + ": ...}");
 }
 
 }  // namespace forereach

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
+#include <cmath>
+#include <numbers>
 #include <ostream>
 
 #include <nlohmann/json.hpp>
@@ -35,7 +36,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       half_width_(HalfWidth(config)),
       residual_(config.problem),
       proposer_(MakeProposer(config)),
-      hardest_(MakeMotion(*config.problem, std::numeric_limits<double>::infinity())),
+      hardest_(MakeMotion(config, Braking::kHardest)),
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
@@ -99,15 +100,25 @@ void PlannerNode::Follow(const robot_state_t& state) {
   std::erase_if(withdrawn_, [this](const auto& withdrawn) { return !plans_.contains(withdrawn.first); });
 }
 
+// Whether holding changes the state by no more than a candidate's X0 allows. A robot that is still coming to rest will
+// be somewhere else when the candidate starts.
+bool PlannerNode::IsAtRest(const robot_state_t& state) const {
+  const Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
+  Eigen::VectorXd held = x;
+  proposer_->motion().Hold({held.data(), static_cast<std::size_t>(held.size())});
+  return ((x - held).cwiseAbs().array() <= half_width_.array()).all();
+}
+
 bool PlannerNode::NextPlanIsDue(const robot_state_t& state) const {
-  if (state.mode == robot_state_t::STANDING) return true;
+  if (state.mode == robot_state_t::STANDING) return IsAtRest(state);
   const auto plan = plans_.find(state.executing_plan_id);
   return plan != plans_.end() && 0 <= state.executing_step && state.executing_step < plan->second.num_steps &&
          (withdrawn_.contains(plan->first) ||
           state.executing_step + config_.planner.lead_steps >= plan->second.progress_steps);
 }
 
-// Simulates from the measured state through the controls that will be applied before the start.
+// Simulates from the measured state through the controls that will be applied before the start. An angle gets the turns
+// that bring it nearest to the middle of the domain.
 std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& state, std::int64_t lead_steps) const {
   const std::size_t n = static_cast<std::size_t>(state.num_states);
   Eigen::VectorXd x = Eigen::Map<const Eigen::VectorXd>(state.state, state.num_states);
@@ -120,6 +131,11 @@ std::optional<Eigen::VectorXd> PlannerNode::PredictStart(const robot_state_t& st
     residual_.Predict({z.data(), n + static_cast<std::size_t>(plan->num_inputs)}, {x.data(), n});
   }
   if (!executing || start >= plan->num_steps) proposer_->motion().Hold({x.data(), n});
+  for (const int k : config_.problem->model->angles()) {  // room to turn either way
+    const Box& domain = config_.problem->domain.state;
+    const double middle = domain.lower()[k] / 2 + domain.upper()[k] / 2;
+    x[k] = middle + std::remainder(x[k] - middle, 2 * std::numbers::pi);
+  }
   if (!x.allFinite()) return std::nullopt;
   return x;
 }

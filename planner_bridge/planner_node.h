@@ -81,6 +81,7 @@ class PlannerNode final : public Node {
   [[nodiscard]] bool IsUsable(const robot_state_t& state, std::int64_t now_us) const;
   [[nodiscard]] bool TakeOrder(const robot_state_t& state, std::int64_t now_us);
   [[nodiscard]] bool IsAtGoal(const robot_state_t& state) const;
+  [[nodiscard]] bool IsAtRest(const robot_state_t& state) const;
   [[nodiscard]] bool NextPlanIsDue(const robot_state_t& state) const;
   [[nodiscard]] std::optional<Eigen::VectorXd> PredictStart(const robot_state_t& state, std::int64_t lead_steps) const;
   [[nodiscard]] std::int64_t StepsToAStop(std::int64_t now_us) const;

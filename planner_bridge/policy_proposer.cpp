@@ -37,10 +37,10 @@ void RequireFits(const Problem& problem, const PlannerOptions& options, const Po
 
 }  // namespace
 
-PolicyProposer::PolicyProposer(std::shared_ptr<const Problem> problem, PlannerOptions options, Policy policy)
-    : problem_(std::move(problem)), options_(std::move(options)), policy_(std::move(policy)) {
+PolicyProposer::PolicyProposer(const Config& config, Policy policy)
+    : problem_(config.problem), options_(config.planner), policy_(std::move(policy)) {
   RequireFits(*problem_, options_, policy_);
-  motion_ = MakeMotion(*problem_, options_.braking);
+  motion_ = MakeMotion(config, Braking::kPlanned);
   wheelbase_ = problem_->model->parameters()[1];
   duration_ = policy_.num_steps() * motion_->dt();
 }

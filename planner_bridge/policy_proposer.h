@@ -21,8 +21,8 @@ class PolicyProposer final : public Proposer {
 
   /** @throws std::invalid_argument unless the policy belongs to the problem's model, the model is a bicycle with x and
   y as safety coordinates, and the policy has 12 features and progress_steps steps; also if the goal or the steps are
-  invalid. */
-  PolicyProposer(std::shared_ptr<const Problem> problem, PlannerOptions options, Policy policy);
+  invalid. ConfigError as MakeMotion. */
+  PolicyProposer(const Config& config, Policy policy);
 
   void SetObstacles(std::vector<Obstacle>) override {}
   [[nodiscard]] const RobotMotion& motion() const override { return *motion_; }

@@ -39,9 +39,11 @@ constexpr double kShareOfRadius = 0.7;  // the goal counts as reached this far i
 constexpr unsigned kLongestHold = 4;    // steps one control is held at most
 constexpr double kLargestTurn = 0.8;    // rad, off the way down the navigation field
 constexpr double kLargestSlowdown = 0.5;
-constexpr int kLookAhead = 4;           // steps
-constexpr double kReverse = 1e-3;       // m/s, what counts as standing still
-constexpr double kRoomAhead = 9;        // m, kept free beyond the end of a braking tail: enough to turn away in
+constexpr int kLookAhead = 4;      // steps
+constexpr double kReverse = 1e-3;  // m/s, what counts as standing still
+constexpr double kRoomAhead = 1;   // s at cruise speed, kept free beyond a braking tail: enough to turn away in
+constexpr int kRoomSamples = 9;
+constexpr double kLeastCell = 1.0 / 9;  // of a cruising step
 constexpr double kArrivalTime = 2.5;    // s: a robot that is nearer to the goal than this takes its speed back ...
 constexpr double kArrivalSpeed = 0.35;  // ... down to this share of the cruise speed
 
@@ -140,13 +142,17 @@ class Sweep {
   int first_, last_;
 };
 
-/** Mostly follows a hint, for a step at a time and with some error; sometimes any control, held for longer. */
+/** If there are hints: mostly follows one, for a step at a time and with some error; sometimes any control, held for
+longer. */
 class HintedSampler final : public oc::ControlSampler {
  public:
   /** Fills a control for the given state; `turn` from [-1, 1] and `slower` from [0, 1] say how to err. */
   using Hint = std::function<void(const double* s, double turn, double slower, double* u)>;
+  /** Changes a control drawn at random into one for the given state, with `share` from [0, 1]. */
+  using Explore = std::function<void(const double* s, double share, double* u)>;
 
-  HintedSampler(const oc::ControlSpace* space, Hint hint) : ControlSampler(space), hint_(std::move(hint)) {}
+  HintedSampler(const oc::ControlSpace* space, Hint hint, Explore explore)
+      : ControlSampler(space), hint_(std::move(hint)), explore_(std::move(explore)) {}
 
   void sample(oc::Control* control) override {
     hinted_ = false;
@@ -155,7 +161,10 @@ class HintedSampler final : public oc::ControlSampler {
     for (std::size_t k = 0; k < bounds.low.size(); ++k) u[k] = rng_.uniformReal(bounds.low[k], bounds.high[k]);
   }
   void sample(oc::Control* control, const ob::State* state) override {
-    if (rng_.uniform01() > kHinted) return sample(control);
+    if (!hint_ || rng_.uniform01() > kHinted) {
+      sample(control);
+      return explore_(Values(state), rng_.uniform01(), Values(control));
+    }
     hinted_ = true;
     const double turn = std::clamp(rng_.gaussian(0, 0.4), -1.0, 1.0), slower = rng_.uniform01() * rng_.uniform01();
     hint_(Values(state), turn, slower, Values(control));
@@ -168,7 +177,8 @@ class HintedSampler final : public oc::ControlSampler {
 
  private:
   static constexpr double kHinted = 0.9;
-  const Hint hint_;
+  const Hint hint_;  // empty: there are none
+  const Explore explore_;
   bool hinted_ = false;
 };
 
@@ -191,14 +201,14 @@ class PositionProjection final : public ob::ProjectionEvaluator {
 
 class Planner final : public Proposer {
  public:
-  Planner(std::shared_ptr<const Problem> problem, PlannerOptions options, std::vector<Obstacle> obstacles)
-      : problem_(std::move(problem)),
-        options_(std::move(options)),
+  explicit Planner(const Config& config)
+      : problem_(config.problem),
+        options_(config.planner),
         make_algorithm_(AlgorithmNamed(options_.algorithm)),
-        motion_(MakeMotion(*problem_, options_.braking)),
+        motion_(MakeMotion(config, Braking::kPlanned)),
         region_(ProjectedRegion(*problem_)),
         goal_(Eigen::Map<const Eigen::VectorXd>(options_.goal.data(), std::ssize(options_.goal))),
-        obstacles_(std::move(obstacles)) {
+        obstacles_(config.obstacles) {
     RequireGoalAndSteps(*problem_, options_);
     ompl::msg::noOutputHandler();
   }
@@ -263,7 +273,7 @@ class Planner::Search {
     gain_ = IdealGain();
     top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
     least_speed_ = std::min(-kReverse, planner.motion_->Speed(x));
-    at_rest_ = std::abs(planner.motion_->Speed(x)) <= kReverse;
+    at_rest_ = planner.motion_->IsAtRest(x);
     start_valid_ = Allowed(x, 0);
   }
 
@@ -369,20 +379,27 @@ class Planner::Search {
     return std::clamp(distance / kArrivalTime, kArrivalSpeed * cruise, cruise);
   }
 
-  // Follows the descent of the navigation field a short distance ahead, with a random turn and a random lower speed.
-  void Hint(const double* s, double turn, double slower, double* u) const {
+  // Follows the descent of the navigation field a short distance ahead, with a turn and a lower speed.
+  [[nodiscard]] DesiredMotion DesiredIn(const double* s, double turn, double slower) const {
     const Eigen::VectorXd position = Position(StateOf(s));
     const Eigen::VectorXd descent = field_.Descent(position + kLookAhead * Drift(StateOf(s)));
     const double heading = std::atan2(descent.size() > 1 ? descent(1) : 0.0, descent(0)) + kLargestTurn * turn;
     const double speed = SpeedAt(field_.DistanceToGo(position)) * (1 - kLargestSlowdown * slower);
-    planner_.motion_->Pursue(StateOf(s), heading, speed, {u, m_});
+    const double climb = descent.size() > 2 ? descent(2) : 0.0, level = std::sqrt(1 - std::min(climb * climb, 1.0));
+    return {heading, speed * level, speed * climb};
   }
 
-  // How far the robot moves in one step without control.
+  // What the motion does of its own accord in one step.
+  void Coast(std::span<const double> x, std::span<double> next) const {
+    std::array<double, kMaxInputs> u;
+    planner_.motion_->Coast(x, {u.data(), m_});
+    Step(x, u.data(), next);
+  }
+
+  // How far the robot moves in one step by itself.
   [[nodiscard]] Eigen::VectorXd Drift(std::span<const double> x) const {
-    const std::array<double, kMaxInputs> rest{};
     std::array<double, kMaxStates> next;
-    Step(x, rest.data(), {next.data(), n_});
+    Coast(x, {next.data(), n_});
     return Position({next.data(), n_}) - Position(x);
   }
 
@@ -405,10 +422,9 @@ class Planner::Search {
 
   // Evaluated a short time ahead, so that the steering angle counts. A robot at rest has no heading and passes.
   [[nodiscard]] bool HeadsWell(std::span<const double> x, double cosine) const {
-    const std::array<double, kMaxInputs> rest{};
     std::array<double, kMaxStates> ahead;
     std::copy(x.begin(), x.end(), ahead.begin());
-    for (int t = 0; t < kLookAhead; ++t) Step({ahead.data(), n_}, rest.data(), {ahead.data(), n_});
+    for (int t = 0; t < kLookAhead; ++t) Coast({ahead.data(), n_}, {ahead.data(), n_});
     const Eigen::VectorXd drift = Drift({ahead.data(), n_});
     return drift.dot(field_.Descent(Position({ahead.data(), n_}))) >= cosine * drift.norm();
   }
@@ -447,13 +463,14 @@ class Planner::Search {
                              const Eigen::VectorXd& direction) const {
     const Body& body = planner_.problem_->body;
     const double heading = body.heading >= 0 ? x[static_cast<std::size_t>(body.heading)] : 0;
-    for (double ahead = 1; ahead <= kRoomAhead; ++ahead) {
-      const Sweep sweep(PlaceBody(body, position + ahead * direction, heading), 0);
+    const double room = kRoomAhead * planner_.options_.cruise_speed;
+    for (int i = 1; i <= kRoomSamples; ++i) {
+      const Sweep sweep(PlaceBody(body, position + room * i / kRoomSamples * direction, heading), 0);
       for (std::size_t o = 0; o < clearances_.size(); ++o)
         if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
           return false;
     }
-    return planner_.region_.Contains(position + kRoomAhead * direction);
+    return planner_.region_.Contains(position + room * direction);
   }
 
   [[nodiscard]] std::unique_ptr<oc::SimpleSetup> SetUp(const Ambition& ambition) {
@@ -464,7 +481,8 @@ class Planner::Search {
     bounds.high[n_] = planner_.options_.progress_steps;
     bounds.high[n_ + 1] = start_distance_;
     states->setBounds(bounds);
-    const double cell = std::max(gain_ / planner_.options_.progress_steps, 0.1);
+    const double cell = std::max(gain_ / planner_.options_.progress_steps,
+                                 kLeastCell * planner_.options_.cruise_speed * planner_.motion_->dt());
     states->registerDefaultProjection(
         std::make_shared<PositionProjection>(states, planner_.problem_->projection, cell));
 
@@ -475,8 +493,14 @@ class Planner::Search {
     control_bounds.high.assign(input.upper().begin(), input.upper().end());
     controls->setBounds(control_bounds);
     controls->setControlSamplerAllocator([this](const oc::ControlSpace* space) {
-      return std::make_shared<HintedSampler>(
-          space, [this](const double* s, double turn, double slower, double* u) { Hint(s, turn, slower, u); });
+      HintedSampler::Hint hint;
+      if (planner_.motion_->has_hints())
+        hint = [this](const double* s, double turn, double slower, double* u) {
+          planner_.motion_->Pursue(StateOf(s), DesiredIn(s, turn, slower), {u, m_});
+        };
+      return std::make_shared<HintedSampler>(space, std::move(hint), [this](const double* s, double share, double* u) {
+        planner_.motion_->Explore(StateOf(s), DesiredIn(s, 0, 0), share, {u, m_});
+      });
     });
 
     auto setup = std::make_unique<oc::SimpleSetup>(controls);
@@ -544,9 +568,6 @@ std::optional<Proposal> Planner::Propose(const PlanRequest& request) {
 
 }  // namespace
 
-std::unique_ptr<Proposer> MakeOmplProposer(std::shared_ptr<const Problem> problem, PlannerOptions options,
-                                           std::vector<Obstacle> obstacles) {
-  return std::make_unique<Planner>(std::move(problem), std::move(options), std::move(obstacles));
-}
+std::unique_ptr<Proposer> MakeOmplProposer(const Config& config) { return std::make_unique<Planner>(config); }
 
 }  // namespace forereach

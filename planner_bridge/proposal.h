@@ -8,7 +8,6 @@ obstacles into account only if their velocity is zero. */
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "planner_bridge/proposer.h"
 
@@ -20,8 +19,7 @@ inline constexpr int kStepsPerMs = 400;  ///< Work of a search, see MakeOmplProp
 model steps for each millisecond of options.time_limit_ms. The search counts work instead of reading a clock, so the
 result depends only on request, options and obstacles. A navigation field is computed once for each set of obstacles and
 clearance, in about 10 ms. Only one thread of the process may call Propose, because OMPL's seed is global.
-@throws std::invalid_argument for a model without RobotMotion, an unknown algorithm, or an invalid goal or horizon. */
-[[nodiscard]] std::unique_ptr<Proposer> MakeOmplProposer(std::shared_ptr<const Problem> problem, PlannerOptions options,
-                                                         std::vector<Obstacle> obstacles);
+@throws ConfigError as MakeMotion, std::invalid_argument for an unknown algorithm, or an invalid goal or horizon. */
+[[nodiscard]] std::unique_ptr<Proposer> MakeOmplProposer(const Config& config);
 
 }  // namespace forereach

@@ -9,10 +9,11 @@
 namespace forereach {
 
 std::unique_ptr<Proposer> MakeProposer(const Config& config) try {
+  if (config.problem->body.HasPlaces())
+    throw std::invalid_argument("task.body: parts at expressions (place, places) are not planned for");
   const std::string& source = config.planner.source;
-  if (source == "policy")
-    return std::make_unique<PolicyProposer>(config.problem, config.planner, LoadPolicy(config.planner.policy));
-  if (source == "ompl") return MakeOmplProposer(config.problem, config.planner, config.obstacles);
+  if (source == "policy") return std::make_unique<PolicyProposer>(config, LoadPolicy(config.planner.policy));
+  if (source == "ompl") return MakeOmplProposer(config);
   throw std::invalid_argument("planner.source: " + source + " is not ompl or policy");
 } catch (const std::invalid_argument& error) {
   throw ConfigError(config.path + ": " + error.what());

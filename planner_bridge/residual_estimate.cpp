@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "certifier/numerics/limits.h"
 
@@ -11,6 +12,7 @@ namespace forereach {
 namespace {
 
 constexpr int kNearest = 4;
+constexpr double kTurn = 2 * std::numbers::pi;
 
 struct Neighbour {
   double distance = std::numeric_limits<double>::infinity();
@@ -46,6 +48,7 @@ ResidualEstimate::ResidualEstimate(std::shared_ptr<const Problem> problem)
     for (int l = 0; l < data.z.cols(); ++l) z[static_cast<std::size_t>(l)] = data.z(i, l);
     problem_->model->Evaluate({z.data(), static_cast<std::size_t>(data.z.cols())}, {nominal.data(), n});
     residuals_.row(i) -= Eigen::Map<const Eigen::RowVectorXd>(nominal.data(), residuals_.cols());
+    for (const int k : problem_->model->angles()) residuals_(i, k) = std::remainder(residuals_(i, k), kTurn);
   }
 }
 

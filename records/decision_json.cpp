@@ -161,7 +161,9 @@ nlohmann::json ToJson(const CertifyResult& result, const Tube& tube, const Certi
   document["cause"] =
       decision.cause == Cause::kNone ? Json(nullptr) : Json(CauseName(static_cast<std::int16_t>(decision.cause)));
   document["capped"] = decision.capped;
-  document["message"] = Explain(decision, certifier.problem());
+  const auto inputs = static_cast<int>(result.controls.rows());
+  const Plan plan{result.controls.data(), inputs, static_cast<int>(result.controls.cols()), inputs, result.schedule};
+  document["message"] = Explain(decision, certifier.problem(), plan, tube);
   document["inputs"] = InputsJson(result, config);
   document["tube"] = before_any_step ? Json::array() : TubeJson(tube, certifier, config.obstacles, result.schedule);
   document["digests"] = {{"plan", ToHex(PlanDigest(result.controls, config.initial_set))},

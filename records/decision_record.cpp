@@ -203,7 +203,7 @@ class Reading {
 }  // namespace
 
 std::vector<double> ThresholdsOf(const Problem& problem, const Obstacle& obstacle, const Schedule& schedule, int t) {
-  const Placement placement(problem.projection, problem.body, problem.between, problem.model->num_states());
+  const Placement placement = PlacementOf(problem);
   const double growth =
       obstacle.motion() ? Meet(*obstacle.motion(), schedule, t, t + (placement.sweeps() ? 1 : 0)).growth : 0;
   std::vector<double> thresholds;

@@ -1,6 +1,7 @@
 #include "records/outlines.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -8,6 +9,7 @@
 
 #include <Eigen/Geometry>
 
+#include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 #include "certifier/sets/zonogon.h"
 
@@ -90,7 +92,16 @@ std::vector<Picture::Polygon> BodyAt(const Problem& problem, const Eigen::Vector
   std::vector<Picture::Polygon> parts;
   for (const BodyPart& part : problem.body.parts) {
     std::vector<Vector2d> points;
-    for (const Eigen::Vector3d& point : part.points) points.push_back(position + turn * point.head<2>());
+    if (part.places.empty())
+      for (const Eigen::Vector3d& point : part.points) points.push_back(position + turn * point.head<2>());
+    for (const auto& place : part.places) {
+      const TextFunction function(NamesOf(*problem.model), place);
+      std::vector<double> z(x.begin(), x.end());
+      z.resize(ToSize(function.num_variables()));
+      std::array<long double, 2> at;
+      function.Evaluate(z, at);
+      points.emplace_back(static_cast<double>(at[0]), static_cast<double>(at[1]));
+    }
     parts.push_back(HullOf(points, part.radius));
   }
   return parts;
@@ -111,6 +122,22 @@ std::vector<Picture::Polygon> PredictionOf(const Obstacle& obstacle) {
         points, obstacle.radius() + motion.uncertainty + motion.growth * tau + motion.growth_rate * tau * tau / 2));
   }
   return outlines;
+}
+
+void AddObstacle(const Obstacle& obstacle, Picture& picture) {
+  const auto& points = obstacle.points();
+  switch (obstacle.kind()) {
+    case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
+    case Obstacle::Kind::kBox:
+    case Obstacle::Kind::kPolygon: {
+      std::vector<Eigen::Vector2d> corners;
+      for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
+      picture.polygons.push_back(HullOf(corners));
+      break;
+    }
+    case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
+  }
+  std::ranges::move(PredictionOf(obstacle), std::back_inserter(picture.predictions));
 }
 
 }  // namespace forereach

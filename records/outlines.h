@@ -23,4 +23,7 @@ a point at the samples it is the projected slice. @pre p = 2. */
 one that stands and for a half-space. @pre p = 2. */
 [[nodiscard]] std::vector<Picture::Polygon> PredictionOf(const Obstacle& obstacle);
 
+/** Adds an obstacle's shape and its prediction to a picture. @pre p = 2. */
+void AddObstacle(const Obstacle& obstacle, Picture& picture);
+
 }  // namespace forereach

@@ -8,10 +8,10 @@
 #include <system_error>
 #include <utility>
 
-#include <cairo-pdf.h>
-#include <cairo-svg.h>
 #include <cairo.h>
 #include <fmt/core.h>
+
+#include "records/canvas.h"
 
 namespace forereach {
 namespace {
@@ -57,6 +57,8 @@ Extent ExtentOf(const Picture& picture) {
   for (const auto& body : picture.bodies) extent.Add(body);
   for (const auto& slice : picture.executed) extent.Add(slice);
   for (const auto& slice : picture.certified) extent.Add(slice);
+  for (const auto& slice : picture.expected) extent.Add(slice);
+  extent.Add(picture.observations);
   if (picture.goal) extent.Add(picture.goal->center, picture.goal->radius);
   if (!(extent.lower.x() <= extent.upper.x())) extent.Add(Vector2d::Zero(), 1);
   const Vector2d least = (Vector2d::Constant(1.0) - (extent.upper - extent.lower)).cwiseMax(0) / 2;
@@ -105,7 +107,9 @@ class Painter final {
     PaintGrid();
     PaintGoal();
     PaintTube(picture_.certified, kCertified, 0.30);
+    PaintTube(picture_.expected, kCertified, 0.30);
     PaintTube(picture_.executed, kExecuted, 0.55);
+    PaintObservations();
     PaintObstacles();
     PaintOutlines(picture_.predictions, kObstacle);
     PaintAbstained();
@@ -258,6 +262,12 @@ class Painter final {
     FillAndStroke(kGoal, 0.22, kGoal, 2);
   }
 
+  void PaintObservations() {
+    for (const Vector2d& place : picture_.observations) TraceDisc(ToPixels(place), 1.6 * unit_);
+    SetColor(kFaintInk, 0.7);
+    cairo_fill(cairo_);
+  }
+
   void PaintStop(const Vector2d& pixel) {
     const double half = 4 * unit_;
     cairo_rectangle(cairo_, pixel.x() - half, pixel.y() - half, 2 * half, 2 * half);
@@ -299,10 +309,16 @@ class Painter final {
     const bool obstacles = !(picture_.circles.empty() && picture_.polygons.empty() && picture_.half_planes.empty());
     entry(!picture_.executed.empty(), "certified, executed", [&] { PaintSwatch(x, y, kExecuted, 0.55, 1); });
     entry(!picture_.certified.empty(), "certified, replaced", [&] { PaintSwatch(x, y, kCertified, 0.30, 0.6); });
+    entry(!picture_.expected.empty(), "tube without obstacles", [&] { PaintSwatch(x, y, kCertified, 0.30, 0.6); });
+    entry(!picture_.observations.empty(), "data", [&] {
+      TraceDisc({x + 11 * unit_, y - 4 * unit_}, 2.5 * unit_);
+      SetColor(kFaintInk);
+      cairo_fill(cairo_);
+    });
     entry(!picture_.abstained.empty(), "abstained (S)", [&] { PaintSwatch(x, y, kAbstained, 0, 1); });
     entry(obstacles, "obstacle", [&] { PaintSwatch(x, y, kObstacle, 0.88, 1); });
     entry(!picture_.predictions.empty(), "predicted", [&] { PaintSwatch(x, y, kObstacle, 0, 0.7); });
-    entry(!picture_.path.empty(), "driven", [&] { PaintLine(x, y); });
+    entry(picture_.path.size() > 1, "driven", [&] { PaintLine(x, y); });
     entry(!picture_.path.empty(), "start", [&] { PaintRing({x + 11 * unit_, y - 4 * unit_}, 5.5); });
     entry(!picture_.stops.empty(), "stop", [&] { PaintStop({x + 11 * unit_, y - 4 * unit_}); });
     entry(picture_.goal.has_value(), "goal", [&] { PaintSwatch(x, y, kGoal, 0.22, 1); });
@@ -333,11 +349,6 @@ class Painter final {
   Vector2d lower_;                                                              // metres, the frame's lower left
 };
 
-void Check(cairo_status_t status, const std::string& path) {
-  if (status != CAIRO_STATUS_SUCCESS)
-    throw PictureError("picture: cannot write " + path + ": " + cairo_status_to_string(status));
-}
-
 }  // namespace
 
 std::vector<std::string> PictureFiles(const std::string& name) {
@@ -359,26 +370,7 @@ std::vector<std::string> PictureFiles(const std::string& name) {
 }
 
 void DrawPicture(const Picture& picture, const std::string& path, int width, int height) {
-  const bool svg = path.ends_with(".svg"), png = path.ends_with(".png");
-  if (!svg && !png && !path.ends_with(".pdf"))
-    throw PictureError("picture: " + path + " has to end in .svg, .png or .pdf");
-  if (width < 200 || width > 10000 || height < 200 || height > 10000)
-    throw PictureError(fmt::format("picture: {} x {} pixels is not within 200 to 10000", width, height));
-  const std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> surface(
-      png   ? cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)
-      : svg ? cairo_svg_surface_create(path.c_str(), width, height)
-            : cairo_pdf_surface_create(path.c_str(), width, height),
-      &cairo_surface_destroy);
-  Check(cairo_surface_status(surface.get()), path);
-  if (svg) cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
-  {
-    const std::unique_ptr<cairo_t, void (*)(cairo_t*)> cairo(cairo_create(surface.get()), &cairo_destroy);
-    Painter(cairo.get(), picture, width, height).Paint();
-    Check(cairo_status(cairo.get()), path);
-  }
-  if (png) Check(cairo_surface_write_to_png(surface.get(), path.c_str()), path);
-  cairo_surface_finish(surface.get());
-  Check(cairo_surface_status(surface.get()), path);
+  DrawFile(path, width, height, [&](cairo_t* cairo) { Painter(cairo, picture, width, height).Paint(); });
 }
 
 }  // namespace forereach

@@ -46,6 +46,9 @@ struct Picture {
   std::vector<std::vector<Polygon>> abstained;  ///< Tubes refused for an obstacle (S), each up to
                                                 ///< the slice that may touch it.
 
+  std::vector<Polygon> expected;              ///< A tube that is expected, not of a plan that was sent.
+  std::vector<Eigen::Vector2d> observations;  ///< Where recorded transitions begin.
+
   std::vector<Eigen::Vector2d> path;   ///< Measured positions, from the start on.
   std::vector<Polygon> bodies;         ///< The parts of the robot's body at some of them.
   std::vector<Eigen::Vector2d> stops;  ///< Positions of stops before the goal.

@@ -85,7 +85,7 @@ class PictureMaker final : public TimelineUser {
         std::ranges::move(tube[t],
                           std::back_inserter(executed_.contains({plan_id, static_cast<int>(t)}) ? picture.executed
                                                                                                 : picture.certified));
-    for (const Obstacle& obstacle : timeline.logged_obstacles()) AddObstacle(obstacle);
+    for (const Obstacle& obstacle : timeline.logged_obstacles()) AddObstacle(obstacle, result_.picture);
     return std::move(result_);
   }
 
@@ -163,23 +163,6 @@ class PictureMaker final : public TimelineUser {
     if (stops && !arrived_ && position) result_.picture.stops.push_back(*position);
   }
 
-  void AddObstacle(const Obstacle& obstacle) {
-    Picture& picture = result_.picture;
-    const auto& points = obstacle.points();
-    switch (obstacle.kind()) {
-      case Obstacle::Kind::kCircle: picture.circles.push_back({points[0], obstacle.radius()}); break;
-      case Obstacle::Kind::kBox:
-      case Obstacle::Kind::kPolygon: {
-        std::vector<Eigen::Vector2d> corners;
-        for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
-        picture.polygons.push_back(HullOf(corners));
-        break;
-      }
-      case Obstacle::Kind::kHalfSpace: picture.half_planes.push_back({points[0], obstacle.offset()}); break;
-    }
-    std::ranges::move(PredictionOf(obstacle), std::back_inserter(picture.predictions));
-  }
-
   const Config& last_;  // task
   const BusOptions channels_;
   std::unique_ptr<Certifier> certifier_;  // as the one of the log was when it decided on those below
@@ -218,7 +201,7 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   };
   add(abstained("pairwise"), "abstained F");
   add(abstained("domain_exit") + abstained("no_finite_enclosure"), "abstained D");
-  add(abstained("obstacle"), "abstained S");
+  add(abstained("obstacle") + abstained("limit"), "abstained S");
   add(abstained("no_obstacles"), "abstained without obstacles");
   if (summary.latency_us.WasMeasured())
     numbers.push_back(fmt::format("decided in {} (p50), {} (p99)", DurationText(summary.latency_us.p50),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "certifier/numerics/size.h"
 #include "certifier/safety/clearance.h"
@@ -60,7 +61,10 @@ double TurnAcceleration(const Between& between, double change) {
 // The motion with one choice of signs: bit k for coordinate k, bit p for the heading.
 Approaches Follow(const Problem& problem, std::span<const Obstacle> obstacles, const Sample& from, const Sample& to,
                   const Between& between, unsigned signs) {
-  const Pose first = PoseOf(problem, from.x), last = PoseOf(problem, to.x);
+  const Pose first = PoseOf(problem, from.x);
+  Pose last = PoseOf(problem, to.x);
+  if (problem.body.heading >= 0 && problem.model->IsAngle(problem.body.heading))  // the shorter way round
+    last.heading = first.heading + std::remainder(last.heading - first.heading, 2 * std::numbers::pi);
   const auto sign = [&](Eigen::Index bit) { return signs >> bit & 1U ? 1.0 : -1.0; };
   Eigen::VectorXd acceleration = between.acceleration;
   for (Eigen::Index k = 0; k < acceleration.size(); ++k) acceleration[k] *= sign(k);

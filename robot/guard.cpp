@@ -61,25 +61,30 @@ bool AtMostSum(double x, double a, double b) {
   return (a - a_part) + (b - b_part) >= 0;
 }
 
-GuardVerdict CheckInitialSet(const candidate_plan_t& plan, std::span<const double> state) {
+const char* TurnsOf(bool is_angle) { return is_angle ? " after whole turns" : ""; }
+
+GuardVerdict CheckInitialSet(const candidate_plan_t& plan, const Angles& angles, std::span<const double> state) {
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double x = state[k], center = plan.initial_center[k], half_width = plan.initial_half_width[k];
-    if (AtMostSum(x, center, half_width) && AtMostSum(-x, -center, half_width)) continue;
-    const double bound = x < center ? center - half_width : center + half_width;
+    const Ends turned = angles[k] ? TurnTowards(x, center - half_width, center + half_width) : Ends{x, x};
+    if (AtMostSum(turned.upper, center, half_width) && AtMostSum(-turned.lower, -center, half_width)) continue;
+    const double bound = turned.lower < center ? center - half_width : center + half_width;
     return RefuseAt(GuardCause::kOutsideInitialSet, 0, static_cast<int>(k), x, bound,
-                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g, outside X0 = %.17g +- %.17g",
-                             plan.plan_id, k, x, center, half_width));
+                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g, outside X0 = %.17g +- %.17g%s",
+                             plan.plan_id, k, x, center, half_width, TurnsOf(angles[k])));
   }
   return {};
 }
 
-GuardVerdict CheckSlice(const certified_plan_t& certified, int step, std::span<const double> state) {
+GuardVerdict CheckSlice(const certified_plan_t& certified, const Angles& angles, int step,
+                        std::span<const double> state) {
   for (std::size_t k = 0; k < state.size(); ++k) {
     const double x = state[k], lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
-    if (lower <= x && x <= upper) continue;
-    return RefuseAt(GuardCause::kOutsideSlice, step, static_cast<int>(k), x, x < lower ? lower : upper,
-                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g at step %d, outside [%.17g, %.17g]",
-                             certified.plan.plan_id, k, x, step, lower, upper));
+    if (LiesWithin(x, lower, upper, angles[k])) continue;
+    const double nearest = angles[k] ? TurnTowards(x, lower, upper).lower : x;
+    return RefuseAt(GuardCause::kOutsideSlice, step, static_cast<int>(k), x, nearest < lower ? lower : upper,
+                    Sentence("plan %" PRId64 ": state coordinate %zu is %.17g at step %d, outside [%.17g, %.17g]%s",
+                             certified.plan.plan_id, k, x, step, lower, upper, TurnsOf(angles[k])));
   }
   return {};
 }
@@ -204,6 +209,7 @@ Guard::Guard(GuardOptions options) : options_(std::move(options)) {
     throw std::invalid_argument("GuardOptions: max_jitter_us is " + std::to_string(*options_.max_jitter_us) +
                                 ", it must not be negative");
   RequireDomain(options_.domain, options_);
+  angles_ = AnglesOf(options_.angles, options_.num_states);
   if (!options_.keys) return;
   if (options_.bus_name.empty()) throw std::invalid_argument("GuardOptions: bus_name has to be given with keys");
   // A plan expires and its plan_id has to be new, so a plan from before the guard's start does no more harm than a late
@@ -218,12 +224,14 @@ void Guard::Halt() noexcept {
   executing_.reset();
 }
 
-void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain) {
+void Guard::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain,
+                   const std::optional<std::vector<int>>& angles) {
   RequireDomain(domain, options_);
+  const std::optional<Angles> known = angles ? std::optional(AnglesOf(*angles, options_.num_states)) : std::nullopt;
   std::erase_if(expected_,
                 [&](const Task& task) { return task.config == config_digest && task.model == model_digest; });
   if (expected_.size() >= kMostExpected) expected_.erase(expected_.begin());
-  expected_.push_back({config_digest, model_digest, std::move(domain)});
+  expected_.push_back({config_digest, model_digest, std::move(domain), known});
 }
 
 // Checks and removes the signature.
@@ -260,9 +268,11 @@ GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noex
       options_.config_digest = task->config;
       options_.model_digest = task->model;
       if (task->domain) options_.domain = task->domain;
+      angles_ = task->angles.value_or(angles_);
       expected_.erase(expected_.begin(), task + 1);
     }
     pending_ = std::move(certified);
+    pending_angles_ = angles_;
   } catch (...) {
     verdict.cause = GuardCause::kInternalError;
   }
@@ -447,6 +457,7 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
   if (verdict.cause == GuardCause::kTooEarly) return verdict;
   if (verdict.ok()) {
     executing_ = std::move(pending_);
+    executing_angles_ = pending_angles_;
     last_step_ = 0;
     standing_steps_.reset();
   }
@@ -469,8 +480,8 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_u
   if (verdict.ok()) verdict = ExamineTime(plan, 0, now_us);
   if (!verdict.ok()) return verdict;
   verdict = ExamineStateSize(state);
-  if (verdict.ok()) verdict = CheckInitialSet(plan, state);
-  return verdict.ok() ? CheckSlice(*pending_, 0, state) : verdict;
+  if (verdict.ok()) verdict = CheckInitialSet(plan, pending_angles_, state);
+  return verdict.ok() ? CheckSlice(*pending_, pending_angles_, 0, state) : verdict;
 }
 
 GuardVerdict Guard::ExamineStateSize(std::span<const double> state) const {
@@ -504,7 +515,7 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
     return Refuse(GuardCause::kWithdrawn,
                   Sentence("control %d of plan %" PRId64 " had been withdrawn", step - 1, executing_->plan.plan_id));
   GuardVerdict verdict = ExamineStateSize(state);
-  if (verdict.ok()) verdict = CheckSlice(*executing_, step, state);
+  if (verdict.ok()) verdict = CheckSlice(*executing_, executing_angles_, step, state);
   return verdict.ok() ? ExamineTime(executing_->plan, step, now_us) : verdict;
 }
 

@@ -20,7 +20,8 @@ next one. Apply only what `control` returns.
 
 Check compares with interval hulls: a certified_plan_t contains, for t = 0..T, the interval hull of the certified slice
 X_t, rounded outward. X_t lies in its hull. So a state outside the hull has left X_t, and the certificate does not cover
-it. The guard uses hulls instead of zonotopes because 2n comparisons need no arithmetic.
+it. The guard uses hulls instead of zonotopes because 2n comparisons need no arithmetic. A state that is an angle may
+differ by whole turns (GuardOptions::angles); then it has to be inside by more than the rounding of the turns.
 
 Plan ids of all sources are compared with each other, because a robot follows one planner. Single-threaded. */
 #pragma once
@@ -37,6 +38,7 @@ Plan ids of all sources are compared with each other, because a robot follows on
 #include "bus/authentic.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/withdrawal_t.hpp"
+#include "lcmtypes/angle.h"
 #include "lcmtypes/codec.h"
 
 namespace forereach {
@@ -131,6 +133,9 @@ struct GuardOptions {
   std::string channel = "PLAN_CERTIFIED";    ///< The channel of certified plans.
   std::string withdrawn = "PLAN_WITHDRAWN";  ///< The channel of withdrawals.
   std::optional<GuardDomain> domain = {};    ///< If set, plans that leave it are refused.
+  /** The states that are angles, the task's model.angles, by their indices: a measured state is inside X_0 or a slice
+  if it is there after whole turns of these (lcmtypes/angle.h). */
+  std::vector<int> angles = {};
   /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, microseconds, not
   negative. Where obstacles may move, it is half of the task's gate.max_clock_error_ms. */
   std::optional<std::int64_t> max_jitter_us = {};
@@ -187,9 +192,10 @@ class Guard final {
   void Reset() noexcept { halted_ = false; }
   /** After a reload of the task: also accepts plans certified under this configuration and model. The certifier may not
   have taken the new task yet, so plans of the old one are accepted until the first plan of the new one arrives.
-  @param domain the domain of these plans; nothing: the domain in force stays. @throws std::invalid_argument as the
-  constructor. */
-  void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {});
+  @param domain the domain of these plans; nothing: the domain in force stays. @param angles likewise.
+  @throws std::invalid_argument as the constructor. */
+  void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
+              const std::optional<std::vector<int>>& angles = {});
   [[nodiscard]] bool halted() const { return halted_; }
 
   /** The control that may be applied after the last step that passed: num_inputs entries. Empty if no plan is
@@ -206,6 +212,7 @@ class Guard final {
   struct Task {
     Digest config, model;
     std::optional<GuardDomain> domain;
+    std::optional<Angles> angles;
   };
 
   [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, Bytes& bytes);
@@ -223,11 +230,13 @@ class Guard final {
 
   GuardOptions options_;
   std::vector<Task> expected_;  // by Expect
+  Angles angles_;               // of plans that are accepted now
   std::optional<Authenticator> authenticator_;
   bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;  // plan_id
   std::int64_t last_expiry_ = INT64_MIN;       // the latest expiry of the accepted plans
   std::unique_ptr<certified_plan_t> pending_, executing_;
+  Angles pending_angles_, executing_angles_;
   int last_step_ = 0;                  // last checked step of the executing plan
   std::optional<int> standing_steps_;  // of the executing plan
 };

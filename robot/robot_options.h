@@ -1,21 +1,29 @@
 /** The options of the simulated robot, from `robot` in a task file. */
 #pragma once
 
+#include <array>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace forereach {
 
+/** The states that are zero while a robot with a model of the library stands. */
+inline constexpr std::array<std::string_view, 4> kHeldByDefault{"v", "a", "vx", "vy"};
+
 struct RobotOptions {
-  std::vector<double> start;         ///< The first state in the model's units, one entry for each state.
-  std::vector<std::string> hold;     ///< The states that are zero while the robot stands. Empty: those of the model.
+  std::vector<double> start;  ///< The first state in the model's units, one entry for each state.
+  /** The states that are zero while the robot stands. Not set: those of a compiled model. */
+  std::optional<std::vector<std::string>> hold;
+  /** The emergency stop: how fast each of these states, of those of hold, goes to zero, in its unit per second. The
+  others of hold are zero at once. */
+  std::map<std::string, double> emergency_stop;
   double step_period_ms = 40;        ///< The wall-clock time of one model step.
   double time_limit_s = 40;          ///< The run ends at this time even without reaching the goal.
-  std::string residual = "none";     ///< The difference from the model: none, heading_saturation or velocity_knee.
   std::string disturbance = "none";  ///< What disturbs each step: none, random or adversarial (disturbance.h).
   int disturbance_seed = 1;          ///< Of its random numbers.
-  std::map<std::string, double> residual_parameters;  ///< All parameters, with the model's dt and wheelbase.
 };
 
 }  // namespace forereach

@@ -108,8 +108,7 @@ int main(int argc, char** argv) {
       {kName,
        "The simulated robot: executes certified plans only, one step at a time, on a target that differs from the "
        "nominal model by the task file's robot.residual and robot.disturbance. Ends at the goal or at "
-       "robot.time_limit_s, and prints one "
-       "line of JSON about the run.",
+       "robot.time_limit_s, and prints one line of JSON about the run.",
        "forereach-robot-sim --config config/demo.yaml\n"
        "  forereach-robot-sim --config config/demo.yaml --make-transitions made.csv --seed 1 --count 400 "
        "--range v=7.25:15.75",

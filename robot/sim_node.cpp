@@ -1,7 +1,9 @@
 #include "robot/sim_node.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <nlohmann/json.hpp>
 
@@ -47,6 +49,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.channel = config.bus.certified;
   options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
+  options.guard.angles = config.problem->model->angles();
   if (const auto& error_ms = config.gate.max_clock_error_ms) options.guard.max_jitter_us = Microseconds(*error_ms) / 2;
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
@@ -58,19 +61,16 @@ SupervisorOptions OptionsOf(const Config& config) {
   return options;
 }
 
-// The states that are zero while the robot stands. @throws ConfigError if nobody says which.
-std::vector<int> RestCoordinates(const Config& config) {
-  const NominalModel& model = *config.problem->model;
-  const std::vector<std::string> of_library{"v", "a", "vx", "vy"}, &given = config.robot.hold;
-  if (given.empty() && model.text() != nullptr)
-    throw ConfigError(config.path +
-                      ": robot.hold: missing: it names the states that are zero while the robot stands, and a model as "
-                      "text does not say which");
-  const std::vector<std::string>& names = given.empty() ? of_library : given;
-  std::vector<int> rest;
-  for (int k = 0; k < model.num_states(); ++k)
-    if (std::ranges::find(names, model.state_names()[ToSize(k)]) != names.end()) rest.push_back(k);
-  return rest;
+// Acts on the states that are zero while the robot stands. @throws ConfigError if nobody says which.
+Brake BrakeOf(const Config& config) {
+  const std::vector<std::string>& names = config.problem->model->state_names();
+  std::vector<double> declines(names.size(), 0.0);
+  for (const int k : HeldStates(config)) {
+    const auto rate = config.robot.emergency_stop.find(names[ToSize(k)]);
+    const bool is_gradual = rate != config.robot.emergency_stop.end();
+    declines[ToSize(k)] = is_gradual ? rate->second * config.period : kInfinity;
+  }
+  return Brake(std::move(declines));
 }
 
 Config WithKeysOfRobot(Config config) {
@@ -93,20 +93,28 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
       target_(MakeTarget(config)),
       disturbance_(config.problem->declaration, config.robot),
       period_us_(Microseconds(config.robot.step_period_ms)),
-      rest_coordinates_(RestCoordinates(config_)),
+      brake_(BrakeOf(config_)),
       reload_([path = config.path, bus = config_.bus] { return Load(path, bus); }),
       obstacles_(config),
       state_(config.robot.start),
       supervisor_(OptionsOf(config_), *this) {
+  if (config.problem->body.HasPlaces())
+    throw ConfigError(config.path +
+                      ": task.body: parts at expressions (place, places): the simulated robot judges contacts of parts "
+                      "in its frame only");
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
     RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
   bus.Subscribe(config_.bus.certified,
                 [this](const Received& received) { supervisor_.OnCertified(received.raw, received.utime); });
-  bus.Subscribe(config_.bus.withdrawn,
-                [this](const Received& received) { supervisor_.OnWithdrawn(received.raw, received.utime); });
-  bus.Subscribe(config_.bus.fault,
-                [this](const Received& received) { supervisor_.OnFault(received.raw, received.utime); });
+  bus.Subscribe(config_.bus.withdrawn, [this](const Received& received) {
+    heard_utime_ = received.utime;
+    supervisor_.OnWithdrawn(received.raw, received.utime);
+  });
+  bus.Subscribe(config_.bus.fault, [this](const Received& received) {
+    heard_utime_ = received.utime;
+    supervisor_.OnFault(received.raw, received.utime);
+  });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
   bus.Subscribe(config_.bus.command, [this](const Received& received) {
     const std::string why = supervisor_.OnCommand(received.raw, received.utime);
@@ -129,30 +137,51 @@ void RobotSimNode::TakeReload() {
   const std::optional<Config> config = reload_.Take().value_or(std::nullopt);
   if (reload_.TakeStall()) logging::Error("not reloaded yet: a file that it reads does not answer");
   if (!config) return;
-  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config));
+  supervisor_.Expect(config->grounds.config, config->grounds.model, DomainOf(*config),
+                     config->problem->model->angles());
   logging::Info("plans certified under {} as it is now are accepted", config_.path);
 }
 
 void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
   const std::span<const double> control = supervisor_.control();
-  const bool moves = !control.empty();
-  if (moves) {
+  const bool moves = !control.empty() || is_stopping_;
+  if (!control.empty()) {
+    is_stopping_ = false;
     target_->Step(state_, control, state_);
     disturbance_.Add(state_);
+  } else if (is_stopping_) {
+    BrakeUntil(utime);
   }
+  if (moves)
+    for (const int k : config_.problem->model->angles())
+      state_[ToSize(k)] = std::remainder(state_[ToSize(k)], 2 * std::numbers::pi);
+  heard_utime_ = utime;
   supervisor_.FinishStep(utime, now_us);
   ReportContacts(utime, moves);
   state_before_ = state_;
   ReportGoal(utime);
   const bool ends = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
-  if (supervisor_.Boundary(utime, now_us, ends).empty() && ends) ++finished_boundaries_;
+  if (supervisor_.Boundary(utime, now_us, ends).empty() && ends && !is_stopping_) ++finished_boundaries_;
   LogProgress(utime);
 }
 
-// The hold mode: no control, residual or disturbance acts.
 void RobotSimNode::Hold() {
-  for (const int k : rest_coordinates_) state_[ToSize(k)] = 0;
+  brake_.Apply(state_, 0, state_);
+  is_stopping_ = brake_.StepsToRest(state_, state_) > 0;
+  brakes_since_utime_ = heard_utime_;
   if (!goal_reached_) ++stops_;
+}
+
+// The step that ends at a boundary, in which the robot comes to rest.
+void RobotSimNode::BrakeUntil(std::int64_t utime) {
+  const std::vector<double> before = state_;
+  const Box& inputs = config_.problem->domain.input;
+  const Eigen::VectorXd idle = inputs.lower().cwiseMax(0).cwiseMin(inputs.upper());
+  target_->Step(before, {idle.data(), ToSize(idle.size())}, state_);
+  disturbance_.Add(state_);
+  const double share = static_cast<double>(utime - brakes_since_utime_) / static_cast<double>(period_us_);
+  brake_.Apply(before, std::clamp(share, 0.0, 1.0), state_);
+  is_stopping_ = brake_.StepsToRest(state_, state_) > 0;
 }
 
 void RobotSimNode::Send(const std::string& channel, Bytes message) { sender_.Send(channel, message); }

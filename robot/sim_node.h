@@ -1,15 +1,18 @@
 /** The simulated robot: a Target that executes certified plans under the Supervisor, one step at a time.
 
 Step boundaries lie at t_j = t_0 + j * step_period, where t_0 is the first Tick. At each boundary, in this order:
- 1. The target takes the control of the step that has ended, is disturbed (disturbance.h), and the supervisor finishes
-    the step.
+ 1. The target takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
+    turned into [-pi, pi], and the supervisor finishes the step.
  2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h), and
     GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
  3. The supervisor starts the pending plan, continues the current one, or holds; then it reports (supervisor.h).
 
-While the robot holds, its speed and acceleration are set to zero (v and a of the bicycle, vx and vy of the point mass).
-Every other coordinate keeps its value, and no control, residual or disturbance acts until the next plan starts. An
-emergency stop is the same hold at any speed.
+While the robot holds, the states of robot.hold are zero: by default v and a of the bicycle, vx and vy of the point
+mass. Every other coordinate keeps its value, and no control, residual or disturbance acts until the next plan starts.
+It comes to rest as robot.emergency_stop says, at the end of a plan and in an emergency: the states that are named there
+fall at exactly their rates, and the others of robot.hold are zero at once. Until all are zero the target moves on with
+inputs of zero, or the nearest to it in the domain, and is disturbed. Of the step in which the stop begins only the part
+after that counts. Without robot.emergency_stop it stands at once, at any speed.
 
 The run ends when the goal is reached or the time limit has passed. Then no further plan starts, and the current one
 runs to its end. Once the robot holds, it sends FINISHED for kFinishedBoundaries boundaries and is done.
@@ -31,6 +34,7 @@ accepts plans that are certified under the new file (Guard::Expect); its state a
 #include "bus/reloading.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
+#include "robot/brake.h"
 #include "robot/contacts.h"
 #include "robot/disturbance.h"
 #include "robot/supervisor.h"
@@ -64,9 +68,13 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
 
  private:
   void Hold() override;
+  [[nodiscard]] int StepsToRest(std::span<const double> lower, std::span<const double> upper) const override {
+    return brake_.StepsToRest(lower, upper);
+  }
   void Send(const std::string& channel, Bytes message) override;
   void TakeReload();
   void Boundary(std::int64_t utime, std::int64_t now_us);
+  void BrakeUntil(std::int64_t utime);
   void ReportContacts(std::int64_t utime, bool moved);
   [[nodiscard]] std::vector<Contact> Contacts(std::int64_t utime, bool moved) const;
   void OnObstacles(const Received& received);
@@ -81,7 +89,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   const std::unique_ptr<Target> target_;
   Disturbance disturbance_;
   const std::int64_t period_us_;
-  std::vector<int> rest_coordinates_;  // zero while standing
+  const Brake brake_;
   Reloading<std::optional<Config>> reload_;
 
   ObstaclesInForce obstacles_;
@@ -89,6 +97,9 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   std::vector<double> state_before_;  // at the last boundary; empty before the first
   std::optional<std::int64_t> start_utime_;
   std::int64_t next_progress_utime_ = 0;
+  bool is_stopping_ = false;
+  std::int64_t heard_utime_ = 0;  // of the message or boundary that is being handled
+  std::int64_t brakes_since_utime_ = 0;
   bool goal_reached_ = false;
   int finished_boundaries_ = 0;
   std::int64_t contacts_ = 0, stops_ = 0;

@@ -1,14 +1,13 @@
 #include "robot/supervisor.h"
 
 #include <algorithm>
-#include <climits>
-#include <stdexcept>
 #include <utility>
 
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/freshness.h"
 #include "lcmtypes/names.h"
+#include "robot/brake.h"
 
 namespace forereach {
 namespace {
@@ -25,9 +24,6 @@ std::int16_t SetValues(double (&field)[N], std::span<const double> values) {
 
 Supervisor::Supervisor(SupervisorOptions options, Robot& robot)
     : options_(std::move(options)), robot_(robot), guard_(options_.guard) {
-  if (options_.emergency_stop_steps < 0 || options_.emergency_stop_steps > 128)
-    throw std::invalid_argument("SupervisorOptions: emergency_stop_steps is " +
-                                std::to_string(options_.emergency_stop_steps) + ", it has to be 0 to 128");
   if (!options_.guard.keys) return;
   // Nothing recorded earlier releases the robot: a command has to be fresh, and later than what halted it.
   authenticator_.emplace(*options_.guard.keys, options_.guard.bus_name,
@@ -53,7 +49,7 @@ void Supervisor::OnWithdrawn(Bytes message, std::int64_t now_us) {
   if (!answer.verdict.ok()) return SendRefusal(now_us, answer.verdict);
   SendEvent(now_us, execution_event_t::WITHDRAWN, answer.verdict.plan_id, answer.standing_steps,
             static_cast<double>(answer.sequence), answer.message);
-  if (IsExecuting() && step_ >= guard_.standing_steps().value_or(INT_MAX)) StopInEmergency(now_us);
+  if (IsExecuting() && MustStop()) StopInEmergency(now_us);
 }
 
 void Supervisor::OnFault(Bytes message, std::int64_t now_us) {
@@ -129,7 +125,8 @@ void Supervisor::StartPending(std::int64_t utime, std::int64_t now_us) {
 }
 
 void Supervisor::ContinuePlan(std::int64_t utime) {
-  if (MustStop(utime)) return StopInEmergency(utime);
+  step_utime_ = utime;
+  if (MustStop()) return StopInEmergency(utime);
   const candidate_plan_t& plan = guard_.executing()->plan;
   if (step_ == plan.num_steps) {
     SendEvent(utime, execution_event_t::STANDING, plan.plan_id, step_, 0, "the plan is finished: holding still");
@@ -139,24 +136,43 @@ void Supervisor::ContinuePlan(std::int64_t utime) {
   }
 }
 
-// Whether what stands has to be left now, at a step boundary.
-bool Supervisor::MustStop(std::int64_t utime) const {
+// Whether the robot has to leave what stands now. It may go on if a stop that begins at the next boundary ends within
+// what stands, from every state of that boundary's slice.
+bool Supervisor::MustStop() const {
   const std::optional<int> standing = guard_.standing_steps();
-  if (!standing || step_ < *standing - options_.emergency_stop_steps) return false;
+  if (!standing) return false;
+  const certified_plan_t& plan = *guard_.executing();
+  const int next = step_ + 1, left = *standing - next;
+  const auto states = static_cast<std::size_t>(plan.plan.num_states);
+  if (left >= 0 && robot_.StepsToRest({plan.slice_lower[next], states}, {plan.slice_upper[next], states}) <= left)
+    return false;
+  return left < 0 || !TakesOver(*standing);
+}
+
+// Whether the pending plan starts within what stands. A plan takes over at the boundary nearest to its start.
+bool Supervisor::TakesOver(int standing) const {
   const certified_plan_t* const next = guard_.pending();
-  if (step_ >= *standing || !next || next->plan.start_utime < utime) return true;
-  // A plan takes over at the boundary nearest to its start.
-  const std::uint64_t ahead = static_cast<std::uint64_t>(next->plan.start_utime) - static_cast<std::uint64_t>(utime);
+  if (!next || next->plan.start_utime < step_utime_) return false;
+  const std::uint64_t ahead =
+      static_cast<std::uint64_t>(next->plan.start_utime) - static_cast<std::uint64_t>(step_utime_);
   const auto step_us = static_cast<std::uint64_t>(options_.guard.step_us);
-  return ahead > static_cast<std::uint64_t>(*standing - step_) * step_us + step_us / 2;
+  return ahead <= static_cast<std::uint64_t>(standing - step_) * step_us + step_us / 2;
 }
 
 void Supervisor::StopInEmergency(std::int64_t utime) {
   ++counts_.emergency_stops;
-  SendEvent(utime, execution_event_t::EMERGENCY_STOP, PlanId(), step_, 0,
-            "emergency stop, which is not certified: the controls from " + std::to_string(*guard_.standing_steps()) +
-                " on were withdrawn, and no newer certificate takes over");
+  const int standing = *guard_.standing_steps(), needed = robot_.StepsToRest(robot_.state(), robot_.state());
+  const bool is_known = needed != Brake::kNoEnd;
+  SendEvent(utime, execution_event_t::EMERGENCY_STOP, PlanId(), step_, is_known ? needed : -1,
+            "emergency stop, not certified: controls from " + std::to_string(standing) +
+                " on were withdrawn, no newer certificate takes over; " +
+                std::to_string(std::max(standing - step_, 0)) + " stand, the stop takes " +
+                (is_known ? std::to_string(needed) : "an unknown number of") + " steps");
   Hold();
+}
+
+int Supervisor::Robot::StepsToRest(std::span<const double> /*lower*/, std::span<const double> /*upper*/) const {
+  return Brake::kNoEnd;
 }
 
 void Supervisor::Hold() {
@@ -164,8 +180,9 @@ void Supervisor::Hold() {
   robot_.Hold();
 }
 
-void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain) {
-  guard_.Expect(config_digest, model_digest, std::move(domain));
+void Supervisor::Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain,
+                        const std::optional<std::vector<int>>& angles) {
+  guard_.Expect(config_digest, model_digest, std::move(domain), angles);
 }
 
 void Supervisor::Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text) {

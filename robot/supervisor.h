@@ -22,8 +22,11 @@ So without a newer certificate the robot runs the tail that is certified already
 there.
 
 A plan of which the certifier has withdrawn a part goes on within the controls that stand. A newer plan may take over
-until then. If none is pending that starts in time, EMERGENCY_STOP is made emergency_stop_steps before the end of what
-stands: a hold that no certificate covers. The robot is not halted by it.
+until then. If none is pending that starts in time, EMERGENCY_STOP is made: a hold that no certificate covers, though
+what stands is used for it. It begins at the last boundary from which the robot provably comes to rest within the
+controls that stand: if the next slice, which contains the next state, allows it (Robot::StepsToRest), the robot goes on
+for another step. If the time is too short already when the withdrawal arrives, the stop begins at once. The robot is
+not halted by it.
 
 After every other emergency stop no plan is accepted until a reset arrives whose stamp is later than everything that
 halted the robot. A fault whose stamp is not later than the last reset is a repetition and is ignored. A plan that is
@@ -55,12 +58,8 @@ namespace forereach {
 
 struct SupervisorOptions {
   GuardOptions guard;
-  std::int64_t max_age_us = 500'000;   ///< The task's gate.max_age_ms: an older command is refused.
-  std::int64_t max_ahead_us = 50'000;  ///< The task's gate.max_ahead_ms: so is one from further ahead.
-  /** The steps that Robot::Hold needs from the highest speed to rest, 0 to 128. An emergency stop for a withdrawal
-  begins so many steps before the controls that stand are used up, so that the robot comes to rest within what they
-  would have covered if it brakes along them. 0: it stops at once. */
-  int emergency_stop_steps = 0;
+  std::int64_t max_age_us = 500'000;                 ///< The task's gate.max_age_ms: an older command is refused.
+  std::int64_t max_ahead_us = 50'000;                ///< The task's gate.max_ahead_ms: so is one from further ahead.
   std::string fault = "FAULT", command = "COMMAND";  ///< Channels, as the guard's `channel`: they are signed.
   std::string robot_state = "ROBOT_STATE", transition = "TRANSITION", event = "EXECUTION_EVENT";
 };
@@ -76,6 +75,10 @@ class Supervisor final {
     /** Come to rest by your own means, and hold until Boundary returns a control. In an emergency nothing certified is
     left to execute, whatever the speed is. */
     virtual void Hold() = 0;
+    /** An upper bound on the steps that Hold takes from a step boundary to rest, from any state x with lower <= x <=
+    upper, num_states entries each (robot/brake.h computes such bounds). The default is
+    Brake::kNoEnd, none is known: an emergency stop for a withdrawal begins as soon as the withdrawal is known. */
+    [[nodiscard]] virtual int StepsToRest(std::span<const double> lower, std::span<const double> upper) const;
     virtual void Send(const std::string& channel, Bytes message) = 0;
     /** A person asks for the task to be read again; call Expect once that is done. */
     virtual void Reload() = 0;
@@ -106,7 +109,8 @@ class Supervisor final {
   void FinishStep(std::int64_t utime, std::int64_t now_us);
 
   /** Guard::Expect. */
-  void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {});
+  void Expect(const Digest& config_digest, const Digest& model_digest, std::optional<GuardDomain> domain = {},
+              const std::optional<std::vector<int>>& angles = {});
 
   /** Sends an event. @param text one sentence. */
   void Report(std::int64_t utime, std::int16_t kind, double value, std::string_view text);
@@ -123,7 +127,8 @@ class Supervisor final {
   [[nodiscard]] int Step() const { return IsExecuting() ? step_ : -1; }
   void StartPending(std::int64_t utime, std::int64_t now_us);
   void ContinuePlan(std::int64_t utime);
-  [[nodiscard]] bool MustStop(std::int64_t utime) const;
+  [[nodiscard]] bool MustStop() const;
+  [[nodiscard]] bool TakesOver(int standing) const;
   void StopInEmergency(std::int64_t utime);
   void Hold();
   void SendState(std::int64_t utime, bool ends);
@@ -143,6 +148,7 @@ class Supervisor final {
   std::int64_t halted_utime_ = 0, reset_utime_ = 0;  // the last time: by a fault or the guard; by a person
   int step_ = 0;                                     // of the executing plan: the control that applies now
   bool is_under_way_ = false;                        // that control's step has not been finished
+  std::int64_t step_utime_ = 0;                      // the boundary from which that control applies
   std::vector<double> step_began_at_;                // the state
   std::int64_t events_ = 0;
   Counts counts_;

@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
-#include "certifier/dynamics/kinematic_bicycle.h"
-#include "certifier/dynamics/models.h"
-#include "certifier/dynamics/point_mass.h"
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -19,83 +16,31 @@
 namespace forereach {
 namespace {
 
-class NominalTarget final : public Target {
+class ModelTarget final : public Target {
  public:
-  explicit NominalTarget(std::shared_ptr<const NominalModel> model) : model_(std::move(model)) {}
+  ModelTarget(std::shared_ptr<const NominalModel> model, std::optional<TextFunction> residual)
+      : model_(std::move(model)), residual_(std::move(residual)) {}
 
   void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const override {
-    std::array<double, kMaxVariables> z;
-    std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), z.begin()));
-    model_->Evaluate(std::span<const double>(z.data(), x.size() + u.size()), next);
+    std::array<double, kMaxVariables> all;
+    std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), all.begin()));
+    const auto z = std::span<const double>(all).first(x.size() + u.size());
+    std::array<long double, kMaxStates> nominal{}, residual{};
+    model_->EvaluateWide(z, std::span(nominal).first(next.size()));
+    if (residual_) residual_->Evaluate(z, std::span(residual).first(next.size()));
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(nominal[k] + residual[k]);
   }
 
  private:
   std::shared_ptr<const NominalModel> model_;
+  std::optional<TextFunction> residual_;
 };
 
-template <class Equations, class Residual>
-class ResidualTarget final : public Target {
- public:
-  ResidualTarget(Equations equations, Residual residual) : equations_(equations), residual_(residual) {}
-
-  void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const override {
-    using Wide = long double;
-    std::array<Wide, Equations::kStates + Equations::kInputs> z;
-    std::copy(u.begin(), u.end(), std::copy(x.begin(), x.end(), z.begin()));
-    std::array<Wide, Equations::kStates> nominal, residual;
-    equations_(std::span<const Wide>(z), std::span<Wide>(nominal));
-    residual_(std::span<const Wide>(z), std::span<Wide>(residual));
-    for (std::size_t k = 0; k < nominal.size(); ++k) next[k] = static_cast<double>(nominal[k] + residual[k]);
-  }
-
- private:
-  Equations equations_;
-  Residual residual_;
-};
-
-[[noreturn]] void Fail(const Config& config, const std::string& what) {
-  throw ConfigError(config.path + ": robot." + what);
-}
-
-// A target of another step or wheelbase would differ from the nominal model by more than the residual it names.
-void RequireSameModel(const Config& config, const NominalModel& expected) {
-  const NominalModel& model = *config.problem->model;
-  if (model.description() != expected.description())
-    Fail(config, "residual: " + config.robot.residual + " is for " + expected.description() + ", the model is " +
-                     model.description());
-}
-
-std::shared_ptr<const NominalModel> ModelOf(const PointMass& model) { return MakePointMass(model.dt); }
-std::shared_ptr<const NominalModel> ModelOf(const KinematicBicycle& model) {
-  return MakeKinematicBicycle(model.dt, model.wheelbase);
-}
-
-// Parameters that are not given have the residual's own defaults, but for the first, which are the nominal model's.
-template <class Residual>
-auto Parameters(const Config& config) {
-  const auto& given = config.robot.residual_parameters;
-  auto values = Residual{}.parameters();
-  for (const auto& [name, value] : given) {
-    const auto* const known = std::ranges::find(Residual::kParameterNames, name);
-    if (known == Residual::kParameterNames.end())
-      Fail(config, "residual: " + config.robot.residual + " has no parameter " + name);
-    if (!std::isfinite(value)) Fail(config, "residual: parameter " + name + " is not finite");
-    values[ToSize(known - Residual::kParameterNames.begin())] = value;
-  }
-  for (const char* name : Residual::Nominal::kParameterNames)
-    if (!given.contains(name)) Fail(config, "residual: " + config.robot.residual + " needs the parameter " + name);
-  return values;
-}
-
-template <class Residual>
-std::unique_ptr<Target> MakeResidualTarget(const Config& config) {
-  using Nominal = typename Residual::Nominal;
-  const auto values = Parameters<Residual>(config);
-  const auto residual = std::apply([](auto... all) { return Residual{all...}; }, values);
-  const auto nominal = [&]<std::size_t... i>(std::index_sequence<i...>) { return Nominal{values[i]...}; }
-  (std::make_index_sequence<Nominal::kParameterNames.size()>());
-  RequireSameModel(config, *ModelOf(nominal));
-  return std::make_unique<ResidualTarget<Nominal, Residual>>(nominal, residual);
+TextFunction FunctionOf(const ParametricResidual& residual, const NominalModel& model) {
+  if (residual.names.states != model.state_names() || residual.names.inputs != model.input_names() ||
+      residual.values.size() != residual.names.states.size())
+    throw std::invalid_argument("for other states or inputs than those of " + model.name());
+  return {residual.names, residual.values};
 }
 
 // std::uniform_real_distribution differs between libraries; this does not.
@@ -132,11 +77,13 @@ std::vector<double> SampleInside(const Domain& domain, const std::vector<Interva
 }  // namespace
 
 std::unique_ptr<Target> MakeTarget(const Config& config) {
-  const std::string& residual = config.robot.residual;
-  if (residual == HeadingSaturation::kName) return MakeResidualTarget<HeadingSaturation>(config);
-  if (residual == VelocityKnee::kName) return MakeResidualTarget<VelocityKnee>(config);
-  if (residual == "none") return std::make_unique<NominalTarget>(config.problem->model);
-  Fail(config, "residual: " + residual + " is not none, heading_saturation or velocity_knee");
+  std::optional<TextFunction> residual;
+  try {
+    if (config.robot_residual) residual = FunctionOf(*config.robot_residual, *config.problem->model);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(config.path + ": robot.residual: " + config.robot_residual->name + ": " + error.what());
+  }
+  return std::make_unique<ModelTarget>(config.problem->model, std::move(residual));
 }
 
 Transitions MakeTransitions(const Target& target, const Problem& problem, std::uint64_t seed, int count,

@@ -25,11 +25,8 @@ class Target {
   virtual void Step(std::span<const double> x, std::span<const double> u, std::span<double> next) const = 0;
 };
 
-/** The target that robot.residual names: "none", "heading_saturation" (kinematic_bicycle) or "velocity_knee"
-(point_mass). robot.residual_parameters are those of residuals.h, by name; their defaults are the paper's values. dt,
-and for the bicycle wheelbase, must equal the model's.
-@throws ConfigError for an unknown residual, a residual of another model, an unknown or missing parameter, one that is
-not finite, or a dt or wheelbase that is not the model's. */
+/** The target of a task: its nominal model with the residual of its robot, both for the middles of their parameters.
+@throws ConfigError if the residual is for other states or inputs than the model's, or is wrong. */
 [[nodiscard]] std::unique_ptr<Target> MakeTarget(const Config& config);
 
 /** A range for one coordinate of z, by its name in the model. */

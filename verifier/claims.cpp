@@ -42,8 +42,10 @@ class Claims {
 
 class SliceCheck {
  public:
-  SliceCheck(const Problem& problem, const Certificate& certificate, const Tube& tube, int t)
+  SliceCheck(const Problem& problem, const Certificate& certificate, const TaskFunctions& functions, const Tube& tube,
+             int t)
       : problem_(problem),
+        functions_(functions),
         certificate_(certificate),
         t_(t),
         slice_(tube.slices[ToSize(t)]),
@@ -58,6 +60,7 @@ class SliceCheck {
     for (int k = 0; step_ && k < slice_.dim() && !failure_; ++k) CheckStep(k);
     if (!step_ && !certificate_.is_remainder) CheckRest();
     if (!failure_) CheckRadius();
+    if (!failure_ && t_ >= certificate_.first_step) CheckLimits();
     if (!failure_ && t_ >= certificate_.first_step) CheckSafety();
     return failure_;
   }
@@ -89,8 +92,7 @@ class SliceCheck {
     const Containment inside = IsInside(slice_, recorded_.center, recorded_.generators);
     if (inside.answer == Answer::kYes) return;
     const int k = inside.coordinate;
-    const Real scale = k < 0 ? inside.bound : abs(slice_.center[ToSize(k)]) + slice_.HalfWidth(k);
-    claims_.Judge(inside.answer, inside.found, inside.bound, scale, "at most", [&] {
+    claims_.Judge(inside.answer, inside.found, inside.bound, inside.scale, "at most", [&] {
       return k < 0 ? "the set that the recorded generators span contains the slice"
                    : "the set that the recorded generators span contains the slice, by " + name(k) +
                          " of what differs from them";
@@ -142,12 +144,56 @@ class SliceCheck {
                     [] { return std::string("the recorded radius covers the projected slice"); });
   }
 
+  // One that uses an input is not claimed where none is applied. It is false only if some state of the slice exceeds
+  // it.
+  void CheckLimits() {
+    if (problem_.limits.empty()) return;
+    std::vector<Real> input(ToSize(problem_.model->num_inputs()));
+    for (std::size_t l = 0; step_ && l < input.size(); ++l)
+      input[l] = certificate_.controls(static_cast<Eigen::Index>(l), t_);
+    const std::vector<Enclosed> functions = functions_.limits.Over(slice_, input);
+    for (std::size_t i = 0; i < functions.size() && !failure_; ++i) {
+      if (!step_ && functions_.limits.UsesInput(i)) continue;
+      const Limit& limit = problem_.limits[i];
+      const Bounds reached = RangeOver(slice_, functions[i]);
+      const auto what = [&] { return "the slice keeps the limit " + limit.name; };
+      for (const double sign : {1.0, -1.0}) {
+        const double bound = sign > 0 ? limit.at_most : limit.at_least;
+        if (!std::isfinite(bound) || failure_) continue;
+        const Real& found = sign > 0 ? reached.upper : reached.lower;
+        Answer answer = sign > 0 ? IsAtMost(found, bound) : IsAtMost(bound, found);
+        if (answer != Answer::kYes) {
+          const Real somewhere = functions_.limits.At(Farthest(functions[i], sign, input))[i];
+          answer = (sign > 0 ? CertainlyBelow(bound, somewhere) : CertainlyBelow(somewhere, bound)) ? Answer::kNo
+                                                                                                    : Answer::kUnknown;
+        }
+        claims_.Judge(answer, found, bound, abs(found) + Real(std::abs(bound)), sign > 0 ? "at most" : "at least",
+                      what);
+      }
+    }
+  }
+
+  // z = (x, u) for a state of the slice that lies far along the function's slope, or against it.
+  [[nodiscard]] std::vector<Real> Farthest(const Enclosed& function, double sign,
+                                           const std::vector<Real>& input) const {
+    std::vector<Real> z = slice_.center;
+    for (const std::vector<Real>& column : slice_.columns) {
+      Real along;
+      for (std::size_t l = 0; l < column.size(); ++l) along += function.slope[l].middle() * column[l];
+      const bool is_against = CertainlyBelow((sign > 0 ? along : -along).middle(), 0.0);
+      for (std::size_t l = 0; l < column.size(); ++l) z[l] = is_against ? z[l] - column[l] : z[l] + column[l];
+    }
+    z.insert(z.end(), input.begin(), input.end());
+    return z;
+  }
+
   // At this sample, or from this sample to the next; the last sample then belongs to the step before.
   void CheckSafety() {
     if (problem_.between && !next_) return;
     const Slice* last = problem_.between ? next_ : nullptr;
     std::vector<std::vector<Sweep>> sweeps;
-    for (const BodyPart& part : problem_.body.parts) sweeps.push_back(SweepsOf(problem_, part, slice_, last));
+    for (std::size_t p = 0; p < problem_.body.parts.size(); ++p)
+      sweeps.push_back(SweepsOf(problem_, problem_.body.parts[p], slice_, last, &functions_.places[p]));
     for (std::size_t o = 0; o < certificate_.obstacles.size() && !failure_; ++o) {
       const double claimed = o < recorded_.clearance.size() ? recorded_.clearance[o] : 0;
       if (!recorded_.clearance.empty() && !(claimed > 0))
@@ -172,7 +218,7 @@ class SliceCheck {
   // The part lies in every one of the sweeps: one that is clear is enough.
   static Answer IsClearOfAny(const std::vector<Sweep>& sweeps, const Obstacle& obstacle, double claimed, Real& best,
                              const Passage& passage) {
-    Answer answer = Answer::kNo;
+    Answer answer = sweeps.empty() ? Answer::kUnknown : Answer::kNo;
     for (std::size_t i = 0; i < sweeps.size(); ++i) {
       Real found;
       const Answer of_this = IsClear(sweeps[i], obstacle, claimed, found, passage);
@@ -185,6 +231,7 @@ class SliceCheck {
 
   inline static const RecordedSlice nothing_{};
   const Problem& problem_;
+  const TaskFunctions& functions_;
   const Certificate& certificate_;
   const int t_;
   const Slice& slice_;
@@ -197,9 +244,10 @@ class SliceCheck {
 
 }  // namespace
 
-std::optional<Failure> FindFalseClaim(const Problem& problem, const Certificate& certificate, const Tube& tube) {
+std::optional<Failure> FindFalseClaim(const Problem& problem, const Certificate& certificate,
+                                      const TaskFunctions& functions, const Tube& tube) {
   for (int t = 0; t < static_cast<int>(tube.slices.size()); ++t)
-    if (auto failure = SliceCheck(problem, certificate, tube, t).Run()) return failure;
+    if (auto failure = SliceCheck(problem, certificate, functions, tube, t).Run()) return failure;
   return std::nullopt;
 }
 

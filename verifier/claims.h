@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "verifier/answer.h"
+#include "verifier/functions.h"
 #include "verifier/tube.h"
 #include "verifier/verifier.h"
 
@@ -14,9 +15,10 @@ claims are:
 - the recorded hull contains X_t; the set of the recorded generators contains X_t and lies in the recorded hull;
 - the recorded envelope and remainder contain the derived ones, the envelope is not empty, and the radius is no smaller;
 - X_t is disjoint from every obstacle, with at least the recorded clearance;
+- X_t keeps the problem's limits;
 - X_T satisfies the problem's `rest`, and so does the recorded last slice.
-@pre the tube is complete and sizes agree. */
+@param functions those of the problem. @pre the tube is complete and sizes agree. */
 [[nodiscard]] std::optional<Failure> FindFalseClaim(const Problem& problem, const Certificate& certificate,
-                                                    const Tube& tube);
+                                                    const TaskFunctions& functions, const Tube& tube);
 
 }  // namespace forereach::verifier

@@ -144,8 +144,10 @@ class Search {
     for (Eigen::Index i = 0; i < generators_.cols(); ++i)
       if (axis_[ToSize(i)] == k) room += Real(std::abs(generators_(k, i)));
     if (CertainlyAtMost(need, room)) return std::nullopt;
-    return Containment{Answer::kUnknown, k, need, room};
+    return Containment{Answer::kUnknown, k, need, room, SizeOf(k)};
   }
+
+  [[nodiscard]] Real SizeOf(int k) const { return abs(inner_.center[ToSize(k)]) + inner_.HalfWidth(k); }
 
   // Along e_i / r_i +- e_k / r_k, with r the half-widths there: where two coordinates are tied together that are not
   // here.
@@ -163,7 +165,8 @@ class Search {
           for (const auto& column : inner_.columns)
             reach += abs(along_i * column[ToSize(i)] + along_k * column[ToSize(k)]);
           for (const auto g : generators_.colwise()) bound += abs(along_i * Real(g[i]) + along_k * Real(g[k]));
-          if (CertainlyBelow(bound, reach)) return Containment{Answer::kNo, -1, reach, bound};
+          if (CertainlyBelow(bound, reach))
+            return Containment{Answer::kNo, -1, reach, bound, abs(along_i) * SizeOf(i) + abs(along_k) * SizeOf(k)};
         }
     return std::nullopt;
   }

@@ -14,6 +14,7 @@ struct Containment {
   Answer answer = Answer::kYes;
   int coordinate = -1;  ///< Unless kYes: the coordinate that fails, or -1 for a direction that mixes coordinates.
   Real found, bound;    ///< Unless kYes: the condition is found <= bound.
+  Real scale;           ///< Unless kYes: the numbers of `inner` that `found` is made of, by absolute value.
 };
 
 /** Whether inner = <c', D> lies in <center, generators>.

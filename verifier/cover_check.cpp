@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -26,11 +25,11 @@ std::string Text(const Real& x) { return x.text(); }
 // One claim's derivative, its domain and its arguments w = (z, theta).
 class ClaimCheck {
  public:
-  ClaimCheck(const Domain& domain, const Slopes& slopes, const SlopeClaim& claim, std::size_t num_variables)
-      : domain_(domain), slopes_(slopes), claim_(claim), num_variables_(num_variables) {}
+  ClaimCheck(const Domain& domain, const Slopes& slopes, const SlopeClaim& claim, const Box& whole)
+      : domain_(domain), slopes_(slopes), claim_(claim), whole_(whole) {}
 
-  [[nodiscard]] CoverVerdict Walk(const Box& whole, const std::function<void()>& checked) const {
-    std::vector<std::pair<int, Box>> open{{0, whole}};
+  [[nodiscard]] CoverVerdict Walk(const std::function<void()>& checked) const {
+    std::vector<std::pair<int, Box>> open{{0, whole_}};
     while (!open.empty()) {
       const auto [index, box] = std::move(open.back());
       open.pop_back();
@@ -78,7 +77,7 @@ class ClaimCheck {
   [[nodiscard]] CoverVerdict Holds(double bound, const Box& box, int cuts) const {
     if (LiesOutside(box)) return {};
     Trial trial{-1, box};
-    const Dual slope = Slope(box, true);
+    const Slope slope = SlopeOver(box, true);
     if (IsAtMostOver(box, slope, bound, 1, trial) && IsAtMostOver(box, slope, bound, -1, trial)) return {};
     for (const Box& near : {trial.point, box})
       if (const auto witness = CounterExample(bound, near)) return *witness;
@@ -101,7 +100,7 @@ class ClaimCheck {
 
   // Whether sign * slope <= bound over the box, by its range, or after the arguments in which it is monotone have moved
   // to where it is largest, or expanded around a point of the others. @param slope over the box.
-  [[nodiscard]] bool IsAtMostOver(const Box& box, Dual slope, double bound, double sign, Trial& trial) const {
+  [[nodiscard]] bool IsAtMostOver(const Box& box, Slope slope, double bound, double sign, Trial& trial) const {
     Box rest = box;
     while (true) {
       if (CertainlyAtMost(Real(sign) * slope.value, bound)) return true;
@@ -115,13 +114,14 @@ class ClaimCheck {
         moved = true;
       }
       if (!moved) return ExpandsTo(rest, slope, bound, sign, trial);
-      slope = Slope(rest, true);
+      slope = SlopeOver(rest, true);
     }
   }
 
-  [[nodiscard]] bool ExpandsTo(const Box& rest, const Dual& slope, double bound, double sign, Trial& trial) const {
+  [[nodiscard]] bool ExpandsTo(const Box& rest, const Slope& slope, double bound, double sign, Trial& trial) const {
     Box& point = trial.point = rest;
     Real excess(0.0), most(-1.0);
+    bool is_finite = true;
     for (std::size_t i = 0; i < rest.size(); ++i) {
       if (IsPoint(rest[i])) continue;
       point[i] = rest[i].middle();
@@ -129,35 +129,36 @@ class ClaimCheck {
       // Rises of at most up to the right and down to the left; the point where both cost the same costs least.
       const Real rise = Real(sign) * slope.gradient[i];
       const Real up = rise.upper(), down = (-rise).upper();
-      if (rise.IsFinite()) point[i] = (rest[i].lower() + Width(rest[i]) * (up / (up + down))).middle();
+      if (!rise.IsFinite()) {  // a kink or a pole: the widest such argument is cut
+        const Real share = Width(rest[i]) / Width(whole_[i]);
+        if (is_finite || CertainlyBelow(most, share)) trial.cut = static_cast<int>(i), most = share;
+        is_finite = false;
+        continue;
+      }
+      point[i] = (rest[i].lower() + Width(rest[i]) * (up / (up + down))).middle();
       if (!CertainlyAtMost(rest[i].lower(), point[i]) || !CertainlyAtMost(point[i], rest[i].upper()))
         point[i] = rest[i].middle();
       const Real cost = max(up * (rest[i].upper() - point[i]), down * (point[i] - rest[i].lower())).upper();
       excess += cost;
-      if (trial.cut >= 0 && !CertainlyBelow(most, cost)) continue;
+      if (!is_finite || (trial.cut >= 0 && !CertainlyBelow(most, cost))) continue;
       trial.cut = static_cast<int>(i);
       most = cost;
     }
-    return CertainlyAtMost(Real(sign) * Slope(point, false).value + excess, bound);
+    return is_finite && CertainlyAtMost(Real(sign) * SlopeOver(point, false).value + excess, bound);
   }
 
   // The middle of a box, if it is in the domain and the slope there is above the bound.
   [[nodiscard]] std::optional<CoverVerdict> CounterExample(double bound, const Box& box) const {
     Box point = box;
     for (Real& w : point) w = w.middle();
-    const Real size = abs(Slope(point, false).value);
+    const Real size = abs(SlopeOver(point, false).value);
     if (!CertainlyBelow(bound, size) || !LiesInside(point)) return std::nullopt;
     return CoverVerdict{Answer::kNo,
                         "a box's bound is " + Text(bound) + ", but the slope is " + Text(size) + " at a point of it"};
   }
 
-  [[nodiscard]] Dual Slope(const Box& w, bool with_gradient) const {
-    std::vector<Dual> arguments;
-    arguments.reserve(w.size());
-    for (std::size_t i = 0; i < w.size(); ++i)
-      arguments.push_back(with_gradient && !IsPoint(w[i]) ? Dual::Variable(w[i], i) : Dual(w[i]));
-    const std::span<const Dual> all(arguments);
-    return slopes_.At(claim_.row, claim_.column, all.first(num_variables_), all.subspan(num_variables_));
+  [[nodiscard]] Slope SlopeOver(const Box& w, bool with_gradient) const {
+    return slopes_.At(claim_.row, claim_.column, w, with_gradient);
   }
 
   // ---- The domain's inequalities and balls.
@@ -193,15 +194,13 @@ class ClaimCheck {
   const Domain& domain_;
   const Slopes& slopes_;
   const SlopeClaim& claim_;
-  std::size_t num_variables_;
+  const Box& whole_;
 };
 
 }  // namespace
 
 CoverChecker::CoverChecker(const Domain& domain, const ParametricResidual& residual)
-    : domain_(domain), residual_(residual), slopes_(SlopesOf(residual)) {
-  if (!slopes_) throw std::invalid_argument("the verifier does not know the residual " + residual.name);
-}
+    : domain_(domain), residual_(residual), slopes_(residual) {}
 
 CoverVerdict CoverChecker::Check(const SlopeClaim& claim, const std::function<void()>& checked) const {
   const auto known = Entries();
@@ -213,9 +212,8 @@ CoverVerdict CoverChecker::Check(const SlopeClaim& claim, const std::function<vo
   Box whole;
   for (const forereach::Box* part : {&domain_.state, &domain_.input})
     for (Eigen::Index l = 0; l < part->dim(); ++l) whole.push_back(Real::FromTo(part->lower()[l], part->upper()[l]));
-  const std::size_t num_variables = whole.size();
-  for (const auto& [name, lower, upper] : residual_.parameters) whole.push_back(Real::FromTo(lower, upper));
-  return ClaimCheck(domain_, *slopes_, claim, num_variables).Walk(whole, checked);
+  for (const auto& [name, lower, upper] : residual_.names.parameters) whole.push_back(Real::FromTo(lower, upper));
+  return ClaimCheck(domain_, slopes_, claim, whole).Walk(checked);
 }
 
 }  // namespace forereach::verifier

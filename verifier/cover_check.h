@@ -2,12 +2,11 @@
 with a bound each.
 
 The boxes cover the domain because of the tree: a cut inside a box leaves two parts whose union is the box. Each bound
-is rederived from the verifier's own formulas of the derivative. */
+is rederived by the verifier's own parser and rules of differentiation. */
 #pragma once
 
 #include <cstddef>
 #include <functional>
-#include <memory>
 #include <string>
 
 #include "certifier/declare/cover.h"
@@ -34,12 +33,11 @@ struct CoverVerdict {
 /** Checks the claims about one residual over one domain. Any number of threads may check at once. */
 class CoverChecker final {
  public:
-  /** @param domain valid for the residual. @throws std::invalid_argument for a residual that the verifier does not
-  implement. */
+  /** @param domain valid for the residual. @throws ExpressionError (expressions.h) if it is not in the language. */
   CoverChecker(const Domain& domain, const ParametricResidual& residual);
 
   /** The derivatives (row, column) that are not identically zero. Each of them needs a claim. */
-  [[nodiscard]] std::vector<std::pair<int, int>> Entries() const { return slopes_->Entries(); }
+  [[nodiscard]] std::vector<std::pair<int, int>> Entries() const { return slopes_.Entries(); }
 
   /** Checks one claim. @param checked is called after each leaf. Cost: for the point mass about 1 ms for each box. */
   [[nodiscard]] CoverVerdict Check(const SlopeClaim& claim, const std::function<void()>& checked = {}) const;
@@ -47,7 +45,7 @@ class CoverChecker final {
  private:
   Domain domain_;
   ParametricResidual residual_;
-  std::unique_ptr<Slopes> slopes_;
+  Slopes slopes_;
 };
 
 }  // namespace forereach::verifier

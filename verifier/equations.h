@@ -24,7 +24,9 @@ struct SecondDerivative {
   Real value;
 };
 
-/** f0 : z = (x, u) -> x+. Derivatives that are not listed are zero. For a box of z, each result contains the range. A
+/** f0 : z = (x, u) -> x+. Derivatives that are not listed are zero. Second derivatives are listed by output, column and
+row, and whether one is listed depends on the equations alone, not on z: bounds on the remainder take some of them
+together, by this list. For a box of z, each result contains the range. A
 result is not finite where it has no finite enclosure: where the box meets a pole or the edge of a function's domain
 and, for second derivatives, where it has a kink inside. With parameters that are intervals, each result contains those
 for all their values; then Value is an interval at a point, too. */

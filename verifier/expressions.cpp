@@ -251,6 +251,7 @@ class Parser {
       case '/': return tape_.Add(Op::kDivide, left.place, right.place);
       default: break;
     }
+    if (right.whole == 0) return tape_.Number(1);  // also where the base has no value
     if (right.whole) return tape_.Add({Op::kPower, left.place, -1, *right.whole});
     const int logarithm = tape_.Add(Op::kLog, left.place);
     return tape_.Add(Op::kExp, tape_.Add(Op::kMultiply, right.place, logarithm));

@@ -50,6 +50,13 @@ Sparse Sum(const Sparse& a, const Sparse& b) {
   return sum;
 }
 
+// The entries, and zeros for the other keys.
+Sparse Padded(const Sparse& entries, const Sparse& keys) {
+  Sparse padded;
+  ForUnion(entries, keys, [&](int key, const Real* x, const Real*) { padded.emplace_back(key, x ? *x : Real(0.0)); });
+  return padded;
+}
+
 Sparse UnknownUnion(const Sparse& a, const Sparse& b) {
   Sparse unknown;
   ForUnion(a, b, [&](int key, const Real*, const Real*) { unknown.emplace_back(key, Real::Everything()); });
@@ -262,9 +269,16 @@ class Rules {
     return result;
   }
   [[nodiscard]] Jet Larger(Real value, const Jet& a, const Jet& b) const {
-    if (CertainlyAtMost(b.value, a.value)) return a;
-    if (CertainlyAtMost(a.value, b.value)) return b;
+    if (CertainlyAtMost(b.value, a.value)) return Chosen(a, b);
+    if (CertainlyAtMost(a.value, b.value)) return Chosen(b, a);
     return Kinked(std::move(value), a.first, b.first);
+  }
+  // `a`, with zeros for the derivatives that it would have at the kink: which entries there are does not depend on the
+  // box.
+  [[nodiscard]] Jet Chosen(const Jet& a, const Jet& other) const {
+    Jet result{a.value, Padded(a.first, other.first), {}};
+    if (second_) result.second = Padded(a.second, UnknownPairs(result.first));
+    return result;
   }
 
   // With u = x / t: s x_j + e t_j, where s_u = m / t, and the second derivatives are m / t times 1, -u and u^2.
@@ -342,7 +356,8 @@ Real RealArithmetic::Apply(const Tape::Operation& operation, const Real* a, cons
 Jet JetArithmetic::Apply(const Tape::Operation& operation, const Jet* a, const Jet* b) const {
   Jet result;
   result.value = values_.Apply(operation, a ? &a->value : nullptr, b ? &b->value : nullptr);
-  if (operation.op == Op::kVariable && operation.index < count_) result.first.emplace_back(operation.index, 1.0);
+  if (operation.op == Op::kVariable && ToSize(operation.index) < by_.size() && by_[ToSize(operation.index)])
+    result.first.emplace_back(operation.index, 1.0);
   if (a == nullptr || (a->first.empty() && (b == nullptr || b->first.empty()))) return result;
   const bool second = order_ == Order::kSecond;
   if (!result.value.IsFinite()) {

@@ -40,15 +40,18 @@ class RealArithmetic final {
   std::span<const Real> variables_, parameters_;
 };
 
-/** For Evaluate: values with their derivatives by the first variables. */
+/** For Evaluate: values with their derivatives by some of the variables. */
 class JetArithmetic final {
  public:
   using Number = Jet;
   enum class Order { kFirst, kSecond };
 
-  /** @param count the number of variables by which there are derivatives. */
+  /** @param by for each variable, whether there are derivatives by it; none by those beyond its end. */
+  JetArithmetic(std::span<const Real> variables, std::span<const Real> parameters, std::vector<bool> by, Order order)
+      : values_(variables, parameters), by_(std::move(by)), order_(order) {}
+  /** By the first `count` variables. */
   JetArithmetic(std::span<const Real> variables, std::span<const Real> parameters, int count, Order order)
-      : values_(variables, parameters), count_(count), order_(order) {}
+      : JetArithmetic(variables, parameters, std::vector<bool>(static_cast<std::size_t>(count), true), order) {}
 
   [[nodiscard]] Jet Apply(const Tape::Operation& operation, const Jet* a, const Jet* b) const;
 
@@ -57,7 +60,7 @@ class JetArithmetic final {
 
  private:
   RealArithmetic values_;
-  int count_;
+  std::vector<bool> by_;
   Order order_;
 };
 

@@ -61,6 +61,11 @@ Real Real::Integer(std::int64_t n) {
   mpfi_set_si(result.value_, n);
   return result;
 }
+Real Real::Pi() {
+  Real result{Uninitialized{}};
+  mpfi_const_pi(result.value_);
+  return result;
+}
 Real::Real(const Real& other) : Real(Uninitialized{}) { mpfi_set(value_, other.value_); }
 Real& Real::operator=(const Real& other) {
   if (this != &other) *this = Real(other);

@@ -34,6 +34,7 @@ class Real final {
   Real(double x);  // NOLINT: as numbers do
   /** The point n, exactly. @pre Precision::bits() >= 64. */
   [[nodiscard]] static Real Integer(std::int64_t n);
+  [[nodiscard]] static Real Pi();
   Real(const Real& other);
   Real(Real&& other) noexcept { *value_ = std::exchange(*other.value_, Empty()); }
   Real& operator=(const Real& other);

@@ -1,6 +1,7 @@
 #include "verifier/sweep.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "certifier/numerics/size.h"
 
@@ -63,6 +64,39 @@ class Places {
     }
     place.bend = Bend(theta, slice.HalfWidth(problem_.body.heading), x, y);
     return Widened(std::move(place), Deviation(point));
+  }
+
+  // At expressions: the places of all points of a part. None if one has no finite bound.
+  [[nodiscard]] std::vector<Place> At(const Functions& functions, const Slice& slice, int sample) const {
+    const std::vector<Real> no_input(ToSize(problem_.model->num_inputs()));
+    const std::vector<Enclosed> coordinates = functions.Over(slice, no_input);
+    const std::size_t p = ToSize(problem_.projection.rows());
+    std::vector<Place> places;
+    for (std::size_t first = 0; first < coordinates.size(); first += p) {
+      Place place{std::vector<Real>(p), {}, Bend(), Real(), sample};
+      std::vector<RealVector> axes;
+      for (std::size_t k = 0; k < p; ++k) {
+        const Enclosed& at = coordinates[first + k];
+        const Real around = at.bend.IsFinite() ? at.value + at.bend : at.range;
+        if (!around.IsFinite()) return {};
+        place.center[k] = around.middle();
+        RealVector axis(p);
+        axis[k] = abs(around - place.center[k]).upper();
+        if (!axis[k].IsZero()) axes.push_back(std::move(axis));
+      }
+      for (const RealVector& column : slice.columns) {
+        RealVector generator(p);
+        for (std::size_t k = 0; k < p; ++k) {
+          const Enclosed& at = coordinates[first + k];
+          for (std::size_t l = 0; at.bend.IsFinite() && l < column.size(); ++l)
+            if (!column[l].IsZero() && !at.slope[l].IsZero()) generator[k] += at.slope[l] * column[l];
+        }
+        if (!IsZeroVector(generator)) place.generators.push_back(std::move(generator));
+      }
+      place.generators.insert(place.generators.end(), axes.begin(), axes.end());
+      places.push_back(Widened(std::move(place), Real()));
+    }
+    return places;
   }
 
   // Where no heading is known: the ball of the points' distance from the frame.
@@ -179,11 +213,18 @@ Bend::Extreme Bend::Farthest(const std::vector<Real>& d) const {
 
 Sweep::Sweep(const ProjectedSlice& slice) : places_{Place{slice.center(), slice.generators(), Bend(), Real(), 0}} {}
 
-std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Slice& first, const Slice* last) {
+std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Slice& first, const Slice* last,
+                            const Functions* functions) {
   const Places places(problem, last != nullptr);
   std::vector<Place> around, exact;
   for (int sample = 0; sample < (last ? 2 : 1); ++sample) {
     const Slice& slice = sample == 0 ? first : *last;
+    if (!part.places.empty()) {
+      std::vector<Place> at = places.At(*functions, slice, sample);
+      if (at.empty()) return {};
+      std::ranges::move(at, std::back_inserter(exact));
+      continue;
+    }
     around.push_back(places.Around(part, slice, sample));
     for (const Eigen::Vector3d& point : part.points) exact.push_back(places.Of(point, slice, sample));
   }

@@ -7,7 +7,10 @@ theta = c_h and r the half-width of the slice in h, every direction d has an ang
     d . g_q(x) = d . (P c + R(theta) q) + d . (P + R'(theta) q e_h^T) D b - 1/2 (D b)_h^2 d . R(xi) q,
 
 by Taylor's theorem for d . R(.) q, whose second derivative is its negative. (D b)_h^2 lies in [0, r^2]. And always
-|g_q(x) - P x| <= |q|, which is tighter where r is large. */
+|g_q(x) - P x| <= |q|, which is tighter where r is large.
+
+A point at expressions is at g(c) + Dg(c) D b, each coordinate within its bend (functions.h). A coordinate without a
+finite bend is anywhere in its range over the slice's hull. */
 #pragma once
 
 #include <array>
@@ -16,6 +19,7 @@ by Taylor's theorem for d . R(.) q, whose second derivative is its negative. (D 
 #include <Eigen/Core>
 
 #include "certifier/certify/problem.h"
+#include "verifier/functions.h"
 #include "verifier/real.h"
 #include "verifier/tube.h"
 
@@ -87,9 +91,10 @@ class Sweep final {
 /** Sets each of which contains all that `part` of the body sweeps: over the slice `first` or, with `last`, from one
 sample to the next, where Problem::between widens the hull by [-e, e], e_k = acceleration_k period^2 / 8, and the place
 of q by a ball of |q| (turn_rate^2 + turn_acceleration) period^2 / 8. One set is by Taylor's theorem. A part that turns
-has another before it, of P X and a ball of the largest |q|. @pre a Certifier accepts the problem. */
+has another before it, of P X and a ball of the largest |q|. None if an expression has no finite bound. @param places
+the expressions of a part that stands at some, one point after the other. @pre a Certifier accepts the problem. */
 [[nodiscard]] std::vector<Sweep> SweepsOf(const Problem& problem, const BodyPart& part, const Slice& first,
-                                          const Slice* last);
+                                          const Slice* last, const Functions* places = nullptr);
 
 /** How a moving obstacle is met between two samples of a plan, seen from the obstacle. By default: it stands. */
 struct Passage {

@@ -1,42 +1,25 @@
 // Equations of a text: one tape from z to x+, the integrator's stages included.
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "certifier/numerics/size.h"
 #include "verifier/equations.h"
 #include "verifier/expressions.h"
+#include "verifier/functions.h"
 #include "verifier/jet.h"
 
 namespace forereach::verifier {
 namespace {
 
-// Expressions, and where on their tape the wanted ones are.
-struct Formulas {
-  Tape tape;
-  std::vector<int> results;
-};
-
-void Define(const std::string& name, int place, Names& names) {
-  if (IsReserved(name)) throw ExpressionError("the language has a meaning of its own for the name " + name);
-  if (!names.try_emplace(name, place).second) throw ExpressionError("the name " + name + " has two meanings");
-}
-
 // The model's equations, each one on the line of its state.
 Formulas FormulasOf(const ModelText& model) {
-  Formulas formulas;
-  Names names;
-  int variable = 0, parameter = 0;
+  std::vector<std::string> variables, parameters;
   for (const auto* const group : {&model.states, &model.inputs})
-    for (const ModelText::Variable& named : *group)
-      Define(named.name, formulas.tape.Add({Op::kVariable, -1, -1, variable++}), names);
-  for (const ModelText::Parameter& named : model.parameters)
-    Define(named.name, formulas.tape.Add({Op::kParameter, -1, -1, parameter++}), names);
-  for (const ModelText::Definition& named : model.definitions)
-    Define(named.name, Parse(named.value, names, formulas.tape), names);
-  for (const ExpressionText& equation : model.equations)
-    formulas.results.push_back(Parse(equation, names, formulas.tape));
-  return formulas;
+    for (const ModelText::Variable& named : *group) variables.push_back(named.name);
+  for (const ModelText::Parameter& named : model.parameters) parameters.push_back(named.name);
+  return verifier::FormulasOf(variables, parameters, model.definitions, model.equations);
 }
 
 // One evaluation of the rates: at x + before dt k, with the rates k of the evaluation before. Its own rates count in x+
@@ -100,9 +83,8 @@ class TextEquations final : public Equations {
     std::vector<SecondDerivative> derivatives;
     for (std::size_t k = 0; k < num_states_; ++k)
       for (const auto& [key, value] : jets[k].second)
-        if (!value.IsZero())
-          derivatives.push_back(
-              {static_cast<int>(k), key / JetArithmetic::kStride, key % JetArithmetic::kStride, value});
+        derivatives.push_back({static_cast<int>(k), key / JetArithmetic::kStride, key % JetArithmetic::kStride, value});
+    std::ranges::sort(derivatives, {}, [](const SecondDerivative& d) { return std::tuple(d.output, d.column, d.row); });
     return derivatives;
   }
 

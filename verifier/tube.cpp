@@ -20,6 +20,17 @@ Real Around(const Real& center, const Real& radius) { return Real::FromTo(center
 
 double UlpOf(double x) { return std::nextafter(std::abs(x), kNone) - std::abs(x); }
 
+// By how much the record of an angle may be off: two units in the last place of 2 pi, or one of its own.
+constexpr double kAngleUnit = 0x1p-49;
+
+// What is nearest to zero of the numbers that differ from this by whole turns, if no other is within three times that:
+// at most a quarter of a turn. Otherwise everything.
+Real WithoutTurns(const Real& observed) {
+  const Real turn = Real(2.0) * Real::Pi();
+  const Real nearest = observed - Real(std::round((observed / turn).ToDouble())) * turn;
+  return CertainlyAtMost(abs(nearest), Real(0.25) * turn) ? nearest : Real::Everything();
+}
+
 bool IsZeroColumn(const std::vector<Real>& column) {
   return std::ranges::all_of(column, [](const Real& entry) { return entry.IsZero(); });
 }
@@ -44,6 +55,26 @@ Slice SliceOf(const InitialSet& set) {
   slice.center.assign(set.center.begin(), set.center.end());
   for (const auto column : set.generators.colwise()) slice.columns.emplace_back(column.begin(), column.end());
   std::erase_if(slice.columns, IsZeroColumn);
+  return slice;
+}
+
+// A certifier writes what it adds for rounding behind all else: tiny columns along the axes, one each at most, in
+// order. What are taken for them makes no difference to the set.
+Slice SliceOf(const RecordedSet& set) {
+  constexpr double kTiny = 0x1p-20;  // of the half-width
+  const Eigen::MatrixXd& generators = set.generators;
+  const Eigen::VectorXd half_width = generators.cwiseAbs().rowwise().sum();
+  Slice slice{{set.center.begin(), set.center.end()}, {}};
+  Eigen::Index end = generators.cols(), axis = generators.rows();
+  while (end > 0) {
+    Eigen::Index k = 0;
+    const double length = generators.col(end - 1).cwiseAbs().maxCoeff(&k);
+    if ((generators.col(end - 1).array() != 0).count() != 1 || k >= axis || !(length <= kTiny * half_width[k])) break;
+    axis = k;
+    --end;
+    ++slice.num_slack;
+  }
+  for (const auto column : generators.colwise()) slice.columns.emplace_back(column.begin(), column.end());
   return slice;
 }
 
@@ -323,8 +354,11 @@ TubeMaker::TubeMaker(const Problem& problem, const Equations& equations, Method 
     std::vector<Bounds>& row = residuals_.emplace_back();
     for (Eigen::Index k = 0; k < data.x_next.cols(); ++k) {
       const double x_next = data.x_next(i, k);
-      const Real allowed = Real(UlpOf(x_next)) + Real(problem.declaration.noise_bound[k]) + disturbance_[ToSize(k)];
-      const Real observed = Real(x_next) - nominal[ToSize(k)];
+      const bool is_angle = std::ranges::count(problem.model->angles(), k) > 0;
+      const double unit = is_angle ? std::max(UlpOf(x_next), kAngleUnit) : UlpOf(x_next);
+      const Real allowed = Real(unit) + Real(problem.declaration.noise_bound[k]) + disturbance_[ToSize(k)];
+      const Real difference = Real(x_next) - nominal[ToSize(k)];
+      const Real observed = is_angle && difference.IsFinite() ? WithoutTurns(difference) : difference;
       const Bounds bounds{observed - allowed, observed + allowed};
       // A transition for which the model has no value says nothing.
       row.push_back(!observed.IsFinite() ? Bounds{-kNone, kNone} : equations.IsExact() ? bounds : Outermost(bounds));
@@ -359,7 +393,7 @@ Tube TubeMaker::Make(const InitialSet& initial_set, const Eigen::MatrixXd& contr
   Tube tube;
   tube.slices.push_back(SliceOf(initial_set));
   for (int t = 0, steps = static_cast<int>(controls.cols()); t < steps && !tube.failure; ++t) {
-    const Slice slice = tube.slices.back();
+    const Slice slice = options.follow ? SliceOf((*options.follow)[ToSize(t)]) : tube.slices.back();
     tube.failure = Advance(tube, Query(t, slice, controls.col(t)), options);
   }
   return tube;
@@ -400,8 +434,8 @@ std::optional<Failure> TubeMaker::Advance(Tube& tube, const Query& query, const 
       next.columns.push_back(Axis(n, k, h));
     if (!(next.center[ToSize(k)] + next.HalfWidth(k) + slack[ToSize(k)]).IsFinite()) return no_bound("the successor");
   }
-  const bool followed = options.follow && tube.slices.size() < options.follow->size() &&
-                        ReduceAs(next, problem_.zonotope_order, (*options.follow)[tube.slices.size()]);
+  const bool followed =
+      options.follow && ReduceAs(next, problem_.zonotope_order, (*options.follow)[tube.slices.size()].generators);
   if (options.reduce && !followed)
     tube.ambiguity = std::max(tube.ambiguity, Reduce(next, problem_.zonotope_order, remainder_rounding_));
   for (int k = 0; k < n; ++k)

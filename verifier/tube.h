@@ -76,14 +76,21 @@ struct KnownRows {
   [[nodiscard]] bool Contains(int i) const { return i < base || (begin <= i && i < end); }
 };
 
+/** A recorded slice, the zonotope <center, generators>. */
+struct RecordedSet {
+  Eigen::VectorXd center;
+  Eigen::MatrixXd generators;
+};
+
 /** Variants of the tube. All are sound; the options can make it tighter. */
 struct TubeOptions {
   bool reduce = true;            ///< Reduce the order by the certifier's rule, or never.
   bool split_remainder = false;  ///< Also bound the Hessian over half the box: the integral remainder in two parts.
   KnownRows known = {};
-  /** If not null: the recorded generators of each slice. The reduction keeps the columns nearest to the recorded
-  ones. */
-  const std::vector<Eigen::MatrixXd>* follow = nullptr;
+  /** If not null: the record of each slice. Each step then starts from the recorded slice, and reduces as the record
+  shows. slices[t] encloses what one step makes of recorded slice t - 1: if every one of them lies in recorded slice t,
+  the record encloses all that it claims, by induction over t. */
+  const std::vector<RecordedSet>* follow = nullptr;
 };
 
 /** Computes tubes for any number of plans of one problem, with the precision at its construction. Immutable. */

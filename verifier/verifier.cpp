@@ -22,13 +22,26 @@ constexpr double kGrowth = 1024;
 
 bool IsSize(double x) { return 0 <= x && x < std::numeric_limits<double>::infinity(); }
 
+TaskFunctions FunctionsOf(const Problem& problem) {
+  std::vector<ExpressionText> limits;
+  for (const Limit& limit : problem.limits) limits.push_back(limit.that);
+  TaskFunctions functions{Functions(*problem.model, limits), {}};
+  for (const BodyPart& part : problem.body.parts) {
+    std::vector<ExpressionText> coordinates;
+    for (const auto& place : part.places) coordinates.insert(coordinates.end(), place.begin(), place.end());
+    functions.places.emplace_back(*problem.model, coordinates);
+  }
+  return functions;
+}
+
 // Body and bounds between the samples.
 const char* FindMisfit(const Body& body, Eigen::Index p, int num_states) {
   if (body.heading < -1 || body.heading >= num_states || (body.heading >= 0 && p < 2))
     return "the body's heading is a state, in two coordinates or more";
   if (body.parts.empty()) return "the body has a part";
   for (const BodyPart& part : body.parts)
-    if (part.points.empty() || !IsSize(part.radius) ||
+    if (part.num_points() == 0 || !IsSize(part.radius) ||
+        !std::ranges::all_of(part.places, [&](const auto& place) { return std::ssize(place) == p; }) ||
         !std::ranges::all_of(part.points, [](const Eigen::Vector3d& point) { return point.allFinite(); }))
       return "the body's parts have points, finite numbers and no negative radius";
   return nullptr;
@@ -110,6 +123,7 @@ Verifier::Verifier(std::shared_ptr<const Problem> problem, Method method)
     : problem_(std::move(problem)), method_(method) {
   try {
     equations_ = EquationsOf(*problem_->model);
+    functions_ = std::make_unique<TaskFunctions>(FunctionsOf(*problem_));
   } catch (const ExpressionError& error) {
     reason_ = std::string(", ") + error.what();
   }
@@ -134,6 +148,8 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
   if (!equations_)
     return {Status::kCannotVerify,
             {-1, "cannot verify: no equations for the model " + problem_->model->name() + reason_, "", ""}};
+  if (!functions_)
+    return {Status::kCannotVerify, {-1, "cannot verify: a limit or place is no expression" + reason_, "", ""}};
   if (const auto misfit = FindMisfit(*problem_, certificate)) return {Status::kRefuted, *misfit};
   std::optional<Failure> failure;
   for (const int bits : kBits) {
@@ -145,29 +161,32 @@ Verdict Verifier::Verify(const Certificate& certificate) const {
   return {Status::kCannotVerify, *failure};
 }
 
-// The certifier's own rules first. Where these leave a choice that its rounding may have taken otherwise, and the claim
-// fails by no more than that may matter, other tubes confirm as well: one that chooses as the record shows, and those
-// that need no choice, never reduced, and with a tighter remainder.
+// The certifier's own rules first. Where these leave a choice, its rounding may have taken it otherwise. What proves
+// the claims as well is a tube that follows the record from slice to slice; and, if they fail by no more than the
+// choice may matter, tubes that need none: never reduced, and with a tighter remainder.
 std::optional<Failure> Verifier::Check(const TubeMaker& maker, const Certificate& certificate) const {
   double ambiguity = 0;
   const auto attempt = [&](const TubeOptions& options) {
     const Tube tube = maker.Make(certificate.initial_set, certificate.controls, options);
     ambiguity = std::max(ambiguity, tube.ambiguity);
-    return tube.failure ? tube.failure : FindFalseClaim(*problem_, certificate, tube);
+    return tube.failure ? tube.failure : FindFalseClaim(*problem_, certificate, *functions_, tube);
   };
   const KnownRows& known = certificate.known;
   const std::optional<Failure> failure = attempt({.known = known});
   if (!failure) return std::nullopt;
+  std::vector<RecordedSet> recorded;
+  for (const RecordedSlice& slice : certificate.slices)
+    if (slice.has_generators) recorded.push_back({slice.center, slice.generators});
+  const bool is_recorded = recorded.size() > ToSize(certificate.controls.cols());
+  const bool is_text = problem_->model->text() != nullptr;
+  for (const bool split : {false, true})
+    if (is_recorded && (!split || is_text) && !attempt({.split_remainder = split, .known = known, .follow = &recorded}))
+      return std::nullopt;
   // The centred remainder may shrink where its center moves; by a rounding error, that is no difference of rules.
   const double rounding = method_ == Method::kCentred ? kRounding : 0;
   if (!(failure->excess < std::max(kGrowth * ambiguity, rounding))) return failure;
-  std::vector<Eigen::MatrixXd> recorded;
-  for (const RecordedSlice& slice : certificate.slices)
-    if (slice.has_generators) recorded.push_back(slice.generators);
-  std::vector<TubeOptions> others{TubeOptions{false, false, known, nullptr}, TubeOptions{false, true, known, nullptr}};
-  if (!recorded.empty()) others.insert(others.begin(), TubeOptions{true, false, known, &recorded});
-  for (const TubeOptions& options : others)
-    if (!attempt(options)) return std::nullopt;
+  for (const bool split : {false, true})
+    if (!attempt({.reduce = false, .split_remainder = split, .known = known})) return std::nullopt;
   return failure;
 }
 

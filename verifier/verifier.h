@@ -1,8 +1,8 @@
 /** Confirms or refutes a certificate. It rederives the certificate from its inputs, in intervals of 256 bits and more.
 
 Confirmed: the verifier's own tube, which is sound for the given doubles in real arithmetic, stays in the domain, lies
-inside every recorded set, and what the body sweeps over it is disjoint from every obstacle. Refuted: one of these is
-false. */
+inside every recorded set and within every limit, and what the body sweeps over it is disjoint from every obstacle.
+Refuted: one of these is false. */
 #pragma once
 
 #include <map>
@@ -17,6 +17,7 @@ false. */
 #include "certifier/certify/problem.h"
 #include "verifier/answer.h"
 #include "verifier/equations.h"
+#include "verifier/functions.h"
 #include "verifier/tube.h"
 
 namespace forereach::verifier {
@@ -77,8 +78,9 @@ class Verifier final {
 
   std::shared_ptr<const Problem> problem_;
   Method method_;
-  std::unique_ptr<Equations> equations_;  // null if there are none
-  std::string reason_;                    // then: why a text gives none
+  std::unique_ptr<Equations> equations_;      // null if there are none
+  std::unique_ptr<TaskFunctions> functions_;  // null if an expression is none
+  std::string reason_;                        // then: why a text gives none
   mutable std::mutex mutex_;
   mutable std::map<int, std::unique_ptr<TubeMaker>> makers_;  // by bits
 };

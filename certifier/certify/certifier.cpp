@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "certifier/dynamics/angles.h"
+#include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/arithmetic.h"
 #include "certifier/numerics/size.h"
 
@@ -13,6 +15,25 @@ namespace {
 
 void RequireThat(bool good, const std::string& what) {
   if (!good) throw std::invalid_argument(what);
+}
+
+// The place of the body has to be that of the configuration, however often an angle has turned.
+void RequireSameAfterTurns(const Problem& problem) {
+  const NominalModel& model = *problem.model;
+  for (const int angle : model.angles())
+    RequireThat(angle >= problem.projection.cols() || problem.projection.col(angle).isZero(0),
+                "projection: depends on " + model.state_names()[ToSize(angle)] +
+                    ", which is an angle: how often it has turned is not known");
+  if (model.angles().empty() || !problem.body.HasPlaces()) return;
+  std::vector<ExpressionText> all;
+  for (const BodyPart& part : problem.body.parts)
+    for (const std::vector<ExpressionText>& place : part.places) all.insert(all.end(), place.begin(), place.end());
+  const ProgramDraft program = MakeProgram(NamesOf(model), all);
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (const int angle : model.angles())
+      RequireThat(IsSameAfterTurn(program.View(), static_cast<int>(i), angle),
+                  "body: the place " + all[i].text + " is not seen to be the same after a turn of the angle " +
+                      model.state_names()[ToSize(angle)] + " by 2 pi");
 }
 
 // What every certifier reads of a problem.
@@ -27,6 +48,7 @@ const Problem& Validated(const std::shared_ptr<const Problem>& problem) {
   RequireThat(1 <= problem->zonotope_order && problem->zonotope_order <= highest_order,
               "zonotope_order: " + std::to_string(problem->zonotope_order) + " is outside [1, " +
                   std::to_string(highest_order) + "] for " + std::to_string(n) + " states");
+  RequireSameAfterTurns(*problem);
   for (const RestBound& bound : problem->rest)
     RequireThat(0 <= bound.coordinate && bound.coordinate < n && bound.tolerance >= 0 && bound.tolerance < kInfinity,
                 "rest: coordinate " + std::to_string(bound.coordinate) + " within " + std::to_string(bound.tolerance) +
@@ -113,6 +135,7 @@ Certifier::Observed::Observed(const Problem& problem) : store(MakeStore(problem)
 Certifier::Certifier(std::shared_ptr<const Problem> problem)
     : problem_((Validated(problem), std::move(problem))),
       safety_(*problem_),
+      limits_(*problem_),
       observed_(std::in_place, *problem_),
       violation_(observed_->known.violation()),
       propagator_(*problem_->model, problem_->domain, observed_->known, problem_->declaration.disturbance,
@@ -121,6 +144,7 @@ Certifier::Certifier(std::shared_ptr<const Problem> problem)
 Certifier::Certifier(std::shared_ptr<const Problem> problem, const ResidualEnclosure& residual)
     : problem_((Validated(problem), std::move(problem))),
       safety_(*problem_),
+      limits_(*problem_),
       propagator_(*problem_->model, problem_->domain, residual, problem_->declaration.disturbance,
                   problem_->zonotope_order, problem_->method, problem_->instructions) {}
 
@@ -192,7 +216,7 @@ Decision Certifier::Certify(const Plan& plan, const Zonotope& initial_set, std::
   if (violation()) return Falsified(*violation());
   Decision decision = Propagate(plan, tube);
   if (decision.outcome == Outcome::kNone) decision = JudgeRest(tube);
-  if (decision.outcome == Outcome::kNone) decision = safety_.Judge(obstacles, plan.schedule, tube);
+  if (decision.outcome == Outcome::kNone) decision = JudgeSafety(plan, obstacles, tube);
   for (int t = 0; t < tube.length(); ++t) decision.capped |= tube.step(t).envelope.capped;
   return decision;
 }
@@ -207,6 +231,14 @@ Decision Certifier::Propagate(const Plan& plan, Tube& tube) const noexcept {
     tube.length_ = t + 1;
   }
   return {};
+}
+
+Decision Certifier::JudgeSafety(const Plan& plan, std::span<const Obstacle> obstacles, Tube& tube,
+                                int first) const noexcept {
+  const Decision limits = limits_.Judge(plan, tube, first);
+  const Decision among_obstacles = safety_.Judge(obstacles, plan.schedule, tube, first);
+  const bool is_touched_before = among_obstacles.outcome == Outcome::kSafety && among_obstacles.step < limits.step;
+  return limits.outcome == Outcome::kNone || is_touched_before ? among_obstacles : limits;
 }
 
 Decision Certifier::JudgeRest(const Tube& tube) const noexcept {

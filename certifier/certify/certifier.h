@@ -11,6 +11,7 @@ and throws nothing. Learn adds later observations between two calls of Certify. 
 
 #include "certifier/certify/decision.h"
 #include "certifier/certify/learned.h"
+#include "certifier/certify/limits.h"
 #include "certifier/certify/problem.h"
 #include "certifier/certify/safety.h"
 #include "certifier/reach/propagator.h"
@@ -58,9 +59,15 @@ class Certifier final {
   index. */
   void Compact() { observed_->store.Compact(); }
 
-  /** The last test of Certify alone, for a tube that Certify has completed: among other obstacles, or from a later step
-  on, and the distances to them (safety.h). */
+  /** The test against obstacles alone, for a tube that Certify has made, and the distances to them (safety.h). */
   [[nodiscard]] const SafetyTest& safety() const { return safety_; }
+  /** The test of the problem's limits alone (limits.h). */
+  [[nodiscard]] const LimitTest& limits() const { return limits_; }
+  /** The last tests of Certify alone, for a tube that Certify has made of this plan: among other obstacles, or from a
+  later step on. A limit that may be exceeded at sample t comes before an obstacle that may be touched in unit t or
+  later (safety.h). Outcome kCertified, or kSafety with the first failure. */
+  [[nodiscard]] Decision JudgeSafety(const Plan& plan, std::span<const Obstacle> obstacles, Tube& tube,
+                                     int first = 0) const noexcept;
   /** SafetyTest::Separate. */
   [[nodiscard]] Separation SeparateSlice(const Tube& tube, int t, const Obstacle& obstacle,
                                          const Schedule& schedule = {}) const {
@@ -86,11 +93,13 @@ class Certifier final {
   /** Decides whether the plan is safe for every admissible residual, every disturbance and every initial state in
   `initial_set`. The outcome is kCertified only with a proof in real arithmetic that, for t = 0..T, `tube.slice(t)`
   contains every reachable state and the body there is disjoint from every obstacle (Theorem "ForeReach containment");
-  with Problem::between also at all times between these samples, for every motion within the declared bounds.
+  with Problem::between also at all times between these samples, for every motion within the declared bounds; and that
+  the problem's limits hold at the samples.
 
   The tests run in this order. First F. Then, for t < T, the domain, the remainder and the envelope; the first failure
   ends the run. After the horizon, the bounds of `Problem::rest` on Box(X_T), in their order (D, kNoStop, step T). Then
-  S, for each sample or step t (safety.h); the first unsafe t is reported. X_T is not tested against the domain.
+  S (JudgeSafety): the first sample or step t at which a limit or an obstacle fails. X_T is not tested against the
+  domain.
   @param tube receives the slices. @pre Require passes.
   Cost O(T (N + n m)) at most, plus the separation of each slice from each near obstacle. Any number of threads may call
   it, each with its own tube. */
@@ -111,6 +120,7 @@ class Certifier final {
 
   std::shared_ptr<const Problem> problem_;
   SafetyTest safety_;
+  LimitTest limits_;
   std::optional<Observed> observed_;  // none where an enclosure was given; propagator_ refers to it
   std::optional<Violation> violation_;
   Propagator propagator_;

@@ -19,30 +19,40 @@ namespace forereach {
 
 /** The numbers are those of lcmtypes/decision_t.lcm. Zero is not a certificate. */
 enum class Outcome { kNone = 0, kCertified = 1, kFalsified = 2, kDomain = 3, kSafety = 4 };
-enum class Cause { kNone = 0, kPairwise = 1, kDomainExit = 2, kNoFiniteEnclosure = 3, kObstacle = 4, kNoStop = 5 };
+enum class Cause {
+  kNone = 0,
+  kPairwise = 1,
+  kDomainExit = 2,
+  kNoFiniteEnclosure = 3,
+  kObstacle = 4,
+  kNoStop = 5,
+  kLimit = 8
+};
 
 struct Decision {
   Outcome outcome = Outcome::kNone;
   Cause cause = Cause::kNone;
-  /** The first t at which X_t fails. S with Problem::between: the body may touch the obstacle between t and t + 1. -1
-  for a certificate, and for F found before the first step. */
+  /** The first t at which X_t fails. S by kObstacle with Problem::between: the body may touch the obstacle between t
+  and t + 1. -1 for a certificate, and for F found before the first step. */
   int step = -1;
 
   /** @name Witness. A member that does not apply to the outcome is -1 or kNone. */
   ///@{
-  DomainExit exit{};    ///< D by domain exit.
-  int coordinate = -1;  ///< F: residual coordinate. D: coordinate of z, or state without a finite enclosure.
+  DomainExit exit{};  ///< D by domain exit.
+  /** F: residual coordinate. D: coordinate of z, or state without a finite enclosure. S by kLimit: the limit. */
+  int coordinate = -1;
   int first_observation = -1, second_observation = -1;  ///< F: the violating pair.
-  int obstacle = -1;                                    ///< S: the obstacle. Certificate: the closest obstacle.
-  int part = -1;                                        ///< S: the part of the body. Certificate: the closest part.
+  int obstacle = -1;                                    ///< S by kObstacle, and certificate: the closest obstacle.
+  int part = -1;                                        ///< Likewise the part of the body.
   /** Certificate: the step of the closest slice. If the problem has bounds between the samples: the step t after which
   the body comes closest, before t + 1. */
   int closest_step = -1;
   ///@}
 
-  /** The deciding value and the value that it is compared with. Certificate and S: proven distance from the body
-  to the obstacle's core, and the distance to be kept: the radius of the obstacle, its growth and the part's radius (m).
-  D: extreme value of the hull, and the bound of the domain or of rest. F: difference of two residuals, and the
+  /** The deciding value and the value that it is compared with. Certificate and S by kObstacle: proven distance from
+  the body to the obstacle's core, and the distance to be kept: the radius of the obstacle, its growth and the part's
+  radius (m). S by kLimit: the value that the limit's function may reach, infinite if it has no bound, and the limit's
+  bound. D: extreme value of the hull, and the bound of the domain or of rest. F: difference of two residuals, and the
   difference that the declaration allows. */
   double margin = 0, threshold = 0;
 

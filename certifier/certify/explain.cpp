@@ -1,5 +1,12 @@
 #include "certifier/certify/explain.h"
 
+#include <optional>
+#include <vector>
+
+#include <cmath>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/dynamics/unbounded.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
@@ -47,7 +54,19 @@ std::string TimeText(const Problem& problem, int step) {
 
 bool NamesPart(const Problem& problem, int part) { return problem.body.parts.size() > 1 && part >= 0; }
 
+std::string ExplainLimit(const Decision& decision, const Problem& problem) {
+  const auto i = ToSize(decision.coordinate);
+  const std::string name = i < problem.limits.size() ? problem.limits[i].name : "limit " + std::to_string(i);
+  const std::string where = "abstain S: at step " + std::to_string(decision.step) + " " + name;
+  const bool below = decision.margin < decision.threshold;
+  const std::string limit = below ? RoundedUp(decision.threshold) : RoundedDown(decision.threshold);
+  if (!std::isfinite(decision.margin)) return where + " has no finite bound, its limit is " + limit;
+  return where + " may reach " + (below ? RoundedDown(decision.margin) : RoundedUp(decision.margin)) +
+         (below ? ", below its limit " : ", above its limit ") + limit;
+}
+
 std::string ExplainSafety(const Decision& decision, const Problem& problem) {
+  if (decision.cause == Cause::kLimit) return ExplainLimit(decision, problem);
   const double clearance = SubDown(decision.margin, decision.threshold);
   if (decision.outcome == Outcome::kCertified)
     return ExplainCertificate(problem, {decision.closest_step, decision.obstacle, decision.part, clearance});
@@ -78,22 +97,45 @@ std::string Sentence(const Decision& decision, const Problem& problem) {
   return "no decision";
 }
 
+// Why there is no finite enclosure; empty if it is not known.
+std::string ExplainUnbounded(const Decision& decision, const NominalModel& model, const Plan& plan, const Tube& tube) {
+  const int t = decision.step;
+  if (decision.cause != Cause::kNoFiniteEnclosure || t < 0 || t > tube.length() || t >= plan.num_steps) return "";
+  std::vector<Interval> box;
+  for (int k = 0; k < model.num_states(); ++k) box.push_back(tube.hull(t, k));
+  for (const double u : plan.input(t)) box.emplace_back(u);
+  const std::optional<Unbounded> found = FindUnbounded(model, box, decision.coordinate);
+  if (!found) return "";
+  std::string states;
+  for (const int k : found->states) states += (states.empty() ? "" : ", ") + VariableName(model, k);
+  return ": " + found->operation + " at line " + std::to_string(found->line) + ", column " +
+         std::to_string(found->column) + " of the model has a kink or a pole there; its argument" +
+         (states.empty() ? "" : ", a function of " + states + ",") + " may be anywhere in [" +
+         RoundedDown(found->argument.lower) + ", " + RoundedUp(found->argument.upper) + "]";
+}
+
 }  // namespace
 
 std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest) {
-  if (closest.obstacle < 0) return "certified: no obstacle is there";
+  const std::string limits = problem.limits.empty() ? "" : "; within its limits at the sample instants";
+  if (closest.obstacle < 0) return "certified: no obstacle is there" + limits;
   const std::string who = NamesPart(problem, closest.part) ? "part " + std::to_string(closest.part) + " " : "";
   return std::string(problem.between ? "certified: the robot stays clear at all times"
                                      : "certified at its sample instants only: the robot stays clear") +
          (problem.declaration.IsDisturbed() ? " under the declared disturbance" : "") + ", closest " +
          TimeText(problem, closest.step) + ", " + who + RoundedDown(closest.clearance) + " m from obstacle " +
-         std::to_string(closest.obstacle);
+         std::to_string(closest.obstacle) + limits;
 }
 
 const char* HoldsName(const Problem& problem) { return problem.between ? "all_times" : "samples"; }
 
 std::string Explain(const Decision& decision, const Problem& problem) {
   return Sentence(decision, problem) + (decision.capped ? kCapped : "");
+}
+
+std::string Explain(const Decision& decision, const Problem& problem, const Plan& plan, const Tube& tube) {
+  return Sentence(decision, problem) + ExplainUnbounded(decision, *problem.model, plan, tube) +
+         (decision.capped ? kCapped : "");
 }
 
 }  // namespace forereach

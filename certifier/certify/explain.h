@@ -8,9 +8,15 @@
 
 namespace forereach {
 
+struct Plan;
+class Tube;
+
 /** One sentence with outcome, step, cause and witness by name, with values, bounds and units. Numbers have six digits
 and are rounded so that the sentence stays true: a clearance down, a depth up. */
 [[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem);
+/** The same, where the plan and its tube are at hand. If the next state has no finite enclosure, it also names the
+operation of the model's text that meets its kink or pole (dynamics/unbounded.h). Not for the certify step. */
+[[nodiscard]] std::string Explain(const Decision& decision, const Problem& problem, const Plan& plan, const Tube& tube);
 
 /** The closest approach of a certified plan, as Decision has it. */
 struct ClosestApproach {
@@ -21,7 +27,8 @@ struct ClosestApproach {
 };
 
 /** The sentence for a certificate, without kCapped. It says when the certificate holds: at all times with
-Problem::between, otherwise at the sample instants only; and that it allows for a disturbance, if one is declared. */
+Problem::between, otherwise at the sample instants only; that it allows for a disturbance, if one is declared; and that
+the limits hold at the sample instants, if there are any. */
 [[nodiscard]] std::string ExplainCertificate(const Problem& problem, const ClosestApproach& closest);
 
 /** "all_times" or "samples": when a decision of the problem holds. */

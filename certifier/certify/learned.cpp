@@ -16,6 +16,8 @@ Learned Observe(const Problem& problem, std::span<const double> z, std::span<con
   };
   try {
     observed = Observe(*problem.model, {row(z), row(next)});
+  } catch (const AmbiguousAngle&) {
+    return Learned::kAmbiguousAngle;
   } catch (const std::invalid_argument&) {
     return Learned::kNoNominalValue;
   }
@@ -28,6 +30,8 @@ std::string Explain(Learned learned) {
     case Learned::kNotFinite: return "NaN or infinity in it";
     case Learned::kOutsideDomain: return "it lies outside the certification domain";
     case Learned::kNoNominalValue: return "the nominal model has no finite value there";
+    case Learned::kAmbiguousAngle:
+      return "an angle is more than a quarter of a turn away from the nominal model's, so its turns cannot be told";
   }
   return "";
 }

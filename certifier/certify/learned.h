@@ -15,6 +15,7 @@ enum class Learned {
   kNotFinite,       ///< An entry is NaN or infinite.
   kOutsideDomain,   ///< z is not proven to lie in the domain: the transition says nothing about the residual there.
   kNoNominalValue,  ///< The nominal map has no finite enclosure at z.
+  kAmbiguousAngle,  ///< An angle departs from the nominal map's by more than a quarter of a turn (observations.h).
 };
 
 /** Examines a transition, z = (x, u) of d_z entries and x+ of n, in the model's units. Without a fault `observed` gets

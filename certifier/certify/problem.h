@@ -13,6 +13,7 @@ projection. */
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/transitions.h"
 #include "certifier/safety/body.h"
+#include "certifier/safety/limit.h"
 #include "certifier/safety/obstacle.h"
 #include "certifier/sets/box.h"
 #include "certifier/sets/eigen.h"
@@ -34,6 +35,7 @@ struct Problem {
   Body body;                                  ///< By default the point P x
   /** The bounds with which a certificate holds at all times; without them it holds at the samples only. */
   std::optional<Between> between;
+  std::vector<Limit> limits;          ///< At most kMaxLimits, which hold at the samples
   Method method = Method::kCentred;   ///< How the nominal remainder is bounded
   int max_leaf_visits = 512;          ///< EnvelopeOptions: bounds the work of one search
   int max_observations = 10'000'000;  ///< Above this number, observations that never attain the envelope are removed

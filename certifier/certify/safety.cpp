@@ -59,7 +59,8 @@ class Nearest {
       if (!(clearance < pairs_[farthest_].clearance)) return;
     }
     Pair* pair = &pairs_[count_ == pairs_.size() ? farthest_ : count_++];
-    pair->bound.separation = found;  // one by one: what is written so can be read so without waiting
+    // Member by member: a load that spans several stores waits for all of them.
+    pair->bound.separation = found;
     pair->bound.part = part;
     pair->clearance = clearance;
     pair->step = t;
@@ -206,7 +207,8 @@ class SafetyTest::Unit {
     return {closest, part};
   }
 
-  void EncloseHull(int t, Hull& hull) const noexcept {
+  void EncloseHull(int t, Hull& hull) noexcept {
+    if (placement().has_expressions()) return placement().EncloseHull(SampleAt(t), hull);
     placement().EncloseHull(tube_.slice(t), tube_.half_width(t), hull);
   }
 
@@ -245,7 +247,7 @@ class SafetyTest::Unit {
       const Placement::Sample& sample = SampleAt(t);
       for (int i = part.first; i < part.first + part.count; ++i)
         for (std::size_t k = 0; k < p; ++k) {
-          const double middle = sample.middle(i, k) - meeting.shift[ToSize(t - first_)][k].lower;
+          const double middle = placement().middle(sample, i, k) - meeting.shift[ToSize(t - first_)][k].lower;
           lower[k] = std::min(lower[k], middle);
           upper[k] = std::max(upper[k], middle);
         }
@@ -301,9 +303,13 @@ class SafetyTest::Unit {
   Encounter meeting_;
 };
 
+Placement PlacementOf(const Problem& problem) {
+  return {problem.projection, problem.body, problem.between, problem.model->num_states(),
+          problem.body.HasPlaces() ? NamesOf(*problem.model) : ExpressionNames{}};
+}
+
 SafetyTest::SafetyTest(const Problem& problem)
-    : placement_(problem.projection, problem.body, problem.between, problem.model->num_states()),
-      instructions_(problem.instructions) {}
+    : placement_(PlacementOf(problem)), instructions_(problem.instructions) {}
 
 PartSeparation SafetyTest::Separate(const Tube& tube, int t, const Obstacle& obstacle, const Schedule& schedule) const {
   std::vector<Zonotope> places(2 * ToSize(placement_.num_points()));
@@ -360,9 +366,10 @@ Decision SafetyTest::Judge(std::span<const Obstacle> obstacles, const Schedule& 
   Pair* least = nearest.Least();
   for (; is_closer(least) && !least->is_direct; least = nearest.Least()) direct(*least);
   if (is_closer(least)) consider(*least);
+  // What no cheap bound proves has been considered above.
   const auto consider_if_closer = [&](Pair& pair) {
     if (is_closer(&pair) && !pair.is_direct) direct(pair);
-    if (is_closer(&pair) && pair.bound.separation.IsProven()) consider(pair);  // otherwise it was, above
+    if (is_closer(&pair) && pair.bound.separation.IsProven()) consider(pair);
   };
   if (nearest.left_out() >= closest.clearance) {
     for (Pair& pair : nearest.InOrder(closest.clearance, least)) consider_if_closer(pair);

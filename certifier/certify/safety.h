@@ -22,6 +22,9 @@ struct PartSeparation {
   int part = -1;
 };
 
+/** The places of a problem's body. @throws std::invalid_argument as Placement does. */
+[[nodiscard]] Placement PlacementOf(const Problem& problem);
+
 /** Immutable, so any number of threads may use it, each with its own tube. */
 class SafetyTest final {
  public:

@@ -119,8 +119,9 @@ class Search {
 
   SlopeBound Run(const SlopeProgress& progress) {
     if (active_.size() > Jet::kMaxArguments)
-      throw std::invalid_argument("slope bound: " + std::to_string(active_.size()) + " arguments, at most " +
-                                  std::to_string(Jet::kMaxArguments) + " may be free");
+      throw std::invalid_argument("slope bound: row " + std::to_string(result_.row) + " of the residual depends on " +
+                                  std::to_string(active_.size()) + " arguments that vary, at most " +
+                                  std::to_string(Jet::kMaxArguments) + " may");
     result_.cover.nodes.resize(1);
     Add(0, kInfinity, root_);
     while (!parts_.empty() && parts_.top().bound > Enough() && parts_.top().cut >= 0 &&
@@ -328,9 +329,9 @@ SlopeBound BoundSlope(const ResidualSlopes& slopes, const Domain& domain, std::s
                       int column, const SlopeBoundOptions& options, const SlopeProgress& progress) {
   RequireExactArithmetic();
   domain.Validate(slopes.num_states(), slopes.num_variables() - slopes.num_states());
-  Require(parameters.size() == slopes.parameter_names().size(),
-          std::to_string(parameters.size()) + " parameter ranges for " +
-              std::to_string(slopes.parameter_names().size()) + " parameters");
+  const auto count = ToSize(slopes.num_arguments() - slopes.num_variables());
+  Require(parameters.size() == count,
+          std::to_string(parameters.size()) + " parameter ranges for " + std::to_string(count) + " parameters");
   Require(0 <= row && row < slopes.num_states(), "no row " + std::to_string(row));
   Require(0 <= column && column < slopes.num_variables(), "no column " + std::to_string(column));
   Require(options.gap > 0 && options.gap < kInfinity, "gap " + ToText(options.gap) + " is outside (0, inf)");

@@ -11,7 +11,10 @@ The program of operations and derivatives is a compile-time constant, so each fu
 #pragma once
 
 #include <array>
+#include <utility>
+#include <vector>
 
+#include "certifier/dynamics/angles.h"
 #include "certifier/dynamics/expand.h"
 #include "certifier/dynamics/image.h"
 #include "certifier/dynamics/program_model.h"
@@ -27,10 +30,22 @@ class EquationsModel final : public ProgramModel {
   static constexpr Program kProgram = ProgramOf<Equations>::kProgram;
   static_assert(Equations::kStates <= kMaxStates && Equations::kInputs <= kMaxInputs);
 
-  explicit EquationsModel(const Equations& equations)
+  /** @param angles the states that are angles, by their indices, ascending. @throws std::invalid_argument unless they
+  are angles of these equations (angles.h). */
+  explicit EquationsModel(const Equations& equations, std::vector<int> angles = {})
       : ProgramModel(kProgram, List<Interval>(equations.parameters()),
-                     {Equations::kName, List<std::string>(Equations::kStateNames),
-                      List<std::string>(Equations::kInputNames), List<std::string>(Equations::kParameterNames)}) {}
+                     {Equations::kName,
+                      List<std::string>(Equations::kStateNames),
+                      List<std::string>(Equations::kInputNames),
+                      List<std::string>(Equations::kParameterNames),
+                      {},
+                      std::move(angles)}) {
+    RequireAngles(kProgram, this->angles(), this->state_names(), false);
+  }
+
+  /** With other values or ranges of the parameters, under other names. */
+  EquationsModel(std::vector<Interval> parameters, ModelNames names)
+      : ProgramModel(kProgram, std::move(parameters), std::move(names)) {}
 
   void Expand(std::span<const double> z, std::span<const PlainInterval> box, Expansion& out,
               InstructionSet instructions = BestInstructionSet()) const noexcept override {

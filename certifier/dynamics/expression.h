@@ -58,8 +58,8 @@ enum class Function : unsigned char {
   kMin,
   kMax,
   kHypot,      ///< sqrt(a^2 + b^2)
-  kSoftplus,   ///< softplus(x, temperature), see residuals.h
-  kSmoothGate  ///< smooth_gate(e), see residuals.h
+  kSoftplus,   ///< softplus(x, temperature), see saturation.h
+  kSmoothGate  ///< smooth_gate(e), see saturation.h
 };
 
 struct NamedFunction {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "certifier/dynamics/evaluate.h"
 #include "certifier/dynamics/saturation.h"
 #include "certifier/numerics/elementary.h"
 
@@ -210,6 +211,30 @@ Jet SmoothGate(const Jet& a) { return Composed(a, SmoothGateRanges(a.value)); }
 Jet Softplus(const Jet& x, const Jet& temperature) {
   const SoftplusRanges f(x.value, temperature.value);
   return Composed(x, temperature, {f.value, f.by_x, f.by_temperature, f.by_xx, f.by_xt, f.by_tt});
+}
+
+Jet step(const Jet& a) {
+  const Interval jump = kink(a.value);
+  return Composed(a, {step(a.value), jump, jump});
+}
+
+Jet sign(const Jet& a) {
+  const Interval jump = kink(a.value);
+  return Composed(a, {sign(a.value), jump, jump});
+}
+
+Jet kink(const Jet& a) {
+  const Interval jump = kink(a.value);
+  return Composed(a, {jump, jump, jump});
+}
+
+Jet cut(const Jet& y, const Jet& x) {
+  const Interval jump = cut(y.value, x.value);
+  return Composed(y, x, {jump, jump, jump, jump, jump, jump});
+}
+
+Jet TanCurvature(const Jet& t) {
+  return Composed(t, {TanCurvature(t.value), Interval(2) + Interval(6) * sqr(t.value), Interval(12) * t.value});
 }
 
 }  // namespace forereach

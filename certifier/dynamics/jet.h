@@ -59,8 +59,15 @@ struct Jet {
 [[nodiscard]] Jet atan2(const Jet& y, const Jet& x);
 [[nodiscard]] Jet tanh(const Jet& a);
 [[nodiscard]] Jet pow(const Jet& a, int n);
-/** The functions of the same names in residuals.h. */
+[[nodiscard]] inline Jet sqr(const Jet& a) { return a * a; }
+/** The functions of the same names in saturation.h. */
 [[nodiscard]] Jet SmoothGate(const Jet& a);
 [[nodiscard]] Jet Softplus(const Jet& x, const Jet& temperature);
+/** What derivatives in a program consist of (elementary.h, evaluate.h). Where one has a jump, nothing is bounded. */
+[[nodiscard]] Jet step(const Jet& a);
+[[nodiscard]] Jet sign(const Jet& a);
+[[nodiscard]] Jet kink(const Jet& a);
+[[nodiscard]] Jet cut(const Jet& y, const Jet& x);
+[[nodiscard]] Jet TanCurvature(const Jet& t);
 
 }  // namespace forereach

@@ -1,8 +1,10 @@
 #include "certifier/dynamics/model.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -11,6 +13,14 @@ NominalModel::NominalModel(const Program& program, std::vector<Interval> paramet
     : program_(program), ranges_(std::move(parameters)), names_(std::move(names)) {
   for (const Interval& range : ranges_) middles_.push_back(range.Middle());
 }
+
+void NominalModel::Evaluate(std::span<const double> z, std::span<double> next) const noexcept {
+  std::array<long double, kMaxStates> wide;
+  EvaluateWide(z, std::span(wide).first(next.size()));
+  for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(wide[k]);
+}
+
+bool NominalModel::IsAngle(int state) const { return std::ranges::binary_search(names_.angles, state); }
 
 std::vector<std::string> NominalModel::variable_names() const {
   std::vector<std::string> names = names_.states;
@@ -33,14 +43,21 @@ std::string NominalModel::description() const {
   std::string text = names_.name;
   for (std::size_t p = 0; p < ranges_.size(); ++p) {
     const auto& [lower, upper] = ranges_[p];
-    text += " " + names_.parameters[p] + "=" +
-            (lower == upper ? ToText(lower) : "[" + ToText(lower) + "," + ToText(upper) + "]");
+    text += " " + names_.parameters[p] + "=";
+    if (lower == upper)
+      text += ToText(lower);
+    else
+      text.append("[").append(ToText(lower)).append(",").append(ToText(upper)).append("]");
   }
-  if (names_.text == nullptr) return text;
   const auto add_names = [&](const char* kind, const std::vector<std::string>& names) {
-    text += std::string("; ") + kind;
+    text += "; ";
+    text += kind;
     for (const std::string& name : names) text += " " + name;
   };
+  std::vector<std::string> angles;
+  for (const int angle : names_.angles) angles.push_back(names_.states[ToSize(angle)]);
+  if (!angles.empty()) add_names("angles", angles);
+  if (names_.text == nullptr) return text;
   add_names("states", names_.states);
   add_names("inputs", names_.inputs);
   for (const auto& [name, value] : names_.text->definitions)

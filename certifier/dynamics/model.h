@@ -52,6 +52,7 @@ struct ModelNames {
   std::string name;
   std::vector<std::string> states, inputs, parameters;
   std::shared_ptr<const ModelText> text = {};  ///< What the model was made from; null if it was compiled.
+  std::vector<int> angles = {};                ///< The states that are angles (angles.h), by their indices, ascending.
 };
 
 class NominalModel {
@@ -76,8 +77,12 @@ class NominalModel {
   [[nodiscard]] const Program& program() const { return program_; }
   /** The text that the model was made from; null if it was compiled. */
   [[nodiscard]] const ModelText* text() const { return names_.text.get(); }
-  /** Name and parameters, or all equations of a text. It identifies the model; the model's digest is computed from
-  it. */
+  /** The states that are angles, by their indices, ascending: x and x + 2 pi e_a are the same configuration, and the
+  equations are the same for both (angles.h). docs/soundness.md, 3.14, says what this declares. */
+  [[nodiscard]] const std::vector<int>& angles() const { return names_.angles; }
+  [[nodiscard]] bool IsAngle(int state) const;
+  /** Name and parameters, or all equations of a text, and the angles. It identifies the model; the model's digest is
+  computed from it. */
   [[nodiscard]] std::string description() const;
 
   [[nodiscard]] int num_states() const { return program_.states; }
@@ -86,7 +91,9 @@ class NominalModel {
 
   /** Sets `next` (n entries) to f0(z) for the middles of the parameters, evaluated in extended precision and rounded
   once. Use it for planning, simulation and display, not for bounds. */
-  virtual void Evaluate(std::span<const double> z, std::span<double> next) const noexcept = 0;
+  void Evaluate(std::span<const double> z, std::span<double> next) const noexcept;
+  /** The same before it is rounded. */
+  virtual void EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept = 0;
 
   /** Encloses f0(z) and D_z f0(z), Eq. (propagation), for all parameters, by interval arithmetic. */
   virtual void Linearize(std::span<const double> z, Linearization& out) const noexcept = 0;

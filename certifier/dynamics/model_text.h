@@ -45,8 +45,16 @@ struct ModelText {
   std::vector<Definition> definitions;
   std::vector<ExpressionText> equations;  ///< One for each state, in the order of the states.
   Integrator integrator = Integrator::kNone;
+  std::vector<std::string> angles;  ///< The states that are angles (NominalModel::angles), in any order.
 
   friend bool operator==(const ModelText&, const ModelText&) = default;
+};
+
+/** The names that expressions may use, and what they stand for. */
+struct ExpressionNames {
+  std::vector<std::string> states, inputs;
+  std::vector<ModelText::Parameter> parameters;
+  std::vector<ModelText::Definition> definitions;  ///< Each may use those before it.
 };
 
 }  // namespace forereach

@@ -1,6 +1,7 @@
 #include "certifier/dynamics/models.h"
 
 #include <stdexcept>
+#include <utility>
 
 #include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/kinematic_bicycle.h"
@@ -22,10 +23,19 @@ std::shared_ptr<const NominalModel> MakePointMass(double dt) {
   return std::make_shared<EquationsModel<PointMass>>(PointMass{dt});
 }
 
-std::shared_ptr<const NominalModel> MakeKinematicBicycle(double dt, double wheelbase) {
+std::shared_ptr<const NominalModel> MakeKinematicBicycle(double dt, double wheelbase, std::vector<int> angles) {
   RequirePositive("dt", dt);
   RequirePositive("wheelbase", wheelbase);
-  return std::make_shared<EquationsModel<KinematicBicycle>>(KinematicBicycle{dt, wheelbase});
+  return std::make_shared<EquationsModel<KinematicBicycle>>(KinematicBicycle{dt, wheelbase}, std::move(angles));
+}
+
+std::vector<ExpressionText> RatesOf(const NominalModel& model) {
+  if (const ModelText* const text = model.text())
+    return text->integrator == ModelText::Integrator::kNone ? std::vector<ExpressionText>() : text->equations;
+  if (model.name() == PointMass::kName) return {{"vx"}, {"vy"}, {"ax"}, {"ay"}};
+  if (model.name() == KinematicBicycle::kName)
+    return {{"v*cos(theta)"}, {"v*sin(theta)"}, {"v*tan(delta)/wheelbase"}, {"a"}, {"jerk"}, {"steer_rate"}};
+  return {};
 }
 
 }  // namespace forereach

@@ -78,8 +78,8 @@ struct Operation {
 };
 
 /** Nodes in the order of evaluation, and the lists of nodes that are the values, the Jacobian and the Hessians of a map
-from z = (x, u) to `states` numbers. Derivatives that are not listed are zero. Second derivatives are those by states:
-inputs are points. The lists belong to a FixedProgram or a ProgramDraft. */
+from z = (x, u) to a list of numbers; that of a model has `states` of them. Derivatives that are not listed are zero.
+Second derivatives are those by states: inputs are points. The lists belong to a FixedProgram or a ProgramDraft. */
 struct Program {
   struct First {
     short row = 0, column = 0;
@@ -111,6 +111,16 @@ struct Program {
   [[nodiscard]] constexpr const Operation& node(int i) const { return nodes[ToSize(i)]; }
 };
 
+/** Marks with 1, among nodes in the order of evaluation, those on which the marked nodes depend. */
+constexpr void MarkOperands(std::span<const Operation> nodes, std::vector<unsigned char>& needed) {
+  for (std::size_t i = nodes.size(); i-- > 0;) {
+    const Operation& n = nodes[i];
+    if (needed[i] == 0) continue;
+    if (n.has_first()) needed[ToSize(n.a)] = 1;
+    if (n.has_second()) needed[ToSize(n.b)] = 1;
+  }
+}
+
 /** A program that grows. */
 class ProgramDraft final {
  public:
@@ -124,8 +134,8 @@ class ProgramDraft final {
   [[nodiscard]] constexpr const Operation& node(int i) const { return nodes_[ToSize(i)]; }
   [[nodiscard]] constexpr bool IsOne(int i) const { return node(i).op == Op::kConstant && node(i).constant == 1; }
 
-  /** The index of the node with this operation. It adds a node unless an equal one exists. @throws std::length_error
-  above kMaxOperations. */
+  /** The index of the node with this operation. It adds a node unless an equal one exists. @throws
+  std::invalid_argument above kMaxOperations. */
   constexpr int Add(const Operation& wanted) {
     if (2 * nodes_.size() >= places_.size()) Grow();
     std::size_t place = HashOf(wanted);
@@ -133,14 +143,15 @@ class ProgramDraft final {
       if (node(places_[place]) == wanted) return places_[place];
       place = (place + 1) % places_.size();
     }
-    if (size() == kMaxOperations) throw std::length_error("program: too many operations");
+    static_assert(kMaxOperations == 65536);  // the message says so
+    if (size() == kMaxOperations) throw std::invalid_argument("equations: more than 65536 operations");
     places_[place] = size();
     nodes_.push_back(wanted);
     return places_[place];
   }
   constexpr int Constant(double value_of) { return Add({Op::kConstant, -1, -1, value_of}); }
 
-  /** Node k is the value of output k. The map has `states` outputs. */
+  /** Node k is the value of output k. */
   constexpr void SetValues(std::span<const int> nodes) { value_.assign(nodes.begin(), nodes.end()); }
 
   /** Adds the Jacobian and the Hessians. @pre SetValues. @throws std::invalid_argument for an operation without
@@ -196,8 +207,7 @@ class ProgramDraft final {
   }
   constexpr int Quotient(int a, int b) { return a == kZero ? kZero : Add({Op::kDivide, a, b}); }
 
-  constexpr void MarkOperands(std::vector<unsigned char>& needed) const;
-  constexpr void MarkTrigonometryAtPoint();
+  constexpr void MarkAtPoint();
 
   std::vector<Operation> nodes_;
   std::vector<int> places_;  // a hash table of the nodes, with linear probing; -1: free
@@ -362,34 +372,25 @@ constexpr int ProgramDraft::DerivativeOf(int i, short variable, const Derivative
   throw std::logic_error("program: a third derivative");
 }
 
-// Marks the nodes on which the nodes in `needed` depend.
-constexpr void ProgramDraft::MarkOperands(std::vector<unsigned char>& needed) const {
-  for (int i = size() - 1; i >= 0; --i) {
-    const Operation& n = node(i);
-    if (needed[ToSize(i)] == 0) continue;
-    if (n.has_first()) needed[ToSize(n.a)] = 1;
-    if (n.has_second()) needed[ToSize(n.b)] = 1;
-  }
-}
-
-// Over a box, a trigonometric function is expanded around its value at the center.
-constexpr void ProgramDraft::MarkTrigonometryAtPoint() {
+// Marks in at_point_, which has the values and the Jacobian, what they are made of.
+constexpr void ProgramDraft::MarkAtPoint() {
   const auto at = [&](int j) -> unsigned char& { return at_point_[ToSize(j)]; };
-  for (int i = 0; i < size(); ++i) {
+  for (int i = 0; i < size(); ++i) {  // over a box, a trigonometric function is expanded around its value at the center
     if (over_box_[ToSize(i)] == 0) continue;
     if (node(i).op == Op::kSin) at(i) = at(i + 1) = 1;
     if (node(i).op == Op::kCos) at(i) = at(i - 1) = 1;
     if (node(i).op == Op::kTan) at(i) = 1;
   }
-  for (int i = 0; i < size(); ++i)  // a tangent at a point is sine over cosine
+  MarkOperands(nodes_, at_point_);
+  for (int i = 0; i < size(); ++i)  // a tangent is sine over cosine; all three have the same operand
     if (node(i).op == Op::kTan && at(i) != 0) at(node(i).b) = at(node(i).b + 1) = 1;
 }
 
 constexpr void ProgramDraft::Differentiate() {
   std::vector<unsigned char> wanted(nodes_.size(), 0);
   for (const int node : value_) wanted[ToSize(node)] = 1;
-  MarkOperands(wanted);
-  for (short k = 0; k < states_; ++k)
+  MarkOperands(nodes_, wanted);
+  for (short k = 0; ToSize(k) < value_.size(); ++k)
     for (short l = 0; l < variables_; ++l) jacobian_.push_back({k, l, kZero, false});
   for (short l = 0; l < variables_; ++l) {
     const Derivatives d = DifferentiateAll(l, wanted, false);
@@ -402,7 +403,7 @@ constexpr void ProgramDraft::Differentiate() {
   wanted.assign(nodes_.size(), 0);
   for (const Program::First& entry : jacobian_)
     if (entry.column < states_) wanted[ToSize(entry.node)] = 1;
-  MarkOperands(wanted);
+  MarkOperands(nodes_, wanted);
   std::vector<Derivatives> by_state;
   for (short l = 0; l < states_; ++l) by_state.push_back(DifferentiateAll(l, wanted, true));
   for (const Program::First& entry : jacobian_)
@@ -415,9 +416,8 @@ constexpr void ProgramDraft::Differentiate() {
   for (const int node : value_) at_point_[ToSize(node)] = 1;
   for (const Program::First& entry : jacobian_) at_point_[ToSize(entry.node)] = 1;
   for (const Program::Second& entry : hessian_) over_box_[ToSize(entry.node)] = 1;
-  MarkOperands(over_box_);
-  MarkTrigonometryAtPoint();
-  MarkOperands(at_point_);
+  MarkOperands(nodes_, over_box_);
+  MarkAtPoint();
 }
 
 /** A program in arrays, for compile time. */

@@ -36,12 +36,12 @@ ProgramModel::ProgramModel(std::shared_ptr<const ProgramDraft> draft, std::vecto
   draft_ = std::move(draft);
 }
 
-void ProgramModel::Evaluate(std::span<const double> z, std::span<double> next) const noexcept {
+void ProgramModel::EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept {
   std::array<long double, kMaxVariables> wide;
   std::ranges::copy(z, wide.begin());
   const std::span values(FOREREACH_ON_STACK(long double, program().size), ToSize(program().size));
   forereach::Evaluate<long double>(program(), program().at_point, parameters(), {wide.data(), z.size()}, values);
-  for (std::size_t k = 0; k < next.size(); ++k) next[k] = static_cast<double>(values[ToSize(program().value[k])]);
+  for (std::size_t k = 0; k < next.size(); ++k) next[k] = values[ToSize(program().value[k])];
 }
 
 void ProgramModel::Linearize(std::span<const double> z, Linearization& out) const noexcept {

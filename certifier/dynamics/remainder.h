@@ -63,7 +63,7 @@ struct RemainderTerms {
       if (term.first == term.second) Join(term);
   }
 
-  /** Calls visit(0), ..., visit(n - 1) for n terms, pairs or states. */
+  /** Calls visit(0), ..., visit(n - 1) for n terms or pairs. */
   template <class Visit>
   FOREREACH_INLINE void ForEachSingle(Visit visit) const {
     for (std::size_t i = 0; i < single.size(); ++i) visit(i);
@@ -72,7 +72,7 @@ struct RemainderTerms {
   FOREREACH_INLINE void ForEachPair(Visit visit) const {
     for (std::size_t p = 0; p < pairs.size(); ++p) visit(p);
   }
-  /** Likewise for two pairs at a time, and for four joined terms. */
+  /** Likewise for n groups: of two pairs, and of four joined terms. */
   template <class Visit>
   FOREREACH_INLINE void ForEachTwoPairs(Visit visit) const {
     for (std::size_t g = 0; 2 * g < pairs.size(); ++g) visit(g);
@@ -148,7 +148,7 @@ inline double CountedError(double error) { return kCountsRounding ? error : 0; }
 
 inline double Size(const PlainInterval& x) { return std::max(std::abs(x.lower), std::abs(x.upper)); }
 
-// Stores `count` numbers and zeros up to a multiple of four.
+// Stores a number for each state, and what is behind them up to a multiple of four.
 template <class Terms>
 FOREREACH_INLINE void StoreStates(const Terms& terms, const double (&numbers)[kMaxStates], double* to) {
   for (std::size_t k = 0; k < terms.states; k += kLaneCount) StoreLanes(LoadLanes(numbers + k), to + k);

@@ -1,8 +1,8 @@
-/** The residuals r(z) = f*(z) - f0(z) of the paper's target systems, Eq. (dynamics). Each is a template over the scalar
-type, like a model (kinematic_bicycle.h): Evaluate takes parameters and coordinates and sets the residual. A scalar type
-needs
-+, -, *, /, comparison, and the functions used below, found by argument-dependent lookup. A type without comparison
-overloads SmoothGate and Softplus. */
+/** The residuals r(z) = f*(z) - f0(z) of the paper's target systems, Eq. (dynamics), compiled: experiments evaluate
+them more often than an interpreted text allows (named_residuals.h has the same equations). Each is a template over the
+scalar type, like a model (kinematic_bicycle.h): Evaluate takes parameters and coordinates and sets the residual. A
+scalar type has the arithmetic operators, comparison, and the functions used below, found by argument-dependent lookup.
+A type without comparison overloads SmoothGate and Softplus (saturation.h). */
 #pragma once
 
 #include <array>

@@ -19,16 +19,26 @@ FOREREACH_ARITHMETIC_BEGIN
 namespace forereach {
 namespace {
 
-// One evaluation of the rates: at x + before dt k, k that of the evaluation before. Its k counts with `weight` dt.
-struct Tableau {
-  Interval before, weight;
+// A part of the step: dt / `divisor`, or nothing if that is 0.
+struct Part {
+  int divisor;
+
+  [[nodiscard]] bool is_nothing() const { return divisor == 0; }
+  template <class T>
+  [[nodiscard]] T Of(double dt) const {
+    return is_nothing() ? T(0) : T(dt) / T(divisor);
+  }
 };
 
-std::vector<Tableau> TableauOf(ModelText::Integrator integrator, double dt) {
-  const Interval step(dt), half = step / Interval(2), sixth = step / Interval(6), third = step / Interval(3);
+// One evaluation of the rates: at x + before k, k that of the evaluation before. Its own k counts with `weight`.
+struct Evaluation {
+  Part before, weight;
+};
+
+std::vector<Evaluation> EvaluationsOf(ModelText::Integrator integrator) {
   switch (integrator) {
-    case ModelText::Integrator::kMidpoint: return {{0.0, 0.0}, {half, step}};
-    case ModelText::Integrator::kRk4: return {{0.0, sixth}, {half, third}, {half, third}, {step, sixth}};
+    case ModelText::Integrator::kMidpoint: return {{{0}, {0}}, {{2}, {1}}};
+    case ModelText::Integrator::kRk4: return {{{0}, {6}}, {{2}, {3}}, {{2}, {3}}, {{1}, {6}}};
     case ModelText::Integrator::kNone:
     case ModelText::Integrator::kEuler: break;
   }
@@ -80,12 +90,13 @@ constexpr int kMaxBlocks = 40;  // of 16 states: 4 (4 + 3 + 2 + 1)
 
 }  // namespace
 
-// The tableau, the derivatives of the rates that are not zero, and the columns by which a Hessian has entries.
+// The integrator's evaluations, the derivatives of the rates that are not zero, and the columns by which a Hessian has
+// entries.
 class StagedModel::Stages final {
  public:
   Stages(std::shared_ptr<const ProgramDraft> rates, ModelText::Integrator integrator, double dt)
-      : draft_(std::move(rates)), rates_(draft_->View()), tableau_(TableauOf(integrator, dt)), dt_(dt) {
-    for (const bool second : {false, true}) Mark(second);
+      : draft_(std::move(rates)), rates_(draft_->View()), evaluations_(EvaluationsOf(integrator)), dt_(dt) {
+    Mark();
     for (int l = 0; l < rates_.variables; ++l) all_columns_.push_back(l);
     for (const Program::First& entry : rates_.jacobian)
       if (entry.column < rates_.states && std::ranges::find(bent_, entry.column) == bent_.end())
@@ -115,22 +126,20 @@ class StagedModel::Stages final {
     return lists;
   }
 
-  void Evaluate(std::span<const double> z, std::span<const double> parameters, std::span<double> next) const noexcept {
+  void Evaluate(std::span<const double> z, std::span<const double> parameters,
+                std::span<long double> next) const noexcept {
     const auto n = ToSize(rates_.states);
     std::array<long double, kMaxVariables> at{};
     std::array<long double, kMaxStates> k{}, sum{};
     std::ranges::copy(z, at.begin());
     const std::span values(FOREREACH_ON_STACK(long double, rates_.size), ToSize(rates_.size));
-    const long double dt = dt_;
-    const bool is_rk4 = tableau_.size() == 4;
-    const std::array<long double, 4> before{0, dt / 2, is_rk4 ? dt / 2 : 0, dt};
-    const std::array<long double, 4> weight{is_rk4 ? dt / 6 : 0, is_rk4 ? dt / 3 : dt, dt / 3, dt / 6};
-    for (std::size_t s = 0; s < tableau_.size(); ++s) {
-      for (std::size_t j = 0; j < n; ++j) at[j] = z[j] + before[s] * k[j];
+    for (const Evaluation& evaluation : evaluations_) {
+      const auto before = evaluation.before.Of<long double>(dt_), weight = evaluation.weight.Of<long double>(dt_);
+      for (std::size_t j = 0; j < n; ++j) at[j] = z[j] + before * k[j];
       forereach::Evaluate<long double>(rates_, values_needed_, parameters, {at.data(), z.size()}, values);
-      for (std::size_t j = 0; j < n; ++j) sum[j] += weight[s] * (k[j] = values[ToSize(rates_.value[j])]);
+      for (std::size_t j = 0; j < n; ++j) sum[j] += weight * (k[j] = values[ToSize(rates_.value[j])]);
     }
-    for (std::size_t j = 0; j < n; ++j) next[j] = static_cast<double>(z[j] + sum[j]);
+    for (std::size_t j = 0; j < n; ++j) next[j] = z[j] + sum[j];
   }
 
   void Linearize(std::span<const double> z, std::span<const Interval> parameters, Linearization& out) const noexcept {
@@ -186,20 +195,19 @@ class StagedModel::Stages final {
     BlockRow product, product_radius;
   };
 
-  void Mark(bool second) {
-    std::vector<unsigned char>& needed = second ? all_needed_ : first_needed_;
-    needed.assign(ToSize(rates_.size), 0);
-    for (const int node : rates_.value) needed[ToSize(node)] = 1;
-    values_needed_ = second ? values_needed_ : needed;
-    for (const Program::First& entry : rates_.jacobian) needed[ToSize(entry.node)] = 1;
-    for (const Program::Second& entry : rates_.hessian) needed[ToSize(entry.node)] |= second ? 1 : 0;
-    for (auto* marks : {&needed, &values_needed_})
-      for (int i = rates_.size - 1; i >= 0; --i) {
-        const Operation& n = rates_.node(i);
-        if ((*marks)[ToSize(i)] == 0) continue;
-        if (n.has_first()) (*marks)[ToSize(n.a)] = 1;
-        if (n.has_second()) (*marks)[ToSize(n.b)] = 1;
-      }
+  // The nodes that values need, those that first derivatives need too, and all.
+  void Mark() {
+    std::vector<unsigned char> marks(ToSize(rates_.size), 0);
+    const auto with_operands = [&] {
+      MarkOperands(rates_.nodes, marks);
+      return marks;
+    };
+    for (const int node : rates_.value) marks[ToSize(node)] = 1;
+    values_needed_ = with_operands();
+    for (const Program::First& entry : rates_.jacobian) marks[ToSize(entry.node)] = 1;
+    first_needed_ = with_operands();
+    for (const Program::Second& entry : rates_.hessian) marks[ToSize(entry.node)] = 1;
+    all_needed_ = with_operands();
   }
 
   // Which derivatives of the successor may be different from zero, by propagation of what depends on what.
@@ -209,7 +217,7 @@ class StagedModel::Stages final {
     Rows argument{}, sum{};
     std::array<Rows, kMaxStates> argument_bent{}, sum_bent{};
     for (std::size_t j = 0; j < n; ++j) argument[j] = sum[j] = 1u << j;
-    for (std::size_t s = 0; s < tableau_.size(); ++s) {
+    for (std::size_t s = 0; s < evaluations_.size(); ++s) {
       Rows rate{};
       std::array<Rows, kMaxStates> rate_bent{};
       for (const Program::First& entry : rates_.jacobian) {
@@ -256,8 +264,8 @@ class StagedModel::Stages final {
     auto& [start, argument, rate, sum, product, product_radius] = forward;
     for (Numbers* numbers : {&start, &argument, &sum}) SetState(z, columns, extent, *numbers);
     std::array<Interval, kMaxVariables> at = z;
-    for (std::size_t s = 0; s < tableau_.size(); ++s) {
-      if (s > 0) AddScaled(start, rate, tableau_[s].before, extent, argument);
+    for (const auto& [before, weight] : evaluations_) {
+      AddScaled(start, rate, before, extent, argument);
       std::copy_n(argument.value.begin(), n, at.begin());
       forereach::Evaluate<Interval>(rates_, second ? all_needed_ : first_needed_, parameters,
                                     {at.data(), ToSize(rates_.variables)}, values);
@@ -265,7 +273,7 @@ class StagedModel::Stages final {
       for (std::size_t j = 0; j < n; ++j) rate.value[j] = values[ToSize(rates_.value[j])];
       Differentiate(values, columns, extent, forward);
       if (!AreModerate(rate, extent)) return false;
-      AddScaled(sum, rate, tableau_[s].weight, extent, sum);
+      AddScaled(sum, rate, weight, extent, sum);
     }
     return AreModerate(sum, extent);
   }
@@ -289,10 +297,11 @@ class StagedModel::Stages final {
     }
   }
 
-  // to = a + factor b.
-  FOREREACH_INLINE void AddScaled(const Numbers& a, const Numbers& b, const Interval& factor, const Extent& extent,
+  // to = a + part b; nothing to do without a part.
+  FOREREACH_INLINE void AddScaled(const Numbers& a, const Numbers& b, const Part& part, const Extent& extent,
                                   Numbers& to) const noexcept {
-    if (factor.lower == 0 && factor.upper == 0) return;  // the first evaluation of the midpoint rule has no weight
+    if (part.is_nothing()) return;
+    const auto factor = part.Of<Interval>(dt_);
     const Number scale(factor);
     const auto add = [&](const double* center, const double* radius, const double* b_center, const double* b_radius,
                          std::size_t count, double* to_center, double* to_radius) __attribute__((always_inline)) {
@@ -404,7 +413,7 @@ class StagedModel::Stages final {
 
   std::shared_ptr<const ProgramDraft> draft_;
   Program rates_;
-  std::vector<Tableau> tableau_;
+  std::vector<Evaluation> evaluations_;
   double dt_;
   std::vector<unsigned char> values_needed_, first_needed_, all_needed_;
   std::vector<int> all_columns_, bent_;  // bent_: the states on which the rates depend
@@ -430,7 +439,7 @@ StagedModel::StagedModel(std::shared_ptr<const ProgramDraft> rates, double dt, s
 StagedModel::StagedModel(std::shared_ptr<const Stages> stages, std::vector<Interval> parameters, ModelNames names)
     : InterpretedModel(stages->Lists(), std::move(parameters), std::move(names)), stages_(std::move(stages)) {}
 
-void StagedModel::Evaluate(std::span<const double> z, std::span<double> next) const noexcept {
+void StagedModel::EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept {
   stages_->Evaluate(z, parameters(), next);
 }
 

@@ -25,7 +25,7 @@ class StagedModel final : public InterpretedModel {
   `names.text`, which has to be midpoint or rk4; otherwise std::invalid_argument. */
   StagedModel(std::shared_ptr<const ProgramDraft> rates, double dt, std::vector<Interval> parameters, ModelNames names);
 
-  void Evaluate(std::span<const double> z, std::span<double> next) const noexcept override;
+  void EvaluateWide(std::span<const double> z, std::span<long double> next) const noexcept override;
   void Linearize(std::span<const double> z, Linearization& out) const noexcept override;
   void EncloseHessian(std::span<const Interval> box, HessianEnclosure& out) const noexcept override;
   /** Infinite: a step uses the enclosures above. */

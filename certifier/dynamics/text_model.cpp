@@ -5,9 +5,11 @@
 #include <string>
 #include <utility>
 
+#include "certifier/dynamics/angles.h"
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/program_model.h"
 #include "certifier/dynamics/staged_model.h"
+#include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
@@ -24,28 +26,6 @@ void RequireCount(const ModelText& text, const char* what, std::size_t count, in
                    std::to_string(most) + "]");
 }
 
-// The names that are known so far, in the order of their values.
-class Names final {
- public:
-  explicit Names(const ModelText& text) : text_(text) {}
-  void Add(const std::string& name, Symbol value) {
-    if (!IsName(name)) Refuse(text_, "\"" + name + "\" is no name");
-    if (IsReserved(name)) Refuse(text_, "the name " + name + " belongs to the language");
-    if (std::ranges::find(names_, name) != names_.end()) Refuse(text_, "the name " + name + " is used twice");
-    names_.push_back(name);
-    values_.push_back(value);
-  }
-  [[nodiscard]] Symbol ValueOf(const ExpressionText& expression, ProgramDraft& program) const {
-    return Evaluate<Symbol>(ParseExpression(expression, names_), values_,
-                            [&](double number) { return Symbol::Constant(program, number); });
-  }
-
- private:
-  const ModelText& text_;
-  std::vector<std::string> names_;
-  std::vector<Symbol> values_;
-};
-
 double StepOf(const ModelText& text) {
   const auto dt = std::ranges::find(text.parameters, "dt", &ModelText::Parameter::name);
   if (dt == text.parameters.end()) Refuse(text, "there is no parameter dt, the step in s");
@@ -53,10 +33,40 @@ double StepOf(const ModelText& text) {
   return dt->lower;
 }
 
-std::vector<std::string> NamesOf(const auto& all) {
+std::vector<std::string> NamesIn(const auto& all) {
   std::vector<std::string> names;
   for (const auto& one : all) names.push_back(one.name);
   return names;
+}
+
+// x + dt x' from x'.
+void AddEulerStep(const ModelText& text, ProgramDraft& program) {
+  const auto dt = std::ranges::find(text.parameters, "dt", &ModelText::Parameter::name) - text.parameters.begin();
+  const Symbol step = Symbol::Parameter(program, static_cast<int>(dt));
+  std::vector<int> next;
+  for (const int rate : program.View().value) {
+    const Symbol x = Symbol::Variable(program, static_cast<int>(next.size()));
+    next.push_back((x + step * Symbol(&program, rate)).node());
+  }
+  program.SetValues(next);
+}
+
+std::vector<int> AnglesOf(const ModelText& text, const Program& program) {
+  std::vector<int> angles;
+  for (const std::string& name : text.angles) {
+    const auto state = std::ranges::find(text.states, name, &ModelText::Variable::name);
+    if (state == text.states.end()) Refuse(text, "angles: " + name + " is no state");
+    angles.push_back(static_cast<int>(state - text.states.begin()));
+  }
+  std::ranges::sort(angles);
+  using Integrator = ModelText::Integrator;
+  const bool has_stages = text.integrator == Integrator::kMidpoint || text.integrator == Integrator::kRk4;
+  try {
+    RequireAngles(program, angles, NamesIn(text.states), has_stages);
+  } catch (const std::invalid_argument& error) {
+    Refuse(text, error.what());
+  }
+  return angles;
 }
 
 }  // namespace
@@ -70,37 +80,21 @@ std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text) {
     Refuse(text, std::to_string(text.equations.size()) + " equations for " + std::to_string(states) + " states");
   const double dt = StepOf(text);
 
-  const auto program =
-      std::make_shared<ProgramDraft>(static_cast<int>(states), static_cast<int>(states + text.inputs.size()));
-  Names names(text);
-  std::vector<Symbol> x;
-  int variable = 0;
-  for (const ModelText::Variable& state : text.states) {
-    x.push_back(Symbol::Variable(*program, variable++));
-    names.Add(state.name, x.back());
-  }
-  for (const ModelText::Variable& input : text.inputs) names.Add(input.name, Symbol::Variable(*program, variable++));
-  std::vector<Interval> parameters;
-  Symbol step;
-  for (const auto& [name, lower, upper] : text.parameters) {
-    if (!(-kInfinity < lower && lower <= upper && upper < kInfinity))
-      Refuse(text, "the parameter " + name + " in [" + ToText(lower) + ", " + ToText(upper) + "] is no finite range");
-    const Symbol value = Symbol::Parameter(*program, static_cast<int>(parameters.size()));
-    if (name == "dt") step = value;
-    names.Add(name, value);
-    parameters.emplace_back(lower, upper);
-  }
-  for (const auto& [name, value] : text.definitions) names.Add(name, names.ValueOf(value, *program));
-  std::vector<int> values;
-  for (std::size_t k = 0; k < states; ++k) {
-    const Symbol value = names.ValueOf(text.equations[k], *program);
-    values.push_back((text.integrator == Integrator::kEuler ? x[k] + step * value : value).node());
-  }
-  program->SetValues(values);
+  const ExpressionNames names{NamesIn(text.states), NamesIn(text.inputs), text.parameters, text.definitions};
+  const auto program = std::make_shared<ProgramDraft>(MakeProgram(names, text.equations));
+  if (text.integrator == Integrator::kEuler) AddEulerStep(text, *program);
   program->Differentiate();
 
-  ModelNames all{text.name, NamesOf(text.states), NamesOf(text.inputs), NamesOf(text.parameters),
-                 std::make_shared<const ModelText>(text)};
+  // No compiled model has such a name: what is known of those by their names is not known of this one.
+  ModelNames all{text.name + " (text)",
+                 names.states,
+                 names.inputs,
+                 NamesIn(text.parameters),
+                 std::make_shared<const ModelText>(text),
+                 AnglesOf(text, program->View())};
+  std::vector<Interval> parameters;
+  for (const ModelText::Parameter& parameter : text.parameters)
+    parameters.emplace_back(parameter.lower, parameter.upper);
   if (text.integrator == Integrator::kNone || text.integrator == Integrator::kEuler)
     return std::make_shared<ProgramModel>(program, std::move(parameters), std::move(all));
   return std::make_shared<StagedModel>(program, dt, std::move(parameters), std::move(all));

@@ -8,17 +8,17 @@
 
 namespace forereach {
 
-void Conformance::Remember(const certified_plan_t& certified) {
+void Conformance::Remember(const certified_plan_t& certified, const Angles& angles) {
   if (const auto known = Find(certified.plan.plan_id); known != plans_.end()) {
-    if (certified.plan.plan_id != last_.plan_id) plans_[ToSize(known - plans_.begin())] = certified;
+    if (certified.plan.plan_id != last_.plan_id) plans_[ToSize(known - plans_.begin())] = {certified, angles};
     return;
   }
   const bool full = plans_.size() == kPlans;
-  if (full && last_.plan_id >= 0 && plans_[next_].plan.plan_id == last_.plan_id) next_ = (next_ + 1) % kPlans;
+  if (full && last_.plan_id >= 0 && plans_[next_].certified.plan.plan_id == last_.plan_id) next_ = (next_ + 1) % kPlans;
   if (!full)
-    plans_.push_back(certified);
+    plans_.push_back({certified, angles});
   else
-    plans_[next_] = certified;
+    plans_[next_] = {certified, angles};
   next_ = (next_ + 1) % kPlans;
 }
 
@@ -49,19 +49,22 @@ std::optional<Conformance::Departure> Conformance::Check(const transition_t& tra
   return std::nullopt;
 }
 
-std::vector<certified_plan_t>::const_iterator Conformance::Find(std::int64_t plan_id) const {
-  return std::ranges::find(plans_, plan_id, [](const certified_plan_t& certified) { return certified.plan.plan_id; });
+std::vector<Conformance::Known>::const_iterator Conformance::Find(std::int64_t plan_id) const {
+  return std::ranges::find(plans_, plan_id, [](const Known& known) { return known.certified.plan.plan_id; });
 }
 
 std::optional<Conformance::Departure> Conformance::Compare(std::int64_t plan_id, int step,
                                                            std::span<const double> state) const {
   const auto known = Find(plan_id);
-  if (known == plans_.end() || step < 0 || step > known->plan.num_steps || std::ssize(state) != known->plan.num_states)
+  if (known == plans_.end()) return std::nullopt;
+  const certified_plan_t& certified = known->certified;
+  if (step < 0 || step > certified.plan.num_steps || std::ssize(state) != certified.plan.num_states)
     return std::nullopt;
-  for (int k = 0; k < known->plan.num_states; ++k) {
+  for (int k = 0; k < certified.plan.num_states; ++k) {
     const double value = state[ToSize(k)];
-    const double lower = known->slice_lower[step][k], upper = known->slice_upper[step][k];
-    if (!(lower <= value && value <= upper)) return Departure{plan_id, step, k, value, lower, upper};
+    const double lower = certified.slice_lower[step][k], upper = certified.slice_upper[step][k];
+    if (!LiesWithin(value, lower, upper, known->angles[ToSize(k)]))
+      return Departure{plan_id, step, k, value, lower, upper};
   }
   return std::nullopt;
 }

@@ -14,6 +14,7 @@ more under a false assumption. */
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "lcmtypes/angle.h"
 #include "lcmtypes/stream_order.h"
 
 namespace forereach {
@@ -32,8 +33,9 @@ class Conformance final {
   Conformance() { plans_.reserve(kPlans); }
 
   /** Remembers a certified plan. It replaces a plan of the same plan_id, unless that plan is executing: a guard does
-  not accept the plan_id that it executes. */
-  void Remember(const certified_plan_t& certified);
+  not accept the plan_id that it executes. @param angles the states that may differ by whole turns: those of the model
+  that it was certified with. */
+  void Remember(const certified_plan_t& certified, const Angles& angles = {});
 
   /** Tests a usable state against the slice of the step that it names. If the robot has advanced by one boundary while
   executing, it also tests the state against the slice of the plan that was executing before. Nothing if the state lies
@@ -51,10 +53,15 @@ class Conformance final {
     int step = -1;
   };
 
-  [[nodiscard]] std::vector<certified_plan_t>::const_iterator Find(std::int64_t plan_id) const;
+  struct Known {
+    certified_plan_t certified;
+    Angles angles;
+  };
+
+  [[nodiscard]] std::vector<Known>::const_iterator Find(std::int64_t plan_id) const;
   [[nodiscard]] std::optional<Departure> Compare(std::int64_t plan_id, int step, std::span<const double> state) const;
 
-  std::vector<certified_plan_t> plans_;  // a ring
+  std::vector<Known> plans_;  // a ring
   std::size_t next_ = 0;
   StreamOrder order_;
   Place last_, before_;  // from the newest received state and from the one before

@@ -17,7 +17,8 @@ namespace {
 static_assert(static_cast<int>(Outcome::kCertified) == 1 && static_cast<int>(Outcome::kSafety) == 4);
 static_assert(static_cast<int>(Cause::kPairwise) == 1 &&
               static_cast<int>(Cause::kObstacle) == decision_t::CAUSE_OBSTACLE &&
-              static_cast<int>(Cause::kNoStop) == decision_t::CAUSE_NO_STOP);
+              static_cast<int>(Cause::kNoStop) == decision_t::CAUSE_NO_STOP &&
+              static_cast<int>(Cause::kLimit) == decision_t::CAUSE_LIMIT);
 
 }  // namespace
 
@@ -25,6 +26,7 @@ Gate::Gate(const Config& config)
     : certifier_(config.problem),
       options_(config.gate),
       grounds_(config.grounds),
+      transitions_(config.grounds.observations),
       obstacles_(config),
       sources_(Microseconds(config.gate.max_age_ms) + Microseconds(config.gate.max_ahead_ms)) {}
 
@@ -195,12 +197,12 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   decision.second_observation = verdict.second_observation;
   decision.margin = verdict.margin;
   decision.threshold = verdict.threshold;
-  SetText(decision.message, Explain(verdict, certifier_.problem()));
+  SetText(decision.message, Explain(verdict, certifier_.problem(), plan, tube_));
   if (verdict.outcome != Outcome::kCertified) return;
   if (!options_.shadow) return Attest(candidate, decision, answer.certified.emplace());
   decision.outcome = decision_t::REJECTED;
   decision.cause = decision_t::CAUSE_SHADOW;
-  SetText(decision.message, "rejected: shadow mode; else: " + Explain(verdict, certifier_.problem()));
+  SetText(decision.message, "rejected: shadow mode; else: " + Explain(verdict, certifier_.problem(), plan, tube_));
 }
 
 namespace {
@@ -209,7 +211,8 @@ namespace {
 int StandingSteps(const Decision& verdict, int num_steps, bool is_swept) {
   if (verdict.outcome == Outcome::kCertified || verdict.cause == Cause::kNoStop) return num_steps;
   if (verdict.outcome == Outcome::kDomain) return verdict.step;
-  if (verdict.outcome == Outcome::kSafety) return std::max(is_swept ? verdict.step : verdict.step - 1, 0);
+  if (verdict.outcome == Outcome::kSafety)
+    return std::max(is_swept && verdict.cause == Cause::kObstacle ? verdict.step : verdict.step - 1, 0);
   return 0;
 }
 
@@ -228,7 +231,7 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noe
     const Standing whole = standing(verdict);
     if (verdict.outcome == Outcome::kCertified || verdict.outcome == Outcome::kFalsified) return whole;
     // Certify has not tested S after D. A failure of S before first_step is past.
-    const Decision rest = certifier_.safety().Judge(obstacles_.all(), plan.schedule, tube_, first_step);
+    const Decision rest = certifier_.JudgeSafety(plan, obstacles_.all(), tube_, first_step);
     if (verdict.outcome == Outcome::kSafety) return standing(rest);
     const Standing safe = standing(rest);
     return rest.outcome == Outcome::kSafety && safe.steps < whole.steps ? safe : whole;

@@ -49,6 +49,8 @@ class Gate final {
   explicit Gate(const Config& config);
 
   [[nodiscard]] const Certifier& certifier() const { return certifier_; }
+  /** The digest of the task's transitions: grounds().observations before anything was learned. */
+  [[nodiscard]] const Digest& transitions() const { return transitions_; }
   [[nodiscard]] const GateOptions& options() const { return options_; }
   [[nodiscard]] const std::vector<Obstacle>& obstacles() const { return obstacles_.all(); }
   /** The reason why obstacles() may be incomplete at this time (obstacles_in_force.h); empty if it is complete. */
@@ -68,7 +70,8 @@ class Gate final {
   - D: X_t is proven, but no step from it. Control t does not stand: t controls stand. If only the end of the plan is
   not at rest (kNoStop), all its controls stand, and no hold after them is certified.
   - S with Problem::between: the motion under control t may touch: t controls stand.
-  - S at the samples: X_t may touch, and control t - 1 leads there: t - 1 controls stand, and none for t = 0.
+  - S at the samples, or by a limit: X_t may touch or exceed it, and control t - 1 leads there: t - 1 controls stand,
+  and none for t = 0.
   - F: the declaration is false: none stands.
   If D and S both fail, the fewer. The tube is computed again from the plan's X_0, with all observations so far.
   @param plan a candidate that this gate or one before a reload has certified. @param first_step 0..num_steps.
@@ -134,6 +137,7 @@ class Gate final {
   Certifier certifier_;
   GateOptions options_;
   Grounds grounds_;  ///< Without the digest of the obstacles, which obstacles_ has.
+  Digest transitions_;
   ObstaclesInForce obstacles_;
   Sources sources_;
   std::int64_t decisions_ = 0, certificates_ = 0;

@@ -17,7 +17,8 @@ static_assert(static_cast<int>(Cause::kPairwise) == withdrawal_t::FALSIFIED &&
               static_cast<int>(Cause::kDomainExit) == withdrawal_t::DOMAIN_EXIT &&
               static_cast<int>(Cause::kNoFiniteEnclosure) == withdrawal_t::NO_FINITE_ENCLOSURE &&
               static_cast<int>(Cause::kObstacle) == withdrawal_t::OBSTACLE &&
-              static_cast<int>(Cause::kNoStop) == withdrawal_t::NO_STOP);
+              static_cast<int>(Cause::kNoStop) == withdrawal_t::NO_STOP &&
+              static_cast<int>(Cause::kLimit) == withdrawal_t::LIMIT);
 
 withdrawal_t Unjudged(std::int16_t cause, const std::string& why) {
   withdrawal_t message{};
@@ -131,7 +132,8 @@ void PlansInForce::TakeAnswer(const execution_event_t& event) {
 
 void PlansInForce::Judge(Gate& gate, std::int64_t now_us) {
   const Grounds grounds = gate.grounds();
-  const Premises premises{grounds.config, grounds.obstacles, gate.certifier().violation().has_value()};
+  const Premises premises{grounds.config, gate.transitions(), grounds.obstacles,
+                          gate.certifier().violation().has_value()};
   if (premises_ != premises) {
     if (premises_)
       for (Entry& entry : plans_) entry.is_changed = is_any_changed_ = true;

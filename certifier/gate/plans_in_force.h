@@ -1,7 +1,9 @@
 /** The certified plans that may be executed, and how many of their controls still stand.
 
 A certificate is about the obstacles, the observations and the task of its moment. When one of these changes, the plans
-that may be executed are judged again, and what no longer holds is withdrawn:
+that may be executed are judged again, and what no longer holds is withdrawn. An observation that is added, and does not
+contradict the declaration, changes nothing: it leaves fewer admissible residuals, and the certificate is about all that
+there were (docs/soundness.md, 3.13). If it contradicts the declaration, nothing stands.
 
     Add, SeeRobot    which plans may be executed: those that were certified and may still be pending, and the one that
                      the robot executes, from the step that it was last seen at
@@ -66,7 +68,8 @@ class PlansInForce final {
   void SeeRobot(const robot_state_t& state, std::int64_t steady_us);
   void TakeAnswer(const execution_event_t& event);
 
-  /** Judges the plans again if obstacles, task or the truth of the declaration have changed since the last call. Cost:
+  /** Judges the plans again if obstacles, task, its file of transitions or the truth of the declaration have changed
+  since the last call. Cost:
   at most kJudged + 1 times that of Certify; without a change O(1). */
   void Judge(Gate& gate, std::int64_t now_us);
 
@@ -98,7 +101,7 @@ class PlansInForce final {
     std::int64_t next_us = 0;                  // when to send it, by the monotonic clock
   };
   struct Premises {
-    Digest config{}, obstacles{};
+    Digest config{}, transitions{}, obstacles{};  // transitions: those of the task's file
     bool is_falsified = false;
     friend bool operator==(const Premises&, const Premises&) = default;
   };

@@ -402,7 +402,8 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
   if (answer.certified) sender_.Send(channels_.certified, *answer.certified);
   sender_.Send(channels_.decision, answer.decision);
   if (answer.certified) {
-    conformance_.Remember(*answer.certified);
+    const NominalModel& model = *config_.problem->model;
+    conformance_.Remember(*answer.certified, AnglesOf(model.angles(), model.num_states()));
     issued_.Add(*answer.certified, clocks_.steady());
     plans_.Add(*answer.certified, clocks_.steady());
   }

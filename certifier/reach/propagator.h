@@ -4,9 +4,9 @@
 
 with J = D_z f0(c), rho and q the middle and half-width of the Taylor remainder over Box(Z_t), and mu, h and A the
 middle, half-width and slope of the residual's bounds. The slope is zero for the residual envelope, Eq. (set-envelope).
-w^ bounds the disturbance of the step
-(Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md defines them. The slack s' contains
-(|J| + |A|) s of the previous slack and all rounding errors, including those of f0(c), J and (J + A) G. */
+w^ bounds the disturbance of the step (Declaration::disturbance). The paper has rho = 0 and w^ = 0; docs/mathematics.md
+defines them. The slack s' contains (|J| + |A|) s of the previous slack and all rounding errors, including those of
+f0(c), J and (J + A) G. */
 #pragma once
 
 #include <array>

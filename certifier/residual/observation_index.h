@@ -88,9 +88,8 @@ class ObservationIndex final {
 /** The largest |floor| and |ceiling|. */
 [[nodiscard]] double LargestValue(const ObservationIndex::Entries& entries);
 
-/** The entries of coordinate k = `coordinate`: floors r~_ik - eps_k and ceilings r~_ik + eps_k, eps_k =
-Declaration::ObservationError, rounded outward,
-and their coordinates in plain arithmetic. */
+/** The entries of coordinate k = `coordinate`: floors r~_ik - eps_k and ceilings r~_ik + eps_k, rounded outward, with
+eps_k = Declaration::ObservationError, and their coordinates in plain arithmetic. */
 [[nodiscard]] ObservationIndex::Entries EntriesOf(const LipschitzRow& row, const Declaration& declaration,
                                                   const Observations& observations, int coordinate);
 

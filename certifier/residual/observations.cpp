@@ -1,10 +1,13 @@
 #include "certifier/residual/observations.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
+#include "certifier/dynamics/angles.h"
 #include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
 
 namespace forereach {
 namespace {
@@ -13,6 +16,27 @@ double UlpOf(double x) { return NextUp(std::abs(x)) - std::abs(x); }
 
 [[noreturn]] void Refuse(int row, const char* why) {
   throw std::invalid_argument("transition " + std::to_string(row) + ": " + why);
+}
+
+// x_next up to its last bit, less the nominal value.
+Interval ResidualOf(double x_next, double unit, const Interval& nominal) {
+  return Interval(x_next) + Interval(-unit, unit) - nominal;
+}
+
+// Whatever whole number j the division gives: if the result is within a quarter of a turn, no other j is.
+Interval ResidualOfAngle(double x_next, const Interval& nominal) {
+  const double turns = std::round((nominal.Middle() - x_next) / kTurn.lower);
+  return ResidualOf(x_next, std::max(UlpOf(x_next), kAngleUnit), nominal) + Interval(turns) * kTurn;
+}
+
+bool IsWithinAQuarterTurn(const Interval& residual) {
+  return -kQuarterTurn <= residual.lower && residual.upper <= kQuarterTurn;
+}
+
+[[noreturn]] void RefuseAngle(int row, const std::string& name, const Interval& residual) {
+  throw AmbiguousAngle(row, "transition " + std::to_string(row) + ": " + name + " is " + ToText(residual.Middle()) +
+                                " rad away from the nominal model's next value, up to whole turns, which is more than "
+                                "pi/2: how often it has turned cannot be told");
 }
 
 }  // namespace
@@ -31,9 +55,12 @@ Observations Observe(const NominalModel& model, const Transitions& transitions) 
     if (!z.allFinite() || !transitions.x_next.row(i).allFinite()) Refuse(i, "not finite");
     model.Linearize({z.data(), ToSize(z.size())}, nominal);
     for (int k = 0; k < n; ++k) {
-      const double x_next = transitions.x_next(i, k), ulp = UlpOf(x_next);
-      const Interval residual = Interval(x_next) + Interval(-ulp, ulp) - nominal.value[ToSize(k)];
+      const double x_next = transitions.x_next(i, k);
+      const bool is_angle = model.IsAngle(k);
+      const Interval& value = nominal.value[ToSize(k)];
+      const Interval residual = is_angle ? ResidualOfAngle(x_next, value) : ResidualOf(x_next, UlpOf(x_next), value);
       if (!residual.IsFinite()) Refuse(i, "the nominal model has no finite value there");
+      if (is_angle && !IsWithinAQuarterTurn(residual)) RefuseAngle(i, model.state_names()[ToSize(k)], residual);
       observations.lower(i, k) = residual.lower;
       observations.upper(i, k) = residual.upper;
     }

@@ -1,10 +1,18 @@
 /** Enclosures of the observed residuals r~_i = x_i+ - f0(z_i), Eq. (data).
 
 A recorded successor is a rounded number. One unit in its last place counts as observation error in addition to sigma.
-So [lower, upper] contains x_i+ - f0(z_i) +- ulp(x_i+), and every admissible residual satisfies lower_ik - eps_k <=
-r_k(z_i)
-<= upper_ik + eps_k, eps_k = Declaration::ObservationError. */
+So [lower, upper] contains x_i+ - f0(z_i) +- ulp(x_i+), and with eps_k = Declaration::ObservationError every admissible
+residual satisfies
+    lower_ik - eps_k <= r_k(z_i) <= upper_ik + eps_k.
+
+A recorded angle is known up to whole turns. Its residual is x_i+ + 2 pi j - f0(z_i) with the j that makes it least in
+size, which has to be at most a quarter of a turn: then every other j gives three quarters or more, which the task
+declares not to happen (docs/soundness.md, 3.14). Instead of the unit of x_i+ it counts the larger one of that and
+kAngleUnit, which covers a successor that was computed in doubles and then turned back. */
 #pragma once
+
+#include <stdexcept>
+#include <string>
 
 #include "certifier/dynamics/model.h"
 #include "certifier/residual/transitions.h"
@@ -20,8 +28,24 @@ struct Observations {
   [[nodiscard]] int num_states() const { return static_cast<int>(lower.cols()); }
 };
 
-/** Computes the observations from transitions. @throws std::invalid_argument if there are none, a size does not match
-the model, a number is not finite, or f0 has no finite enclosure at a location; the message names the row. Cost O(N). */
+/** Two units in the last place of 2 pi: the rounding of a sum below 16, that of one turn taken off it in doubles, and
+that of the double next to 2 pi. */
+inline constexpr double kAngleUnit = 0x1p-49;
+
+/** A transition whose angle is more than a quarter of a turn away from the nominal model's, whatever turns are added.
+ */
+class AmbiguousAngle final : public std::invalid_argument {
+ public:
+  AmbiguousAngle(int row, const std::string& what) : std::invalid_argument(what), row_(row) {}
+  [[nodiscard]] int row() const { return row_; }
+
+ private:
+  int row_;
+};
+
+/** Computes the observations from transitions. @throws AmbiguousAngle; std::invalid_argument if there are none, a size
+does not match the model, a number is not finite, or f0 has no finite enclosure at a location; the message names the
+row. Cost O(N). */
 [[nodiscard]] Observations Observe(const NominalModel& model, const Transitions& transitions);
 
 }  // namespace forereach

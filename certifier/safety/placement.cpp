@@ -31,17 +31,33 @@ void Validate(const Body& body, int dim, int num_states) {
     const BodyPart& part = body.parts[i];
     const std::string name = "body: part " + std::to_string(i) + ": ";
     RequireSize(part.radius, name + "radius");
-    Require(!part.points.empty(), name + "no points");
+    Require(part.num_points() > 0, name + "no points");
+    points += ToSize(part.num_points());
+    for (const auto& place : part.places)
+      Require(std::ssize(place) == dim, name + "a place has " + std::to_string(place.size()) +
+                                            " expressions, there are " + std::to_string(dim) + " safety coordinates");
+    if (!part.places.empty()) continue;
     for (const Eigen::Vector3d& point : part.points) {
       Require(point.allFinite(), name + "a point is not finite");
       for (int k = dim; k < kMaxSafetyDim; ++k)
         Require(point[k] == 0, name + "a point has an entry " + std::to_string(k) + ", there are " +
                                    std::to_string(dim) + " safety coordinates");
     }
-    points += part.points.size();
   }
   Require(points <= kMaxBodyPoints,
           "body: " + std::to_string(points) + " points, must be at most " + std::to_string(kMaxBodyPoints));
+}
+
+// Of all parts, one after the other.
+std::optional<TextEnclosure> ExpressionsOf(const Body& body, const ExpressionNames& names) {
+  if (!body.HasPlaces()) return std::nullopt;
+  std::vector<ExpressionText> all;
+  for (const BodyPart& part : body.parts)
+    for (const auto& place : part.places) all.insert(all.end(), place.begin(), place.end());
+  TextEnclosure expressions(names, all);
+  for (int i = 0; i < expressions.num_values(); ++i)
+    Require(!expressions.UsesInput(i), "body: the place " + all[ToSize(i)].text + " uses an input");
+  return expressions;
 }
 
 void Validate(const Between& between, int dim) {
@@ -108,10 +124,12 @@ void Placement::OverSlice(const Point& point, const Rotation& rotation, Sample::
 }
 
 Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const std::optional<Between>& between,
-                     int num_states)
+                     int num_states, const ExpressionNames& names)
     : projection_(projection, num_states), heading_(body.heading), sweeps_(between.has_value()) {
   for (const MatrixEntry& entry : projection_.entries()) rows_[ToSize(entry.row)].push_back(entry);
   Validate(body, dim(), num_states);
+  expressions_ = ExpressionsOf(body, names);
+  num_inputs_ = static_cast<int>(names.inputs.size());
   double turn = 0;
   if (between) {
     Validate(*between, dim());
@@ -119,8 +137,17 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
       bulge_[k] = Deviation(between->acceleration[static_cast<Eigen::Index>(k)], between->period);
     turn = Deviation(AddUp(MulUp(between->turn_rate, between->turn_rate), between->turn_acceleration), between->period);
   }
+  int linear = 0;
   for (const BodyPart& part : body.parts) {
-    parts_.push_back({num_points(), static_cast<int>(part.points.size()), part.radius});
+    parts_.push_back({num_points(), part.num_points(), part.radius});
+    if (!part.places.empty()) {
+      for (std::size_t i = 0; i < part.places.size(); ++i, linear += dim())
+        points_.push_back({Eigen::Vector3d::Zero(), 0, 0, 0, linear});
+      reach_ = std::max(reach_, part.radius);
+      is_at_frame_ = false;
+      continue;
+    }
+    has_frame_ = true;
     for (const Eigen::Vector3d& q : part.points) {
       const double length = LengthUpper(q[0], q[1]);
       is_at_frame_ &= q.isZero(0);
@@ -131,11 +158,55 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
     }
   }
   Require(reach_ < kInfinity, "body: its size is not finite");
+  Require(!has_frame_ || !projection_.entries().empty(), "projection: must be finite and not zero");
 }
 
 void Placement::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {
   projection_.EncloseHull(slice, half_width, hull);
   for (std::size_t k = 0; k < ToSize(dim()); ++k) hull.half_width[k] = AddUp(hull.half_width[k], bulge_[k]);
+}
+
+void Placement::EncloseHull(const Sample& sample, Hull& hull) const noexcept {
+  if (has_frame_) EncloseHull(*sample.slice, sample.half_width, hull);
+  bool is_first = !has_frame_;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (points_[i].linear < 0) continue;
+    for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+      const AffineEnclosure& linear = sample.linear[ToSize(points_[i].linear) + k];
+      double reach = sample.points[i].spread[k];
+      for (std::size_t l = 0; l < sample.half_width.size(); ++l)
+        reach = AddUp(reach, MulUp(std::abs(linear.slope[l]), sample.half_width[l]));
+      const double middle = sample.points[i].offset[k];
+      Interval range(SubDown(middle, reach), AddUp(middle, reach));
+      if (!is_first)
+        range = Join(range, {SubDown(hull.center[k], hull.half_width[k]), AddUp(hull.center[k], hull.half_width[k])});
+      hull.center[k] = range.IsFinite() ? range.Middle() : 0;
+      hull.half_width[k] = range.DistanceUpper(hull.center[k]);
+    }
+    is_first = false;
+  }
+}
+
+// A place without a finite second order is the box of the ranges; without these it is everything. The margin of its
+// slack is above the rounding of sums over the states and of sums over the generators.
+void Placement::OverSlice(Sample& sample, std::size_t i) const noexcept {
+  Sample::Point& over = sample.points[i];
+  over.slope = {};
+  over.size = 0;
+  for (std::size_t k = 0; k < kMaxSafetyDim; ++k) over.offset[k] = over.spread[k] = 0;
+  for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+    AffineEnclosure& linear = sample.linear[ToSize(points_[i].linear) + k];
+    if (!linear.offset.IsFinite()) {
+      linear.slope.fill(0);
+      linear.offset = linear.range;
+    }
+    const bool is_finite = linear.offset.IsFinite();
+    over.offset[k] = is_finite ? linear.offset.Middle() : 0;
+    over.spread[k] = is_finite ? AddUp(bulge_[k], linear.offset.DistanceUpper(over.offset[k])) : kInfinity;
+    double size = std::abs(over.offset[k]) + over.spread[k];
+    for (std::size_t l = 0; l < sample.half_width.size(); ++l) size += std::abs(linear.slope[l]) * sample.half_width[l];
+    over.size = std::max(over.size, size);
+  }
 }
 
 void Placement::Observe(const Zonotope& slice, std::span<const double> half_width, Sample& sample) const noexcept {
@@ -150,11 +221,28 @@ void Placement::Observe(const Zonotope& slice, std::span<const double> half_widt
     sample.size[k] += std::abs(weight) * (std::abs(x) + half_width[ToSize(entry.column)]);
   }
   const Rotation rotation(is_at_frame_ ? -1 : heading_, slice, half_width);
-  for (std::size_t i = 0; i < points_.size(); ++i) OverSlice(points_[i], rotation, sample.points[i]);
+  if (expressions_) {
+    constexpr std::array<double, kMaxInputs> kNoInput{};
+    expressions_->Enclose(slice.center(), half_width, {kNoInput.data(), ToSize(num_inputs_)},
+                          {sample.linear.data(), ToSize(expressions_->num_values())});
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    if (points_[i].linear < 0)
+      OverSlice(points_[i], rotation, sample.points[i]);
+    else
+      OverSlice(sample, i);
 }
 
 // The slack of the image, and the errors of center, generators, their sum and the slack itself.
-double Placement::Slack(const Sample& sample, const Sample::Point& point, std::size_t k) const noexcept {
+double Placement::Slack(const Sample& sample, std::size_t i, std::size_t k) const noexcept {
+  const Sample::Point& point = sample.points[i];
+  if (points_[i].linear >= 0) {
+    const AffineEnclosure& linear = sample.linear[ToSize(points_[i].linear) + k];
+    double slack = RoundingError(kMargin, point.size) + kTiny;
+    for (std::size_t l = 0; l < sample.half_width.size(); ++l)
+      slack += std::abs(linear.slope[l]) * sample.slice->slack(static_cast<int>(l));
+    return slack;
+  }
   const double turned = point.slope[k] == 0 ? 0 : std::abs(point.slope[k]) * sample.slice->slack(heading_);
   return sample.slack[k] + turned + RoundingError(kMargin, sample.size[k] + point.size) + kTiny;
 }
@@ -166,6 +254,45 @@ double Placement::SupportUpper(const Sample& sample, const Part& part, const Eig
 
 void Placement::Enclose(const Sample& sample, Zonotope* places, InstructionSet instructions) const noexcept {
   Dispatch<&Placement::EncloseInline>(instructions, *this, sample, places);
+}
+
+double Placement::SupportAtExpressions(const Sample& sample, int i, const Eigen::Vector3d& d) const noexcept {
+  const Zonotope& slice = *sample.slice;
+  const Sample::Point& point = sample.points[ToSize(i)];
+  const auto first = ToSize(points_[ToSize(i)].linear);
+  std::array<double, kMaxStates> weight{};
+  double support = 0, size = 0;
+  for (std::size_t k = 0; k < ToSize(dim()); ++k) {
+    const double along = d[static_cast<Eigen::Index>(k)], magnitude = std::abs(along);
+    for (std::size_t l = 0; l < ToSize(slice.dim()); ++l) weight[l] += along * sample.linear[first + k].slope[l];
+    support += along * point.offset[k] + magnitude * (Slack(sample, ToSize(i), k) + point.spread[k]);
+    size += magnitude * point.size;
+  }
+  Lanes spread = AllLanes(0);
+  for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
+    Lanes sum = AllLanes(0);
+    for (int l = 0; l < slice.dim(); ++l)
+      sum += AllLanes(weight[ToSize(l)]) * LoadLanes(slice.padded_row(l).data() + j);
+    spread += Abs(sum);
+  }
+  return support + Sum(spread) + RoundingError(kMargin, size) + kTiny;
+}
+
+void Placement::EncloseAtExpressions(const Sample& sample, std::size_t i, Zonotope& place) const noexcept {
+  const Zonotope& slice = *sample.slice;
+  place.Reset(dim(), slice.num_generators());
+  for (int k = 0; k < dim(); ++k) {
+    const AffineEnclosure& linear = sample.linear[ToSize(points_[i].linear + k)];
+    for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
+      Lanes sum = AllLanes(0);
+      for (int l = 0; l < slice.dim(); ++l)
+        sum += AllLanes(linear.slope[ToSize(l)]) * LoadLanes(slice.padded_row(l).data() + j);
+      StoreLanes(sum, place.mutable_row(k) + j);
+    }
+    place.mutable_center(k) = sample.points[i].offset[ToSize(k)];
+    place.mutable_slack(k) = Slack(sample, i, ToSize(k));
+  }
+  for (int k = 0; k < dim(); ++k) place.AppendAxis(k, sample.points[i].spread[ToSize(k)]);
 }
 
 // The generators of the image of the slice along d are sums over the states of a weight times a row each.
@@ -183,13 +310,19 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
   const double length = d.norm();
   double largest = -kInfinity;
   for (int i = part.first; i < part.first + part.count; ++i) {
+    if (points_[ToSize(i)].linear >= 0) {
+      const double support = SupportAtExpressions(sample, i, d);
+      if (!(support <= largest)) largest = support;
+      if (std::isnan(support)) break;
+      continue;
+    }
     const Sample::Point& point = sample.points[ToSize(i)];
     const double turn = length * points_[ToSize(i)].turn;
     double turned = 0, support = 0, size = 0;
     for (std::size_t k = 0; k < ToSize(dim()); ++k) {
       const double along = d[static_cast<Eigen::Index>(k)], magnitude = std::abs(along);
       turned += along * point.slope[k];
-      support += along * sample.middle(i, k) + magnitude * (Slack(sample, point, k) + point.spread[k]);
+      support += along * middle(sample, i, k) + magnitude * (Slack(sample, ToSize(i), k) + point.spread[k]);
       size += magnitude * (sample.size[k] + point.size);
     }
     if (heading_ >= 0) terms[count - 1].weight = turned;
@@ -213,6 +346,10 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
     return;
   }
   for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (points_[i].linear >= 0) {
+      EncloseAtExpressions(sample, i, places[i]);
+      continue;
+    }
     const Sample::Point& point = sample.points[i];
     Zonotope& place = places[i];
     place.Reset(dim(), slice.num_generators());
@@ -226,7 +363,7 @@ void Placement::EncloseInline(const Sample& sample, Zonotope* places) const noex
         StoreLanes(sum, place.mutable_row(k) + j);
       }
       place.mutable_center(k) = sample.center[row] + point.offset[row];
-      place.mutable_slack(k) = Slack(sample, point, row);
+      place.mutable_slack(k) = Slack(sample, i, row);
     }
     for (int k = 0; k < dim(); ++k) place.AppendAxis(k, point.spread[ToSize(k)]);
   }

@@ -11,7 +11,7 @@ namespace forereach {
 
 class Projection final {
  public:
-  /** @throws std::invalid_argument unless P is p-by-num_states with p = 1..3, finite and not zero. */
+  /** @throws std::invalid_argument unless P is p-by-num_states with p = 1..3 and finite. */
   Projection(const Eigen::MatrixXd& matrix, int num_states);
 
   [[nodiscard]] int dim() const { return dim_; }

@@ -8,6 +8,7 @@
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
+#include "certifier/residual/observations.h"
 #include "certifier/task/csv.h"
 #include "certifier/task/document.h"
 #include "certifier/task/draft.h"
@@ -64,6 +65,13 @@ void RequireInside(const std::string& path, const Transitions& transitions, cons
   }
 }
 
+// Where the turns of an angle cannot be told, the transition says nothing, and something is wrong with it.
+void RequireTurnsAreClear(const std::string& path, const Transitions& transitions, const NominalModel& model) try {
+  if (!model.angles().empty()) static_cast<void>(Observe(model, transitions));
+} catch (const AmbiguousAngle& error) {
+  throw ConfigError(path + ":" + std::to_string(error.row() + 2) + ": " + error.what());
+}
+
 void ReadKeys(Document& file, TaskDraft& draft) {
   file.Check(draft.scope, [&](const Key& row, const std::string& key) {
     try {
@@ -74,18 +82,35 @@ void ReadKeys(Document& file, TaskDraft& draft) {
   });
 }
 
+// What a task that defines rest need not say again.
+void FillStanding(TaskDraft& draft) {
+  constexpr double kShareOfRest = 0.1;  // of the nominal state, since the tube around it has to be at rest
+  const NominalModel& model = *draft.problem.model;
+  Config& config = draft.config;
+  if (!config.robot.hold && model.text() != nullptr && !draft.rest.empty()) {
+    config.robot.hold.emplace();
+    for (const RestBound& bound : draft.rest)
+      config.robot.hold->push_back(model.state_names()[ToSize(bound.coordinate)]);
+  }
+  if (config.laws.at_rest || draft.rest.empty()) return;
+  config.laws.at_rest = draft.rest;
+  for (RestBound& bound : *config.laws.at_rest) bound.tolerance *= kShareOfRest;
+}
+
 Config Load(const std::string& path, TransitionsFile transitions, const NamedFiles& instead) {
   Document file(path);
   TaskDraft draft;
   draft.model_file.path = instead.model;
   ReadKeys(file, draft);
-  auto& [config, problem, scope, transitions_path, model_file] = draft;
+  FillStanding(draft);
+  auto& [config, problem, scope, transitions_path, rest, model_file] = draft;
   const NominalModel& model = *problem.model;
   if (!instead.transitions.empty()) transitions_path = instead.transitions;
   if (!instead.policy.empty() && !config.planner.policy.empty()) config.planner.policy = instead.policy;
   if (transitions == TransitionsFile::kRead) {
     problem.transitions = ReadTransitions(transitions_path, model, file.Place("transitions"));
     RequireInside(transitions_path, problem.transitions, problem.domain, model);
+    RequireTurnsAreClear(transitions_path, problem.transitions, model);
   }
   config.path = path;
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
@@ -135,6 +160,20 @@ void RequireForCertifyingOnBus(const Config& config) {
         config.path + ": task.obstacles[" + std::to_string(moving - config.obstacles.begin()) +
         "].motion: its times begin with the plan, so it is for `forereach certify`. On a bus, write "
         "`gate: {obstacles: bus}`, and send the obstacle of a file of its own with `forereach obstacles`");
+}
+
+std::vector<int> HeldStates(const Config& config) {
+  const NominalModel& model = *config.problem->model;
+  if (!config.robot.hold && model.text() != nullptr)
+    throw ConfigError(config.path +
+                      ": robot.hold: missing: it names the states that are zero while the robot stands, and a model as "
+                      "text does not say which; by default they are those of task.rest, which is missing, too");
+  const std::vector<std::string> names =
+      config.robot.hold.value_or(std::vector<std::string>(kHeldByDefault.begin(), kHeldByDefault.end()));
+  std::vector<int> held;
+  for (int k = 0; k < model.num_states(); ++k)
+    if (std::ranges::find(names, model.state_names()[ToSize(k)]) != names.end()) held.push_back(k);
+  return held;
 }
 
 Transitions LoadTransitions(const std::string& path, const NominalModel& model) {

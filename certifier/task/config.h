@@ -14,6 +14,7 @@ meaning, unit, range and default; config/README.md is generated from it. */
 #include "certifier/task/canonical.h"
 #include "certifier/task/config_error.h"
 #include "certifier/task/gate_options.h"
+#include "certifier/task/laws.h"
 #include "logger/logger_options.h"
 #include "planner_bridge/planner_options.h"
 #include "robot/robot_options.h"
@@ -30,11 +31,14 @@ struct Config {
   Box initial_set;  ///< X0, rounded outward.
   /** False: the file has no task.between, and its certificates hold at the samples only. */
   bool says_between = false;
-  std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds; dt and wheelbase are the model's.
+  std::optional<ParametricResidual> residual;  ///< What `forereach declare` bounds.
+  /** What the simulated robot does beyond the nominal model, with exact parameters of its own. None: nothing. */
+  std::optional<ParametricResidual> robot_residual;
   GateOptions gate;
   RealtimeOptions realtime;
   BusOptions bus;
   PlannerOptions planner;
+  Laws laws;
   RobotOptions robot;
   LoggerOptions logger;
 };
@@ -70,6 +74,10 @@ file moves. A motion in a file begins with the plan; on a bus `forereach obstacl
 begins. */
 void RequireForCertifyingOnBus(const Config& config);
 ///@}
+
+/** The states that are zero while the robot stands, by their indices: those of robot.hold. @throws ConfigError if the
+task does not say it. */
+[[nodiscard]] std::vector<int> HeldStates(const Config& config);
 
 /** Reads transitions from CSV (csv.h): columns for each state, each input and each successor `<state>_next`, in any
 order, in the model's units; one row a transition. @throws ConfigError, also if the file has no transition. */

@@ -9,7 +9,7 @@
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/config_error.h"
-#include "certifier/task/files.h"
+#include "certifier/task/line_reader.h"
 #include "certifier/task/number.h"
 #include "command_line/nearest.h"
 
@@ -53,40 +53,6 @@ std::vector<Eigen::Index> ReadHeader(const std::string& path, const std::vector<
   return order;
 }
 
-constexpr std::size_t kLongestLine = std::size_t{1} << 20;
-
-// Line by line: a file of ten million rows is larger than what is kept of it.
-class LineReader {
- public:
-  LineReader(const std::string& path, const std::string& named_by)
-      : path_(path), file_(path, kLargestCsvFile, named_by), chunk_(1 << 16, '\0') {}
-
-  // As std::getline does: the last line need not end. False at the end.
-  bool Next(std::string& text, int line) {
-    text.clear();
-    while (true) {
-      if (begin_ == end_) {
-        begin_ = 0;
-        end_ = file_.Read(chunk_.data(), chunk_.size());
-        if (end_ == 0) return !text.empty();
-      }
-      const std::string_view rest(chunk_.data() + begin_, end_ - begin_);
-      const std::size_t length = std::min(rest.find('\n'), rest.size());
-      if (text.size() + length > kLongestLine)
-        FailAt(path_, line, "longer than " + std::to_string(kLongestLine) + " bytes, which no row of numbers is");
-      text.append(rest.substr(0, length));
-      begin_ += std::min(length + 1, rest.size());
-      if (length < rest.size()) return true;
-    }
-  }
-
- private:
-  const std::string& path_;
-  InputFile file_;
-  std::string chunk_;
-  std::size_t begin_ = 0, end_ = 0;
-};
-
 class Reader {
  public:
   Reader(const std::string& path, const std::vector<std::string>& columns) : path_(path), columns_(columns) {}
@@ -94,10 +60,12 @@ class Reader {
   Eigen::MatrixXd Read(LineReader in) {
     std::vector<Eigen::Index> order;
     std::vector<std::string_view> fields;
-    int line = 0;
-    for (std::string text; in.Next(text, line + 1);) {
+    int rows = -1;  // without the header
+    for (std::string text; in.Next(text);) {
+      const int line = in.line();
+      ++rows;
       std::string_view content = text;
-      if (++line == 1 && content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
+      if (line == 1 && content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
       Split(content, fields);
       if (line == 1) {
         order = ReadHeader(path_, fields, columns_);
@@ -105,10 +73,10 @@ class Reader {
         AddRow(line, fields, order);
       }
     }
-    if (line == 0)
+    if (rows < 0)
       throw ConfigError(path_ + ":1: the file is empty; it has to begin with the header " + Joined(columns_));
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    return Eigen::Map<const RowMajor>(numbers_.data(), line - 1, std::ssize(columns_));
+    return Eigen::Map<const RowMajor>(numbers_.data(), rows, std::ssize(columns_));
   }
 
  private:
@@ -133,6 +101,21 @@ class Reader {
 };
 
 }  // namespace
+
+std::vector<std::string> CsvColumns(const std::string& path) {
+  std::string text;
+  if (!LineReader(path).Next(text)) throw ConfigError(path + ":1: the file is empty; it has to begin with a header");
+  std::string_view content = text;
+  if (content.starts_with(kByteOrderMark)) content.remove_prefix(kByteOrderMark.size());
+  std::vector<std::string_view> fields;
+  Split(content, fields);
+  std::vector<std::string> columns(fields.begin(), fields.end());
+  for (const std::string& column : columns) {
+    if (column.empty()) FailAt(path, 1, "a column has no name");
+    if (std::ranges::count(columns, column) > 1) FailAt(path, 1, column.substr(0, 64) + ": duplicate column");
+  }
+  return columns;
+}
 
 Eigen::MatrixXd ReadCsv(const std::string& path, const std::vector<std::string>& columns, const std::string& named_by) {
   return Reader(path, columns).Read(LineReader(path, named_by));

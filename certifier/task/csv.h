@@ -11,6 +11,9 @@ empty line, quotes, comments. */
 
 namespace forereach {
 
+/** The columns that a file's header names, at least one. @throws ConfigError if it cannot be read or has none. */
+[[nodiscard]] std::vector<std::string> CsvColumns(const std::string& path);
+
 /** @return one row a line, columns in the order of `columns`. Row i is line i + 2 of the file.
 @param named_by prefix of the message if the file cannot be opened: the place that names it.
 @throws ConfigError with file, line and column. */

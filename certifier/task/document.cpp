@@ -267,7 +267,7 @@ class Checker {
         return row;
       }
       if (leaf.starts_with('<')) {
-        known = leaf == "<state>" ? scope_.states : scope_.variables;
+        known = leaf == "<state>" ? scope_.states : leaf == "<input>" ? scope_.inputs : scope_.variables;
         if (known.empty() || Contains(known, word)) return row;
       } else if (leaf == word) {
         return row;

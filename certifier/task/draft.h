@@ -19,7 +19,8 @@ struct TaskDraft {
   Config config;  ///< Without problem and digests.
   Problem problem;
   SchemaScope scope;
-  std::string transitions;  ///< Path.
+  std::string transitions;      ///< Path.
+  std::vector<RestBound> rest;  ///< task.rest, whether plans have to end so or not.
   /** The model file that `model.file` names, and its bytes. If `path` is not empty before the file is read, it is read
   instead of the one that is named. */
   struct {

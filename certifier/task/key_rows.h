@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "certifier/dynamics/expression.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/document.h"
@@ -124,6 +125,9 @@ inline Key Expression(std::string path, std::string meaning) {
   return Of(Key::Type::kExpression, std::move(path), std::move(meaning));
 }
 
+/** @throws ConfigError with the place of the error in an expression of `file`, and the nearest known name. */
+[[noreturn]] void FailAt(const std::string& file, const ExpressionError& error);
+
 inline bool Has(const Document& file, const std::string& map, std::string_view name) {
   const std::vector<std::string> keys = file.KeysOf(map);
   return std::ranges::find(keys, name) != keys.end();
@@ -142,6 +146,17 @@ inline void RequireOrdered(const Document& file, double lower, double upper, con
   if (lower <= upper) return;
   file.Fail(upper_key,
             ToText(upper) + " is outside " + Range{lower, kReal.upper, false, true}.text() + ", below " + lower_key);
+}
+
+/** A parameter that is a number, or a list of its smallest and largest value. */
+inline ModelText::Parameter ReadParameter(const Document& file, const std::string& key, const std::string& name) {
+  if (file.Count(key) == 0) {
+    const double value = file.Number(key);
+    return {name, value, value};
+  }
+  const Eigen::VectorXd ends = file.Vector(key);
+  RequireOrdered(file, ends[0], ends[1], Entry(key, 0), Entry(key, 1));
+  return {name, ends[0], ends[1]};
 }
 
 /** Makes rows that set members of one options structure. Their defaults are the members' initial values. */
@@ -227,6 +242,10 @@ std::vector<Key> ModelFileKeys();      ///< model, of a model file
 std::vector<Key> ProblemKeys();        ///< domain, declaration, residual, task, certifier
 std::vector<Key> ResidualKeys();       ///< residual, among those
 std::vector<Key> OptionKeys();         ///< gate, realtime, bus, planner, robot, logger
+std::vector<Key> LawKeys();            ///< planner.let, stop, emergency_stop, hints, at_rest, among those
 std::vector<Key> RobotResidualKeys();  ///< robot.residual, among those
+
+/** @throws ConfigError if an expression of LawKeys is wrong. */
+void CheckLaws(const Document& file, const TaskDraft& draft);
 
 }  // namespace forereach::key_rows

@@ -3,6 +3,7 @@
 #include <iterator>
 #include <map>
 
+#include "certifier/dynamics/compiled_models.h"
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
@@ -25,13 +26,38 @@ constexpr const char *kStepName = "dt", *kNextEnding = "_next";
 
 using ModelMaker = std::shared_ptr<const NominalModel> (*)(const Document& file);
 
+constexpr const char* kAngles = "model.angles";
+
+std::vector<std::string> ReadAngles(const Document& file) {
+  return Has(file, "model", "angles") ? file.Names(kAngles) : std::vector<std::string>{};
+}
+
+// @throws ConfigError if one is no state.
+void RequireStates(const Document& file, const std::vector<std::string>& angles,
+                   const std::vector<std::string>& states) {
+  for (const std::string& name : angles)
+    if (std::ranges::find(states, name) == states.end())
+      file.Fail(kAngles, name + " is no state; " + Suggestion(name, states));
+}
+
 const std::vector<Named<ModelMaker>>& Models() {
   static const std::vector<Named<ModelMaker>> models{
       {KinematicBicycle::kName,
        [](const Document& file) {
-         return MakeKinematicBicycle(file.Number("model.dt"), file.Number("model.wheelbase"));
+         const std::vector<std::string> states(KinematicBicycle::kStateNames.begin(),
+                                               KinematicBicycle::kStateNames.end());
+         RequireStates(file, ReadAngles(file), states);
+         std::vector<int> angles;
+         for (const std::string& name : ReadAngles(file))
+           angles.push_back(static_cast<int>(std::ranges::find(states, name) - states.begin()));
+         std::ranges::sort(angles);
+         return MakeKinematicBicycle(file.Number("model.dt"), file.Number("model.wheelbase"), std::move(angles));
        }},
-      {PointMass::kName, [](const Document& file) { return MakePointMass(file.Number("model.dt")); }},
+      {PointMass::kName,
+       [](const Document& file) {
+         if (!ReadAngles(file).empty()) file.Fail(kAngles, "no state of point_mass is an angle");
+         return MakePointMass(file.Number("model.dt"));
+       }},
   };
   return models;
 }
@@ -40,6 +66,16 @@ const std::vector<Named<Integrator>>& Integrators() {
   static const std::vector<Named<Integrator>> integrators{
       {"euler", Integrator::kEuler}, {"midpoint", Integrator::kMidpoint}, {"rk4", Integrator::kRk4}};
   return integrators;
+}
+
+// The step is a number in its range.
+ModelText::Parameter ReadModelParameter(const Document& file, const std::string& key, const std::string& name) {
+  ModelText::Parameter parameter = ReadParameter(file, key, name);
+  if (name != kStepName) return parameter;
+  if (file.Count(key) != 0) file.Fail(key, "is a list, has to be one number: the step is exact");
+  if (!kStep.Contains(parameter.lower))
+    file.Fail(key, ToText(parameter.lower) + " is outside " + kStep.text() + ", its unit is s");
+  return parameter;
 }
 
 // Reads the map `model` of a document as text. The document is a task file or a model file.
@@ -54,6 +90,7 @@ class TextReader final {
     ReadParameters();
     ReadDefinitions();
     ReadEquations();
+    text_.angles = ReadAngles(file_);
     return std::move(text_);
   }
 
@@ -91,10 +128,8 @@ class TextReader final {
 
   void ReadParameters() {
     if (!Has(file_, "model", "parameters")) file_.Fail("model.parameters.dt", "missing: the step of the model, in s");
-    for (const std::string& name : NamesOf("parameters", 1, kMostNames)) {
-      const std::string key = "model.parameters." + name;
-      text_.parameters.push_back(ReadParameter(file_, key, name));
-    }
+    for (const std::string& name : NamesOf("parameters", 1, kMostNames))
+      text_.parameters.push_back(ReadModelParameter(file_, "model.parameters." + name, name));
     if (!meanings_.contains(kStepName) || meanings_[kStepName] != "parameters")
       file_.Fail("model.parameters.dt", "missing: the step of the model, in s");
   }
@@ -123,21 +158,6 @@ class TextReader final {
   const Document& file_;
   ModelText text_;
   std::map<std::string, std::string> meanings_;  // of each name the map that has it
-
- public:
-  /** A number, or a list of two. The step is a number in its range. */
-  static ModelText::Parameter ReadParameter(const Document& file, const std::string& key, const std::string& name) {
-    if (file.Count(key) == 0) {
-      const double value = file.Number(key);
-      if (name == kStepName && !kStep.Contains(value))
-        file.Fail(key, ToText(value) + " is outside " + kStep.text() + ", its unit is s");
-      return {name, value, value};
-    }
-    if (name == kStepName) file.Fail(key, "is a list, has to be one number: the step is exact");
-    const Eigen::VectorXd ends = file.Vector(key);
-    RequireOrdered(file, ends[0], ends[1], Entry(key, 0), Entry(key, 1));
-    return {name, ends[0], ends[1]};
-  }
 };
 
 // The parameters of a task file replace those of the model file that it includes.
@@ -150,7 +170,7 @@ void Override(const Document& task, ModelText& text) {
     const auto parameter = std::ranges::find(text.parameters, name, &ModelText::Parameter::name);
     if (parameter == text.parameters.end())
       task.Fail(key, "is not a parameter of " + text.file + "; " + Suggestion(name, known));
-    *parameter = TextReader::ReadParameter(task, key, name);
+    *parameter = ReadModelParameter(task, key, name);
   }
 }
 
@@ -163,18 +183,15 @@ ModelText ReadModelFile(const Document& task, TaskDraft& draft) {
   const std::string key = "model.file", name = task.Text(key), place = task.Place(key);
   std::string& path = draft.model_file.path;
   if (path.empty()) path = FindModelFile(task.path(), name, place);
-  Document file(path, place);
-  TaskDraft inner;
-  file.Check(
-      inner.scope,
-      [&](const Key& row, const std::string& at) {
-        if (row.read) row.read(file, at, inner);
-      },
-      ModelFileSchema());
-  draft.model_file.bytes = file.text();
-  ModelText text = TextReader(file).Read();
+  ModelText text = LoadModelFile(path, place, &draft.model_file.bytes);
   text.name = std::filesystem::path(name).stem().string();
   Override(task, text);
+  if (Has(task, "model", "angles")) {
+    std::vector<std::string> states;
+    for (const ModelText::Variable& state : text.states) states.push_back(state.name);
+    text.angles = ReadAngles(task);
+    RequireStates(task, text.angles, states);
+  }
   return text;
 }
 
@@ -186,22 +203,21 @@ void RequireOnly(const Document& file, const std::vector<std::string>& allowed, 
 
 std::shared_ptr<const NominalModel> MakeFromText(const ModelText& text) {
   try {
-    return MakeTextModel(text);
+    return CompiledFor(MakeTextModel(text));
   } catch (const ExpressionError& error) {
-    throw ConfigError(text.file + ":" + std::to_string(error.line()) + ":" + std::to_string(error.column()) + ": " +
-                      error.what() + (error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())));
+    FailAt(text.file, error);
   }
 }
 
 std::shared_ptr<const NominalModel> ReadNamedModel(const Document& file) {
-  RequireOnly(file, {"name", "dt", "wheelbase"}, "is for a model as text, this one has a name");
+  RequireOnly(file, {"name", "dt", "wheelbase", "angles"}, "is for a model as text, this one has a name");
   if (!Has(file, "model", kStepName)) file.Fail("model.dt", "missing: The time from one control to the next.");
   return ValueNamed(Models(), file.Text("model.name"))(file);
 }
 
 std::shared_ptr<const NominalModel> ReadTextModel(const Document& file, TaskDraft& draft) {
   if (Has(file, "model", "file")) {
-    RequireOnly(file, {"file", "parameters"}, "stands in the model file, not beside its name");
+    RequireOnly(file, {"file", "parameters", "angles"}, "stands in the model file, not beside its name");
     return MakeFromText(ReadModelFile(file, draft));
   }
   if (Has(file, "model", kStepName)) file.Fail("model.dt", "is model.parameters.dt of a model as text");
@@ -232,6 +248,16 @@ Key ParameterRange() {
   return key;
 }
 
+Key AnglesKey() {
+  return Optional(
+      Names(kAngles, Between(0, kMaxStates), Key::Size::kStates,
+            "The states that are angles: values that differ by 2 pi are the same. Transitions and measured states may "
+            "have any of them, wrapped or not. The equations must not tell them apart, and no step may turn an angle "
+            "by three quarters of a turn or more beyond what the model says; see "
+            "[docs/expressions.md](../docs/expressions.md#angles). Beside `model.file`: instead of the file's."),
+      "none");
+}
+
 // Of a model as text.
 std::vector<Key> TextKeys() {
   return {
@@ -255,10 +281,16 @@ std::vector<Key> TextKeys() {
       Word("model.integrator", NamesIn(Integrators()),
            "The formula that makes the next state of the rates. The model is this formula, not the solution of the "
            "differential equation: its error belongs to the residual. Required with `model.rate`."),
+      AnglesKey(),
   };
 }
 
 }  // namespace
+
+void FailAt(const std::string& file, const ExpressionError& error) {
+  throw ConfigError(file + ":" + std::to_string(error.line()) + ":" + std::to_string(error.column()) + ": " +
+                    error.what() + (error.word().empty() ? "" : "; " + Suggestion(error.word(), error.known())));
+}
 
 std::vector<Key> ModelKeys() {
   std::vector<Key> keys{
@@ -285,3 +317,22 @@ std::vector<Key> ModelFileKeys() {
 }
 
 }  // namespace forereach::key_rows
+
+namespace forereach {
+
+ModelText LoadModelFile(const std::string& path, const std::string& named_by, std::string* bytes) {
+  Document file(path, named_by);
+  TaskDraft draft;
+  file.Check(
+      draft.scope,
+      [&](const Key& row, const std::string& at) {
+        if (row.read) row.read(file, at, draft);
+      },
+      ModelFileSchema());
+  if (bytes != nullptr) *bytes = file.text();
+  ModelText text = key_rows::TextReader(file).Read();
+  text.name = std::filesystem::path(path).stem().string();
+  return text;
+}
+
+}  // namespace forereach

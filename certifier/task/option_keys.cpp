@@ -4,6 +4,7 @@
 #include <set>
 
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
@@ -149,6 +150,7 @@ std::vector<Key> BusKeys() {
 }
 
 void CheckPlanner(const Document& file, const std::string&, TaskDraft& draft) {
+  CheckLaws(file, draft);
   const PlannerOptions& planner = draft.config.planner;
   if (planner.source == "policy" && planner.policy.empty())
     file.Fail("planner.policy", "missing: a policy's file, for planner.source: policy");
@@ -162,7 +164,7 @@ void CheckPlanner(const Document& file, const std::string&, TaskDraft& draft) {
 std::vector<Key> PlannerKeys() {
   const OptionRows<PlannerOptions> planner("planner",
                                            [](TaskDraft& draft) -> PlannerOptions& { return draft.config.planner; });
-  return {
+  std::vector<Key> keys{
       Optional(Map("planner", "The planner.", CheckPlanner), "all defaults"),
       planner.OneOf("source", {"ompl", "policy"}, &PlannerOptions::source,
                     "ompl: a search around the obstacles. policy: blocks of a learned policy of the bicycle, which "
@@ -190,7 +192,9 @@ std::vector<Key> PlannerKeys() {
       planner.Integer("candidates", Between(1, 10000), &PlannerOptions::candidates,
                       "The largest number of candidates for one start."),
       planner.Number("cruise_speed", "m/s", kPositive, &PlannerOptions::cruise_speed, "The desired speed."),
-      planner.Number("braking", "m/s^2", kPositive, &PlannerOptions::braking, "Deceleration of the braking tail."),
+      planner.Number(
+          "braking", "m/s^2", kPositive, &PlannerOptions::braking,
+          "What the search expects of the robot's acceleration and deceleration. A compiled model brakes at it."),
       planner.Number("time_limit_ms", "ms", UpTo(kHourMs), &PlannerOptions::time_limit_ms,
                      "The time limit of one query of the planner."),
       planner.Integer("seed", Between(1, 2147483647), &PlannerOptions::seed,
@@ -199,6 +203,8 @@ std::vector<Key> PlannerKeys() {
                               &PlannerOptions::initial_half_width, "Half the width of each candidate's X0."),
                "as task.initial_set"),
   };
+  std::ranges::move(LawKeys(), std::back_inserter(keys));
+  return keys;
 }
 
 Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
@@ -214,19 +220,49 @@ Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
   return key;
 }
 
+// robot.hold was read before.
+void ReadEmergencyStop(const Document& file, const std::string& key, TaskDraft& draft) {
+  RobotOptions& robot = draft.config.robot;
+  const NominalModel& model = *draft.problem.model;
+  const auto is_at_rest = [&](const std::string& name) {
+    return std::ranges::any_of(draft.rest,
+                               [&](const RestBound& b) { return model.state_names()[ToSize(b.coordinate)] == name; });
+  };
+  for (const std::string& name : file.KeysOf(key)) {
+    const bool is_held = robot.hold                ? std::ranges::find(*robot.hold, name) != robot.hold->end()
+                         : model.text() != nullptr ? is_at_rest(name)
+                                                   : std::ranges::find(kHeldByDefault, name) != kHeldByDefault.end();
+    if (!is_held) file.Fail(key + "." + name, "is not zero while the robot stands: robot.hold does not name it");
+    robot.emergency_stop[name] = file.Number(key + "." + name);
+  }
+  if (robot.emergency_stop.empty()) file.Fail(key, "names no state, so nothing would be braked");
+}
+
 std::vector<Key> RobotKeys() {
   const OptionRows<RobotOptions> robot("robot", [](TaskDraft& draft) -> RobotOptions& { return draft.config.robot; });
   return {
       Optional(Map("robot", "The simulated robot."), "all defaults"),
       Optional(robot.Vector("start", "of the state", kReal, Size::kStates, &RobotOptions::start, "Its initial state."),
                "the center of task.initial_set"),
-      Optional(Names("robot.hold", Between(1, kMaxStates), Size::kStates,
-                     "The states that are zero while the robot stands: it holds its position and sets these to zero. "
-                     "The simulated robot requires the key with a model as text.",
-                     [](const Document& file, const std::string& key, TaskDraft& draft) {
-                       draft.config.robot.hold = file.Names(key);
-                     }),
-               "v and a of kinematic_bicycle, vx and vy of point_mass"),
+      Optional(
+          Names("robot.hold", Between(0, kMaxStates), Size::kStates,
+                "The states that are zero while the robot stands: it holds its position and sets these to zero. With "
+                "`[]`, for a robot that cannot stand, it keeps its state. "
+                "Planner and simulated robot require the key or task.rest with a model as text.",
+                [](const Document& file, const std::string& key, TaskDraft& draft) {
+                  draft.config.robot.hold = file.Names(key);
+                }),
+          "those of task.rest with a model as text; v and a of kinematic_bicycle, vx and vy of point_mass"),
+      Optional(
+          Map("robot.emergency_stop",
+              "How the robot comes to rest by itself, whatever its plan was. The guard computes from it how many "
+              "steps a stop takes, and begins one early enough to end within what a withdrawal leaves of a plan. "
+              "While it stops, the simulated robot follows its equations with inputs of zero. States of robot.hold "
+              "that are not named here are zero at once.",
+              ReadEmergencyStop),
+          "all states of robot.hold are zero at once, at any speed, as no real robot can"),
+      Number("robot.emergency_stop.<state>", "of the state, per second of the model", kPositive,
+             "Its absolute value falls at least so fast. The state is one of robot.hold."),
       robot.Number("step_period_ms", "ms", Between(0.1, 60000), &RobotOptions::step_period_ms,
                    "Wall-clock time of one step of the model. The certifier assumes that no step of a plan takes "
                    "longer than this or model.dt."),
@@ -235,7 +271,6 @@ std::vector<Key> RobotKeys() {
       RobotDisturbance(robot),
       robot.Integer("disturbance_seed", Between(0, 2147483647), &RobotOptions::disturbance_seed,
                     "The seed of the disturbance's random numbers."),
-      robot.OneOf("residual", {"none"}, &RobotOptions::residual, "none: the robot is the nominal model."),
   };
 }
 

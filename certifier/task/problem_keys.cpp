@@ -5,10 +5,11 @@
 #include <iterator>
 #include <span>
 
+#include "certifier/certify/limits.h"
+#include "certifier/certify/safety.h"
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
-#include "certifier/safety/placement.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
@@ -160,11 +161,16 @@ void ReadRest(const Document& file, const std::string& key, TaskDraft& draft) {
     rest.push_back({IndexOf(draft.scope.states, name), file.Number(key + "." + name)});
   if (rest.empty()) file.Fail(key, "names no state, so everything would be standing");
   std::ranges::sort(rest, {}, &RestBound::coordinate);
+  draft.rest = rest;
 }
 
 void SetProjection(const Document& file, const std::string& key, Eigen::MatrixXd projection, TaskDraft& draft) {
   for (Eigen::Index i = 0; i < projection.rows(); ++i)
     if (projection.row(i).isZero(0)) file.Fail(Entry(key, i), "is zero, which sees no state");
+  for (const int angle : draft.problem.model->angles())
+    if (!projection.col(angle).isZero(0))
+      file.Fail(key, "depends on " + draft.scope.states[ToSize(angle)] +
+                         ", which is one of model.angles: how often an angle has turned is not known");
   draft.scope.safety_dim = static_cast<int>(projection.rows());
   draft.problem.projection = std::move(projection);
 }
@@ -190,39 +196,75 @@ void RequirePointSize(const Document& file, const std::string& key, Eigen::Index
                        ", as many as the first point of the body");
 }
 
+// The expressions of one point.
+std::vector<ExpressionText> ReadPlace(const Document& file, const std::string& key) {
+  std::vector<ExpressionText> place;
+  for (int k = 0; k < file.Count(key); ++k) place.push_back(file.Expression(Entry(key, k)));
+  return place;
+}
+
 // `size` is that of the body's points, 0 before the first.
 BodyPart ReadPart(const Document& file, const std::string& key, Eigen::Index& size) {
   if (const std::size_t kinds = file.KeysOf(key).size(); kinds != 1)
     file.Fail(key, "has " + std::to_string(kinds) + " keys, has to have one of disc, hull");
   const bool is_disc = Has(file, key, "disc");
-  const std::string shape = key + (is_disc ? ".disc" : ".hull"), at = shape + (is_disc ? ".at" : ".points");
+  const std::string shape = key + (is_disc ? ".disc" : ".hull"), at = shape + (is_disc ? ".at" : ".points"),
+                    places = shape + (is_disc ? ".place" : ".places");
+  const bool has_points = Has(file, shape, is_disc ? "at" : "points");
+  if (has_points == Has(file, shape, is_disc ? "place" : "places"))
+    file.Fail(shape, has_points ? "has points in the robot's frame and at expressions; delete one of them"
+                                : std::string("missing: ") + (is_disc ? "at or place" : "points or places"));
+  BodyPart part{{}, Has(file, shape, "radius") ? file.Number(shape + ".radius") : 0, {}};
+  const auto add = [&](Eigen::Index entries, const std::string& which) {
+    if (size == 0) size = entries;
+    RequirePointSize(file, which, entries, size);
+  };
+  if (!has_points) {
+    for (int i = 0; i < (is_disc ? 1 : file.Count(places)); ++i) {
+      const std::string which = is_disc ? places : Entry(places, i);
+      part.places.push_back(ReadPlace(file, which));
+      add(std::ssize(part.places.back()), which);
+    }
+    return part;
+  }
   const std::vector<Eigen::VectorXd> points = is_disc ? std::vector{file.Vector(at)} : file.Vectors(at);
-  BodyPart part{{}, Has(file, shape, "radius") ? file.Number(shape + ".radius") : 0};
   for (const Eigen::VectorXd& point : points) {
-    if (size == 0) size = point.size();
-    RequirePointSize(file, is_disc ? at : Entry(at, std::ssize(part.points)), point.size(), size);
+    add(point.size(), is_disc ? at : Entry(at, std::ssize(part.points)));
     part.points.emplace_back(Eigen::Vector3d::Zero()).head(size) = point;
   }
   return part;
+}
+
+// A body without a point in the robot's frame needs no frame.
+void ReadPose(const Document& file, const std::string& key, Eigen::Index size, Body& body, TaskDraft& draft) {
+  const bool has_frame = std::ranges::any_of(body.parts, [](const BodyPart& part) { return part.places.empty(); });
+  const auto& states = draft.scope.states;
+  if (!Has(file, "task.body", "pose")) {
+    if (has_frame) file.Fail(key, "missing: the states that are the position of the robot's frame");
+    draft.scope.safety_dim = static_cast<int>(size);
+    draft.problem.projection = Eigen::MatrixXd::Zero(size, std::ssize(states));
+    return;
+  }
+  const std::vector<std::string> pose = file.Names(key);
+  if (const Eigen::Index names = std::ssize(pose); names == size + 1)
+    body.heading = IndexOf(states, pose.back());
+  else if (names != size)
+    file.Fail(key, "has " + std::to_string(names) + " entries, has to have " + std::to_string(size) +
+                       ", as many as the points of the body, or one more, the heading");
+  SetProjection(file, key, ProjectionTo(std::span(pose).first(ToSize(size)), states), draft);
 }
 
 void ReadBody(const Document& file, const std::string& key, TaskDraft& draft) {
   if (draft.scope.safety_dim != 0) file.Fail(key, "the task has task.projection too; delete one of them");
   Body body{.heading = -1, .parts = {}};
   Eigen::Index size = 0;
-  std::size_t points = 0;
+  int points = 0;
   for (int i = 0; i < file.Count(key + ".parts"); ++i)
-    points += body.parts.emplace_back(ReadPart(file, Entry(key + ".parts", i), size)).points.size();
+    points += body.parts.emplace_back(ReadPart(file, Entry(key + ".parts", i), size)).num_points();
   if (points > kMaxBodyPoints)
     file.Fail(key + ".parts",
               "have " + std::to_string(points) + " points, which is outside " + Between(1, kMaxBodyPoints).text());
-  const std::vector<std::string> pose = file.Names(key + ".pose");
-  if (const Eigen::Index names = std::ssize(pose); names == size + 1)
-    body.heading = IndexOf(draft.scope.states, pose.back());
-  else if (names != size)
-    file.Fail(key + ".pose", "has " + std::to_string(names) + " entries, has to have " + std::to_string(size) +
-                                 ", as many as the points of the body, or one more, the heading");
-  SetProjection(file, key + ".pose", ProjectionTo(std::span(pose).first(ToSize(size)), draft.scope.states), draft);
+  ReadPose(file, key + ".pose", size, body, draft);
   draft.problem.body = std::move(body);
 }
 
@@ -296,11 +338,31 @@ void ReadObstacle(const Document& file, const std::string& key, TaskDraft& draft
   if (moves) ReadMotion(file, key + ".motion", draft);
 }
 
+// At least one of both bounds.
+void ReadLimit(const Document& file, const std::string& key, TaskDraft& draft) {
+  const std::string least = key + ".at_least", most = key + ".at_most";
+  const bool has_least = Has(file, key, "at_least"), has_most = Has(file, key, "at_most");
+  Limit limit{.name = file.Text(key + ".name"), .that = file.Expression(key + ".that")};
+  if (has_least) limit.at_least = file.Number(least);
+  if (has_most) limit.at_most = file.Number(most);
+  if (!has_least && !has_most) file.Fail(key, "bounds nothing, has to have at_most, at_least or both");
+  if (has_least && has_most) RequireOrdered(file, limit.at_least, limit.at_most, least, most);
+  std::vector<Limit>& limits = draft.problem.limits;
+  if (const auto other = std::ranges::find(limits, limit.name, &Limit::name); other != limits.end())
+    file.Fail(key + ".name", limit.name + " is the name of " + Entry("task.limits", other - limits.begin()) + ", too");
+  limits.push_back(std::move(limit));
+}
+
 void CheckTask(const Document& file, const std::string& key, TaskDraft& draft) {
   const Problem& problem = draft.problem;
   if (draft.scope.safety_dim == 0) file.Fail(key + ".projection", "missing: the task needs this key, or task.body");
   // Numbers that are each in their range may still be too large together. @throws std::invalid_argument.
-  static_cast<void>(Placement(problem.projection, problem.body, problem.between, problem.model->num_states()));
+  try {
+    static_cast<void>(PlacementOf(problem));
+    static_cast<void>(LimitTest(problem));
+  } catch (const ExpressionError& error) {
+    FailAt(file.path(), error);
+  }
 }
 
 std::vector<Key> TaskKeys() {
@@ -324,20 +386,31 @@ std::vector<Key> TaskKeys() {
               "P as a matrix: 1 to 3 rows, one entry for each state.", ReadProjectionMatrix),
       Map("task.body", "The robot's body, the union of its parts. Obstacles are given in its position's coordinates.",
           ReadBody),
-      Required(Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
-                     "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point of "
-                     "a part has entries. One name more is the heading, in radians: the frame turns by it in the first "
-                     "two coordinates. Without it the frame does not turn.")),
+      Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
+            "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point of a part has "
+            "entries. One name more is the heading, in radians: the frame turns by it in the first two coordinates. "
+            "Without it the frame does not turn. Required if a part is in the frame."),
       Required(List(
           "task.body.parts", Between(1, kMaxBodyParts),
-          "Convex parts in the robot's frame, with at most " + std::to_string(kMaxBodyPoints) + " points in all.")),
+          "Convex parts, with at most " + std::to_string(kMaxBodyPoints) +
+              " points in all. A part's points are fixed in the robot's frame, or stand where expressions of the state "
+              "say, as the joints of an arm do.")),
       Map("task.body.parts[]", "One of disc and hull."),
       Map("task.body.parts[].disc", "A disc, or a ball: the points within a radius of one point."),
-      Required(Vector("task.body.parts[].disc.at", "m", kReal, Size::kPoint, "Its center.")),
+      Vector("task.body.parts[].disc.at", "m", kReal, Size::kPoint,
+             "Its center in the robot's frame. Required without `place`."),
+      List("task.body.parts[].disc.place", Between(2, kMaxSafetyDim),
+           "Instead of `at`, the safety coordinates of its center in metres, as expressions of states, parameters and "
+           "definitions of the model; see [docs/expressions.md](../docs/expressions.md)."),
+      Expression("task.body.parts[].disc.place[]", "One coordinate."),
       Required(Number("task.body.parts[].disc.radius", "m", kNotNegative, "Its radius.")),
       Map("task.body.parts[].hull", "The points within a radius of the convex hull of some points."),
-      Required(Vectors("task.body.parts[].hull.points", "m", kReal, Between(1, kMaxBodyPoints), Size::kPoint,
-                       "The points, in any order.")),
+      Vectors("task.body.parts[].hull.points", "m", kReal, Between(1, kMaxBodyPoints), Size::kPoint,
+              "The points in the robot's frame, in any order. Required without `places`."),
+      List("task.body.parts[].hull.places", Between(1, kMaxBodyPoints),
+           "Instead of `points`, the points by expressions, as in `disc.place`."),
+      List("task.body.parts[].hull.places[]", Between(2, kMaxSafetyDim), "The coordinates of one point."),
+      Expression("task.body.parts[].hull.places[][]", "One coordinate."),
       Optional(Number("task.body.parts[].hull.radius", "m", kNotNegative, "The radius."), "0"),
       Optional(Word("task.between", {"samples"},
                     "A certificate holds at its sample instants only, as in the paper. Only with `certifier.method: "
@@ -350,11 +423,26 @@ std::vector<Key> TaskKeys() {
           "next, model.dt later. `forereach declare --between` proposes them.",
           ReadBetween),
       Required(Vector("task.between.acceleration", "m/s^2", kNotNegative, Size::kSafety,
-                      "The largest absolute second derivative of each safety coordinate.")),
+                      "The largest absolute second derivative of each safety coordinate, of the robot's frame and of "
+                      "every point of the body that stands at expressions.")),
       Number("task.between.turn_rate", "rad/s", kNotNegative,
              "The largest absolute derivative of the heading. Required if task.body has a heading."),
       Number("task.between.turn_acceleration", "rad/s^2", kNotNegative,
              "The largest absolute second derivative of the heading. Required if task.body has a heading."),
+      Optional(List("task.limits", Between(0, kMaxLimits),
+                    "Bounds on functions of state and input: a lateral acceleration, a power, a region to keep in. A "
+                    "plan that may exceed one gets abstention S (limit). They hold at the sample instants; nothing is "
+                    "claimed between these."),
+               "[]"),
+      Map("task.limits[]", "One limit: a function with at_most, at_least or both.", ReadLimit),
+      Required(Text("task.limits[].name",
+                    "For messages, 1 to " + std::to_string(kMaxLimitName) + " printable characters of ASCII.")),
+      Required(Expression("task.limits[].that",
+                          "The function; see [docs/expressions.md](../docs/expressions.md). It may use states, inputs, "
+                          "parameters and definitions of the model. One that uses an input holds at every sample at "
+                          "which an input is applied: all but the last.")),
+      Number("task.limits[].at_most", "of the function", kReal, "Its largest value, for every state of the slice."),
+      Number("task.limits[].at_least", "of the function", kReal, "Its least value, likewise."),
       Required(List(
           "task.obstacles", Between(0, kMaxObstacles),
           "The unsafe sets, closed. `[]` for none. With `gate.obstacles: bus` those received on the bus count too.")),

@@ -1,156 +1,151 @@
 // The rows of residuals: `residual`, which `forereach declare` bounds, and `robot.residual`.
 #include <iterator>
 
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/expression.h"
+#include "certifier/dynamics/named_residuals.h"
+#include "certifier/dynamics/text_program.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
 namespace {
 
-struct Parameter {
-  const char *name, *unit;
+constexpr const char* kNone = "none";
+
+// A parameter of a residual of the library.
+struct ParameterRow {
+  const char *residual, *name, *unit;
   Range range;
   const char* meaning;
 };
 
-// A residual of dynamics/residuals.h. Its first parameters are its model's.
-struct Residual {
-  const char* model;
-  std::vector<const char*> parameter_names;
-  std::vector<double> defaults;     // as many
-  std::vector<Parameter> own_rows;  // of those that are not the model's
+constexpr ParameterRow kParameters[] = {
+    {"heading_saturation", "understeer", "", kReal, "Fraction of the heading rate lost in full saturation."},
+    {"heading_saturation", "friction", "", kNotNegative,
+     "Friction coefficient; saturation begins at friction times gravity."},
+    {"heading_saturation", "gravity", "m/s^2", kPositive, "Gravity."},
+    {"heading_saturation", "gate_temperature", "s^2/m", kPositive, "How fast the saturation begins."},
+    {"velocity_knee", "damping", "1/s", kReal, "Drag along the velocity."},
+    {"velocity_knee", "cross", "1/s", kReal, "Force across the velocity."},
+    {"velocity_knee", "knee", "m/s", kNotNegative, "The speed above which drag and lateral force act."},
+    {"velocity_knee", "softplus_temperature", "m/s", kPositive, "How fast drag and lateral force begin."},
+    {"velocity_knee", "regularizer", "m/s", kPositive, "Keeps the gain finite at rest."},
+    {"velocity_knee", "smoothing", "m^2/s^2", kPositive, "Makes the speed differentiable at rest."},
 };
 
-template <class Equations>
-Named<Residual> Make(std::vector<Parameter> own_rows) {
-  const auto defaults = Equations{}.parameters();
-  return {Equations::kName,
-          {Equations::Nominal::kName,
-           {Equations::kParameterNames.begin(), Equations::kParameterNames.end()},
-           {defaults.begin(), defaults.end()},
-           std::move(own_rows)}};
+std::vector<std::string_view> Names() {
+  std::vector<std::string_view> names;
+  for (const ResidualText& residual : NamedResiduals()) names.push_back(residual.name);
+  return names;
 }
 
-const std::vector<Named<Residual>>& Residuals() {
-  static const std::vector<Named<Residual>> residuals{
-      Make<HeadingSaturation>({
-          {"understeer", "", kReal, "Fraction of the heading rate lost in full saturation."},
-          {"friction", "", kNotNegative, "Friction coefficient; saturation begins at friction times gravity."},
-          {"gravity", "m/s^2", kPositive, "Gravity."},
-          {"gate_temperature", "s^2/m", kPositive, "How fast the saturation begins."},
-      }),
-      Make<VelocityKnee>({
-          {"damping", "1/s", kReal, "Drag along the velocity."},
-          {"cross", "1/s", kReal, "Force across the velocity."},
-          {"knee", "m/s", kNotNegative, "The speed above which drag and lateral force act."},
-          {"softplus_temperature", "m/s", kPositive, "How fast drag and lateral force begin."},
-          {"regularizer", "m/s", kPositive, "Keeps the gain finite at rest."},
-          {"smoothing", "m^2/s^2", kPositive, "Makes the speed differentiable at rest."},
-      }),
-  };
-  return residuals;
+ModelText::Parameter& ParameterNamed(ResidualText& residual, std::string_view name) {
+  const auto found = std::ranges::find(residual.parameters, name, &ModelText::Parameter::name);
+  if (found == residual.parameters.end())
+    throw std::logic_error(residual.name + " has no parameter " + std::string(name));
+  return *found;
 }
 
-// "A is for model B, ..."
-std::string ModelsOfResiduals() {
-  std::string text;
-  for (const auto& [name, residual] : Residuals())
-    text += (text.empty() ? "" : ", ") + std::string(name) + (text.empty() ? " is for " : " for ") + residual.model;
-  return text + ".";
-}
-
-// A row for each parameter of each residual that is not its model's, in the map `path`.
-std::vector<Key> ParameterKeys(const std::string& path, const Key::Reader& read) {
-  std::vector<Key> keys;
-  for (const auto& [residual_name, residual] : Residuals())
-    for (std::size_t i = 0, first = residual.defaults.size() - residual.own_rows.size(); i < residual.own_rows.size();
-         ++i) {
-      const auto& [name, unit, range, meaning] = residual.own_rows[i];
-      if (std::string_view(name) != residual.parameter_names[first + i])
-        throw std::logic_error(std::string(residual_name) + " has no parameter " + name + " at this place");
-      keys.push_back(OnlyFor(std::string(residual_name), Optional(Number(path + "." + name, unit, range, meaning, read),
-                                                                  ToText(residual.defaults[first + i]))));
-    }
-  return keys;
-}
-
-// The residual that is named at `key`: its model's parameters are the model's, all others have the default.
-ParametricResidual DefaultResidual(const Document& file, const std::string& key, const NominalModel& model) {
-  const std::string name = file.Text(key);
-  const Residual& residual = ValueNamed(Residuals(), name);
-  if (residual.model != model.name())
-    file.Fail(key, name + " is for " + residual.model + ", the model is " + model.name());
-  ParametricResidual result{name, {}};
-  for (std::size_t i = 0; i < residual.defaults.size(); ++i) {
-    const double value = i < model.parameters().size() ? model.parameters()[i] : residual.defaults[i];
-    result.parameters.push_back({residual.parameter_names[i], value, value});
+// The map `path` as a residual: of the library, or as text. Its parameters may be intervals.
+ResidualText ReadText(const Document& file, const std::string& path) {
+  const bool has_name = Has(file, path, "name");
+  if (has_name == Has(file, path, "add"))
+    file.Fail(path, has_name ? "has both name and add; delete one of them"
+                             : "has neither add, what the next states have beyond the model's, nor name");
+  if (!has_name) {
+    ResidualText text{"the residual", {}, {}, {}};
+    for (const std::string& name : file.KeysOf(path + ".parameters"))
+      text.parameters.push_back(ReadParameter(file, path + ".parameters." + name, name));
+    for (const std::string& name : file.KeysOf(path + ".let"))
+      text.definitions.push_back({name, file.Expression(path + ".let." + name)});
+    for (const std::string& state : file.KeysOf(path + ".add"))
+      text.values.emplace(state, file.Expression(path + ".add." + state));
+    return text;
   }
-  return result;
+  ResidualText text = ResidualNamed(file.Text(path + ".name"));
+  for (const std::string& key : file.KeysOf(path)) {
+    if (key == "name") continue;
+    if (key == "parameters" || key == "let")
+      file.Fail(path + "." + key, "is for a residual as text, this one has a name");
+    ParameterNamed(text, key) = ReadParameter(file, path + "." + key, key);
+  }
+  return text;
 }
 
-void ReadResidual(const Document& file, const std::string& key, TaskDraft& draft) {
-  draft.config.residual = DefaultResidual(file, key, *draft.problem.model);
+// The residual at `path`. Its expressions are parsed here for the first time.
+ParametricResidual ReadResidual(const Document& file, const std::string& path, const NominalModel& model) {
+  const bool is_named = Has(file, path, "name");
+  const ResidualText text = ReadText(file, path);
+  try {
+    const ParametricResidual residual = ResidualOf(model, text);
+    (void)MakeProgram(residual.names, residual.values);
+    return residual;
+  } catch (const ExpressionError& error) {
+    if (!is_named) FailAt(file.path(), error);
+    file.Fail(path + ".name", text.name + " uses " + error.word() + ", which " + model.name() + " does not have");
+  } catch (const std::invalid_argument& error) {
+    file.Fail(is_named ? path + ".name" : path, error.what());
+  }
 }
 
-void ReadParameter(const Document& file, const std::string& key, double lower, double upper, TaskDraft& draft) {
-  RequireOrdered(file, lower, upper, Entry(key, 0), Entry(key, 1));
-  auto& parameters = draft.config.residual->parameters;
-  const auto parameter =
-      std::ranges::find(parameters, key.substr(key.rfind('.') + 1), &ParametricResidual::Parameter::name);
-  parameter->lower = lower;
-  parameter->upper = upper;
-}
-
-void ReadExactParameter(const Document& file, const std::string& key, TaskDraft& draft) {
-  ReadParameter(file, key, file.Number(key), file.Number(key), draft);
-}
-
-void ReadParameterRange(const Document& file, const std::string& key, TaskDraft& draft) {
-  const Eigen::VectorXd ends = file.Vector(key);
-  ReadParameter(file, key, ends[0], ends[1], draft);
-}
-
-void ReadRobotResidual(const Document& file, const std::string& key, TaskDraft& draft) {
-  RobotOptions& robot = draft.config.robot;
-  robot.residual = file.Text(key);
-  if (robot.residual == "none") return;
-  for (const auto& [name, value, same] : DefaultResidual(file, key, *draft.problem.model).parameters)
-    robot.residual_parameters[name] = value;
-}
-
-void ReadRobotParameter(const Document& file, const std::string& key, TaskDraft& draft) {
-  file.Read(key, draft.config.robot.residual_parameters[key.substr(key.rfind('.') + 1)]);
+// Rows for the map `path`, each parameter a number or, if `with_ranges`, an interval.
+std::vector<Key> Rows(const std::string& path, std::vector<std::string_view> names, bool with_ranges) {
+  std::vector<Key> keys{Word(path + ".name", std::move(names),
+                             "A residual of the library, for each model that has the names that it uses: states and "
+                             "inputs of the paper's car for heading_saturation, of its point mass for velocity_knee.")};
+  const auto add = [&](const Key& number) {
+    keys.push_back(number);
+    if (!with_ranges) return;
+    Key range = Vector(number.path, number.unit, number.range, Key::Size::kAny, "Its smallest and largest value.");
+    range.count = Between(2, 2);
+    range.only = number.only;
+    keys.push_back(std::move(range));
+  };
+  for (const auto& [residual, name, unit, range, meaning] : kParameters) {
+    ResidualText text = ResidualNamed(residual);
+    add(OnlyFor(residual,
+                Optional(Number(path + "." + name, unit, range, meaning), ToText(ParameterNamed(text, name).lower))));
+  }
+  keys.push_back(Map(path + ".parameters", "Parameters of a residual as text, in the units of its expressions."));
+  add(Number(path + ".parameters.<name>", "", kReal, "The value."));
+  keys.push_back(Map(path + ".let", "Intermediate definitions, which the expressions behind them may use."));
+  keys.push_back(
+      Expression(path + ".let.<name>",
+                 "See [docs/expressions.md](../docs/expressions.md). It may use states and inputs, the "
+                 "parameters and definitions of the model, these parameters, and the definitions before it."));
+  keys.push_back(Map(path + ".add", "A residual as text: what the states after a step have beyond the model's."));
+  keys.push_back(Expression(path + ".add.<state>", "What is added to this state. A state that is left out has zero."));
+  return keys;
 }
 
 }  // namespace
 
 // What is assumed of the residual, each parameter a number or an interval.
 std::vector<Key> ResidualKeys() {
-  std::vector<Key> keys{
+  std::vector<Key> keys = Rows("residual", Names(), true);
+  keys.insert(
+      keys.begin(),
       Map("residual",
-          "Equations of the residual with intervals for its parameters. `forereach declare` derives the declaration "
-          "from them. The certifier does not read this key."),
-      Required(Word("residual.name", NamesIn(Residuals()), ModelsOfResiduals(), ReadResidual)),
-  };
-  for (const Key& number : ParameterKeys("residual", ReadExactParameter)) {
-    keys.push_back(number);
-    Key range = Vector(number.path, number.unit, number.range, Key::Size::kAny, "Its smallest and largest value.",
-                       ReadParameterRange);
-    range.count = Between(2, 2);
-    range.only = number.only;
-    keys.push_back(std::move(range));
-  }
+          "The residual's equations, as text or by name, with intervals for its parameters. `forereach declare` "
+          "derives the declaration from them. The certifier does not use this key.",
+          [](const Document& file, const std::string& path, TaskDraft& draft) {
+            draft.config.residual = ReadResidual(file, path, *draft.problem.model);
+          }));
   return keys;
 }
 
 std::vector<Key> RobotResidualKeys() {
-  std::vector<std::string_view> names = NamesIn(Residuals());
-  names.insert(names.begin(), "none");
-  std::vector<Key> keys{
-      Optional(Map("robot.residual", "The difference between the real robot and the nominal model."), "none"),
-      Required(Word("robot.residual.name", names, ModelsOfResiduals(), ReadRobotResidual)),
-  };
-  std::ranges::move(ParameterKeys("robot.residual", ReadRobotParameter), std::back_inserter(keys));
+  std::vector<std::string_view> names = Names();
+  names.insert(names.begin(), kNone);
+  std::vector<Key> keys = Rows("robot.residual", std::move(names), false);
+  keys.insert(keys.begin(),
+              {Optional(Word("robot.residual", {kNone}, "none: the robot is the nominal model."), kNone),
+               Optional(Map("robot.residual",
+                            "The difference between the real robot and the nominal model, as text or by name.",
+                            [](const Document& file, const std::string& path, TaskDraft& draft) {
+                              if (Has(file, path, "name") && file.Text(path + ".name") == kNone) return;
+                              draft.config.robot_residual = ReadResidual(file, path, *draft.problem.model);
+                            }),
+                        kNone)});
   return keys;
 }
 

@@ -90,9 +90,10 @@ std::string Range::text() const {
 std::string SchemaMarkdown() {
   std::string text =
       "## Keys\n\n"
-      "A dot leads one map down. `[]` means every entry of a list, `<state>` the name of a state, `<variable>` the "
-      "name of a\n"
-      "state or an input, `<name>` any name. Lists of numbers are in the model's order. A range with `(` or `)` does "
+      "A dot leads one map down. `[]` means every entry of a list, `<state>` the name of a state, `<input>` that "
+      "of an input,\n"
+      "`<variable>` that of either, `<name>` any name. Lists of numbers are in the model's order. A range with `(` or "
+      "`)` does "
       "not contain\n"
       "its end. If the default is empty, the key may be left out and has no value.\n"
       "\n"

@@ -31,8 +31,8 @@ struct Range {
 inline constexpr Range kReal{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
 
 /** One row. In a path, a dot precedes each key, `[]` stands for every entry of a list, `<state>` for the name of every
-state, `<variable>` for the name of every state or input, and `<name>` for any name. A path has several rows if its
-value has several forms. */
+state, `<input>` for that of every input, `<variable>` for that of both, and `<name>` for any name. A path has several
+rows if its value has several forms. */
 struct Key {
   enum class Type {
     kMap,

@@ -19,9 +19,10 @@ static Bytes BytesOf(const ReceiveBuffer* m) { return {static_cast<const std::ui
 class PointMass final : public Supervisor::Robot {
  public:
   explicit PointMass(lcm::LCM& lcm) : lcm_(lcm) {}
-  std::span<const double> state() const override { return x_; }  // your sensors
-  void Hold() override { x_[2] = x_[3] = 0; }                    // your brakes
-  void Reload() override {}                                      // without a digest it accepts plans of every task
+  std::span<const double> state() const override { return x_; }                                   // your sensors
+  void Hold() override { x_[2] = x_[3] = 0; }                                                     // your brakes
+  int StepsToRest(std::span<const double>, std::span<const double>) const override { return 0; }  // their time
+  void Reload() override {}  // without a digest it accepts plans of every task
   void Send(const std::string& channel, Bytes message) override {
     lcm_.publish(channel, message.data(), static_cast<unsigned>(message.size()));
   }

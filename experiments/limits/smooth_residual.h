@@ -10,7 +10,7 @@ its first two derivatives get. */
 
 #include <Eigen/Core>
 
-#include "certifier/declare/residual_slopes.h"
+#include "experiments/equations_slopes.h"
 
 namespace forereach::experiments {
 

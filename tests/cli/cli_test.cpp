@@ -268,7 +268,7 @@ TEST(BadInput, AnUnknownWordBringsTheOneThatWasMeant) {
                {"verfiy x", "unknown command verfiy; did you mean verify?"},
                {"replya", "unknown command replya; did you mean replay?"},
                {"check_log x", "unknown command check_log; did you mean check-log?"},
-               {"nonsense", "unknown command nonsense; known here: certify, plan, declare"},
+               {"nonsense", "unknown command nonsense; known here: certify, init, import"},
                {"--verison", "unknown option --verison; did you mean --version?"},
                {"certify --confg x --plan y", "unknown option --confg of certify; did you mean --config?"},
                {"certify --config x --plan y --jsn", "unknown option --jsn of certify; did you mean --json?"},

@@ -217,6 +217,30 @@ TEST_F(DeclareTest, CoverIsConfirmed) {
   EXPECT_EQ(Json::parse(Declare("--json --check " + cover_).text)["verdict"], "confirmed");
 }
 
+// Slopes, a pole and a cover of a text over the domain of the task, where v is in [0, 25].
+TEST_F(DeclareTest, ATextIsBoundedAndItsCoverIsConfirmed) {
+  WriteTask("residual: {parameters: {c: [0.1, 0.2]}, let: {drag: c*v*abs(v)}, add: {v: -dt*drag, a: 0.5*abs(jerk)}}\n");
+  const Json document = Json::parse(Declare("--json --cover " + cover_).text);
+  EXPECT_NEAR(document["lipschitz"][3][3], 0.1 * 0.2 * 2 * 25, 1e-6);
+  EXPECT_EQ(document["lipschitz"][4][6], 0.5);
+  EXPECT_EQ(document["residual"]["add"]["v"], "-dt*drag");
+  EXPECT_EQ(document["residual"]["parameters"]["c"], Json::parse("[0.1, 0.2]"));
+  EXPECT_EQ(Check().code, 0) << Check().text;
+  EXPECT_THAT(Check().text, HasSubstr("check: confirmed: 2 bounds of the residual"));
+  Tamper([](Json& document) { document["entries"][1]["bound"] = document["entries"][1]["cover"] = 0.499; });
+  Reseal();
+  ExpectRefuted("a by jerk: a box's bound is");
+  for (const char* other : {"c*v*v", "c*v*abs(a)"}) {
+    WriteTask("residual: {parameters: {c: [0.1, 0.2]}, let: {drag: " + std::string(other) +
+              "}, add: {v: -dt*drag, a: 0.5*abs(jerk)}}\n");
+    ExpectRefuted("another domain, residual or parameters");
+  }
+  WriteTask("residual: {add: {v: log(v - 3)}}\n");
+  const Output output = Declare();
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr("no finite bound for the slope of v by v: the residual has none over v in ["));
+}
+
 TEST_F(DeclareTest, TamperedCoversAreRefused) {
   WriteTask("residual: {name: heading_saturation}\n");
   Declare("--cover " + cover_);
@@ -251,7 +275,9 @@ TEST_F(DeclareTest, BadInputExitsWithTwoAndOneLine) {
     EXPECT_EQ(std::count(output.text.begin(), output.text.end(), '\n'), 1) << output.text;
   };
   expect("", "residual: missing");
-  expect("residual: {name: velocity_knee}\n", "residual.name: velocity_knee is for point_mass");
+  expect(
+      "residual: {name: velocity_knee}\n",
+      "residual.name: the residual velocity_knee is for a model with the state px, which kinematic_bicycle does not");
   expect("residual: {name: heading_saturation, knee: 1}\n", "residual.knee: is for velocity_knee");
   expect("residual: {name: heading_saturation, mu: 1}\n", "residual.mu: unknown key");
   expect("residual: {name: heading_saturation, friction: [0.9, 0.8]}\n",
@@ -265,7 +291,8 @@ TEST_F(DeclareTest, BadInputExitsWithTwoAndOneLine) {
 TEST(DeclareHelp, Teaches) {
   const Output output = Forereach("declare --help");
   EXPECT_EQ(output.code, 0);
-  for (const char* text : {"--check", "exit 0", "residual: {name:", "forereach declare --config config/bicycle.yaml"})
+  for (const char* text :
+       {"--check", "exit 0", "residual: {parameters:", "forereach declare --config config/bicycle.yaml"})
     EXPECT_THAT(output.text, HasSubstr(text));
 }
 

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "certifier/dynamics/named_residuals.h"
 #include "certifier/dynamics/residuals.h"
 #include "certifier/task/schema.h"
 #include "tests/config/task_files.h"
@@ -64,8 +65,7 @@ TEST(LoadConfig, DefaultsAreThoseOfTheStructures) {
   EXPECT_EQ(config.planner.initial_half_width, (std::vector<double>{0.1, 0.1, 0.1, 0.1}));
   EXPECT_EQ(config.robot.start, (std::vector<double>{0, 0, 1, 0}));
   EXPECT_EQ(config.robot.step_period_ms, RobotOptions{}.step_period_ms);
-  EXPECT_EQ(config.robot.residual, "none");
-  EXPECT_TRUE(config.robot.residual_parameters.empty());
+  EXPECT_FALSE(config.robot_residual);
   EXPECT_EQ(config.logger.directory, "log");
   EXPECT_EQ(config.logger.queue, LoggerOptions{}.queue);
   EXPECT_EQ(config.logger.quota_mb, std::nullopt);
@@ -115,7 +115,7 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(planner.initial_half_width, (std::vector<double>{1, 2, 3, 4}));
   EXPECT_EQ(config.robot.start, (std::vector<double>{4, 3, 2, 1}));
   EXPECT_EQ(std::tie(config.robot.step_period_ms, config.robot.time_limit_s), std::make_tuple(14.0, 15.0));
-  EXPECT_EQ(config.robot.residual, "velocity_knee");
+  EXPECT_EQ(config.robot_residual->name, "velocity_knee");
   EXPECT_EQ(config.logger.directory, files.directory() / "here");
   const LoggerOptions& logger = config.logger;
   EXPECT_EQ(std::tie(logger.queue, logger.flush_ms, logger.rotate_mb, logger.rotate_minutes, logger.min_free_mb),
@@ -282,29 +282,64 @@ TEST(LoadConfig, TheLongestStepIsTheModelsOrTheRobots) {
   EXPECT_EQ(files.Load(std::string(kTask) + "robot: {step_period_ms: 200}\n").gate.longest_step_ms, 200);
 }
 
-TEST(LoadConfig, ResidualsHaveTheModelsStepAndTheResidualsOwnDefaults) {
+using Parameters = std::vector<ModelText::Parameter>;
+
+TEST(LoadConfig, NamedResidualsHaveTheModelsParametersAndThePapersValues) {
   const TaskFiles files;
   const auto given = files.Load(std::string(kTask) + "robot: {residual: {name: velocity_knee, knee: 2}}\n");
   const VelocityKnee knee{.dt = 0.15};
-  const std::map<std::string, double> expected{{"dt", 0.15},
-                                               {"damping", knee.damping},
-                                               {"cross", knee.cross},
-                                               {"knee", 2},
-                                               {"softplus_temperature", knee.softplus_temperature},
-                                               {"regularizer", knee.regularizer},
-                                               {"smoothing", knee.smoothing}};
-  EXPECT_EQ(given.robot.residual_parameters, expected);
-  EXPECT_EQ(files.Load(std::string(kTask) + "robot: {residual: none}\n").robot.residual, "none");
-  EXPECT_EQ(files.Load(std::string(kTask) + "robot: {residual: {name: none}}\n").robot.residual, "none");
+  Parameters expected;
+  for (std::size_t i = 0; i < knee.parameters().size(); ++i)
+    expected.push_back({VelocityKnee::kParameterNames[i], knee.parameters()[i], knee.parameters()[i]});
+  expected[3].lower = expected[3].upper = 2;
+  EXPECT_EQ(given.robot_residual->names.parameters, expected);
+  EXPECT_FALSE(files.Load(std::string(kTask) + "robot: {residual: none}\n").robot_residual);
+  EXPECT_FALSE(files.Load(std::string(kTask) + "robot: {residual: {name: none}}\n").robot_residual);
 
   const HeadingSaturation saturation{.dt = 0.1, .wheelbase = 2.5};
-  const std::map<std::string, double> heading{{"dt", 0.1},
-                                              {"wheelbase", 2.5},
-                                              {"understeer", saturation.understeer},
-                                              {"friction", saturation.friction},
-                                              {"gravity", saturation.gravity},
-                                              {"gate_temperature", saturation.gate_temperature}};
-  EXPECT_EQ(LoadConfig(FOREREACH_SOURCE_DIR "/config/bicycle.yaml").robot.residual_parameters, heading);
+  Parameters heading;
+  for (std::size_t i = 0; i < saturation.parameters().size(); ++i)
+    heading.push_back({HeadingSaturation::kParameterNames[i], saturation.parameters()[i], saturation.parameters()[i]});
+  EXPECT_EQ(LoadConfig(FOREREACH_SOURCE_DIR "/config/bicycle.yaml").robot_residual->names.parameters, heading);
+}
+
+// Each parameter of the library's residuals has a row, as a number and, for a proof, as an interval.
+TEST(LoadConfig, EachParameterOfANamedResidualMayBeSet) {
+  const TaskFiles files;
+  for (const ResidualText& text : NamedResiduals()) {
+    if (text.name != "velocity_knee") continue;  // that of the task's model
+    for (const auto& [name, lower, upper] : text.parameters) {
+      const std::string begin = "residual: {name: " + text.name + ", " + name + ": ";
+      const auto find = [&](const ParametricResidual& residual) {
+        return *std::ranges::find(residual.names.parameters, name, &ModelText::Parameter::name);
+      };
+      EXPECT_EQ(find(*files.Load(std::string(kTask) + begin + "[0.25, 0.5]}\n").residual),
+                (ModelText::Parameter{name, 0.25, 0.5}));
+      EXPECT_EQ(find(*files.Load(std::string(kTask) + "robot: {" + begin + "0.5}}\n").robot_residual),
+                (ModelText::Parameter{name, 0.5, 0.5}));
+    }
+  }
+}
+
+TEST(LoadConfig, ReadsResidualsAsText) {
+  const TaskFiles files;
+  const Config config = files.Load(std::string(kTask) +
+                                   "residual:\n"
+                                   "  parameters: {c: [0.1, 0.2], k: 3}\n"
+                                   "  let: {size: 'hypot(vx, vy)'}\n"
+                                   "  add: {vy: -dt*c*vy*size, px: k*ax}\n"
+                                   "robot: {residual: {parameters: {c: 0.15}, add: {vx: -c*abs(vx)}}}\n");
+  const ParametricResidual& residual = *config.residual;
+  EXPECT_EQ(residual.names.parameters, (Parameters{{"dt", 0.15, 0.15}, {"c", 0.1, 0.2}, {"k", 3, 3}}));
+  EXPECT_EQ(residual.names.states, config.problem->model->state_names());
+  EXPECT_EQ(residual.names.inputs, config.problem->model->input_names());
+  ASSERT_EQ(residual.names.definitions.size(), 1u);
+  EXPECT_EQ(residual.names.definitions[0].value.text, "hypot(vx, vy)");
+  std::vector<std::string> values;
+  for (const ExpressionText& value : residual.values) values.push_back(value.text);
+  EXPECT_EQ(values, (std::vector<std::string>{"k*ax", "0", "0", "-dt*c*vy*size"}));
+  EXPECT_EQ(config.robot_residual->names.parameters, (Parameters{{"dt", 0.15, 0.15}, {"c", 0.15, 0.15}}));
+  EXPECT_EQ(config.robot_residual->values[2].text, "-c*abs(vx)");
 }
 
 TEST(LoadConfig, ReadsBallsAndInequalities) {

@@ -47,9 +47,24 @@ TEST_F(ErrorTest, MessagesAreOneLineWhateverTheFileHolds) {
   EXPECT_EQ(
       files_.ErrorWith("dt: 0.15", "dt: 0.15, \"a\\nb\\e[2J\": 1"),
       "task.yaml:1: model.a?b?[2J: unknown key; known here: name, dt, wheelbase, file, states, inputs, parameters, "
-      "let, next, rate, integrator");
+      "let, next, rate, integrator, angles");
   EXPECT_EQ(files_.ErrorWith("name: point_mass", "name: \"point\\nmass\""),
             "task.yaml:1: model.name: point?mass is not known; did you mean point_mass?");
+}
+
+TEST_F(ErrorTest, EmergencyStops) {
+  EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {vx: 3, vy: 1e-3}}\n"), "");
+  EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {vx: 3}, hold: [vx]}\n"), "");
+  EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {vx: 3, vy: 3}, hold: [vx]}\n"),
+            "task.yaml:20: robot.emergency_stop.vy: is not zero while the robot stands: robot.hold does not name it");
+  EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {px: 3}}\n"),
+            "task.yaml:20: robot.emergency_stop.px: is not zero while the robot stands: robot.hold does not name it");
+  EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {}}\n"),
+            "task.yaml:20: robot.emergency_stop: names no state, so nothing would be braked");
+  EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {vx: 0}}\n"),
+            "task.yaml:20: robot.emergency_stop.vx: 0 is outside (0, inf)");
+  EXPECT_EQ(ErrorAfter("robot: {emergency_stop: {speed: 1}}\n"),
+            "task.yaml:20: robot.emergency_stop.speed: unknown key; known here: px, py, vx, vy");
 }
 
 TEST_F(ErrorTest, WhatStandingIs) {
@@ -109,6 +124,60 @@ TEST_F(ErrorTest, Bodies) {
     EXPECT_THAT(error("{pose: " + std::string(pose) + ", parts: [{hull: {points: " + points + "}}]}"),
                 testing::AllOf(StartsWith("task.yaml:17: task.body.pose: has "),
                                HasSubstr(", as many as the points of the body, or one more, the heading")));
+}
+
+TEST_F(ErrorTest, BodiesAtExpressions) {
+  const auto error = [&](const std::string& body) {
+    return files_.ErrorWith("  projection: [px, py]", "  body: " + body);
+  };
+  EXPECT_EQ(error("{parts: [{disc: {place: [px, vx*py], radius: 0.1}}]}"), "");
+  EXPECT_EQ(
+      error("{pose: [px, py], parts: [{disc: {at: [1, 0], radius: 0}}, {hull: {places: [[px, py], [px + 1, py]]}}]}"),
+      "");
+  EXPECT_EQ(error("{parts: [{hull: {places: [[px, py], [px]]}}]}"),
+            "task.yaml:17: task.body.parts[0].hull.places[1]: has 1 entries, which is outside [2, 3]");
+  EXPECT_EQ(
+      error("{parts: [{hull: {places: [[px, py], [px, py, vx]]}}]}"),
+      "task.yaml:17: task.body.parts[0].hull.places[1]: has 3 entries, has to have 2, as many as the first point of "
+      "the body");
+  EXPECT_EQ(error("{parts: [{disc: {place: [px, v_x], radius: 0}}]}"),
+            "task.yaml:17:38: v_x is not a name that is known here; did you mean vx?");
+  EXPECT_EQ(error("{parts: [{disc: {place: [px, ax], radius: 0}}]}"),
+            "task.yaml:14: task: body: the place ax uses an input");
+  EXPECT_EQ(error("{parts: [{disc: {radius: 0}}]}"), "task.yaml:17: task.body.parts[0].disc: missing: at or place");
+  EXPECT_EQ(
+      error("{parts: [{hull: {points: [[1, 0]], places: [[px, py]]}}]}"),
+      "task.yaml:17: task.body.parts[0].hull: has points in the robot's frame and at expressions; delete one of them");
+  EXPECT_EQ(error("{parts: [{hull: {points: [[1, 0]]}}, {disc: {place: [px, py], radius: 0}}]}"),
+            "task.yaml:17: task.body.pose: missing: the states that are the position of the robot's frame");
+}
+
+TEST_F(ErrorTest, Limits) {
+  const auto error = [&](const std::string& limits) {
+    return files_.ErrorWith("  projection:", "  limits: " + limits + "\n  projection:");
+  };
+  EXPECT_EQ(error("[]"), "");
+  EXPECT_EQ(
+      error("[{name: force, that: \"2*hypot(ax, ay)\", at_most: 6}, {name: lane, that: py, at_least: -1, at_most: 2}]"),
+      "");
+  EXPECT_EQ(error("[{name: force, that: ax, at_most: 6, at_last: 1}]"),
+            "task.yaml:17: task.limits[0].at_last: unknown key; did you mean at_least?");
+  EXPECT_THAT(error("[{name: force, at_most: 6}]"), StartsWith("task.yaml:17: task.limits[0].that: missing: "));
+  EXPECT_THAT(error("[{that: ax, at_most: 6}]"), StartsWith("task.yaml:17: task.limits[0].name: missing: "));
+  EXPECT_EQ(error("[{name: force, that: ax}]"),
+            "task.yaml:17: task.limits[0]: bounds nothing, has to have at_most, at_least or both");
+  EXPECT_EQ(error("[{name: force, that: ax, at_most: 1, at_least: 2}]"),
+            "task.yaml:17: task.limits[0].at_most: 1 is outside [2, inf), below task.limits[0].at_least");
+  EXPECT_THAT(error("[{name: force, that: ax, at_most: .inf}]"),
+              StartsWith("task.yaml:17: task.limits[0].at_most: .inf is not a finite number"));
+  EXPECT_EQ(error("[{name: a, that: ax, at_most: 1}, {name: a, that: ay, at_most: 1}]"),
+            "task.yaml:17: task.limits[1].name: a is the name of task.limits[0], too");
+  EXPECT_EQ(error("[{name: a, that: ax + v_x, at_most: 1}]"),
+            "task.yaml:17:33: v_x is not a name that is known here; did you mean vx?");
+  EXPECT_EQ(error("[{name: a, that: \"softplus(ax, 1)\", at_most: 1}]"),
+            "task.yaml:14: task: softplus and smooth_gate are for residuals: a nominal model needs derivatives");
+  EXPECT_THAT(error("[{name: " + std::string(49, 'a') + ", that: ax, at_most: 1}]"),
+              StartsWith("task.yaml:14: task: limits: limit 0: its name has 49 bytes, must be 1 to 48"));
 }
 
 TEST_F(ErrorTest, ABodyHasAtMostSixteenPointsInAll) {
@@ -201,7 +270,31 @@ TEST_F(ErrorTest, KeysOfAnotherModel) {
   EXPECT_EQ(ErrorAfter("robot: {residual: {name: velocity_knee, friction: 1}}\n"),
             "task.yaml:20: robot.residual.friction: is for heading_saturation, not for velocity_knee");
   EXPECT_EQ(ErrorAfter("robot: {residual: {name: heading_saturation}}\n"),
-            "task.yaml:20: robot.residual.name: heading_saturation is for kinematic_bicycle, the model is point_mass");
+            "task.yaml:20: robot.residual.name: the residual heading_saturation is for a model with the state theta, "
+            "which point_mass does not have");
+}
+
+TEST_F(ErrorTest, ResidualsAsText) {
+  const auto with = [&](const std::string& value) { return ErrorAfter("residual: {" + value + "}\n"); };
+  EXPECT_EQ(with(""),
+            "task.yaml:20: residual: has neither add, what the next states have beyond the model's, nor name");
+  EXPECT_EQ(with("name: velocity_knee, add: {vx: vx}"),
+            "task.yaml:20: residual: has both name and add; delete one of them");
+  EXPECT_EQ(with("name: velocity_knee, parameters: {c: 1}"),
+            "task.yaml:20: residual.parameters: is for a residual as text, this one has a name");
+  EXPECT_EQ(with("add: {vz: 1}"), "task.yaml:20: residual.add.vz: unknown key; did you mean vx?");
+  EXPECT_EQ(with("add: {vx: vx*drug}, parameters: {drag: 1}"),
+            "task.yaml:20:25: drug is not a name that is known here; did you mean drag?");
+  EXPECT_EQ(with("add: {vx: c}, parameters: {c: [2, 1]}"),
+            "task.yaml:20: residual.parameters.c[1]: 1 is outside [2, inf), below residual.parameters.c[0]");
+  EXPECT_EQ(with("add: {vx: dt}, parameters: {dt: 1}"), "task.yaml:20: residual: the name dt is used twice");
+  EXPECT_EQ(with("add: {vx: sin}, parameters: {sin: 1}"),
+            "task.yaml:20: residual: the name sin belongs to the language");
+  EXPECT_EQ(with("add: {vx: vx}, let: {vy: vx}"), "task.yaml:20: residual: the name vy is used twice");
+  EXPECT_EQ(with("add: {vx: b}, let: {a: b, b: vx}"),
+            "task.yaml:20:35: b is not a name that is known here; known here: px, py, vx, vy, ax, ay, dt, pi");
+  EXPECT_EQ(ErrorAfter("robot: {residual: {add: {vx: c}, parameters: {c: [1, 2]}}}\n"),
+            "task.yaml:20: robot.residual.parameters.c: a list is not a number; write a number in (-inf, inf)");
 }
 
 TEST_F(ErrorTest, Disturbances) {
@@ -227,7 +320,7 @@ TEST_F(ErrorTest, MissingKeys) {
               StartsWith("task.yaml:18: task.obstacles[0].circle.radius: missing: "));
   EXPECT_EQ(ErrorAfter("planner: {source: policy}\n"),
             "task.yaml:20: planner.policy: missing: a policy's file, for planner.source: policy");
-  EXPECT_THAT(ErrorAfter("robot: {residual: {}}\n"), StartsWith("task.yaml:20: robot.residual.name: missing: "));
+  EXPECT_THAT(ErrorAfter("robot: {residual: {}}\n"), StartsWith("task.yaml:20: robot.residual: has neither add"));
 }
 
 TEST_F(ErrorTest, DoubleKeys) {

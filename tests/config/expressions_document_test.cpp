@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/expression.h"
+#include "certifier/dynamics/program.h"
 #include "certifier/numerics/limits.h"
 #include "command_line/nearest.h"
 #include "tests/config/task_files.h"
@@ -75,11 +76,12 @@ TEST(ExpressionsDocument, ErrorsAreThoseOfTheTable) {
 
 TEST(ExpressionsDocument, LimitsAreThoseOfTheCode) {
   const auto rows = Rows("| what | at most |");
-  ASSERT_EQ(rows.size(), 7u);
+  ASSERT_EQ(rows.size(), 8u);
   EXPECT_EQ(rows[0][1], std::to_string(kMaxStates) + ", at least 1");
   EXPECT_EQ(rows[1][1], std::to_string(kMaxInputs) + ", at least 1");
   EXPECT_EQ(rows[4][1], std::to_string(kLargestExpression));
   EXPECT_EQ(rows[5][1], std::to_string(kDeepestExpression));
+  EXPECT_EQ(rows[7][1], std::to_string(ProgramDraft::kMaxOperations));
   EXPECT_THAT(Document(), testing::HasSubstr("from -" + std::to_string(kLargestWholePower) + " to " +
                                              std::to_string(kLargestWholePower)));
 }
@@ -90,14 +92,27 @@ TEST(ExpressionsDocument, ModelsLoad) {
   const struct {
     std::size_t states, inputs;
     const char* projection;
-  } sizes[] = {{5, 2, "x, y"}, {2, 1, "angle"}, {5, 2, "x, y"}};
+  } sizes[] = {{5, 2, "x, y"}, {2, 1, "angle"}, {5, 2, "x, y"}, {4, 2, "x, y"}};
   const ScratchDirectory directory;
   std::size_t count = 0;
-  for (std::sregex_iterator at(document.begin(), document.end(), block), end; at != end; ++at, ++count) {
+  std::string first;
+  for (std::sregex_iterator at(document.begin(), document.end(), block), end; at != end; ++at) {
+    const std::string text = (*at)[1].str(), task = "task:\n";
+    if (text.starts_with(task)) {  // what a task of the first model may have
+      const std::string arm =
+          Replaced(TaskFor("model: {file: " FOREREACH_SOURCE_DIR "/config/models/two_link_arm.yaml}\n", 4, 2, "q1"),
+                   "  projection: [q1]\n", "");
+      const std::string& whole = text.find("body:") == std::string::npos ? first : arm;
+      EXPECT_NO_THROW(
+          (void)LoadConfig(directory.Write("task.yaml", whole + text.substr(task.size())), TransitionsFile::kIgnore))
+          << text;
+      continue;
+    }
     ASSERT_LT(count, std::size(sizes));
     const std::string model =
         std::regex_replace((*at)[1].str(), std::regex("models/"), FOREREACH_SOURCE_DIR "/config/models/");
-    const auto& [states, inputs, projection] = sizes[count];
+    const auto& [states, inputs, projection] = sizes[count++];
+    if (first.empty()) first = TaskFor(model, states, inputs, projection);
     const Config config =
         LoadConfig(directory.Write("task.yaml", TaskFor(model, states, inputs, projection)), TransitionsFile::kIgnore);
     EXPECT_EQ(config.problem->model->num_states(), static_cast<int>(states));

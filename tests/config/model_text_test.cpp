@@ -275,9 +275,9 @@ TEST_F(ModelFileTest, ErrorsNameTheFileThatIsWrong) {
   EXPECT_EQ(Error("model: {file: drag.yaml}\n"),
             "drag.yaml:11:18: axx is not a name that is known here; did you mean ax?");
   files_.directory().Write("drag.yaml", "model: {file: drag.yaml}\n");
-  EXPECT_EQ(
-      Error("model: {file: drag.yaml}\n"),
-      "drag.yaml:1: model.file: unknown key; known here: states, inputs, parameters, let, next, rate, integrator");
+  EXPECT_EQ(Error("model: {file: drag.yaml}\n"),
+            "drag.yaml:1: model.file: unknown key; known here: states, inputs, parameters, let, next, rate, "
+            "integrator, angles");
   files_.directory().Write("drag.yaml", std::string(kModel) + "domain: {}\n");
   EXPECT_EQ(Error("model: {file: drag.yaml}\n"), "drag.yaml:13: domain: unknown key; known here: model");
 }
@@ -287,6 +287,100 @@ TEST_F(ModelFileTest, AnotherFileCanBeReadInstead) {
   files_.directory().Write("steps.csv", kTransitions);
   const Config config = LoadConfig(task, NamedFiles{{}, {}, files_.directory() / "drag.yaml"});
   EXPECT_EQ(config.problem->model->text()->name, "gone");
+}
+
+// A unicycle in the plane; `more` are further lines of the model.
+std::string Turning(const std::string& more, const std::string& projection = "x, y") {
+  return TaskFor(
+      "model:\n"                                                                                          // 1
+      "  states: {x: m, y: m, theta: rad, v: m/s}\n"                                                      // 2
+      "  inputs: {a: m/s^2, omega: rad/s}\n"                                                              // 3
+      "  parameters: {dt: 0.1}\n"                                                                         // 4
+      "  next: {x: x + dt*v*cos(theta), y: y + dt*v*sin(theta), theta: theta + dt*omega, v: v + dt*a}\n"  // 5
+          + more,                                                                                         // 6
+      4, 2, projection);
+}
+
+constexpr const char* kNoTurn =
+    "x,y,theta,v,a,omega,x_next,y_next,theta_next,v_next\n"
+    "0,0,0,0,0,0,0,0,0,0\n";
+constexpr const char* kTurns =
+    "x,y,theta,v,a,omega,x_next,y_next,theta_next,v_next\n"
+    "0,0,0,0,0,0,0,0,-6.2,0\n"
+    "0,0,0.5,0,0,0,0,0,13,0\n";
+
+class AnglesTest : public testing::Test {
+ protected:
+  std::string Error(const std::string& task, const std::string& steps = kNoTurn) const {
+    return files_.Error(task, steps);
+  }
+  TaskFiles files_;
+};
+
+TEST_F(AnglesTest, AreStatesThatTheEquationsDoNotTellApart) {
+  const Config config = files_.Load(Turning("  angles: [theta]\n"), kTurns), none = files_.Load(Turning(""), kNoTurn);
+  EXPECT_EQ(config.problem->model->angles(), std::vector<int>{2});
+  EXPECT_TRUE(none.problem->model->angles().empty());
+  EXPECT_NE(config.grounds.model, none.grounds.model);
+  EXPECT_EQ(files_.Load(Turning("  angles: []\n"), kNoTurn).grounds.model, none.grounds.model);
+  EXPECT_EQ(Error(Turning("  angles: [thetta]\n")),
+            "task.yaml:6: model.angles[0]: thetta is not a coordinate; did you mean theta?");
+  EXPECT_THAT(Error(Turning("  angles: [v]\n")),
+              HasSubstr("angles: v: the equation of x is not seen to be the same after a turn of it by 2 pi"));
+  EXPECT_THAT(Error(Turning("  angles: [omega]\n")), HasSubstr("model.angles[0]: omega is not a coordinate"));
+}
+
+TEST_F(AnglesTest, AreNotCoordinatesOfObstacles) {
+  EXPECT_EQ(
+      Error(Turning("  angles: [theta, x]\n")),
+      "task.yaml:14: task.projection: depends on x, which is one of model.angles: how often an angle has turned is "
+      "not known");
+}
+
+TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
+  const auto with = [](const std::string& that) {
+    return Turning("  angles: [theta]\n") + "  limits: [{name: wall, that: " + that + ", at_most: 2}]\n";
+  };
+  EXPECT_EQ(Error(with("v*cos(theta)")), "");
+  EXPECT_THAT(Error(with("x + theta")), HasSubstr("limits: wall is not seen to be the same after a turn of the angle "
+                                                  "theta by 2 pi: write it with sin, cos or tan of it"));
+}
+
+TEST_F(AnglesTest, ATransitionWhoseTurnsCannotBeToldIsRefusedWithItsLine) {
+  EXPECT_EQ(Error(Turning("  angles: [theta]\n"), std::string(kTurns) + "0,0,0,0,0,0,0,0,2,0\n"),
+            "steps.csv:4: transition 2: theta is 2 rad away from the nominal model's next value, up to whole turns, "
+            "which is more than pi/2: how often it has turned cannot be told");
+}
+
+TEST_F(AnglesTest, OfACompiledModel) {
+  const auto task = [](const std::string& model) { return TaskFor(model, 6, 2, "x, y"); };
+  const std::string columns =
+      "x,y,theta,v,a,delta,jerk,steer_rate,x_next,y_next,theta_next,v_next,a_next,delta_next\n0,0,0,0,0,0,0,0,0,0,-6.2,"
+      "0,"
+      "0,0\n";
+  const auto model = [](const std::string& angles) {
+    return "model: {name: kinematic_bicycle, dt: 0.1, wheelbase: 2, angles: [" + angles + "]}\n";
+  };
+  EXPECT_EQ(files_.Load(task(model("theta")), columns).problem->model->angles(), std::vector<int>{2});
+  EXPECT_EQ(Error(task(model("teta")), columns), "task.yaml:1: model.angles: teta is no state; did you mean theta?");
+  EXPECT_THAT(Error(task(model("v")), columns), HasSubstr("angles: v: the equation of x"));
+  EXPECT_EQ(Error(TaskFor("model: {name: point_mass, dt: 0.1, angles: [px]}\n", 4, 2, "px, py")),
+            "task.yaml:1: model.angles: no state of point_mass is an angle");
+}
+
+TEST_F(AnglesTest, OfAModelFileMayBeReplaced) {
+  files_.directory().Write(
+      "model.yaml",
+      "model:\n  states: {x: m, y: m, theta: rad}\n  inputs: {u: rad/s}\n  parameters: {dt: 0.1}\n"
+      "  next: {x: x + dt*cos(theta), y: y + dt*sin(theta), theta: theta + dt*u}\n  angles: [theta]\n");
+  const std::string steps = "x,y,theta,u,x_next,y_next,theta_next\n0,0,0,0,0,0,0\n";
+  const auto load = [&](const std::string& more) {
+    return files_.Load(TaskFor("model: {file: model.yaml" + more + "}\n", 3, 1, "x, y"), steps);
+  };
+  EXPECT_EQ(load("").problem->model->angles(), std::vector<int>{2});
+  EXPECT_TRUE(load(", angles: []").problem->model->angles().empty());
+  EXPECT_THAT(Error(TaskFor("model: {file: model.yaml, angles: [u]}\n", 3, 1, "x, y"), steps),
+              HasSubstr("task.yaml:1: model.angles: u is no state"));
 }
 
 }  // namespace

@@ -163,6 +163,32 @@ TEST(Shipped, AModelAsTextDecidesAsTheCompiledOneInOtherTasks) {
   }
 }
 
+TEST(Shipped, ACarKeepsItsLaneOrNot) {
+  const Config config = LoadConfig(kDirectory + "lane.yaml");
+  const auto decide = [&](const std::string& plan) {
+    return Decide(config, LoadPlan(kDirectory + "plans/" + plan + ".csv", *config.problem->model));
+  };
+  const Decision straight = decide("straight"), turn = decide("lane_turn");
+  EXPECT_EQ(Explain(straight, *config.problem),
+            "certified: no obstacle is there; within its limits at the sample instants");
+  EXPECT_EQ(turn.cause, Cause::kLimit);
+  EXPECT_THAT(Explain(turn, *config.problem), testing::HasSubstr("left front corner may reach"));
+}
+
+// Its forearm comes near the post at the end, and would meet one that stands a tenth of a metre nearer.
+TEST(Shipped, AnArmReachesPastAPost) {
+  Config config = LoadConfig(kDirectory + "arm.yaml");
+  const Eigen::MatrixXd plan = LoadPlan(kDirectory + "plans/arm_reach.csv", *config.problem->model);
+  const Decision reaches = Decide(config, plan);
+  EXPECT_EQ(reaches.outcome, Outcome::kCertified) << Explain(reaches, *config.problem);
+  EXPECT_EQ(reaches.obstacle, 0);
+  EXPECT_EQ(reaches.part, 1);
+  config.obstacles = {Obstacle::Circle(Eigen::Vector2d(1.02, 1.13), 0.08)};
+  const Decision touches = Decide(config, plan);
+  EXPECT_EQ(touches.cause, Cause::kObstacle);
+  EXPECT_EQ(touches.part, 1);
+}
+
 // What a robot on the bus drives has to end standing; coasting does not, standing still does.
 TEST(Shipped, ARobotsPlanHasToEndStanding) {
   for (const std::string task : {"demo", "policy"}) {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/saturation.h"
 
 namespace forereach {
 namespace {
@@ -58,6 +58,28 @@ TEST(Jet, WhatIsOffIsExactlyZero) {
   EXPECT_EQ(off.value, Interval(0, 0));
   EXPECT_EQ(off.slope, Interval(0, 0));
   EXPECT_EQ((off * abs(Jet::Argument({-1, 1}, 0, true))).curvature[0], Interval(0, 0));
+}
+
+// What a program's derivatives consist of.
+TEST(Jet, OfJumpsIsFlatBesideThemAndUnboundedAcross) {
+  const Jet beside = Jet::Argument({0.5, 2}, 0, true), across = Jet::Argument({-1, 2}, 0, true);
+  EXPECT_EQ(step(beside).value, Interval(1, 1));
+  EXPECT_EQ(sign(-beside).value, Interval(-1, -1));
+  for (const Jet& flat : {step(beside), sign(-beside), kink(beside), cut(across, beside), cut(beside, across)}) {
+    EXPECT_EQ(flat.slope, Interval(0, 0));
+    EXPECT_EQ(flat.curvature[0], Interval(0, 0));
+  }
+  EXPECT_EQ(step(across).value, Interval(0, 1));
+  EXPECT_EQ(sign(across).value, Interval(-1, 1));
+  for (const Jet& jump : {step(across), sign(across), kink(across), cut(across, -beside)})
+    EXPECT_FALSE(jump.slope.IsFinite());
+}
+
+TEST(Jet, OfTheTangentsCurvature) {
+  const Jet t = TanCurvature(Jet::Argument({1, 2}, 0, true));  // 2 t + 2 t^3
+  EXPECT_EQ(t.value, Interval(4, 20));
+  EXPECT_EQ(t.slope, Interval(8, 26));
+  EXPECT_EQ(t.curvature[0], Interval(12, 24));
 }
 
 TEST(Jet, SquareIsNotNegative) {

@@ -12,6 +12,8 @@
 
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
+#include "certifier/dynamics/text_model.h"
+#include "tests/text_models.h"
 
 namespace forereach {
 namespace {
@@ -175,18 +177,8 @@ TEST(MotionBound, ThereIsNoneOverAPoleOfTheTangent) {
 }
 
 // x' = x^2 from x = 1 is infinite after a second.
-struct Explosion {
-  static constexpr int kStates = 1, kInputs = 1;
-  static constexpr std::array<const char*, 1> kParameterNames{"unused"};
-  template <class T>
-  static void Rate(std::span<const T>, std::span<const T> z, std::span<T> rate) {
-    rate[0] = z[0] * z[0];
-  }
-};
-
 TEST(MotionBound, ThereIsNoneWhereTheMotionEndsBeforeThePeriod) {
-  const std::array<double, 1> unused{0};
-  const EquationsFlow<Explosion> flow(unused);
+  const Flow flow({{"x"}, {"u"}, {}, {}}, std::vector<ExpressionText>{{"x^2"}});
   const Domain domain = DomainOf(Eigen::VectorXd::Zero(1), Eigen::VectorXd::Ones(1), Eigen::VectorXd::Ones(1));
   const Eigen::MatrixXd projection = Eigen::MatrixXd::Ones(1, 1);
   const auto bound = [&](double period) {
@@ -214,6 +206,33 @@ TEST(MotionBound, OfWeightedStatesAddsThemUp) {
   const Domain domain = DomainOf(Eigen::Vector4d(-9, -9, -3, -3), Eigen::Vector4d(9, 9, 3, 3), Eigen::Vector2d(2, 0.5));
   const Eigen::MatrixXd projection{{1, -4, 0, 0}};
   EXPECT_EQ(BoundMotion({*flow, domain, 0.15, projection, -1, NoRest(4)}).acceleration.at(0).upper, 4);
+}
+
+// A text with rates has the bounds of the compiled model with the same equations.
+TEST(MotionBound, OfATextIsThatOfItsRates) {
+  ModelText text = BicycleText(0.1, 2.5);
+  text.equations = {{"v*cos(theta)"}, {"v*sin(theta)"}, {"v*tan(delta)/wheelbase"}, {"a"}, {"jerk"}, {"steer_rate"}};
+  const Domain domain = BicycleDomain(12, 3, 0.36);
+  const MotionBounds compiled = Bound(*MakeKinematicBicycle(0.1, 2.5), domain, 0.1, 2, NoRest(6));
+  for (const auto integrator : {ModelText::Integrator::kEuler, ModelText::Integrator::kRk4}) {
+    text.integrator = integrator;
+    const MotionBounds bounds = Bound(*MakeTextModel(text), domain, 0.1, 2, NoRest(6));
+    for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(bounds.acceleration[i].upper, compiled.acceleration[i].upper);
+    EXPECT_EQ(bounds.turn_acceleration.upper, compiled.turn_acceleration.upper);
+  }
+  text.integrator = ModelText::Integrator::kNone;
+  EXPECT_EQ(MakeFlow(*MakeTextModel(text)), nullptr);
+}
+
+// a = c u with c in [1, 2].
+TEST(MotionBound, HoldsForAllParameters) {
+  const Flow flow({{"x", "v"}, {"u"}, {{"c", 1, 2}}, {}}, std::vector<ExpressionText>{{"v"}, {"c*u"}});
+  const Domain domain = DomainOf(Eigen::Vector2d(-9, -3), Eigen::Vector2d(9, 3), Eigen::VectorXd::Constant(1, 5));
+  const Eigen::MatrixXd projection{{1, 0}};
+  const MotionBound bound =
+      BoundMotion({flow, domain, 0.1, projection, -1, NoRest(2)}, {.max_boxes = 100}).acceleration.at(0);
+  EXPECT_GE(bound.upper, 10);
+  EXPECT_LE(bound.upper, 10 * (1 + 1e-12));
 }
 
 TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {

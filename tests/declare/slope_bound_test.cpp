@@ -7,55 +7,23 @@
 
 #include <gtest/gtest.h>
 
+#include "certifier/dynamics/residuals.h"
+#include "experiments/equations_slopes.h"
 #include "tests/declare/families.h"
 
 namespace forereach {
 namespace {
 
-// Two states, one input, one parameter.
-struct TwoStates {
-  static constexpr int kStates = 2, kInputs = 1;
-};
-
-// r_0 = c (z0^3 - 3 z0 z1^2): slopes 3 c (z0^2 - z1^2) and -6 c z0 z1. r_1 = max(z0, z1) + |z2| / 2.
-struct Cubic {
-  using Nominal = TwoStates;
-  static constexpr const char* kName = "cubic";
-  static constexpr std::array<const char*, 1> kParameterNames{"c"};
-
-  template <class T>
-  static void Evaluate(std::span<const T> parameters, std::span<const T> z, std::span<T> residual) {
-    using std::abs, std::max;
-    residual[0] = parameters[0] * (z[0] * z[0] * z[0] - T(3) * z[0] * (z[1] * z[1]));
-    residual[1] = max(z[0], z[1]) + abs(z[2]) / T(2);
-  }
-};
-
-// r_0 = sin(z0) cos(z1): slope cos(z0) cos(z1), largest in the middle. r_1 = z0^2 / 2 + z0 z1.
-struct Wave {
-  using Nominal = TwoStates;
-  static constexpr const char* kName = "wave";
-  static constexpr std::array<const char*, 1> kParameterNames{"unused"};
-
-  template <class T>
-  static void Evaluate(std::span<const T>, std::span<const T> z, std::span<T> residual) {
-    using std::cos, std::sin;
-    residual[0] = sin(z[0]) * cos(z[1]);
-    residual[1] = z[0] * z[0] / T(2) + z[0] * z[1];
-  }
-};
-
-Domain Square(double half_width) {
-  Domain domain;
-  domain.state = Box(Eigen::Vector2d::Constant(-half_width), Eigen::Vector2d::Constant(half_width));
-  domain.input = Box(Eigen::VectorXd::Constant(1, -1), Eigen::VectorXd::Constant(1, 1));
-  return domain;
+// Slopes 3 c (x^2 - y^2) and -6 c x y; the second has kinks.
+Family Cubic(const Domain& domain, const Interval& c = {1, 1}) {
+  return Made(domain, "c*(x*x*x - 3*x*y^2)", "max(x, y) + abs(u)/2", c);
 }
 
-template <class Residual>
-SlopeBound Bound(const Domain& domain, int row, int column, const Interval& parameter = {1, 1}) {
-  return BoundSlope(EquationsSlopes<Residual>(), domain, {&parameter, 1}, row, column);
-}
+// The first slope is largest in the middle.
+Family Wave(const Domain& domain) { return Made(domain, "sin(x)*cos(y)", "x^2/2 + x*y"); }
+
+// No finite slope of the first where the domain has x = c.
+Family Pole(const Domain& domain, const Interval& c = {1, 1}) { return Made(domain, "1/(x - c)", "x*y*u^2", c); }
 
 void ExpectSupremum(const SlopeBound& bound, double supremum) {
   EXPECT_GE(bound.upper, supremum * (1 - 1e-15));
@@ -67,24 +35,24 @@ void ExpectSupremum(const SlopeBound& bound, double supremum) {
 }
 
 TEST(SlopeBound, OfAPolynomialInACorner) {
-  ExpectSupremum(Bound<Cubic>(Square(2), 0, 0), 12);
-  ExpectSupremum(Bound<Cubic>(Square(2), 0, 1), 24);
+  ExpectSupremum(Cubic(Square(2)).Bound(0, 0), 12);
+  ExpectSupremum(Cubic(Square(2)).Bound(0, 1), 24);
 }
 
-TEST(SlopeBound, OverAParameter) { ExpectSupremum(Bound<Cubic>(Square(2), 0, 1, {-3, 2}), 72); }
+TEST(SlopeBound, OverAParameter) { ExpectSupremum(Cubic(Square(2), {-3, 2}).Bound(0, 1), 72); }
 
 TEST(SlopeBound, OfAKinkIsTheGeneralisedGradients) {
-  ExpectSupremum(Bound<Cubic>(Square(2), 1, 0), 1);
-  ExpectSupremum(Bound<Cubic>(Square(2), 1, 2), 0.5);
+  ExpectSupremum(Cubic(Square(2)).Bound(1, 0), 1);
+  ExpectSupremum(Cubic(Square(2)).Bound(1, 2), 0.5);
 }
 
-TEST(SlopeBound, InsideAnInterval) { ExpectSupremum(Bound<Wave>(Square(2), 0, 0), 1); }
+TEST(SlopeBound, InsideAnInterval) { ExpectSupremum(Wave(Square(2)).Bound(0, 0), 1); }
 
 TEST(SlopeBound, OverABallItsBoundaryCounts) {
   Domain domain = Square(2);
   domain.balls.push_back({{0, 1}, Eigen::Vector2d::Zero(), 2});
-  ExpectSupremum(Bound<Cubic>(domain, 0, 1), 12);                 // 6 z0 z1 on |z| <= 2
-  ExpectSupremum(Bound<Wave>(domain, 1, 0), 2 * std::sqrt(2.0));  // z0 + z1
+  ExpectSupremum(Cubic(domain).Bound(0, 1), 12);                 // 6 x y on |z| <= 2
+  ExpectSupremum(Wave(domain).Bound(1, 0), 2 * std::sqrt(2.0));  // x + y
 }
 
 TEST(SlopeBound, OverAnInequality) {
@@ -93,11 +61,11 @@ TEST(SlopeBound, OverAnInequality) {
   coefficients << 2, 1, 0;
   domain.inequalities.push_back({coefficients, 1});
   domain.inequalities.push_back({-coefficients, 1});
-  ExpectSupremum(Bound<Wave>(domain, 1, 0), 1.5);  // |z0 + z1| where |2 z0 + z1| <= 1
+  ExpectSupremum(Wave(domain).Bound(1, 0), 1.5);  // |x + y| where |2 x + y| <= 1
 }
 
 TEST(SlopeBound, OfWhatDoesNotOccurIsZero) {
-  const SlopeBound bound = Bound<Wave>(Square(2), 0, 2);
+  const SlopeBound bound = Wave(Square(2)).Bound(0, 2);
   EXPECT_EQ(bound.upper, 0);
   EXPECT_TRUE(bound.reached);
 }
@@ -111,24 +79,10 @@ TEST(SlopeBound, AtTheWorkLimitHoldsAndSaysSo) {
   EXPECT_LE(bound.boxes, 502u);
 }
 
-// r_0 = 1 / (z0 - c): no finite slope where the domain holds the pole.
-struct Pole {
-  using Nominal = TwoStates;
-  static constexpr const char* kName = "pole";
-  static constexpr std::array<const char*, 1> kParameterNames{"c"};
-
-  template <class T>
-  static void Evaluate(std::span<const T> parameters, std::span<const T> z, std::span<T> residual) {
-    residual[0] = T(1) / (z[0] - parameters[0]);
-    residual[1] = z[0] * z[1] * (z[2] * z[2]);
-  }
-};
-
 // A pole is found at once, not after 2^d boxes around it, however many are allowed.
 TEST(SlopeBound, OverAPoleNamesABoxAndEnds) {
   for (const double pole : {0.0, 0.3, 2.0, -2.0, 0x1p-1074}) {
-    const Interval c(pole);
-    const SlopeBound bound = BoundSlope(EquationsSlopes<Pole>(), Square(2), {&c, 1}, 0, 0, {1e-7, 100'000'000});
+    const SlopeBound bound = Pole(Square(2), pole).Bound(0, 0, {1e-7, 100'000'000});
     EXPECT_EQ(bound.upper, kInfinity);
     EXPECT_FALSE(bound.reached);
     EXPECT_LT(bound.boxes, 10'000u) << pole;
@@ -138,55 +92,42 @@ TEST(SlopeBound, OverAPoleNamesABoxAndEnds) {
   }
 }
 
-// r_0 = SmoothGate(z0 - 1) log(z0 + c): zero below 1, but for z0 <= -c it is undefined.
-struct GatedLogarithm {
-  using Nominal = TwoStates;
-  static constexpr const char* kName = "gated_logarithm";
-  static constexpr std::array<const char*, 1> kParameterNames{"c"};
-
-  template <class T>
-  static void Evaluate(std::span<const T> parameters, std::span<const T> z, std::span<T> residual) {
-    using std::log;
-    residual[0] = SmoothGate(z[0] - T(1)) * log(z[0] + parameters[0]);
-    residual[1] = z[1];
-  }
-};
-
+// Zero for x below 1, but for x <= -c it is undefined.
 TEST(SlopeBound, OfWhatIsUndefinedIsInfiniteThoughItIsOff) {
-  const SlopeBound undefined = Bound<GatedLogarithm>(Square(2), 0, 0, {0, 0});
+  const auto bound = [](double c) { return Made(Square(2), "smooth_gate(x - 1)*log(x + c)", "y", c).Bound(0, 0); };
+  const SlopeBound undefined = bound(0);
   EXPECT_EQ(undefined.upper, kInfinity);
   ASSERT_FALSE(undefined.unbounded.empty());
   EXPECT_LE(undefined.unbounded[0].lower, 0);
-  const SlopeBound defined = Bound<GatedLogarithm>(Square(2), 0, 0, {2.5, 2.5});
+  const SlopeBound defined = bound(2.5);
   EXPECT_TRUE(defined.reached);
   EXPECT_GT(defined.upper, 0.1);
 }
 
 TEST(SlopeBound, OfAPoleAmongTheParametersNamesABoxAndEnds) {
-  const SlopeBound bound = Bound<Pole>(Square(2), 0, 0, {1, 5});
+  const SlopeBound bound = Pole(Square(2), {1, 5}).Bound(0, 0);
   EXPECT_EQ(bound.upper, kInfinity);
   EXPECT_FALSE(bound.unbounded.empty());
 }
 
 TEST(SlopeBound, BesideAPoleIsFinite) {
-  ExpectSupremum(Bound<Pole>(Square(2), 0, 0, {2.5, 4}), 4);
+  ExpectSupremum(Pole(Square(2), {2.5, 4}).Bound(0, 0), 4);
   Domain domain = Square(2);  // the pole at 1 is in the box, not in the domain
   Eigen::VectorXd coefficients(3);
   coefficients << 1, 0, 0;
   domain.inequalities.push_back({coefficients, 0.5});
-  const SlopeBound bound = Bound<Pole>(domain, 0, 0, {1, 1});
+  const SlopeBound bound = Pole(domain, {1, 1}).Bound(0, 0);
   ExpectSupremum(bound, 4);
   EXPECT_TRUE(bound.unbounded.empty());
 }
 
 // Widths that overflow, that are subnormal, that have no double between their ends: it ends, and what it says holds.
 TEST(SlopeBound, EndsOnEveryScale) {
-  const Interval one(1, 1);
   for (const double size : {kMaxDouble, 0x1p+1000, 0x1p+400, 1e-300, 0x1p-1022, 0x3p-1074, 0x1p-1074, 0.0}) {
     const Domain domain = Square(size);
     for (const auto& [row, column] : {std::pair{0, 0}, {0, 1}, {1, 0}, {1, 1}, {1, 2}}) {
-      const SlopeBound wave = BoundSlope(EquationsSlopes<Wave>(), domain, {&one, 1}, row, column, {1e-7, 3000});
-      const SlopeBound cubic = BoundSlope(EquationsSlopes<Cubic>(), domain, {&one, 1}, row, column, {1e-7, 3000});
+      const SlopeBound wave = Wave(domain).Bound(row, column, {1e-7, 3000});
+      const SlopeBound cubic = Cubic(domain).Bound(row, column, {1e-7, 3000});
       for (const SlopeBound& bound : {wave, cubic}) {
         EXPECT_LE(bound.boxes, 3002u);
         EXPECT_GE(bound.upper, bound.lower) << size;
@@ -198,7 +139,7 @@ TEST(SlopeBound, EndsOnEveryScale) {
       }
       if (row == 1 && column == 0) {
         EXPECT_GE(cubic.upper, 1);
-        EXPECT_GE(wave.upper, std::min(2 * size, kMaxDouble));  // |z0 + z1|
+        EXPECT_GE(wave.upper, std::min(2 * size, kMaxDouble));  // |x + y|
       }
     }
   }
@@ -206,12 +147,11 @@ TEST(SlopeBound, EndsOnEveryScale) {
 
 // Slopes that are finite up to the largest double, over ranges whose width overflows: none may come out as nothing.
 TEST(SlopeBound, NextToOverflowNothingIsTakenForZero) {
-  const Interval one(1, 1);
   for (const double size : {0x1p+341, 0x1p+511, 0x1p+512, 0x1p+600}) {
     const Domain domain = Square(size);
     for (int column = 0; column < 2; ++column) {
-      const SlopeBound bound = BoundSlope(EquationsSlopes<Pole>(), domain, {&one, 1}, 1, column, {1e-7, 3000});
-      EXPECT_GE(bound.upper, size);  // |z_other z2^2|, |z2| <= 1
+      const SlopeBound bound = Pole(domain).Bound(1, column, {1e-7, 3000});
+      EXPECT_GE(bound.upper, size);  // |x| or |y| times u^2, |u| <= 1
     }
   }
 }
@@ -221,11 +161,13 @@ TEST(SlopeBound, RefusesWhatDoesNotFit) {
   EXPECT_THROW((void)family.Bound(6, 0), std::invalid_argument);
   EXPECT_THROW((void)family.Bound(0, 8), std::invalid_argument);
   EXPECT_THROW((void)family.Bound(2, 3, {0, 10}), std::invalid_argument);
-  EXPECT_THROW((void)BoundSlope(*family.slopes, family.domain, {}, 2, 3), std::invalid_argument);
+  EXPECT_THROW((void)BoundSlope(family.slopes, family.domain, {}, 2, 3), std::invalid_argument);
   ParametricResidual other = family.residual;
-  other.parameters[3].lower = 2;
-  EXPECT_THROW((void)ParameterRanges(*family.slopes, other), std::invalid_argument);
-  EXPECT_THROW((void)MakeResidualSlopes("none"), std::invalid_argument);
+  other.names.parameters[3].lower = 2;
+  EXPECT_THROW(TextSlopes{other}, std::invalid_argument);
+  other = family.residual;
+  other.values.pop_back();
+  EXPECT_THROW(TextSlopes{other}, std::invalid_argument);
 }
 
 // ---- The paper's.
@@ -243,7 +185,7 @@ void ExpectBetterThanTheGrid(const Family& family, const Entry& entry) {
   EXPECT_NEAR(bound.upper, entry.supremum, entry.digit);
   EXPECT_LT(bound.upper, entry.grid);
   EXPECT_TRUE(
-      family.domain.Contains(std::span(bound.point).first(static_cast<std::size_t>(family.slopes->num_variables()))));
+      family.domain.Contains(std::span(bound.point).first(static_cast<std::size_t>(family.slopes.num_variables()))));
 }
 
 TEST(SlopeBound, BicycleIsBelowThePapersGrid) {
@@ -261,9 +203,47 @@ TEST(SlopeBound, PointMassIsBelowThePapersGrid) {
 TEST(SlopeBound, OnlyTheSaturatingEntriesOccur) {
   const Family bicycle = Bicycle(), point_mass = PointMassInBall();
   for (int l = 0; l < 8; ++l)
-    for (int k = 0; k < 6; ++k) EXPECT_EQ(bicycle.slopes->Occurs(k, l), k == 2 && (l == 3 || l == 5)) << k << l;
+    for (int k = 0; k < 6; ++k) EXPECT_EQ(bicycle.slopes.Occurs(k, l), k == 2 && (l == 3 || l == 5)) << k << l;
   for (int l = 0; l < 6; ++l)
-    for (int k = 0; k < 4; ++k) EXPECT_EQ(point_mass.slopes->Occurs(k, l), l == 2 || l == 3) << k << l;
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(point_mass.slopes.Occurs(k, l), l == 2 || l == 3) << k << l;
+}
+
+// As text they have the bounds of the compiled equations, box for box.
+template <class Residual>
+void ExpectTheSameBounds(const Family& family) {
+  const EquationsSlopes<Residual> compiled;
+  for (int row = 0; row < family.slopes.num_states(); ++row)
+    for (int column = 0; column < family.slopes.num_variables(); ++column) {
+      ASSERT_EQ(family.slopes.Occurs(row, column), compiled.Occurs(row, column));
+      if (!compiled.Occurs(row, column)) continue;
+      const SlopeBoundOptions options{1e-3, 500};
+      const SlopeBound text = family.Bound(row, column, options),
+                       same = BoundSlope(compiled, family.domain, family.parameters, row, column, options);
+      EXPECT_EQ(text.upper, same.upper);
+      EXPECT_EQ(text.lower, same.lower);
+      EXPECT_EQ(text.boxes, same.boxes);
+    }
+}
+
+TEST(SlopeBound, OfATextIsThatOfTheCompiledEquations) {
+  for (const double widen : {0.0, 0.1}) {
+    ExpectTheSameBounds<HeadingSaturation>(Bicycle(widen));
+    ExpectTheSameBounds<VelocityKnee>(PointMassInBall(widen));
+  }
+}
+
+TEST(SlopeBound, OfMoreArgumentsThanFitIsRefused) {
+  ParametricResidual many{"many", {{"s"}, {"u"}, {}, {}}, {{"s"}}};
+  for (int i = 0; i < Jet::kMaxArguments; ++i) {
+    many.names.parameters.push_back({"c" + std::to_string(i), 0, 1});
+    many.values[0].text += " + c" + std::to_string(i) + "*s";
+  }
+  Domain domain;
+  domain.state = domain.input = Box(Eigen::VectorXd::Constant(1, -1), Eigen::VectorXd::Constant(1, 1));
+  const auto bound = [&] { return BoundSlope(TextSlopes(many), domain, ParameterRanges(many), 0, 0); };
+  EXPECT_THROW((void)bound(), std::invalid_argument);
+  many.names.parameters[0].upper = 0;  // a point does not vary
+  EXPECT_NEAR(bound().upper, Jet::kMaxArguments, 1e-9);
 }
 
 // Slopes at random points and parameters, by a difference quotient in extended precision.
@@ -273,7 +253,7 @@ double SampledMaximum(const Family& family, int row, int column, int count) {
   const auto uniform = [&](double lower, double upper) {
     return lower + (upper - lower) * static_cast<double>(random() >> 11) * 0x1p-53;
   };
-  const auto variables = static_cast<std::size_t>(family.slopes->num_variables());
+  const auto variables = static_cast<std::size_t>(family.slopes.num_variables());
   double largest = 0;
   for (int i = 0; i < count; ++i) {
     std::vector<double> z(variables);
@@ -284,7 +264,7 @@ double SampledMaximum(const Family& family, int row, int column, int count) {
       z[l] = uniform(box.lower()[k], box.upper()[k]);
     }
     if (!family.domain.Contains(z)) continue;
-    std::vector<long double> p, w(z.begin(), z.end()), ahead(static_cast<std::size_t>(family.slopes->num_states())),
+    std::vector<long double> p, w(z.begin(), z.end()), ahead(static_cast<std::size_t>(family.slopes.num_states())),
         behind = ahead;
     for (const Interval& range : family.parameters) p.push_back(uniform(range.lower, range.upper));
     constexpr long double kStep = 1e-6L;

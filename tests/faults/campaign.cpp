@@ -856,14 +856,18 @@ class Campaign final {
     std::vector<Obstacle> seen = LoadConfig(world_.Write("world.yaml", DemoTask())).obstacles;
     Rig rig(DemoTaskOnTheBus(""), {.seen = seen});
     rig.witness().SetWorld({ObstaclesDigest(seen)});
-    std::int64_t last_withdrawn = 0, withdrawn = 0, stops = 0;
+    std::int64_t last_withdrawn = 0, withdrawn = 0, stops = 0, short_stops = 0;
+    std::map<std::int64_t, int> standing;  // by plan
     rig.Hear(rig.config().bus.withdrawn, [&](const Received& r) {
       const auto message = Decoded<withdrawal_t>(r.bytes);
       if (message && std::exchange(last_withdrawn, message->plan_id) != message->plan_id) ++withdrawn;
     });
     rig.Hear(rig.config().bus.event, [&](const Received& r) {
       const auto event = Decoded<execution_event_t>(r.bytes);
-      stops += event && event->kind == execution_event_t::EMERGENCY_STOP;
+      if (event && event->kind == execution_event_t::WITHDRAWN) standing[event->plan_id] = event->step;
+      if (!event || event->kind != execution_event_t::EMERGENCY_STOP) return;
+      ++stops;
+      short_stops += event->value < 0 || event->step + event->value > standing[event->plan_id];
     });
     Row& row = Begin("A wall appears across the way of the robot, and goes", options_.others);
     Tries(
@@ -890,7 +894,8 @@ class Campaign final {
         },
         options_.others);
     Demand(row, withdrawn > 0, "no plan was withdrawn");
-    Remark(row, std::to_string(withdrawn) + " plans withdrawn, " + std::to_string(stops) + " emergency stops");
+    Remark(row, std::to_string(withdrawn) + " plans withdrawn, " + std::to_string(stops) + " emergency stops, " +
+                    std::to_string(short_stops) + " of them by a wall nearer than the brakes can stop");
   }
 
   void Disks();

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -75,6 +76,21 @@ TEST(ConformanceTest, TheSmallestSequenceDoesNotFollowTheLargest) {
   conformance.Remember(Plan(7));
   EXPECT_FALSE(conformance.Check(At(std::numeric_limits<std::int64_t>::max(), 7, 0, 0.5, 0.5)));
   EXPECT_FALSE(conformance.Check(At(std::numeric_limits<std::int64_t>::min(), 99, 0, 100, 100)));
+}
+
+TEST(ConformanceTest, AnAngleMayDifferByWholeTurns) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  Conformance conformance;
+  conformance.Remember(Plan(7), Angles(0b10));
+  EXPECT_FALSE(conformance.Check(At(0, 7, 1, 1.5, 1.5)));
+  EXPECT_FALSE(conformance.Check(At(10, 7, 1, 1.5, 1.5 + kTurn)));
+  EXPECT_FALSE(conformance.Check(At(20, 7, 1, 1.5, 1.5 - 3 * kTurn)));
+  EXPECT_EQ(conformance.Check(At(30, 7, 1, 1.5, 2.5 - kTurn))->coordinate, 1);
+  EXPECT_EQ(conformance.Check(At(40, 7, 1, 1.5 + kTurn, 1.5))->coordinate, 0) << "that state is no angle";
+  EXPECT_TRUE(conformance.Check(At(50, 7, 1, 1.5, 1 + kTurn))) << "at the end of the slice it cannot be told";
+  conformance.Remember(Plan(8));
+  EXPECT_TRUE(conformance.Check(At(60, 8, 1, 1.5, 1.5 + kTurn))) << "a plan of a task without angles";
+  conformance.Remember(Plan(8), Angles(0b10));
 }
 
 transition_t Step(std::int64_t utime, double x, double y) {

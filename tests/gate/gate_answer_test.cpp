@@ -51,6 +51,28 @@ TEST(GateNoStop, APlanThatEndsMovingIsAbstainedFrom) {
   EXPECT_TRUE(gate.Decide(Encode(brakes), kNow).certified);
 }
 
+TEST(GateLimit, APlanThatMayExceedOneIsAbstainedFrom) {
+  Config config = SmallTask();
+  Problem problem = *config.problem;
+  problem.limits = {{.name = "height", .that = {"py", 1, 1}, .at_most = 9},
+                    {.name = "speed squared", .that = {"vx^2 + vy^2", 1, 1}, .at_most = 1}};
+  config.problem = std::make_shared<const Problem>(problem);
+  Gate gate(config);
+  const GateAnswer fast = gate.Decide(Encode(Candidate(1)), kNow);
+  EXPECT_EQ(fast.decision.outcome, decision_t::ABSTAIN_SAFETY);
+  EXPECT_EQ(fast.decision.cause, decision_t::CAUSE_LIMIT);
+  EXPECT_EQ(fast.decision.step, 0);
+  EXPECT_EQ(fast.decision.coordinate, 1);
+  EXPECT_EQ(fast.decision.obstacle, -1);
+  EXPECT_GT(fast.decision.margin, 1);
+  EXPECT_EQ(fast.decision.threshold, 1);
+  EXPECT_THAT(GetText(fast.decision.message), HasSubstr("at step 0 speed squared may reach 1."));
+  EXPECT_FALSE(fast.certified);
+  candidate_plan_t slow = Candidate(2);
+  slow.initial_center[2] = 0.5;
+  EXPECT_TRUE(gate.Decide(Encode(slow), kNow).certified);
+}
+
 template <class Message>
 void ExpectDigestsOf(const Config& config, const Message& message) {
   EXPECT_EQ(GetDigest(message.config_digest), config.grounds.config);

@@ -135,6 +135,7 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                {"NO_FINITE_ENCLOSURE", 3},
                                {"OBSTACLE", 4},
                                {"NO_STOP", 5},
+                               {"LIMIT", 8},
                                {"STALE", 10},
                                {"FUTURE", 11},
                                {"DUPLICATE", 12},
@@ -175,7 +176,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                     {"OBSTACLE", 4},
                                                     {"NO_STOP", 5},
                                                     {"NOT_JUDGED", 6},
-                                                    {"UNKNOWN_PLAN", 7}}));
+                                                    {"UNKNOWN_PLAN", 7},
+                                                    {"LIMIT", 8}}));
   EXPECT_EQ(ConstantsOf("fault_t"), (Constants{{"ROBOT_STATE_LOST", 1},
                                                {"CLOCK_JUMP", 2},
                                                {"SLICE_LEFT", 3},

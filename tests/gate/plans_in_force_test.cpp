@@ -287,6 +287,22 @@ TEST_F(PlansInForceTest, TheExecutingPlanIsJudgedHoweverManyArePending) {
   EXPECT_FALSE(Due());
 }
 
+// To contradict, not to be added, is what ends a certificate.
+TEST_F(PlansInForceTest, AnObservationThatContradictsNothingWithdrawsNothing) {
+  const certified_plan_t plan = Certify(1);
+  SeeWall(Reach(plan, kSteps) + 0.01);
+  transition_t transition{};
+  transition.utime = now_;
+  transition.num_states = 4;
+  transition.num_inputs = 2;
+  const Digest before = gate_.grounds().observations;
+  EXPECT_EQ(gate_.Learn(Encode(transition)), "");
+  EXPECT_NE(gate_.grounds().observations, before);
+  EXPECT_FALSE(gate_.certifier().violation());
+  plans_.Judge(gate_, now_);
+  EXPECT_FALSE(Due());
+}
+
 TEST_F(PlansInForceTest, AFalsifiedDeclarationLeavesNothing) {
   config_.gate.learns = true;
   Certify(1);
@@ -315,6 +331,23 @@ TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
   EXPECT_EQ(message.valid_steps, 8);
 }
 
+// The task file is the same, its file of transitions is not.
+TEST_F(PlansInForceTest, UnderOtherTransitionsOfTheTaskItIsJudgedAgain) {
+  const certified_plan_t plan = Certify(1);
+  SeeWall(Reach(plan, kSteps) + 0.01);
+  EXPECT_FALSE(Due());
+  Problem problem = *config_.problem;
+  problem.transitions.x_next.col(2).array() += 0.01;  // everywhere the same residual
+  config_.problem = std::make_shared<const Problem>(problem);
+  config_.grounds = GroundsOf(config_.grounds.config, problem, config_.obstacles);
+  Gate gate(config_);
+  gate.Inherit(gate_);
+  plans_.Judge(gate, now_);
+  const withdrawal_t message = Due().value();
+  EXPECT_EQ(message.cause, withdrawal_t::OBSTACLE);
+  EXPECT_LT(message.valid_steps, kSteps);
+}
+
 TEST_F(PlansInForceTest, AnObstacleBeforeTheStepThatLeavesTheDomainCounts) {
   const certified_plan_t plan = Certify(1);
   Config narrower = NarrowerFrom(plan, 8);
@@ -340,6 +373,30 @@ TEST_F(PlansInForceTest, AnEndThatIsNotAtRestKeepsItsControls) {
   const withdrawal_t message = Due().value();
   EXPECT_EQ(message.cause, withdrawal_t::NO_STOP);
   EXPECT_EQ(message.valid_steps, kSteps);
+}
+
+// It is exceeded first where the robot has come that far: the control that leads there does not stand.
+TEST_F(PlansInForceTest, ALimitOfANewTaskLeavesTheControlsBeforeIt) {
+  const certified_plan_t plan = Certify(1);
+  const auto judge = [&](double most) {
+    Config limited = config_;
+    Problem problem = *config_.problem;
+    problem.limits = {{.name = "it", .that = {"px", 1, 1}, .at_most = most}};
+    problem.between = Between{Eigen::Vector2d(8, 8), 0, 0, 0.15};  // it is exceeded at the sample, not on the way
+    limited.problem = std::make_shared<const Problem>(problem);
+    limited.grounds.config = DigestOf("limited to " + std::to_string(most));
+    Gate gate(limited);
+    gate.Inherit(gate_);
+    plans_.Judge(gate, now_);
+    return Due();
+  };
+  EXPECT_FALSE(judge(Reach(plan, kSteps) + 1e-9));
+  const withdrawal_t message = judge(Reach(plan, 6) - 1e-9).value();
+  EXPECT_EQ(message.cause, withdrawal_t::LIMIT);
+  EXPECT_EQ(message.step, 6);
+  EXPECT_EQ(message.obstacle, -1);
+  EXPECT_EQ(message.valid_steps, 5);
+  EXPECT_EQ(message.threshold, Reach(plan, 6) - 1e-9);
 }
 
 TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfterEachChange) {

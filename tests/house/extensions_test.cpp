@@ -105,9 +105,4 @@ TEST(Extensions, TheFilesOfAnObstacleKind) {
                                     R"(\bkHalfSpace\b|\bHalfSpace\b|\bHALF_SPACE\b|\]\.half_plane\b)"});
 }
 
-TEST(Extensions, TheFilesOfAResidual) {
-  ExpectListed("A residual",
-               {R"(\bHeadingSaturation\w*|"heading_saturation")", R"(\bVelocityKnee\w*|"velocity_knee")"});
-}
-
 }  // namespace

@@ -2,6 +2,8 @@
 // leave a slice of the tube, and under a certified plan never meet an obstacle.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iostream>
 #include <memory>
 #include <tuple>
 #include <vector>
@@ -166,6 +168,74 @@ TEST_P(Containment, NoAdmissibleRolloutLeavesTheTubeOrMeetsAnObstacle) {
   RecordProperty("certified", certified);
   EXPECT_GT(certified, 20);
   EXPECT_GT(slices, 2000);
+}
+
+// How far a slice reaches beyond the other tube's in some coordinate, in half-widths of that slice.
+double Excess(const Tube& tube, const Tube& of) {
+  double most = 0;
+  for (int t = 0; t <= std::min(tube.length(), of.length()); ++t)
+    for (int k = 0; k < tube.slice(0).dim(); ++k) {
+      const Interval hull = of.hull(t, k);
+      const double beyond = std::max(tube.hull(t, k).upper - hull.upper, hull.lower - tube.hull(t, k).lower);
+      if (beyond > 0) most = std::max(most, beyond / hull.HalfWidthUpper());
+    }
+  return most;
+}
+
+// A certificate is about all residuals that the observations of its moment admit. More observations admit some of
+// these, so it holds for them; whether it could be derived again is not said.
+TEST_P(Containment, WhatIsCertifiedHoldsForWhatMoreObservationsAdmit) {
+  const auto [bicycle, disturbed] = GetParam();
+  Random random(821 + bicycle), winds(831 + bicycle);
+  SCOPED_TRACE(random.trace());
+  int rollouts = 0, plans = 0, wider = 0;
+  double farthest = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    SCOPED_TRACE("trial " + std::to_string(trial));
+    const auto all = AnyProblem(random, bicycle, random.Integer(4, 16));
+    if (disturbed) Disturb(winds, *all);
+    const int last = static_cast<int>(all->transitions.z.rows()),
+              first = random.Coin() ? last - 1 : random.Integer(1, 3);
+    const auto some = std::make_shared<Problem>(*all);
+    some->transitions = {all->transitions.z.topRows(first), all->transitions.x_next.topRows(first)};
+    Certifier certifier(some);
+    const Query query = AnyQuery(random, *all);
+    Tube issued, again;
+    const Decision decision = certifier.Certify(query.plan(), query.initial_set, {}, issued);
+    for (Eigen::Index i = first; i < all->transitions.z.rows(); ++i) {
+      const Eigen::VectorXd z = all->transitions.z.row(i), next = all->transitions.x_next.row(i);
+      ASSERT_EQ(certifier.Learn(View(z), View(next)), Learned::kAdded);
+    }
+    ASSERT_FALSE(certifier.violation()) << "the data come from a residual that satisfies the declaration";
+    if (decision.outcome != Outcome::kCertified) continue;
+    ++plans;
+    std::vector<Membership> members;
+    for (int t = 0; t <= issued.length(); ++t) members.emplace_back(random, issued.slice(t));
+    for (int r = 0; r < 3; ++r) {
+      const AdmissibleResidual residual(random, *all);
+      std::vector<Real> x = PointOf(random, query.initial_set);
+      ++rollouts;
+      for (int t = 0; t < issued.length(); ++t) {
+        std::vector<Real> z = x;
+        for (const double u : query.plan().input(t)) z.emplace_back(u);
+        x = NominalSuccessor(bicycle, z);
+        const std::vector<Real> wind = AnyDisturbance(winds, *all);
+        for (std::size_t k = 0; k < x.size(); ++k) x[k] += residual(z, static_cast<int>(k)) + wind[k];
+        ASSERT_TRUE(members[static_cast<std::size_t>(t) + 1].Contains(x)) << "slice " << t + 1;
+      }
+    }
+    static_cast<void>(certifier.Certify(query.plan(), query.initial_set, {}, again));
+    const double excess = Excess(again, issued);
+    wider += excess > 1e-9;
+    farthest = std::max(farthest, excess);
+  }
+  RecordProperty("rollouts", rollouts);
+  RecordProperty("plans", plans);
+  RecordProperty("wider", wider);
+  std::cout << rollouts << " rollouts; of " << plans << " certified plans, " << wider
+            << " have a slice that is wider when derived from more observations, by up to " << farthest
+            << " of its half-width\n";
+  EXPECT_GT(rollouts, 40);
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, Containment, testing::Combine(testing::Bool(), testing::Bool()));

@@ -15,7 +15,9 @@
 #include <thread>
 #include <vector>
 
+#include "certifier/dynamics/expression.h"
 #include "command_line/command_line.h"
+#include "tests/oracle/any_text.h"
 #include "tests/oracle/motions.h"
 #include "tests/oracle/problems.h"
 #include "tests/oracle/random.h"
@@ -31,7 +33,9 @@ struct Options {
   int calls = 50;  ///< Of each problem.
   bool wide =
       false;  ///< Problems and queries are then changed as Tighten and Widen do, by random numbers of their own.
+  bool texts = false;   ///< Random models as text.
   bool worlds = false;  ///< Bodies, bounds between samples and obstacles that move, instead of the problems above.
+  bool limits = false;  ///< Limits on random functions, instead of the problems above.
 };
 
 // What AnyProblem leaves out: any safety dimension, dense rows of L, high orders, domains cut by inequalities.
@@ -354,14 +358,97 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
   return counts;
 }
 
+// An expression of these names, nested up to `depth`.
+std::string AnyExpression(Random& random, const std::vector<std::string>& names, int depth) {
+  const auto name = [&] { return names[static_cast<std::size_t>(random.Below(static_cast<int>(names.size())))]; };
+  if (depth == 0) return random.Coin(0.8) ? name() : std::to_string(random.Integer(1, 9)) + "/7";
+  const auto inner = [&] { return std::string("(").append(AnyExpression(random, names, depth - 1)).append(")"); };
+  switch (random.Below(14)) {
+    case 0: return inner() + "+" + inner();
+    case 1: return inner() + "-" + inner();
+    case 2:
+    case 3: return inner() + "*" + inner();
+    case 4: return inner() + "/(2+" + inner() + "^2)";
+    case 5: return inner() + "^" + std::to_string(random.Integer(2, 3));
+    case 6: return "sin" + inner();
+    case 7: return "cos" + inner();
+    case 8: return "sqrt(1+" + inner() + "^2)";
+    case 9: return "atan2(" + inner() + ",1+" + inner() + "^2)";
+    case 10: return "tanh" + inner();
+    case 11: return "abs" + inner();
+    case 12: return "max(" + inner() + "," + inner() + ")";
+    default: return "exp(-abs" + inner() + ")";
+  }
+}
+
+// The value of an expression of the model's states and inputs in 256 bits.
+exact::Real ValueOf(const ExpressionText& text, const std::vector<std::string>& names,
+                    const std::vector<exact::Real>& z) {
+  return Evaluate<exact::Real>(ParseExpression(text, names), z, [](double x) { return exact::Real(x); });
+}
+
+// Limits to the last bit of what the certifier bounds, which the verifier has to confirm, and a limit that a state of
+// X_0 exceeds, which it may never confirm.
+Counts RunLimits(const Options& options, long number, Tube& tube, std::mutex& output) {
+  Random random(options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number));
+  Counts counts;
+  counts.problems = 1;
+  const auto problem = AnyProblem(random, random.Coin(), random.Integer(1, 20));
+  problem->method = options.method;
+  const std::vector<std::string> names = problem->model->variable_names(), states = problem->model->state_names();
+  for (int i = random.Integer(1, 4); i > 0; --i)
+    problem->limits.push_back(
+        {.name = "limit " + std::to_string(i),
+         .that = {AnyExpression(random, random.Coin() ? names : states, random.Integer(0, 3)), 1, 1},
+         .at_most = 1e300});
+  const Certifier certifier(problem);
+  for (int i = 0; i < options.calls; ++i) {
+    const Query query = AnyQuery(random, *problem);
+    ++counts.calls;
+    if (certifier.Certify(query.plan(), query.initial_set, {}, tube).outcome != Outcome::kCertified) continue;
+    const auto tight = std::make_shared<Problem>(*problem);
+    for (std::size_t l = 0; l < tight->limits.size(); ++l) {
+      const auto reach = certifier.limits().Reach(static_cast<int>(l), query.plan(), tube);
+      tight->limits[l].at_least = reach->lower;
+      tight->limits[l].at_most = reach->upper;
+    }
+    const Certifier strict(tight);
+    if (strict.Certify(query.plan(), query.initial_set, {}, tube).outcome != Outcome::kCertified)
+      throw std::logic_error("a limit is exceeded by what it reaches");
+    ++counts.certified;
+    verifier::Certificate certificate = CertificateOf(strict, query.plan(), query.initial_set, {}, tube);
+    Count(options, number, i, verifier::Verifier(tight, verifier::MethodOf(*tight)).Verify(certificate), output,
+          counts);
+
+    std::vector<exact::Real> z = PointOf(random, query.initial_set);
+    for (const double u : query.plan().input(0)) z.emplace_back(u);
+    const auto exceeded = std::make_shared<Problem>(*problem);
+    Limit& limit = exceeded->limits[static_cast<std::size_t>(random.Below(static_cast<int>(problem->limits.size())))];
+    const double value = ValueOf(limit.that, names, z).ToDouble();
+    limit.at_most = value - 1e-12 * (1 + std::abs(value));
+    ++counts.contacts;
+    certificate.slices.clear();
+    const auto status = verifier::Verifier(exceeded, verifier::MethodOf(*exceeded)).Verify(certificate).status;
+    counts.contacts_refuted += status == verifier::Status::kRefuted;
+    counts.contacts_confirmed += status == verifier::Status::kConfirmed;
+    if (status != verifier::Status::kConfirmed) continue;
+    const std::lock_guard lock(output);
+    std::cerr << "CONFIRMED A LIMIT THAT IS EXCEEDED: --seed " << options.seed << " --problem " << number << ", call "
+              << i << ": " << limit.that.text << std::endl;
+  }
+  return counts;
+}
+
 // All that follows from one seed and one problem's number.
 Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& output) {
   const std::uint64_t start = options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number);
   Random random(start), wide(~start), winds(start ^ 0x5851f42d4c957f2d);
   Counts counts;
   counts.problems = 1;
-  const bool absurd = random.Coin(0.25);
-  const auto problem = AnyProblem(random, random.Coin(), random.Integer(1, 20));
+  const bool absurd = random.Coin(0.25) && !options.texts;
+  const auto problem =
+      options.texts ? AnyTextProblem(random) : AnyProblem(random, random.Coin(), random.Integer(1, 20));
+  if (!problem) return counts;
   problem->method = options.method;
   Vary(random, *problem);
   if (winds.Coin(0.4)) Disturb(winds, *problem);
@@ -379,7 +466,7 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
   }
   std::unique_ptr<verifier::Verifier> judge;
   for (int i = 0; i < options.calls; ++i) {
-    Query query = AnyCall(random, *problem, absurd);
+    Query query = options.texts ? AnyTextQuery(random, *problem) : AnyCall(random, *problem, absurd);
     if (options.wide) Widen(wide, query);
     if (random.Coin(0.3) &&
         certifier->Certify(query.plan(), query.initial_set, {}, tube).outcome == Outcome::kCertified) {
@@ -429,9 +516,13 @@ int main(int argc, char** argv) {
                   {.name = "--wide",
                    .variable = &options.wide,
                    .help = "Wider initial sets, and domains whose inequalities the data just meet"},
+                  {.name = "--texts", .variable = &options.texts, .help = "Random models as text"},
                   {.name = "--worlds",
                    .variable = &options.worlds,
                    .help = "Bodies, bounds between samples and obstacles that move, just accepted and just met"},
+                  {.name = "--limits",
+                   .variable = &options.limits,
+                   .help = "Limits on random functions, as tight as they are proven, and exceeded"},
                   {.name = "--problem", .variable = &only, .help = "This problem only; negative: all"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   options.method = method == "paper" ? Method::kPaper : Method::kCentred;
@@ -442,11 +533,11 @@ int main(int argc, char** argv) {
   Counts total;
   const auto work = [&] {
     Tube tube;
-    while (called < count) {
+    while (called < count && next < 100 * count) {
       const long number = next++;
       if (only >= 0 && number > only) break;
-      const Counts counts =
-          options.worlds ? RunWorld(options, number, tube, mutex) : RunProblem(options, number, tube, mutex);
+      const auto run = options.worlds ? RunWorld : options.limits ? RunLimits : RunProblem;
+      const Counts counts = run(options, number, tube, mutex);
       called += counts.calls;
       const std::lock_guard lock(mutex);
       total.Add(counts);
@@ -461,13 +552,13 @@ int main(int argc, char** argv) {
             << total.refused << " refused), " << total.certified << " certified, " << total.confirmed << " confirmed, "
             << total.refuted << " refuted, " << total.cannot_verify << " cannot verify; " << seconds << " s"
             << std::endl;
-  if (options.worlds)
+  if (options.worlds || options.limits)
     std::cout << total.inside << " obstacles a micrometre further in, " << total.inside_refuted << " refuted; "
               << total.contacts << " that are met, " << total.contacts_refuted << " refuted, "
               << total.contacts_confirmed << " confirmed" << std::endl;
   const bool enough = only >= 0 || total.certified * 20 >= total.calls;  // a fuzz that certifies nothing tests nothing
   // Of wide sets the reduction's choices are now and then too close for the verifier to follow: it then says so.
-  const bool is_wide = options.wide || options.worlds;
+  const bool is_wide = options.wide || options.worlds || options.texts;
   const bool followed = total.cannot_verify * (is_wide ? 200 : total.calls + 1) <= total.certified;
   return total.refuted == 0 && total.contacts_confirmed == 0 &&
                  (total.inside - total.inside_refuted) * 100 <= total.inside && followed && enough

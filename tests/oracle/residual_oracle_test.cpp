@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 #include <vector>
 
 #include "certifier/dynamics/models.h"
@@ -83,6 +84,94 @@ TEST(Observe, OfTheBicycleEnclosesTheResidual) {
     ASSERT_LE(Real(observations.lower(i, 2)), residual - ulp);
     ASSERT_GE(Real(observations.upper(i, 2)), residual + ulp);
     ASSERT_LE(observations.upper(i, 2) - observations.lower(i, 2), 1e-14);
+  }
+}
+
+// Transitions of a bicycle whose heading is recorded with any turns: x+ = wrapped f0 + r, computed in doubles.
+struct Turned {
+  Transitions data;
+  std::vector<double> turns;  // that were taken off theta
+};
+
+Turned TurnedTransitions(Random& random, int count) {
+  Turned made{{random.Matrix(count, 8, 1.2), random.Matrix(count, 6, 2)}, {}};
+  for (int i = 0; i < count; ++i) {
+    const Eigen::VectorXd z = made.data.z.row(i);
+    const double next = z[2] + 0.1 / 2.5 * (z[3] * std::tan(z[5])) + random.Uniform(-1.5, 1.5);
+    made.turns.push_back(random.Integer(-2, 2));
+    made.data.x_next(i, 2) = next - made.turns.back() * (2 * std::numbers::pi);
+  }
+  return made;
+}
+
+// theta+ of the bicycle.
+Real NextHeading(const Transitions& data, int i) {
+  return Real(data.z(i, 2)) + Real(0.1) / Real(2.5) * (Real(data.z(i, 3)) * tan(Real(data.z(i, 5))));
+}
+
+TEST(Observe, TakesTheTurnsOffAnAngleAndEnclosesItsResidual) {
+  Random random(631);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5, {2}), plain = MakeKinematicBicycle(0.1, 2.5);
+  const auto [data, turns] = TurnedTransitions(random, 1000);
+  const Observations observations = Observe(*model, data), unturned = Observe(*plain, data);
+  for (int i = 0; i < data.size(); ++i) {
+    const Real turned = Real(data.x_next(i, 2)) + Real(turns[static_cast<std::size_t>(i)]) * Real(2.0) * Real::Pi();
+    const Real residual = turned - NextHeading(data, i);
+    const Real unit(std::max(Ulp(data.x_next(i, 2)), Rational(0x1p-49)));
+    ASSERT_LE(Real(observations.lower(i, 2)), residual - unit);
+    ASSERT_GE(Real(observations.upper(i, 2)), residual + unit);
+    ASSERT_LE(observations.upper(i, 2) - observations.lower(i, 2), 1e-14);
+    for (const int k : {0, 1, 3, 4, 5}) {
+      ASSERT_EQ(observations.lower(i, k), unturned.lower(i, k));
+      ASSERT_EQ(observations.upper(i, k), unturned.upper(i, k));
+    }
+  }
+}
+
+// Where nothing else rounds, 2 pi does: it lies between two doubles.
+TEST(Observe, ATurnIsNoDouble) {
+  const auto model = MakeKinematicBicycle(0.5, 2, {2});
+  for (const double next : {6.2, -6.2, 6.3, -12.5, 12.6, 25.1}) {
+    Transitions data{Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
+    data.x_next(0, 2) = next;
+    const Observations observations = Observe(*model, data);
+    const Real turns(std::round(-next / 6.28)), residual = Real(next) + turns * Real(2.0) * Real::Pi();
+    const Real unit(std::max(Ulp(next), Rational(0x1p-49)));
+    EXPECT_LE(Real(observations.lower(0, 2)), residual - unit) << next;
+    EXPECT_GE(Real(observations.upper(0, 2)), residual + unit) << next;
+  }
+}
+
+// The nominal successor of theta is zero, exactly, and its record is known to 2^-49.
+TEST(Observe, AQuarterOfATurnIsTheEnd) {
+  const auto model = MakeKinematicBicycle(0.5, 2, {2});
+  const auto observe = [&](double next) {
+    Transitions data{Eigen::MatrixXd::Zero(3, 8), Eigen::MatrixXd::Zero(3, 6)};
+    data.x_next(1, 2) = next;
+    return Observe(*model, data);
+  };
+  const double quarter = std::numbers::pi / 2, inside = quarter - 0x1p-48;
+  ASSERT_LT(Real(quarter), Real::Pi() / Real(2.0));
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_NO_THROW(observe(sign * inside));
+    EXPECT_THROW(observe(sign * quarter), AmbiguousAngle) << "the record may be off by 2^-49";
+    EXPECT_THROW(observe(sign * 2), AmbiguousAngle);
+    EXPECT_THROW(observe(sign * std::numbers::pi), AmbiguousAngle);
+    EXPECT_THROW(observe(sign * 4.7), AmbiguousAngle);
+    EXPECT_NO_THROW(observe(sign * 4.72));  // 3/2 pi is 4.712
+    EXPECT_THROW(observe(sign * (20 * std::numbers::pi + 1.6)), AmbiguousAngle);
+    EXPECT_NO_THROW(observe(sign * (20 * std::numbers::pi + 1.5)));
+    EXPECT_THROW(observe(sign * 1e300), AmbiguousAngle) << "where doubles are farther apart than turns";
+  }
+  try {
+    observe(2);
+    FAIL();
+  } catch (const AmbiguousAngle& error) {
+    EXPECT_EQ(error.row(), 1);
+    EXPECT_STREQ(error.what(),
+                 "transition 1: theta is 2 rad away from the nominal model's next value, up to whole turns, which is "
+                 "more than pi/2: how often it has turned cannot be told");
   }
 }
 
@@ -280,6 +369,33 @@ TEST(FindViolation, NeverFalsifiesTheTruthThroughRounding) {
       Enclose(EnvelopeFor(declaration, observations, point, {z.data() + 6, 2}), point, {z.data() + 6, 2}, bounds);
       for (std::size_t k = 0; k < 6; ++k) ASSERT_LE(bounds.lower[k], bounds.upper[k]);
     }
+  }
+}
+
+// Wrapped and unwrapped, the same drives give the same envelope, up to the units and the width of 2 pi.
+TEST(Envelope, OfWrappedDataIsThatOfUnwrappedData) {
+  Random random(632);
+  SCOPED_TRACE(random.trace());
+  const auto model = MakeKinematicBicycle(0.1, 2.5, {2});
+  for (int trial = 0; trial < 100; ++trial) {
+    auto [wrapped, turns] = TurnedTransitions(random, 40);
+    Transitions unwrapped = wrapped;
+    for (int i = 0; i < 40; ++i) {
+      const Real turned = Real(wrapped.x_next(i, 2)) + Real(turns[static_cast<std::size_t>(i)] * 2) * Real::Pi();
+      unwrapped.x_next(i, 2) = turned.ToDouble();
+    }
+    Declaration declaration{random.Matrix(6, 8).cwiseAbs(), Eigen::VectorXd::Constant(6, 10)};
+    const Zonotope slice = Zonotope::FromBox(random.Vector(6), random.Vector(6, 0.1).cwiseAbs());
+    const Eigen::VectorXd input = random.Vector(2);
+    ResidualBounds bounds, as_driven;
+    const Observations of_wrapped = Observe(*model, wrapped), of_unwrapped = Observe(*model, unwrapped);
+    Enclose(EnvelopeFor(declaration, of_wrapped, slice, View(input)), slice, View(input), bounds);
+    Enclose(EnvelopeFor(declaration, of_unwrapped, slice, View(input)), slice, View(input), as_driven);
+    for (std::size_t k = 0; k < 6; ++k) {
+      ASSERT_NEAR(bounds.lower[k], as_driven.lower[k], 1e-13);
+      ASSERT_NEAR(bounds.upper[k], as_driven.upper[k], 1e-13);
+    }
+    EXPECT_FALSE(FindViolation(declaration, of_wrapped));
   }
 }
 

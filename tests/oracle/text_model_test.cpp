@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <map>
 
+#include "certifier/declare/flow.h"
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/models.h"
+#include "tests/oracle/any_text.h"
 #include "tests/oracle/exact.h"
 #include "tests/oracle/random.h"
+#include "tests/text_models.h"
 
 namespace forereach {
 namespace {
@@ -20,48 +22,27 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 using Integrator = ModelText::Integrator;
 
-ModelText TextOf(std::vector<std::string> states, std::vector<std::string> inputs,
-                 std::map<std::string, double> parameters, std::vector<std::string> equations,
-                 Integrator integrator = Integrator::kNone) {
-  ModelText text{.name = "a_text", .integrator = integrator};
-  for (const std::string& name : states) text.states.push_back({name, ""});
-  for (const std::string& name : inputs) text.inputs.push_back({name, ""});
-  for (const auto& [name, value] : parameters) text.parameters.push_back({name, value, value});
-  for (const std::string& equation : equations) text.equations.push_back({equation});
-  return text;
-}
-
+// In the order of operations of kinematic_bicycle.h and point_mass.h.
 ModelText Bicycle() {
-  return TextOf({"x", "y", "theta", "v", "a", "delta"}, {"jerk", "steer_rate"}, {{"dt", 0.1}, {"wheelbase", 2.7}},
-                {"x + dt * (v * cos(theta))", "y + dt * (v * sin(theta))", "theta + dt / wheelbase * (v * tan(delta))",
-                 "v + dt * a", "a + dt * jerk", "delta + dt * steer_rate"});
+  return TextModel({{"x", "x + dt * (v * cos(theta))"},
+                    {"y", "y + dt * (v * sin(theta))"},
+                    {"theta", "theta + dt / wheelbase * (v * tan(delta))"},
+                    {"v", "v + dt * a"},
+                    {"a", "a + dt * jerk"},
+                    {"delta", "delta + dt * steer_rate"}},
+                   {"jerk", "steer_rate"}, {{"dt", 0.1, 0.1}, {"wheelbase", 2.7, 2.7}});
 }
 
-// A quadrotor with Euler angles, as rates.
-ModelText Quadrotor(Integrator integrator) {
-  ModelText text =
-      TextOf({"x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "vz", "p", "q", "r"}, {"thrust", "mx", "my", "mz"},
-             {{"dt", 0.05}, {"mass", 0.775}, {"ix", 0.0015}, {"iy", 0.0025}, {"iz", 0.0035}, {"g", 9.81}},
-             {"vx", "vy", "vz", "p + sr*tan(pitch)*q + cr*tan(pitch)*r", "cr*q - sr*r", "(sr*q + cr*r)/cp",
-              "lift*(cr*sp*cos(yaw) + sr*sin(yaw))", "lift*(cr*sp*sin(yaw) - sr*cos(yaw))", "lift*cr*cp - g",
-              "(mx + (iy - iz)*q*r)/ix", "(my + (iz - ix)*p*r)/iy", "(mz + (ix - iy)*p*q)/iz"},
-             integrator);
-  for (const auto& [name, value] : {std::pair{"sr", "sin(roll)"},
-                                    {"cr", "cos(roll)"},
-                                    {"sp", "sin(pitch)"},
-                                    {"cp", "cos(pitch)"},
-                                    {"lift", "thrust/mass"}})
-    text.definitions.push_back({name, {value}});
-  return text;
+ModelText PointMass() {
+  return TextModel({{"px", "px + dt * vx + dt * dt / 2 * ax"},
+                    {"py", "py + dt * vy + dt * dt / 2 * ay"},
+                    {"vx", "vx + dt * ax"},
+                    {"vy", "vy + dt * ay"}},
+                   {"ax", "ay"}, {{"dt", 0.1, 0.1}});
 }
 
 bool SameBits(const double* a, const double* b, std::size_t count) {
   return std::memcmp(a, b, count * sizeof(double)) == 0;
-}
-
-ModelText PointMassText() {
-  return TextOf({"px", "py", "vx", "vy"}, {"ax", "ay"}, {{"dt", 0.1}},
-                {"px + dt * vx + dt * dt / 2 * ax", "py + dt * vy + dt * dt / 2 * ay", "vx + dt * ax", "vy + dt * ay"});
 }
 
 struct Pair {
@@ -73,7 +54,7 @@ class SameBitsTest : public testing::TestWithParam<int> {
  protected:
   [[nodiscard]] static Pair Models() {
     if (GetParam() == 0) return {MakeTextModel(Bicycle()), MakeKinematicBicycle(0.1, 2.7), 1.2};
-    return {MakeTextModel(PointMassText()), MakePointMass(0.1), 20};
+    return {MakeTextModel(PointMass()), MakePointMass(0.1), 20};
   }
 };
 
@@ -130,6 +111,50 @@ TEST_P(SameBitsTest, InExpansionRemainderAndImage) {
         }
       }
   }
+}
+
+// Random equations: what the step computes in plain arithmetic differs from enclosures by no more than its error
+// bounds.
+TEST(TextModel, ExpansionsAreWithinTheirErrors) {
+  Random random(7104);
+  SCOPED_TRACE(random.trace());
+  int bounded = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    ModelText text = AnyText(random);
+    text.integrator = random.Coin() ? Integrator::kNone : Integrator::kEuler;
+    for (ModelText::Parameter& parameter : text.parameters) parameter.upper = parameter.lower;
+    const auto model = MakeTextModel(text);
+    const auto d = static_cast<std::size_t>(model->num_variables());
+    const ExpansionError error = model->BoundError(std::vector<Interval>(d, Interval(-2, 2)));
+    std::vector<double> z(d);
+    std::vector<PlainInterval> box;
+    std::vector<Interval> point;
+    for (double& coordinate : z) {
+      coordinate = random.Uniform(-1.9, 1.9);
+      box.push_back({coordinate, coordinate});
+      point.emplace_back(coordinate);
+    }
+    Expansion expansion;
+    Linearization exact;
+    HessianEnclosure hessian;
+    model->Expand(z, box, expansion);
+    model->Linearize(z, exact);
+    model->EncloseHessian(point, hessian);
+    const auto expect_near = [&](const Interval& enclosure, double lower, double upper, double most, const char* what) {
+      if (!std::isfinite(most)) return;
+      ++bounded;
+      ASSERT_LE(lower - most, enclosure.upper) << what << " of trial " << trial;
+      ASSERT_GE(upper + most, enclosure.lower) << what << " of trial " << trial;
+    };
+    for (std::size_t k = 0; k < static_cast<std::size_t>(model->num_states()); ++k)
+      expect_near(exact.value[k], expansion.value[k], expansion.value[k], error.value[k], "a value");
+    for (std::size_t e = 0; e < static_cast<std::size_t>(exact.count); ++e)
+      expect_near(exact.entries[e].value, expansion.jacobian[e], expansion.jacobian[e], error.jacobian[e], "a slope");
+    for (std::size_t e = 0; e < static_cast<std::size_t>(hessian.count); ++e)
+      expect_near(hessian.entries[e].second_derivative, expansion.hessian[e].lower, expansion.hessian[e].upper,
+                  error.hessian[e], "a second derivative");
+  }
+  EXPECT_GT(bounded, 30000);
 }
 
 TEST_P(SameBitsTest, InValuesAndIntervals) {
@@ -219,18 +244,18 @@ bool IsInside(const Real& x, const Interval& range) {
 }
 
 ModelText Everything(Integrator integrator) {
-  return TextOf({"x", "y", "z"}, {"u"}, {{"dt", 0.1}, {"c", 0.75}},
-                {"sin(x*y) + exp(-z^2)*tanh(u) + atan2(y + 3, x) + sqrt(z^2 + 1)/(2 + x)",
-                 "log(4 + x)*acos(y/4) - asin(z/4) + max(x + 3, y)*min(z - 3, u) + abs(x + 2)*c",
-                 "atan(x*z) + tan(y/3)*(1 + tan(y/3)^2) + (x + 3)^-3 + (2 + z)^c + hypot(x, y + 3) + cos(u)*z*z*z"},
-                integrator);
+  return TextModel(
+      {{"x", "sin(x*y) + exp(-z^2)*tanh(u) + atan2(y + 3, x) + sqrt(z^2 + 1)/(2 + x)"},
+       {"y", "log(4 + x)*acos(y/4) - asin(z/4) + max(x + 3, y)*min(z - 3, u) + abs(x + 2)*c"},
+       {"z", "atan(x*z) + tan(y/3)*(1 + tan(y/3)^2) + (x + 3)^-3 + (2 + z)^c + hypot(x, y + 3) + cos(u)*z*z*z"}},
+      {"u"}, {{"dt", 0.1, 0.1}, {"c", 0.75, 0.75}}, {}, integrator);
 }
 
 class StagesTest : public testing::TestWithParam<std::tuple<int, Integrator>> {};
 
 TEST_P(StagesTest, EncloseValuesAndDerivatives) {
   const auto [which, integrator] = GetParam();
-  const ModelText text = which == 0 ? Everything(integrator) : Quadrotor(integrator);
+  const ModelText text = which == 0 ? Everything(integrator) : QuadrotorText(integrator);
   const auto model = MakeTextModel(text);
   const ExactModel exact(text);
   const int n = model->num_states(), d = model->num_variables();
@@ -306,7 +331,8 @@ TEST(TextModel, AKinkInsideTheBoxHasNoFiniteHessian) {
   for (const char* equation : {"abs(x)", "max(x, y)", "min(x, 2*y)", "atan2(x, y - 3)", "sqrt(x^2)", "log(x)", "1/x",
                                "asin(x + 0.9995)", "sqrt(x)", "x^0.5", "hypot(x, y)", "tan(x + pi/2)"}) {
     for (const Integrator integrator : {Integrator::kNone, Integrator::kRk4}) {
-      const auto model = MakeTextModel(TextOf({"x", "y"}, {"u"}, {{"dt", 0.1}}, {equation, "u"}, integrator));
+      const auto model =
+          MakeTextModel(TextModel({{"x", equation}, {"y", "u"}}, {"u"}, {{"dt", 0.1, 0.1}}, {}, integrator));
       const std::vector<Interval> at{{-0.001, 0.001}, {-0.001, 0.001}, 0.0}, beside{{0.01, 0.012}, {3.5, 3.6}, 0.0};
       HessianEnclosure hessian;
       model->EncloseHessian(at, hessian);
@@ -343,7 +369,7 @@ TEST(TextModel, AParameterMayBeARange) {
 TEST(TextModel, SaysWhatIsWrong) {
   const auto make = [](const ModelText& text) { return [text] { static_cast<void>(MakeTextModel(text)); }; };
   const auto with = [](auto change) {
-    ModelText text = PointMassText();
+    ModelText text = PointMass();
     change(text);
     return text;
   };
@@ -366,13 +392,36 @@ TEST(TextModel, SaysWhatIsWrong) {
   EXPECT_THAT(make(with([](ModelText& t) { t.equations[0].text = "smooth_gate(px)"; })), says("are for residuals"));
 }
 
+// What is known of a compiled model, its equations in continuous time for example, is not known of a text of that name.
+TEST(TextModel, HasTheNameOfNoCompiledModel) {
+  ModelText text = PointMass();
+  for (const std::string name : {"point_mass", "kinematic_bicycle"}) {
+    text.name = name;
+    const auto model = MakeTextModel(text);
+    EXPECT_EQ(model->name(), name + " (text)");
+    EXPECT_EQ(MakeFlow(*model), nullptr);
+  }
+  EXPECT_NE(MakeFlow(*MakePointMass(0.1)), nullptr);
+}
+
+TEST(TextModel, OfTooManyOperationsIsRefused) {
+  ModelText text = PointMass();
+  for (int i = 0; i < 100; ++i) {
+    std::string sum = "0";
+    for (int j = 0; j < 1000; ++j) sum += " + px*" + std::to_string(1000 * i + j + 1);
+    text.definitions.push_back({"d" + std::to_string(i), {sum}});
+  }
+  EXPECT_THAT([&] { static_cast<void>(MakeTextModel(text)); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("more than 65536 operations")));
+}
+
 // Definitions that each use the one before twice: the derivatives are shared like the values.
 TEST(TextModel, SharesDerivatives) {
-  ModelText text = TextOf({"x"}, {"u"}, {{"dt", 0.1}}, {"d60"});
-  text.definitions.push_back({"d0", {"sin(x)"}});
-  for (int i = 1; i <= 60; ++i)
-    text.definitions.push_back(
-        {"d" + std::to_string(i), {"d" + std::to_string(i - 1) + "*d" + std::to_string(i - 1) + " + u"}});
+  ModelText text = TextModel({{"x", "d60"}}, {"u"}, {{"dt", 0.1, 0.1}}, {{"d0", "sin(x)"}});
+  for (int i = 1; i <= 60; ++i) {
+    const std::string before = "d" + std::to_string(i - 1);
+    text.definitions.push_back({"d" + std::to_string(i), {before + "*" + before + " + u"}});
+  }
   EXPECT_LT(MakeTextModel(text)->program().size, 2000);
 }
 

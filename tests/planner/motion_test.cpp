@@ -20,10 +20,11 @@ Eigen::VectorXd Successor(const NominalModel& model, const Eigen::VectorXd& x, c
 std::span<const double> Span(const Eigen::VectorXd& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
 
 // Brakes with every tail from random states; `rest` are the coordinates that have to end at zero.
-void ExpectStandstill(const Problem& problem, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+void ExpectStandstill(const Config& config, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
                       const std::vector<int>& rest, std::uint32_t seed) {
   SCOPED_TRACE("seed " + std::to_string(seed));
-  const auto motion = MakeMotion(problem, 2.5);
+  const Problem& problem = *config.problem;
+  const auto motion = MakeMotion(config, Braking::kPlanned);
   std::mt19937 random(seed);
   for (int i = 0; i < 300; ++i) {
     Eigen::VectorXd x(lower.size());
@@ -42,18 +43,16 @@ void ExpectStandstill(const Problem& problem, const Eigen::VectorXd& lower, cons
 }
 
 TEST(Motion, EveryTailOfTheBicycleEndsAtStandstillWithStraightWheels) {
-  const Config config = Bicycle();
-  ExpectStandstill(*config.problem, Vec({0, 0, 0, 0.5, -2, -0.48}), Vec({0, 0, 0, 11, 2.5, 0.48}), {3, 4, 5}, 1);
+  ExpectStandstill(Bicycle(), Vec({0, 0, 0, 0.5, -2, -0.48}), Vec({0, 0, 0, 11, 2.5, 0.48}), {3, 4, 5}, 1);
 }
 
 TEST(Motion, TheTailOfThePointMassEndsAtStandstill) {
-  const Config config = PointMass();
-  ExpectStandstill(*config.problem, Vec({0, 0, -3, -3}), Vec({0, 0, 3, 3}), {2, 3}, 2);
+  ExpectStandstill(PointMass(), Vec({0, 0, -3, -3}), Vec({0, 0, 3, 3}), {2, 3}, 2);
 }
 
 TEST(Motion, ATailThatNeedsMoreStepsThanAllowedIsRefused) {
   const Config config = Bicycle();
-  const auto motion = MakeMotion(*config.problem, 2.5);
+  const auto motion = MakeMotion(config, Braking::kPlanned);
   const Eigen::VectorXd x = Vec({0, 0, 0, 9, 0, 0});
   Eigen::MatrixXd controls;
   ASSERT_TRUE(motion->Brake(Span(x), 0, 100, controls));
@@ -66,23 +65,23 @@ TEST(Motion, ATailThatNeedsMoreStepsThanAllowedIsRefused) {
 TEST(Motion, ARobotThatStandsNeedsNoTail) {
   const Config config = Bicycle();
   Eigen::MatrixXd controls;
-  ASSERT_TRUE(MakeMotion(*config.problem, 2.5)->Brake(Span(Vec({1, 2, 3, 0, 0, 0})), 0, 0, controls));
+  ASSERT_TRUE(MakeMotion(config, Braking::kPlanned)->Brake(Span(Vec({1, 2, 3, 0, 0, 0})), 0, 0, controls));
   EXPECT_EQ(controls.cols(), 0);
 }
 
 TEST(Motion, KnowsTheTimeOfAStep) {
-  EXPECT_DOUBLE_EQ(MakeMotion(*Bicycle().problem, 2.5)->dt(), 0.1);
-  EXPECT_DOUBLE_EQ(MakeMotion(*PointMass().problem, 2.5)->dt(), 0.15);
+  EXPECT_DOUBLE_EQ(MakeMotion(Bicycle(), Braking::kPlanned)->dt(), 0.1);
+  EXPECT_DOUBLE_EQ(MakeMotion(PointMass(), Braking::kPlanned)->dt(), 0.15);
 }
 
 TEST(Motion, PursuitTurnsTowardsTheHeadingWithinTheInputDomain) {
   const Config config = Bicycle();
-  const auto motion = MakeMotion(*config.problem, 2.5);
+  const auto motion = MakeMotion(config, Braking::kPlanned);
   for (const double heading : {-2.0, -0.3, 0.4, 2.5}) {
     Eigen::VectorXd x = Vec({0, 0, 0, 5, 0, 0});
     for (int t = 0; t < 60; ++t) {
       Eigen::VectorXd u(2);
-      motion->Pursue(Span(x), heading, 6, {u.data(), 2});
+      motion->Pursue(Span(x), {heading, 6, 0}, {u.data(), 2});
       EXPECT_TRUE(config.problem->domain.input.Contains(u));
       x = Successor(*config.problem->model, x, u);
     }

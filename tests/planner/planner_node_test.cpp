@@ -120,6 +120,19 @@ TEST_F(PlannerNodeTest, SaysNothingBeforeItHearsOfTheRobot) {
   EXPECT_TRUE(candidates_.empty());
 }
 
+TEST_F(PlannerNodeTest, WhileTheRobotComesToRestNothingIsPlanned) {
+  robot_state_t state = Standing();
+  state.state[3] = std::nextafter(config_.planner.initial_half_width[3], 1);
+  Say(state);
+  Run(3);
+  EXPECT_TRUE(candidates_.empty()) << "it will be somewhere else";
+  ++state.sequence;
+  state.state[3] = -config_.planner.initial_half_width[3];
+  Say(state);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 1u);
+}
+
 TEST_F(PlannerNodeTest, ACandidateSaysWhatItIs) {
   const robot_state_t state = Standing();
   Say(state);
@@ -162,7 +175,12 @@ TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
   Start(config_);
   robot_state_t state = Standing();
   state.state[0] = 8;
-  state.state[3] = 5;  // a robot that reports a speed while standing is held, so this starts at rest
+  state.state[3] = 5;  // it comes to rest still
+  Say(state);
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 0u);
+  state.state[3] = 0;
+  ++state.sequence;
   state.state[1] = 3.5;
   Say(state);
   for (int i = 1; i <= 6; ++i) {

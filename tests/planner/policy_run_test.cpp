@@ -107,7 +107,7 @@ TEST(PolicyRun, WhereNothingCanBeCertifiedNothingIsDriven) {
 TEST(PolicyProposer, ItsPlansAreThePolicysBlocksAndEndInAStop) {
   const Config config = LoadConfig(kTask);
   const Policy policy = LoadPolicy(config.planner.policy);
-  PolicyProposer proposer(config.problem, config.planner, policy);
+  PolicyProposer proposer(config, policy);
   PlanRequest request;
   request.state = Vec({0, 0, 0, 5, 0, 0});
   const auto proposal = proposer.Propose(request);
@@ -132,7 +132,7 @@ TEST(PolicyProposer, RefusesWhatDoesNotFit) {
   const Policy policy = LoadPolicy(config.planner.policy);
   const auto refusal = [&](Config task, const Policy& other) -> std::string {
     try {
-      const PolicyProposer proposer(task.problem, task.planner, other);
+      const PolicyProposer proposer(task, other);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }

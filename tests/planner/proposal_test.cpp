@@ -11,9 +11,7 @@
 namespace forereach {
 namespace {
 
-std::unique_ptr<Proposer> PlannerOf(const Config& config) {
-  return MakeOmplProposer(config.problem, config.planner, config.obstacles);
-}
+std::unique_ptr<Proposer> PlannerOf(const Config& config) { return MakeOmplProposer(config); }
 
 PlanRequest From(const Eigen::VectorXd& state, std::uint32_t seed, double clearance = 0.3) {
   PlanRequest request;

@@ -19,6 +19,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "certifier/dynamics/named_residuals.h"
 #include "certifier/gate/obstacle_message.h"
 #include "robot/sim_node.h"
 #include "tests/gate/small_task.h"
@@ -831,10 +832,10 @@ TEST_F(ArmedNodeTest, ARobotThatLeavesItsSliceLatches) {
   config_.gate.learns = false;  // else the first step falsifies the declaration
   config_.robot.start = {0, 0, 1, 0.1};
   config_.robot.step_period_ms = 150;
-  config_.robot.residual = "velocity_knee";
-  config_.robot.residual_parameters = {
-      {"dt", 0.15},          {"damping", 4},      {"cross", 0.3}, {"knee", 0.1}, {"softplus_temperature", 0.14},
-      {"regularizer", 0.15}, {"smoothing", 1e-12}};
+  ResidualText drag = ResidualNamed("velocity_knee");
+  for (auto& [name, lower, upper] : drag.parameters)
+    lower = upper = name == "damping" ? 4 : name == "knee" ? 0.1 : lower;
+  config_.robot_residual = ResidualOf(*config_.problem->model, drag);
   Restart();
   bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
   std::vector<robot_state_t> states;

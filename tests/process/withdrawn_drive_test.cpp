@@ -1,4 +1,6 @@
 // The certifier's node and the simulated robot on one bus and a simulated clock: a wall appears while the robot drives.
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <map>
@@ -54,7 +56,7 @@ Config Task() {
 
 class WithdrawnDriveTest : public testing::Test {
  protected:
-  WithdrawnDriveTest() {
+  explicit WithdrawnDriveTest(Config config = Task()) : config_(std::move(config)) {
     const auto keep = [this](const std::string& channel, auto& messages) {
       bus_->Subscribe(channel, [&messages](const Received& r) {
         using Message = typename std::remove_reference_t<decltype(messages)>::value_type;
@@ -130,7 +132,7 @@ class WithdrawnDriveTest : public testing::Test {
 
   std::int64_t now_ = kNow, sequence_ = 0, next_obstacles_ = kNow;
   const Clock clock_ = [this] { return now_; };
-  Config config_ = Task();
+  const Config config_;
   std::vector<Obstacle> obstacles_;
   std::unique_ptr<Bus> bus_ = OpenBus("memq://", clock_);
   LossyBus lossy_{*bus_};
@@ -241,6 +243,57 @@ TEST_F(WithdrawnDriveTest, AFalsifiedDeclarationStopsTheRobotEvenIfItsFaultIsLos
   ASSERT_FALSE(withdrawn_.empty());
   EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::FALSIFIED);
   EXPECT_EQ(withdrawn_[0].valid_steps, 0);
+  EXPECT_EQ(robot_.state()[2], 0);
+}
+
+// The robot brakes by 1 m/s^2: from 1 m/s in seven steps.
+class BrakingDriveTest : public WithdrawnDriveTest {
+ protected:
+  BrakingDriveTest() : WithdrawnDriveTest(WithBrake()) {}
+  static Config WithBrake() {
+    Config config = Task();
+    config.period = 0.15;
+    config.robot.emergency_stop = {{"vx", 1}};
+    return config;
+  }
+  const execution_event_t& Stop() const {
+    return *std::ranges::find(events_, execution_event_t::EMERGENCY_STOP, &execution_event_t::kind);
+  }
+  // The steps of a stop from any state of a slice.
+  int StepsFrom(int step) const { return static_cast<int>(std::ceil(certified_.at(0).slice_upper[step][2] / 0.15)); }
+};
+
+TEST_F(BrakingDriveTest, TheStopEndsWithinWhatStandsAndBeginsNoStepTooEarly) {
+  Drive();
+  RunFor(200'000);
+  SeeWall(2.5);
+  RunFor(5'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  ASSERT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+  const int standing = withdrawn_[0].valid_steps;
+  EXPECT_LE(Stop().step + StepsFrom(Stop().step), standing);
+  EXPECT_GT(Stop().step + 1 + StepsFrom(Stop().step + 1), standing) << "a step later it might not have fitted";
+  EXPECT_GT(Stop().step, 1) << "it has used what stood";
+  const auto rest = std::ranges::find_if(
+      states_, [this](const robot_state_t& state) { return state.utime > Stop().utime && state.state[2] == 0; });
+  ASSERT_NE(rest, states_.end());
+  EXPECT_LE(rest->utime, certified_[0].plan.start_utime + standing * kStepUs) << "in time";
+  EXPECT_LT(Place(), 2.5);
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::CONTACT)));
+}
+
+TEST_F(BrakingDriveTest, WhereTooFewStepsStandItStopsAtOnceAndSaysSo) {
+  Drive();
+  RunFor(200'000);
+  const int step = Step();
+  SeeWall(certified_.at(0).slice_upper[step + 4][0] - 0.001);
+  RunFor(10'000);
+  ASSERT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+  EXPECT_EQ(Stop().step, step);
+  EXPECT_EQ(Stop().value, 7);
+  EXPECT_THAT(GetText(Stop().message), testing::HasSubstr("; 3 stand, the stop takes 7 steps"));
+  EXPECT_GT(robot_.state()[2], 0) << "it takes its time";
+  RunFor(3'000'000);
   EXPECT_EQ(robot_.state()[2], 0);
 }
 

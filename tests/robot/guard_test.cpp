@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -697,6 +698,99 @@ TEST(GuardDomainTest, ComesWithTheTaskThatIsReadAgain) {
   EXPECT_THROW(guard.Expect(DigestOf("c"), DigestOf("m"), GuardDomain{{1}, {0}, {}, {}}), std::invalid_argument);
 }
 
+// Coordinate 0 is an angle: X0 is 3 +- 0.5, slice t is [3, 3 + t / 8], which are across pi.
+certified_plan_t TurningPlan(std::int64_t plan_id = 7) {
+  certified_plan_t certified = SmallPlan(plan_id);
+  certified.plan.initial_center[0] = 3;
+  for (int t = 0; t <= 3; ++t) certified.slice_lower[t][0] = 2.5, certified.slice_upper[t][0] = 3.5 + t / 8.0;
+  return certified;
+}
+
+GuardOptions WithAnAngle() {
+  GuardOptions options = TwoStates();
+  options.angles = {0};
+  return options;
+}
+
+constexpr double kTurn = 2 * std::numbers::pi;
+
+TEST(GuardAngle, IsInsideAfterWholeTurns) {
+  for (const double turns : {-2, -1, 0, 1, 3}) {
+    for (const double heading : {2.6, 3.0, 3.4}) {
+      Guard guard(WithAnAngle());
+      EXPECT_TRUE(guard.Accept(Sealed(TurningPlan()), kNow).ok());
+      const GuardVerdict verdict = guard.TryStart(kStart, kStart, State{heading + turns * kTurn, -2});
+      EXPECT_TRUE(verdict.ok()) << verdict.message;
+      // From one sample to the next it may be wrapped.
+      EXPECT_TRUE(guard.Check(1, State{3.55, 0}, kNow).ok());
+      EXPECT_TRUE(guard.Check(2, State{3.55 - kTurn, 0}, kNow).ok());
+      EXPECT_EQ(guard.Check(3, State{3.9 - kTurn, 0}, kNow).cause, GuardCause::kOutsideSlice);
+      EXPECT_TRUE(guard.halted());
+    }
+    for (const double heading : {2.4, 3.6}) {
+      Guard guard(WithAnAngle());
+      EXPECT_TRUE(guard.Accept(Sealed(TurningPlan()), kNow).ok());
+      EXPECT_EQ(guard.TryStart(kStart, kStart, State{heading + turns * kTurn, -2}).cause,
+                GuardCause::kOutsideInitialSet);
+    }
+  }
+}
+
+TEST(GuardAngle, NoOtherStateIsTurned) {
+  Guard guard(WithAnAngle());
+  EXPECT_TRUE(guard.Accept(Sealed(TurningPlan()), kNow).ok());
+  EXPECT_EQ(guard.TryStart(kStart, kStart, State{3, -2 + kTurn}).cause, GuardCause::kOutsideInitialSet);
+  Guard plain(TwoStates());
+  EXPECT_TRUE(plain.Accept(Sealed(TurningPlan()), kNow).ok());
+  EXPECT_EQ(plain.TryStart(kStart, kStart, State{3 - kTurn, -2}).cause, GuardCause::kOutsideInitialSet);
+}
+
+// A state counts as inside only if it certainly is, and without a turn the bounds themselves are.
+TEST(GuardAngle, TheRoundingOfTurnsCountsAgainstIt) {
+  const auto start = [](double heading) {
+    Guard guard(WithAnAngle());
+    EXPECT_TRUE(guard.Accept(Sealed(TurningPlan()), kNow).ok());
+    return guard.TryStart(kStart, kStart, State{heading, -2}).ok();
+  };
+  EXPECT_TRUE(start(2.5));
+  EXPECT_TRUE(start(3.5));
+  EXPECT_FALSE(start(Below(2.5)));
+  EXPECT_FALSE(start(Above(3.5)));
+  for (const double edge : {2.5, 3.5})
+    for (const double turns : {-1, 1, 2}) {
+      const double inward = edge == 2.5 ? 1 : -1;
+      EXPECT_TRUE(start(edge + turns * kTurn + inward * 1e-14));
+      EXPECT_FALSE(start(edge + turns * kTurn)) << "it cannot be told";
+      EXPECT_FALSE(start(edge + turns * kTurn - inward * 1e-14));
+    }
+}
+
+TEST(GuardAngle, ComesWithTheTaskThatIsReadAgain) {
+  Guard guard(TwoStates());
+  guard.Expect(DigestOf("second"), DigestOf("model"), {}, std::vector{0});
+  guard.Expect(DigestOf("third"), DigestOf("model"));
+  guard.Expect(DigestOf("fourth"), DigestOf("model"), {}, std::vector<int>{});
+  EXPECT_THROW(guard.Expect(DigestOf("fifth"), DigestOf("model"), {}, std::vector{2}), std::invalid_argument);
+  std::int64_t plan_id = 7;
+  const auto starts = [&](const char* config) {
+    certified_plan_t certified = TurningPlan(plan_id++);
+    SetDigest(certified.config_digest, DigestOf(config));
+    EXPECT_TRUE(guard.Accept(Sealed(certified), kNow).ok());
+    return guard.TryStart(kStart, kStart, State{3 - kTurn, -2}).ok();
+  };
+  EXPECT_FALSE(starts("config"));
+  EXPECT_TRUE(starts("second"));
+  certified_plan_t next = TurningPlan(plan_id++);
+  SetDigest(next.config_digest, DigestOf("third"));
+  EXPECT_TRUE(guard.Accept(Sealed(next), kNow).ok());
+  EXPECT_TRUE(guard.TryStart(kStart, kStart, State{3 - kTurn, -2}).ok()) << "nothing said: as before";
+  next.plan.plan_id = plan_id++;
+  SetDigest(next.config_digest, DigestOf("fourth"));
+  EXPECT_TRUE(guard.Accept(Sealed(next), kNow).ok());
+  EXPECT_TRUE(guard.Check(1, State{3 - kTurn, 0}, kNow).ok()) << "the plan that executes was certified with the angle";
+  EXPECT_FALSE(guard.TryStart(kStart, kStart, State{3 - kTurn, -2}).ok());
+}
+
 TEST(GuardHalt, ForgetsWhatWaitsAndWhatExecutes) {
   Guard guard = Executing();
   ASSERT_TRUE(guard.Accept(Sealed(SmallPlan(8)), kNow).ok());
@@ -720,6 +814,11 @@ TEST(GuardOptionsTest, ImpossibleOptionsThrow) {
         GuardDomain{{0, kNaN}, {1, 1}, {0}, {1}}, GuardDomain{{0, 0}, {1, 1}, {0, 0}, {1, 1}}}) {
     GuardOptions options = TwoStates();
     options.domain = bad;
+    EXPECT_THROW(Guard{options}, std::invalid_argument);
+  }
+  for (const int bad : {-1, 2}) {
+    GuardOptions options = TwoStates();
+    options.angles = {bad};
     EXPECT_THROW(Guard{options}, std::invalid_argument);
   }
 }

@@ -1,6 +1,9 @@
 #include "robot/sim_node.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -9,13 +12,17 @@
 
 #include "bus/authentic_bus.h"
 #include "certifier/dynamics/models.h"
+#include "certifier/dynamics/named_residuals.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/residual/observations.h"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
+#include "forereach/withdrawal_t.hpp"
+#include "lcmtypes/grounds.h"
 #include "tests/keys.h"
 #include "tests/reset.h"
 #include "tests/robot/sealed_plan.h"
@@ -269,7 +276,7 @@ TEST(RobotSim, OfATextStandsByRobotHold) {
   problem.model = MakeTextModel(text);
   config.problem = std::make_shared<const Problem>(problem);
   EXPECT_THAT([&] { Rig rig(config); }, ThrowsMessage<ConfigError>(HasSubstr("task.yaml: robot.hold: missing")));
-  config.robot.hold = {"vx"};
+  config.robot.hold = std::vector<std::string>{"vx"};
   Rig rig(config);
   rig.RunTo(0);
   certified_plan_t first = Plan(config, 1, 1, kOrigin);
@@ -485,6 +492,104 @@ TEST(RobotSim, LeavingTheSliceStopsItAtOnce) {
   EXPECT_EQ(summary["stops"], 1);
 }
 
+// vx falls by 0.15 in each step; vy is not named, so it is zero at once.
+Config TaskWithBrake() {
+  Config config = PointMassTask();
+  config.period = 0.15;
+  config.robot.emergency_stop = {{"vx", 1}};
+  return config;
+}
+
+TEST(RobotSim, ComesToRestAsItsEmergencyStopSays) {
+  Config config = TaskWithBrake();
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(PlanThatIsLeft(config));
+  rig.RunTo(8);
+  EXPECT_EQ(rig.First(kOutside).utime, BoundaryTime(3));
+  const double place = rig.StateAt(3)[0];
+  EXPECT_NEAR(rig.StateAt(3)[2], 0.3, 1e-12);
+  EXPECT_NEAR(rig.StateAt(4)[2], 0.15, 1e-12);
+  EXPECT_NEAR(rig.StateAt(4)[0], place + 0.15 * 0.3, 1e-12) << "it moves on";
+  EXPECT_EQ(rig.StateAt(5)[2], 0);
+  EXPECT_NEAR(rig.StateAt(5)[0], place + 0.15 * (0.3 + 0.15), 1e-12);
+  EXPECT_EQ(rig.StateAt(8), rig.StateAt(5)) << "at rest";
+  EXPECT_EQ(rig.Summary()["steps_executed"], 2) << "no step of the stop is one of a plan";
+}
+
+TEST(RobotSim, WhatItsEmergencyStopDoesNotNameIsZeroAtOnce) {
+  Config config = TaskWithBrake();
+  config.robot.start = {0, 0, 1, 0.5};
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
+  plan.slice_upper[1][0] = 0;
+  rig.Send(plan);
+  rig.RunTo(10);
+  EXPECT_EQ(rig.StateAt(2)[3], 0);
+  EXPECT_EQ(rig.StateAt(9)[1], rig.StateAt(2)[1]);
+  EXPECT_GT(rig.StateAt(9)[2], 0) << "it takes eight steps";
+  EXPECT_EQ(rig.StateAt(10)[2], 0);
+}
+
+TEST(RobotSim, AnEmergencyStopInTheMiddleOfAStepBrakesForTheRestOfIt) {
+  Config config = TaskWithBrake();
+  config.robot.start = {0, 0, 1, 0};
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
+  Seal(plan);
+  rig.Send(plan);
+  rig.RunTo(2);
+  withdrawal_t message{};
+  message.utime = BoundaryTime(2);
+  message.plan_id = 1;
+  message.cause = withdrawal_t::OBSTACLE;
+  SetGrounds(message, GroundsOf(plan));
+  SetDigest(message.certificate_digest, GetDigest(plan.certificate_digest));
+  rig.SendRaw("PLAN_WITHDRAWN", Bytes(Encode(message)));  // 2 ms after boundary 2
+  rig.RunTo(12);
+  const double speed = 1 + 0.15;
+  EXPECT_NEAR(rig.StateAt(2)[2], speed, 1e-12);
+  EXPECT_NEAR(rig.StateAt(3)[2], speed - 0.95 * 0.15, 1e-12);
+  EXPECT_NEAR(rig.StateAt(3)[0], rig.StateAt(2)[0] + 0.15 * speed, 1e-12) << "without the plan's control";
+  EXPECT_NEAR(rig.StateAt(4)[2], speed - 1.95 * 0.15, 1e-12);
+  EXPECT_EQ(rig.StateAt(10)[2], 0);
+  EXPECT_EQ(rig.First(execution_event_t::EMERGENCY_STOP).value, 8) << "1.15 by 0.15";
+}
+
+TEST(RobotSim, WhatItMeetsWhileItStopsIsAContact) {
+  Config config = TaskWithBrake();
+  config.robot.start = {0, 0, 1, 0};
+  config.obstacles = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 0.4)};
+  Rig rig(config);
+  rig.RunTo(0);
+  certified_plan_t plan = Plan(config, 1, 1, config.robot.start);
+  plan.slice_upper[1][0] = 0;
+  rig.Send(plan);
+  rig.RunTo(2);
+  EXPECT_LT(rig.StateAt(2)[0], 0.4);
+  EXPECT_EQ(rig.Count(kContact), 0);
+  rig.RunTo(9);
+  EXPECT_GT(rig.Count(kContact), 0);
+  EXPECT_GT(rig.StateAt(9)[0], 0.4);
+}
+
+TEST(RobotSim, ANewPlanMayTakeOverWhileItStops) {
+  Config config = TaskWithBrake();
+  config.robot.start = {0, 0, 1, 0};
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, config.robot.start, 1));
+  rig.RunTo(2);
+  EXPECT_EQ(rig.Count(kStanding), 1) << "the plan ends in motion";
+  const std::vector<double> then{rig.StateAt(2)[0] + 0.15 * rig.StateAt(2)[2], 0, rig.StateAt(2)[2] - 0.15, 0};
+  rig.Send(Plan(config, 2, 3, then, 2));
+  rig.RunTo(4);
+  EXPECT_EQ(rig.Count(kStarted), 2);
+  EXPECT_NEAR(rig.StateAt(4)[2], then[2] + 0.15, 1e-12) << "its control, and no brake";
+}
+
 TEST(RobotSim, AtTheGoalItFinishesItsTailAndStartsNothingMore) {
   Config config = PointMassTask();
   config.planner.goal = {0.1, 0};
@@ -623,8 +728,7 @@ TEST(RobotSim, ExecutesOnTheTargetNotOnTheNominalModel) {
   problem.domain.input = Box(Eigen::VectorXd::Constant(2, -1e3), Eigen::VectorXd::Constant(2, 1e3));
   config.problem = std::make_shared<const Problem>(problem);
   config.robot.start = {0, 0, 0, 20, 1, 0.3};
-  config.robot.residual = "heading_saturation";
-  config.robot.residual_parameters = {{"dt", 0.1}, {"wheelbase", 2.5}};
+  config.robot_residual = ResidualOf(*problem.model, ResidualNamed("heading_saturation"));
   Rig rig(config);
   rig.RunTo(0);
   rig.Send(Plan(config, 1, 1, config.robot.start, 2));
@@ -694,8 +798,93 @@ TEST(RobotSim, AConfigThatDoesNotFitTheModelIsAnError) {
   config.planner.goal.push_back(0);
   EXPECT_THROW(RobotSimNode(config, *bus), ConfigError);
   config = PointMassTask();
-  config.robot.residual = "ice";
+  config.robot_residual = ResidualOf(*MakeKinematicBicycle(0.1, 2.5), ResidualNamed("heading_saturation"));
   EXPECT_THROW(RobotSimNode(config, *bus), ConfigError);
+}
+
+// A bicycle that turns left from a heading just below pi.
+Config TurningTask() {
+  Config config = PointMassTask();
+  Problem problem = *config.problem;
+  problem.model = MakeKinematicBicycle(0.1, 2, {2});
+  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -1e3), Eigen::VectorXd::Constant(6, 1e3));
+  problem.body.heading = 2;
+  problem.between = Between{Eigen::Vector2d(1, 1), 0.7, 1, 0.1};
+  config.problem = std::make_shared<const Problem>(problem);
+  config.robot.start = {0, 0, 3.1, 2, 0, 0.5};
+  return config;
+}
+
+// Slices of +- 1e-6 around the motion, in which the heading goes on beyond pi.
+certified_plan_t TurningPlan(const Config& config, int steps) {
+  certified_plan_t certified = Plan(config, 1, 1, config.robot.start, steps);
+  certified.plan.progress_steps = static_cast<std::int16_t>(steps);
+  std::array<double, 8> z{};
+  std::ranges::copy(config.robot.start, z.begin());
+  for (int t = 0; t <= steps; ++t) {
+    for (std::size_t k = 0; k < 6; ++k) {
+      certified.slice_lower[t][k] = z[k] - 1e-6;
+      certified.slice_upper[t][k] = z[k] + 1e-6;
+    }
+    if (t < steps) certified.plan.control[t][0] = 0;
+    std::array<double, 6> next;
+    config.problem->model->Evaluate(z, next);
+    std::ranges::copy(next, z.begin());
+  }
+  return certified;
+}
+
+TEST(RobotSim, WrapsItsAnglesAndStaysInItsSlices) {
+  constexpr int kSteps = 30;
+  const Config config = TurningTask();
+  const certified_plan_t certified = TurningPlan(config, kSteps);
+  ASSERT_GT(certified.slice_lower[kSteps][2], 4.5) << "it turns far beyond pi";
+  Rig rig(config);
+  rig.Send(certified);
+  rig.RunTo(kSteps + 2);
+  EXPECT_EQ(rig.Count(kInside), kSteps);
+  EXPECT_EQ(rig.Count(kOutside), 0);
+  EXPECT_EQ(rig.Count(kContact), 0);
+  bool is_wrapped = false;
+  for (const robot_state_t& state : rig.states) {
+    EXPECT_LE(std::abs(state.state[2]), 3.2);
+    is_wrapped |= state.state[2] < 0;
+  }
+  EXPECT_TRUE(is_wrapped);
+
+  // What it reports are observations of no residual.
+  ASSERT_EQ(rig.transitions.size(), static_cast<std::size_t>(kSteps));
+  Transitions data{Eigen::MatrixXd(kSteps, 8), Eigen::MatrixXd(kSteps, 6)};
+  for (int i = 0; i < kSteps; ++i) {
+    const transition_t& step = rig.transitions[static_cast<std::size_t>(i)];
+    for (int k = 0; k < 6; ++k) data.z(i, k) = step.state[k], data.x_next(i, k) = step.next_state[k];
+    for (int k = 0; k < 2; ++k) data.z(i, 6 + k) = step.input[k];
+  }
+  const Observations observations = Observe(*config.problem->model, data);
+  for (int i = 0; i < kSteps; ++i) {
+    EXPECT_LE(observations.lower(i, 2), 0);
+    EXPECT_GE(observations.upper(i, 2), 0) << "within the unit of an angle";
+  }
+}
+
+TEST(RobotSim, WithoutAnglesTheSameRobotLeavesItsSlices) {
+  Config config = TurningTask();
+  const certified_plan_t certified = TurningPlan(config, 30);
+  certified_plan_t wrapped = certified;
+  for (int t = 0; t <= 30; ++t)
+    for (double* const end : {&wrapped.slice_lower[t][2], &wrapped.slice_upper[t][2]}) *end -= 2 * std::numbers::pi;
+  wrapped.plan.initial_center[2] -= 2 * std::numbers::pi;
+  for (const bool has_angles : {true, false}) {
+    Problem problem = *config.problem;
+    if (!has_angles) problem.model = MakeKinematicBicycle(0.1, 2);
+    config.problem = std::make_shared<const Problem>(problem);
+    Rig rig(config);
+    rig.Send(wrapped);
+    rig.RunTo(5);
+    EXPECT_EQ(rig.Count(kStarted), has_angles ? 1 : 0);
+    EXPECT_EQ(rig.Count(kRefused), has_angles ? 0 : 1);
+  }
 }
 
 }  // namespace

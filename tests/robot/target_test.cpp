@@ -12,8 +12,11 @@
 #include <mpfr.h>
 
 #include "certifier/dynamics/models.h"
+#include "certifier/dynamics/named_residuals.h"
 #include "certifier/dynamics/residuals.h"
+#include "certifier/dynamics/text_model.h"
 #include "certifier/residual/consistency.h"
+#include "tests/text_models.h"
 
 namespace forereach {
 namespace {
@@ -98,8 +101,7 @@ Reals PointMassTarget(const std::vector<double>& z) {
   return next;
 }
 
-Config Task(std::shared_ptr<const NominalModel> model, std::vector<double> bound, std::string residual,
-            std::map<std::string, double> parameters) {
+Config Task(std::shared_ptr<const NominalModel> model, std::vector<double> bound, const ResidualText& residual) {
   Config config;
   config.path = "task.yaml";
   Problem problem;
@@ -111,19 +113,17 @@ Config Task(std::shared_ptr<const NominalModel> model, std::vector<double> bound
   };
   problem.domain.state = box(0, n);
   problem.domain.input = box(n, bound.size());
+  config.robot_residual = ResidualOf(*model, residual);
   problem.model = std::move(model);
   config.problem = std::make_shared<const Problem>(std::move(problem));
-  config.robot.residual = std::move(residual);
-  config.robot.residual_parameters = std::move(parameters);
   return config;
 }
 
 Config Bicycle() {
-  return Task(MakeKinematicBicycle(0.1, 2.5), {40, 40, 3, 25, 3, 0.48, 20, 2}, "heading_saturation",
-              {{"dt", 0.1}, {"wheelbase", 2.5}});
+  return Task(MakeKinematicBicycle(0.1, 2.5), {40, 40, 3, 25, 3, 0.48, 20, 2}, ResidualNamed("heading_saturation"));
 }
 
-Config PointMassTask() { return Task(MakePointMass(0.15), {20, 20, 5.4, 5.4, 2, 2}, "velocity_knee", {{"dt", 0.15}}); }
+Config PointMassTask() { return Task(MakePointMass(0.15), {20, 20, 5.4, 5.4, 2, 2}, ResidualNamed("velocity_knee")); }
 
 std::vector<double> Step(const Target& target, const std::vector<double>& z, std::size_t n) {
   std::vector<double> next(n);
@@ -169,9 +169,51 @@ void ExpectOneRounding(const Config& config, Reals (*reference)(const std::vecto
 TEST(Target, BicycleIsRoundedOnce) { ExpectOneRounding(Bicycle(), BicycleTarget, 1); }
 TEST(Target, PointMassIsRoundedOnce) { ExpectOneRounding(PointMassTask(), PointMassTarget, 2); }
 
+// Rates with stages, and a residual with definitions and a kink.
+TEST(Target, OfTextsIsRoundedOnce) {
+  const ModelText text = TextModel({{"angle", "rate"}, {"rate", "torque - 9.81*sin(angle)"}}, {"torque"},
+                                   {{"dt", 0.05, 0.05}}, {}, ModelText::Integrator::kRk4);
+  const ResidualText friction{
+      "friction", {{"c", 0.3, 0.3}}, {{"size", {"abs(rate)"}}}, {{"rate", {"-dt*c*rate*size"}}}};
+  const auto reference = [](const std::vector<double>& z) {
+    const Real dt = 0.05, half = dt / Real(2), torque = z[2];
+    const auto rates = [&](const Reals& x) { return Reals{x[1], torque - Real(9.81) * Sin(x[0])}; };
+    const auto at = [&](const Real& length, const Reals& k) {
+      return Reals{Real(z[0]) + length * k[0], Real(z[1]) + length * k[1]};
+    };
+    const Reals k1 = rates({z[0], z[1]}), k2 = rates(at(half, k1)), k3 = rates(at(half, k2)), k4 = rates(at(dt, k3));
+    Reals next = {z[0], z[1]};
+    for (const std::size_t k : {0u, 1u}) next[k] = next[k] + dt / Real(6) * (k1[k] + Real(2) * (k2[k] + k3[k]) + k4[k]);
+    next[1] = next[1] - dt * Real(0.3) * Real(z[1]) * Abs(Real(z[1]));
+    return next;
+  };
+  ExpectOneRounding(Task(MakeTextModel(text), {3, 5, 2}, friction), reference, 3);
+}
+
+// The bits of the compiled equations of model and residual, in the same order of operations.
+template <class Nominal, class Residual>
+void ExpectTheBitsOf(const Nominal& nominal, const Residual& residual, const Config& config) {
+  const std::unique_ptr<Target> target = MakeTarget(config);
+  const Transitions made = MakeTransitions(*target, *config.problem, 4, 20000);
+  for (int i = 0; i < made.size(); ++i) {
+    const Eigen::VectorXd row = made.z.row(i);
+    const std::vector<long double> z(row.begin(), row.end());
+    std::vector<long double> f0(Nominal::kStates), r = f0;
+    nominal(std::span<const long double>(z), std::span(f0));
+    residual(std::span<const long double>(z), std::span(r));
+    for (std::size_t k = 0; k < f0.size(); ++k)
+      ASSERT_EQ(made.x_next(i, static_cast<Eigen::Index>(k)), static_cast<double>(f0[k] + r[k]));
+  }
+}
+
+TEST(Target, OfANamedResidualHasTheBitsOfTheCompiledOne) {
+  ExpectTheBitsOf(KinematicBicycle{0.1, 2.5}, HeadingSaturation{0.1, 2.5}, Bicycle());
+  ExpectTheBitsOf(PointMass{0.15}, VelocityKnee{0.15}, PointMassTask());
+}
+
 TEST(Target, WithoutResidualItIsTheNominalModel) {
   for (Config config : {Bicycle(), PointMassTask()}) {
-    config.robot.residual = "none";
+    config.robot_residual.reset();
     const auto n = static_cast<std::size_t>(config.problem->model->num_states());
     const std::vector<double> z(static_cast<std::size_t>(config.problem->model->num_variables()), 0.3);
     std::vector<double> nominal(n);
@@ -262,8 +304,9 @@ TEST(Residuals, TheBuildingBlocksDoNotOverflow) {
 }
 
 TEST(MakeTargetTest, SaysWhatIsWrongWithTheConfig) {
-  const auto failure = [](Config config, auto change) {
-    change(config.robot);
+  const auto failure = [](auto change) {
+    Config config = Bicycle();
+    change(*config.robot_residual);
     try {
       static_cast<void>(MakeTarget(config));
     } catch (const ConfigError& error) {
@@ -271,30 +314,22 @@ TEST(MakeTargetTest, SaysWhatIsWrongWithTheConfig) {
     }
     return std::string("accepted");
   };
-  EXPECT_THAT(failure(Bicycle(), [](auto& robot) { robot.residual = "ice"; }), HasSubstr("ice is not none"));
-  EXPECT_THAT(failure(Bicycle(), [](auto& robot) { robot.residual_parameters["mu"] = 1; }),
-              HasSubstr("no parameter mu"));
-  EXPECT_THAT(failure(Bicycle(), [](auto& robot) { robot.residual_parameters.erase("wheelbase"); }),
-              HasSubstr("needs the parameter wheelbase"));
-  EXPECT_THAT(failure(Bicycle(), [](auto& robot) { robot.residual_parameters["friction"] = NAN; }),
-              HasSubstr("friction is not finite"));
-  EXPECT_THAT(failure(Bicycle(), [](auto& robot) { robot.residual_parameters["wheelbase"] = 2.6; }),
-              HasSubstr("wheelbase=2.6"));
-  EXPECT_THAT(failure(PointMassTask(), [](auto& robot) { robot.residual_parameters["dt"] = 0.1; }),
-              HasSubstr("dt=0.1"));
-  EXPECT_THAT(failure(PointMassTask(),
-                      [](auto& robot) {
-                        robot.residual = "heading_saturation";
-                        robot.residual_parameters = {{"dt", 0.15}, {"wheelbase", 2.5}};
-                      }),
-              HasSubstr("the model is point_mass"));
+  EXPECT_EQ(failure([](auto&) {}), "accepted");
+  EXPECT_THAT(failure([](auto& residual) { residual.names.parameters.back().lower = NAN; }),
+              HasSubstr("task.yaml: robot.residual: heading_saturation: the parameter gate_temperature"));
+  EXPECT_THAT(failure([](auto& residual) { residual.values[0].text = "mu"; }), HasSubstr("mu"));
+  EXPECT_THAT(failure([](auto& residual) { residual.values.pop_back(); }), HasSubstr("of kinematic_bicycle"));
+  EXPECT_THAT(failure([](auto& residual) { residual = *PointMassTask().robot_residual; }),
+              HasSubstr("velocity_knee: for other states"));
 }
 
 TEST(MakeTargetTest, ParametersReplaceThePapersValues) {
   Config config = Bicycle();
   const std::vector<double> z{0, 0, 0, 20, 0, 0.4, 0, 0};
   const double paper = Step(*MakeTarget(config), z, 6)[2];
-  config.robot.residual_parameters["understeer"] = 0;
+  auto& parameters = config.robot_residual->names.parameters;
+  const auto understeer = std::ranges::find(parameters, "understeer", &ModelText::Parameter::name);
+  understeer->lower = understeer->upper = 0;
   const double nominal = Step(*MakeTarget(config), z, 6)[2];
   EXPECT_LT(paper, nominal);
   EXPECT_DOUBLE_EQ(nominal, 0.1 / 2.5 * 20 * std::tan(0.4));
@@ -367,7 +402,7 @@ class DisturbanceTest : public testing::TestWithParam<std::string> {};
 TEST_P(DisturbanceTest, StaysWithinItsBoundAndReachesIt) {
   Config config = PointMassTask();
   Problem problem = *config.problem;
-  config.robot.residual = "none";
+  config.robot_residual.reset();
   problem.declaration.lipschitz = Eigen::MatrixXd::Zero(4, 6);
   problem.declaration.noise_bound = Eigen::VectorXd::Zero(4);
   problem.declaration.disturbance = Eigen::Vector4d(0, 0, 0.25, 1e-300);

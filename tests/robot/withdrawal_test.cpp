@@ -1,12 +1,15 @@
 // Withdrawals at the guard and the supervisor: no withdrawn control is ever applied, and each message is answered.
 #include <array>
+#include <cmath>
 #include <limits>
+#include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/grounds.h"
+#include "robot/brake.h"
 #include "robot/supervisor.h"
 #include "tests/keys.h"
 #include "tests/robot/sealed_plan.h"
@@ -20,6 +23,7 @@ using State = std::array<double, 2>;
 
 constexpr std::int64_t kStart = kPlanStart, kStep = kPlanStepUs, kNow = kStart - 3 * kStep;
 constexpr State kInside{1, -2};
+constexpr double kFarthest = 11;  // of the first state in slice 1 of SmallPlan
 
 GuardOptions TwoStates() {
   GuardOptions options{2, 1, kStep, {}, {}};
@@ -220,10 +224,18 @@ class SupervisorWithdrawTest : public testing::Test, protected Supervisor::Robot
     if (channel == "ROBOT_STATE") last_state_ = *Decoded<robot_state_t>(message);
   }
 
-  void Make(int emergency_stop_steps = 0) {
+  int StepsToRest(std::span<const double> lower, std::span<const double> upper) const override {
+    return brake_ ? brake_->StepsToRest(lower, upper) : Supervisor::Robot::StepsToRest(lower, upper);
+  }
+
+  // The first state falls by `decline` in each step; it is at most 10 in each slice.
+  void Make(double decline = std::numeric_limits<double>::infinity()) {
+    brake_.emplace(std::vector<double>{decline, 0});
+    Remake();
+  }
+  void Remake() {
     SupervisorOptions options;
     options.guard = TwoStates();
-    options.emergency_stop_steps = emergency_stop_steps;
     Supervisor::Robot& robot = *this;
     supervisor_.emplace(options, robot);
   }
@@ -249,6 +261,7 @@ class SupervisorWithdrawTest : public testing::Test, protected Supervisor::Robot
     return kinds;
   }
 
+  std::optional<Brake> brake_;  // nothing: it is not known
   int holds_ = 0;
   std::vector<execution_event_t> events_;
   robot_state_t last_state_{};
@@ -331,7 +344,7 @@ TEST_F(SupervisorWithdrawTest, ANewerPlanThatStartsLaterComesTooLate) {
 // A brake of last resort that takes a step begins a step earlier, unless a plan takes over in time.
 TEST_F(SupervisorWithdrawTest, ABrakeThatTakesTimeBeginsBeforeTheEnd) {
   for (const int start_of_next : {2, 3}) {
-    Make(1);
+    Make(kFarthest);
     Accept(PlanFrom(0, 7));
     EXPECT_TRUE(Boundary(0));
     Withdraw(PlanFrom(0, 7), 2);
@@ -353,10 +366,117 @@ TEST_F(SupervisorWithdrawTest, AnEndThatIsNotAtRestIsNoCertifiedStand) {
   EXPECT_EQ(events_.back().kind, kStop);
 }
 
-TEST_F(SupervisorWithdrawTest, OptionsOutOfRangeThrow) {
-  EXPECT_NO_THROW(Make(128));
-  EXPECT_THROW(Make(129), std::invalid_argument);
-  EXPECT_THROW(Make(-1), std::invalid_argument);
+// What counts is where the next slice allows the state to be, not the state.
+TEST_F(SupervisorWithdrawTest, AStopThatJustFitsMayWaitForABoundaryAndOneThatDoesNotMayNot) {
+  for (const bool fits : {true, false}) {
+    Make(fits ? kFarthest : std::nextafter(kFarthest, 0));  // a step, or two
+    Accept(PlanFrom(0, 7));
+    EXPECT_TRUE(Boundary(0));
+    events_.clear();
+    Withdraw(PlanFrom(0, 7), 2);
+    EXPECT_EQ(holds_, fits ? 0 : 1) << "two steps have to begin before the next boundary";
+    EXPECT_FALSE(Boundary(1));
+    const std::vector<std::int16_t> waits{kWithdrawn, kInsideSlice, kStop}, stops{kWithdrawn, kStop};
+    ASSERT_EQ(Events(), fits ? waits : stops);
+    EXPECT_EQ(events_.back().step, fits ? 1 : 0);
+    EXPECT_EQ(events_.back().value, 1) << "from the state that it has";
+    EXPECT_THAT(GetText(events_.back().message), HasSubstr(fits ? "; 1 stand, the stop takes 1 s" : "; 2 stand"));
+    holds_ = 0;
+  }
+}
+
+TEST_F(SupervisorWithdrawTest, AStopOfWhichNothingIsKnownBeginsAtOnceUnlessAPlanTakesOver) {
+  for (const bool takes_over : {true, false}) {
+    Remake();
+    holds_ = 0;
+    events_.clear();
+    Accept(PlanFrom(0, 7));
+    EXPECT_TRUE(Boundary(0));
+    if (takes_over) Accept(PlanFrom(2, 8));
+    Withdraw(PlanFrom(0, 7), 3);
+    EXPECT_EQ(holds_, !takes_over);
+    EXPECT_EQ(Boundary(1), takes_over);
+    if (takes_over) continue;
+    EXPECT_EQ(events_.back().value, -1);
+    EXPECT_THAT(GetText(events_.back().message), HasSubstr("3 stand, the stop takes an unknown number of steps"));
+  }
+}
+
+// It waited for a plan that then does not start, or is withdrawn, too: what is left is used from there on.
+TEST_F(SupervisorWithdrawTest, AStopThatWaitedForAPlanBeginsOnceThatPlanIsGone) {
+  Make(kFarthest);
+  Accept(PlanFrom(0, 7));
+  EXPECT_TRUE(Boundary(0));
+  Accept(PlanFrom(2, 8));
+  Withdraw(PlanFrom(0, 7), 2);
+  EXPECT_TRUE(Boundary(1));
+  Withdraw(PlanFrom(2, 8), 1);
+  EXPECT_EQ(holds_, 1) << "in the middle of a step, because it is late";
+  EXPECT_FALSE(Boundary(2));
+  EXPECT_EQ(holds_, 1);
+}
+
+TEST(BrakeTest, TakesAsManyStepsAsItSays) {
+  std::mt19937_64 random(20261123);
+  std::uniform_real_distribution<double> exponent(-3, 3), sign(-1, 1);
+  for (int i = 0; i < 20'000; ++i) {
+    const double decline = std::pow(10, exponent(random));
+    const int whole = 1 + static_cast<int>(random() % 100);
+    // Just below, at and just above a whole number of steps.
+    for (double speed : {std::nextafter(whole * decline, 0), whole * decline, std::nextafter(whole * decline, 1e9),
+                         whole * decline * std::abs(sign(random))}) {
+      speed = std::copysign(speed, sign(random));
+      const Brake brake({0, decline});
+      std::array<double, 2> x{7, speed};
+      const std::array<double, 2> lower{-9, std::min(speed, 0.0)}, upper{9, std::max(speed, 0.0)};
+      const int steps = brake.StepsToRest(lower, upper);
+      ASSERT_LE(std::abs(speed), steps * decline * (1 + 1e-15));
+      for (int t = 0; t < steps; ++t) {
+        if (t < steps - 1) {
+          ASSERT_NE(x[1], 0) << "of " << steps << " steps";
+        }
+        brake.Apply(x, 1, x);
+      }
+      ASSERT_EQ(x[1], 0) << speed << " by " << decline;
+      ASSERT_EQ(x[0], 7);
+    }
+  }
+}
+
+TEST(BrakeTest, TheFarthestStateOfTheBoxCounts) {
+  const Brake brake({1, 0.5});
+  const auto steps = [&](State lower, State upper) { return brake.StepsToRest(lower, upper); };
+  EXPECT_EQ(steps({0, 0}, {0, 0}), 0);
+  EXPECT_EQ(steps({-2, 0}, {1, 0}), 2);
+  EXPECT_EQ(steps({-2, 0}, {1, 1.5}), 3);
+  EXPECT_EQ(steps({-2.25, 0}, {1, 1}), 3);
+  const double infinity = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(steps({0, 0}, {infinity, 0}), Brake::kNoEnd);
+  EXPECT_EQ(steps({nan, 0}, {1, 0}), Brake::kNoEnd);
+  EXPECT_EQ(steps({0, 0}, {1, nan}), Brake::kNoEnd);
+  EXPECT_EQ(steps({0, 0}, {Brake::kMostSteps, 0}), Brake::kMostSteps);
+  EXPECT_EQ(steps({0, 0}, {Brake::kMostSteps + 1, 0}), Brake::kNoEnd);
+  const Brake at_once({infinity, 0});
+  EXPECT_EQ(at_once.StepsToRest(State{-1e300, 5}, State{1e300, 5}), 0);
+  State x{3, 5};
+  at_once.Apply(x, 0, x);
+  EXPECT_EQ(x, (State{0, 5}));
+  EXPECT_EQ(Brake().StepsToRest(x, x), 0);
+}
+
+TEST(BrakeTest, APartOfAStepTakesAPartOfTheDecline) {
+  const Brake brake({2, 0});
+  const State before{-3, 1};
+  State x{-5, 4};
+  brake.Apply(before, 0.25, x);
+  EXPECT_EQ(x, (State{-2.5, 4}));
+  brake.Apply(before, 0, x);
+  EXPECT_EQ(x, (State{-3, 4}));
+}
+
+TEST(BrakeTest, RefusesWhatIsNoDecline) {
+  EXPECT_THROW(Brake({1, -1e-300}), std::invalid_argument);
+  EXPECT_THROW(Brake({std::numeric_limits<double>::quiet_NaN()}), std::invalid_argument);
 }
 
 }  // namespace

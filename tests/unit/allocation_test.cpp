@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "certifier/certify/certifier.h"
@@ -79,13 +80,13 @@ class Allocation : public testing::Test {
     const Eigen::VectorXd center = (Eigen::VectorXd(6) << 0, 0, 0, v, 0, delta).finished();
     const Zonotope start = Zonotope::FromBox(center, Eigen::VectorXd::Constant(6, 0.01));
     const long before = allocations;
-    const Decision decision = certifier_.Certify({controls_.data(), 2, 12, 2}, start, obstacles, tube_);
+    const Decision decision = certifier_->Certify({controls_.data(), 2, 12, 2}, start, obstacles, tube_);
     const long counted = allocations - before;
     EXPECT_EQ(decision.outcome, expected);
     return counted;
   }
 
-  Certifier certifier_{std::make_shared<Problem>(BicycleProblem())};
+  std::optional<Certifier> certifier_{std::make_shared<Problem>(BicycleProblem())};
   Eigen::MatrixXd controls_ = Eigen::MatrixXd::Zero(2, 12);
   Tube tube_;
 };
@@ -108,6 +109,16 @@ TEST_F(Allocation, CertifyDoesNone) {
   EXPECT_EQ(Count(10, 0, obstacles, Outcome::kCertified), 0);
   EXPECT_EQ(Count(30, 0, obstacles, Outcome::kDomain), 0);
   obstacles.push_back(Obstacle::Circle(Eigen::Vector2d(6, 0), 1));
+  EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
+}
+
+TEST_F(Allocation, LimitsAndPlacesAtExpressionsDoNone) {
+  Problem problem = BicycleProblem();
+  problem.limits = {{.name = "lateral acceleration", .that = {"v^2*tan(delta)/wheelbase", 1, 1}, .at_most = 4}};
+  problem.body.parts = {{{}, 0.5, {{{"x + cos(theta)", 1, 1}, {"y + sin(theta)", 1, 1}}}}};
+  certifier_.emplace(std::make_shared<Problem>(problem));
+  const std::vector<Obstacle> obstacles{Obstacle::Circle(Eigen::Vector2d(10, 8), 1)};
+  EXPECT_EQ(Count(10, 0, obstacles, Outcome::kCertified), 0);
   EXPECT_EQ(Count(10, 0.1, obstacles, Outcome::kSafety), 0);
 }
 

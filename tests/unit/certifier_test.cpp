@@ -14,7 +14,9 @@
 
 #include "certifier/certify/explain.h"
 #include "certifier/dynamics/models.h"
+#include "certifier/dynamics/text_model.h"
 #include "tests/oracle/random.h"
+#include "tests/text_models.h"
 
 namespace forereach {
 namespace {
@@ -241,6 +243,30 @@ TEST(AbstainDomain, ThePoleOfTheSteeringHasItsOwnCause) {
   const Decision later = judge(Zonotope::FromBox(Vec({0, 0, 0, 0.5, 0, 1.2}), Vec({0, 0, 0, 0, 0, 0.1})), turn, {});
   EXPECT_EQ(later.cause, Cause::kNoFiniteEnclosure);
   EXPECT_EQ(later.step, 2);
+}
+
+TEST(AbstainDomain, AKinkOfATextIsNamedWithItsPlaceAndItsArgument) {
+  const Lines equations{{"x", "x + dt*v"}, {"y", "y"}, {"v", "v - dt*v*abs(v) + dt*u"}};
+  Problem problem = Bare(MakeTextModel(TextModel(equations, {"u"}, {{"dt", 0.5, 0.5}})), Vec({9, 9, 9}), Vec({1}));
+  AddNominalTransition(problem, Eigen::VectorXd::Zero(4));
+  const auto shared = std::make_shared<Problem>(problem);
+  const Certifier certifier(shared);
+  const Eigen::MatrixXd controls = Eigen::MatrixXd::Constant(1, 4, -0.5);
+  const Plan plan{controls.data(), 1, 4, 1, {}};
+  Tube tube;
+  const Decision d = certifier.Certify(plan, Zonotope::FromBox(Vec({0, 0, 0.5}), Vec({0, 0, 0.25})), {}, tube);
+  EXPECT_EQ(d.cause, Cause::kNoFiniteEnclosure);
+  EXPECT_EQ(d.step, 1) << "v is positive at first";
+  EXPECT_THAT(
+      Explain(d, *shared, plan, tube),
+      testing::MatchesRegex("abstain D: at step 1 the next v has no finite enclosure: abs at line 1, column 10 of "
+                            "the model has a kink or a pole there; its argument, a function of v, may be "
+                            "anywhere in .-0[.][0-9]*, 0[.][0-9]*."));
+  EXPECT_EQ(Explain(d, *shared), "abstain D: at step 1 the next v has no finite enclosure");
+
+  const Decision good =
+      certifier.Certify({controls.data(), 1, 1, 1, {}}, Zonotope::FromBox(Vec({0, 0, 5}), Vec({0, 0, 1})), {}, tube);
+  EXPECT_EQ(Explain(good, *shared, plan, tube), Explain(good, *shared));
 }
 
 // A brake that ends at +-0.25 m/s, with the widths and the last bit of the residual around it.
@@ -518,6 +544,27 @@ TEST(Certifier, NamesThePartThatDoesNotFit) {
   Problem largest = PointMassProblem();
   largest.zonotope_order = 26;
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(largest)));
+}
+
+TEST(Certifier, AProjectionKnowsNoAngle) {
+  Problem problem = Bare(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Vec({9, 9, 9, 9, 1, 1}), Vec({1, 1}));
+  AddNominalTransition(problem, Eigen::VectorXd::Zero(8));
+  EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(problem)));
+  problem.projection(1, kTheta) = 1e-300;
+  EXPECT_THAT([&] { Certifier(std::make_shared<Problem>(problem)); },
+              ThrowsMessage<std::invalid_argument>(
+                  Eq("projection: depends on theta, which is an angle: how often it has turned is not known")));
+}
+
+TEST(Certifier, ABodysPlacesAreTheSameAfterATurn) {
+  Problem problem = Bare(MakeKinematicBicycle(0.1, 2.5, {kTheta}), Vec({9, 9, 9, 9, 1, 1}), Vec({1, 1}));
+  AddNominalTransition(problem, Eigen::VectorXd::Zero(8));
+  problem.body.parts = {BodyPart{.radius = 0.1, .places = {{{"x + cos(theta)"}, {"y + sin(theta)"}}}}};
+  EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(problem)));
+  problem.body.parts[0].places[0][1].text = "y + theta";
+  EXPECT_THAT([&] { Certifier(std::make_shared<Problem>(problem)); },
+              ThrowsMessage<std::invalid_argument>(
+                  Eq("body: the place y + theta is not seen to be the same after a turn of the angle theta by 2 pi")));
 }
 
 TEST(Certifier, RequireNamesWhatItCannotJudge) {

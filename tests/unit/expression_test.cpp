@@ -14,7 +14,8 @@ namespace {
 const std::vector<std::string> kNames{"x", "y", "theta", "v", "dt"};
 constexpr long double Wide(double x) { return x; }
 
-constexpr long double kX = 0.75L, kY = -1.25L, kTheta = 0.5L, kV = 3, kDt = 0.1;
+// volatile: the library computes at run time, the compiler in its own way.
+const volatile long double kX = 0.75L, kY = -1.25L, kTheta = 0.5L, kV = 3, kDt = 0.1;
 
 long double ValueOf(const std::string& text) {
   const std::vector<long double> values{kX, kY, kTheta, kV, kDt};

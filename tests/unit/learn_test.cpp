@@ -1,7 +1,9 @@
 // A certifier that learns transitions gives the same answers as one that had them from the start.
+#include <array>
 #include <cmath>
 #include <memory>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -140,6 +142,26 @@ TEST_F(LearnTest, WhereTheNominalModelHasNoFiniteValueNothingIsLearned) {
   z[2] = kHuge;
   EXPECT_EQ(certifier.Learn({z.data(), 6}, {z.data(), 4}), Certifier::Learned::kNoNominalValue);
   EXPECT_EQ(certifier.num_observations(), 1u);
+}
+
+TEST_F(LearnTest, AnAngleIsLearnedWithAnyTurnsThatCanBeTold) {
+  Problem problem;
+  problem.model = MakeKinematicBicycle(0.1, 2, {2});
+  problem.domain.state = Box(Eigen::VectorXd::Constant(6, -9), Eigen::VectorXd::Constant(6, 9));
+  problem.domain.input = Box(Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1));
+  problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Constant(6, 0.1)};
+  problem.projection = Eigen::MatrixXd::Identity(2, 6);
+  problem.transitions = {Eigen::MatrixXd::Zero(1, 8), Eigen::MatrixXd::Zero(1, 6)};
+  Certifier certifier(std::make_shared<Problem>(problem));
+  const std::vector<double> z(8, 0);
+  const auto learn = [&](double theta) { return certifier.Learn(z, std::array{0.0, 0.0, theta, 0.0, 0.0, 0.0}); };
+  EXPECT_EQ(learn(6.2), Certifier::Learned::kAdded);
+  EXPECT_EQ(learn(-12.5), Certifier::Learned::kAdded);
+  EXPECT_FALSE(certifier.violation());
+  EXPECT_EQ(learn(2), Certifier::Learned::kAmbiguousAngle);
+  EXPECT_EQ(certifier.num_observations(), 3u);
+  EXPECT_EQ(learn(6.6), Certifier::Learned::kAdded);
+  EXPECT_TRUE(certifier.violation()) << "0.32 rad after a turn contradict -0.08 rad and sigma";
 }
 
 TEST_F(LearnTest, AContradictionNamesThePairAndFalsifies) {

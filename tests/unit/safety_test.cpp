@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "certifier/safety/obstacle.h"
+#include "certifier/safety/placement.h"
 #include "certifier/safety/projection.h"
 #include "certifier/safety/separation.h"
 
@@ -74,7 +75,7 @@ TEST(Separation, StartsUnproven) {
 }
 
 TEST(Projection, RefusesWhatProjectsToNothing) {
-  EXPECT_THROW(Projection(Eigen::MatrixXd::Zero(2, 4), 4), std::invalid_argument);
+  EXPECT_THROW(Placement(Eigen::MatrixXd::Zero(2, 4), Body{}, std::nullopt, 4), std::invalid_argument);
   EXPECT_THROW(Projection(Eigen::MatrixXd::Ones(4, 4), 4), std::invalid_argument);
   EXPECT_THROW(Projection(Eigen::MatrixXd(0, 4), 4), std::invalid_argument);
   EXPECT_THROW(Projection(Eigen::MatrixXd::Ones(2, 3), 4), std::invalid_argument);

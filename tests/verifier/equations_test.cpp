@@ -7,7 +7,7 @@
 #include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/models.h"
 #include "tests/oracle/random.h"
-#include "tests/verifier/text_models.h"
+#include "tests/text_models.h"
 #include "verifier/equations.h"
 
 namespace forereach::verifier {

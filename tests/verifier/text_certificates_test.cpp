@@ -1,13 +1,15 @@
 // Certificates of models that are texts: what the certifier claims, the verifier derives by its own parser.
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "certifier/dynamics/text_model.h"
 #include "tests/oracle/random.h"
+#include "tests/text_models.h"
 #include "tests/verifier/record.h"
-#include "tests/verifier/text_models.h"
 
 namespace forereach::verifier {
 namespace {
@@ -86,6 +88,86 @@ TEST_P(TextCertificates, WithAParameterThatIsAnIntervalAreConfirmed) {
   ExpectConfirmed(TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "k*u"}, {"v", "-k*v*abs(v + 2)"}}, {"u"},
                             {{"dt", 0.1, 0.1}, {"k", 0.19, 0.21}}, {}, GetParam()),
                   random, Eigen::VectorXd::Constant(1, 0.1), 8);
+}
+
+// Records of the heading of a robot that turns through pi: as it was, or wrapped.
+std::shared_ptr<Problem> TurningProblem(const ModelText& text, bool wrapped) {
+  const auto problem = ProblemOf(text, 8);
+  problem->declaration.lipschitz.setConstant(1e-3);
+  problem->declaration.noise_bound.setConstant(1e-9);
+  constexpr int kCount = 60;
+  const int n = problem->model->num_states(), d = problem->model->num_variables();
+  problem->transitions = {Eigen::MatrixXd(kCount, d), Eigen::MatrixXd(kCount, n)};
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(d), next(n);
+  z << 0, 0, 2.9, 1, 0.1, 0.5;
+  for (int i = 0; i < kCount; ++i) {
+    problem->model->Evaluate({z.data(), static_cast<std::size_t>(d)}, {next.data(), static_cast<std::size_t>(n)});
+    next[2] += 1e-3 * std::sin(z[2]);  // the residual
+    if (wrapped) next[2] = std::remainder(next[2], 2 * std::numbers::pi);
+    problem->transitions.z.row(i) = z;
+    problem->transitions.x_next.row(i) = next;
+    z[2] = next[2];
+    z[4] = 0.1 + 0.01 * (i % 3);
+  }
+  return problem;
+}
+
+TEST_P(TextCertificates, OfWrappedHeadingsAreConfirmed) {
+  ModelText text = TextModel({{"x", "v*cos(q)"}, {"y", "v*sin(q)"}, {"q", "w"}, {"v", "0"}, {"w", "u"}}, {"u"},
+                             {{"dt", 0.2, 0.2}}, {}, GetParam());
+  const Eigen::MatrixXd controls = Eigen::MatrixXd::Constant(1, 10, 0.2);
+  const Plan plan{controls.data(), 1, 10, 1, {}};
+  const Zonotope initial =
+      Zonotope::FromBox((Eigen::VectorXd(5) << 0, 0, 3.05, 1, 0.2).finished(), Eigen::VectorXd::Constant(5, 1e-3));
+  forereach::Tube tube;
+  EXPECT_TRUE(Certifier(TurningProblem(text, true)).violation()) << "without angles it falsifies the declaration";
+  text.angles = {"q"};
+  std::vector<double> last;
+  for (const bool wrapped : {true, false}) {
+    const auto problem = TurningProblem(text, wrapped);
+    const Certifier certifier(problem);
+    ASSERT_FALSE(certifier.violation());
+    ASSERT_EQ(certifier.Certify(plan, initial, {}, tube).outcome, Outcome::kCertified);
+    EXPECT_GT(tube.hull(10, 2).lower, std::numbers::pi) << "the tube goes on beyond pi";
+    last.push_back(tube.hull(10, 2).upper);
+    const Verifier judge(problem, MethodOf(*problem));
+    const Certificate certificate = CertificateOf(certifier, plan, initial, {}, tube);
+    const Verdict verdict = judge.Verify(certificate);
+    EXPECT_EQ(verdict.status, Status::kConfirmed) << "step " << verdict.failure.step << ": " << verdict.failure.what;
+    for (const int k : {0, 2}) {
+      Certificate smaller = certificate;
+      smaller.slices.back().upper[k] -= 0.2 * (smaller.slices.back().upper[k] - smaller.slices.back().lower[k]);
+      EXPECT_EQ(judge.Verify(smaller).status, Status::kRefuted);
+    }
+  }
+  // Wrapped and unwrapped records are at different places, so their bounds differ a little.
+  EXPECT_NEAR(last[0], last[1], 0.05);
+}
+
+// An envelope that is narrower than wrapped data allow by less than the unit of an angle.
+TEST(AngleCertificates, TheUnitOfAnAngleCounts) {
+  ModelText text =
+      TextModel({{"x", "x + dt*cos(q)"}, {"y", "y + dt*sin(q)"}, {"q", "q + dt*u"}}, {"u"}, {{"dt", 0.5, 0.5}});
+  text.angles = {"q"};
+  const auto problem = ProblemOf(text, 8);
+  problem->declaration.lipschitz.setZero();
+  problem->declaration.noise_bound.setZero();
+  problem->transitions = {Eigen::MatrixXd::Zero(1, 4), Eigen::MatrixXd::Zero(1, 3)};
+  problem->transitions.x_next(0, 0) = 0.5;  // f0(0) = (0.5, 0, 0)
+  const Certifier certifier(problem);
+  const Eigen::MatrixXd controls = Eigen::MatrixXd::Zero(1, 1);
+  const Plan plan{controls.data(), 1, 1, 1, {}};
+  const Zonotope initial = Zonotope::FromBox(Eigen::VectorXd::Zero(3), Eigen::VectorXd::Zero(3));
+  forereach::Tube tube;
+  ASSERT_EQ(certifier.Certify(plan, initial, {}, tube).outcome, Outcome::kCertified);
+  EXPECT_EQ(tube.hull(0, 2).upper, 0);
+  EXPECT_GE(tube.hull(1, 2).upper, 0x1p-49);
+  const Verifier judge(problem, MethodOf(*problem));
+  const Certificate certificate = CertificateOf(certifier, plan, initial, {}, tube);
+  EXPECT_EQ(judge.Verify(certificate).status, Status::kConfirmed);
+  Certificate narrow = certificate;
+  narrow.slices[1].upper[2] = 0x1.ffp-50;
+  EXPECT_EQ(judge.Verify(narrow).status, Status::kRefuted);
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, TextCertificates,

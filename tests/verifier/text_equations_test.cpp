@@ -8,7 +8,7 @@
 
 #include "certifier/dynamics/models.h"
 #include "tests/oracle/random.h"
-#include "tests/verifier/text_models.h"
+#include "tests/text_models.h"
 #include "verifier/equations.h"
 #include "verifier/expressions.h"
 

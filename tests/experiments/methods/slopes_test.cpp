@@ -1,5 +1,5 @@
 // Slope estimates by hand; no estimator finds a slope that no sample shows.
-#include "experiments/methods/slopes.h"
+#include "identify/slopes.h"
 
 #include <cmath>
 

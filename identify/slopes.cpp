@@ -1,12 +1,10 @@
-#include "experiments/methods/slopes.h"
+#include "identify/slopes.h"
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 
-#include "experiments/methods/samples.h"
-
-namespace forereach::experiments {
+namespace forereach {
 namespace {
 
 constexpr double kReliability = 1.5;
@@ -15,7 +13,9 @@ constexpr int kBatches = 50, kPairs = 100;
 class PairSlopes {
  public:
   PairSlopes(const Declaration& declaration, const Observations& observations, int k)
-      : weights_(declaration.lipschitz.row(k)), z_(observations.z), residual_(ObservedResiduals(observations).col(k)) {}
+      : weights_(declaration.lipschitz.row(k)),
+        z_(observations.z),
+        residual_((observations.lower.col(k) + observations.upper.col(k)) / 2) {}
 
   [[nodiscard]] int size() const { return static_cast<int>(residual_.size()); }
 
@@ -102,4 +102,4 @@ Declaration EstimatedDeclaration(SlopeEstimator estimator, const Declaration& de
   return estimated;
 }
 
-}  // namespace forereach::experiments
+}  // namespace forereach

@@ -7,7 +7,7 @@
 
 #include "certifier/dynamics/model_text.h"
 
-namespace forereach::verifier {
+namespace forereach {
 
 using Lines = std::vector<std::pair<std::string, std::string>>;  ///< Names, each with an expression.
 
@@ -68,4 +68,4 @@ using Lines = std::vector<std::pair<std::string, std::string>>;  ///< Names, eac
                    {{"lift", "f/m"}}, integrator);
 }
 
-}  // namespace forereach::verifier
+}  // namespace forereach

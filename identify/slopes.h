@@ -12,7 +12,7 @@ do not count; a zero row stays zero. */
 #include "certifier/residual/declaration.h"
 #include "certifier/residual/observations.h"
 
-namespace forereach::experiments {
+namespace forereach {
 
 enum class SlopeEstimator {
   /** max_ij (|r~_ik - r~_jk| - 2 sigma_k) / d_k, at least 0: Calliess et al. 2020 (LACKI), Eq. (7), lambda = 2
@@ -40,4 +40,4 @@ Cost O(N^2) for the first two. */
 /** The right end of the law of `maxima`, by the fit above. @pre at least 3 entries. */
 [[nodiscard]] double ExtremeValueEnd(std::vector<double> maxima);
 
-}  // namespace forereach::experiments
+}  // namespace forereach

@@ -1,0 +1,100 @@
+#include "certifier/dynamics/text_program.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+#include "certifier/dynamics/evaluate.h"
+#include "certifier/dynamics/expression.h"
+#include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
+
+FOREREACH_ARITHMETIC_BEGIN
+
+namespace forereach {
+namespace {
+
+// The names that are known so far, in the order of their values.
+class Known final {
+ public:
+  void Add(const std::string& name, Symbol value) {
+    if (!IsName(name)) throw std::invalid_argument("\"" + name + "\" is no name");
+    if (IsReserved(name)) throw std::invalid_argument("the name " + name + " belongs to the language");
+    if (std::ranges::find(names_, name) != names_.end())
+      throw std::invalid_argument("the name " + name + " is used twice");
+    names_.push_back(name);
+    values_.push_back(value);
+  }
+  [[nodiscard]] Symbol ValueOf(const ExpressionText& expression, ProgramDraft& program) const {
+    return Evaluate<Symbol>(ParseExpression(expression, names_), values_,
+                            [&](double number) { return Symbol::Constant(program, number); });
+  }
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<Symbol> values_;
+};
+
+void RequireAtMost(std::size_t count, int most, const char* what) {
+  if (count > ToSize(most))
+    throw std::invalid_argument(std::to_string(count) + " " + what + " are more than " + std::to_string(most));
+}
+
+}  // namespace
+
+ExpressionNames NamesOf(const NominalModel& model) {
+  ExpressionNames names{model.state_names(), model.input_names(), {}, {}};
+  for (std::size_t p = 0; p < model.parameter_names().size(); ++p) {
+    const Interval& range = model.parameter_ranges()[p];
+    names.parameters.push_back({model.parameter_names()[p], range.lower, range.upper});
+  }
+  if (model.text() != nullptr) names.definitions = model.text()->definitions;
+  return names;
+}
+
+ProgramDraft MakeProgram(const ExpressionNames& names, std::span<const ExpressionText> expressions) {
+  RequireAtMost(names.states.size(), kMaxStates, "states");
+  RequireAtMost(names.inputs.size(), kMaxInputs, "inputs");
+  const std::size_t states = names.states.size();
+  ProgramDraft program(static_cast<int>(states), static_cast<int>(states + names.inputs.size()));
+  Known known;
+  int variable = 0, parameter = 0;
+  for (const auto* variables : {&names.states, &names.inputs})
+    for (const std::string& name : *variables) known.Add(name, Symbol::Variable(program, variable++));
+  for (const auto& [name, lower, upper] : names.parameters) {
+    if (!(-kInfinity < lower && lower <= upper && upper < kInfinity))
+      throw std::invalid_argument("the parameter " + name + " in [" + ToText(lower) + ", " + ToText(upper) +
+                                  "] is no finite range");
+    known.Add(name, Symbol::Parameter(program, parameter++));
+  }
+  for (const auto& [name, value] : names.definitions) known.Add(name, known.ValueOf(value, program));
+  std::vector<int> values;
+  for (const ExpressionText& expression : expressions) values.push_back(known.ValueOf(expression, program).node());
+  program.SetValues(values);
+  return program;
+}
+
+TextFunction::TextFunction(const ExpressionNames& names, std::span<const ExpressionText> expressions)
+    : program_(std::make_shared<const ProgramDraft>(MakeProgram(names, expressions))) {
+  const Program program = program_->View();
+  needed_.assign(program.nodes.size(), 0);
+  for (const int node : program.value) needed_[ToSize(node)] = 1;
+  MarkOperands(program.nodes, needed_);
+  for (const auto& [name, lower, upper] : names.parameters) parameters_.push_back(lower + (upper - lower) / 2);
+}
+
+void TextFunction::Evaluate(std::span<const double> z, std::span<long double> values) const noexcept {
+  const Program program = program_->View();
+  std::array<long double, kMaxVariables> wide;
+  std::ranges::copy(z, wide.begin());
+  const std::span all(FOREREACH_ON_STACK(long double, program.size), ToSize(program.size));
+  forereach::Evaluate<long double>(program, needed_, std::span<const double>(parameters_), {wide.data(), z.size()},
+                                   all);
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] = all[ToSize(program.value[k])];
+}
+
+}  // namespace forereach
+
+FOREREACH_ARITHMETIC_END

@@ -1,0 +1,73 @@
+#include "certifier/task/laws.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "certifier/dynamics/expression.h"
+
+namespace forereach {
+namespace {
+
+std::vector<std::string> Desired() { return {kDesiredHeading, kDesiredSpeed, kDesiredClimb}; }
+
+// All names but those of definitions.
+std::vector<std::string> Given(const ExpressionNames& names) {
+  std::vector<std::string> given = names.states;
+  given.insert(given.end(), names.inputs.begin(), names.inputs.end());
+  for (const ModelText::Parameter& parameter : names.parameters) given.push_back(parameter.name);
+  return given;
+}
+
+// @throws ExpressionError if a definition uses a name that nobody knows, std::invalid_argument if it has the name of
+// something else.
+void CheckDefinitions(const NominalModel& model, const Laws& laws) {
+  const ExpressionNames names = NamesOf(model);
+  std::vector<std::string> known = Given(names);
+  for (const std::string& name : Desired()) known.push_back(name);
+  for (const ModelText::Definition& definition : names.definitions) known.push_back(definition.name);
+  for (const ModelText::Definition& definition : laws.definitions) {
+    if (std::ranges::find(known, definition.name) != known.end())
+      throw std::invalid_argument("the name " + definition.name + " is used twice");
+    static_cast<void>(ParseExpression(definition.value, known));
+    known.push_back(definition.name);
+  }
+}
+
+// The names for a law with these in the place of inputs. Definitions that use another name are left out: all are right,
+// so it is a name that a law cannot know, as that of an input.
+ExpressionNames NamesFor(const NominalModel& model, const Laws& laws, std::vector<std::string> inputs) {
+  CheckDefinitions(model, laws);
+  ExpressionNames names = NamesOf(model);
+  names.inputs = std::move(inputs);
+  std::vector<ModelText::Definition> definitions = std::move(names.definitions);
+  definitions.insert(definitions.end(), laws.definitions.begin(), laws.definitions.end());
+  names.definitions.clear();
+  std::vector<std::string> known = Given(names);
+  for (ModelText::Definition& definition : definitions) {
+    try {
+      static_cast<void>(ParseExpression(definition.value, known));
+    } catch (const ExpressionError&) {
+      continue;
+    }
+    known.push_back(definition.name);
+    names.definitions.push_back(std::move(definition));
+  }
+  return names;
+}
+
+}  // namespace
+
+TextFunction MakeStopLaw(const NominalModel& model, const Laws& laws, const Law& law) {
+  return {NamesFor(model, laws, {}), law};
+}
+
+TextFunction MakeSpeed(const NominalModel& model, const Laws& laws) {
+  return {NamesFor(model, laws, {}), std::vector<ExpressionText>{laws.speed.value()}};
+}
+
+TextFunction MakeHints(const NominalModel& model, const Laws& laws) {
+  return {NamesFor(model, laws, Desired()), laws.hints};
+}
+
+}  // namespace forereach

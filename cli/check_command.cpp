@@ -1,0 +1,152 @@
+#include <algorithm>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/numerics/limits.h"
+#include "certifier/numerics/text.h"
+#include "certifier/task/json_text.h"
+#include "cli/commands.h"
+#include "cli/offline.h"
+#include "cli/task_check.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+struct Options {
+  TaskCheckOptions check;
+  std::string picture;
+  bool json = false;
+};
+
+// The steps for which widths are shown: about ten, among them the first and the last.
+std::vector<std::size_t> ShownSteps(std::size_t last) {
+  std::vector<std::size_t> steps;
+  const std::size_t stride = std::max<std::size_t>(1, (last + 9) / 10);
+  for (std::size_t t = 0; t < last; t += stride) steps.push_back(t);
+  steps.push_back(last);
+  return steps;
+}
+
+void PrintData(const TaskCheck& check, std::ostream& out) {
+  out << "data: " << check.data << ", " << check.transitions << " transitions\n";
+  if (check.coordinates.empty()) return;
+  out << "  " << std::left << std::setw(20) << "coordinate" << std::setw(24) << "domain" << std::setw(24) << "data"
+      << "the declared error depends on it\n";
+  constexpr std::size_t kShort = 8;  // characters of a number that is shown as it is
+  const auto number = [](double x, const std::string& rounded) {
+    const std::string text = ToText(x);
+    return text.size() <= kShort ? text : rounded;
+  };
+  const auto range = [&](double lower, double upper) {
+    return "[" + number(lower, RoundedDown(lower, 4)) + ", " + number(upper, RoundedUp(upper, 4)) + "]";
+  };
+  for (const TaskCheck::Coordinate& coordinate : check.coordinates)
+    out << "  " << std::setw(20) << coordinate.name << std::setw(24) << range(coordinate.lower, coordinate.upper)
+        << std::setw(24) << range(coordinate.least, coordinate.largest) << (coordinate.matters ? "yes" : "no") << "\n";
+  if (check.rows.empty()) return;
+  out << "declaration: of what it allows, two transitions differ by at most\n  ";
+  for (const TaskCheck::Row& row : check.rows) out << row.name << " " << RoundedUp(100 * row.used, 3) << " %  ";
+  out << (check.all_pairs ? "" : "(a sample of them)") << "\n";
+}
+
+void PrintTube(const TaskCheck& check, const Options& options, std::ostream& out) {
+  if (check.half_widths.empty()) return;
+  out << "tube without obstacles, " << check.planned_steps << " steps of "
+      << (options.check.plan.empty() ? "the inputs closest to zero" : options.check.plan)
+      << ": half-width of each slice\n  " << std::setw(6) << "step" << std::setw(8) << "s";
+  for (const std::string& state : check.states) out << std::setw(12) << state;
+  out << "\n";
+  for (const std::size_t t : ShownSteps(check.half_widths.size() - 1)) {
+    out << "  " << std::setw(6) << t << std::setw(8) << RoundedDown(static_cast<double>(t) * check.period, 4);
+    for (const double width : check.half_widths[t]) out << std::setw(12) << RoundedUp(width, 4);
+    out << "\n";
+  }
+}
+
+void PrintFindings(const TaskCheck& check, std::ostream& out) {
+  const auto remarks = std::ranges::count_if(check.findings, &Finding::is_remark);
+  const auto findings = std::ssize(check.findings) - remarks;
+  out << (findings == 0 ? std::string("a plan could be certified")
+                        : std::to_string(findings) + (findings == 1 ? " finding" : " findings"))
+      << (remarks == 0 ? "" : ", " + std::to_string(remarks) + (remarks == 1 ? " remark" : " remarks")) << "\n";
+  for (const Finding& finding : check.findings)
+    out << finding.place << (finding.is_remark ? "remark: " : "") << finding.what << "\n    " << finding.advice << "\n";
+}
+
+Json ToJson(const TaskCheck& check) {
+  Json findings = Json::array(), coordinates = Json::array(), rows = Json::array();
+  for (const Finding& finding : check.findings)
+    findings.push_back(
+        {{"place", finding.place}, {"what", finding.what}, {"advice", finding.advice}, {"remark", finding.is_remark}});
+  for (const TaskCheck::Coordinate& c : check.coordinates)
+    coordinates.push_back(
+        {{"name", c.name}, {"domain", {c.lower, c.upper}}, {"data", {c.least, c.largest}}, {"matters", c.matters}});
+  for (const TaskCheck::Row& row : check.rows)
+    rows.push_back({{"name", row.name}, {"used", row.used}, {"lines", {row.first, row.second}}});
+  return {{"findings", findings},
+          {"data", check.data},
+          {"transitions", check.transitions},
+          {"coordinates", coordinates},
+          {"declaration", rows},
+          {"states", check.states},
+          {"half_widths", check.half_widths},
+          {"tube", check.tube},
+          {"good", !check.HasFindings()}};
+}
+
+int Check(const Options& options) {
+  const std::vector<std::string> files =
+      options.picture.empty() ? std::vector<std::string>{} : PictureFiles(options.picture);
+  const TaskCheck check = CheckTask(options.check);
+  if (!files.empty() && !check.is_planar)
+    throw PictureError("picture: the task's safety coordinates are not two, so there is no picture");
+  for (const std::string& file : files) DrawPicture(check.picture, file);
+  if (options.json) {
+    std::cout << JsonText(ToJson(check)) << std::endl;
+  } else {
+    std::ostringstream out;
+    PrintData(check, out);
+    PrintTube(check, options, out);
+    PrintFindings(check, out);
+    for (const std::string& file : files) out << "picture: " << file << "\n";
+    std::cout << out.str() << std::flush;
+  }
+  return check.HasFindings() ? 1 : 0;
+}
+
+}  // namespace
+
+Command CheckCommand() {
+  const auto options = std::make_shared<Options>();
+  return {.name = kCheck.name,
+          .purpose = kCheck.purpose,
+          .footer =
+              "It compares the domain and the declaration with the data, looks at the start, the goal, the obstacles "
+              "and the\n"
+              "length of a step, and propagates the tube of one plan without obstacles. Each finding has file, line "
+              "and key,\n"
+              "the value and its bound, and what to do. A remark costs width or time, and keeps nothing from being "
+              "certified.\n"
+              "A tube that ends after the planner's progress_steps is a remark, unless --plan is given.\n\n"
+              "What it cannot tell: whether the declaration is true.\n\n"
+              "Example:\n  forereach check config/bicycle.yaml --picture check.svg",
+          .options = {Required({"TASK", &options->check.config, "FILE", "Task file (YAML)"}),
+                      {"--plan", &options->check.plan, "FILE.csv",
+                       "The plan for the tube; by default the inputs closest to zero"},
+                      {"--steps", &options->check.steps, "",
+                       "Steps of the plan without a file; by default planner.progress_steps + planner.tail_steps",
+                       NumberRange{1, kMaxSteps}},
+                      {"--picture", &options->picture, "NAME",
+                       "Draws data, tube, obstacles and goal into NAME.svg and NAME.png, or a NAME.svg, .png or .pdf"},
+                      JsonFlag(options->json)},
+          .run = [options] { return Check(*options); }};
+}
+
+}  // namespace forereach

@@ -1,0 +1,156 @@
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
+#include "certifier/task/config.h"
+#include "certifier/task/json_text.h"
+#include "cli/commands.h"
+#include "cli/offline.h"
+#include "identify/fit.h"
+#include "records/scatter.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kDigits = 6;
+
+struct Options {
+  std::string config, names, picture;
+  bool json = false;
+};
+
+// The parameters to fit: those that are named, or all but dt.
+std::vector<std::string> NamesOf(const std::string& given, const ModelText& text) {
+  std::vector<std::string> names;
+  std::istringstream in(given);
+  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
+  if (given.empty())
+    for (const ModelText::Parameter& parameter : text.parameters)
+      if (parameter.name != "dt") names.push_back(parameter.name);
+  return names;
+}
+
+double RootMeanSquare(const Eigen::MatrixXd& errors, Eigen::Index k) {
+  return std::sqrt(errors.col(k).squaredNorm() / static_cast<double>(errors.rows()));
+}
+
+std::string Short(double value) {
+  std::ostringstream text;
+  text.precision(kDigits);
+  text << value;
+  return text.str();
+}
+
+std::string Yaml(const Fit& fit) {
+  std::string text;
+  for (const FittedParameter& parameter : fit.parameters)
+    text += (text.empty() ? "" : ", ") + parameter.name + ": " + Short(parameter.after);
+  return "parameters: {" + text + "}";
+}
+
+Json ToJson(const Fit& fit, const NominalModel& model) {
+  Json document{{"converged", fit.converged},
+                {"evaluations", fit.evaluations},
+                {"yaml", Yaml(fit)},
+                {"parameters", Json::array()},
+                {"states", Json::array()}};
+  for (const FittedParameter& each : fit.parameters)
+    document["parameters"].push_back(
+        {{"name", each.name},
+         {"before", each.before},
+         {"after", each.after},
+         {"deviation", std::isfinite(each.deviation) ? Json(each.deviation) : Json(nullptr)}});
+  for (Eigen::Index k = 0; k < fit.after.cols(); ++k)
+    document["states"].push_back({{"name", model.state_names()[ToSize(k)]},
+                                  {"rms_before", RootMeanSquare(fit.before, k)},
+                                  {"rms_after", RootMeanSquare(fit.after, k)},
+                                  {"largest_before", fit.before.col(k).cwiseAbs().maxCoeff()},
+                                  {"largest_after", fit.after.col(k).cwiseAbs().maxCoeff()}});
+  return document;
+}
+
+void PrintForPeople(const Fit& fit, const Config& config) {
+  const NominalModel& model = *config.problem->model;
+  std::ostringstream out;
+  out << "fit: " << fit.parameters.size() << " parameters to " << fit.after.rows() << " transitions of " << config.path
+      << (fit.converged ? "" : "; stopped before it converged") << "\n"
+      << std::left << "  " << std::setw(18) << "parameter" << std::setw(13) << "before" << std::setw(13) << "after"
+      << "standard error\n";
+  for (const FittedParameter& each : fit.parameters)
+    out << "  " << std::setw(18) << each.name << std::setw(13) << Short(each.before) << std::setw(13)
+        << Short(each.after)
+        << (std::isfinite(each.deviation) ? Short(each.deviation) : "not determined by these transitions") << "\n";
+  out << "\n  " << std::setw(18) << "one-step error" << std::setw(13) << "rms before" << std::setw(13) << "rms after"
+      << std::setw(16) << "largest before"
+      << "largest after\n";
+  for (Eigen::Index k = 0; k < fit.after.cols(); ++k)
+    out << "  " << std::setw(18) << model.state_names()[ToSize(k)] << std::setw(13)
+        << RoundedUp(RootMeanSquare(fit.before, k), 4) << std::setw(13) << RoundedUp(RootMeanSquare(fit.after, k), 4)
+        << std::setw(16) << RoundedUp(fit.before.col(k).cwiseAbs().maxCoeff(), 4)
+        << RoundedUp(fit.after.col(k).cwiseAbs().maxCoeff(), 4) << "\n";
+  std::cout
+      << out.str()
+      << "\nThe sum of squared errors of one step, each over its rms before, has a local minimum there. The "
+         "standard errors assume\nindependent errors of measurement; what the equations lack is none. A model "
+         "that fits better leaves a smaller residual,\nwhich still has to be declared, for the new parameters.\n\n"
+         "model:\n  "
+      << Yaml(fit) << std::endl;
+}
+
+int RunFit(const Options& options) {
+  const auto pictures = options.picture.empty() ? std::vector<std::string>() : PictureFiles(options.picture);
+  const Config config = LoadConfig(options.config);
+  const Problem& problem = *config.problem;
+  const ModelText* text = problem.model->text();
+  if (!text)
+    throw ConfigError(config.path + ": model: " + problem.model->name() +
+                      " is compiled; only the parameters of a model as text can be fitted");
+  Fit fit;
+  try {
+    fit = FitParameters(*text, problem.transitions, NamesOf(options.names, *text));
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(config.path + ": " + error.what());
+  }
+  if (options.json)
+    std::cout << JsonText(ToJson(fit, *problem.model)) << std::endl;
+  else
+    PrintForPeople(fit, config);
+  for (const std::string& file : pictures)
+    DrawScatter({"Errors of one step against each coordinate", "before", "after", problem.model->variable_names(),
+                 problem.model->state_names(), problem.transitions.z, fit.before, fit.after},
+                file);
+  return fit.converged ? 0 : 1;
+}
+
+}  // namespace
+
+Command FitCommand() {
+  const auto options = std::make_shared<Options>();
+  return {.name = kFit.name,
+          .purpose = kFit.purpose,
+          .footer =
+              "The model has to be text in the task file or in a model file. Its parameters begin at their values, "
+              "a range at its middle.\n"
+              "Copy the last line into the task file: `model.parameters`. Then declare the residual that is left; "
+              "see docs/data.md.\n\n"
+              "Example:\n  forereach fit --config my_robot.yaml --parameters gain,drag --picture errors",
+          .options = {ConfigOption(options->config, "Task file (YAML) with a model as text, and transitions"),
+                      {"--parameters", &options->names, "NAMES",
+                       "Those to fit, with commas between; by default all but dt"},
+                      {"--picture", &options->picture, "NAME",
+                       "The errors before and after against each coordinate, as NAME.svg and NAME.png, or as one of "
+                       ".svg, .png, .pdf"},
+                      JsonFlag(options->json)},
+          .run = [options] { return RunFit(*options); }};
+}
+
+}  // namespace forereach

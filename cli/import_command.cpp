@@ -1,0 +1,344 @@
+#include <algorithm>
+#include <iomanip>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
+#include "certifier/task/config.h"
+#include "certifier/task/json_text.h"
+#include "certifier/task/number.h"
+#include "cli/commands.h"
+#include "cli/offline.h"
+#include "cli/progress.h"
+#include "command_line/nearest.h"
+#include "identify/import.h"
+#include "identify/units.h"
+#include "lcmtypes/printable.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+struct Options {
+  std::string config, out, time, time_unit = "s", delimiter = "auto", comment = "#", header;
+  std::vector<std::string> logs, states, inputs, units, input_tolerances, unwrapped;
+  std::optional<double> rate, from, until;
+  double tolerance_ms = 0.001;
+  bool input_mean = false, overlapping = false, json = false;
+};
+
+// ---- NAME=VALUE options
+
+[[noreturn]] void Refuse(const std::string& option, const std::string& what) {
+  throw ConfigError("--" + option + ": " + what);
+}
+
+// The values by names that the model has. @throws ConfigError for another name, one that is given twice, or no '='.
+std::map<std::string, std::string> Assignments(const std::string& option, const std::vector<std::string>& texts,
+                                               const std::vector<std::string>& known) {
+  std::map<std::string, std::string> values;
+  for (const std::string& text : texts) {
+    const std::size_t at = text.find('=');
+    const std::string name = text.substr(0, at);
+    if (at == std::string::npos) Refuse(option, "'" + text + "' is not NAME=VALUE");
+    if (std::ranges::find(known, name) == known.end())
+      Refuse(option, "the model has no '" + name + "'; " + Suggestion(name, known));
+    if (!values.emplace(name, text.substr(at + 1)).second) Refuse(option, name + " is given twice");
+  }
+  return values;
+}
+
+// "a,b" as names.
+std::vector<std::string> Names(const std::string& text) {
+  std::vector<std::string> names;
+  std::istringstream in(text);
+  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
+  return names;
+}
+
+// The unit of a state or an input in a model's text; empty if the model is compiled.
+std::string UnitOf(const NominalModel& model, std::size_t variable) {
+  if (!model.text()) return "";
+  const std::size_t n = model.text()->states.size();
+  return variable < n ? model.text()->states[variable].unit : model.text()->inputs[variable - n].unit;
+}
+
+// ---- what is asked
+
+LogFormat FormatOf(const Options& options) {
+  LogFormat format{.delimiter = {}, .comment = options.comment, .header = Names(options.header)};
+  if (options.delimiter != "auto")
+    format.delimiter = options.delimiter == "comma" ? ',' : options.delimiter == "semicolon" ? ';' : '\t';
+  return format;
+}
+
+// The columns: the stamp, the states, the inputs. A variable without an option has the column of its name.
+std::vector<std::string> ColumnsOf(const Options& options, const NominalModel& model) {
+  std::vector<std::string> columns;
+  if (!options.rate) columns.push_back(options.time);
+  const auto take = [&](const char* option, const auto& texts, const std::vector<std::string>& names) {
+    const auto given = Assignments(option, texts, names);
+    for (const std::string& name : names) {
+      const auto at = given.find(name);
+      columns.push_back(at == given.end() ? name : at->second);
+    }
+  };
+  take("state", options.states, model.state_names());
+  take("input", options.inputs, model.input_names());
+  return columns;
+}
+
+std::vector<long double> FactorsOf(const Options& options, const NominalModel& model) {
+  const std::vector<std::string> names = model.variable_names();
+  const auto given = Assignments("unit", options.units, names);
+  std::vector<long double> factors(names.size(), 1);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto at = given.find(names[i]);
+    if (at == given.end()) continue;
+    try {
+      factors[i] = FactorOf(at->second, UnitOf(model, i));
+    } catch (const std::invalid_argument& error) {
+      Refuse("unit", names[i] + "=" + error.what());
+    }
+  }
+  return factors;
+}
+
+Eigen::VectorXd InputTolerances(const Options& options, const NominalModel& model) {
+  const std::vector<std::string>& names = model.input_names();
+  Eigen::VectorXd tolerances = Eigen::VectorXd::Zero(model.num_inputs());
+  for (const auto& [name, text] : Assignments("input-tolerance", options.input_tolerances, names)) {
+    const auto [value, problem] = ParseNumber(text);
+    if (!problem.empty() || value < 0) Refuse("input-tolerance", name + ": '" + text + "' is no number from 0 up");
+    tolerances[std::ranges::find(names, name) - names.begin()] = value;
+  }
+  return tolerances;
+}
+
+ImportOptions ImportOptionsOf(const Options& options, const Config& config) {
+  const NominalModel& model = *config.problem->model;
+  ImportOptions import;
+  import.period = config.period;
+  import.tolerance = options.tolerance_ms / 1000;
+  if (!(import.tolerance < config.period / 2))
+    Refuse("tolerance-ms", ToText(options.tolerance_ms) + " has to be below half a step of the task, " +
+                               ToText(config.period * 500) + " ms");
+  try {
+    import.time_unit = options.rate ? 0 : FactorOf(options.time_unit, "s");
+  } catch (const std::invalid_argument& error) {
+    Refuse("time-unit", error.what());
+  }
+  import.row_spacing = options.rate ? 1 / *options.rate : 0;
+  import.factors = FactorsOf(options, model);
+  import.input_tolerance = InputTolerances(options, model);
+  import.input_mean = options.input_mean;
+  import.overlapping = options.overlapping;
+  for (const std::string& name : options.unwrapped) {
+    const auto at = std::ranges::find(model.state_names(), name);
+    if (at == model.state_names().end())
+      Refuse("unwrap", "the model has no state '" + name + "'; " + Suggestion(name, model.state_names()));
+    import.unwrapped.push_back(static_cast<int>(at - model.state_names().begin()));
+  }
+  import.from = options.from.value_or(-kInfinity);
+  import.until = options.until.value_or(kInfinity);
+  return import;
+}
+
+// ---- what was found
+
+struct Source {
+  LogTable table;
+  ImportedLog log;
+};
+
+Json ToJson(const Finding& finding) {
+  return {{"count", finding.count}, {"first_line", finding.first_line}, {"first", finding.first}};
+}
+
+Json ToJson(const Source& source, const std::vector<std::string>& columns) {
+  Json document{{"log", source.table.path},
+                {"rows", source.table.values.rows()},
+                {"samples", source.log.samples},
+                {"spacing_s", source.log.typical_spacing},
+                {"transitions", source.log.transitions.size()},
+                {"blank_lines", source.table.blank.count},
+                {"comments", source.table.comments.count},
+                {"dropped", Json::object()},
+                {"not_a_number", Json::object()},
+                {"largest_offset_s", source.log.largest_offset},
+                {"largest_rate", source.log.largest_rate},
+                {"input_deviation", source.log.input_deviation}};
+  for (std::size_t cause = 0; cause < source.log.dropped.size(); ++cause)
+    if (source.log.dropped[cause].count > 0)
+      document["dropped"][ToWord(static_cast<Dropped>(cause))] = ToJson(source.log.dropped[cause]);
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    if (source.table.not_a_number[j].count > 0)
+      document["not_a_number"][columns[j]] = ToJson(source.table.not_a_number[j]);
+  return document;
+}
+
+std::string Line(const Finding& finding, const std::string& what) {
+  std::ostringstream text;
+  text << "  " << std::right << std::setw(9) << finding.count << "  " << what << "; first in line "
+       << finding.first_line;
+  if (!finding.first.empty()) text << " (" << Printable(finding.first) << ")";
+  return text.str() + "\n";
+}
+
+void PrintForPeople(const Source& source, const std::vector<std::string>& columns) {
+  const auto& [table, log] = source;
+  std::cout << table.path << ": " << log.transitions.size() << " transitions from " << table.values.rows() << " rows";
+  if (log.typical_spacing > 0) std::cout << ", typically " << RoundedUp(log.typical_spacing) << " s apart";
+  if (table.blank.count + table.comments.count > 0)
+    std::cout << "; " << table.blank.count << " blank lines, " << table.comments.count << " comments";
+  std::cout << "\n";
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    if (const Finding& finding = table.not_a_number[j]; finding.count > 0)
+      std::cout << Line({finding.count, finding.first_line, "'" + finding.first + "'"},
+                        "fields of '" + columns[j] + "' that are no number");
+  for (std::size_t cause = 0; cause < log.dropped.size(); ++cause)
+    if (log.dropped[cause].count > 0) std::cout << Line(log.dropped[cause], Explain(static_cast<Dropped>(cause)));
+}
+
+// "x 0.0012, y 0.001", of those that are not zero; empty if all are.
+std::string Listed(const std::vector<std::string>& names, const Eigen::VectorXd& values) {
+  std::string text;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    if (const double value = values[static_cast<Eigen::Index>(k)]; value > 0)
+      text += (text.empty() ? "" : ", ") + names[k] + " " + RoundedUp(value, 3);
+  return text;
+}
+
+// What the transitions cannot know, from the largest of all logs.
+void PrintErrors(const std::vector<Source>& sources, const Options& options, const NominalModel& model) {
+  double offset = 0;
+  Eigen::VectorXd rate = Eigen::VectorXd::Zero(model.num_states()), input = Eigen::VectorXd::Zero(model.num_inputs());
+  for (const Source& source : sources) {
+    offset = std::max(offset, source.log.largest_offset);
+    rate = rate.cwiseMax(source.log.largest_rate);
+    input = input.cwiseMax(source.log.input_deviation);
+  }
+  if (const std::string moved = Listed(model.state_names(), offset * rate); !moved.empty())
+    std::cout << "Stamps are up to " << RoundedUp(offset * 1000, 3)
+              << " ms off t + dt. At the largest mean rates seen, the states move in that time by up to\n  " << moved
+              << "\nThat is an error of the successor: declaration.noise_bound has to include it.\n";
+  if (const std::string differs = Listed(model.input_names(), input); !differs.empty())
+    std::cout << "The logged inputs differ from the transition's input, "
+              << (options.input_mean ? "their mean over the step" : "the one that the step began with")
+              << ", by up to\n  " << differs
+              << "\nWhat that does to the robot is part of the residual's error: declaration.disturbance has to "
+                 "include it.\n";
+}
+
+int RunImport(const Options& options) {
+  if (options.time.empty() == !options.rate)
+    throw ConfigError("give either --time, the column of the stamps, or --rate, the rows in a second");
+  const Config config = LoadConfig(options.config, TransitionsFile::kIgnore);
+  const NominalModel& model = *config.problem->model;
+  const std::vector<std::string> columns = ColumnsOf(options, model);
+  const ImportOptions import = ImportOptionsOf(options, config);
+  std::vector<Source> sources;
+  Transitions all{Eigen::MatrixXd(0, model.num_variables()), Eigen::MatrixXd(0, model.num_states())};
+  std::optional<Progress> progress(std::in_place, "logs read", options.logs.size());
+  for (const std::string& path : options.logs) {
+    Source& source = sources.emplace_back();
+    source.table = ReadLog(path, columns, FormatOf(options));
+    source.log = Import(source.table, *config.problem, import);
+    const Transitions& found = source.log.transitions;
+    const Eigen::Index before = all.z.rows();
+    all.z.conservativeResize(before + found.z.rows(), Eigen::NoChange);
+    all.x_next.conservativeResize(before + found.z.rows(), Eigen::NoChange);
+    all.z.bottomRows(found.z.rows()) = found.z;
+    all.x_next.bottomRows(found.z.rows()) = found.x_next;
+    progress->Advance();
+  }
+  progress.reset();
+  if (all.size() > 0) SaveTransitions(options.out, model, all);
+  if (options.json) {
+    Json document{{"transitions", all.size()}, {"period_s", config.period}, {"logs", Json::array()}};
+    document["out"] = all.size() > 0 ? Json(options.out) : Json(nullptr);
+    for (const Source& source : sources) document["logs"].push_back(ToJson(source, columns));
+    std::cout << JsonText(document) << std::endl;
+  } else {
+    for (const Source& source : sources) PrintForPeople(source, columns);
+    PrintErrors(sources, options, model);
+    std::cout << "import: " << all.size() << " transitions of " << ToText(config.period) << " s"
+              << (all.size() > 0 ? " in " + options.out : "; " + options.out + " is not written") << std::endl;
+  }
+  return all.size() > 0 ? 0 : 1;
+}
+
+std::string UnitNames() {
+  std::string text;
+  for (const Unit& unit : KnownUnits()) text += (text.empty() ? "" : ", ") + std::string(unit.name);
+  return text;
+}
+
+}  // namespace
+
+Command ImportCommand() {
+  const auto options = std::make_shared<Options>();
+  return {
+      .name = kImport.name,
+      .purpose = kImport.purpose,
+      .footer =
+          "A transition is (state at t, input held from t to t + dt, state at t + dt), with dt and the names of the "
+          "task's model.\n"
+          "A row's input holds until the next row. No state is interpolated, and no transition spans a lost row.\n"
+          "docs/data.md says what else counts, and what of it is an error that the declaration has to allow for.\n\n"
+          "Units beside those of the model: " +
+          UnitNames() +
+          ".\n\n"
+          "Examples:\n"
+          "  forereach import --config my_robot.yaml --time stamp --out transitions.csv log.csv\n"
+          "  forereach import --config my_robot.yaml --time 'mocap time' --time-unit ms --tolerance-ms 2 \\\n"
+          "    --state x='mocap x' --state theta='mocap yaw' --unit theta=deg --unwrap theta \\\n"
+          "    --input a=cmd.accel --input-mean --out transitions.csv monday.csv tuesday.csv",
+      .options = {ConfigOption(options->config,
+                               "Task file (YAML): its model, dt and domain; its transitions are not read"),
+                  Required({"--out", &options->out, "FILE.csv", "The transitions, for the key `transitions`"}),
+                  {"--time", &options->time, "COLUMN", "The column of the stamps"},
+                  {"--time-unit", &options->time_unit, "UNIT", "Unit of the stamps: s, ms, us, ns, min, h"},
+                  {"--rate", &options->rate, "", "There are no stamps: so many rows are recorded in a second",
+                   NumberRange{1e-6, 1e9}},
+                  {"--state", &options->states, "NAME=COLUMN",
+                   "The column of a state; by default the one of its name. May be repeated"},
+                  {"--input", &options->inputs, "NAME=COLUMN", "The same for an input"},
+                  {"--unit", &options->units, "NAME=UNIT",
+                   "The unit of a state's or an input's column, or a factor: model's value = factor * value"},
+                  {"--unwrap", &options->unwrapped, "STATE",
+                   "An angle in rad: turns are added to the successor until it is within half a turn of the state"},
+                  {"--tolerance-ms", &options->tolerance_ms, "",
+                   "A stamp may be so far from t + dt; what the state moves in that time is part of its error",
+                   NumberRange{0, 1e6}},
+                  {"--input-tolerance", &options->input_tolerances, "NAME=VALUE",
+                   "An input may differ by so much during a step from the one that the step began with"},
+                  {.name = "--input-mean",
+                   .variable = &options->input_mean,
+                   .help = "Take the mean of each input over the step, however it changes",
+                   .excludes = "--input-tolerance"},
+                  {"--overlapping", &options->overlapping, "",
+                   "Start a transition at each sample; by default where the one before it ended"},
+                  {"--from", &options->from, "", "Leave out samples before so many seconds after a log's first stamp",
+                   NumberRange{0, 1e12}},
+                  {"--until", &options->until, "", "Leave out samples after so many seconds", NumberRange{0, 1e12}},
+                  {.name = "--delimiter",
+                   .variable = &options->delimiter,
+                   .help = "What stands between two fields; by default the one that the header contains",
+                   .one_of = {"auto", "comma", "semicolon", "tab"}},
+                  {"--comment", &options->comment, "TEXT", "A line that begins with this text is a comment"},
+                  {"--header", &options->header, "NAMES",
+                   "The names of the columns, with commas between, of a log that does not begin with them"},
+                  JsonFlag(options->json),
+                  Required({"logs", &options->logs, "LOG.csv", "Logs; no transition goes from one to the next"})},
+      .run = [options] { return RunImport(*options); }};
+}
+
+}  // namespace forereach

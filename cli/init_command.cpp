@@ -1,0 +1,213 @@
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <numbers>
+#include <optional>
+#include <sstream>
+
+#include "certifier/dynamics/expression.h"
+#include "certifier/numerics/limits.h"
+#include "certifier/numerics/text.h"
+#include "certifier/task/config.h"
+#include "certifier/task/csv.h"
+#include "certifier/task/files.h"
+#include "certifier/task/model_file.h"
+#include "cli/commands.h"
+#include "cli/new_file.h"
+#include "cli/offline.h"
+#include "cli/task_template.h"
+
+namespace forereach {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kNextEnding = "_next";
+
+struct Options {
+  std::string model, transitions, out;
+  std::optional<double> dt;
+  bool force = false;
+};
+
+// What stands behind `name:` in a model file's parameters, if it is a comment: what it means.
+std::string CommentOf(const std::string& file, const std::string& name) {
+  std::istringstream lines(file);
+  bool here = false;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t begin = line.find_first_not_of(' ');
+    if (begin == std::string::npos) continue;
+    here = here ? begin > 2 : line.starts_with("  parameters:");
+    if (!here || line.compare(begin, name.size() + 1, name + ":") != 0) continue;
+    const std::size_t comment = line.find(" #");
+    return comment == std::string::npos ? "" : " " + line.substr(comment);
+  }
+  return "";
+}
+
+std::string ValueOf(const ModelText::Parameter& parameter) {
+  return parameter.lower == parameter.upper ? ToText(parameter.lower)
+                                            : "[" + ToText(parameter.lower) + ", " + ToText(parameter.upper) + "]";
+}
+
+TemplateVariable PlaceholderRange(const ModelText::Variable& variable) {
+  const double most = variable.unit == "rad" ? std::numbers::pi : 10;
+  return {variable.name, variable.unit, -most, most, false};
+}
+
+TaskTemplate FromModel(const Options& options) {
+  const std::string name = options.model.ends_with(".yaml") ? options.model : "models/" + options.model + ".yaml";
+  const std::string path = FindModelFile(options.out, name, "--model: ");
+  const ModelText text = LoadModelFile(path);
+  const std::string file = ReadWhole(path, kLargestTaskFile);
+  TaskTemplate task;
+  for (const ModelText::Variable& state : text.states) task.states.push_back(PlaceholderRange(state));
+  for (const ModelText::Variable& input : text.inputs) task.inputs.push_back(PlaceholderRange(input));
+  task.center.assign(text.states.size(), 0);
+  task.model =
+      "# The nominal model: the equations of a file that comes with ForeReach, with the parameters of your robot. To "
+      "change\n"
+      "# the equations, copy " +
+      path +
+      " and name your copy.\n"
+      "model:\n"
+      "  file: " +
+      YamlText(name) +
+      "\n"
+      "  parameters:\n";
+  for (const ModelText::Parameter& parameter : text.parameters) {
+    const bool is_given = parameter.name == "dt" && options.dt;
+    task.model += "    " + parameter.name + ": " + (is_given ? ToText(*options.dt) : ValueOf(parameter)) +
+                  (parameter.name == "dt" ? "  # s, from one control to the next" : CommentOf(file, parameter.name)) +
+                  "\n";
+  }
+  task.transitions = fs::path(options.out).stem().string() + "_steps.csv";
+  task.command = "forereach init --model " + options.model;
+  return task;
+}
+
+// The states and inputs that a header of transitions names, in its order.
+struct Header {
+  std::vector<std::string> states, inputs;
+};
+
+void RequireCount(const std::string& path, const char* what, const std::vector<std::string>& names, int most) {
+  if (names.size() > static_cast<std::size_t>(most))
+    throw ConfigError(path + ":1: " + std::to_string(names.size()) + " " + what + " are outside [0, " +
+                      std::to_string(most) + "]");
+}
+
+Header ReadHeader(const std::string& path) {
+  const std::vector<std::string> columns = CsvColumns(path);
+  Header header;
+  for (const std::string& column : columns) {
+    if (column.ends_with(kNextEnding)) continue;
+    if (!IsName(column) || IsReserved(column) || column == "dt")
+      throw ConfigError(path + ":1: '" + column.substr(0, 64) +
+                        "' cannot be the name of a state or an input: that is a letter, then letters, digits and "
+                        "underscores, and no function, pi or dt; rename the column");
+    const bool is_state = std::ranges::find(columns, column + kNextEnding) != columns.end();
+    (is_state ? header.states : header.inputs).push_back(column);
+  }
+  for (const std::string& column : columns)
+    if (const std::string name = column.substr(0, column.size() - std::min<std::size_t>(column.size(), 5));
+        column.ends_with(kNextEnding) && std::ranges::find(header.states, name) == header.states.end())
+      throw ConfigError(path + ":1: " + column + " is the state after a step, and there is no column " + name +
+                        " with the state before it");
+  if (header.states.empty())
+    throw ConfigError(
+        path +
+        ":1: no column is a state: a state x has the columns x, before a step, and x_next, after it. A log "
+        "of states and inputs over time is made into such a file first");
+  RequireCount(path, "states", header.states, kMaxStates);
+  if (header.inputs.empty())
+    throw ConfigError(path + ":1: no column is an input: every column has one with _next, and a model needs an input");
+  RequireCount(path, "inputs", header.inputs, kMaxInputs);
+  return header;
+}
+
+TaskTemplate FromTransitions(const Options& options) {
+  if (!options.dt)
+    throw ConfigError(
+        "--transitions: needs --dt, the time from one sample of the data to the next in s: the file does not "
+        "have it");
+  const std::string& path = options.transitions;
+  const Header header = ReadHeader(path);
+  std::vector<std::string> columns = header.states;
+  columns.insert(columns.end(), header.inputs.begin(), header.inputs.end());
+  const auto n = header.states.size();
+  for (const std::string& state : header.states) columns.push_back(state + kNextEnding);
+  const Eigen::MatrixXd rows = ReadCsv(path, columns);
+  if (rows.rows() == 0) throw ConfigError(path + ":2: no transitions; at least one is needed");
+
+  TaskTemplate task;
+  for (std::size_t l = 0; l < n + header.inputs.size(); ++l) {
+    const auto column = rows.col(static_cast<Eigen::Index>(l));
+    (l < n ? task.states : task.inputs).push_back(RangeAround(columns[l], column.minCoeff(), column.maxCoeff()));
+    if (l < n) task.center.push_back(column[0]);
+  }
+  task.model =
+      "# The nominal model. What follows is only a frame for your equations: as it stands, the state does not change, "
+      "and the\n"
+      "# whole motion of the robot is the model's error. docs/expressions.md describes the language; `forereach init "
+      "--model`\n"
+      "# begins with a model of the library.\n"
+      "model:\n"
+      "  states:  # with their units, which are for people; 1 where you have not put one in\n";
+  for (const std::string& state : header.states) task.model += "    " + state + ": \"1\"\n";
+  task.model += "  inputs:  # likewise\n";
+  for (const std::string& input : header.inputs) task.model += "    " + input + ": \"1\"\n";
+  task.model +=
+      "  parameters:\n"
+      "    dt: " +
+      ToText(*options.dt) +
+      "  # s, from one sample of the data to the next\n"
+      "  next:  # the state after one step, or `rate` and `integrator`. PLACEHOLDER\n";
+  for (const std::string& state : header.states) task.model += "    " + state + ": " + state + "\n";
+  const fs::path directory = fs::absolute(options.out).parent_path();
+  task.transitions = fs::absolute(path).lexically_normal().lexically_proximate(directory.lexically_normal()).string();
+  task.transitions_exist = true;
+  task.command = "forereach init --transitions " + path + " --dt " + ToText(*options.dt);
+  return task;
+}
+
+int Init(const Options& options) {
+  if (options.model.empty() == options.transitions.empty())
+    throw ConfigError(
+        "init: needs one of --model, a model of the library, and --transitions, a file of recorded steps");
+  TaskTemplate task = options.model.empty() ? FromTransitions(options) : FromModel(options);
+  task.path = options.out;
+  WriteNewFile(options.out, TaskText(task), options.force);
+  std::cout << options.out << ": a task to begin with, " << task.states.size() << " states, " << task.inputs.size()
+            << " inputs\n  now: put in what your robot is where a line says PLACEHOLDER";
+  if (!task.transitions_exist) std::cout << ", record " << task.transitions;
+  std::cout << ", and run\n  forereach check " << options.out << std::endl;
+  return 0;
+}
+
+}  // namespace
+
+Command InitCommand() {
+  const auto options = std::make_shared<Options>();
+  return {
+      .name = kInit.name,
+      .purpose = kInit.purpose,
+      .footer =
+          "With --model, states, inputs, parameters and units are those of a file in config/models, and the ranges "
+          "are\n"
+          "placeholders. With --transitions, a column x with a column x_next is a state, the others are inputs, and "
+          "the\n"
+          "domain is the range of the data, a tenth wider at each end.\n"
+          "The file can be used as it is. Its placeholders keep plans from being certified until you replace them.\n\n"
+          "Examples:\n  forereach init --model differential_drive --out robot.yaml\n"
+          "  forereach init --transitions log.csv --dt 0.1 --out robot.yaml",
+      .options = {{"--model", &options->model, "NAME",
+                   "A model of the library, for example unicycle, or a path of a model file, relative to the new file"},
+                  {"--transitions", &options->transitions, "FILE.csv", "Recorded steps"},
+                  {"--dt", &options->dt, "", "The time of one step, s", NumberRange{1e-6, 60}},
+                  Required({"-o,--out", &options->out, "FILE.yaml", "The new task file"}),
+                  {"--force", &options->force, "", "Overwrite the file if it exists"}},
+      .run = [options] { return Init(*options); }};
+}
+
+}  // namespace forereach

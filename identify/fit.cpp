@@ -1,0 +1,160 @@
+#include "identify/fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+#include <stdexcept>
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <unsupported/Eigen/NonLinearOptimization>
+#include <unsupported/Eigen/NumericalDiff>
+
+#include "certifier/dynamics/text_model.h"
+#include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kMostEvaluations = 2000;
+constexpr double kDifference = 1e-12;  // the square of the relative step of a difference
+
+// x+ - f0(z) of all transitions, N-by-n; of an angle without whole turns.
+Eigen::MatrixXd ErrorsOf(const ModelText& text, const Transitions& transitions) {
+  const auto model = MakeTextModel(text);
+  Eigen::MatrixXd errors(transitions.x_next.rows(), transitions.x_next.cols());
+  Eigen::VectorXd z, next(errors.cols());
+  for (Eigen::Index i = 0; i < errors.rows(); ++i) {
+    z = transitions.z.row(i);
+    model->Evaluate({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())});
+    errors.row(i) = transitions.x_next.row(i) - next.transpose();
+    for (const int k : model->angles()) errors(i, k) = std::remainder(errors(i, k), 2 * std::numbers::pi);
+  }
+  return errors;
+}
+
+// What the solver minimises: the scaled errors as a function of the parameters, each divided by its unit.
+class Problem {
+ public:
+  using Scalar = double;
+  using InputType = Eigen::VectorXd;
+  using ValueType = Eigen::VectorXd;
+  using JacobianType = Eigen::MatrixXd;
+  enum { InputsAtCompileTime = Eigen::Dynamic, ValuesAtCompileTime = Eigen::Dynamic };
+
+  Problem(const ModelText& text, const Transitions& transitions, std::vector<std::size_t> free)
+      : text_(text), transitions_(transitions), free_(std::move(free)) {
+    const Eigen::MatrixXd errors = ErrorsOf(text, transitions);
+    if (!errors.allFinite()) throw std::invalid_argument("the model has no finite value at some transition");
+    scales_ = (errors.colwise().squaredNorm() / static_cast<double>(errors.rows())).cwiseSqrt();
+    for (double& scale : scales_)
+      if (!(scale > 0)) scale = 1;
+    for (const std::size_t p : free_)
+      units_.push_back(text.parameters[p].lower == 0 ? 1 : std::abs(text.parameters[p].lower));
+  }
+
+  [[nodiscard]] int inputs() const { return static_cast<int>(free_.size()); }
+  [[nodiscard]] int values() const { return static_cast<int>(transitions_.x_next.size()); }
+
+  // Parameters without a finite value are far from every solution: the solver then takes a shorter step.
+  int operator()(const Eigen::VectorXd& x, Eigen::VectorXd& values) const {
+    Eigen::MatrixXd errors = Errors(x);
+    errors.array().rowwise() /= scales_.array();
+    values = errors.reshaped();
+    for (double& value : values)
+      if (!std::isfinite(value)) value = 1e10;
+    return 0;
+  }
+
+  [[nodiscard]] ModelText TextWith(const Eigen::VectorXd& x) const {
+    ModelText text = text_;
+    for (std::size_t c = 0; c < free_.size(); ++c) {
+      ModelText::Parameter& parameter = text.parameters[free_[c]];
+      parameter.lower = parameter.upper = x[static_cast<Eigen::Index>(c)] * units_[c];
+    }
+    return text;
+  }
+  [[nodiscard]] Eigen::MatrixXd Errors(const Eigen::VectorXd& x) const { return ErrorsOf(TextWith(x), transitions_); }
+  [[nodiscard]] Eigen::VectorXd Start() const {
+    Eigen::VectorXd x(inputs());
+    for (std::size_t c = 0; c < free_.size(); ++c)
+      x[static_cast<Eigen::Index>(c)] = text_.parameters[free_[c]].lower / units_[c];
+    return x;
+  }
+  [[nodiscard]] double unit(std::size_t c) const { return units_[c]; }
+
+ private:
+  ModelText text_;  // parameters have one value each
+  const Transitions& transitions_;
+  std::vector<std::size_t> free_;
+  std::vector<double> units_;
+  Eigen::RowVectorXd scales_;
+};
+
+// The standard errors of x from the Jacobian at the solution.
+Eigen::VectorXd DeviationsOf(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& values) {
+  const Eigen::Index count = jacobian.cols();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(jacobian);
+  qr.setThreshold(1e-8);
+  if (qr.rank() < count) return Eigen::VectorXd::Constant(count, kInfinity);
+  const Eigen::MatrixXd inverse = (jacobian.transpose() * jacobian).inverse();
+  const double freedom = std::max<double>(1, static_cast<double>(jacobian.rows() - count));
+  return (inverse.diagonal() * values.squaredNorm() / freedom).cwiseSqrt();
+}
+
+// The places of the named parameters in the text.
+std::vector<std::size_t> PlacesOf(const ModelText& text, const std::vector<std::string>& names) {
+  std::vector<std::size_t> places;
+  for (const std::string& name : names) {
+    const auto at = std::ranges::find(text.parameters, name, &ModelText::Parameter::name);
+    if (at == text.parameters.end()) throw std::invalid_argument("the model has no parameter '" + name + "'");
+    if (name == "dt") throw std::invalid_argument("dt is the step, which no transition says");
+    const auto place = ToSize(at - text.parameters.begin());
+    if (std::ranges::find(places, place) != places.end())
+      throw std::invalid_argument("parameter '" + name + "' is given twice");
+    places.push_back(place);
+  }
+  if (places.empty()) throw std::invalid_argument("no parameter to fit");
+  return places;
+}
+
+}  // namespace
+
+Fit FitParameters(const ModelText& text, const Transitions& transitions, const std::vector<std::string>& names) {
+  const std::vector<std::size_t> places = PlacesOf(text, names);
+  if (transitions.x_next.size() < std::ssize(names))
+    throw std::invalid_argument(std::to_string(transitions.x_next.size()) + " numbers cannot determine " +
+                                std::to_string(names.size()) + " parameters");
+  ModelText middle = text;
+  for (ModelText::Parameter& parameter : middle.parameters)
+    parameter.lower = parameter.upper = parameter.lower + (parameter.upper - parameter.lower) / 2;
+  const Problem problem(middle, transitions, places);
+  Eigen::NumericalDiff<Problem, Eigen::Central> differences(problem, kDifference);
+  Eigen::LevenbergMarquardt<Eigen::NumericalDiff<Problem, Eigen::Central>> solver(differences);
+  solver.parameters.maxfev = kMostEvaluations;
+  solver.parameters.xtol = solver.parameters.ftol = 1e-12;
+  Eigen::VectorXd x = problem.Start();
+  const auto status = solver.minimize(x);
+
+  Fit fit;
+  fit.converged = status != Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation &&
+                  status != Eigen::LevenbergMarquardtSpace::ImproperInputParameters;
+  fit.evaluations = static_cast<int>(solver.nfev + 2 * std::ssize(names) * solver.njev);
+  fit.before = problem.Errors(problem.Start());
+  fit.after = problem.Errors(x);
+  Eigen::MatrixXd jacobian(problem.values(), problem.inputs());
+  Eigen::VectorXd values;
+  (void)problem(x, values);
+  (void)differences.df(x, jacobian);
+  const Eigen::VectorXd deviations = DeviationsOf(jacobian, values);
+  for (std::size_t c = 0; c < places.size(); ++c) {
+    const auto at = static_cast<Eigen::Index>(c);
+    fit.parameters.push_back(
+        {names[c], middle.parameters[places[c]].lower, x[at] * problem.unit(c), deviations[at] * problem.unit(c)});
+  }
+  return fit;
+}
+
+}  // namespace forereach

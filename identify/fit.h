@@ -1,0 +1,41 @@
+/** The parameters of a nominal model from transitions, by nonlinear least squares.
+
+For parameters p, the one-step error of transition i in coordinate k is e_ik(p) = x_ik+ - f0_k(z_i; p). The fit
+minimises sum over i and k of (e_ik(p) / c_k)^2, where c_k is the root mean square of e_ik at the start, so that states
+of different units count alike. The solver is Levenberg & Marquardt's, MINPACK's in Eigen, with differences for
+derivatives. A better nominal model leaves a smaller residual; nothing about the residual is proven by it. */
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/dynamics/model_text.h"
+#include "certifier/residual/transitions.h"
+
+namespace forereach {
+
+struct FittedParameter {
+  std::string name;
+  double before = 0, after = 0;
+  /** The standard error, if the errors were independent and alike; infinite if the transitions do not determine the
+  parameter together with the others. */
+  double deviation = 0;
+};
+
+struct Fit {
+  std::vector<FittedParameter> parameters;
+  Eigen::MatrixXd before, after;  ///< e_ik, N-by-n, at the start and at the end.
+  bool converged = false;         ///< Otherwise the limit on evaluations was reached.
+  int evaluations = 0;            ///< Of the model at all transitions.
+};
+
+/** Fits the named parameters from the middles of their ranges; the others stay.
+@throws std::invalid_argument if the text has no such parameter, dt is named, a name is given twice, there are fewer
+numbers than parameters, or the model has no finite value at some transition at the start. Cost: some tens of times
+(1 + parameters) evaluations of the model at all transitions. */
+[[nodiscard]] Fit FitParameters(const ModelText& text, const Transitions& transitions,
+                                const std::vector<std::string>& names);
+
+}  // namespace forereach

@@ -1,0 +1,107 @@
+#include "identify/hold_out.h"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "certifier/numerics/size.h"
+#include "certifier/residual/consistency.h"
+#include "certifier/residual/lipschitz_row.h"
+#include "certifier/residual/observation_index.h"
+#include "certifier/residual/pairs.h"
+
+namespace forereach {
+namespace {
+
+Observations Joined(const Observations& a, const Observations& b) {
+  Observations both{Eigen::MatrixXd(a.size() + b.size(), a.z.cols()),
+                    Eigen::MatrixXd(a.size() + b.size(), a.num_states()),
+                    Eigen::MatrixXd(a.size() + b.size(), a.num_states())};
+  both.z << a.z, b.z;
+  both.lower << a.lower, b.lower;
+  both.upper << a.upper, b.upper;
+  return both;
+}
+
+// For coordinate k: which of the observations from `first` on contradict one of those before.
+void Mark(const Declaration& declaration, const Observations& all, int first, int k, std::vector<bool>& contradicts) {
+  const LipschitzRow row(declaration, k);
+  const auto test = [&](int i, int j) { return TestPair(declaration, all, i, j, k).has_value(); };
+  if (row.is_constant()) {
+    int highest = 0, lowest = 0;
+    for (int i = 1; i < first; ++i) {
+      if (all.lower(i, k) > all.lower(highest, k)) highest = i;
+      if (all.upper(i, k) < all.upper(lowest, k)) lowest = i;
+    }
+    for (int j = first; j < all.size(); ++j)
+      if (test(highest, j) || test(lowest, j)) contradicts[ToSize(j - first)] = true;
+    return;
+  }
+  const Observations learned{all.z.topRows(first), all.lower.topRows(first), all.upper.topRows(first)};
+  const ObservationIndex index(EntriesOf(row, declaration, learned, k));
+  const auto entries = EntriesOf(row, declaration, all, k);
+  const PairSearch search(index, MarginUpper(row, entries, all));
+  for (int j = first; j < all.size(); ++j)
+    if (search.AnyPartner(PointOf(entries, j), [&](std::uint32_t i) { return test(static_cast<int>(i), j); }))
+      contradicts[ToSize(j - first)] = true;
+}
+
+}  // namespace
+
+Split SplitByTime(int count, int blocks) {
+  if (!(2 <= blocks && blocks <= count))
+    throw std::invalid_argument(std::to_string(blocks) + " blocks of " + std::to_string(count) +
+                                " transitions: there have to be between 2 and " + std::to_string(count));
+  Split split;
+  const auto begin_of = [&](int b) { return static_cast<int>(static_cast<std::int64_t>(count) * b / blocks); };
+  for (int b = 0; b < blocks; ++b) (b % 2 == 0 ? split.learn : split.judge).push_back({begin_of(b), begin_of(b + 1)});
+  return split;
+}
+
+Transitions RowsOf(const Transitions& transitions, const std::vector<Split::Block>& blocks) {
+  Eigen::Index rows = 0;
+  for (const Split::Block& block : blocks) rows += block.size();
+  Transitions part{Eigen::MatrixXd(rows, transitions.z.cols()), Eigen::MatrixXd(rows, transitions.x_next.cols())};
+  rows = 0;
+  for (const Split::Block& block : blocks) {
+    part.z.middleRows(rows, block.size()) = transitions.z.middleRows(block.begin, block.size());
+    part.x_next.middleRows(rows, block.size()) = transitions.x_next.middleRows(block.begin, block.size());
+    rows += block.size();
+  }
+  return part;
+}
+
+Contradictions CountContradictions(const Problem& problem, const Declaration& declaration, const Split& split) {
+  const Observations learned = Observe(*problem.model, RowsOf(problem.transitions, split.learn));
+  const Observations judged = Observe(*problem.model, RowsOf(problem.transitions, split.judge));
+  const Observations all = Joined(learned, judged);
+  std::vector<bool> contradicts(ToSize(judged.size()), false);
+  for (int k = 0; k < all.num_states(); ++k) Mark(declaration, all, learned.size(), k, contradicts);
+  Contradictions found;
+  found.transitions = judged.size();
+  found.contradicting = static_cast<int>(std::ranges::count(contradicts, true));
+  auto at = contradicts.begin();
+  for (const Split::Block& block : split.judge) {
+    const auto end = at + block.size();
+    ++found.blocks;
+    if (std::find(at, end, true) != end) ++found.blocks_contradicting;
+    at = end;
+  }
+  return found;
+}
+
+std::vector<Window> WindowsOf(const Transitions& transitions, const Split& split, int steps) {
+  std::vector<Window> windows;
+  const Eigen::Index n = transitions.x_next.cols();
+  for (const Split::Block& block : split.judge)
+    for (int begin = block.begin, i = begin; i < block.end; ++i) {
+      if (i > begin && transitions.z.row(i).head(n) != transitions.x_next.row(i - 1)) begin = i;
+      if (i + 1 - begin < steps) continue;
+      windows.push_back({begin, steps});
+      begin = i + 1;
+    }
+  return windows;
+}
+
+}  // namespace forereach

@@ -1,0 +1,46 @@
+/** How often fresh transitions contradict what was learned from others: the transitions are cut into blocks of time,
+the first, third, ... to learn from and the others to judge by. */
+#pragma once
+
+#include <vector>
+
+#include "certifier/certify/problem.h"
+
+namespace forereach {
+
+/** A split of transitions 0..N-1, which stand in the order of time. */
+struct Split {
+  struct Block {
+    int begin = 0, end = 0;
+    [[nodiscard]] int size() const { return end - begin; }
+  };
+  std::vector<Block> learn, judge;  ///< Contiguous, of nearly equal size, alternating.
+};
+
+/** @throws std::invalid_argument unless 2 <= blocks <= count. */
+[[nodiscard]] Split SplitByTime(int count, int blocks);
+
+/** The rows of the blocks, in order. */
+[[nodiscard]] Transitions RowsOf(const Transitions& transitions, const std::vector<Split::Block>& blocks);
+
+/** What the judging blocks say against a declaration and the learning transitions. A transition counts if it provably
+contradicts one of the learning transitions; those among each other do not count. */
+struct Contradictions {
+  int transitions = 0, contradicting = 0;
+  int blocks = 0, blocks_contradicting = 0;
+};
+
+/** Cost: one descent of a search tree over the learning transitions for each judging one and each row of L. */
+[[nodiscard]] Contradictions CountContradictions(const Problem& problem, const Declaration& declaration,
+                                                 const Split& split);
+
+/** A stretch of a block whose transitions follow one another: each begins in the state in which the one before it ends.
+ */
+struct Window {
+  int begin = 0, steps = 0;
+};
+
+/** The stretches of exactly `steps` transitions in the judging blocks that do not overlap, in order. */
+[[nodiscard]] std::vector<Window> WindowsOf(const Transitions& transitions, const Split& split, int steps);
+
+}  // namespace forereach

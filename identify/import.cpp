@@ -1,0 +1,299 @@
+#include "identify/import.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "certifier/certify/learned.h"
+#include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
+#include "certifier/reach/domain.h"
+#include "certifier/task/config_error.h"
+
+namespace forereach {
+namespace {
+
+constexpr long double kTurn = 2 * std::numbers::pi_v<long double>;
+
+struct Sample {
+  long double time;  // s after the log's first stamp
+  Eigen::Index row;
+  bool begins_piece;  // no transition spans the boundary before it
+};
+
+class Importer {
+ public:
+  Importer(const LogTable& table, const Problem& problem, const ImportOptions& options)
+      : table_(table),
+        problem_(problem),
+        options_(options),
+        first_column_(options.time_unit > 0 ? 1 : 0),
+        n_(problem.model->num_states()),
+        m_(problem.model->num_inputs()) {
+    log_.largest_rate = Eigen::VectorXd::Zero(n_);
+    log_.input_deviation = Eigen::VectorXd::Zero(m_);
+  }
+
+  ImportedLog Run() {
+    CollectSamples();
+    RequireFineEnough();
+    for (std::size_t i = 0; i < samples_.size();) {
+      const std::size_t end = Try(i);
+      i = end == 0 || options_.overlapping ? i + 1 : end;
+    }
+    const auto count = std::ssize(log_.lines);
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Map<const RowMajor> rows(numbers_.data(), count, 2 * n_ + m_);
+    log_.transitions = {rows.leftCols(n_ + m_), rows.rightCols(n_)};
+    log_.samples = static_cast<int>(samples_.size());
+    return std::move(log_);
+  }
+
+ private:
+  // ---- rows to samples
+
+  // The stamp in s, NaN if there is none.
+  [[nodiscard]] long double TimeOf(Eigen::Index row) const {
+    if (first_column_ == 0) return static_cast<long double>(row) * options_.row_spacing;
+    return table_.values(row, 0) * options_.time_unit;
+  }
+  [[nodiscard]] bool SameValues(Eigen::Index a, Eigen::Index b) const {
+    for (Eigen::Index j = first_column_; j < table_.values.cols(); ++j) {
+      const double x = table_.values(a, j), y = table_.values(b, j);
+      if (!(x == y || (std::isnan(x) && std::isnan(y)))) return false;
+    }
+    return true;
+  }
+  [[nodiscard]] int LineOf(Eigen::Index row) const { return table_.lines[ToSize(row)]; }
+  void Drop(Dropped cause, Eigen::Index row, const std::string& what = "") { log_.At(cause).Add(LineOf(row), what); }
+
+  void CollectSamples() {
+    log_.At(Dropped::kRowLost) = table_.lost;
+    const Eigen::Index rows = table_.values.rows();
+    bool has_origin = false, broken = true;
+    long double origin = 0, last = 0;
+    for (Eigen::Index row = 0; row < rows;) {
+      broken |= table_.after_loss[ToSize(row)];
+      const long double time = TimeOf(row);
+      if (!std::isfinite(time)) {
+        Drop(Dropped::kNoStamp, row++);
+        broken = true;
+        continue;
+      }
+      if (!has_origin)
+        origin = time, has_origin = true;
+      else if (time < last) {
+        Drop(Dropped::kBackwards, row);
+        broken = true;
+      }
+      last = time;
+      const auto [end, same] = Repetitions(row, time);
+      if (!same) {
+        for (Eigen::Index i = row; i < end; ++i) Drop(Dropped::kRepeatedStamp, i);
+        broken = true;
+      } else {
+        for (Eigen::Index i = row + 1; i < end; ++i) Drop(Dropped::kRepeatedRow, i);
+        const long double since = time - origin;
+        if (options_.from <= since && since <= options_.until)
+          samples_.push_back({since, row, std::exchange(broken, false)});
+        else
+          Drop(Dropped::kOutsideWindow, row), broken = true;
+      }
+      row = end;
+    }
+  }
+
+  // The end of the rows with the stamp of the first, and whether all have its values.
+  [[nodiscard]] std::pair<Eigen::Index, bool> Repetitions(Eigen::Index first, long double time) const {
+    bool same = true;
+    Eigen::Index end = first + 1;
+    for (; end < table_.values.rows() && !table_.after_loss[ToSize(end)] && TimeOf(end) == time; ++end)
+      same &= SameValues(first, end);
+    return {end, same};
+  }
+
+  void RequireFineEnough() {
+    std::vector<double> spacings;
+    for (std::size_t i = 1; i < samples_.size(); ++i)
+      if (!samples_[i].begins_piece) spacings.push_back(static_cast<double>(samples_[i].time - samples_[i - 1].time));
+    if (spacings.empty()) return;
+    const auto middle = spacings.begin() + std::ssize(spacings) / 2;
+    std::nth_element(spacings.begin(), middle, spacings.end());
+    log_.typical_spacing = *middle;
+    if (log_.typical_spacing > options_.period + options_.tolerance)
+      throw ConfigError(table_.path + ": its rows are typically " + ToText(log_.typical_spacing) +
+                        " s apart, and a step of the task is " + ToText(options_.period) +
+                        " s; states are not interpolated: record faster, or let model.dt be a multiple of the log's "
+                        "spacing; if the stamps are not in s, give their unit");
+  }
+
+  // ---- samples to transitions
+
+  [[nodiscard]] double Value(std::size_t i, Eigen::Index variable) const {
+    return static_cast<double>(options_.factors[ToSize(variable)] *
+                               table_.values(samples_[i].row, first_column_ + variable));
+  }
+
+  // The sample nearest to a step behind sample i in its piece, 0 with the cause counted if there is none.
+  std::size_t EndOf(std::size_t i) {
+    const long double target = samples_[i].time + options_.period;
+    std::size_t j = i + 1;
+    while (j < samples_.size() && !samples_[j].begins_piece && samples_[j].time < target) ++j;
+    const auto offset = [&](std::size_t at) { return std::abs(samples_[at].time - target); };
+    const bool ends = j == samples_.size() || samples_[j].begins_piece;
+    if (ends || (j > i + 1 && offset(j - 1) < offset(j))) --j;
+    if (j > i && offset(j) <= options_.tolerance) return j;
+    Drop(ends ? Dropped::kEnd : Dropped::kGap, samples_[i].row);
+    return 0;
+  }
+
+  // Sets `input` to that of the step. False with the cause counted if the step has none.
+  bool FindInput(std::size_t i, std::size_t j, std::span<double> input, std::span<double> deviation) {
+    for (Eigen::Index l = 0; l < m_; ++l) {
+      const auto at = [&](std::size_t row) { return Value(row, n_ + l); };
+      long double sum = 0;
+      for (std::size_t row = i; row < j; ++row) {
+        if (!std::isfinite(at(row))) {
+          Drop(Dropped::kNoInput, samples_[i].row, problem_.model->input_names()[ToSize(l)]);
+          return false;
+        }
+        sum += at(row) * (samples_[row + 1].time - samples_[row].time);
+      }
+      double& u = input[ToSize(l)];
+      u = options_.input_mean ? static_cast<double>(sum / (samples_[j].time - samples_[i].time)) : at(i);
+      for (std::size_t row = i; row < j; ++row)
+        deviation[ToSize(l)] = std::max(deviation[ToSize(l)], std::abs(at(row) - u));
+      if (!options_.input_mean && deviation[ToSize(l)] > options_.input_tolerance[l]) {
+        Drop(Dropped::kInputChanges, samples_[i].row, problem_.model->input_names()[ToSize(l)]);
+        return false;
+      }
+    }
+    return true;
+  }
+
+  bool FindStates(std::size_t i, std::size_t j, std::span<double> state, std::span<double> next) {
+    for (Eigen::Index k = 0; k < n_; ++k) {
+      state[ToSize(k)] = Value(i, k);
+      next[ToSize(k)] = Value(j, k);
+      if (std::isfinite(state[ToSize(k)]) && std::isfinite(next[ToSize(k)])) continue;
+      Drop(Dropped::kNoState, samples_[i].row, problem_.model->state_names()[ToSize(k)]);
+      return false;
+    }
+    for (const int k : options_.unwrapped) {
+      const long double turns = std::round((static_cast<long double>(state[ToSize(k)]) - next[ToSize(k)]) / kTurn);
+      next[ToSize(k)] = static_cast<double>(next[ToSize(k)] + turns * kTurn);
+    }
+    return true;
+  }
+
+  // The sample that ends the transition from sample i, or 0 with the cause counted.
+  std::size_t Try(std::size_t i) {
+    const std::size_t j = EndOf(i);
+    if (j == 0) return 0;
+    std::array<double, kMaxVariables> z;
+    std::array<double, kMaxStates> next;
+    std::array<double, kMaxInputs> deviation{};
+    const std::span<double> location(z.data(), ToSize(n_ + m_)), successor(next.data(), ToSize(n_));
+    if (!FindStates(i, j, location.first(ToSize(n_)), successor)) return 0;
+    if (!FindInput(i, j, location.subspan(ToSize(n_)), deviation)) return 0;
+    Observations observed;
+    switch (Observe(problem_, location, successor, observed)) {
+      case Learned::kAdded: break;
+      case Learned::kNotFinite: Drop(Dropped::kNoState, samples_[i].row); return 0;
+      case Learned::kOutsideDomain: Drop(Dropped::kOutsideDomain, samples_[i].row, ConstraintAt(location)); return 0;
+      case Learned::kNoNominalValue: Drop(Dropped::kNoNominalValue, samples_[i].row); return 0;
+      case Learned::kAmbiguousAngle: Drop(Dropped::kAmbiguousAngle, samples_[i].row); return 0;
+    }
+    numbers_.insert(numbers_.end(), location.begin(), location.end());
+    numbers_.insert(numbers_.end(), successor.begin(), successor.end());
+    log_.lines.push_back(LineOf(samples_[i].row));
+    Note(i, j, location, successor, deviation);
+    return j;
+  }
+
+  // Of an angle without whole turns.
+  [[nodiscard]] double Change(Eigen::Index k, std::span<const double> z, std::span<const double> next) const {
+    const double change = next[ToSize(k)] - z[ToSize(k)];
+    return problem_.model->IsAngle(static_cast<int>(k)) ? std::remainder(change, 2 * std::numbers::pi) : change;
+  }
+
+  void Note(std::size_t i, std::size_t j, std::span<const double> z, std::span<const double> next,
+            std::span<const double> deviation) {
+    const long double offset = std::abs(samples_[j].time - samples_[i].time - options_.period);
+    log_.largest_offset = std::max(log_.largest_offset, static_cast<double>(offset));
+    for (Eigen::Index k = 0; k < n_; ++k)
+      log_.largest_rate[k] = std::max(log_.largest_rate[k], std::abs(Change(k, z, next)) / options_.period);
+    for (Eigen::Index l = 0; l < m_; ++l)
+      log_.input_deviation[l] = std::max(log_.input_deviation[l], deviation[ToSize(l)]);
+  }
+
+  // "v 3.2", for a coordinate outside its range.
+  [[nodiscard]] std::string ConstraintAt(std::span<const double> z) const {
+    std::array<Interval, kMaxVariables> point;
+    for (std::size_t l = 0; l < z.size(); ++l) point[l] = Interval(z[l]);
+    const DomainExit exit = FindExit(problem_.domain, {point.data(), z.size()});
+    if (exit.kind != DomainExit::Kind::kLower && exit.kind != DomainExit::Kind::kUpper) return "";
+    return problem_.model->variable_names()[ToSize(exit.index)] + " " + ToText(z[ToSize(exit.index)]);
+  }
+
+  const LogTable& table_;
+  const Problem& problem_;
+  const ImportOptions& options_;
+  const Eigen::Index first_column_, n_, m_;
+  std::vector<Sample> samples_;
+  std::vector<double> numbers_;  // row by row
+  ImportedLog log_;
+};
+
+}  // namespace
+
+std::string Explain(Dropped dropped) {
+  switch (dropped) {
+    case Dropped::kRowLost: return "rows with other fields than the header";
+    case Dropped::kNoStamp: return "rows without a stamp";
+    case Dropped::kRepeatedRow: return "rows that repeat the one before";
+    case Dropped::kRepeatedStamp: return "rows with another row's stamp and other values";
+    case Dropped::kBackwards: return "stamps that go backwards: a new piece begins";
+    case Dropped::kOutsideWindow: return "rows before --from or after --until";
+    case Dropped::kEnd: return "starts whose step goes past the end";
+    case Dropped::kGap: return "starts without a stamp near t + dt";
+    case Dropped::kNoState: return "starts with a state that is no number";
+    case Dropped::kNoInput: return "starts with an input that is no number";
+    case Dropped::kInputChanges: return "starts whose input is not constant over the step";
+    case Dropped::kOutsideDomain: return "starts outside the task's domain";
+    case Dropped::kNoNominalValue: return "starts where the nominal model has no value";
+    case Dropped::kAmbiguousAngle: return "starts of steps in which the turns of an angle cannot be told";
+    case Dropped::kCount: break;
+  }
+  return "";
+}
+
+std::string ToWord(Dropped dropped) {
+  switch (dropped) {
+    case Dropped::kRowLost: return "row_lost";
+    case Dropped::kNoStamp: return "no_stamp";
+    case Dropped::kRepeatedRow: return "repeated_row";
+    case Dropped::kRepeatedStamp: return "repeated_stamp";
+    case Dropped::kBackwards: return "backwards";
+    case Dropped::kOutsideWindow: return "outside_window";
+    case Dropped::kEnd: return "end";
+    case Dropped::kGap: return "gap";
+    case Dropped::kNoState: return "no_state";
+    case Dropped::kNoInput: return "no_input";
+    case Dropped::kInputChanges: return "input_changes";
+    case Dropped::kOutsideDomain: return "outside_domain";
+    case Dropped::kNoNominalValue: return "no_nominal_value";
+    case Dropped::kAmbiguousAngle: return "ambiguous_angle";
+    case Dropped::kCount: break;
+  }
+  return "";
+}
+
+ImportedLog Import(const LogTable& table, const Problem& problem, const ImportOptions& options) {
+  return Importer(table, problem, options).Run();
+}
+
+}  // namespace forereach

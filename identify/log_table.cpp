@@ -1,0 +1,202 @@
+#include "identify/log_table.h"
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include <csv.h>
+
+#include "certifier/task/config_error.h"
+#include "certifier/task/line_reader.h"
+#include "certifier/task/number.h"
+#include "command_line/nearest.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+constexpr std::size_t kShown = 40;            // bytes of a field in a message
+constexpr std::size_t kLongestRow = 1 << 24;  // bytes, of a row that quotes spread over lines
+
+std::string_view Trim(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+std::string Name(char delimiter) { return delimiter == '\t' ? "tab" : std::string(1, delimiter); }
+
+// libcsv's parser, fed line by line. Its callbacks are called from C, so they throw nothing.
+class RowParser {
+ public:
+  explicit RowParser(char delimiter) : delimiter_(delimiter) { Begin(); }
+  ~RowParser() { csv_free(&parser_); }
+  RowParser(const RowParser&) = delete;
+  RowParser& operator=(const RowParser&) = delete;
+
+  // False if the line breaks the rules of quotes; the row is then given up.
+  bool Feed(const std::string& line) {
+    if (complete_) fields_.clear(), bytes_ = 0;
+    complete_ = false;
+    bytes_ += line.size() + 1;
+    if (Parse(line) && Parse("\n") && bytes_ <= kLongestRow) return true;
+    csv_free(&parser_);
+    Begin();
+    return false;
+  }
+
+  [[nodiscard]] bool is_complete() const { return complete_; }
+  [[nodiscard]] const std::vector<std::string>& fields() const { return fields_; }
+
+ private:
+  void Begin() {
+    csv_init(&parser_, CSV_STRICT);
+    csv_set_delim(&parser_, static_cast<unsigned char>(delimiter_));
+    complete_ = true;
+  }
+  bool Parse(const std::string& text) {
+    return csv_parse(&parser_, text.data(), text.size(), &RowParser::TakeField, &RowParser::EndRow, this) ==
+           text.size();
+  }
+  static void TakeField(void* text, std::size_t size, void* self) noexcept {
+    static_cast<RowParser*>(self)->fields_.emplace_back(static_cast<const char*>(text), size);
+  }
+  static void EndRow(int, void* self) noexcept { static_cast<RowParser*>(self)->complete_ = true; }
+
+  const char delimiter_;
+  csv_parser parser_{};
+  std::vector<std::string> fields_;
+  std::size_t bytes_ = 0;
+  bool complete_ = true;  // no row is begun and not ended
+};
+
+class Reader {
+ public:
+  Reader(const std::string& path, const std::vector<std::string>& wanted, const LogFormat& format)
+      : wanted_(wanted), format_(format), lines_(path) {
+    table_.path = path;
+    table_.not_a_number.resize(wanted.size());
+    if (!format.header.empty()) TakeHeader(format.header);
+  }
+
+  LogTable Read() {
+    for (std::string line; lines_.Next(line);) {
+      if (lines_.line() == 1 && line.starts_with(kByteOrderMark)) line.erase(0, kByteOrderMark.size());
+      if (IsRow(line)) Take(line);
+    }
+    if (parser_ && !parser_->is_complete()) Fail(first_line_, "a quoted field begins in this row and does not end");
+    if (num_fields_ == 0)
+      throw ConfigError(table_.path + ":1: no line that names the columns; give their names if the file has none");
+    using RowMajor = decltype(table_.values);
+    table_.values = Eigen::Map<const RowMajor>(numbers_.data(), std::ssize(table_.lines), std::ssize(wanted_));
+    return std::move(table_);
+  }
+
+ private:
+  [[noreturn]] void Fail(int line, const std::string& what) const {
+    throw ConfigError(table_.path + ":" + std::to_string(line) + ": " + what);
+  }
+
+  // Whether the line is a row or a part of one, and not blank or a comment.
+  bool IsRow(const std::string& line) {
+    if (parser_ && !parser_->is_complete()) return true;
+    first_line_ = lines_.line();
+    const std::string_view content = Trim(line);
+    if (!format_.comment.empty() && content.starts_with(format_.comment)) {
+      table_.comments.Add(first_line_);
+      return false;
+    }
+    if (content.empty()) table_.blank.Add(first_line_);
+    return !content.empty();
+  }
+
+  void Take(const std::string& line) {
+    if (!parser_) parser_ = std::make_unique<RowParser>(DelimiterOf(line));
+    if (!parser_->Feed(line)) {
+      if (num_fields_ == 0) Fail(first_line_, "the names of the columns break the rules of quotes");
+      Lose("quotes inside a field");
+    } else if (parser_->is_complete()) {
+      if (num_fields_ == 0)
+        TakeHeader(parser_->fields());
+      else
+        TakeRow(parser_->fields());
+    }
+  }
+
+  [[nodiscard]] char DelimiterOf(const std::string& line) const {
+    if (format_.delimiter) return *format_.delimiter;
+    std::string found;
+    bool quoted = false;
+    for (const char c : line) {
+      if (c == '"') quoted = !quoted;
+      if (!quoted && (c == ',' || c == ';' || c == '\t') && found.find(c) == std::string::npos) found += c;
+    }
+    if (found.size() > 1)
+      Fail(first_line_,
+           "the fields may be separated by " + Name(found[0]) + " or by " + Name(found[1]) + "; say which it is");
+    return found.empty() ? ',' : found[0];
+  }
+
+  void TakeHeader(const std::vector<std::string>& names) {
+    const int line = std::max(1, lines_.line());
+    for (const std::string& name : wanted_) {
+      const auto count = std::ranges::count(names, name);
+      if (count == 0) {
+        const bool numbers =
+            std::ranges::all_of(names, [](const std::string& field) { return ParseNumber(field).problem.empty(); });
+        Fail(line, numbers ? "this line has numbers only, so no column has a name; give the names of the columns"
+                           : "no column '" + name + "'; " + Suggestion(name, names));
+      }
+      if (count > 1) Fail(line, std::to_string(count) + " columns are named '" + name + "'");
+      places_.push_back(static_cast<std::size_t>(std::ranges::find(names, name) - names.begin()));
+    }
+    num_fields_ = names.size();
+  }
+
+  void TakeRow(const std::vector<std::string>& fields) {
+    if (fields.size() != num_fields_) {
+      Lose(std::to_string(fields.size()) + " fields, the header has " + std::to_string(num_fields_));
+      return;
+    }
+    for (std::size_t j = 0; j < places_.size(); ++j) {
+      const std::string& field = fields[places_[j]];
+      const auto [value, problem] = ParseNumber(field);
+      numbers_.push_back(problem.empty() ? value : std::numeric_limits<double>::quiet_NaN());
+      if (!problem.empty()) table_.not_a_number[j].Add(first_line_, field.substr(0, kShown));
+    }
+    table_.lines.push_back(first_line_);
+    table_.after_loss.push_back(std::exchange(lost_, false));
+  }
+
+  void Lose(const std::string& why) {
+    table_.lost.Add(first_line_, why);
+    lost_ = true;
+  }
+
+  const std::vector<std::string>& wanted_;
+  const LogFormat& format_;
+  LineReader lines_;
+  LogTable table_;
+  std::unique_ptr<RowParser> parser_;  // from the first row on, which shows the delimiter
+  std::size_t num_fields_ = 0;         // 0 before the header
+  std::vector<std::size_t> places_;    // of the wanted columns
+  std::vector<double> numbers_;        // row by row
+  int first_line_ = 0;                 // of the row
+  bool lost_ = false;
+};
+
+}  // namespace
+
+void Finding::Add(int line, const std::string& what) {
+  if (count++ > 0) return;
+  first_line = line;
+  first = what;
+}
+
+LogTable ReadLog(const std::string& path, const std::vector<std::string>& wanted, const LogFormat& format) {
+  return Reader(path, wanted, format).Read();
+}
+
+}  // namespace forereach

@@ -1,0 +1,53 @@
+/** Logs as they come: CSV files whose header names the columns, of which some are wanted. The other columns may hold
+anything.
+
+Fields may be in double quotes, also column names. White space around a field is ignored, and so are blank lines and
+comment lines. Nothing is guessed: a field that is not one decimal number is NaN and counted, and a row with more or
+fewer fields than the header is left out and counted. libcsv reads the fields. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace forereach {
+
+struct LogFormat {
+  /** ',', ';' or a tab. None: the one of them that the header contains. */
+  std::optional<char> delimiter;
+  /** A line that begins with this text is a comment. Empty: there are no comments. */
+  std::string comment = "#";
+  /** The names of the columns, if the file does not begin with them. */
+  std::vector<std::string> header;
+};
+
+/** How often something was found, and where first. */
+struct Finding {
+  std::int64_t count = 0;
+  int first_line = 0;
+  std::string first;  ///< What stood there; it may be empty.
+
+  void Add(int line, const std::string& what = "");
+};
+
+struct LogTable {
+  std::string path;
+  /** One row for each row of the file with the header's number of fields; the wanted columns in their order. NaN where
+  a field is no finite number. */
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values;
+  std::vector<int> lines;             ///< In which line each row begins.
+  std::vector<bool> after_loss;       ///< Whether a row was left out directly before this one.
+  Finding blank, comments, lost;      ///< Lines without a row, and rows left out.
+  std::vector<Finding> not_a_number;  ///< For each wanted column.
+};
+
+/** Reads the wanted columns of a log. Cost: linear in the file.
+@throws ConfigError with file and line: the file cannot be read, has no header, names a wanted column twice or not at
+all, or ends inside a quoted field; the delimiter is not clear. */
+[[nodiscard]] LogTable ReadLog(const std::string& path, const std::vector<std::string>& wanted,
+                               const LogFormat& format);
+
+}  // namespace forereach

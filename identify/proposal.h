@@ -1,0 +1,53 @@
+/** A declaration proposed from observations alone, with what it rests on. Nothing in it is proven: data can refute a
+declaration and cannot establish one. */
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <vector>
+
+#include "identify/noise_floor.h"
+#include "identify/smallest_row.h"
+
+namespace forereach {
+
+struct ProposalOptions {
+  double factor = 1.5;          ///< Proposed slope over the smallest consistent one, at least 1.
+  bool estimate_noise = false;  ///< Raise sigma to what the data show: NoiseFloor::repeated and three deviations.
+  /** For each coordinate k: the columns of z on which its residual may depend. */
+  std::vector<std::vector<int>> columns;
+  /** Called twice for each coordinate, as the work goes on; may be empty. */
+  std::function<void()> advance = {};
+};
+
+struct ProposedRow {
+  SmallestRow smallest;  ///< With the proposed sigma.
+  NoiseFloor noise;
+  Eigen::RowVectorXd least;  ///< FindSmallestEntry of each column with a slope, the others as proposed.
+  /** What other estimators (slopes.h) say of the row's size, as factors of `smallest`; 0 for a row without slopes. */
+  double strongin = 0, knuth_chou = 0;
+};
+
+struct Proposal {
+  Declaration declaration;  ///< L = factor * smallest and sigma, rounded up to kDigits; no pair contradicts it.
+  std::vector<ProposedRow> rows;
+  std::vector<int> constant;  ///< Columns of z that never vary: the data say nothing about their slopes, L has zeros.
+
+  static constexpr int kDigits = 6;
+};
+
+/** Two observations that no L explains. */
+struct Unexplained : std::runtime_error {
+  Unexplained(int state, const ObservedPair& found)
+      : std::runtime_error("no slopes are consistent with the observations"), coordinate(state), pair(found) {}
+  int coordinate;
+  ObservedPair pair;
+};
+
+/** @param declaration its sigma and disturbance are those of the task; its L is not read.
+@throws Unexplained if no row is consistent. Cost: n (1 + columns) linear programs; the other estimators take at most
+1000 observations, evenly chosen. */
+[[nodiscard]] Proposal Propose(const Declaration& declaration, const Observations& observations,
+                               const ProposalOptions& options);
+
+}  // namespace forereach

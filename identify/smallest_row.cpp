@@ -1,0 +1,208 @@
+#include "identify/smallest_row.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include <ClpSimplex.hpp>
+
+#include "certifier/numerics/size.h"
+#include "certifier/residual/consistency.h"
+#include "certifier/residual/lipschitz_row.h"
+#include "certifier/residual/observation_index.h"
+#include "certifier/residual/pairs.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::size_t kCutsInARound = 60;
+constexpr int kMostRounds = 500;
+constexpr double kTolerance = 1e-9;  // of the program, whose numbers are made to be about 1
+
+// The program: minimise sum_c y_c over y >= 0 with A y >= b, where y_c = s_l L_kl for the free columns l.
+class Program {
+ public:
+  explicit Program(std::size_t columns) : columns_(columns) {
+    clp_.setLogLevel(0);
+    clp_.resize(0, static_cast<int>(columns));
+    clp_.setPrimalTolerance(kTolerance);
+    for (std::size_t c = 0; c < columns; ++c) {
+      clp_.setColumnBounds(static_cast<int>(c), 0, COIN_DBL_MAX);
+      clp_.setObjectiveCoefficient(static_cast<int>(c), 1);
+    }
+  }
+
+  void Add(const std::vector<double>& coefficients, double bound) {
+    std::vector<int> indices(columns_);
+    for (std::size_t c = 0; c < columns_; ++c) indices[c] = static_cast<int>(c);
+    clp_.addRow(static_cast<int>(columns_), indices.data(), coefficients.data(), bound, COIN_DBL_MAX);
+  }
+
+  // The minimum, or false if there is no solution.
+  bool Solve() {
+    clp_.dual();
+    return clp_.isProvenOptimal();
+  }
+  [[nodiscard]] double Value(std::size_t c) const { return std::max(0.0, clp_.primalColumnSolution()[c]); }
+  [[nodiscard]] double Price(std::size_t row) const { return clp_.dualRowSolution()[row]; }
+
+ private:
+  const std::size_t columns_;
+  ClpSimplex clp_;
+};
+
+class Search {
+ public:
+  Search(const Declaration& declaration, const Observations& observations, int coordinate,
+         const Eigen::RowVectorXd& scales)
+      : declaration_(declaration), observations_(observations), k_(coordinate), scales_(scales) {
+    for (Eigen::Index l = 0; l < scales.size(); ++l)
+      if (scales[l] > 0) {
+        free_.push_back(l);
+        declaration_.lipschitz(k_, l) = 0;
+      }
+    entries_ = Entries();
+    const auto [highest, lowest] = Extremes();
+    unit_ = entries_.floors[highest] - entries_.ceilings[lowest];
+  }
+
+  SmallestRow Run() {
+    SmallestRow found;
+    found.slopes = declaration_.lipschitz.row(k_);
+    found.reasons.resize(ToSize(scales_.size()));
+    Program program(free_.size());
+    for (; found.rounds < kMostRounds; ++found.rounds) {
+      const std::vector<ObservedPair> violated = MostViolated();
+      if (violated.empty()) break;
+      for (const ObservedPair& pair : violated) {
+        const std::vector<double> coefficients = CoefficientsOf(pair);
+        if (std::ranges::all_of(coefficients, [](double value) { return value == 0; })) {
+          found.unexplained = pair;
+          return found;
+        }
+        program.Add(coefficients, FreePart(pair) / unit_);
+        cuts_.push_back(pair);
+      }
+      if (!program.Solve()) break;  // cannot happen: a large enough row satisfies every cut
+      for (std::size_t c = 0; c < free_.size(); ++c)
+        declaration_.lipschitz(k_, free_[c]) = program.Value(c) * unit_ / scales_[free_[c]];
+    }
+    if (!cuts_.empty()) FindReasons(program, found);
+    ScaleUp();
+    found.slopes = declaration_.lipschitz.row(k_);
+    return found;
+  }
+
+ private:
+  [[nodiscard]] ObservationIndex::Entries Entries() const {
+    return EntriesOf(LipschitzRow(declaration_, k_), declaration_, observations_, k_);
+  }
+  [[nodiscard]] double Along(const ObservedPair& pair, Eigen::Index l) const {
+    return std::abs(observations_.z(pair.first, l) - observations_.z(pair.second, l));
+  }
+  [[nodiscard]] std::vector<double> CoefficientsOf(const ObservedPair& pair) const {
+    std::vector<double> coefficients;
+    for (const Eigen::Index l : free_) coefficients.push_back(Along(pair, l) / scales_[l]);
+    return coefficients;
+  }
+  // What the free columns have to explain of a pair's difference.
+  [[nodiscard]] double FreePart(const ObservedPair& pair) const {
+    double rest = pair.difference;
+    for (Eigen::Index l = 0; l < scales_.size(); ++l)
+      if (!(scales_[l] > 0)) rest -= declaration_.lipschitz(k_, l) * Along(pair, l);
+    return rest;
+  }
+  // The observations with the largest floor and the least ceiling.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> Extremes() const {
+    return {ToSize(std::ranges::max_element(entries_.floors) - entries_.floors.begin()),
+            ToSize(std::ranges::min_element(entries_.ceilings) - entries_.ceilings.begin())};
+  }
+
+  // The pairs that violate the row most, at most one that begins with each observation; none twice over all rounds.
+  std::vector<ObservedPair> MostViolated() {
+    std::vector<std::pair<double, ObservedPair>> violated;
+    const auto consider = [&](std::size_t i, std::size_t j, double excess) {
+      if (!(excess > kTolerance * unit_)) return;
+      if (!known_.emplace(std::min(i, j), std::max(i, j)).second) return;
+      violated.push_back(
+          {excess, {static_cast<int>(i), static_cast<int>(j), entries_.floors[i] - entries_.ceilings[j]}});
+    };
+    const LipschitzRow row(declaration_, k_);
+    if (row.is_constant()) {
+      const auto [highest, lowest] = Extremes();
+      consider(highest, lowest, unit_);
+    } else {
+      const auto entries = Entries();
+      const ObservationIndex index(entries);
+      const PairSearch search(index, MarginUpper(row, entries, observations_));
+      for (int i = 0; i < observations_.size(); ++i) {
+        const auto other = search.BestOther(PointOf(entries, i), 1, static_cast<std::uint32_t>(i));
+        if (other.id != ObservationIndex::kNone) consider(ToSize(i), other.id, entries.floors[ToSize(i)] + other.value);
+      }
+    }
+    const auto kept = std::min(violated.size(), kCutsInARound);
+    std::ranges::partial_sort(violated, violated.begin() + static_cast<std::ptrdiff_t>(kept), std::greater{},
+                              &std::pair<double, ObservedPair>::first);
+    std::vector<ObservedPair> pairs;
+    for (std::size_t c = 0; c < violated.size(); ++c) {
+      const ObservedPair& pair = violated[c].second;
+      if (c < kept)
+        pairs.push_back(pair);
+      else
+        known_.erase(std::minmax(ToSize(pair.first), ToSize(pair.second)));
+    }
+    return pairs;
+  }
+
+  void FindReasons(const Program& program, SmallestRow& found) const {
+    std::vector<double> largest(found.reasons.size(), 0);
+    for (std::size_t p = 0; p < cuts_.size(); ++p)
+      for (const Eigen::Index l : free_) {
+        const double part = program.Price(p) * declaration_.lipschitz(k_, l) * Along(cuts_[p], l);
+        if (!(part > largest[ToSize(l)])) continue;
+        largest[ToSize(l)] = part;
+        found.reasons[ToSize(l)] = cuts_[p];
+      }
+  }
+
+  // The program has a tolerance, and the test of a declaration has none. The other rows get errors that nothing
+  // contradicts.
+  void ScaleUp() {
+    Declaration row{Eigen::MatrixXd::Zero(declaration_.lipschitz.rows(), declaration_.lipschitz.cols()),
+                    Eigen::VectorXd::Constant(declaration_.noise_bound.size(), kMaxDouble / 8),
+                    declaration_.disturbance};
+    row.noise_bound[k_] = declaration_.noise_bound[k_];
+    for (double more = 1e-12; more < 1; more *= 4) {
+      row.lipschitz.row(k_) = declaration_.lipschitz.row(k_);
+      if (!FindViolation(row, observations_)) return;
+      for (const Eigen::Index l : free_) declaration_.lipschitz(k_, l) *= 1 + more;
+    }
+  }
+
+  Declaration declaration_;
+  const Observations& observations_;
+  const int k_;
+  const Eigen::RowVectorXd& scales_;
+  std::vector<Eigen::Index> free_;
+  ObservationIndex::Entries entries_;  // only floors and ceilings are used
+  double unit_;                        // the largest difference
+  std::vector<ObservedPair> cuts_;
+  std::set<std::pair<std::size_t, std::size_t>> known_;
+};
+
+}  // namespace
+
+SmallestRow FindSmallestRow(const Declaration& declaration, const Observations& observations, int coordinate,
+                            const Eigen::RowVectorXd& scales) {
+  return Search(declaration, observations, coordinate, scales).Run();
+}
+
+SmallestRow FindSmallestEntry(const Declaration& declaration, const Observations& observations, int coordinate,
+                              int column) {
+  Eigen::RowVectorXd scales = Eigen::RowVectorXd::Constant(declaration.lipschitz.cols(), -1);
+  scales[column] = 1;
+  return FindSmallestRow(declaration, observations, coordinate, scales);
+}
+
+}  // namespace forereach

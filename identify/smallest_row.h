@@ -1,0 +1,50 @@
+/** The smallest row of L that a set of observations does not contradict: a linear program.
+
+Row k of L with columns L_kl is consistent with observations of which each errs by at most eps if for all pairs i, j
+    sum_l L_kl |z_il - z_jl| >= |r~_ik - r~_jk| - 2 eps.                                              (pairs)
+A pair bounds one entry from below only if the others are known or do not count in it. All pairs together bound the sum
+of s_l L_kl for any s_l >= 0: the smallest value of that sum over all consistent rows is one that the true row reaches
+or exceeds. The program finds it, with the row where it is. This is a fact about the data and proves no upper bound. */
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "certifier/residual/declaration.h"
+#include "certifier/residual/observations.h"
+
+namespace forereach {
+
+/** Two observations: the residuals differ by at least `difference` = |r~_ik - r~_jk| - 2 eps. */
+struct ObservedPair {
+  int first = 0, second = 0;
+  double difference = 0;
+};
+
+struct SmallestRow {
+  Eigen::RowVectorXd slopes;  ///< d_z entries, not negative
+  /** For each column with a slope: a pair whose inequality is tight and in which this column counts most. */
+  std::vector<std::optional<ObservedPair>> reasons;
+  /** No row is consistent: two observations that agree in all columns with a free or positive slope differ by more than
+  2 eps. */
+  std::optional<ObservedPair> unexplained;
+  int rounds = 0;
+};
+
+/** Minimises sum_l s_l L_kl over the consistent rows. Cuts are added until no pair violates (pairs), and the row is
+then scaled up, by a factor close to 1, until FindViolation finds nothing either, whose arithmetic is rigorous.
+@param declaration its sigma and disturbance make eps; its row k gives the fixed slopes. @param scales s_l, d_z entries:
+positive for a column that is free, not positive for one that keeps the declaration's slope.
+Cost: some tens of rounds, each about N descents of a search tree and a small linear program. */
+[[nodiscard]] SmallestRow FindSmallestRow(const Declaration& declaration, const Observations& observations,
+                                          int coordinate, const Eigen::RowVectorXd& scales);
+
+/** The smallest entry L_kl if the other entries of row k are at most the declaration's: the declaration's own row has
+to be consistent. If it bounds the true row from above in the other columns, this is a lower bound on the true entry. */
+[[nodiscard]] SmallestRow FindSmallestEntry(const Declaration& declaration, const Observations& observations,
+                                            int coordinate, int column);
+
+}  // namespace forereach

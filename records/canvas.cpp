@@ -1,0 +1,45 @@
+#include "records/canvas.h"
+
+#include <memory>
+
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
+#include <cairo.h>
+#include <fmt/core.h>
+
+#include "records/picture.h"
+
+namespace forereach {
+namespace {
+
+void Check(cairo_status_t status, const std::string& path) {
+  if (status != CAIRO_STATUS_SUCCESS)
+    throw PictureError("picture: cannot write " + path + ": " + cairo_status_to_string(status));
+}
+
+}  // namespace
+
+void DrawFile(const std::string& path, int width, int height, const std::function<void(cairo_t*)>& draw) {
+  const bool svg = path.ends_with(".svg"), png = path.ends_with(".png");
+  if (!svg && !png && !path.ends_with(".pdf"))
+    throw PictureError("picture: " + path + " has to end in .svg, .png or .pdf");
+  if (width < 200 || width > 10000 || height < 200 || height > 10000)
+    throw PictureError(fmt::format("picture: {} x {} pixels is not within 200 to 10000", width, height));
+  const std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)> surface(
+      png   ? cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height)
+      : svg ? cairo_svg_surface_create(path.c_str(), width, height)
+            : cairo_pdf_surface_create(path.c_str(), width, height),
+      &cairo_surface_destroy);
+  Check(cairo_surface_status(surface.get()), path);
+  if (svg) cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
+  {
+    const std::unique_ptr<cairo_t, void (*)(cairo_t*)> cairo(cairo_create(surface.get()), &cairo_destroy);
+    draw(cairo.get());
+    Check(cairo_status(cairo.get()), path);
+  }
+  if (png) Check(cairo_surface_write_to_png(surface.get(), path.c_str()), path);
+  cairo_surface_finish(surface.get());
+  Check(cairo_surface_status(surface.get()), path);
+}
+
+}  // namespace forereach

@@ -1,0 +1,16 @@
+/** Files that are drawn with cairo: the surface of each format, and its errors. */
+#pragma once
+
+#include <functional>
+#include <string>
+
+struct _cairo;
+
+namespace forereach {
+
+/** Draws a .svg, .png or .pdf file by the same drawing code.
+@param width, height pixels (of a .pdf points), 200 to 10000 each.
+@throws PictureError (picture.h) for another ending or size, or if the file cannot be written. */
+void DrawFile(const std::string& path, int width, int height, const std::function<void(_cairo*)>& draw);
+
+}  // namespace forereach

@@ -1,0 +1,73 @@
+// `forereach fit`: what it prints goes into a task file, and what cannot be fitted is refused.
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/dynamics/model.h"
+#include "certifier/task/config.h"
+#include "tests/cli/program.h"
+#include "tests/config/task_files.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+class FitCommandTest : public testing::Test {
+ protected:
+  // x+ = 0.5 x + 0.25 u, without noise.
+  FitCommandTest() {
+    scratch_.Write("task.yaml", TaskFor("model:\n"
+                                        "  states: {x: m, y: m}\n"
+                                        "  inputs: {u: m}\n"
+                                        "  parameters: {dt: 0.1, decay: 1, gain: [0, 1]}\n"
+                                        "  next: {x: decay*x + gain*u, y: y}\n",
+                                        2, 1, "x, y"));
+    std::ostringstream rows("x,y,u,x_next,y_next\n", std::ios::ate);
+    for (int i = 0; i < 20; ++i) {
+      const double x = i % 5 / 8.0, u = i % 7 / 8.0;
+      rows << x << ",0," << u << "," << 0.5 * x + 0.25 * u << ",0\n";
+    }
+    scratch_.Write("steps.csv", rows.str());
+  }
+  Output Fit(const std::string& options) const { return Forereach("fit --config " + task_ + " " + options + " 2>&1"); }
+
+  ScratchDirectory scratch_;
+  const std::string task_ = scratch_ / "task.yaml";
+};
+
+TEST_F(FitCommandTest, ItsLineGoesIntoATaskFile) {
+  const std::string picture = scratch_ / "errors.svg";
+  const Output output = Fit("--picture " + picture);
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr("model:\n  parameters: {decay: 0.5, gain: 0.25}"));
+  EXPECT_THAT(Read(picture), HasSubstr("<svg"));
+  const Json document = Json::parse(Fit("--json").text);
+  EXPECT_TRUE(document["converged"]);
+  EXPECT_EQ(document["parameters"][1]["before"], 0.5) << "the middle of its range";
+  EXPECT_LT(document["states"][0]["rms_after"], 1e-9);
+  EXPECT_EQ(document["states"][1]["rms_before"], 0);
+}
+
+TEST_F(FitCommandTest, BadInputIsExitTwo) {
+  for (const auto& [options, words] :
+       std::vector<std::pair<std::string, const char*>>{{"--parameters mass", "the model has no parameter 'mass'"},
+                                                        {"--parameters dt", "dt is the step"},
+                                                        {"--parameters gain,gain", "parameter 'gain' is given twice"},
+                                                        {"--picture errors.gif", "ends in .gif"}}) {
+    const Output output = Fit(options);
+    EXPECT_EQ(output.code, 2) << options;
+    EXPECT_THAT(output.text, HasSubstr(words));
+  }
+  const Output compiled = Forereach("fit --config config/point_mass.yaml 2>&1");
+  EXPECT_EQ(compiled.code, 2);
+  EXPECT_THAT(compiled.text, HasSubstr("only the parameters of a model as text can be fitted"));
+}
+
+}  // namespace
+}  // namespace forereach

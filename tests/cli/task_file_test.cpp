@@ -1,0 +1,350 @@
+// `forereach init` and `forereach check`: a task to begin with, and what keeps one from certifying plans.
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "certifier/numerics/size.h"
+#include "certifier/task/config.h"
+#include "cli/task_template.h"
+#include "tests/cli/program.h"
+#include "tests/config/task_files.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kSource = FOREREACH_SOURCE_DIR;
+
+class TaskFileTest : public testing::Test {
+ protected:
+  TaskFileTest() { fs::copy(kSource + "/config/models", scratch_ / "models"); }
+  [[nodiscard]] Output Init(const std::string& options) const {
+    return Forereach("init " + options + " --out " + task_ + " 2>&1");
+  }
+  [[nodiscard]] Output Check(const std::string& options = "") const {
+    return Forereach("check " + task_ + " " + options + " 2>&1");
+  }
+  /** Writes kTask with one thing changed, and its data. */
+  void WriteTask(const std::string& from = "", const std::string& to = "",
+                 const std::string& transitions = kTransitions) const {
+    const std::string task = Replaced(kTask, "[0, 0, 0.01, 0.01]", "[0.01, 0.01, 0.01, 0.01]");
+    scratch_.Write("task.yaml", from.empty() ? task : Replaced(task, from, to));
+    scratch_.Write("steps.csv", transitions);
+  }
+
+  ScratchDirectory scratch_;
+  const std::string task_ = scratch_ / "task.yaml";
+};
+
+using InitTest = TaskFileTest;
+using CheckTest = TaskFileTest;
+
+// ---- init
+
+TEST_F(InitTest, EveryModelOfTheLibraryGivesATaskThatLoads) {
+  int models = 0;
+  for (const auto& entry : fs::directory_iterator(kSource + "/config/models")) {
+    const std::string name = entry.path().stem().string();
+    SCOPED_TRACE(name);
+    const Output output = Init("--force --model " + name);
+    ASSERT_EQ(output.code, 0) << output.text;
+    const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
+    EXPECT_EQ(config.problem->model->name(), name + " (text)");
+    EXPECT_TRUE(config.says_between);
+    EXPECT_NE(config.gate.obstacles, ObstaclesSource::kUnsaid);
+    EXPECT_EQ(Check().code, 1) << "there are no data yet";
+    EXPECT_THAT(Check().text, HasSubstr("task_steps.csv does not exist"));
+    ++models;
+  }
+  EXPECT_GE(models, 13);
+}
+
+// What nobody has looked at yet certifies nothing, even with data of the model itself all over the domain.
+TEST_F(InitTest, PlaceholdersKeepPlansFromBeingCertified) {
+  for (const char* name : {"unicycle", "differential_drive", "point_mass"}) {
+    SCOPED_TRACE(name);
+    ASSERT_EQ(Init(std::string("--force --model ") + name).code, 0);
+    const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
+    const NominalModel& model = *config.problem->model;
+    Transitions transitions{Eigen::MatrixXd::Zero(50, model.num_variables()),
+                            Eigen::MatrixXd::Zero(50, model.num_states())};
+    for (Eigen::Index i = 0; i < 50; ++i) {
+      Eigen::VectorXd z = Eigen::VectorXd::Constant(model.num_variables(), 0.1 * static_cast<double>(i - 25));
+      Eigen::VectorXd next(model.num_states());
+      model.Evaluate({z.data(), ToSize(model.num_variables())}, {next.data(), ToSize(model.num_states())});
+      transitions.z.row(i) = z.transpose();
+      transitions.x_next.row(i) = next.transpose();
+    }
+    SaveTransitions(scratch_ / "task_steps.csv", model, transitions);
+    SavePlan(scratch_ / "plan.csv", model, Eigen::MatrixXd::Zero(model.num_inputs(), 5));
+    const Output output = Forereach("certify --config " + task_ + " --plan " + (scratch_ / "plan.csv") + " 2>&1");
+    EXPECT_EQ(output.code, 1) << output.text;
+    const Output check = Check();
+    EXPECT_EQ(check.code, 1);
+    EXPECT_THAT(check.text, HasSubstr("from a declaration that is too wide")) << check.text;
+  }
+}
+
+TEST_F(InitTest, SaysWhatTheParametersAre) {
+  ASSERT_EQ(Init("--model differential_drive --dt 0.05").code, 0);
+  EXPECT_THAT(Read(task_), AllOf(HasSubstr("\n    dt: 0.05  # s"), HasSubstr("\n    wheel_radius: 0.033  # m\n"),
+                                 HasSubstr("\n    track: 0.16  # m, from wheel to wheel\n")));
+  EXPECT_EQ(LoadConfig(task_, TransitionsFile::kIgnore).period, 0.05);
+}
+
+TEST_F(InitTest, OverwritesNothingUnlessTold) {
+  scratch_.Write("task.yaml", "mine\n");
+  const Output output = Init("--model unicycle");
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("the file exists, and is not changed"));
+  EXPECT_EQ(Read(task_), "mine\n");
+  scratch_.Write("task.yaml", std::string(100'000, '#'));
+  EXPECT_EQ(Init("--model unicycle --force").code, 0);
+  EXPECT_EQ(LoadConfig(task_, TransitionsFile::kIgnore).problem->model->num_states(), 5);
+}
+
+TEST_F(InitTest, UnknownModelsAreRefusedWithTheNearest) {
+  const Output output = Init("--model unicicle");
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("did you mean models/unicycle.yaml?"));
+  EXPECT_FALSE(fs::exists(task_));
+}
+
+TEST_F(InitTest, AHeaderNamesStatesAndInputs) {
+  scratch_.Write("log.csv", "\xef\xbb\xbfx , v,x_next,u, v_next\r\n0,1,0.1,5,1.5\n2,-1,1.9,5,-0.5\n");
+  const Output output = Init("--dt 0.1 --transitions " + (scratch_ / "log.csv"));
+  ASSERT_EQ(output.code, 0) << output.text;
+  const Config config = LoadConfig(task_);
+  const Problem& problem = *config.problem;
+  EXPECT_EQ(problem.model->state_names(), (std::vector<std::string>{"x", "v"}));
+  EXPECT_EQ(problem.model->input_names(), std::vector<std::string>{"u"});
+  EXPECT_EQ(problem.transitions.size(), 2);
+  EXPECT_EQ(config.period, 0.1);
+  EXPECT_EQ(problem.domain.state.lower(), Eigen::Vector2d(-0.2, -1.2));
+  EXPECT_EQ(problem.domain.state.upper(), Eigen::Vector2d(2.2, 1.2));
+  EXPECT_EQ(problem.domain.input.lower()[0], 4.9);
+  EXPECT_EQ(problem.domain.input.upper()[0], 5.1);
+  EXPECT_THAT(Read(task_), HasSubstr("transitions: log.csv\n"));
+}
+
+TEST_F(InitTest, AnyRangeContainsItsData) {
+  const double values[] = {0, 5e-324, 1e-300, 0.1, 1, 999.9999, 1e15, 1e300};
+  for (const double a : values)
+    for (const double b : values)
+      for (const double sign : {-1.0, 1.0}) {
+        const double least = std::min(sign * a, b), largest = std::max(sign * a, b);
+        const TemplateVariable range = RangeAround("x", least, largest);
+        EXPECT_LE(range.lower, least) << least << " " << largest;
+        EXPECT_GE(range.upper, largest) << least << " " << largest;
+      }
+}
+
+TEST_F(InitTest, HeadersThatAreNoTransitionsAreRefused) {
+  const auto refused = [&](const std::string& header, const std::string& why) {
+    std::string row = "1";
+    for (const char c : header) row += c == ',' ? ",1" : "";
+    scratch_.Write("log.csv", header + "\n" + row + "\n");
+    const Output output = Init("--dt 0.1 --transitions " + (scratch_ / "log.csv"));
+    EXPECT_EQ(output.code, 2) << header;
+    EXPECT_THAT(output.text, HasSubstr(why)) << header;
+    EXPECT_FALSE(fs::exists(task_)) << header;
+  };
+  refused("x,u", "no column is a state");
+  refused("x,x_next", "no column is an input");
+  refused("x,x_next,v_next,u", "there is no column v with the state before it");
+  refused("x,x_next,sin", "'sin' cannot be the name");
+  refused("x,x_next,a b", "'a b' cannot be the name");
+  refused("x,x_next,dt", "'dt' cannot be the name");
+  refused("x,x_next,u,u", "duplicate column");
+  refused("x,x_next,", "a column has no name");
+  refused("", "a column has no name");
+  std::string states, inputs = "x,x_next";
+  for (int k = 0; k < 17; ++k) states += "x" + std::to_string(k) + ",x" + std::to_string(k) + "_next,";
+  for (int k = 0; k < 9; ++k) inputs += ",u" + std::to_string(k);
+  refused(states + "u", "17 states are outside [0, 16]");
+  refused(inputs, "9 inputs are outside [0, 8]");
+  scratch_.Write("log.csv", "x,x_next,u\n");
+  EXPECT_THAT(Init("--dt 0.1 --transitions " + (scratch_ / "log.csv")).text, HasSubstr("no transitions"));
+  scratch_.Write("log.csv", "x,x_next,u\n1,1,1\n");
+  EXPECT_THAT(Init("--transitions " + (scratch_ / "log.csv")).text, HasSubstr("needs --dt"));
+  EXPECT_EQ(Init("--dt 61 --transitions " + (scratch_ / "log.csv")).code, 2);
+  EXPECT_EQ(Init("").code, 2);
+  EXPECT_EQ(Init("--dt 0.1 --model unicycle --transitions " + (scratch_ / "log.csv")).code, 2);
+}
+
+TEST(YamlTextTest, QuotesWhatIsNotPlain) {
+  EXPECT_EQ(YamlText("a/b_c-1.csv"), "a/b_c-1.csv");
+  EXPECT_EQ(YamlText("a b's: #"), "'a b''s: #'");
+  EXPECT_EQ(YamlText("-a"), "'-a'");
+  EXPECT_EQ(YamlText(""), "''");
+}
+
+// ---- check
+
+TEST(Check, ShippedTasks) {
+  for (const auto& [task, code] : {std::pair("demo", 0),
+                                   {"post", 0},
+                                   {"truck", 0},
+                                   {"pedestrian", 0},
+                                   {"policy", 0},
+                                   {"point_mass", 0},
+                                   {"point_mass_text", 0},
+                                   {"post_samples", 1},
+                                   {"bicycle_falsified", 1},
+                                   {"point_mass_falsified", 1}}) {
+    const Output output = Forereach(std::string("check config/") + task + ".yaml");
+    EXPECT_EQ(output.code, code) << task << "\n" << output.text;
+  }
+}
+
+TEST_F(CheckTest, AnExampleWithoutFindings) {
+  WriteTask();
+  const Output output = Check();
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, HasSubstr("a plan could be certified"));
+  const Json json = Json::parse(Check("--json --steps 3").text);
+  EXPECT_EQ(json["good"], true);
+  EXPECT_EQ(json["half_widths"].size(), 4u);
+  EXPECT_EQ(json["coordinates"][2],
+            Json({{"name", "vx"}, {"domain", {-5.4, 5.4}}, {"data", {1, 2}}, {"matters", true}}));
+}
+
+TEST_F(CheckTest, DataOutsideTheDomainAreAllNamed) {
+  const std::string at = "0,0,5.4,0,3,0,0.84375,0,5.85,0\n";
+  WriteTask("", "", kTransitions + at);
+  EXPECT_EQ(Check().code, 0) << Check().text;
+  WriteTask("", "", kTransitions + at + "0,0,5.5,-5.41,0,0,0,0,0,0\n0,0,6.5,0,0,3.1,0,0,0,0\n");
+  const Output output = Check();
+  EXPECT_EQ(output.code, 1);
+  const std::string steps = scratch_ / "steps.csv";
+  EXPECT_THAT(output.text,
+              AllOf(HasSubstr(task_ + ":4: domain.state.lower: vy: 1 transition below -5.4, the least is -5.41 in " +
+                              steps + ":5\n"),
+                    HasSubstr(task_ + ":5: domain.state.upper: vx: 2 transitions above 5.4, the largest is 6.5 in " +
+                              steps + ":6\n"),
+                    HasSubstr(task_ + ":6: domain.input.upper: ay: 1 transition above 3")));
+  WriteTask("  input:", "  balls: [{coordinates: [vx, vy], center: [0, 0], radius: 2}]\n  input:");
+  EXPECT_THAT(Check().text, HasSubstr("domain.balls[0]: 1 transition outside, the first in " + steps + ":3\n"));
+}
+
+// Observation errors of 2 sigma and 0.05 m/s times 1 m/s: the residuals of vx may differ by 0.12. They differ by d.
+TEST_F(CheckTest, AContradictionIsNamedWithWhatResolvesIt) {
+  const auto with = [&](const std::string& next) {
+    WriteTask("", "",
+              "px,py,vx,vy,ax,ay,px_next,py_next,vx_next,vy_next\n0,0,1,0,0,0,0.15,0,1,0\n0,0,1,1,0,0,0.15,0.15," +
+                  next + ",1\n");
+    return Check();
+  };
+  EXPECT_EQ(with("1.0699").code, 0) << with("1.0699").text;
+  EXPECT_THAT(with("1.0699").text, HasSubstr(task_ + ":9: declaration.lipschitz.vx: remark: vx: the data use 99."));
+  const Output output = with("1.0701");
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text, HasSubstr(task_ + ":9: declaration.lipschitz.vx: vx: lines 2 and 3 of " +
+                                     (scratch_ / "steps.csv") + " differ in the model's error by 0.07"));
+  EXPECT_THAT(output.text, HasSubstr("noise_bound of vx at least 0.01005")) << output.text;
+  scratch_.Write("task.yaml", Replaced(Read(task_), "[0.01, 0.01, 0.01, 0.01]", "[0.01, 0.01, 0.01006, 0.01]"));
+  EXPECT_EQ(Check().code, 0) << Check().text;
+}
+
+// X0 is a square of half-width 0.1, and the circle's edge is at 3 - radius.
+TEST_F(CheckTest, ObstaclesAtTheStart) {
+  const auto with = [&](const std::string& radius) {
+    WriteTask("{center: [3, 2], radius: 0.8}", "{center: [3, 0], radius: " + radius + "}");
+    return Check();
+  };
+  EXPECT_THAT(with("2.9001").text, HasSubstr(task_ + ":18: task.obstacles[0]: the robot may touch it at the start"));
+  EXPECT_EQ(with("2.9001").code, 1);
+  EXPECT_EQ(with("2.8999").code, 0) << with("2.8999").text;
+}
+
+// In 0.15 s at up to 5.4 m/s along both axes, and 3 m/s^2 along both: sqrt(2) (0.81 + 0.03375) = 1.1933 m.
+TEST_F(CheckTest, ObstaclesThinnerThanAStep) {
+  const auto with = [&](const std::string& radius) {
+    WriteTask("radius: 0.8", "radius: " + radius);
+    return Check();
+  };
+  EXPECT_EQ(with("0.5967").code, 0) << with("0.5967").text;
+  EXPECT_THAT(with("0.5966").text,
+              HasSubstr(task_ + ":19: task.between: the robot moves by up to 1.194 m in one step of 0.15 s"));
+  EXPECT_EQ(with("0.5966").code, 1);
+  WriteTask("  between: samples\n", "  between: {acceleration: [5, 5]}\n");
+  scratch_.Write("task.yaml", Replaced(Read(task_), "radius: 0.8", "radius: 0.1"));
+  EXPECT_EQ(Check().code, 0);
+}
+
+TEST_F(CheckTest, Goals) {
+  const auto with = [&](const std::string& goal) {
+    WriteTask("  between: samples\n", "  between: samples\nplanner: {goal: " + goal + ", goal_radius: 0.5}\n");
+    return Check();
+  };
+  EXPECT_EQ(with("[20, -20]").code, 0) << with("[20, -20]").text;
+  EXPECT_THAT(with("[20.1, 0]").text, HasSubstr(task_ + ":20: planner.goal: px: 20.1 is outside [-20, 20]"));
+  EXPECT_EQ(with("[20.1, 0]").code, 1);
+  EXPECT_EQ(with("[3.29, 2]").code, 1) << "0.8 - 0.29 > 0.5: no point of the goal is free";
+  EXPECT_EQ(with("[3.31, 2]").code, 0);
+}
+
+TEST_F(CheckTest, Rest) {
+  const auto with = [&](const std::string& bound) {
+    WriteTask("  between: samples\n", "  between: samples\n  rest: {vx: " + bound + "}\n");
+    return Check();
+  };
+  EXPECT_EQ(with("0.099").code, 1);
+  EXPECT_THAT(with("0.099").text, HasSubstr(task_ + ":20: task.rest: vx is known only up to"));
+  EXPECT_EQ(with("5").code, 0) << with("5").text;
+}
+
+// The table is that of `certify` where there are no obstacles.
+TEST_F(CheckTest, WidthsAreThoseOfTheTube) {
+  WriteTask("obstacles: [{circle: {center: [3, 2], radius: 0.8}}]", "obstacles: []");
+  const std::string plan = scratch_.Write("plan.csv", "ax,ay\n1,0\n0,-1\n0,0\n");
+  const Json check = Json::parse(Check("--json --plan " + plan).text);
+  const Json certify = Json::parse(Forereach("certify --json --config " + task_ + " --plan " + plan).text);
+  ASSERT_EQ(check["half_widths"].size(), 4u);
+  for (std::size_t t = 0; t < 4; ++t) EXPECT_EQ(check["half_widths"][t], certify["tube"][t]["half_width"]) << t;
+  EXPECT_EQ(check["tube"], certify["message"]);
+}
+
+// Of a plan that somebody gives, the whole tube counts.
+TEST_F(CheckTest, APlanThatLeavesTheDomain) {
+  WriteTask();
+  std::string controls = "ax,ay\n";
+  for (int t = 0; t < 15; ++t) controls += "2,0\n";
+  const Output output = Check("--plan " + scratch_.Write("plan.csv", controls));
+  EXPECT_EQ(output.code, 1);
+  EXPECT_THAT(output.text,
+              AllOf(HasSubstr("domain.state.upper: the tube of " + (scratch_ / "plan.csv")), HasSubstr("vx reaches")));
+  EXPECT_THAT(output.text, HasSubstr("remark: vx: at step ")) << "the data end at 2 m/s";
+}
+
+TEST_F(CheckTest, BadInputIsRefused) {
+  WriteTask("dt: 0.15", "dt: -1");
+  EXPECT_EQ(Check().code, 2);
+  WriteTask("", "", "px\n1\n");
+  EXPECT_EQ(Check().code, 2);
+  WriteTask();
+  EXPECT_EQ(Check("--steps 129").code, 2);
+  EXPECT_EQ(Check("--plan none.csv").code, 2);
+  EXPECT_EQ(Check("--picture " + (scratch_ / "none/a.svg")).code, 2);
+  EXPECT_EQ(Forereach("check 2>/dev/null").code, 2);
+}
+
+TEST_F(CheckTest, DrawsWhatItSaw) {
+  WriteTask();
+  EXPECT_EQ(Check("--picture " + (scratch_ / "a.svg")).code, 0);
+  EXPECT_THAT(Read(scratch_ / "a.svg"), HasSubstr("<svg"));
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,95 @@
+// Fits: what made the transitions is found again, and what they do not show is said.
+#include "identify/fit.h"
+
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/dynamics/text_model.h"
+#include "certifier/numerics/size.h"
+#include "tests/identify/seed.h"
+
+namespace forereach {
+namespace {
+
+// A pendulum with damping: rates, by Runge and Kutta.
+ModelText Pendulum(double length, double damping, double unused = 1) {
+  ModelText text;
+  text.name = "pendulum";
+  text.states = {{"angle", "rad"}, {"rate", "rad/s"}};
+  text.inputs = {{"torque", "N m"}};
+  text.parameters = {
+      {"dt", 0.05, 0.05}, {"length", length, length}, {"damping", damping, damping}, {"unused", unused, unused}};
+  text.equations = {{"rate", 1, 1}, {"torque - 9.81/length*sin(angle) - damping*rate + 0*unused", 2, 1}};
+  text.integrator = ModelText::Integrator::kRk4;
+  return text;
+}
+
+Transitions Drive(const ModelText& truth, unsigned seed, double noise) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto model = MakeTextModel(truth);
+  Transitions data{Eigen::MatrixXd(300, 3), Eigen::MatrixXd(300, 2)};
+  for (Eigen::Index i = 0; i < 300; ++i) {
+    Eigen::Vector3d z(2 * uniform(random), 3 * uniform(random), uniform(random));
+    Eigen::Vector2d next;
+    model->Evaluate({z.data(), 3}, {next.data(), 2});
+    data.z.row(i) = z;
+    data.x_next.row(i) = next.transpose() + noise * Eigen::RowVector2d(uniform(random), uniform(random));
+  }
+  return data;
+}
+
+TEST(Fit, FindsTheParametersThatMadeTheTransitions) {
+  const unsigned first = SeedOf(1);
+  for (unsigned trial = 0; trial < 5; ++trial) {
+    SCOPED_TRACE("seed " + std::to_string(first + trial));
+    const double length = 0.6 + 0.2 * trial, damping = 0.1 * trial;
+    const Transitions data = Drive(Pendulum(length, damping), first + trial, 0);
+    const Fit fit = FitParameters(Pendulum(1, 0), data, {"length", "damping"});
+    EXPECT_TRUE(fit.converged);
+    EXPECT_EQ(fit.parameters[0].before, 1);
+    EXPECT_NEAR(fit.parameters[0].after, length, 1e-7);
+    EXPECT_NEAR(fit.parameters[1].after, damping, 1e-7);
+    EXPECT_LT(fit.after.cwiseAbs().maxCoeff(), 1e-8);
+  }
+}
+
+TEST(Fit, WithNoiseIsWithinSomeStandardErrors) {
+  const unsigned first = SeedOf(1);
+  for (unsigned trial = 0; trial < 5; ++trial) {
+    SCOPED_TRACE("seed " + std::to_string(first + trial));
+    const Transitions data = Drive(Pendulum(0.8, 0.3), first + trial, 0.01);
+    const Fit fit = FitParameters(Pendulum(1, 0.1), data, {"length", "damping"});
+    const double truth[] = {0.8, 0.3};
+    for (std::size_t p = 0; p < 2; ++p) {
+      EXPECT_GT(fit.parameters[p].deviation, 0);
+      EXPECT_LT(std::abs(fit.parameters[p].after - truth[p]), 6 * fit.parameters[p].deviation);
+    }
+    EXPECT_LT(fit.after.squaredNorm(), fit.before.squaredNorm());
+  }
+}
+
+TEST(Fit, LeavesTheOthersAndSaysWhatIsNotDetermined) {
+  const Transitions data = Drive(Pendulum(0.8, 0.3), SeedOf(3), 0.01);
+  const Fit one = FitParameters(Pendulum(0.8, 0), data, {"damping"});
+  ASSERT_EQ(one.parameters.size(), 1u);
+  EXPECT_NEAR(one.parameters[0].after, 0.3, 0.05);
+  const Fit with = FitParameters(Pendulum(0.8, 0), data, {"damping", "unused"});
+  EXPECT_EQ(with.parameters[1].deviation, kInfinity);
+  EXPECT_EQ(with.parameters[1].after, 1);
+}
+
+TEST(Fit, RefusesWhatItCannotFit) {
+  const Transitions data = Drive(Pendulum(0.8, 0.3), SeedOf(3), 0);
+  for (const auto& names : std::vector<std::vector<std::string>>{{}, {"dt"}, {"mass"}, {"length", "length"}})
+    EXPECT_THROW((void)FitParameters(Pendulum(1, 0), data, names), std::invalid_argument);
+  EXPECT_THROW((void)FitParameters(Pendulum(0, 0), data, {"length"}), std::invalid_argument) << "a division by zero";
+  const Transitions none{Eigen::MatrixXd(0, 3), Eigen::MatrixXd(0, 2)};
+  EXPECT_THROW((void)FitParameters(Pendulum(1, 0), none, {"length"}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,118 @@
+// Logs as they come: what is read of them, what is left out, and what is refused.
+#include "identify/log_table.h"
+
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "certifier/task/config_error.h"
+#include "tests/identify/seed.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class LogTableTest : public testing::Test {
+ protected:
+  LogTable Table(const std::string& text, const LogFormat& format = {}) {
+    return ReadLog(files_.Write("log.csv", text), {"t", "pos x"}, format);
+  }
+  std::string Error(const std::string& text, const LogFormat& format = {}) {
+    try {
+      (void)Table(text, format);
+      return {};
+    } catch (const ConfigError& error) {
+      return std::string(error.what()).substr((files_ / "").size());
+    }
+  }
+  ScratchDirectory files_;
+};
+
+TEST_F(LogTableTest, ColumnsAreFoundByNameAndTheOthersMayHoldAnything) {
+  for (const char* text : {"t,pos x,mode\n1,2,auto\n3,-4,\"a,b\"\n", "mode;\"pos x\";t\nauto;2;1\n\"a;\"\"b\";-4;3",
+                           "t\tpos x\n1\t2\n3\t-4\n", " t , pos x \r\n1, 2 \r\n\r\n3 ,-4\r\n",
+                           "\xef\xbb\xbf# a comment\n\nt,pos x\n1,2\n  # another\n3,-4\n"}) {
+    const LogTable table = Table(text);
+    ASSERT_EQ(table.values.rows(), 2) << text;
+    EXPECT_EQ(table.values, (Eigen::Matrix2d() << 1, 2, 3, -4).finished()) << text;
+    EXPECT_EQ(table.lost.count, 0);
+  }
+}
+
+TEST_F(LogTableTest, LinesAreCountedAsAnEditorCountsThem) {
+  const LogTable table = Table("# made by hand\nt,pos x,note\n\n1,2,\"two\nlines\"\n# here\n\n3,4,one\n");
+  EXPECT_THAT(table.lines, ElementsAre(4, 8));
+  EXPECT_EQ(table.blank.count, 2);
+  EXPECT_EQ(table.blank.first_line, 3);
+  EXPECT_EQ(table.comments.count, 2);
+  EXPECT_EQ(table.comments.first_line, 1);
+}
+
+TEST_F(LogTableTest, AFieldThatIsNoNumberIsNanAndCounted) {
+  const LogTable table = Table("t,pos x\n1,2\n2,nan\n3,\n4,inf\n5,1.5m\n6,1e999\n7,0x10\n8,\"7\"\n9,1 2\n");
+  ASSERT_EQ(table.values.rows(), 9);
+  EXPECT_EQ(table.not_a_number[0].count, 0);
+  EXPECT_EQ(table.not_a_number[1].count, 7);
+  EXPECT_EQ(table.not_a_number[1].first_line, 3);
+  EXPECT_EQ(table.not_a_number[1].first, "nan");
+  for (const int row : {1, 2, 3, 4, 5, 6, 8}) EXPECT_TRUE(std::isnan(table.values(row, 1))) << row;
+  EXPECT_EQ(table.values(7, 1), 7) << "quotes do not make it less of a number";
+}
+
+TEST_F(LogTableTest, ARowWithOtherFieldsThanTheHeaderIsLostAndSaid) {
+  const LogTable table = Table("t,pos x\n1,2\n2\n3,4\n4,5,6\n5,\"a\"b\n6,7\n7,8");
+  EXPECT_THAT(table.lines, ElementsAre(2, 4, 7, 8));
+  EXPECT_EQ(table.lost.count, 3);
+  EXPECT_EQ(table.lost.first_line, 3);
+  EXPECT_EQ(table.lost.first, "1 fields, the header has 2");
+  EXPECT_THAT(table.after_loss, ElementsAre(false, true, true, false));
+}
+
+TEST_F(LogTableTest, WhatIsNotClearIsRefused) {
+  EXPECT_EQ(Error("t,pos y\n1,2\n"), "log.csv:1: no column 'pos x'; did you mean pos y?");
+  EXPECT_EQ(Error("\n1,2\n3,4\n"),
+            "log.csv:2: this line has numbers only, so no column has a name; give the names of the columns");
+  EXPECT_EQ(Error("t,t,pos x\n"), "log.csv:1: 2 columns are named 't'");
+  EXPECT_EQ(Error("t;pos x,y\n"), "log.csv:1: the fields may be separated by ; or by ,; say which it is");
+  EXPECT_EQ(Error("t,pos x\n1,\"2\n3,4\n"), "log.csv:2: a quoted field begins in this row and does not end");
+  EXPECT_THAT(Error(""), HasSubstr("no line that names the columns"));
+  EXPECT_THAT(Error("# t,pos x\n"), HasSubstr("no line that names the columns"));
+  std::string text = "t,pos x\n";
+  text.append(2 << 20, '1');
+  EXPECT_THAT(Error(text), HasSubstr("log.csv:2: longer than 1048576 bytes"));
+}
+
+TEST_F(LogTableTest, ItsFormatMayBeSaid) {
+  EXPECT_EQ(Table("1,2\n3,4\n", {.delimiter = {}, .comment = "#", .header = {"t", "pos x"}}).values.rows(), 2);
+  EXPECT_EQ(Table("% x\nt;pos x\n1;2\n", {.delimiter = ';', .comment = "%", .header = {}}).values.rows(), 1);
+  EXPECT_EQ(Table("t,pos x\n#,2\n", {.delimiter = {}, .comment = "", .header = {}}).not_a_number[0].count, 1);
+  EXPECT_THAT(Error("t;pos x,y\n1;2\n", {.delimiter = ',', .comment = "#", .header = {}}),
+              HasSubstr("log.csv:1: no column 't'"));
+}
+
+// Any bytes give a table or an error, and a table has as many numbers as it says.
+TEST_F(LogTableTest, AnyBytesAreReadOrRefused) {
+  const unsigned seed = SeedOf(1);
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  const std::string letters = "t,pos x\n\n\"\"12.;e#\r\t\x01\xff";
+  for (int trial = 0; trial < 300; ++trial) {
+    std::string text = "t,pos x\n";
+    for (auto size = random() % 60; size > 0; --size) text += letters[random() % letters.size()];
+    try {
+      const LogTable table = Table(text);
+      ASSERT_EQ(table.values.rows(), std::ssize(table.lines));
+      ASSERT_EQ(table.after_loss.size(), table.lines.size());
+      ASSERT_TRUE(std::ranges::is_sorted(table.lines)) << text;
+    } catch (const ConfigError&) {
+    }
+  }
+}
+
+}  // namespace
+}  // namespace forereach
