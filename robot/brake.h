@@ -11,6 +11,8 @@ exactly like this; a robot with a brake that is at least as strong may link it f
 #include <utility>
 #include <vector>
 
+#include "certifier/numerics/compilation.h"
+
 namespace forereach {
 
 class Brake final {

@@ -154,6 +154,13 @@ std::string NameArray(const std::string& type, const char* member, const List& l
          Joined(list, [](const auto& named) { return Quoted(named); }) + "};\n";
 }
 
+// Units and paths are anybody's text, and end no comment.
+std::string InComment(std::string text) {
+  std::ranges::replace_if(text, [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+  for (std::size_t end = 0; (end = text.find("*/", end)) != std::string::npos;) text.insert(end + 1, " ");
+  return text;
+}
+
 std::string UnitsOf(const std::vector<ModelText::Variable>& variables) {
   return Joined(variables, [](const ModelText::Variable& variable) { return variable.name + " " + variable.unit; });
 }
@@ -195,7 +202,8 @@ std::string EquationsHeader(const ModelText& text, const std::string& name, cons
                       " operations, more than the " + std::to_string(kMostCompiled) +
                       " that compilers finish with in a minute");
   const std::string parameters = std::to_string(text.parameters.size());
-  return "/** " + origin + "\n\nStates: " + UnitsOf(text.states) + ". Inputs: " + UnitsOf(text.inputs) + ". */\n" +
+  return "/** " + InComment(origin) + "\n\nStates: " + InComment(UnitsOf(text.states)) +
+         ". Inputs: " + InComment(UnitsOf(text.inputs)) + ". */\n" +
          "#pragma once\n\n#include <algorithm>\n#include <array>\n#include <cmath>\n#include <span>\n\n"
          "#include \"certifier/numerics/compilation.h\"\n\n"
          "struct " +

@@ -21,6 +21,7 @@ namespace forereach {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 // Every operation that a nominal model may have, names that are words of C++, and a definition that nothing uses.
 ModelText EveryOperation() {
@@ -51,6 +52,16 @@ TEST(EquationsHeader, IsTheOneThatIsCompiledHere) {
   const std::string path = FOREREACH_SOURCE_DIR "/tests/unit/exported_model.inc";
   if (header != File(path)) std::ofstream("exported_model.inc") << header;
   EXPECT_EQ(header, File(path)) << "the new one is exported_model.inc in the working directory";
+}
+
+// A unit is any text, and what a task says does not become code.
+TEST(EquationsHeader, UnitsAndOriginEndNoComment) {
+  ModelText text = EveryOperation();
+  text.states[0].unit = "m**//\n#error */";
+  const std::string header = EquationsHeader(text, "robot", "robot.yaml */\rint x; /*/");
+  EXPECT_EQ(header.find("*/"), header.find(". */\n#pragma once") + 2);
+  EXPECT_THAT(header, Not(HasSubstr("\n#error")));
+  EXPECT_THAT(header, Not(HasSubstr("\r")));
 }
 
 TEST(EquationsHeader, HasTheProgramOfTheText) {
