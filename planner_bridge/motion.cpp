@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "certifier/dynamics/kinematic_bicycle.h"
+#include "certifier/dynamics/models.h"
 #include "certifier/dynamics/point_mass.h"
 #include "certifier/numerics/size.h"
 
@@ -24,11 +25,6 @@ constexpr double kShareOfBound = 0.95;
 double Reach(const Box& box, int k) { return std::min(-box.lower()(k), box.upper()(k)); }
 
 constexpr double kStandstill = 1e-3;  // m/s
-
-double StepOf(const NominalModel& model) {
-  const auto& names = model.parameter_names();
-  return model.parameters()[ToSize(std::ranges::find(names, "dt") - names.begin())];
-}
 
 /** Driving and braking by the laws of the task. */
 class LawMotion final : public RobotMotion {

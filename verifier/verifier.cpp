@@ -26,11 +26,7 @@ TaskFunctions FunctionsOf(const Problem& problem) {
   std::vector<ExpressionText> limits;
   for (const Limit& limit : problem.limits) limits.push_back(limit.that);
   TaskFunctions functions{Functions(*problem.model, limits), {}};
-  for (const BodyPart& part : problem.body.parts) {
-    std::vector<ExpressionText> coordinates;
-    for (const auto& place : part.places) coordinates.insert(coordinates.end(), place.begin(), place.end());
-    functions.places.emplace_back(*problem.model, coordinates);
-  }
+  for (const BodyPart& part : problem.body.parts) functions.places.emplace_back(*problem.model, part.Coordinates());
   return functions;
 }
 

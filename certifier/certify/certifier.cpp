@@ -25,9 +25,7 @@ void RequireSameAfterTurns(const Problem& problem) {
                 "projection: depends on " + model.state_names()[ToSize(angle)] +
                     ", which is an angle: how often it has turned is not known");
   if (model.angles().empty() || !problem.body.HasPlaces()) return;
-  std::vector<ExpressionText> all;
-  for (const BodyPart& part : problem.body.parts)
-    for (const std::vector<ExpressionText>& place : part.places) all.insert(all.end(), place.begin(), place.end());
+  const std::vector<ExpressionText> all = problem.body.Coordinates();
   const ProgramDraft program = MakeProgram(NamesOf(model), all);
   for (std::size_t i = 0; i < all.size(); ++i)
     for (const int angle : model.angles())

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "certifier/dynamics/angles.h"
-#include "certifier/dynamics/text_program.h"
+#include "certifier/dynamics/text_enclosure.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
@@ -41,13 +41,13 @@ std::optional<TextEnclosure> FunctionsOf(const Problem& problem) {
   std::vector<ExpressionText> expressions;
   for (const Limit& limit : problem.limits) expressions.push_back(limit.that);
   const NominalModel& model = *problem.model;
-  const ProgramDraft program = MakeProgram(NamesOf(model), expressions);
+  TextEnclosure functions(NamesOf(model), expressions);
   for (std::size_t i = 0; i < problem.limits.size(); ++i)
     for (const int angle : model.angles())
-      Require(IsSameAfterTurn(program.View(), static_cast<int>(i), angle),
+      Require(IsSameAfterTurn(functions.program(), static_cast<int>(i), angle),
               problem.limits[i].name + " is not seen to be the same after a turn of the angle " +
                   model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
-  return TextEnclosure(NamesOf(model), expressions);
+  return functions;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "certifier/dynamics/expression.h"
+#include "certifier/dynamics/stages.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -156,7 +157,8 @@ std::string NameArray(const std::string& type, const char* member, const List& l
 
 // Units and paths are anybody's text, and end no comment.
 std::string InComment(std::string text) {
-  std::ranges::replace_if(text, [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
   for (std::size_t end = 0; (end = text.find("*/", end)) != std::string::npos;) text.insert(end + 1, " ");
   return text;
 }
@@ -166,7 +168,7 @@ std::string UnitsOf(const std::vector<ModelText::Variable>& variables) {
 }
 
 void RequireGain(const ModelText& text) {
-  if (text.integrator == ModelText::Integrator::kMidpoint || text.integrator == ModelText::Integrator::kRk4)
+  if (HasStages(text.integrator))
     throw ExportError(
         text.file +
         ": model.integrator: midpoint and rk4 are bounded stage by stage, which compiled code of the whole step "

@@ -1,11 +1,14 @@
 #include "certifier/dynamics/models.h"
 
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
 #include "certifier/dynamics/equations_model.h"
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/point_mass.h"
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 
 namespace forereach {
@@ -27,6 +30,11 @@ std::shared_ptr<const NominalModel> MakeKinematicBicycle(double dt, double wheel
   RequirePositive("dt", dt);
   RequirePositive("wheelbase", wheelbase);
   return std::make_shared<EquationsModel<KinematicBicycle>>(KinematicBicycle{dt, wheelbase}, std::move(angles));
+}
+
+double StepOf(const NominalModel& model) {
+  const auto dt = std::ranges::find(model.parameter_names(), "dt") - model.parameter_names().begin();
+  return dt < std::ssize(model.parameters()) ? model.parameters()[ToSize(dt)] : 0;
 }
 
 std::vector<ExpressionText> RatesOf(const NominalModel& model) {

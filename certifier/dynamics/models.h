@@ -17,6 +17,9 @@ angles, by their indices, ascending: none, or theta.
 [[nodiscard]] std::shared_ptr<const NominalModel> MakeKinematicBicycle(double dt, double wheelbase,
                                                                        std::vector<int> angles = {});
 
+/** The step of a model in s: its parameter dt, which every model of a task has. 0 if it has none. */
+[[nodiscard]] double StepOf(const NominalModel& model);
+
 /** The equations of a model in continuous time, one for each state: those of its text, or of the two models above.
 Empty if the text says what the next state is. */
 [[nodiscard]] std::vector<ExpressionText> RatesOf(const NominalModel& model);

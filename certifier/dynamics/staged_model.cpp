@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "certifier/dynamics/evaluate.h"
+#include "certifier/dynamics/stages.h"
 #include "certifier/numerics/instruction_set.h"
 #include "certifier/numerics/lanes.h"
 #include "certifier/numerics/size.h"
@@ -18,32 +19,6 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 namespace {
-
-// A part of the step: dt / `divisor`, or nothing if that is 0.
-struct Part {
-  int divisor;
-
-  [[nodiscard]] bool is_nothing() const { return divisor == 0; }
-  template <class T>
-  [[nodiscard]] T Of(double dt) const {
-    return is_nothing() ? T(0) : T(dt) / T(divisor);
-  }
-};
-
-// One evaluation of the rates: at x + before k, k that of the evaluation before. Its own k counts with `weight`.
-struct Evaluation {
-  Part before, weight;
-};
-
-std::vector<Evaluation> EvaluationsOf(ModelText::Integrator integrator) {
-  switch (integrator) {
-    case ModelText::Integrator::kMidpoint: return {{{0}, {0}}, {{2}, {1}}};
-    case ModelText::Integrator::kRk4: return {{{0}, {6}}, {{2}, {3}}, {{2}, {3}}, {{1}, {6}}};
-    case ModelText::Integrator::kNone:
-    case ModelText::Integrator::kEuler: break;
-  }
-  throw std::invalid_argument("a model with stages needs the integrator midpoint or rk4");
-}
 
 // ---- Rows of numbers c +- r, in plain arithmetic: the radius counts what rounding took.
 
@@ -96,6 +71,7 @@ class StagedModel::Stages final {
  public:
   Stages(std::shared_ptr<const ProgramDraft> rates, ModelText::Integrator integrator, double dt)
       : draft_(std::move(rates)), rates_(draft_->View()), evaluations_(EvaluationsOf(integrator)), dt_(dt) {
+    if (!HasStages(integrator)) throw std::invalid_argument("a model with stages needs the integrator midpoint or rk4");
     Mark();
     for (int l = 0; l < rates_.variables; ++l) all_columns_.push_back(l);
     for (const Program::First& entry : rates_.jacobian)
@@ -133,7 +109,7 @@ class StagedModel::Stages final {
     std::array<long double, kMaxStates> k{}, sum{};
     std::ranges::copy(z, at.begin());
     const std::span values(FOREREACH_ON_STACK(long double, rates_.size), ToSize(rates_.size));
-    for (const Evaluation& evaluation : evaluations_) {
+    for (const StageEvaluation& evaluation : evaluations_) {
       const auto before = evaluation.before.Of<long double>(dt_), weight = evaluation.weight.Of<long double>(dt_);
       for (std::size_t j = 0; j < n; ++j) at[j] = z[j] + before * k[j];
       forereach::Evaluate<long double>(rates_, values_needed_, parameters, {at.data(), z.size()}, values);
@@ -298,7 +274,7 @@ class StagedModel::Stages final {
   }
 
   // to = a + part b; nothing to do without a part.
-  FOREREACH_INLINE void AddScaled(const Numbers& a, const Numbers& b, const Part& part, const Extent& extent,
+  FOREREACH_INLINE void AddScaled(const Numbers& a, const Numbers& b, const StepPart& part, const Extent& extent,
                                   Numbers& to) const noexcept {
     if (part.is_nothing()) return;
     const auto factor = part.Of<Interval>(dt_);
@@ -413,7 +389,7 @@ class StagedModel::Stages final {
 
   std::shared_ptr<const ProgramDraft> draft_;
   Program rates_;
-  std::vector<Evaluation> evaluations_;
+  std::vector<StageEvaluation> evaluations_;
   double dt_;
   std::vector<unsigned char> values_needed_, first_needed_, all_needed_;
   std::vector<int> all_columns_, bent_;  // bent_: the states on which the rates depend

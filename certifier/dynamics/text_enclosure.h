@@ -31,6 +31,8 @@ class TextEnclosure final {
   /** @throws as MakeProgram; std::invalid_argument also for an expression that has no derivatives. */
   TextEnclosure(const ExpressionNames& names, std::span<const ExpressionText> expressions);
 
+  /** The values, in the order of the expressions, and their derivatives. */
+  [[nodiscard]] Program program() const { return program_->View(); }
   [[nodiscard]] int num_values() const { return static_cast<int>(uses_input_.size()); }
   /** Whether expression k names an input, itself or through a definition. */
   [[nodiscard]] bool UsesInput(int k) const { return uses_input_[ToSize(k)]; }

@@ -9,6 +9,7 @@
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/program_model.h"
 #include "certifier/dynamics/staged_model.h"
+#include "certifier/dynamics/stages.h"
 #include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -59,10 +60,8 @@ std::vector<int> AnglesOf(const ModelText& text, const Program& program) {
     angles.push_back(static_cast<int>(state - text.states.begin()));
   }
   std::ranges::sort(angles);
-  using Integrator = ModelText::Integrator;
-  const bool has_stages = text.integrator == Integrator::kMidpoint || text.integrator == Integrator::kRk4;
   try {
-    RequireAngles(program, angles, NamesIn(text.states), has_stages);
+    RequireAngles(program, angles, NamesIn(text.states), HasStages(text.integrator));
   } catch (const std::invalid_argument& error) {
     Refuse(text, error.what());
   }
@@ -72,7 +71,6 @@ std::vector<int> AnglesOf(const ModelText& text, const Program& program) {
 }  // namespace
 
 std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text) {
-  using Integrator = ModelText::Integrator;
   const std::size_t states = text.states.size();
   RequireCount(text, "states", states, 1, kMaxStates);
   RequireCount(text, "inputs", text.inputs.size(), 0, kMaxInputs);
@@ -82,7 +80,7 @@ std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text) {
 
   const ExpressionNames names{NamesIn(text.states), NamesIn(text.inputs), text.parameters, text.definitions};
   const auto program = std::make_shared<ProgramDraft>(MakeProgram(names, text.equations));
-  if (text.integrator == Integrator::kEuler) AddEulerStep(text, *program);
+  if (text.integrator == ModelText::Integrator::kEuler) AddEulerStep(text, *program);
   program->Differentiate();
 
   // No compiled model has such a name: what is known of those by their names is not known of this one.
@@ -95,7 +93,7 @@ std::shared_ptr<const NominalModel> MakeTextModel(const ModelText& text) {
   std::vector<Interval> parameters;
   for (const ModelText::Parameter& parameter : text.parameters)
     parameters.emplace_back(parameter.lower, parameter.upper);
-  if (text.integrator == Integrator::kNone || text.integrator == Integrator::kEuler)
+  if (!HasStages(text.integrator))
     return std::make_shared<ProgramModel>(program, std::move(parameters), std::move(all));
   return std::make_shared<StagedModel>(program, dt, std::move(parameters), std::move(all));
 }

@@ -5,6 +5,8 @@
 #include <string_view>
 
 #include "certifier/dynamics/expression.h"
+#include "certifier/dynamics/models.h"
+#include "certifier/dynamics/stages.h"
 #include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/elementary.h"
 #include "certifier/numerics/size.h"
@@ -13,7 +15,6 @@ namespace forereach {
 namespace {
 
 using Kind = Expression::Kind;
-using Integrator = ModelText::Integrator;
 
 // A range, the states on which it depends, and the first operation of it that is not bounded.
 struct Value {
@@ -131,32 +132,15 @@ std::optional<Unbounded> CauseIn(const std::vector<Value>& equations, int state)
   return found == equations.end() ? std::nullopt : found->cause;
 }
 
-// Where in a step the rates are evaluated: at x + part of dt times the rates before.
-std::vector<double> PartsOf(Integrator integrator) {
-  switch (integrator) {
-    case Integrator::kNone:
-    case Integrator::kEuler: break;
-    case Integrator::kMidpoint: return {0, 0.5};
-    case Integrator::kRk4: return {0, 0.5, 0.5, 1};
-  }
-  return {0};
-}
-
-Interval StepOf(const NominalModel& model) {
-  const auto& names = model.parameter_names();
-  const auto dt = std::ranges::find(names, "dt");
-  return dt == names.end() ? Interval(0) : model.parameter_ranges()[ToSize(dt - names.begin())];
-}
-
 }  // namespace
 
 std::optional<Unbounded> FindUnbounded(const NominalModel& model, std::span<const Interval> box, int state) {
   if (model.text() == nullptr || state < 0 || state >= model.num_states()) return std::nullopt;
   std::vector<Interval> argument(box.begin(), box.end());
   std::vector<Value> rates;
-  for (const double part : PartsOf(model.text()->integrator)) {
+  for (const StageEvaluation& evaluation : EvaluationsOf(model.text()->integrator)) {
     for (std::size_t k = 0; k < rates.size(); ++k)
-      argument[k] = box[k] + Interval(part) * StepOf(model) * rates[k].range;
+      argument[k] = box[k] + evaluation.before.Of<Interval>(StepOf(model)) * rates[k].range;
     rates = Equations(model, argument);
     if (const auto cause = CauseIn(rates, state)) return cause;
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "certifier/dynamics/model_text.h"
@@ -19,6 +20,12 @@ struct BodyPart {
   std::vector<std::vector<ExpressionText>> places = {};
 
   [[nodiscard]] int num_points() const { return static_cast<int>(places.empty() ? points.size() : places.size()); }
+  /** All coordinates of all places, one after the other. */
+  [[nodiscard]] std::vector<ExpressionText> Coordinates() const {
+    std::vector<ExpressionText> all;
+    for (const auto& place : places) all.insert(all.end(), place.begin(), place.end());
+    return all;
+  }
 
   friend bool operator==(const BodyPart&, const BodyPart&) = default;
 };
@@ -33,6 +40,12 @@ struct Body {
 
   [[nodiscard]] bool HasPlaces() const {
     return std::ranges::any_of(parts, [](const BodyPart& part) { return !part.places.empty(); });
+  }
+  /** The coordinates of all parts, one part after the other. */
+  [[nodiscard]] std::vector<ExpressionText> Coordinates() const {
+    std::vector<ExpressionText> all;
+    for (const BodyPart& part : parts) std::ranges::move(part.Coordinates(), std::back_inserter(all));
+    return all;
   }
 
   friend bool operator==(const Body&, const Body&) = default;

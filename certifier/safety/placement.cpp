@@ -48,12 +48,9 @@ void Validate(const Body& body, int dim, int num_states) {
           "body: " + std::to_string(points) + " points, must be at most " + std::to_string(kMaxBodyPoints));
 }
 
-// Of all parts, one after the other.
 std::optional<TextEnclosure> ExpressionsOf(const Body& body, const ExpressionNames& names) {
   if (!body.HasPlaces()) return std::nullopt;
-  std::vector<ExpressionText> all;
-  for (const BodyPart& part : body.parts)
-    for (const auto& place : part.places) all.insert(all.end(), place.begin(), place.end());
+  const std::vector<ExpressionText> all = body.Coordinates();
   TextEnclosure expressions(names, all);
   for (int i = 0; i < expressions.num_values(); ++i)
     Require(!expressions.UsesInput(i), "body: the place " + all[ToSize(i)].text + " uses an input");
@@ -158,7 +155,7 @@ Placement::Placement(const Eigen::MatrixXd& projection, const Body& body, const 
     }
   }
   Require(reach_ < kInfinity, "body: its size is not finite");
-  Require(!has_frame_ || !projection_.entries().empty(), "projection: must be finite and not zero");
+  Require(!has_frame_ || !projection_.entries().empty(), "projection: is zero");
 }
 
 void Placement::EncloseHull(const Zonotope& slice, std::span<const double> half_width, Hull& hull) const noexcept {

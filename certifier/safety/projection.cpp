@@ -13,7 +13,7 @@ Projection::Projection(const Eigen::MatrixXd& matrix, int num_states) : dim_(sta
   if (dim_ < 1 || dim_ > kMaxSafetyDim || matrix.cols() != num_states)
     throw std::invalid_argument("projection: " + std::to_string(matrix.rows()) + "-by-" +
                                 std::to_string(matrix.cols()) + ", must be 1, 2 or 3 by " + std::to_string(num_states));
-  if (!matrix.allFinite()) throw std::invalid_argument("projection: must be finite and not zero");
+  if (!matrix.allFinite()) throw std::invalid_argument("projection: must be finite");
   for (int k = 0; k < dim_; ++k)
     for (int l = 0; l < num_states; ++l)
       if (matrix(k, l) != 0) entries_.push_back({k, l, Interval(matrix(k, l))});

@@ -226,11 +226,6 @@ std::shared_ptr<const NominalModel> ReadTextModel(const Document& file, TaskDraf
   return MakeFromText(text);
 }
 
-double StepOf(const NominalModel& model) {
-  const auto& names = model.parameter_names();
-  return model.parameters()[ToSize(std::ranges::find(names, kStepName) - names.begin())];
-}
-
 void ReadModel(const Document& file, const std::string& key, TaskDraft& draft) {
   const bool has_kind = Has(file, key, "name") || Has(file, key, "file") || Has(file, key, "states");
   if (!has_kind) file.Fail(key, "has no model: write name, file, or states with their equations");

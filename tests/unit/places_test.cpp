@@ -162,7 +162,7 @@ TEST_F(Places, ThatAreNoneAreRefused) {
   refused(At({{"q1", "u1"}}, 0), "the place u1 uses an input");
   refused(At({{"q1", "q3"}}, 0), "q3");
   refused(At({{"q1", "q2"}}, -1), "radius -1");
-  refused({}, "projection: must be finite and not zero");
+  refused({}, "projection: is zero");
   refused(At(std::vector<std::vector<std::string>>(17, {"q1", "q2"}), 0), "17 points, must be at most 16");
 }
 
