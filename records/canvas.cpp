@@ -42,4 +42,18 @@ void DrawFile(const std::string& path, int width, int height, const std::functio
   Check(cairo_surface_status(surface.get()), path);
 }
 
+void BeginDrawing(cairo_t* cairo) {
+  cairo_set_source_rgb(cairo, 1, 1, 1);
+  cairo_paint(cairo);
+  cairo_select_font_face(cairo, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+}
+
+void WriteText(cairo_t* cairo, const std::string& text, double x, double y, double size) {
+  cairo_set_source_rgb(cairo, 0.13, 0.13, 0.15);
+  cairo_set_font_size(cairo, size);
+  cairo_move_to(cairo, x, y);
+  cairo_show_text(cairo, text.c_str());
+  cairo_new_path(cairo);
+}
+
 }  // namespace forereach

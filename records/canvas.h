@@ -13,4 +13,10 @@ namespace forereach {
 @throws PictureError (picture.h) for another ending or size, or if the file cannot be written. */
 void DrawFile(const std::string& path, int width, int height, const std::function<void(_cairo*)>& draw);
 
+/** Begins a drawing: white, and the font of all. */
+void BeginDrawing(_cairo* cairo);
+
+/** In dark ink, from the point (x, y) of its base line on. @param size pixels. */
+void WriteText(_cairo* cairo, const std::string& text, double x, double y, double size);
+
 }  // namespace forereach

@@ -28,9 +28,7 @@ class ChartPainter {
       : cairo_(cairo), chart_(chart), width_(width), height_(height) {}
 
   void Paint() {
-    cairo_set_source_rgb(cairo_, 1, 1, 1);
-    cairo_paint(cairo_);
-    cairo_select_font_face(cairo_, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    BeginDrawing(cairo_);
     Write(chart_.title, kLeft, 34, 18);
     PaintAxes();
     for (std::size_t s = 0; s < chart_.series.size(); ++s) PaintSeries(s);
@@ -44,13 +42,7 @@ class ChartPainter {
   }
   double Y(double percent) const { return height_ - kBottom - (height_ - kTop - kBottom) * percent / 100; }
 
-  void Write(const std::string& text, double x, double y, double size) {
-    cairo_set_source_rgb(cairo_, 0.13, 0.13, 0.15);
-    cairo_set_font_size(cairo_, size);
-    cairo_move_to(cairo_, x, y);
-    cairo_show_text(cairo_, text.c_str());
-    cairo_new_path(cairo_);
-  }
+  void Write(const std::string& text, double x, double y, double size) { WriteText(cairo_, text, x, y, size); }
   void Line(double x0, double y0, double x1, double y1) {
     cairo_set_source_rgb(cairo_, 0.80, 0.80, 0.82);
     cairo_set_line_width(cairo_, 1);

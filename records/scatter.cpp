@@ -20,9 +20,7 @@ class ScatterPainter {
   ScatterPainter(cairo_t* cairo, const Scatter& scatter) : cairo_(cairo), scatter_(scatter) {}
 
   void Paint() {
-    cairo_set_source_rgb(cairo_, 1, 1, 1);
-    cairo_paint(cairo_);
-    cairo_select_font_face(cairo_, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    BeginDrawing(cairo_);
     Write(scatter_.title, kGap, 28, 17);
     Legend(scatter_.first, kGap, false);
     Legend(scatter_.second, kGap + 160, true);
@@ -31,13 +29,7 @@ class ScatterPainter {
   }
 
  private:
-  void Write(const std::string& text, double x, double y, double size) {
-    cairo_set_source_rgb(cairo_, 0.13, 0.13, 0.15);
-    cairo_set_font_size(cairo_, size);
-    cairo_move_to(cairo_, x, y);
-    cairo_show_text(cairo_, text.c_str());
-    cairo_new_path(cairo_);
-  }
+  void Write(const std::string& text, double x, double y, double size) { WriteText(cairo_, text, x, y, size); }
   void UseColor(bool second) {
     second ? cairo_set_source_rgba(cairo_, 0.00, 0.45, 0.70, 0.6)
            : cairo_set_source_rgba(cairo_, 0.84, 0.37, 0.00, 0.35);

@@ -1,6 +1,7 @@
 /** Random expressions, and random problems whose models are texts made of them. */
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <memory>
@@ -10,6 +11,7 @@
 
 #include "certifier/dynamics/expression.h"
 #include "certifier/dynamics/text_model.h"
+#include "certifier/numerics/size.h"
 #include "tests/oracle/problems.h"
 #include "tests/text_models.h"
 
@@ -168,7 +170,7 @@ inline ModelText TameText(Random& random) {
 
 inline ModelText AnyText(Random& random) { return random.Coin() ? WeaklyCoupledText(random) : TameText(random); }
 
-/** f0(z) of a text in high precision. @param parameters their values. */
+/** f0(z) of a text in high precision, by the formulas of the integrators. @param parameters their values. */
 class TextInHighPrecision {
  public:
   TextInHighPrecision(const ModelText& text, const std::vector<double>& parameters)
@@ -187,7 +189,8 @@ class TextInHighPrecision {
   [[nodiscard]] std::vector<exact::Real> operator()(const std::vector<exact::Real>& z) const {
     using Integrator = ModelText::Integrator;
     using exact::Real;
-    const Real dt = parameters_[0];
+    const Real dt = parameters_[ToSize(std::ranges::find(text_.parameters, "dt", &ModelText::Parameter::name) -
+                                       text_.parameters.begin())];
     std::vector<Real> x(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(equations_.size()));
     const auto after = [&](const Real& length, const std::vector<Real>& rates) {
       std::vector<Real> sum = z;

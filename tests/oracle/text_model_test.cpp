@@ -179,64 +179,6 @@ TEST_P(SameBitsTest, InValuesAndIntervals) {
 
 INSTANTIATE_TEST_SUITE_P(BicycleAndPointMass, SameBitsTest, testing::Values(0, 1));
 
-// The successor of a text in 256 bits, by the formulas of the integrators.
-class ExactModel {
- public:
-  explicit ExactModel(const ModelText& text) : text_(text) {
-    for (const auto* variables : {&text.states, &text.inputs})
-      for (const auto& [name, unit] : *variables) names_.push_back(name);
-    for (const auto& parameter : text.parameters) names_.push_back(parameter.name);
-    for (const auto& [name, value] : text.definitions) {
-      definitions_.push_back(ParseExpression(value, names_));
-      names_.push_back(name);
-    }
-    for (const ExpressionText& equation : text.equations) equations_.push_back(ParseExpression(equation, names_));
-  }
-
-  [[nodiscard]] std::vector<Real> operator()(const std::vector<Real>& z) const {
-    const std::size_t n = text_.states.size();
-    const auto dt = Real(std::ranges::find(text_.parameters, "dt", &ModelText::Parameter::name)->lower);
-    const auto at = [&](const std::vector<Real>& k, const Real& factor) {
-      std::vector<Real> moved = z;
-      for (std::size_t j = 0; j < n; ++j) moved[j] = z[j] + factor * k[j];
-      return moved;
-    };
-    const auto next = [&](const std::vector<Real>& k, const Real& factor) {
-      std::vector<Real> x = at(k, factor);
-      x.resize(n);
-      return x;
-    };
-    const std::vector<Real> k1 = Rates(z);
-    switch (text_.integrator) {
-      case Integrator::kNone: return k1;
-      case Integrator::kEuler: return next(k1, dt);
-      case Integrator::kMidpoint: return next(Rates(at(k1, dt / Real(2))), dt);
-      case Integrator::kRk4: {
-        const std::vector<Real> k2 = Rates(at(k1, dt / Real(2))), k3 = Rates(at(k2, dt / Real(2))),
-                                k4 = Rates(at(k3, dt));
-        std::vector<Real> sum(n);
-        for (std::size_t j = 0; j < n; ++j) sum[j] = k1[j] + Real(2) * k2[j] + Real(2) * k3[j] + k4[j];
-        return next(sum, dt / Real(6));
-      }
-    }
-    return {};
-  }
-
- private:
-  [[nodiscard]] std::vector<Real> Rates(const std::vector<Real>& z) const {
-    std::vector<Real> values = z, rates;
-    const auto number = [](double x) { return Real(x); };
-    for (const auto& parameter : text_.parameters) values.emplace_back(parameter.lower);
-    for (const Expression& definition : definitions_) values.push_back(Evaluate<Real>(definition, values, number));
-    for (const Expression& equation : equations_) rates.push_back(Evaluate<Real>(equation, values, number));
-    return rates;
-  }
-
-  ModelText text_;
-  std::vector<std::string> names_;
-  std::vector<Expression> definitions_, equations_;
-};
-
 // Whether x lies in the range, with an allowance for what differences of 256-bit numbers leave of a derivative.
 bool IsInside(const Real& x, const Interval& range) {
   const Real allowance = Real(0x1p-60) * (abs(x) + Real(1));
@@ -257,7 +199,9 @@ TEST_P(StagesTest, EncloseValuesAndDerivatives) {
   const auto [which, integrator] = GetParam();
   const ModelText text = which == 0 ? Everything(integrator) : QuadrotorText(integrator);
   const auto model = MakeTextModel(text);
-  const ExactModel exact(text);
+  std::vector<double> parameters;
+  for (const ModelText::Parameter& parameter : text.parameters) parameters.push_back(parameter.lower);
+  const TextInHighPrecision exact(text, parameters);
   const int n = model->num_states(), d = model->num_variables();
   Random random(7104);
   SCOPED_TRACE(random.trace());
