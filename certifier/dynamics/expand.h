@@ -94,9 +94,14 @@ FOREREACH_INLINE PlainInterval TanRange(double tangent, const Turns& turns) {
   return {range[0], range[1]};
 }
 
+/** The functions below are for any node, or with an operation as kOp for the nodes that have it: a compiler then drops
+the other cases before it inlines them into the straight-line code of a program. */
+inline constexpr int kAnyOp = -1;
+
 /** The value of an operation on numbers; not that of a variable, a parameter or a constant. */
+template <int kOp>
 FOREREACH_INLINE double ValueOf(const Operation& n, double a, double b) {
-  switch (n.op) {
+  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
     case Op::kVariable:
     case Op::kParameter: break;
     case Op::kConstant: return n.constant;
@@ -136,10 +141,11 @@ FOREREACH_INLINE PlainInterval Plain(const Interval& x) { return {x.lower, x.upp
 
 /** The range of an operation over ranges, by plain arithmetic where that is quick; not that of a variable, a parameter,
 a sine, a cosine or a tangent. */
+template <int kOp>
 FOREREACH_INLINE PlainInterval RangeOf(const Operation& n, const PlainInterval& a, const PlainInterval& b,
                                        bool a_is_number, bool b_is_number) {
   const auto exact = [](const PlainInterval& x) __attribute__((always_inline)) { return Interval(x.lower, x.upper); };
-  switch (n.op) {
+  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
     case Op::kConstant: return {n.constant, n.constant};
     case Op::kAdd: return a + b;
     case Op::kSubtract: return a - b;
@@ -178,17 +184,16 @@ FOREREACH_INLINE PlainInterval RangeOf(const Operation& n, const PlainInterval& 
   return Plain(Interval::Entire());
 }
 
-/** Sets v[i], the value of node i at a point. `program` may be a constant expression. */
+/** Sets v[i], the value of node i at a point. */
+template <int kOp = kAnyOp>
 FOREREACH_INLINE void EvaluateAtPoint(const Operation& n, std::size_t i, const double* parameters, const double* z,
                                       double* v) {
-  if (n.op == Op::kVariable)
-    v[i] = z[n.a];
-  else if (n.op == Op::kParameter)
-    v[i] = parameters[n.a];
-  else if (n.op == Op::kTan)  // sine over cosine
-    v[i] = v[n.b] / v[n.b + 1];
-  else
-    v[i] = ValueOf(n, n.has_first() ? v[n.a] : 0, n.has_second() ? v[n.b] : 0);
+  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
+    case Op::kVariable: v[i] = z[n.a]; break;
+    case Op::kParameter: v[i] = parameters[n.a]; break;
+    case Op::kTan: v[i] = v[n.b] / v[n.b + 1]; break;  // sine over cosine
+    default: v[i] = ValueOf<kOp>(n, n.has_first() ? v[n.a] : 0, n.has_second() ? v[n.b] : 0);
+  }
 }
 
 /** Whether the node is the same number over the whole box. */
@@ -198,25 +203,28 @@ constexpr bool IsNumber(const Program& program, int i) {
 
 /** Sets w[i], the range of node i over a box; v has the values at its center. Sine and cosine of one argument share
 their ends: the first of them that is needed sets both. */
+template <int kOp = kAnyOp>
 FOREREACH_INLINE void EvaluateOverBox(const Program& program, std::size_t i, const double* parameters,
                                       const PlainInterval* box, const double* v, PlainInterval* w) {
   const Operation n = program.nodes[i];
-  if (n.op == Op::kVariable) {
-    w[i] = box[n.a];
-  } else if (n.op == Op::kParameter) {
-    w[i] = {parameters[n.a], parameters[n.a]};
-  } else if (n.op == Op::kSin) {
-    const Wave wave(v[i], v[i + 1], Turns(v[n.a], w[n.a]));
-    w[i] = wave.SineRange();
-    w[i + 1] = wave.CosineRange();
-  } else if (n.op == Op::kCos) {
-    if (program.over_box[ToSize(n.b)] == 0) w[i] = Wave(v[i - 1], v[i], Turns(v[n.a], w[n.a])).CosineRange();
-  } else if (n.op == Op::kTan) {
-    w[i] = TanRange(v[i], Turns(v[n.a], w[n.a]));
-  } else {
-    const PlainInterval none{0, 0};
-    w[i] = RangeOf(n, n.has_first() ? w[n.a] : none, n.has_second() ? w[n.b] : none, IsNumber(program, n.a),
-                   n.has_second() && IsNumber(program, n.b));
+  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
+    case Op::kVariable: w[i] = box[n.a]; break;
+    case Op::kParameter: w[i] = {parameters[n.a], parameters[n.a]}; break;
+    case Op::kSin: {
+      const Wave wave(v[i], v[i + 1], Turns(v[n.a], w[n.a]));
+      w[i] = wave.SineRange();
+      w[i + 1] = wave.CosineRange();
+      break;
+    }
+    case Op::kCos:
+      if (program.over_box[ToSize(n.b)] == 0) w[i] = Wave(v[i - 1], v[i], Turns(v[n.a], w[n.a])).CosineRange();
+      break;
+    case Op::kTan: w[i] = TanRange(v[i], Turns(v[n.a], w[n.a])); break;
+    default: {
+      const PlainInterval none{0, 0};
+      w[i] = RangeOf<kOp>(n, n.has_first() ? w[n.a] : none, n.has_second() ? w[n.b] : none, IsNumber(program, n.a),
+                          n.has_second() && IsNumber(program, n.b));
+    }
   }
 }
 
@@ -239,10 +247,11 @@ FOREREACH_INLINE void Expand(const double* parameters, const double* z, const Pl
   std::array<PlainInterval, kSize> w;
   ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) {
     constexpr Operation n = kProgram.nodes[i];
-    if constexpr (kProgram.at_point[i] != 0) EvaluateAtPoint(n, i, parameters, z, v.data());
+    if constexpr (kProgram.at_point[i] != 0) EvaluateAtPoint<static_cast<int>(n.op)>(n, i, parameters, z, v.data());
   });
   ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) {
-    if constexpr (kProgram.over_box[i] != 0) EvaluateOverBox(kProgram, i, parameters, box, v.data(), w.data());
+    if constexpr (kProgram.over_box[i] != 0)
+      EvaluateOverBox<static_cast<int>(kProgram.nodes[i].op)>(kProgram, i, parameters, box, v.data(), w.data());
   });
   ForEachConstant<kProgram.states>([&](auto k) __attribute__((always_inline)) { out.value[k] = v[kProgram.value[k]]; });
   ForEachConstant<kProgram.num_first>([&](auto e) __attribute__((always_inline)) {
