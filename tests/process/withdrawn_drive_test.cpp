@@ -216,6 +216,25 @@ TEST_F(WithdrawnDriveTest, AnOldAnswerAnswersNothing) {
   EXPECT_LT(Place(), 2);
 }
 
+// It is refused whole, so the wall in it is not known. The next good message tells.
+TEST_F(WithdrawnDriveTest, AMessageThatIsRefusedWithdrawsNothing) {
+  Drive();
+  RunFor(150'000);
+  obstacles_ = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 2)};
+  obstacles_t message = ToMessage(obstacles_);
+  message.utime = now_;
+  message.sequence = sequence_++;
+  message.num_obstacles = 2;  // the second has kind 0
+  bus_->Publish("OBSTACLES", message);
+  next_obstacles_ = now_ + 300'000;
+  RunFor(300'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  EXPECT_NE(certifier_->gate().WhyObstaclesUnknown(now_), "");
+  RunFor(4'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  EXPECT_LT(Place(), 2);
+}
+
 TEST_F(WithdrawnDriveTest, APlanThatHasNotBegunIsDropped) {
   Begin();
   RunFor(20'000);
@@ -323,13 +342,16 @@ class RestartedCertifierTest : public WithdrawnDriveTest {
     Gate predecessor(config_);
     Drive(predecessor);
   }
-  void Drive(Gate& predecessor) {
+  void SendPlan(Gate& predecessor) {
     obstacles_t message = ToMessage(obstacles_);
     message.utime = now_;
     ASSERT_EQ(predecessor.UpdateObstacles(Encode(message), now_), "");
     RunFor(20'000);
     const auto plan = Plan(1, states_.front().utime + 3 * kStepUs, {0, 0, 1, 0}, kProgress);
     bus_->Publish("PLAN_CERTIFIED", predecessor.Decide(Encode(plan), now_).certified.value());
+  }
+  void Drive(Gate& predecessor) {
+    SendPlan(predecessor);
     while (Step() < 0 && now_ < kNow + 2'000'000) RunFor(2000);
     RunFor(200'000);
   }
@@ -377,6 +399,17 @@ TEST_F(RestartedCertifierTest, ThePlanStopsWhereItRestsOnLearnedTransitions) {
   Begin();
   RunFor(300'000);
   EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+}
+
+TEST_F(RestartedCertifierTest, APlanThatHadNotBegunStopsOnceItHas) {
+  Gate predecessor(config_);
+  SendPlan(predecessor);
+  obstacles_ = {Obstacle::Circle(Eigen::Vector2d(3, 3), 0.5)};
+  Begin();
+  RunFor(1'000'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STARTED));
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+  EXPECT_LT(Place(), 0.16) << "within a step";
 }
 
 TEST_F(RestartedCertifierTest, ThePlanStopsWhereAnObstacleIsGone) {
