@@ -287,14 +287,6 @@ bool Names(const withdrawal_t& message, const certified_plan_t& certified) {
   return named == GetDigest(certified.certificate_digest);
 }
 
-// Whether what the plan was certified under is what the message's certifier has in force. Observations may have been
-// added: they only narrow what is reachable.
-bool IsUnderEqualGrounds(const certified_plan_t& certified, const withdrawal_t& message) {
-  Grounds now = GroundsOf(message);
-  now.observations = GetDigest(certified.observations_digest);
-  return GroundsOf(certified) == now;
-}
-
 }  // namespace
 
 GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes) noexcept {
@@ -317,7 +309,7 @@ GuardWithdrawal Guard::Withdraw(Bytes withdrawal_bytes) noexcept {
 void Guard::Take(const withdrawal_t& message, GuardWithdrawal& answer) {
   const auto counts = [&](const std::unique_ptr<certified_plan_t>& plan) {
     return plan && Names(message, *plan) &&
-           !(message.cause == withdrawal_t::UNKNOWN_PLAN && IsUnderEqualGrounds(*plan, message));
+           !(message.cause == withdrawal_t::UNKNOWN_PLAN && GroundsOf(*plan) == GroundsOf(message));
   };
   if (counts(executing_)) {
     const int valid = std::clamp<int>(message.valid_steps, 0, executing_->plan.num_steps);

@@ -179,8 +179,8 @@ class Guard final {
     message never extends what stands.
   - Neither: it is not accepted later. Until its certificate has expired, a plan_id has to exceed it (see Accept).
   Cause UNKNOWN_PLAN comes from a certifier that has not certified the plan, and does not count if the plan was
-  certified under exactly the message's configuration, model, declaration and obstacles: then nothing has changed. A
-  valid_steps outside 0 .. num_steps counts as the nearest of these numbers. */
+  certified under exactly the message's five digests: then nothing has changed. A valid_steps outside 0 .. num_steps
+  counts as the nearest of these numbers. */
   [[nodiscard]] GuardWithdrawal Withdraw(Bytes withdrawal_bytes) noexcept;
 
   /** Ends the executing plan. */

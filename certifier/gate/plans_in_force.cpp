@@ -118,12 +118,11 @@ void PlansInForce::RememberStranger(const robot_state_t& state, std::int64_t ste
 }
 
 void PlansInForce::TakeAnswer(const execution_event_t& event) {
-  if (event.kind != execution_event_t::WITHDRAWN) return;
   for (Entry& entry : plans_) {
-    if (entry.plan_id != event.plan_id || !entry.withdrawal || entry.first_sequence < 0) continue;
-    const bool answers =
-        static_cast<double>(entry.first_sequence) <= event.value && event.value < static_cast<double>(sequence_);
-    if (!answers) continue;
+    if (entry.plan_id != event.plan_id || !entry.withdrawal) continue;
+    // Plans of two sources may have one plan_id: each is answered for itself.
+    const auto is_answered = [&](std::int64_t sequence) { return static_cast<double>(sequence) == event.value; };
+    if (std::ranges::none_of(entry.sent, is_answered)) continue;
     if (entry.is_known && event.step > entry.standing_steps) continue;
     entry.withdrawal.reset();
     if (entry.is_known) entry.standing_steps = std::max<int>(event.step, 0);
@@ -155,7 +154,10 @@ void PlansInForce::Judge(Entry& entry, Gate& gate) {
   if (!entry.is_known) {
     withdrawal_t message =
         Unjudged(withdrawal_t::UNKNOWN_PLAN, "this certifier has not certified it, and cannot judge whether it holds");
-    SetGrounds(message, gate.grounds());
+    Grounds grounds = gate.grounds();
+    // What this certifier has learned itself takes nothing back, unless it contradicts the declaration.
+    if (!gate.certifier().violation()) grounds.observations = gate.transitions();
+    SetGrounds(message, grounds);
     return Withdraw(entry, message);
   }
   if (entry.is_withdrawn && entry.standing_steps <= entry.first_step) return;  // nothing is left
@@ -182,7 +184,7 @@ void PlansInForce::Withdraw(Entry& entry, const withdrawal_t& withdrawal) {
   SetDigest(message.certificate_digest, entry.certificate_digest);
   entry.is_withdrawn = true;
   entry.standing_steps = message.valid_steps;
-  entry.first_sequence = -1;
+  entry.sent.clear();
   entry.next_us = INT64_MIN;
   is_any_unanswered_ = true;
   ++withdrawals_;
@@ -199,8 +201,8 @@ std::optional<PlansInForce::Due> PlansInForce::TakeDue(std::int64_t now_us, std:
     withdrawal_t& message = *entry.withdrawal;
     message.utime = now_us;
     message.sequence = sequence_++;
-    const bool is_repetition = entry.first_sequence >= 0;
-    if (!is_repetition) entry.first_sequence = message.sequence;
+    const bool is_repetition = !entry.sent.empty();
+    entry.sent.push_back(message.sequence);
     return Due{message, is_repetition};
   }
   return std::nullopt;

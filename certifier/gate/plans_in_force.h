@@ -20,7 +20,9 @@ withdrawn when something changes (NOT_JUDGED).
 
 A plan that the robot executes and that is not known was certified by another process, for example by this certifier
 before a restart. It cannot be judged. It is withdrawn as UNKNOWN_PLAN, at once and after each change, as soon as the
-obstacles are known; a guard heeds this unless the plan was certified under exactly what is in force.
+obstacles are known; a guard heeds this unless the plan was certified under exactly what is in force: the task, its
+file of transitions without learned ones, the obstacles. So a plan that another process certified under learned
+transitions is withdrawn: its digest does not tell which file they were added to.
 
 No bus, no clock. Times of a monotonic clock and of the wall clock in microseconds. */
 #pragma once
@@ -31,6 +33,7 @@ No bus, no clock. Times of a monotonic clock and of the wall clock in microsecon
 #include <deque>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "certifier/gate/gate.h"
 #include "certifier/task/gate_options.h"
@@ -66,6 +69,7 @@ class PlansInForce final {
   void Add(const certified_plan_t& certified, std::int64_t steady_us);
   /** Takes a usable state of the robot. Cost O(plans). */
   void SeeRobot(const robot_state_t& state, std::int64_t steady_us);
+  /** Takes the robot's answer to a withdrawal. @pre event.kind == execution_event_t::WITHDRAWN. */
   void TakeAnswer(const execution_event_t& event);
 
   /** Judges the plans again if obstacles, task, its file of transitions or the truth of the declaration have changed
@@ -97,7 +101,7 @@ class PlansInForce final {
     int standing_steps = 0;
     bool is_changed = false;                   // what it rests on, since it was judged
     std::unique_ptr<withdrawal_t> withdrawal;  // the last one, until it is answered
-    std::int64_t first_sequence = -1;          // of that one; -1: it was not sent yet
+    std::vector<std::int64_t> sent;            // the sequences of that one and of its repetitions
     std::int64_t next_us = 0;                  // when to send it, by the monotonic clock
   };
   struct Premises {

@@ -267,6 +267,10 @@ void CertifierNode::OnEvent(const Received& received) {
   LookAtCharge();
   const auto event = Decoded<execution_event_t>(received.bytes);
   if (!event) return Refuse(channels_.event, "not an execution_event_t");
+  if (event->kind != execution_event_t::WITHDRAWN) return;
+  // A certifier before this one has counted its withdrawals from 0, too.
+  if (const std::string error = gate_->CheckFresh(event->utime, received.utime); !error.empty())
+    return Refuse(channels_.event, error);
   if (is_in_charge()) plans_.TakeAnswer(*event);
 }
 

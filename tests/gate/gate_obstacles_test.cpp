@@ -432,10 +432,14 @@ TEST(GateMovingTest, WithoutAClockNothingMoves) {
 constexpr std::int64_t kAtTheWall = kNow + 500'000 + 750'000, kError = 20'000;
 const Obstacle kWall = Obstacle::AxisBox(Eigen::Vector2d(0.7, -5), Eigen::Vector2d(0.8, 5));
 
-std::int16_t OutcomeAmong(const std::vector<Obstacle>& obstacles) {
+decision_t DecisionAmong(const std::vector<Obstacle>& obstacles) {
   Gate gate(SmallTaskWithAClock());
   EXPECT_EQ(gate.UpdateObstacles(MovingMessage(0, kNow, obstacles), kNow), "");
-  const decision_t decision = gate.Decide(Encode(Candidate(1)), kNow).decision;
+  return gate.Decide(Encode(Candidate(1)), kNow).decision;
+}
+
+std::int16_t OutcomeAmong(const std::vector<Obstacle>& obstacles) {
+  const decision_t decision = DecisionAmong(obstacles);
   if (decision.outcome == decision_t::ABSTAIN_SAFETY) {
     EXPECT_THAT(decision.step, testing::AnyOf(4, 5));
     EXPECT_EQ(decision.obstacle, static_cast<int>(obstacles.size())) << "the task's own comes first";
@@ -453,6 +457,32 @@ TEST(GateMovingTest, AWindowIsMetUpToTheClockError) {
     beside.until_us = comes.from_us = kAtTheWall + kError - off;
     EXPECT_EQ(OutcomeAmong({kFarAway[0].Moving(beside), kWall.Moving(comes)}),
               off < 0 ? decision_t::CERTIFIED : decision_t::ABSTAIN_SAFETY);
+  }
+}
+
+TEST(GateMovingTest, AWindowOfNoLengthIsMet) {
+  for (const std::int64_t off : {-1, 0}) {
+    ObstacleMotion before, there, after;
+    before.stamp_us = there.stamp_us = after.stamp_us = kNow;
+    before.until_us = there.from_us = there.until_us = after.from_us = kAtTheWall + kError - off;
+    EXPECT_EQ(DecisionAmong({kFarAway[0].Moving(before), kWall.Moving(there), kFarAway[0].Moving(after)}).outcome,
+              off < 0 ? decision_t::CERTIFIED : decision_t::ABSTAIN_SAFETY);
+  }
+}
+
+// Finite numbers whose products overflow: the wall may be anywhere, or where the robot is when it is there.
+TEST(GateMovingTest, NumbersThatOverflowAreNeverClear) {
+  for (const double huge : {1e154, 1e155, 1e300, std::numeric_limits<double>::max()}) {
+    for (int which = 0; which < 5; ++which) {
+      ObstacleMotion motion;
+      motion.stamp_us = kAtTheWall;
+      if (which == 0) motion.velocity.x() = huge;
+      if (which == 1) motion.velocity = {-huge, huge, 0};
+      if (which == 2) motion.uncertainty = huge;
+      if (which == 3) motion.growth = huge;
+      if (which == 4) motion.growth_rate = huge;
+      EXPECT_EQ(DecisionAmong({kWall.Moving(motion)}).outcome, decision_t::ABSTAIN_SAFETY) << huge << " " << which;
+    }
   }
 }
 

@@ -37,8 +37,10 @@ class PlansInForceTest : public testing::Test {
     EXPECT_EQ(See({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), offset)}), "");
     plans_.Judge(gate_, now_);
   }
-  certified_plan_t Certify(std::int64_t plan_id) {
-    const GateAnswer answer = gate_.Decide(Encode(Candidate(plan_id, kAccelerationThatCertifies, now_)), now_);
+  certified_plan_t Certify(std::int64_t plan_id, const char* source = "test") {
+    candidate_plan_t candidate = Candidate(plan_id, kAccelerationThatCertifies, now_);
+    SetText(candidate.source, source);
+    const GateAnswer answer = gate_.Decide(Encode(candidate), now_);
     EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
     plans_.Add(answer.certified.value(), now_);
     return *answer.certified;
@@ -203,6 +205,24 @@ TEST_F(PlansInForceTest, IsRepeatedUntilItIsAnswered) {
   Answer(1, first.valid_steps, std::nan(""));
   EXPECT_TRUE(Due());
   Answer(1, first.valid_steps, 1);
+  now_ += PlansInForce::kRepeatUs;
+  EXPECT_FALSE(Due());
+}
+
+// The guard has one of them. Its answer for the other must not silence the message that it needs.
+TEST_F(PlansInForceTest, PlansOfTwoSourcesWithOneIdAreAnsweredEachForItself) {
+  Certify(1, "one");
+  Certify(1, "another");
+  SeeRobot(1, 0);
+  SeeWall(1);
+  const withdrawal_t lost = Due().value(), heard = Due().value();
+  ASSERT_NE(GetDigest(lost.certificate_digest), GetDigest(heard.certificate_digest));
+  Answer(1, 0, static_cast<double>(heard.sequence));
+  now_ += PlansInForce::kRepeatUs;
+  const withdrawal_t repeated = Due().value();
+  EXPECT_EQ(GetDigest(repeated.certificate_digest), GetDigest(lost.certificate_digest));
+  EXPECT_FALSE(Due());
+  Answer(1, 0, static_cast<double>(repeated.sequence));
   now_ += PlansInForce::kRepeatUs;
   EXPECT_FALSE(Due());
 }
@@ -416,6 +436,11 @@ TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfte
   EXPECT_EQ(withdrawal.cause, withdrawal_t::UNKNOWN_PLAN);
   EXPECT_EQ(GetDigest(withdrawal.certificate_digest), Digest{});
   EXPECT_EQ(GroundsOf(withdrawal), restarted.grounds());
+  transition_t learned{};
+  learned.utime = now_;
+  learned.num_states = 4;
+  learned.num_inputs = 2;
+  EXPECT_EQ(restarted.Learn(Encode(learned)), "");
   Answer(77, 20, 0);  // it stands: the guard found equal grounds
   now_ += PlansInForce::kRepeatUs;
   EXPECT_FALSE(Due());
@@ -424,7 +449,14 @@ TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfte
   message.sequence = 2;
   ASSERT_EQ(restarted.UpdateObstacles(Encode(message), now_), "");
   judge();
-  EXPECT_EQ(Due()->plan_id, 77);
+  const withdrawal_t changed = Due().value();
+  EXPECT_EQ(changed.plan_id, 77);
+  EXPECT_EQ(GetDigest(changed.observations_digest), restarted.transitions()) << "without what it has learned";
+  learned.next_state[2] = 1;  // contradicts
+  EXPECT_EQ(restarted.Learn(Encode(learned)), "");
+  ASSERT_TRUE(restarted.certifier().violation());
+  judge();
+  EXPECT_NE(GetDigest(Due()->observations_digest), restarted.transitions()) << "no guard has these";
 }
 
 }  // namespace

@@ -198,6 +198,43 @@ TEST_F(WithdrawnDriveTest, LostWithdrawalsAreRepeated) {
   EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::CONTACT)));
 }
 
+// Replayed from before: a certifier that was restarted counts its withdrawals from 0 again.
+TEST_F(WithdrawnDriveTest, AnOldAnswerAnswersNothing) {
+  Drive();
+  RunFor(200'000);
+  lossy_.to_lose["PLAN_WITHDRAWN"] = 3;
+  SeeWall(2);
+  RunFor(4000);
+  execution_event_t old{};
+  old.utime = now_ - 500'001;
+  old.plan_id = 1;
+  old.kind = execution_event_t::WITHDRAWN;
+  bus_->Publish("EXECUTION_EVENT", old);
+  RunFor(4'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  EXPECT_EQ(withdrawn_[0].sequence, 3);
+  EXPECT_LT(Place(), 2);
+}
+
+// It is refused whole, so the wall in it is not known. The next good message tells.
+TEST_F(WithdrawnDriveTest, AMessageThatIsRefusedWithdrawsNothing) {
+  Drive();
+  RunFor(150'000);
+  obstacles_ = {Obstacle::HalfSpace(Eigen::Vector2d(1, 0), 2)};
+  obstacles_t message = ToMessage(obstacles_);
+  message.utime = now_;
+  message.sequence = sequence_++;
+  message.num_obstacles = 2;  // the second has kind 0
+  bus_->Publish("OBSTACLES", message);
+  next_obstacles_ = now_ + 300'000;
+  RunFor(300'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  EXPECT_NE(certifier_->gate().WhyObstaclesUnknown(now_), "");
+  RunFor(4'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  EXPECT_LT(Place(), 2);
+}
+
 TEST_F(WithdrawnDriveTest, APlanThatHasNotBegunIsDropped) {
   Begin();
   RunFor(20'000);
@@ -297,17 +334,24 @@ TEST_F(BrakingDriveTest, WhereTooFewStepsStandItStopsAtOnceAndSaysSo) {
   EXPECT_EQ(robot_.state()[2], 0);
 }
 
-// The certifier restarts while the robot executes what its predecessor certified.
+// The certifier restarts while the robot executes what its predecessor certified, which may have had other transitions
+// under the same task file.
 class RestartedCertifierTest : public WithdrawnDriveTest {
  protected:
   void Drive() {
     Gate predecessor(config_);
+    Drive(predecessor);
+  }
+  void SendPlan(Gate& predecessor) {
     obstacles_t message = ToMessage(obstacles_);
     message.utime = now_;
     ASSERT_EQ(predecessor.UpdateObstacles(Encode(message), now_), "");
     RunFor(20'000);
     const auto plan = Plan(1, states_.front().utime + 3 * kStepUs, {0, 0, 1, 0}, kProgress);
     bus_->Publish("PLAN_CERTIFIED", predecessor.Decide(Encode(plan), now_).certified.value());
+  }
+  void Drive(Gate& predecessor) {
+    SendPlan(predecessor);
     while (Step() < 0 && now_ < kNow + 2'000'000) RunFor(2000);
     RunFor(200'000);
   }
@@ -320,8 +364,76 @@ TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereNothingHasChanged) {
   RunFor(6'000'000);
   ASSERT_EQ(withdrawn_.size(), 1u);
   EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_GT(certifier_->gate().certifier().num_observations(), 2u) << "what it learns itself takes nothing back";
   EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
   EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+}
+
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereItHadOtherTransitionsOfTheTask) {
+  Config before = config_;
+  Problem problem = *config_.problem;
+  problem.transitions.z.row(1).swap(problem.transitions.z.row(0));
+  problem.transitions.x_next.row(1).swap(problem.transitions.x_next.row(0));
+  before.grounds = GroundsOf(config_.grounds.config, problem, config_.obstacles);
+  before.problem = std::make_shared<const Problem>(problem);
+  Gate predecessor(before);
+  Drive(predecessor);
+  Begin();
+  RunFor(300'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+}
+
+// The certificate does not say which transitions were learned, and to which file of transitions they were added.
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereItRestsOnLearnedTransitions) {
+  Gate predecessor(config_);
+  transition_t learned{};
+  learned.utime = now_;
+  learned.num_states = 4;
+  learned.num_inputs = 2;
+  learned.state[2] = 1.5;
+  learned.next_state[0] = 1.5 * 0.15;
+  learned.next_state[2] = 1.5;
+  ASSERT_EQ(predecessor.Learn(Encode(learned)), "");
+  ASSERT_NE(predecessor.grounds().observations, predecessor.transitions());
+  Drive(predecessor);
+  Begin();
+  RunFor(300'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+}
+
+TEST_F(RestartedCertifierTest, APlanThatHadNotBegunStopsOnceItHas) {
+  Gate predecessor(config_);
+  SendPlan(predecessor);
+  obstacles_ = {Obstacle::Circle(Eigen::Vector2d(3, 3), 0.5)};
+  Begin();
+  RunFor(1'000'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STARTED));
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+  EXPECT_LT(Place(), 0.16) << "within a step";
+}
+
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereAnObstacleIsGone) {
+  obstacles_ = {Obstacle::Circle(Eigen::Vector2d(3, 3), 0.5)};
+  Drive();
+  obstacles_.clear();
+  Begin();
+  RunFor(300'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+}
+
+// Nothing is known then, so nothing can be judged. It stops as soon as it is known.
+TEST_F(RestartedCertifierTest, ThePlanGoesOnWhileNobodySendsObstacles) {
+  obstacles_ = {Obstacle::Circle(Eigen::Vector2d(3, 3), 0.5)};
+  Drive();
+  obstacles_.clear();
+  next_obstacles_ = INT64_MAX;
+  Begin();
+  RunFor(1'000'000);
+  EXPECT_TRUE(withdrawn_.empty());
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+  next_obstacles_ = now_;
+  RunFor(300'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
 }
 
 TEST_F(RestartedCertifierTest, ThePlanStopsWhereSomethingHasChangedMeanwhile) {
