@@ -252,7 +252,8 @@ Command InitCommand() {
       .footer =
           "With --model, states, inputs, parameters and units are those of a file in config/models, and the ranges "
           "are\n"
-          "placeholders. With --transitions, a column x with a column x_next is a state, the others are inputs, and "
+          "placeholders; the laws by which it stops and is steered are those of its task in config/drive.\n"
+          "With --transitions, a column x with a column x_next is a state, the others are inputs, and "
           "the\n"
           "domain is the range of the data, a tenth wider at each end.\n"
           "The file can be used as it is. Its placeholders keep plans from being certified until you replace them.\n\n"
