@@ -336,7 +336,7 @@ std::unique_ptr<RobotMotion> MakeMotion(const Config& config, Braking braking) {
       braking == Braking::kHardest ? std::numeric_limits<double>::infinity() : config.planner.braking;
   if (const NamedModel* const named = FindNamed(*problem.model); named != nullptr) switch (named->layout) {
       case Layout::kCar: return std::make_unique<CarMotion>(problem, deceleration);
-      case Layout::kPointMass2d: return std::make_unique<PlaneMotion>(problem, deceleration);
+      case Layout::kPlane: return std::make_unique<PlaneMotion>(problem, deceleration);
     }
   throw ConfigError(config.path +
                     ": planner.stop: missing: how the robot brakes, an expression for each input, for example {" +

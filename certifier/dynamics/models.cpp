@@ -69,7 +69,7 @@ const std::vector<NamedModel>& NamedModels() {
        .standing = {"vx", "vy"},
        .next = {"px + dt*vx + dt*dt/2*ax", "py + dt*vy + dt*dt/2*ay", "vx + dt*ax", "vy + dt*ay"},
        .rates = {"vx", "vy", "ax", "ay"},
-       .layout = Layout::kPointMass2d,
+       .layout = Layout::kPlane,
        .make =
            [](std::span<const double> parameters, std::vector<int> angles) {
              if (!angles.empty()) throw std::invalid_argument("no state of point_mass is an angle");

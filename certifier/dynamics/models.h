@@ -26,8 +26,8 @@ angles, by their indices, ascending: none, or theta.
 
 /** What the states and inputs of a named model are, for a planner that drives it without laws of its task. */
 enum class Layout {
-  kCar,         ///< x, y, heading, speed, acceleration, steering angle; jerk, steering rate.
-  kPointMass2d  ///< Place and velocity in the plane; acceleration.
+  kCar,   ///< x, y, heading, speed, acceleration, steering angle; jerk, steering rate.
+  kPlane  ///< Place and velocity in the plane; acceleration.
 };
 
 /** A model that a task file names. The lists are of text, for task files, the declaration and the verifier; the bits of
