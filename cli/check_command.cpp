@@ -51,9 +51,16 @@ void PrintData(const TaskCheck& check, std::ostream& out) {
     out << "  " << std::setw(20) << coordinate.name << std::setw(24) << range(coordinate.lower, coordinate.upper)
         << std::setw(24) << range(coordinate.least, coordinate.largest) << (coordinate.matters ? "yes" : "no") << "\n";
   if (check.rows.empty()) return;
-  out << "declaration: of what it allows, two transitions differ by at most\n  ";
-  for (const TaskCheck::Row& row : check.rows) out << row.name << " " << RoundedUp(100 * row.used, 3) << " %  ";
-  out << (check.all_pairs ? "" : "(a sample of them)") << "\n";
+  std::string used, undeclared;
+  for (const TaskCheck::Row& row : check.rows)
+    if (row.is_declared)
+      used += "  " + row.name + " " + RoundedUp(100 * row.used, 3) + " %";
+    else
+      undeclared += (undeclared.empty() ? "" : ", ") + row.name;
+  if (!used.empty())
+    out << "declaration: of what it allows, two transitions differ by at most\n"
+        << used << (check.all_pairs ? "" : "  (a sample of them)") << "\n";
+  if (!undeclared.empty()) out << "declaration: nothing is declared for " << undeclared << "\n";
 }
 
 void PrintTube(const TaskCheck& check, const Options& options, std::ostream& out) {
@@ -89,7 +96,10 @@ Json ToJson(const TaskCheck& check) {
     coordinates.push_back(
         {{"name", c.name}, {"domain", {c.lower, c.upper}}, {"data", {c.least, c.largest}}, {"matters", c.matters}});
   for (const TaskCheck::Row& row : check.rows)
-    rows.push_back({{"name", row.name}, {"used", row.used}, {"lines", {row.first, row.second}}});
+    rows.push_back({{"name", row.name},
+                    {"declared", row.is_declared},
+                    {"used", row.is_declared ? Json(row.used) : Json()},
+                    {"lines", {row.first, row.second}}});
   return {{"findings", findings},
           {"data", check.data},
           {"transitions", check.transitions},

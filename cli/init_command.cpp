@@ -1,12 +1,16 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <numbers>
 #include <optional>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "certifier/dynamics/expression.h"
 #include "certifier/numerics/limits.h"
+#include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/config.h"
 #include "certifier/task/csv.h"
@@ -50,9 +54,51 @@ std::string ValueOf(const ModelText::Parameter& parameter) {
                                             : "[" + ToText(parameter.lower) + ", " + ToText(parameter.upper) + "]";
 }
 
-TemplateVariable PlaceholderRange(const ModelText::Variable& variable) {
-  const double most = variable.unit == "rad" ? std::numbers::pi : 10;
+// An angle that is reported in [-pi, pi] turns on in a plan.
+TemplateVariable PlaceholderRange(const ModelText::Variable& variable, bool turns) {
+  const double most = variable.unit == "rad" ? (turns ? 2 : 1) * std::numbers::pi : 10;
   return {variable.name, variable.unit, -most, most, false};
+}
+
+// The lines of the map `planner` of a task file of the library that have its laws, each with the comment above it.
+std::string LawLines(const std::string& file) {
+  constexpr std::array kKeys{"let", "speed", "stop", "emergency_stop", "hints", "at_rest"};
+  std::istringstream lines(file);
+  std::string laws, comments;
+  bool in_planner = false, is_law = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("  ")) in_planner = line == "planner:";
+    if (!in_planner || line == "planner:") continue;
+    line += "\n";
+    if (line.starts_with("  #")) {
+      comments += line;
+    } else if (line.starts_with("   ")) {
+      if (is_law) laws += line;
+    } else {
+      is_law = std::ranges::find(kKeys, line.substr(2, line.find(':') - 2)) != kKeys.end();
+      if (is_law) laws += comments + line;
+      comments.clear();
+    }
+  }
+  return laws;
+}
+
+// Those of the task drive/NAME.yaml in the directory that has models/NAME.yaml, if it is a task of this model file.
+std::optional<KnownLaws> LawsFor(const std::string& model_file) {
+  const fs::path path(model_file);
+  const fs::path drive = path.parent_path() / ".." / "drive" / path.filename();
+  if (!fs::exists(drive) || !fs::equivalent(FilesNamedBy(drive).model, path)) return std::nullopt;
+  const Config config = LoadConfig(drive, TransitionsFile::kIgnore);
+  if (config.laws.stop.empty()) return std::nullopt;
+  KnownLaws laws;
+  laws.task = drive.lexically_normal().string();
+  laws.lines = LawLines(ReadWhole(drive, kLargestTaskFile));
+  laws.has_at_rest = ("\n" + laws.lines).find("\n  at_rest:") != std::string::npos;
+  const std::vector<std::string>& states = config.problem->model->state_names();
+  for (const RestBound& bound : config.problem->rest)
+    laws.rest.emplace_back(states[ToSize(bound.coordinate)], bound.tolerance);
+  for (const int k : HeldStates(config)) laws.held.push_back(states[ToSize(k)]);
+  return laws;
 }
 
 TaskTemplate FromModel(const Options& options) {
@@ -61,8 +107,9 @@ TaskTemplate FromModel(const Options& options) {
   const ModelText text = LoadModelFile(path);
   const std::string file = ReadWhole(path, kLargestTaskFile);
   TaskTemplate task;
-  for (const ModelText::Variable& state : text.states) task.states.push_back(PlaceholderRange(state));
-  for (const ModelText::Variable& input : text.inputs) task.inputs.push_back(PlaceholderRange(input));
+  for (const ModelText::Variable& state : text.states)
+    task.states.push_back(PlaceholderRange(state, std::ranges::find(text.angles, state.name) != text.angles.end()));
+  for (const ModelText::Variable& input : text.inputs) task.inputs.push_back(PlaceholderRange(input, false));
   task.center.assign(text.states.size(), 0);
   task.model =
       "# The nominal model: the equations of a file that comes with ForeReach, with the parameters of your robot. To "
@@ -81,6 +128,12 @@ TaskTemplate FromModel(const Options& options) {
                   (parameter.name == "dt" ? "  # s, from one control to the next" : CommentOf(file, parameter.name)) +
                   "\n";
   }
+  if (!text.angles.empty()) {
+    task.model += "  # Values that differ by 2 pi are the same, in the data and of the measured state.\n  angles: [";
+    for (const std::string& angle : text.angles) task.model += (&angle == text.angles.data() ? "" : ", ") + angle;
+    task.model += "]\n";
+  }
+  task.laws = LawsFor(path);
   task.transitions = fs::path(options.out).stem().string() + "_steps.csv";
   task.command = "forereach init --model " + options.model;
   return task;
@@ -158,6 +211,10 @@ TaskTemplate FromTransitions(const Options& options) {
   task.model += "  inputs:  # likewise\n";
   for (const std::string& input : header.inputs) task.model += "    " + input + ": \"1\"\n";
   task.model +=
+      "  # The states that are angles, if there are any: values that differ by 2 pi are the same.\n"
+      "  # angles: [" +
+      header.states.back() +
+      "]\n"
       "  parameters:\n"
       "    dt: " +
       ToText(*options.dt) +
@@ -195,7 +252,8 @@ Command InitCommand() {
       .footer =
           "With --model, states, inputs, parameters and units are those of a file in config/models, and the ranges "
           "are\n"
-          "placeholders. With --transitions, a column x with a column x_next is a state, the others are inputs, and "
+          "placeholders; the laws by which it stops and is steered are those of its task in config/drive.\n"
+          "With --transitions, a column x with a column x_next is a state, the others are inputs, and "
           "the\n"
           "domain is the range of the data, a tenth wider at each end.\n"
           "The file can be used as it is. Its placeholders keep plans from being certified until you replace them.\n\n"

@@ -209,11 +209,11 @@ class Examination final {
     const Eigen::Index stride = 1 + (observations.size() - 1) / kMostCompared;
     result_.all_pairs = stride == 1;
     for (std::size_t k = 0; k < result_.states.size(); ++k) {
-      TaskCheck::Row row{result_.states[k], 0, 0, 0};
       const auto c = static_cast<Eigen::Index>(k);
       const Eigen::VectorXd residual = (observations.lower.col(c) + observations.upper.col(c)) / 2;
       const Eigen::VectorXd bounds = problem_.declaration.lipschitz.row(c).transpose();
       const double errors = 2 * problem_.declaration.ObservationError(c);
+      TaskCheck::Row row{result_.states[k], errors > 0 || (bounds.array() > 0).any(), 0, 0, 0};
       for (Eigen::Index i = 0; i < observations.size(); i += stride)
         for (Eigen::Index j = i + stride; j < observations.size(); j += stride) {
           const double allowed = errors +
@@ -221,7 +221,7 @@ class Examination final {
                                  (observations.upper(i, c) - observations.lower(i, c)) +
                                  (observations.upper(j, c) - observations.lower(j, c));
           const double used = std::abs(residual[i] - residual[j]) / allowed;
-          if (used > row.used) row = {row.name, used, FileLine(i), FileLine(j)};
+          if (used > row.used) row = {row.name, row.is_declared, used, FileLine(i), FileLine(j)};
         }
       result_.rows.push_back(row);
     }
@@ -233,6 +233,7 @@ class Examination final {
     std::string loose;
     double most = 0;
     for (const TaskCheck::Row& row : result_.rows) {
+      if (!row.is_declared) continue;
       if (row.used > kTight)
         Remark(RowKey(row.name),
                row.name + ": the data use " + Up(100 * row.used) + " % of what is declared (lines " +

@@ -35,6 +35,7 @@ struct TaskCheck {
   contradict the declaration. */
   struct Row {
     std::string name;
+    bool is_declared = false;  ///< Otherwise nothing may differ but for rounding, and `used` says nothing.
     double used = 0;
     int first = 0, second = 0;  ///< Lines of the data file.
   };

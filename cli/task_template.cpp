@@ -12,6 +12,13 @@
 namespace forereach {
 namespace {
 
+// To three digits.
+std::string Rounded(double x) {
+  std::array<char, 32> text{};
+  static_cast<void>(std::snprintf(text.data(), text.size(), "%.3g", x));
+  return text.data();
+}
+
 std::string List(const std::vector<std::string>& entries) {
   std::string text = "[";
   for (const std::string& entry : entries) text += (text.size() > 1 ? ", " : "") + entry;
@@ -105,6 +112,46 @@ std::string TransitionsKey(const TaskTemplate& task) {
   return text + "transitions: " + YamlText(task.transitions) + "\n";
 }
 
+std::string Bounds(const std::vector<std::pair<std::string, double>>& bounds) {
+  std::string text;
+  for (const auto& [name, bound] : bounds) text += (text.empty() ? "" : ", ") + name + ": " + ToText(bound);
+  return "{" + text + "}";
+}
+
+// What standing is: that of the task which drives the model, or the states that are velocities.
+std::vector<std::pair<std::string, double>> Rest(const TaskTemplate& task) {
+  if (task.laws) return task.laws->rest;
+  std::vector<std::pair<std::string, double>> rest;
+  for (const std::string& name : Velocities(task.states)) rest.emplace_back(name, 0.05);
+  return rest;
+}
+
+std::string RestKey(const TaskTemplate& task) {
+  if (const auto rest = Rest(task); !rest.empty())
+    return "  # What standing is: each plan that is certified on the bus has to end with no more than this. "
+           "PLACEHOLDER.\n"
+           "  rest: " +
+           Bounds(rest) + "\n";
+  if (task.laws)
+    return "  # There is no `rest`: this robot cannot stand, and plans end in motion. " + task.laws->task +
+           "\n"
+           "  # says what that means.\n";
+  return "  # What standing is. Name the velocities; each plan that is certified on the bus then has to end with no "
+         "more:\n"
+         "  # rest: {" +
+         task.states.back().name + ": 0.05}\n";
+}
+
+// A place along the domain, given by its share.
+std::string PlaceAt(double share, const TaskTemplate& task, const std::vector<std::string>& positions) {
+  std::vector<std::string> place;
+  for (const std::string& name : positions) {
+    const auto state = std::ranges::find(task.states, name, &TemplateVariable::name);
+    place.push_back(Rounded(state->lower + share * (state->upper - state->lower)));
+  }
+  return List(place);
+}
+
 // Towards the upper corner of the domain, of a fortieth of its width.
 std::string ExampleObstacle(const TaskTemplate& task, const std::vector<std::string>& positions) {
   constexpr double kShare = 0.0125;
@@ -153,20 +200,7 @@ std::string TaskKey(const TaskTemplate& task, const std::vector<std::string>& po
       "there,\n"
       "  # `between: {acceleration: [...]}`.\n"
       "  between: samples\n";
-  if (const std::vector<std::string> velocities = Velocities(task.states); !velocities.empty()) {
-    std::string rest;
-    for (const std::string& name : velocities) rest += (rest.empty() ? "" : ", ") + name + ": 0.05";
-    text +=
-        "  # What standing is: each plan that is certified on the bus has to end with no more than this. PLACEHOLDER.\n"
-        "  rest: {" +
-        rest + "}\n";
-  } else {
-    text +=
-        "  # What standing is. Name the velocities; each plan that is certified on the bus then has to end with no "
-        "more:\n"
-        "  # rest: {" +
-        task.states.back().name + ": 0.05}\n";
-  }
+  text += RestKey(task);
   text +=
       "  # What the robot must not touch. PLACEHOLDER: one obstacle, as an example.\n"
       "  obstacles:\n"
@@ -175,31 +209,84 @@ std::string TaskKey(const TaskTemplate& task, const std::vector<std::string>& po
   return text;
 }
 
-std::string Processes(const TaskTemplate& task) {
-  const std::vector<std::string> velocities = Velocities(task.states);
-  std::string text =
-      "# The certifier on the bus: where the obstacles come from. bus: those above and those that a sender repeats; "
-      "nothing is\n"
-      "# certified while none is heard. task: those above are all there are.\n"
-      "gate: {obstacles: bus}\n"
-      "\n"
-      "# The simulated robot, for trying this without one: the states that are zero while it stands.\n";
-  text += velocities.empty() ? "# robot: {hold: [" + task.states.back().name + "]}\n"
-                             : "robot: {hold: " + List(velocities) + "}\n";
+// Of the states that are velocities: what the others do while the robot brakes is not a matter of a rate.
+std::string EmergencyStop(const TaskTemplate& task, const std::vector<std::string>& held) {
+  std::vector<std::pair<std::string, double>> rates;
+  for (const std::string& name : Velocities(task.states))
+    if (std::ranges::find(held, name) != held.end()) rates.emplace_back(name, 1);
+  if (rates.empty()) return "";
+  return "  # How fast its brakes take each of them to zero whatever happens, in its unit per second. PLACEHOLDER: "
+         "what "
+         "your robot\n"
+         "  # surely does. Stops begin the earlier the less it is.\n"
+         "  emergency_stop: " +
+         Bounds(rates) + "\n";
+}
+
+std::string RobotKey(const TaskTemplate& task) {
+  std::vector<std::string> held = task.laws ? task.laws->held : Velocities(task.states);
+  std::string text = "# The robot, and the simulated one: the states that are zero while it stands.\n";
+  if (task.laws || !held.empty()) return text + "robot:\n  hold: " + List(held) + "\n" + EmergencyStop(task, held);
+  held = {task.states.back().name};
   return text +
+         "# robot:\n"
+         "#   hold: " +
+         List(held) +
+         "\n"
+         "#   emergency_stop: " +
+         Bounds({{held[0], 1}}) + "  # how fast its brakes take it to zero, in its unit per second\n";
+}
+
+std::string PlannerKey(const TaskTemplate& task, const std::vector<std::string>& positions) {
+  const std::string goal = "goal: " + PlaceAt(0.65, task, positions);
+  const std::vector<std::pair<std::string, double>> rest = Rest(task);
+  if (!task.laws)
+    return "# The planner: how the robot stops, an expression of the state for each input, clipped to domain.input, "
+           "and "
+           "where it is\n"
+           "# at rest. docs/planner.md explains them. The planner starts when these lines are there.\n"
+           "# planner:\n"
+           "#   " +
+           goal +
+           "\n"
+           "#   stop: {" +
+           task.inputs.front().name + ": -" + (rest.empty() ? task.states.back().name : rest.front().first) +
+           "/dt}  # and each other input\n"
+           "#   at_rest: {" +
+           (rest.empty() ? task.states.back().name : rest.front().first) + ": 0.005}\n";
+  std::string text =
+      "# The planner: how the robot stops and is steered. These laws are those of\n"
+      "#   " +
+      task.laws->task +
+      "\n"
+      "# docs/planner.md explains them.\n"
+      "planner:\n"
+      "  # Where to go, in the coordinates of task.projection. The planner plans once there is a goal.\n"
+      "  # " +
+      goal + "\n" + task.laws->lines;
+  if (task.laws->has_at_rest) return text;
+  std::string at_rest;
+  for (const auto& [name, bound] : rest) at_rest += (at_rest.empty() ? "" : ", ") + name + ": " + Rounded(bound / 10);
+  return text +
+         "  # Where a plan ends, by the model. Less than task.rest, since what is not known of the robot comes on "
+         "top.\n"
+         "  at_rest: {" +
+         at_rest + "}\n";
+}
+
+std::string Processes(const TaskTemplate& task, const std::vector<std::string>& positions) {
+  return "# The certifier on the bus: where the obstacles come from. bus: those above and those that a sender repeats; "
+         "nothing is\n"
+         "# certified while none is heard. task: those above are all there are.\n"
+         "gate: {obstacles: bus}\n"
+         "\n" +
+         PlannerKey(task, positions) + "\n" + RobotKey(task) +
          "\n"
          "# The directory of recorded runs.\n"
          "logger: {directory: log}\n";
 }
 
 constexpr double kLargest = std::numeric_limits<double>::max();
-
-// To three digits.
-std::string Rounded(double x) {
-  std::array<char, 32> text{};
-  static_cast<void>(std::snprintf(text.data(), text.size(), "%.3g", x));
-  return text.data();
-}
 
 }  // namespace
 
@@ -235,6 +322,7 @@ std::string YamlText(const std::string& text) {
 }
 
 std::string TaskText(const TaskTemplate& task) {
+  const std::vector<std::string> positions = PositionStates(task.states);
   return "# The task of a robot, begun by\n"
          "#   " +
          task.command +
@@ -246,7 +334,7 @@ std::string TaskText(const TaskTemplate& task) {
          "# say what is still missing.\n"
          "\n" +
          task.model + "\n" + Domain(task) + "\n" + Declaration(task) + "\n" + TransitionsKey(task) + "\n" +
-         TaskKey(task, PositionStates(task.states)) + "\n" + Processes(task);
+         TaskKey(task, positions) + "\n" + Processes(task, positions);
 }
 
 }  // namespace forereach

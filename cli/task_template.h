@@ -1,7 +1,9 @@
 /** The text of a task file to begin with. */
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace forereach {
@@ -13,6 +15,15 @@ struct TemplateVariable {
   bool from_data = false;  ///< The range is that of data, widened; otherwise a placeholder.
 };
 
+/** How a robot of a model of the library stops and is steered, as the task says it that drives this model. */
+struct KnownLaws {
+  std::string task;                                  ///< The path of this task.
+  std::string lines;                                 ///< Its laws: lines of the map `planner`, with their comments.
+  bool has_at_rest = false;                          ///< Among the lines is planner.at_rest.
+  std::vector<std::pair<std::string, double>> rest;  ///< States and bounds of its task.rest; none if it has none.
+  std::vector<std::string> held;                     ///< The states that are zero while the robot stands.
+};
+
 struct TaskTemplate {
   std::string path;     ///< Where the file will be, for the commands that it suggests.
   std::string command;  ///< What makes this text.
@@ -21,6 +32,7 @@ struct TaskTemplate {
   std::vector<double> center;  ///< Of the initial set, one for each state.
   std::string transitions;     ///< Relative to the file.
   bool transitions_exist = false;
+  std::optional<KnownLaws> laws;
 };
 
 /** The task file, each line or block with a comment. It is a valid task. Where nothing is known it has placeholders

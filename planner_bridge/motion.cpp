@@ -10,9 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
-#include "certifier/dynamics/point_mass.h"
 #include "certifier/numerics/size.h"
 
 namespace forereach {
@@ -174,9 +172,9 @@ class CompiledMotion : public RobotMotion {
 
 /** Jerk-limited deceleration to v = a = 0, while the wheels go to a bend, stay there for half of the time and then
 return to straight ahead. */
-class BicycleMotion final : public CompiledMotion {
+class CarMotion final : public CompiledMotion {
  public:
-  BicycleMotion(const Problem& problem, double braking)
+  CarMotion(const Problem& problem, double braking)
       : dt_(problem.model->parameters()[0]),
         deceleration_(std::min(braking, kShareOfBound * Reach(problem.domain.state, kA))),
         jerk_(kShareOfBound * Reach(problem.domain.input, 0)),
@@ -288,9 +286,9 @@ class BicycleMotion final : public CompiledMotion {
 };
 
 /** Constant deceleration against the velocity. */
-class PointMassMotion final : public CompiledMotion {
+class PlaneMotion final : public CompiledMotion {
  public:
-  PointMassMotion(const Problem& problem, double braking)
+  PlaneMotion(const Problem& problem, double braking)
       : dt_(problem.model->parameters()[0]),
         deceleration_(std::min({braking, kShareOfBound * Reach(problem.domain.input, 0),
                                 kShareOfBound * Reach(problem.domain.input, 1)})) {}
@@ -336,9 +334,10 @@ std::unique_ptr<RobotMotion> MakeMotion(const Config& config, Braking braking) {
   }
   const double deceleration =
       braking == Braking::kHardest ? std::numeric_limits<double>::infinity() : config.planner.braking;
-  const std::string& name = problem.model->name();
-  if (name == KinematicBicycle::kName) return std::make_unique<BicycleMotion>(problem, deceleration);
-  if (name == PointMass::kName) return std::make_unique<PointMassMotion>(problem, deceleration);
+  if (const NamedModel* const named = FindNamed(*problem.model); named != nullptr) switch (named->layout) {
+      case Layout::kCar: return std::make_unique<CarMotion>(problem, deceleration);
+      case Layout::kPlane: return std::make_unique<PlaneMotion>(problem, deceleration);
+    }
   throw ConfigError(config.path +
                     ": planner.stop: missing: how the robot brakes, an expression for each input, for example {" +
                     problem.model->input_names()[0] + ": ...}");

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "certifier/dynamics/kinematic_bicycle.h"
+#include "certifier/dynamics/models.h"
 #include "planner_bridge/reference.h"
 
 namespace forereach {
@@ -23,8 +23,8 @@ void RequireFits(const Problem& problem, const PlannerOptions& options, const Po
   RequireGoalAndSteps(problem, options);
   const std::string model = problem.model->description();
   Require(policy.model == model, "is for the model " + policy.model + ", the task's is " + model);
-  Require(problem.model->name() == KinematicBicycle::kName,
-          "there are policies for " + std::string(KinematicBicycle::kName) + " only");
+  const NamedModel* const named = FindNamed(*problem.model);
+  Require(named != nullptr && named->layout == Layout::kCar, "there are policies for compiled models of cars only");
   Require(problem.projection == Eigen::MatrixXd::Identity(2, problem.model->num_states()),
           "a policy goes to a point (x, y), task.projection has to be [x, y]");
   Require(policy.num_features() == kFeatures,

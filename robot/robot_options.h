@@ -1,17 +1,12 @@
 /** The options of the simulated robot, from `robot` in a task file. */
 #pragma once
 
-#include <array>
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace forereach {
-
-/** The states that are zero while a robot with a model of the library stands. */
-inline constexpr std::array<std::string_view, 4> kHeldByDefault{"v", "a", "vx", "vy"};
 
 struct RobotOptions {
   std::vector<double> start;  ///< The first state in the model's units, one entry for each state.

@@ -1,99 +1,154 @@
+// The equations of a text: one tape from z to x+, the integrator's stages included.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "certifier/dynamics/models.h"
+#include "certifier/numerics/size.h"
 #include "verifier/equations.h"
-
-#include <map>
-
-#include "verifier/ranges.h"
+#include "verifier/expressions.h"
+#include "verifier/functions.h"
+#include "verifier/jet.h"
 
 namespace forereach::verifier {
 namespace {
 
-// p+ = p + dt v + dt^2/2 u, v+ = v + dt u; z = (px, py, vx, vy, ax, ay).
-class PointMassEquations final : public Equations {
+// The model's equations, each one on the line of its state.
+Formulas FormulasOf(const ModelText& model) {
+  std::vector<std::string> variables, parameters;
+  for (const auto* const group : {&model.states, &model.inputs})
+    for (const ModelText::Variable& named : *group) variables.push_back(named.name);
+  for (const ModelText::Parameter& named : model.parameters) parameters.push_back(named.name);
+  return verifier::FormulasOf(variables, parameters, model.definitions, model.equations);
+}
+
+// One evaluation of the rates: at x + before dt k, with the rates k of the evaluation before. Its own rates count in x+
+// with weight dt. Both are fractions.
+struct Stage {
+  std::pair<int, int> before, weight;
+};
+
+std::vector<Stage> StagesOf(ModelText::Integrator integrator) {
+  switch (integrator) {
+    case ModelText::Integrator::kNone: return {};
+    case ModelText::Integrator::kEuler: return {{{0, 1}, {1, 1}}};
+    case ModelText::Integrator::kMidpoint: return {{{0, 1}, {0, 1}}, {{1, 2}, {1, 1}}};
+    case ModelText::Integrator::kRk4: return {{{0, 1}, {1, 6}}, {{1, 2}, {1, 3}}, {{1, 2}, {1, 3}}, {{1, 1}, {1, 6}}};
+  }
+  throw ExpressionError("the integrator is unknown");
+}
+
+class TextEquations final : public Equations {
  public:
-  explicit PointMassEquations(double dt) : dt_(dt) {}
+  explicit TextEquations(const ModelText& model)
+      : formulas_(FormulasOf(model)), stages_(StagesOf(model.integrator)), num_states_(model.states.size()) {
+    for (const auto& [name, lower, upper] : model.parameters) {
+      if (!(lower <= upper) || !std::isfinite(lower) || !std::isfinite(upper))
+        throw ExpressionError("the parameter " + name + " has to lie between two finite numbers");
+      if (name == "dt") dt_ = static_cast<int>(parameters_.size());
+      parameters_.emplace_back(lower, upper);
+    }
+    if (!stages_.empty() && dt_ < 0) throw ExpressionError("an integrator needs the parameter dt");
+  }
+
+  bool IsExact() const override {
+    return std::ranges::all_of(parameters_, [](const auto& range) { return range.first == range.second; });
+  }
 
   std::vector<Real> Value(std::span<const Real> z) const override {
-    std::vector<Real> next(4);
-    const Real step(dt_), half_square = step * step * Real(0.5);
-    for (std::size_t i = 0; i < 2; ++i) {
-      next[i] = z[i] + step * z[i + 2] + half_square * z[i + 4];
-      next[i + 2] = z[i + 2] + step * z[i + 4];
+    const std::vector<Real> parameters = Parameters();
+    if (stages_.empty()) return Evaluate(formulas_.tape, formulas_.results, RealArithmetic(z, parameters));
+    std::vector<Real> at(z.begin(), z.end()), next(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(num_states_)),
+        rates;
+    for (const Stage& stage : stages_) {
+      const Real before = Length(stage.before), weight = Length(stage.weight);
+      for (std::size_t k = 0; k < rates.size(); ++k) at[k] = z[k] + before * rates[k];
+      rates = Evaluate(formulas_.tape, formulas_.results, RealArithmetic(at, parameters));
+      for (std::size_t k = 0; k < num_states_; ++k) next[k] += weight * rates[k];
     }
     return next;
   }
-  std::vector<FirstDerivative> First(std::span<const Real>) const override {
-    const Real step(dt_), half_square = step * step * Real(0.5);
-    return {{0, 0, 1.0},         {0, 2, step}, {0, 4, half_square}, {1, 1, 1.0}, {1, 3, step},
-            {1, 5, half_square}, {2, 2, 1.0},  {2, 4, step},        {3, 3, 1.0}, {3, 5, step}};
-  }
-  std::vector<SecondDerivative> Second(std::span<const Real>) const override { return {}; }
 
- private:
-  double dt_;
-};
-
-// x+ = x + dt v cos(theta), y+ = y + dt v sin(theta), theta+ = theta + dt/l v tan(delta), v+ = v + dt a,
-// a+ = a + dt jerk, delta+ = delta + dt steer_rate; z = (x, y, theta, v, a, delta, jerk, steer_rate).
-class BicycleEquations final : public Equations {
- public:
-  BicycleEquations(double dt, double wheelbase) : dt_(dt), wheelbase_(wheelbase) {}
-
-  std::vector<Real> Value(std::span<const Real> z) const override {
-    const Real step(dt_);
-    const Real &theta = z[2], &v = z[3];
-    return {z[0] + step * v * cos(theta),
-            z[1] + step * v * sin(theta),
-            theta + step / Real(wheelbase_) * v * tan(z[5]),
-            v + step * z[4],
-            z[4] + step * z[6],
-            z[5] + step * z[7]};
-  }
   std::vector<FirstDerivative> First(std::span<const Real> z) const override {
-    const Real step(dt_), one(1.0), turn = step / Real(wheelbase_);
-    const Real s = sin(z[2]), c = cos(z[2]), t = tan(z[5]);
-    const Real& v = z[3];
-    return {{0, 0, one},
-            {0, 2, -(step * v * s)},
-            {0, 3, step * c},
-            {1, 1, one},
-            {1, 2, step * v * c},
-            {1, 3, step * s},
-            {2, 2, one},
-            {2, 3, turn * t},
-            {2, 5, turn * v * (one + sqr(t))},
-            {3, 3, one},
-            {3, 4, step},
-            {4, 4, one},
-            {4, 6, step},
-            {5, 5, one},
-            {5, 7, step}};
+    const std::vector<Jet> jets = Step(z, z.size(), JetArithmetic::Order::kFirst);
+    std::vector<FirstDerivative> derivatives;
+    for (std::size_t k = 0; k < num_states_; ++k)
+      for (const auto& [variable, value] : jets[k].first)
+        if (!value.IsZero()) derivatives.push_back({static_cast<int>(k), variable, value});
+    return derivatives;
   }
+
   std::vector<SecondDerivative> Second(std::span<const Real> z) const override {
-    const Real step(dt_), one(1.0), turn = step / Real(wheelbase_);
-    const Real s = sin(z[2]), c = cos(z[2]), t = tan(z[5]);
-    const Real& v = z[3];
-    const Real bent = t.IsFinite() ? TangentBend(t) : t;
-    return {{0, 2, 2, -(step * v * c)}, {0, 2, 3, -(step * s)},           {1, 2, 2, -(step * v * s)},
-            {1, 2, 3, step * c},        {2, 3, 5, turn * (one + sqr(t))}, {2, 5, 5, turn * v * bent}};
+    const std::vector<Jet> jets = Step(z, num_states_, JetArithmetic::Order::kSecond);
+    std::vector<SecondDerivative> derivatives;
+    for (std::size_t k = 0; k < num_states_; ++k)
+      for (const auto& [key, value] : jets[k].second)
+        derivatives.push_back({static_cast<int>(k), key / JetArithmetic::kStride, key % JetArithmetic::kStride, value});
+    std::ranges::sort(derivatives, {}, [](const SecondDerivative& d) { return std::tuple(d.output, d.column, d.row); });
+    return derivatives;
   }
 
  private:
-  double dt_, wheelbase_;
+  [[nodiscard]] std::vector<Real> Parameters() const {
+    std::vector<Real> ranges;
+    for (const auto& [lower, upper] : parameters_) ranges.push_back(Real::FromTo(lower, upper));
+    return ranges;
+  }
+  // That part of dt.
+  [[nodiscard]] Real Length(const std::pair<int, int>& part) const {
+    const auto& [lower, upper] = parameters_[ToSize(dt_)];
+    return Real::FromTo(lower, upper) * Real::Integer(part.first) / Real::Integer(part.second);
+  }
+
+  // x+ with its derivatives by the first `count` variables. Each stage's arguments are jets, whose derivatives those of
+  // the rates by the arguments are composed with.
+  [[nodiscard]] std::vector<Jet> Step(std::span<const Real> z, std::size_t count, JetArithmetic::Order order) const {
+    const std::vector<Real> parameters = Parameters();
+    const auto formulas = [&](std::span<const Real> at) {
+      const JetArithmetic arithmetic(at, parameters, static_cast<int>(count), order);
+      return Evaluate(formulas_.tape, formulas_.results, arithmetic);
+    };
+    if (stages_.empty()) return formulas(z);
+    std::vector<Jet> start;
+    for (std::size_t l = 0; l < z.size(); ++l) {
+      start.push_back({z[l], {}, {}});
+      if (l < count) start[l].first.emplace_back(static_cast<int>(l), 1.0);
+    }
+    std::vector<Jet> argument = start, next = start, rates;
+    std::vector<Real> at(z.begin(), z.end());
+    for (const Stage& stage : stages_) {
+      const Real before = Length(stage.before), weight = Length(stage.weight);
+      for (std::size_t k = 0; k < rates.size(); ++k) {
+        argument[k] = AddScaled(start[k], before, rates[k]);
+        at[k] = argument[k].value;
+      }
+      rates = formulas(at);
+      for (Jet& rate : rates) rate = Compose(rate, argument, order);
+      for (std::size_t k = 0; k < num_states_; ++k) next[k] = AddScaled(next[k], weight, rates[k]);
+    }
+    return next;
+  }
+
+  Formulas formulas_;
+  std::vector<Stage> stages_;
+  std::size_t num_states_;
+  std::vector<std::pair<double, double>> parameters_;
+  int dt_ = -1;  // its place among them
 };
 
 }  // namespace
 
+std::unique_ptr<Equations> EquationsOf(const ModelText& model) {
+  if (model.states.empty() || model.equations.size() != model.states.size())
+    throw ExpressionError("a model has states and an equation for each");
+  return std::make_unique<TextEquations>(model);
+}
+
 std::unique_ptr<Equations> EquationsOf(const NominalModel& model) {
-  if (model.text() != nullptr) return EquationsOf(*model.text());
-  std::map<std::string, double> parameters;
-  for (std::size_t p = 0; p < model.parameters().size(); ++p)
-    parameters[model.parameter_names()[p]] = model.parameters()[p];
-  const auto has = [&](const char* name) { return parameters.count(name) == 1; };
-  if (model.name() == "point_mass" && has("dt") && parameters.size() == 1)
-    return std::make_unique<PointMassEquations>(parameters.at("dt"));
-  if (model.name() == "kinematic_bicycle" && has("dt") && has("wheelbase") && parameters.size() == 2)
-    return std::make_unique<BicycleEquations>(parameters.at("dt"), parameters.at("wheelbase"));
-  return nullptr;
+  const std::optional<ModelText> text = TextOf(model);
+  return text ? EquationsOf(*text) : nullptr;
 }
 
 }  // namespace forereach::verifier

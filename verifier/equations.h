@@ -1,5 +1,6 @@
-/** The verifier's own equations of the nominal models: those of the library with hand-written first and second
-derivatives, those of a text by its own parser and by the rules of differentiation over intervals. */
+/** The verifier's own evaluation of the nominal models. All are texts to it, the compiled ones by their rows in the
+table of named models; it reads them by its own parser, and derives them by the rules of differentiation over intervals.
+*/
 #pragma once
 
 #include <memory>
@@ -40,8 +41,8 @@ class Equations {
   [[nodiscard]] virtual std::vector<SecondDerivative> Second(std::span<const Real> z) const = 0;
 };
 
-/** The equations of a model's text or, if it has none, for its name and parameters; null for a model that the verifier
-does not implement. @throws ExpressionError (expressions.h) if the text is not a model in the language. */
+/** The equations of TextOf(model) (certifier/dynamics/models.h); null if there is no text.
+@throws ExpressionError (expressions.h) if it is not a model in the language. */
 [[nodiscard]] std::unique_ptr<Equations> EquationsOf(const NominalModel& model);
 
 /** The equations of a text. @throws ExpressionError (expressions.h) if it is not a model in the language. */

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "certifier/dynamics/models.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -164,12 +165,13 @@ void RequireForCertifyingOnBus(const Config& config) {
 
 std::vector<int> HeldStates(const Config& config) {
   const NominalModel& model = *config.problem->model;
-  if (!config.robot.hold && model.text() != nullptr)
+  const NamedModel* const named = FindNamed(model);
+  if (!config.robot.hold && named == nullptr)
     throw ConfigError(config.path +
                       ": robot.hold: missing: it names the states that are zero while the robot stands, and a model as "
                       "text does not say which; by default they are those of task.rest, which is missing, too");
   const std::vector<std::string> names =
-      config.robot.hold.value_or(std::vector<std::string>(kHeldByDefault.begin(), kHeldByDefault.end()));
+      config.robot.hold ? *config.robot.hold : std::vector<std::string>(named->standing.begin(), named->standing.end());
   std::vector<int> held;
   for (int k = 0; k < model.num_states(); ++k)
     if (std::ranges::find(names, model.state_names()[ToSize(k)]) != names.end()) held.push_back(k);

@@ -1,13 +1,14 @@
 // The rows of the nominal model: one of the library, or equations as text, in the task file or in a model file.
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <map>
+#include <stdexcept>
+#include <utility>
 
 #include "certifier/dynamics/compiled_models.h"
 #include "certifier/dynamics/expression.h"
-#include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/models.h"
-#include "certifier/dynamics/point_mass.h"
 #include "certifier/dynamics/text_model.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/config_error.h"
@@ -24,8 +25,6 @@ constexpr Range kStep = UpTo(60);
 constexpr int kMostNames = 1000;  // of parameters, and of definitions
 constexpr const char *kStepName = "dt", *kNextEnding = "_next";
 
-using ModelMaker = std::shared_ptr<const NominalModel> (*)(const Document& file);
-
 constexpr const char* kAngles = "model.angles";
 
 std::vector<std::string> ReadAngles(const Document& file) {
@@ -40,25 +39,12 @@ void RequireStates(const Document& file, const std::vector<std::string>& angles,
       file.Fail(kAngles, name + " is no state; " + Suggestion(name, states));
 }
 
-const std::vector<Named<ModelMaker>>& Models() {
-  static const std::vector<Named<ModelMaker>> models{
-      {KinematicBicycle::kName,
-       [](const Document& file) {
-         const std::vector<std::string> states(KinematicBicycle::kStateNames.begin(),
-                                               KinematicBicycle::kStateNames.end());
-         RequireStates(file, ReadAngles(file), states);
-         std::vector<int> angles;
-         for (const std::string& name : ReadAngles(file))
-           angles.push_back(static_cast<int>(std::ranges::find(states, name) - states.begin()));
-         std::ranges::sort(angles);
-         return MakeKinematicBicycle(file.Number("model.dt"), file.Number("model.wheelbase"), std::move(angles));
-       }},
-      {PointMass::kName,
-       [](const Document& file) {
-         if (!ReadAngles(file).empty()) file.Fail(kAngles, "no state of point_mass is an angle");
-         return MakePointMass(file.Number("model.dt"));
-       }},
-  };
+const std::vector<Named<const NamedModel*>>& Models() {
+  static const std::vector<Named<const NamedModel*>> models = [] {
+    std::vector<Named<const NamedModel*>> rows;
+    for (const NamedModel& model : NamedModels()) rows.push_back({model.name, &model});
+    return rows;
+  }();
   return models;
 }
 
@@ -210,9 +196,26 @@ std::shared_ptr<const NominalModel> MakeFromText(const ModelText& text) {
 }
 
 std::shared_ptr<const NominalModel> ReadNamedModel(const Document& file) {
-  RequireOnly(file, {"name", "dt", "wheelbase", "angles"}, "is for a model as text, this one has a name");
+  std::vector<std::string> keys{"name", kStepName, "angles"};
+  for (const NamedModel& model : NamedModels())
+    for (const NamedModel::Parameter& parameter : model.parameters) keys.emplace_back(parameter.name);
+  RequireOnly(file, keys, "is for a model as text, this one has a name");
   if (!Has(file, "model", kStepName)) file.Fail("model.dt", "missing: The time from one control to the next.");
-  return ValueNamed(Models(), file.Text("model.name"))(file);
+  const NamedModel& model = *ValueNamed(Models(), file.Text("model.name"));
+  std::vector<double> parameters{file.Number("model.dt")};
+  for (const NamedModel::Parameter& parameter : model.parameters)
+    parameters.push_back(file.Number("model." + std::string(parameter.name)));
+  const std::vector<std::string> states(model.states.begin(), model.states.end());
+  RequireStates(file, ReadAngles(file), states);
+  std::vector<int> angles;
+  for (const std::string& name : ReadAngles(file))
+    angles.push_back(static_cast<int>(std::ranges::find(states, name) - states.begin()));
+  std::ranges::sort(angles);
+  try {
+    return model.make(parameters, std::move(angles));
+  } catch (const std::invalid_argument& error) {  // the parameters are in their ranges
+    file.Fail(kAngles, error.what());
+  }
 }
 
 std::shared_ptr<const NominalModel> ReadTextModel(const Document& file, TaskDraft& draft) {
@@ -295,12 +298,16 @@ std::vector<Key> ModelKeys() {
               ReadModel)),
       Word("model.name", NamesIn(Models()), "A compiled model."),
       Number("model.dt", "s", kStep, "The time from one control to the next. Required with `model.name`."),
-      OnlyFor(KinematicBicycle::kName,
-              Required(Number("model.wheelbase", "m", UpTo(1000), "Distance between the axles."))),
+  };
+  for (const NamedModel& model : NamedModels())
+    for (const NamedModel::Parameter& parameter : model.parameters)
+      keys.push_back(OnlyFor(std::string(model.name),
+                             Required(Number("model." + std::string(parameter.name), std::string(parameter.unit),
+                                             UpTo(parameter.most), std::string(parameter.meaning)))));
+  keys.push_back(
       Text("model.file",
            "A model file, relative to this file's directory or to the installed config directory, for example "
-           "`models/unicycle.yaml`. It has one map, `model`, with a model as text."),
-  };
+           "`models/unicycle.yaml`. It has one map, `model`, with a model as text."));
   std::ranges::move(TextKeys(), std::back_inserter(keys));
   return keys;
 }

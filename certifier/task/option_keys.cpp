@@ -3,6 +3,7 @@
 #include <iterator>
 #include <set>
 
+#include "certifier/dynamics/models.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/key_rows.h"
@@ -224,18 +225,30 @@ Key RobotDisturbance(const OptionRows<RobotOptions>& robot) {
 void ReadEmergencyStop(const Document& file, const std::string& key, TaskDraft& draft) {
   RobotOptions& robot = draft.config.robot;
   const NominalModel& model = *draft.problem.model;
+  const NamedModel* const named = FindNamed(model);
   const auto is_at_rest = [&](const std::string& name) {
     return std::ranges::any_of(draft.rest,
                                [&](const RestBound& b) { return model.state_names()[ToSize(b.coordinate)] == name; });
   };
   for (const std::string& name : file.KeysOf(key)) {
-    const bool is_held = robot.hold                ? std::ranges::find(*robot.hold, name) != robot.hold->end()
-                         : model.text() != nullptr ? is_at_rest(name)
-                                                   : std::ranges::find(kHeldByDefault, name) != kHeldByDefault.end();
+    const bool is_held = robot.hold         ? std::ranges::find(*robot.hold, name) != robot.hold->end()
+                         : named == nullptr ? is_at_rest(name)
+                                            : std::ranges::find(named->standing, name) != named->standing.end();
     if (!is_held) file.Fail(key + "." + name, "is not zero while the robot stands: robot.hold does not name it");
     robot.emergency_stop[name] = file.Number(key + "." + name);
   }
   if (robot.emergency_stop.empty()) file.Fail(key, "names no state, so nothing would be braked");
+}
+
+// As a sentence goes on: "; v and a of ...".
+std::string StandingOfNamedModels() {
+  std::string text;
+  for (const NamedModel& model : NamedModels()) {
+    std::string states;
+    for (const std::string_view state : model.standing) states += (states.empty() ? "" : " and ") + std::string(state);
+    text += (text.empty() ? "; " : ", ") + states + " of " + std::string(model.name);
+  }
+  return text;
 }
 
 std::vector<Key> RobotKeys() {
@@ -252,7 +265,7 @@ std::vector<Key> RobotKeys() {
                 [](const Document& file, const std::string& key, TaskDraft& draft) {
                   draft.config.robot.hold = file.Names(key);
                 }),
-          "those of task.rest with a model as text; v and a of kinematic_bicycle, vx and vy of point_mass"),
+          "those of task.rest with a model as text" + StandingOfNamedModels()),
       Optional(
           Map("robot.emergency_stop",
               "How the robot comes to rest by itself, whatever its plan was. The guard computes from it how many "

@@ -28,7 +28,10 @@ const std::string kSource = FOREREACH_SOURCE_DIR;
 
 class TaskFileTest : public testing::Test {
  protected:
-  TaskFileTest() { fs::copy(kSource + "/config/models", scratch_ / "models"); }
+  TaskFileTest() {
+    for (const char* directory : {"/models", "/drive"})
+      fs::copy(kSource + "/config" + directory, scratch_.path() + directory);
+  }
   [[nodiscard]] Output Init(const std::string& options) const {
     return Forereach("init " + options + " --out " + task_ + " 2>&1");
   }
@@ -68,6 +71,70 @@ TEST_F(InitTest, EveryModelOfTheLibraryGivesATaskThatLoads) {
     ++models;
   }
   EXPECT_GE(models, 13);
+}
+
+std::vector<std::string> TextsOf(const Law& law) {
+  std::vector<std::string> texts;
+  for (const ExpressionText& expression : law) texts.push_back(expression.text);
+  return texts;
+}
+
+std::vector<std::vector<std::string>> TextsOf(const std::vector<Law>& laws) {
+  std::vector<std::vector<std::string>> texts;
+  for (const Law& law : laws) texts.push_back(TextsOf(law));
+  return texts;
+}
+
+// The laws, rest and hold of the task that drives the model, and the angles of the model's file.
+TEST_F(InitTest, AModelOfTheLibraryComesWithTheLawsThatDriveIt) {
+  for (const auto& entry : fs::directory_iterator(kSource + "/config/models")) {
+    const std::string name = entry.path().stem().string();
+    SCOPED_TRACE(name);
+    ASSERT_EQ(Init("--force --model " + name).code, 0);
+    EXPECT_THAT(Read(task_), HasSubstr("\n  # goal: ["));
+    scratch_.Write("task.yaml", Replaced(Read(task_), "\n  # goal: [", "\n  goal: ["));
+    const Config task = LoadConfig(task_, TransitionsFile::kIgnore);
+    const Config drive = LoadConfig(kSource + "/config/drive/" + name + ".yaml", TransitionsFile::kIgnore);
+    EXPECT_EQ(std::ssize(task.planner.goal), task.problem->projection.rows());
+    ASSERT_FALSE(task.laws.stop.empty());
+    EXPECT_EQ(TextsOf(task.laws.stop), TextsOf(drive.laws.stop));
+    EXPECT_EQ(TextsOf(task.laws.emergency_stop), TextsOf(drive.laws.emergency_stop));
+    EXPECT_EQ(TextsOf(task.laws.hints), TextsOf(drive.laws.hints));
+    ASSERT_EQ(task.laws.definitions.size(), drive.laws.definitions.size());
+    for (std::size_t i = 0; i < task.laws.definitions.size(); ++i)
+      EXPECT_EQ(task.laws.definitions[i].value.text, drive.laws.definitions[i].value.text);
+    ASSERT_EQ(task.laws.speed.has_value(), drive.laws.speed.has_value());
+    if (task.laws.speed) EXPECT_EQ(task.laws.speed->text, drive.laws.speed->text);
+    ASSERT_TRUE(task.laws.at_rest && drive.laws.at_rest);
+    ASSERT_EQ(task.laws.at_rest->size(), drive.laws.at_rest->size());
+    for (std::size_t i = 0; i < task.laws.at_rest->size(); ++i) {
+      EXPECT_EQ((*task.laws.at_rest)[i].coordinate, (*drive.laws.at_rest)[i].coordinate);
+      EXPECT_NEAR((*task.laws.at_rest)[i].tolerance, (*drive.laws.at_rest)[i].tolerance, 1e-15);
+    }
+    EXPECT_EQ(HeldStates(task), HeldStates(drive));
+    for (const auto& [state, rate] : task.robot.emergency_stop) EXPECT_EQ(rate, 1) << state;
+    EXPECT_EQ(task.problem->rest.size(), drive.problem->rest.size());
+    EXPECT_EQ(task.problem->model->angles(), drive.problem->model->angles());
+  }
+}
+
+// The laws are not guessed.
+TEST_F(InitTest, WithoutATaskThatDrivesTheModelTheLawsAreLeftToYou) {
+  const auto leaves_them = [&] {
+    ASSERT_EQ(Init("--force --model unicycle").code, 0);
+    EXPECT_THAT(Read(task_), AllOf(HasSubstr("\n# planner:\n#   goal: ["), HasSubstr("\n#   stop: {a: -v/dt}")));
+    const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
+    EXPECT_TRUE(config.laws.stop.empty());
+    EXPECT_EQ(config.problem->rest.size(), 2u);
+  };
+  fs::copy_file(scratch_ / "drive/boat.yaml", scratch_ / "drive/unicycle.yaml", fs::copy_options::overwrite_existing);
+  leaves_them();  // a task of another model
+  fs::remove(scratch_ / "drive/unicycle.yaml");
+  leaves_them();
+  scratch_.Write("log.csv", "x,v,x_next,u,v_next\n0,1,0.1,5,1.5\n2,-1,1.9,5,-0.5\n");
+  ASSERT_EQ(Init("--force --dt 0.1 --transitions " + (scratch_ / "log.csv")).code, 0);
+  EXPECT_THAT(Read(task_), AllOf(HasSubstr("\n#   stop: {u: -v/dt}"), HasSubstr("\n#   at_rest: {v: 0.005}\n"),
+                                 HasSubstr("\n  # angles: [v]\n"), HasSubstr("\n#   hold: [v]\n")));
 }
 
 // What nobody has looked at yet certifies nothing, even with data of the model itself all over the domain.
@@ -255,6 +322,22 @@ TEST_F(CheckTest, AContradictionIsNamedWithWhatResolvesIt) {
   EXPECT_THAT(output.text, HasSubstr("noise_bound of vx at least 0.01005")) << output.text;
   scratch_.Write("task.yaml", Replaced(Read(task_), "[0.01, 0.01, 0.01, 0.01]", "[0.01, 0.01, 0.01006, 0.01]"));
   EXPECT_EQ(Check().code, 0) << Check().text;
+}
+
+TEST_F(CheckTest, WhereNothingIsDeclaredThereIsNoShareOfIt) {
+  const auto with = [&](const std::string& noise_bound) {
+    WriteTask("[0.01, 0.01, 0.01, 0.01]", noise_bound);
+    return Check();
+  };
+  EXPECT_THAT(with("[0.01, 0.01, 0.01, 0.01]").text, Not(HasSubstr("nothing is declared")));
+  const std::string text = with("[0, 0.01, 0, 0]").text;
+  EXPECT_THAT(text, AllOf(HasSubstr("declaration: nothing is declared for px\n"), HasSubstr("\n  py "),
+                          HasSubstr("  vx "), Not(HasSubstr("  px 0"))))
+      << text;
+  const Json rows = Json::parse(Check("--json").text)["declaration"];
+  EXPECT_EQ(rows[0]["declared"], false);
+  EXPECT_TRUE(rows[0]["used"].is_null());
+  EXPECT_EQ(rows[1]["declared"], true);
 }
 
 // X0 is a square of half-width 0.1, and the circle's edge is at 3 - radius.

@@ -9,6 +9,7 @@
 #include "certifier/dynamics/models.h"
 #include "tests/oracle/random.h"
 #include "tests/text_models.h"
+#include "tests/verifier/equations_by_hand.h"
 #include "verifier/equations.h"
 #include "verifier/expressions.h"
 
@@ -77,11 +78,15 @@ void ExpectTheSameEquations(const Equations& text, const Equations& by_hand, int
 }
 
 TEST(TextEquations, OfTheBicycleAreThoseWrittenByHand) {
-  ExpectTheSameEquations(*EquationsOf(BicycleText(0.1, 2.5)), *EquationsOf(*MakeKinematicBicycle(0.1, 2.5)), 8);
+  const BicycleEquations by_hand(0.1, 2.5);
+  ExpectTheSameEquations(*EquationsOf(BicycleText(0.1, 2.5)), by_hand, 8);
+  ExpectTheSameEquations(*EquationsOf(*MakeKinematicBicycle(0.1, 2.5)), by_hand, 8);
 }
 
 TEST(TextEquations, OfThePointMassAreThoseWrittenByHand) {
-  ExpectTheSameEquations(*EquationsOf(PointMassText(0.15)), *EquationsOf(*MakePointMass(0.15)), 6);
+  const PointMassEquations by_hand(0.15);
+  ExpectTheSameEquations(*EquationsOf(PointMassText(0.15)), by_hand, 6);
+  ExpectTheSameEquations(*EquationsOf(*MakePointMass(0.15)), by_hand, 6);
 }
 
 struct Formula {
