@@ -12,6 +12,7 @@ struct RealOptions {
   std::filesystem::path data;       ///< The folder of the drives that are learned from and judged by
   std::vector<std::string> others;  ///< Files of drives to judge by only
   std::filesystem::path directory;  ///< Of results
+  bool quick = false;               ///< Fewer rows in the tables
   std::string command;              ///< That the report names as its origin
 };
 

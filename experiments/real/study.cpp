@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "certifier/certify/certifier.h"
 #include "certifier/dynamics/text_model.h"
+#include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/task/model_file.h"
 #include "identify/hold_out.h"
@@ -105,7 +105,6 @@ Eigen::VectorXd QuantilesOf(const Eigen::MatrixXd& errors, double share) {
   return quantiles;
 }
 
-// The standard errors of measured states of all drives together, three times.
 Eigen::VectorXd StateErrorOf(const std::vector<Stretch>& stretches) {
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(6);
   for (const Stretch& stretch : stretches) largest = largest.cwiseMax(3 * stretch.drive->deviation);
@@ -119,8 +118,8 @@ std::vector<int> RowsWithin(const Eigen::MatrixXd& errors, const Eigen::VectorXd
   return rows;
 }
 
-// The smallest slopes times the factor; false if there are none.
-bool SetSlopes(Declaration& declaration, const NominalModel& model, const Transitions& transitions, double factor) {
+// The smallest slopes; false if there are none.
+bool SetSlopes(Declaration& declaration, const NominalModel& model, const Transitions& transitions) {
   const Observations observations = Observe(model, transitions);
   const Eigen::RowVectorXd all = ScalesOf(observations);
   Eigen::RowVectorXd scales = Eigen::RowVectorXd::Constant(all.size(), -1);
@@ -129,7 +128,7 @@ bool SetSlopes(Declaration& declaration, const NominalModel& model, const Transi
   for (int k = 0; k < kBefore; ++k) {
     const SmallestRow row = FindSmallestRow(declaration, observations, k, scales);
     if (row.unexplained) return false;
-    declaration.lipschitz.row(k) = factor * row.slopes;
+    declaration.lipschitz.row(k) = row.slopes;
   }
   return true;
 }
@@ -237,7 +236,7 @@ std::vector<Stretch> Blocks(const Drive& drive, bool odd) {
   for (int i = 0; i < std::ssize(drive.times); ++i) {
     const double time = drive.times[ToSize(i)], block = block_of(time);
     const bool across = block_of(time + kStep - 2e-6) != block;
-    if ((std::fmod(block, 2) == 0) != odd || across) continue;
+    if ((std::fmod(block, 2) == 1) != odd || across) continue;
     if (!blocks.empty() && blocks.back().end == i)
       ++blocks.back().end;
     else
@@ -248,30 +247,53 @@ std::vector<Stretch> Blocks(const Drive& drive, bool odd) {
 
 std::vector<Stretch> Whole(const Drive& drive) { return {{&drive, 0, drive.transitions.size()}}; }
 
-Learned Learn(const Problem& driving, const std::vector<Stretch>& stretches, const LearnOptions& options) {
-  const Transitions transitions = Thinned(Gather(stretches, nullptr), options.most);
-  if (transitions.size() == 0) throw std::invalid_argument("there are no transitions to learn from");
-  Learned learned;
-  learned.fit = FitTwice(*driving.model->text(), transitions);
-  learned.text = WithParameters(*driving.model->text(), learned.fit);
-  learned.transitions = transitions.size();
-  learned.state_error = StateErrorOf(stretches);
-  auto problem = std::make_shared<Problem>(driving);
-  problem->model = MakeTextModel(learned.text);
-  problem->domain = CoveredBy(driving.domain, transitions);
+Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most) {
+  Fitted fitted{driving, Thinned(Gather(stretches, nullptr), most), {}, StateErrorOf(stretches)};
+  if (fitted.transitions.size() == 0) throw std::invalid_argument("there are no transitions to learn from");
+  fitted.fit = FitTwice(*driving.model->text(), fitted.transitions);
+  fitted.driving.model = MakeTextModel(WithParameters(*driving.model->text(), fitted.fit));
+  return fitted;
+}
+
+Learned Learn(const Fitted& fitted, const LearnOptions& options) {
+  const Transitions& all = fitted.transitions;
+  auto problem = std::make_shared<Problem>(fitted.driving);
+  problem->domain = CoveredBy(problem->domain, options.domain_of.empty() ? all : Gather(options.domain_of, nullptr));
   Declaration& declaration = problem->declaration;
-  declaration.noise_bound = learned.state_error.array() + kRounding;
-  const Eigen::VectorXd errors = QuantilesOf(learned.fit.after, options.quantile);
-  declaration.disturbance = (errors - declaration.noise_bound).cwiseMax(0);
+  declaration.noise_bound = fitted.state_error.array() + kRounding;
+  declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
   declaration.disturbance[kBefore] = 0;
-  const std::vector<int> within = RowsWithin(learned.fit.after, EpsilonOf(declaration));
-  if (options.slopes)
-    learned.explained = SetSlopes(declaration, *problem->model, transitions, options.factor);
-  else
-    learned.left_out = transitions.size() - static_cast<int>(within.size());
-  problem->transitions = options.slopes ? transitions : RowsAt(transitions, within);
-  learned.problem = problem;
+  problem->transitions = all;
+  Learned learned{problem, all.size(), 0, fitted.state_error, true};
+  if (options.slopes) {
+    learned.explained = SetSlopes(declaration, *problem->model, all);
+  } else {
+    problem->transitions = RowsAt(all, RowsWithin(fitted.fit.after, EpsilonOf(declaration)));
+    learned.left_out = all.size() - problem->transitions.size();
+  }
   return learned;
+}
+
+Learned WithSlopesTimes(const Learned& learned, double factor) {
+  auto problem = std::make_shared<Problem>(*learned.problem);
+  problem->declaration.lipschitz *= factor;
+  Learned scaled = learned;
+  scaled.problem = problem;
+  return scaled;
+}
+
+void Judgement::Add(const Judgement& other) {
+  transitions += other.transitions;
+  outside_domain += other.outside_domain;
+  contradicting += other.contradicting;
+  beyond += other.beyond;
+  windows.insert(windows.end(), other.windows.begin(), other.windows.end());
+}
+
+int Judgement::slices() const {
+  int count = 0;
+  for (const WindowResult& window : windows) count += static_cast<int>(window.center.cols()) - 1;
+  return count;
 }
 
 int Judgement::inside() const {
@@ -288,13 +310,19 @@ int Judgement::certified(std::size_t corridor) const {
   return count;
 }
 
-std::optional<double> Judgement::HalfWidth(double share) const {
+std::optional<double> Judgement::HalfWidth() const {
   std::vector<double> widths;
   for (const WindowResult& window : windows)
-    widths.push_back(window.complete ? window.half_width.col(steps).maxCoeff()
-                                     : std::numeric_limits<double>::infinity());
+    widths.push_back(window.complete ? window.half_width.col(steps).maxCoeff() : kInfinity);
   if (widths.empty()) return std::nullopt;
-  return Quantile(widths, share);
+  return Quantile(widths, 0.5);
+}
+
+std::optional<double> Judgement::LargestHalfWidth() const {
+  std::optional<double> largest;
+  for (const WindowResult& window : windows)
+    if (window.complete) largest = std::max(largest.value_or(0), window.half_width.col(steps).maxCoeff());
+  return largest;
 }
 
 std::optional<double> Judgement::Distance() const {

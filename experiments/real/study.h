@@ -28,28 +28,39 @@ block are in none. */
 [[nodiscard]] std::vector<Stretch> Blocks(const Drive& drive, bool odd);
 [[nodiscard]] std::vector<Stretch> Whole(const Drive& drive);
 
+/** The model with the parameters that fit the transitions of the stretches best. */
+struct Fitted {
+  Problem driving;  ///< What was fitted, with the fitted model
+  Transitions transitions;
+  Fit fit;
+  Eigen::VectorXd state_error;  ///< Of a measured state: three standard errors, the largest of the drives.
+};
+
+/** @param driving DrivingProblem(). @param most from so many transitions only, evenly chosen; 0: from all.
+@throws std::invalid_argument if there are too few transitions. Cost: about a second for 700 transitions. */
+[[nodiscard]] Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most = 0);
+
 struct LearnOptions {
   double quantile = 0.99;  ///< Of |one-step error|, for each state: sigma + w, where that is more than sigma.
-  /** Whether transitions with larger errors stay, and slopes explain them: L is then `factor` times the smallest that
-  no two transitions contradict. Otherwise they are left out, and L is zero. */
+  /** Whether transitions with larger errors stay, and slopes explain them: L is then the smallest that no two
+  transitions contradict. Otherwise they are left out, and L is zero. */
   bool slopes = false;
-  double factor = 1;
-  int most = 0;  ///< Learn from so many transitions only, evenly chosen; 0: from all.
+  /** The domain's ranges are those of these; empty: of those that the model was fitted to. */
+  std::vector<Stretch> domain_of = {};
 };
 
 struct Learned {
   std::shared_ptr<const Problem> problem;  ///< Fitted model, domain, declaration and the transitions that were kept.
-  ModelText text;                          ///< With the fitted parameters
-  Fit fit;
   int transitions = 0, left_out = 0;
-  Eigen::VectorXd state_error;  ///< Of a measured state, three standard errors.
+  Eigen::VectorXd state_error;  ///< Fitted::state_error
   bool explained = true;        ///< Whether slopes were found, or none were asked for.
 };
 
-/** Parameters, disturbance and slopes from the stretches alone. The domain's ranges are those of the stretches; those
-of the states are widened by a tenth, since a tube needs room. @throws std::invalid_argument if there are too few
-transitions. Cost: below a second for 700 transitions without slopes, some seconds with them. */
-[[nodiscard]] Learned Learn(const Problem& driving, const std::vector<Stretch>& stretches, const LearnOptions& options);
+/** Disturbance and slopes from what the fitted model leaves of its transitions. The domain's ranges of the states are
+widened by a tenth, since a tube needs room. Cost: some seconds for slopes. */
+[[nodiscard]] Learned Learn(const Fitted& fitted, const LearnOptions& options);
+/** The same with `factor` times the slopes. */
+[[nodiscard]] Learned WithSlopesTimes(const Learned& learned, double factor);
 
 /** Half-widths of corridors about a recorded path, m. */
 inline constexpr double kCorridors[] = {0.1, 0.15, 0.2, 0.3};
@@ -71,14 +82,19 @@ struct Judgement {
   int beyond = 0;         ///< Transitions with a one-step error above sigma + w in some state.
   std::vector<WindowResult> windows;
 
-  [[nodiscard]] int states() const { return static_cast<int>(windows.size()) * steps; }
+  /** Adds what another learner was judged by. */
+  void Add(const Judgement& other);
+
+  /** Slices of all tubes but the initial sets, and the recorded states that lie in them. */
+  [[nodiscard]] int slices() const;
   [[nodiscard]] int inside() const;
   [[nodiscard]] int complete() const;
   [[nodiscard]] int certified(std::size_t corridor) const;
-  /** Of the half-widths of the position in the last slices, the larger of x and y; infinite where there is no last
-  slice.
-  @param share 0.5 for the median, 1 for the largest. None without windows. */
-  [[nodiscard]] std::optional<double> HalfWidth(double share) const;
+  /** The median over the windows of the position's half-width in the last slice, the larger of x and y; infinite where
+  there is no last slice. None without windows. */
+  [[nodiscard]] std::optional<double> HalfWidth() const;
+  /** The largest of those that are finite. */
+  [[nodiscard]] std::optional<double> LargestHalfWidth() const;
   /** The median of the distances that the car covered in a window. */
   [[nodiscard]] std::optional<double> Distance() const;
 };
