@@ -259,6 +259,12 @@ Study ReadAll(const RealOptions& options) {
 
 // ---- the report
 
+std::string Delays(const std::vector<double>& delays) {
+  if (delays.empty()) return "";
+  return "; the curvature is half way to a new steering command " + Text("%.2f", delays.front()) + " to " +
+         Text("%.2f s", delays.back()) + " after the log has it (" + std::to_string(delays.size()) + " steps of it)";
+}
+
 std::string AboutData(const Study& study) {
   std::string text;
   for (const std::vector<Drive>* all : {&study.drives, &study.others})
@@ -268,7 +274,7 @@ std::string AboutData(const Study& study) {
               " to " + Text("%.2f m/s", drive.transitions.z.col(3).maxCoeff()) +
               "; standard errors of a measured state: place " + Text("%.2g mm", 1000 * drive.deviation[0]) + ", yaw " +
               Text("%.2g mrad", 1000 * drive.deviation[2]) + ", speed " + Text("%.2g mm/s", 1000 * drive.deviation[3]) +
-              ", yaw rate " + Text("%.2g mrad/s\n", 1000 * drive.deviation[4]);
+              ", yaw rate " + Text("%.2g mrad/s", 1000 * drive.deviation[4]) + Delays(drive.delays) + "\n";
   return text;
 }
 
@@ -326,7 +332,8 @@ Plot TradeOff(const Study& study) {
   const auto series = [](int steps, const char* color, const char* what) {
     const std::string data = "$after" + std::to_string(steps);
     return data + " using 1:2 with linespoints pt 7 ps 0.6 lw 2 lc rgb " + color + " title '" + what + "', " + data +
-           " using 1:2:(sprintf('%g', $3)) with labels right offset -0.8,0.3 font ',9' textcolor rgb '#666666' notitle";
+           " using 1:2:($3 == 0.98 || $3 == 0.99 ? '' : sprintf('%g', $3)) with labels right offset -0.8,0.3 font ',9' "
+           "textcolor rgb '#666666' notitle";
   };
   return {"real-trade-off",
           "Recorded states inside their slices against the median half-width of the last one, for each quantile.", 720,

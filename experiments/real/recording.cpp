@@ -146,6 +146,33 @@ std::vector<std::string> FindRecordings(const std::filesystem::path& folder) {
   return found;
 }
 
+std::vector<double> SteeringDelays(const Recording& recording) {
+  constexpr Eigen::Index kQuiet = 25, kEarliest = 15, kSettled = 5;            // rows
+  constexpr double kChange = 0.25, kSteady = 0.1, kSlowest = 1, kLeast = 0.3;  // the last two: m/s, 1/m
+  const auto& values = recording.table.values;
+  const auto steer = values.col(7);
+  const Eigen::ArrayXd curvature = values.col(5).array() / values.col(4).array();
+  const auto spread = [&](Eigen::Index first) {
+    const auto part = steer.segment(first, kQuiet);
+    return part.maxCoeff() - part.minCoeff();
+  };
+  std::vector<double> delays;
+  for (Eigen::Index i = kQuiet; i + kQuiet + kSettled < values.rows(); ++i) {
+    if (!(std::abs(steer[i] - steer[i - 1]) > kChange &&
+          values.col(4).segment(i - kQuiet, 2 * kQuiet).minCoeff() > kSlowest))
+      continue;
+    if (spread(i - kQuiet) > kSteady || spread(i) > kSteady) continue;
+    const double before = curvature.segment(i - kQuiet, kQuiet - kEarliest).mean(),
+                 after = curvature.segment(i + kQuiet - kSettled, 2 * kSettled).mean();
+    if (!(std::abs(after - before) > kLeast)) continue;
+    Eigen::Index at = i - kEarliest;
+    while (at < i + kQuiet && (curvature[at] - before) / (after - before) < 0.5) ++at;
+    delays.push_back(static_cast<double>(at - i) * kSpacing);
+  }
+  std::ranges::sort(delays);
+  return delays;
+}
+
 Drive TransitionsOf(const Recording& recording, const Problem& problem) {
   ImportOptions options;
   options.period = kStep;
@@ -154,7 +181,7 @@ Drive TransitionsOf(const Recording& recording, const Problem& problem) {
   options.input_tolerance = Eigen::VectorXd::Zero(problem.model->num_inputs());
   options.input_mean = true;
   ImportedLog log = Import(recording.table, problem, options);
-  Drive drive{recording.name, std::move(log.transitions), {}, 0, recording.deviation};
+  Drive drive{recording.name, std::move(log.transitions), {}, 0, recording.deviation, SteeringDelays(recording)};
   for (const int line : log.lines) drive.times.push_back(kSpacing * (line - 1));
   drive.samples_outside = static_cast<int>(log.At(Dropped::kOutsideDomain).count);
   return drive;

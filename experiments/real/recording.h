@@ -38,10 +38,16 @@ struct Recording {
 struct Drive {
   std::string name;
   Transitions transitions;
-  std::vector<double> times;  ///< s since the drive's first row, ascending
-  int samples_outside = 0;    ///< Rows that begin no transition: the car stands, starts, brakes or is slow.
-  Eigen::VectorXd deviation;  ///< Recording::deviation
+  std::vector<double> times;   ///< s since the drive's first row, ascending
+  int samples_outside = 0;     ///< Rows that begin no transition: the car stands, starts, brakes or is slow.
+  Eigen::VectorXd deviation;   ///< Recording::deviation
+  std::vector<double> delays;  ///< SteeringDelays, ascending
 };
+
+/** For each step of the steering command by more than 0.25 that comes after and before a quarter of a second without
+another: the time from where the log has it until the curvature is half way to where it then settles, s. The log has
+commands ten times a second, whenever they were given. */
+[[nodiscard]] std::vector<double> SteeringDelays(const Recording& recording);
 
 /** The transitions of dt = 0.1 s, with the mean of the inputs over each step, that lie in the problem's domain. */
 [[nodiscard]] Drive TransitionsOf(const Recording& recording, const Problem& problem);

@@ -127,6 +127,15 @@ TEST_F(RealTest, KnowsTheErrorOfItsStates) {
   EXPECT_EQ(recording.deviation[5], 0);
 }
 
+TEST_F(RealTest, MeasuresHowLateSteeringIsFelt) {
+  // The made-up car answers to half after lag * log 2, and the fit of 35 ms to either side adds nothing to that.
+  const Recording recording =
+      ReadRecording(scratch_.Write("lag.csv", MakeLog({.lag = 0.07, .yaw_noise = 1e-5}, 40, 1)));
+  const std::vector<double> delays = SteeringDelays(recording);
+  ASSERT_GT(delays.size(), 5u);
+  for (const double delay : delays) EXPECT_NEAR(delay, 0.07 * std::log(2), 0.015);
+}
+
 TEST_F(RealTest, OnlyStepsInWhichTheCarDrivesCount) {
   const Drive drive = DriveOf({}, 20, 1);
   ASSERT_GT(drive.transitions.size(), 100);
