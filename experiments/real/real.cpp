@@ -21,8 +21,9 @@ struct Grid {
   std::vector<double> quantiles{0.9, 0.95, 0.98, 0.985, 0.99, 0.995, 1}, slope_quantiles{0.9, 0.98, 0.995},
       factors{1, 1.5, 2};
   std::vector<int> sizes{50, 100, 200, 400};
+  std::vector<double> changes{0.1, 0.2, 0.3, 0.5}, change_quantiles{0.985, 1};
 };
-const Grid kWhole, kQuick{{0.9, 0.985, 1}, {0.995}, {1, 2}, {100}};
+const Grid kWhole, kQuick{{0.9, 0.985, 1}, {0.995}, {1, 2}, {100}, {0.2}, {1}};
 
 constexpr int kShort = 5, kLong = 10;  // steps of a window
 constexpr double kChosen = 0.985;      // the quantile of the tables that vary something else, and of the task
@@ -67,6 +68,8 @@ const Field kLearnedFrom{"learned from", [](const Trial&t) { return t.learned_fr
     kFactor{"factor on L", [](const Trial&t) { return t.options.slopes ? Text("%g", t.factor) : "L = 0"; }},
     kLargestSlope{"largest slope",
                   [](const Trial&t) { return Text("%.3g", t.learned.problem->declaration.lipschitz.maxCoeff()); }},
+    kChange{"steering, at most",
+            [](const Trial&t) { return Text("%.2g", t.learned.problem->domain.inequalities.front().bound); }},
     kLeftOut{"left out", [](const Trial&t) { return std::to_string(t.learned.left_out); }},
     kSteps{"steps", [](const Trial&t) { return std::to_string(t.judged.steps); }},
     kWindows{"windows", [](const Trial&t) { return std::to_string(t.judged.windows.size()); }},
@@ -98,6 +101,7 @@ std::vector<Field> AllFields() {
                          kQuantile,
                          kFactor,
                          kLargestSlope,
+                         kChange,
                          kLeftOut,
                          kSteps,
                          kWindows,
@@ -170,10 +174,10 @@ struct Study {
     return all;
   }
   // Alternate blocks of all drives, either way: the trials' counts are those of both together.
-  [[nodiscard]] std::vector<Fold> BothWays(int most = 0) const {
+  [[nodiscard]] std::vector<Fold> BothWays(const Problem& problem, int most = 0) const {
     std::vector<Fold> folds;
     for (const bool odd : {false, true})
-      folds.push_back({names, "the blocks between", FitTo(driving, BlocksOfAll(odd), most), BlocksOfAll(!odd)});
+      folds.push_back({names, "the blocks between", FitTo(problem, BlocksOfAll(odd), most), BlocksOfAll(!odd)});
     return folds;
   }
 
@@ -201,12 +205,17 @@ struct Study {
   }
 
   void Run() {
-    const std::vector<Fold> folds = BothWays();
+    const std::vector<Fold> folds = BothWays(driving);
     for (const double quantile : grid.quantiles) Try("quantile", folds, {.quantile = quantile}, {1}, {kShort, kLong});
     for (const double quantile : grid.slope_quantiles)
       Try("slopes", folds, {.quantile = quantile, .slopes = true}, grid.factors, {kShort});
-    for (const int size : grid.sizes) Try("size", BothWays(size), {.quantile = kChosen}, {1}, {kShort});
+    for (const int size : grid.sizes) Try("size", BothWays(driving, size), {.quantile = kChosen}, {1}, {kShort});
     Try("size", folds, {.quantile = kChosen}, {1}, {kShort});
+    for (const double change : grid.changes) {
+      const std::vector<Fold> gentle = BothWays(DrivingProblem(change));
+      for (const double quantile : grid.change_quantiles)
+        Try("steering", gentle, {.quantile = quantile}, {1}, {kShort});
+    }
     for (const Drive& from : drives)
       Try("drives",
           {{from.name + ", every other block", "the blocks between", FitTo(driving, Blocks(from, false)),
@@ -312,6 +321,9 @@ std::string Report(const Study& study, const Learned& chosen, const RealOptions&
          "\n## Against the factor on L\n" +
          Markdown(study.trials, "slopes", With({kQuantile, kFactor, kLargestSlope, kWindows, kComplete}, outcome)) +
          "\n## Against N\n" + Markdown(study.trials, "size", With({kCount, kWindows, kComplete}, outcome)) +
+         "\n## Against the change of steering from step to step\n" +
+         Markdown(study.trials, "steering",
+                  With({kChange, kQuantile, kOutside, kWindows, kComplete}, With(outcome, corridors))) +
          "\n## Against the drive\n" +
          Markdown(study.trials, "drives",
                   With({kLearnedFrom, kJudgedBy, kCount, kOutside, kWindows, kComplete, kDistance}, outcome));
@@ -380,9 +392,9 @@ std::string Task(const Learned& learned, const Fit& fit) {
   for (const FittedParameter& each : fit.parameters)
     parameters += (parameters.empty() ? "" : ", ") + each.name + ": " + Text("%.17g", each.after);
   const Eigen::VectorXd start = problem.transitions.z.row(0).head(6);
-  return "# Learned from logs: an assumption, not a proof. docs/real-car.md.\nmodel: {file: " +
-         std::string(FOREREACH_SOURCE_DIR) + "/experiments/real/car.yaml, parameters: {" + parameters +
-         "}}\ndomain:\n  state: {lower: " + List(problem.domain.state.lower()) +
+  return "# Learned from logs: an assumption, not a proof. docs/real-car.md.\nmodel: {file: real-model.yaml, "
+         "parameters: {" +
+         parameters + "}}\ndomain:\n  state: {lower: " + List(problem.domain.state.lower()) +
          ", upper: " + List(problem.domain.state.upper()) +
          "}\n  input: {lower: " + List(problem.domain.input.lower()) +
          ", upper: " + List(problem.domain.input.upper()) +
@@ -409,6 +421,7 @@ void RunReal(const RealOptions& options, std::ostream& out) {
       report += "\n![" + plot.caption + "](figures/" + plot.name + ".svg)\n\n" + plot.caption + "\n";
   WriteFile(options.directory / "real.csv", Csv(study.trials));
   WriteFile(options.directory / "real.md", report);
+  fs::copy_file(kModelFile, options.directory / "real-model.yaml", fs::copy_options::overwrite_existing);
   WriteFile(options.directory / "real-task.yaml", Task(chosen.learned, study.fit));
   SaveTransitions((options.directory / "real-transitions.csv").string(), *chosen.learned.problem->model,
                   chosen.learned.problem->transitions);

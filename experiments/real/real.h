@@ -19,7 +19,7 @@ struct RealOptions {
 /** Writes
     DIR/real.md, real.csv                     the tables, also printed to `out`; a line of the CSV for each trial
     DIR/figures/real-*.svg, plots/real-*.gp   the pictures
-    DIR/real-task.yaml, real-transitions.csv  what was learned, for every other command
+    DIR/real-task.yaml, real-model.yaml, real-transitions.csv  what was learned, for every other command
 The same files from the same data. @throws ConfigError if data cannot be read or hold too little; the message says where
 to get them. Cost: about a minute for two drives of one and a half. */
 void RunReal(const RealOptions& options, std::ostream& out);

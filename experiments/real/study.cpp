@@ -13,6 +13,9 @@
 #include "identify/smallest_row.h"
 
 namespace forereach::experiments {
+
+const char* const kModelFile = FOREREACH_SOURCE_DIR "/experiments/real/car.yaml";
+
 namespace {
 
 constexpr double kBlock = 10, kStep = 0.1;  // s
@@ -64,10 +67,10 @@ Domain CoveredBy(const Domain& driving, const Transitions& transitions) {
     lower[k] = low - (high - low) / 10;
     upper[k] = high + (high - low) / 10;
   }
-  return {Box(lower, upper),
-          Box(transitions.z.rightCols(2).colwise().minCoeff(), transitions.z.rightCols(2).colwise().maxCoeff()),
-          {},
-          {}};
+  Domain covered = driving;
+  covered.state = Box(lower, upper);
+  covered.input = Box(transitions.z.rightCols(2).colwise().minCoeff(), transitions.z.rightCols(2).colwise().maxCoeff());
+  return covered;
 }
 
 ModelText WithParameters(ModelText text, const Fit& fit) {
@@ -217,14 +220,20 @@ WindowResult JudgeWindow(const Certifier& certifier, const Learned& learned, con
 
 }  // namespace
 
-Problem DrivingProblem() {
+Problem DrivingProblem(double most_change) {
   Problem problem;
-  problem.model = MakeTextModel(LoadModelFile(FOREREACH_SOURCE_DIR "/experiments/real/car.yaml"));
+  problem.model = MakeTextModel(LoadModelFile(kModelFile));
   const Eigen::VectorXd state{{kFar, kFar, kFar, kFastest, kSharpest, 1}}, steer{{-1, kPower}};
   Eigen::VectorXd lowest = -state;
   lowest[kV] = kSlowest;
   problem.domain.state = Box(lowest, state);
   problem.domain.input = Box(steer, Eigen::VectorXd::Ones(2));
+  for (const double sign : {1.0, -1.0}) {
+    Eigen::VectorXd change = Eigen::VectorXd::Zero(8);
+    change[kSteer] = sign;
+    change[kBefore] = -sign;
+    problem.domain.inequalities.push_back({change, most_change + kRounding});
+  }
   problem.declaration = {Eigen::MatrixXd::Zero(6, 8), Eigen::VectorXd::Zero(6), Eigen::VectorXd::Zero(6)};
   problem.projection = Eigen::MatrixXd::Identity(2, 6);
   return problem;
@@ -248,7 +257,7 @@ std::vector<Stretch> Blocks(const Drive& drive, bool odd) {
 std::vector<Stretch> Whole(const Drive& drive) { return {{&drive, 0, drive.transitions.size()}}; }
 
 Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most) {
-  Fitted fitted{driving, Thinned(Gather(stretches, nullptr), most), {}, StateErrorOf(stretches)};
+  Fitted fitted{driving, Thinned(Gather(stretches, &driving.domain), most), {}, StateErrorOf(stretches)};
   if (fitted.transitions.size() == 0) throw std::invalid_argument("there are no transitions to learn from");
   fitted.fit = FitTwice(*driving.model->text(), fitted.transitions);
   fitted.driving.model = MakeTextModel(WithParameters(*driving.model->text(), fitted.fit));
@@ -258,7 +267,8 @@ Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int 
 Learned Learn(const Fitted& fitted, const LearnOptions& options) {
   const Transitions& all = fitted.transitions;
   auto problem = std::make_shared<Problem>(fitted.driving);
-  problem->domain = CoveredBy(problem->domain, options.domain_of.empty() ? all : Gather(options.domain_of, nullptr));
+  problem->domain =
+      CoveredBy(problem->domain, options.domain_of.empty() ? all : Gather(options.domain_of, &problem->domain));
   Declaration& declaration = problem->declaration;
   declaration.noise_bound = fitted.state_error.array() + kRounding;
   declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);

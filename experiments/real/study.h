@@ -12,10 +12,14 @@
 
 namespace forereach::experiments {
 
+/** car.yaml */
+extern const char* const kModelFile;
+
 /** The model of car.yaml with the domain in which a car drives: at 1 m/s or more, under power. Place and heading are
 free.
+@param most_change of the steering command from one step to the next; 2 is from end to end.
 @throws ConfigError if the file cannot be read. */
-[[nodiscard]] Problem DrivingProblem();
+[[nodiscard]] Problem DrivingProblem(double most_change = 2);
 
 /** A part of a drive: transitions begin <= i < end. */
 struct Stretch {
@@ -36,7 +40,8 @@ struct Fitted {
   Eigen::VectorXd state_error;  ///< Of a measured state: three standard errors, the largest of the drives.
 };
 
-/** @param driving DrivingProblem(). @param most from so many transitions only, evenly chosen; 0: from all.
+/** @param driving DrivingProblem, to whose domain the transitions are cut. @param most from so many transitions only,
+evenly chosen; 0: from all.
 @throws std::invalid_argument if there are too few transitions. Cost: about a second for 700 transitions. */
 [[nodiscard]] Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most = 0);
 

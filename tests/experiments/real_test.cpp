@@ -147,6 +147,22 @@ TEST_F(RealTest, OnlyStepsInWhichTheCarDrivesCount) {
   EXPECT_EQ(DriveOf({.cut = true}, 20, 2).transitions.size(), 0);
 }
 
+TEST_F(RealTest, TheDomainMayLeaveOutHastySteering) {
+  const Drive drive = DriveOf({}, 30, 1);
+  const Learned any = Learn(FitTo(driving_, Whole(drive)), {}),
+                gentle = Learn(FitTo(DrivingProblem(0.2), Whole(drive)), {.quantile = 1});
+  const auto largest = [](const Transitions& transitions) {
+    return (transitions.z.col(6) - transitions.z.col(5)).cwiseAbs().maxCoeff();
+  };
+  EXPECT_GT(largest(any.problem->transitions), 0.5);
+  EXPECT_LE(largest(gentle.problem->transitions), 0.2 + 1e-6);
+  EXPECT_EQ(Judge(any, Whole(drive), 5).outside_domain, 0);
+  const Judgement judged = Judge(gentle, Whole(drive), 5);
+  EXPECT_GT(judged.outside_domain, 5);
+  EXPECT_EQ(judged.outside_domain + judged.transitions, drive.transitions.size());
+  EXPECT_EQ(judged.beyond, 0);
+}
+
 TEST_F(RealTest, BlocksTakeEachTransitionOnceAndNoneAcrossAnEnd) {
   const Drive drive = DriveOf({}, 45, 1);
   std::vector<int> taken(static_cast<std::size_t>(drive.transitions.size()), 0);
