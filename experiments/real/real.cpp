@@ -141,7 +141,7 @@ std::string Markdown(const std::vector<Trial>& trials, const std::string& table,
   for (const Trial& trial : trials) {
     if (trial.table != table) continue;
     text += "|";
-    for (const Field& field : fields) text += " " + field.text(trial) + " |";
+    for (const Field& field : fields) text.append(" ").append(field.text(trial)).append(" |");
     text += "\n";
   }
   return text;
@@ -185,6 +185,7 @@ struct Study {
   void Try(const std::string& table, const std::vector<Fold>& folds, const LearnOptions& options,
            const std::vector<double>& factors, const std::vector<int>& lengths) {
     std::vector<Learned> learned;
+    learned.reserve(folds.size());
     for (const Fold& fold : folds) learned.push_back(Learn(fold.fitted, options));
     if (!std::ranges::all_of(learned, &Learned::explained)) return;
     for (const double factor : factors)

@@ -55,6 +55,7 @@ Transitions RowsAt(const Transitions& transitions, const std::vector<int>& rows)
 Transitions Thinned(const Transitions& transitions, int most) {
   if (most <= 0 || most >= transitions.size()) return transitions;
   std::vector<int> rows;
+  rows.reserve(ToSize(most));
   for (int i = 0; i < most; ++i)
     rows.push_back(static_cast<int>(static_cast<std::int64_t>(i) * transitions.size() / most));
   return RowsAt(transitions, rows);
