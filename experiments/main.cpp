@@ -5,9 +5,11 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "command_line/command_line.h"
 #include "experiments/chunks/training.h"
+#include "experiments/real/real.h"
 #include "experiments/run.h"
 
 using namespace forereach::experiments;
@@ -23,6 +25,7 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-experiments recall --seeds 3       one experiment on three of the ten seeds
   forereach-experiments all --out run/paper    everything, in minutes
   forereach-experiments train                  the policy of `chunks` and of config/policy.yaml, taught anew
+  forereach-experiments real --data ../dart    declarations from a real car's logs, judged by others: docs/real-car.md
 
 Exit: 0 done, 2 bad usage or a file that cannot be used.)";
 
@@ -50,12 +53,14 @@ int main(int argc, char** argv) {
   options.threads = std::max(1u, std::thread::hardware_concurrency());
   std::string directory, report;
 
-  std::string name, policy = "config/policies/bicycle.json";
+  std::string name, policy = "config/policies/bicycle.json", data;
+  std::vector<std::string> others;
   Command program{
       .name = "forereach-experiments",
       .purpose = "The paper's experiments, done again.",
       .footer = kFooter,
-      .options = {{"--quick", &quick, "", "2 seeds, 30 plans a group, 24 rollouts a plan, the smallest and largest N"},
+      .options = {{"--quick", &quick, "",
+                   "2 seeds, 30 plans a group, 24 rollouts a plan, the smallest and largest N; `real`: shorter tables"},
                   {"--seeds", &seeds, "", "how many seeds; the paper has 10", NumberRange{1, 1000}},
                   {"--threads", &options.threads, "", "how many cells at once; results do not depend on it",
                    NumberRange{1, 1024}},
@@ -69,6 +74,11 @@ int main(int argc, char** argv) {
   program.commands.push_back({.name = "train",
                               .purpose = "make the policy that `chunks` asks for its plans",
                               .options = {{"--policy", &policy, "", "where it goes"}}});
+  program.commands.push_back(
+      {.name = "real",
+       .purpose = "what a declaration from a real car's logs is worth on other logs of it",
+       .options = {{"--data", &data, "FOLDER", "the drives: every CSV file of the recorder"},
+                   {"--other", &others, "FILE.csv", "a drive to judge by only; may be repeated"}}});
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
   for (const Experiment& experiment : Experiments())
@@ -82,7 +92,10 @@ int main(int argc, char** argv) {
       "experiments/run " + name + (quick ? " --quick" : "") + (seeds ? " --seeds " + std::to_string(*seeds) : "");
   try {
     if (name == "train") return Train(policy, options.threads), 0;
-    RunExperiments(options, std::cout);
+    if (name == "real")
+      RunReal({data, others, options.directory, quick, options.command + " --data " + data}, std::cout);
+    else
+      RunExperiments(options, std::cout);
   } catch (const std::exception& error) {
     std::cerr << "forereach-experiments: " << error.what() << "\n";
     return 2;
