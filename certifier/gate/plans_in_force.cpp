@@ -202,6 +202,7 @@ std::optional<PlansInForce::Due> PlansInForce::TakeDue(std::int64_t now_us, std:
     message.utime = now_us;
     message.sequence = sequence_++;
     const bool is_repetition = !entry.sent.empty();
+    if (entry.sent.size() == kMostSent) entry.sent.pop_front();
     entry.sent.push_back(message.sequence);
     return Due{message, is_repetition};
   }

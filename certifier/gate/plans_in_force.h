@@ -33,7 +33,6 @@ No bus, no clock. Times of a monotonic clock and of the wall clock in microsecon
 #include <deque>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "certifier/gate/gate.h"
 #include "certifier/task/gate_options.h"
@@ -50,6 +49,7 @@ class PlansInForce final {
   static constexpr std::size_t kPlans = 32768;  ///< Capacity.
   static constexpr std::size_t kJudged = 16;
   static constexpr std::int64_t kRepeatUs = 50'000;
+  static constexpr std::size_t kMostSent = 256;  ///< Repetitions of which an answer counts: those of 12.8 s.
 
   struct Due {
     withdrawal_t message;
@@ -101,7 +101,7 @@ class PlansInForce final {
     int standing_steps = 0;
     bool is_changed = false;                   // what it rests on, since it was judged
     std::unique_ptr<withdrawal_t> withdrawal;  // the last one, until it is answered
-    std::vector<std::int64_t> sent;            // the sequences of that one and of its repetitions
+    std::deque<std::int64_t> sent;             // the sequences of that one and of its last kMostSent repetitions
     std::int64_t next_us = 0;                  // when to send it, by the monotonic clock
   };
   struct Premises {
