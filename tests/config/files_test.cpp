@@ -173,12 +173,21 @@ TEST_F(ReloadingTest, NobodyWaitsForOneThatNeverEnds) {
   EXPECT_EQ(reloads_under_way, 1);
 }
 
+TEST_F(ReloadingTest, NoneStallsBeforeItsTime) {
+  mount_->Set(1, true);
+  Reloading<int> reloads = Reloads(std::chrono::hours(1));
+  EXPECT_TRUE(reloads.Ask());
+  mount_->AwaitReaders(1);
+  EXPECT_FALSE(reloads.TakeStall());
+  mount_->Set(1, false);
+  EXPECT_EQ(Await(reloads), 1);
+}
+
 TEST_F(ReloadingTest, AGoodOneAfterOneThatStallsIsTaken) {
   mount_->Set(1, true);
   Reloading<int> reloads = Reloads(milliseconds(20));
   EXPECT_TRUE(reloads.Ask());
   mount_->AwaitReaders(1);
-  EXPECT_FALSE(reloads.TakeStall());
   {
     const std::lock_guard lock(mount_->mutex);
     mount_->value = 2;
