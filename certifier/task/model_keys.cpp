@@ -1,5 +1,7 @@
 // The rows of the nominal model: one of the library, or equations as text, in the task file or in a model file.
 #include <algorithm>
+#include <cctype>
+#include <cstddef>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -23,6 +25,7 @@ using Integrator = ModelText::Integrator;
 
 constexpr Range kStep = UpTo(60);
 constexpr int kMostNames = 1000;  // of parameters, and of definitions
+constexpr std::size_t kLongestUnit = 64;
 constexpr const char *kStepName = "dt", *kNextEnding = "_next";
 
 constexpr const char* kAngles = "model.angles";
@@ -103,8 +106,12 @@ class TextReader final {
 
   void ReadVariables(const std::string& map, int most, std::vector<ModelText::Variable>& variables) {
     if (!Has(file_, "model", map)) file_.Fail("model." + map, "missing: a model as text needs this key");
-    for (const std::string& name : NamesOf(map, 1, most))
-      variables.push_back({name, file_.Text("model." + map + "." + name)});
+    for (const std::string& name : NamesOf(map, 1, most)) {
+      const std::string key = "model." + map + "." + name, unit = file_.Text(key);
+      if (unit.size() > kLongestUnit || std::ranges::any_of(unit, [](unsigned char c) { return std::iscntrl(c) != 0; }))
+        file_.Fail(key, "a unit has at most " + std::to_string(kLongestUnit) + " bytes and no control characters");
+      variables.push_back({name, unit});
+    }
     if (&variables == &text_.states) return;
     for (const ModelText::Variable& state : text_.states)  // a column of transitions
       if (const std::string next = state.name + kNextEnding; meanings_.contains(next))

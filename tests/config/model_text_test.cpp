@@ -165,6 +165,16 @@ TEST_F(ModelTextTest, Names) {
             "task.yaml:4: model.parameters." + longest + ": ...: the name has 65 letters, at most 64 are allowed");
 }
 
+// They are written into headers and new tasks, as comments.
+TEST_F(ModelTextTest, UnitsAreOneShortLine) {
+  const std::string error = "task.yaml:2: model.states.px: a unit has at most 64 bytes and no control characters";
+  EXPECT_EQ(ErrorWith("px: m,", "px: \"m\\nx\","), error);
+  EXPECT_EQ(ErrorWith("px: m,", "px: \"m\\r\","), error);
+  EXPECT_EQ(ErrorWith("px: m,", "px: " + std::string(65, 'm') + ","), error);
+  EXPECT_EQ(ErrorWith("px: m,", "px: " + std::string(64, 'm') + ","), "");
+  EXPECT_EQ(ErrorWith("px: m,", "px: \"\u00b0/s\","), "");
+}
+
 TEST_F(ModelTextTest, EachStateHasItsEquation) {
   EXPECT_EQ(ErrorWith("    vx: vx + dt*(ax - loss*vx)\n", ""),
             "task.yaml:9: model.next.vx: missing: each state needs its equation");
