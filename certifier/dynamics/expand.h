@@ -96,12 +96,12 @@ FOREREACH_INLINE PlainInterval TanRange(double tangent, const Turns& turns) {
 
 /** The functions below are for any node, or with an operation as kOp for the nodes that have it: a compiler then drops
 the other cases before it inlines them into the straight-line code of a program. */
-inline constexpr int kAnyOp = -1;
+inline constexpr Op kAnyOp{0xff};
 
 /** The value of an operation on numbers; not that of a variable, a parameter or a constant. */
-template <int kOp>
+template <Op kOp>
 FOREREACH_INLINE double ValueOf(const Operation& n, double a, double b) {
-  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
+  switch (kOp == kAnyOp ? n.op : kOp) {
     case Op::kVariable:
     case Op::kParameter: break;
     case Op::kConstant: return n.constant;
@@ -141,11 +141,11 @@ FOREREACH_INLINE PlainInterval Plain(const Interval& x) { return {x.lower, x.upp
 
 /** The range of an operation over ranges, by plain arithmetic where that is quick; not that of a variable, a parameter,
 a sine, a cosine or a tangent. */
-template <int kOp>
+template <Op kOp>
 FOREREACH_INLINE PlainInterval RangeOf(const Operation& n, const PlainInterval& a, const PlainInterval& b,
                                        bool a_is_number, bool b_is_number) {
   const auto exact = [](const PlainInterval& x) __attribute__((always_inline)) { return Interval(x.lower, x.upper); };
-  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
+  switch (kOp == kAnyOp ? n.op : kOp) {
     case Op::kConstant: return {n.constant, n.constant};
     case Op::kAdd: return a + b;
     case Op::kSubtract: return a - b;
@@ -185,10 +185,10 @@ FOREREACH_INLINE PlainInterval RangeOf(const Operation& n, const PlainInterval& 
 }
 
 /** Sets v[i], the value of node i at a point. */
-template <int kOp = kAnyOp>
+template <Op kOp = kAnyOp>
 FOREREACH_INLINE void EvaluateAtPoint(const Operation& n, std::size_t i, const double* parameters, const double* z,
                                       double* v) {
-  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
+  switch (kOp == kAnyOp ? n.op : kOp) {
     case Op::kVariable: v[i] = z[n.a]; break;
     case Op::kParameter: v[i] = parameters[n.a]; break;
     case Op::kTan: v[i] = v[n.b] / v[n.b + 1]; break;  // sine over cosine
@@ -203,11 +203,11 @@ constexpr bool IsNumber(const Program& program, int i) {
 
 /** Sets w[i], the range of node i over a box; v has the values at its center. Sine and cosine of one argument share
 their ends: the first of them that is needed sets both. */
-template <int kOp = kAnyOp>
+template <Op kOp = kAnyOp>
 FOREREACH_INLINE void EvaluateOverBox(const Program& program, std::size_t i, const double* parameters,
                                       const PlainInterval* box, const double* v, PlainInterval* w) {
   const Operation n = program.nodes[i];
-  switch (kOp == kAnyOp ? n.op : static_cast<Op>(kOp)) {
+  switch (kOp == kAnyOp ? n.op : kOp) {
     case Op::kVariable: w[i] = box[n.a]; break;
     case Op::kParameter: w[i] = {parameters[n.a], parameters[n.a]}; break;
     case Op::kSin: {
@@ -247,11 +247,11 @@ FOREREACH_INLINE void Expand(const double* parameters, const double* z, const Pl
   std::array<PlainInterval, kSize> w;
   ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) {
     constexpr Operation n = kProgram.nodes[i];
-    if constexpr (kProgram.at_point[i] != 0) EvaluateAtPoint<static_cast<int>(n.op)>(n, i, parameters, z, v.data());
+    if constexpr (kProgram.at_point[i] != 0) EvaluateAtPoint<n.op>(n, i, parameters, z, v.data());
   });
   ForEachConstant<kSize>([&](auto i) __attribute__((always_inline)) {
     if constexpr (kProgram.over_box[i] != 0)
-      EvaluateOverBox<static_cast<int>(kProgram.nodes[i].op)>(kProgram, i, parameters, box, v.data(), w.data());
+      EvaluateOverBox<kProgram.nodes[i].op>(kProgram, i, parameters, box, v.data(), w.data());
   });
   ForEachConstant<kProgram.states>([&](auto k) __attribute__((always_inline)) { out.value[k] = v[kProgram.value[k]]; });
   ForEachConstant<kProgram.num_first>([&](auto e) __attribute__((always_inline)) {
