@@ -26,6 +26,7 @@ struct Grid {
 const Grid kWhole, kQuick{{0.9, 0.985, 1}, {0.995}, {1, 2}, {100}, {0.2}, {1}};
 
 constexpr int kShort = 5, kLong = 10;  // steps of a window
+constexpr double kGentle = 0.3;        // change of steering from step to step, where each way is shown by itself
 constexpr double kChosen = 0.985;      // the quantile of the tables that vary something else, and of the task
 
 std::string Text(const char* format, double value) {
@@ -217,9 +218,11 @@ struct Study {
       for (const double quantile : grid.change_quantiles)
         Try("steering", gentle, {.quantile = quantile}, {1}, {kShort});
     }
+    TryEachWay(folds, "");
+    TryEachWay(BothWays(DrivingProblem(kGentle)), ", steering within " + Text("%g", kGentle));
     for (const Drive& from : drives)
       Try("drives",
-          {{from.name + ", every other block", "the blocks between", FitTo(driving, Blocks(from, false)),
+          {{from.name + ", even blocks", "the blocks between", FitTo(driving, Blocks(from, false)),
             Blocks(from, true)}},
           {.quantile = kChosen}, {1}, {kShort});
     for (const Drive& from : drives) {
@@ -234,6 +237,13 @@ struct Study {
     for (const Drive& by : others) rest.push_back(&by);
     TryDrives(names, all, rest);
     fit = folds.front().fitted.fit;
+  }
+  void TryEachWay(const std::vector<Fold>& folds, const std::string& domain) {
+    for (std::size_t i = 0; i < folds.size(); ++i) {
+      Fold fold = folds[i];
+      fold.learned_from += (i == 0 ? ", even blocks" : ", odd blocks") + domain;
+      Try("drives", {fold}, {.quantile = kChosen}, {1}, {kShort});
+    }
   }
   // In the domain of what was learned from, and in that of both.
   void TryDrives(const std::string& name, const Stretches& learn, const std::vector<const Drive*>& judges) {
@@ -325,7 +335,7 @@ std::string Report(const Study& study, const Learned& chosen, const RealOptions&
          "\n## Against the change of steering from step to step\n" +
          Markdown(study.trials, "steering",
                   With({kChange, kQuantile, kOutside, kWindows, kComplete}, With(outcome, corridors))) +
-         "\n## Against the drive\n" +
+         "\n## Against what it is learned from\n" +
          Markdown(study.trials, "drives",
                   With({kLearnedFrom, kJudgedBy, kCount, kOutside, kWindows, kComplete, kDistance}, outcome));
 }

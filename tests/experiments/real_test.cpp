@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -239,6 +240,27 @@ TEST_F(RealTest, LearningLeavesOutOrExplainsTheLargeErrors) {
   EXPECT_THROW((void)FitTo(driving_, {}), std::invalid_argument);
 }
 
+// docs/real-car.md's first figures. The folder of its drives is FOREREACH_REAL_CAR in the environment.
+TEST_F(RealTest, TheRealCarIsInsideAsTheDocumentSays) {
+  const char* folder = std::getenv("FOREREACH_REAL_CAR");
+  if (!folder) GTEST_SKIP() << "FOREREACH_REAL_CAR names no folder";
+  std::vector<Drive> drives;
+  for (const std::string& file : FindRecordings(folder)) drives.push_back(TransitionsOf(ReadRecording(file), driving_));
+  Judgement both;
+  both.steps = 5;
+  for (const bool odd : {false, true}) {
+    std::vector<Stretch> learn, judge;
+    for (const Drive& drive : drives) {
+      for (const Stretch& block : Blocks(drive, odd)) learn.push_back(block);
+      for (const Stretch& block : Blocks(drive, !odd)) judge.push_back(block);
+    }
+    both.Add(Judge(Learn(FitTo(driving_, learn), {.quantile = 0.985}), judge, both.steps));
+  }
+  EXPECT_GT(both.windows.size(), 200u);
+  EXPECT_GE(both.inside(), 0.99 * both.slices());
+  EXPECT_LE(*both.HalfWidth(), 0.15);
+}
+
 TEST_F(RealTest, RefusesWhatIsNoDrive) {
   const std::string log = MakeLog({}, 1, 1);
   ExpectRefusal("time,x\n1,2\n", "");
@@ -287,10 +309,10 @@ Output Command(const std::string& arguments) {
 TEST_F(RealTest, TheCommandWritesTablesAndATaskThatOthersRead) {
   const fs::path data = scratch_ / "data", out = scratch_ / "out";
   fs::create_directories(data);
-  std::ofstream(data / "run_a.csv") << MakeLog({}, 35, 1);
-  std::ofstream(data / "run_b.csv") << MakeLog({.throttle = 0.33}, 35, 2);
+  std::ofstream(data / "run_a.csv") << MakeLog({}, 26, 1);
+  std::ofstream(data / "run_b.csv") << MakeLog({.throttle = 0.33}, 26, 2);
   std::ofstream(data / "transitions.csv") << "something,else\n1,2\n";
-  const std::string other = scratch_.Write("run_c.csv", MakeLog({}, 25, 3));
+  const std::string other = scratch_.Write("run_c.csv", MakeLog({}, 15, 3));
   const Output run = Command("--quick --data " + data.string() + " --other " + other + " --out " + out.string());
   ASSERT_EQ(run.code, 0) << run.text;
   EXPECT_THAT(run.text, HasSubstr("an assumption"));
