@@ -83,7 +83,7 @@ void Witness::OnCertified(const Received& received) {
 void Witness::OnState(const Received& received) {
   robot_heard_ = std::chrono::steady_clock::now();
   const auto state = Decoded<robot_state_t>(received.bytes);
-  if (!state || state->mode != robot_state_t::EXECUTING) return;
+  if (!state || state->mode != robot_state_t::EXECUTING || state->sequence >= kFirstLie) return;
   applied_[state->utime] = {state->executing_plan_id, state->executing_step};
   const auto withdrawn = withdrawn_.find(state->executing_plan_id);
   if (withdrawn != withdrawn_.end() && state->utime > withdrawn->second.utime &&

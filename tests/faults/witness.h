@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -25,6 +26,9 @@ namespace forereach {
 
 class Witness final {
  public:
+  /** States of the robot with this sequence or a later one are the campaign's lies, and show nothing that a robot does. */
+  static constexpr std::int64_t kFirstLie = 1 << 30;
+
   /** @param bus hands out authentic messages only.
   @param spoiled if somebody between the certifier and this drops, repeats, delays or alters messages: the numbers of
   decisions are then not judged. */
