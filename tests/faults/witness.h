@@ -26,7 +26,8 @@ namespace forereach {
 
 class Witness final {
  public:
-  /** States of the robot with this sequence or a later one are the campaign's lies, and show nothing that a robot does. */
+  /** States of the robot with this sequence or a later one are the campaign's lies, and show nothing that a robot does.
+   */
   static constexpr std::int64_t kFirstLie = 1 << 30;
 
   /** @param bus hands out authentic messages only.
