@@ -151,7 +151,7 @@ struct Study {
   bool quick;
 
   [[nodiscard]] std::vector<Drive> Make(double most_lateral, std::uint64_t seed, double dt = kDt) const {
-    return RandomDrives({.dt = dt, .most_lateral = most_lateral, .drives = quick ? 2 : 20, .seed = seed});
+    return RandomDrives({.dt = dt, .most_lateral = most_lateral, .drives = quick ? 2 : 10, .seed = seed});
   }
 };
 
