@@ -2,9 +2,11 @@
 for CommonRoad's single-track drift model, and what it is worth on fresh drives. */
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <iosfwd>
 #include <string>
+#include <vector>
 
 #include "experiments/drift/single_track_drift.h"
 #include "experiments/real/study.h"
