@@ -9,6 +9,7 @@
 
 #include "command_line/command_line.h"
 #include "experiments/chunks/training.h"
+#include "experiments/drift/drift.h"
 #include "experiments/real/real.h"
 #include "experiments/run.h"
 
@@ -26,6 +27,7 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-experiments all --out run/paper    everything, in minutes
   forereach-experiments train                  the policy of `chunks` and of config/policy.yaml, taught anew
   forereach-experiments real --data ../dart    declarations from a real car's logs, judged by others: docs/real-car.md
+  forereach-experiments drift                  a published car of nine states: docs/higher-order-car.md
 
 Exit: 0 done, 2 bad usage or a file that cannot be used.)";
 
@@ -79,6 +81,8 @@ int main(int argc, char** argv) {
        .purpose = "what a declaration from a real car's logs is worth on other logs of it",
        .options = {{"--data", &data, "FOLDER", "the drives: every CSV file of the recorder"},
                    {"--other", &others, "FILE.csv", "a drive to judge by only; may be repeated"}}});
+  program.commands.push_back(
+      {.name = "drift", .purpose = "what has to be declared for CommonRoad's single-track drift model, and its worth"});
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
 
   for (const Experiment& experiment : Experiments())
@@ -94,6 +98,8 @@ int main(int argc, char** argv) {
     if (name == "train") return Train(policy, options.threads), 0;
     if (name == "real")
       RunReal({data, others, options.directory, quick, options.command + " --data " + data}, std::cout);
+    else if (name == "drift")
+      RunDrift({options.directory, quick, options.command}, std::cout);
     else
       RunExperiments(options, std::cout);
   } catch (const std::exception& error) {

@@ -23,7 +23,6 @@ constexpr double kWall = 0.05;              // m, thickness of a corridor's wall
 
 // Coordinates of z in car.yaml.
 enum Coordinate { kX, kY, kYaw, kV, kR, kBefore, kSteer, kThrottle };
-const std::vector<int> kResidualColumns{kV, kR, kBefore, kSteer, kThrottle};
 
 // A limit on place and heading that no drive reaches; an error that covers the rounding of a mean of commands.
 constexpr double kFar = 1000, kRounding = 1e-9;
@@ -40,7 +39,9 @@ Transitions Gather(const std::vector<Stretch>& stretches, const Domain* domain) 
       z.emplace_back(location.transpose());
       next.emplace_back(stretch.drive->transitions.x_next.row(i));
     }
-  Transitions all{Eigen::MatrixXd(std::ssize(z), 8), Eigen::MatrixXd(std::ssize(z), 6)};
+  Transitions all;
+  if (z.empty()) return all;
+  all = {Eigen::MatrixXd(std::ssize(z), z.front().size()), Eigen::MatrixXd(std::ssize(z), next.front().size())};
   for (std::size_t i = 0; i < z.size(); ++i) {
     all.z.row(static_cast<Eigen::Index>(i)) = z[i];
     all.x_next.row(static_cast<Eigen::Index>(i)) = next[i];
@@ -61,16 +62,18 @@ Transitions Thinned(const Transitions& transitions, int most) {
   return RowsAt(transitions, rows);
 }
 
-Domain CoveredBy(const Domain& driving, const Transitions& transitions) {
+Domain CoveredBy(const Domain& driving, const Transitions& transitions, const std::vector<int>& felt) {
   Eigen::VectorXd lower = driving.state.lower(), upper = driving.state.upper();
-  for (const int k : {kV, kR, kBefore}) {
+  for (const int k : felt) {
+    if (k >= lower.size()) continue;
     const double low = transitions.z.col(k).minCoeff(), high = transitions.z.col(k).maxCoeff();
     lower[k] = low - (high - low) / 10;
     upper[k] = high + (high - low) / 10;
   }
   Domain covered = driving;
   covered.state = Box(lower, upper);
-  covered.input = Box(transitions.z.rightCols(2).colwise().minCoeff(), transitions.z.rightCols(2).colwise().maxCoeff());
+  const auto inputs = transitions.z.rightCols(driving.input.lower().size());
+  covered.input = Box(inputs.colwise().minCoeff(), inputs.colwise().maxCoeff());
   return covered;
 }
 
@@ -110,8 +113,10 @@ Eigen::VectorXd QuantilesOf(const Eigen::MatrixXd& errors, double share) {
 }
 
 Eigen::VectorXd StateErrorOf(const std::vector<Stretch>& stretches) {
-  Eigen::VectorXd largest = Eigen::VectorXd::Zero(6);
-  for (const Stretch& stretch : stretches) largest = largest.cwiseMax(3 * stretch.drive->deviation);
+  Eigen::VectorXd largest;
+  for (const Stretch& stretch : stretches)
+    largest = largest.size() == 0 ? Eigen::VectorXd(3 * stretch.drive->deviation)
+                                  : largest.cwiseMax(3 * stretch.drive->deviation);
   return largest;
 }
 
@@ -123,13 +128,14 @@ std::vector<int> RowsWithin(const Eigen::MatrixXd& errors, const Eigen::VectorXd
 }
 
 // The smallest slopes; false if there are none.
-bool SetSlopes(Declaration& declaration, const NominalModel& model, const Transitions& transitions) {
+bool SetSlopes(Declaration& declaration, const NominalModel& model, const Transitions& transitions,
+               const std::vector<int>& felt) {
   const Observations observations = Observe(model, transitions);
   const Eigen::RowVectorXd all = ScalesOf(observations);
   Eigen::RowVectorXd scales = Eigen::RowVectorXd::Constant(all.size(), -1);
-  for (const int l : kResidualColumns)
+  for (const int l : felt)
     if (all[l] > 0) scales[l] = all[l];
-  for (int k = 0; k < kBefore; ++k) {
+  for (int k = 0; k < static_cast<int>(transitions.x_next.cols()); ++k) {
     const SmallestRow row = FindSmallestRow(declaration, observations, k, scales);
     if (row.unexplained) return false;
     declaration.lipschitz.row(k) = row.slopes;
@@ -144,17 +150,6 @@ Eigen::VectorXd EpsilonOf(const Declaration& declaration) {
 }
 
 // ---- judging
-
-Eigen::MatrixXd ErrorsOf(const NominalModel& model, const Transitions& transitions) {
-  Eigen::MatrixXd errors(transitions.size(), 6);
-  Eigen::VectorXd z, next(6);
-  for (Eigen::Index i = 0; i < errors.rows(); ++i) {
-    z = transitions.z.row(i);
-    model.Evaluate({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())});
-    errors.row(i) = transitions.x_next.row(i) - next.transpose();
-  }
-  return errors;
-}
 
 int CountContradicting(const Problem& problem, const Transitions& judged) {
   Problem both = problem;
@@ -184,12 +179,13 @@ std::vector<Obstacle> CorridorAbout(const Eigen::Matrix2Xd& path, double half_wi
 
 WindowResult JudgeWindow(const Certifier& certifier, const Learned& learned, const Transitions& judged,
                          const Window& window, Tube& tube) {
-  const int steps = window.steps;
-  Eigen::MatrixXd states(6, steps + 1);
-  states.leftCols(steps) = judged.z.block(window.begin, 0, steps, 6).transpose();
+  const int steps = window.steps, count = static_cast<int>(judged.x_next.cols()),
+            inputs = static_cast<int>(judged.z.cols()) - count;
+  Eigen::MatrixXd states(count, steps + 1);
+  states.leftCols(steps) = judged.z.block(window.begin, 0, steps, count).transpose();
   states.col(steps) = judged.x_next.row(window.begin + steps - 1);
-  const Eigen::MatrixXd controls = judged.z.block(window.begin, kSteer, steps, 2).transpose();
-  const Plan plan{controls.data(), 2, steps, 2};
+  const Eigen::MatrixXd controls = judged.z.block(window.begin, count, steps, inputs).transpose();
+  const Plan plan{controls.data(), inputs, steps, inputs};
   const Zonotope start = Zonotope::FromBox(states.col(0), learned.state_error);
 
   WindowResult result;
@@ -200,7 +196,7 @@ WindowResult JudgeWindow(const Certifier& certifier, const Learned& learned, con
   result.half_width.resize(2, tube.length() + 1);
   for (int t = 0; t <= tube.length(); ++t) {
     bool in = true;
-    for (int k = 0; k < 6; ++k) {
+    for (int k = 0; k < count; ++k) {
       const Interval hull = tube.hull(t, k);
       const double x = states(k, t), error = learned.state_error[k] + kRounding;
       in &= hull.lower - error <= x && x <= hull.upper + error;
@@ -220,6 +216,18 @@ WindowResult JudgeWindow(const Certifier& certifier, const Learned& learned, con
 }
 
 }  // namespace
+
+Eigen::MatrixXd ErrorsOf(const NominalModel& model, const Transitions& transitions) {
+  const Eigen::Index states = transitions.x_next.cols();
+  Eigen::MatrixXd errors(transitions.size(), states);
+  Eigen::VectorXd z, next(states);
+  for (Eigen::Index i = 0; i < errors.rows(); ++i) {
+    z = transitions.z.row(i);
+    model.Evaluate({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())});
+    errors.row(i) = transitions.x_next.row(i) - next.transpose();
+  }
+  return errors;
+}
 
 Problem DrivingProblem(double most_change) {
   Problem problem;
@@ -257,8 +265,19 @@ std::vector<Stretch> Blocks(const Drive& drive, bool odd) {
 
 std::vector<Stretch> Whole(const Drive& drive) { return {{&drive, 0, drive.transitions.size()}}; }
 
+Fitted Unfitted(const Problem& driving, const std::vector<Stretch>& stretches, std::vector<int> felt) {
+  Fitted fitted{driving, Gather(stretches, &driving.domain), {}, StateErrorOf(stretches), std::move(felt)};
+  if (fitted.transitions.size() == 0) throw std::invalid_argument("there are no transitions to learn from");
+  fitted.fit.before = fitted.fit.after = ErrorsOf(*driving.model, fitted.transitions);
+  return fitted;
+}
+
 Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most) {
-  Fitted fitted{driving, Thinned(Gather(stretches, &driving.domain), most), {}, StateErrorOf(stretches)};
+  Fitted fitted{driving,
+                Thinned(Gather(stretches, &driving.domain), most),
+                {},
+                StateErrorOf(stretches),
+                {kV, kR, kBefore, kSteer, kThrottle}};
   if (fitted.transitions.size() == 0) throw std::invalid_argument("there are no transitions to learn from");
   fitted.fit = FitTwice(*driving.model->text(), fitted.transitions);
   fitted.driving.model = MakeTextModel(WithParameters(*driving.model->text(), fitted.fit));
@@ -268,16 +287,15 @@ Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int 
 Learned Learn(const Fitted& fitted, const LearnOptions& options) {
   const Transitions& all = fitted.transitions;
   auto problem = std::make_shared<Problem>(fitted.driving);
-  problem->domain =
-      CoveredBy(problem->domain, options.domain_of.empty() ? all : Gather(options.domain_of, &problem->domain));
+  problem->domain = CoveredBy(
+      problem->domain, options.domain_of.empty() ? all : Gather(options.domain_of, &problem->domain), fitted.felt);
   Declaration& declaration = problem->declaration;
   declaration.noise_bound = fitted.state_error.array() + kRounding;
   declaration.disturbance = (QuantilesOf(fitted.fit.after, options.quantile) - declaration.noise_bound).cwiseMax(0);
-  declaration.disturbance[kBefore] = 0;
   problem->transitions = all;
   Learned learned{problem, all.size(), 0, fitted.state_error, true};
   if (options.slopes) {
-    learned.explained = SetSlopes(declaration, *problem->model, all);
+    learned.explained = SetSlopes(declaration, *problem->model, all, fitted.felt);
   } else {
     problem->transitions = RowsAt(all, RowsWithin(fitted.fit.after, EpsilonOf(declaration)));
     learned.left_out = all.size() - problem->transitions.size();

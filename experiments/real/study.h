@@ -38,12 +38,19 @@ struct Fitted {
   Transitions transitions;
   Fit fit;
   Eigen::VectorXd state_error;  ///< Of a measured state: three standard errors, the largest of the drives.
+  std::vector<int> felt;        ///< Columns of z on which the residual depends; the domain has ranges of these.
 };
 
 /** @param driving DrivingProblem, to whose domain the transitions are cut. @param most from so many transitions only,
 evenly chosen; 0: from all.
 @throws std::invalid_argument if there are too few transitions. Cost: about a second for 700 transitions. */
 [[nodiscard]] Fitted FitTo(const Problem& driving, const std::vector<Stretch>& stretches, int most = 0);
+
+/** The same with the model as it is. */
+[[nodiscard]] Fitted Unfitted(const Problem& driving, const std::vector<Stretch>& stretches, std::vector<int> felt);
+
+/** What the model leaves of each transition, N-by-n. */
+[[nodiscard]] Eigen::MatrixXd ErrorsOf(const NominalModel& model, const Transitions& transitions);
 
 struct LearnOptions {
   double quantile = 0.99;  ///< Of |one-step error|, for each state: sigma + w, where that is more than sigma.
