@@ -33,6 +33,7 @@ inline constexpr const char* kTaskOfLogs =
 [[nodiscard]] Command DeclareCommand();
 [[nodiscard]] Command VerifyCommand();
 [[nodiscard]] Command ReplayCommand();
+[[nodiscard]] Command AdviseCommand();
 [[nodiscard]] Command ReportCommand();
 [[nodiscard]] Command CheckLogCommand();
 [[nodiscard]] Command RunCommand();

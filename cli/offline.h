@@ -39,6 +39,10 @@ inline constexpr OfflineCommand kVerify{
     "certificates and all are confirmed, 1 with the first that is not and its first failing step, 2 bad input"};
 inline constexpr OfflineCommand kReplay{
     "replay", "Replay a recorded log through the gate: exit 0 if every decision equals the recorded one, otherwise 1"};
+inline constexpr OfflineCommand kAdvise{
+    "advise",
+    "Find what would have turned abstentions into certificates: exit 0 if each has such a change, 1 if not, 2 bad "
+    "input"};
 inline constexpr OfflineCommand kReport{"report", "Summarise a recorded log, and draw it"};
 inline constexpr OfflineCommand kCheckLog{
     "check-log",
@@ -47,7 +51,7 @@ inline constexpr OfflineCommand kCheckLog{
 inline constexpr OfflineCommand kRun{
     "run", "Run planner, certifier, robot and logger in this process, on an in-memory bus and a simulated clock"};
 
-inline constexpr OfflineCommand kOfflineCommands[] = {kInit,    kImport, kCheck,  kFit,    kExportModel, kPlan,
-                                                      kDeclare, kVerify, kReplay, kReport, kCheckLog,    kRun};
+inline constexpr OfflineCommand kOfflineCommands[] = {kInit,   kImport, kCheck,  kFit,    kExportModel, kPlan, kDeclare,
+                                                      kVerify, kReplay, kAdvise, kReport, kCheckLog,    kRun};
 
 }  // namespace forereach

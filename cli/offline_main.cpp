@@ -3,8 +3,8 @@
 
 int main(int argc, char** argv) {
   using namespace forereach;
-  return RunCommands(
-      {InitCommand(), ImportCommand(), CheckCommand(), FitCommand(), ExportModelCommand(), PlanCommand(),
-       DeclareCommand(), VerifyCommand(), ReplayCommand(), ReportCommand(), CheckLogCommand(), RunCommand()},
-      argc, argv);
+  return RunCommands({InitCommand(), ImportCommand(), CheckCommand(), FitCommand(), ExportModelCommand(), PlanCommand(),
+                      DeclareCommand(), VerifyCommand(), ReplayCommand(), AdviseCommand(), ReportCommand(),
+                      CheckLogCommand(), RunCommand()},
+                     argc, argv);
 }

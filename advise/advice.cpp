@@ -1,0 +1,654 @@
+#include "advise/advice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "certifier/certify/explain.h"
+#include "certifier/numerics/size.h"
+#include "certifier/numerics/text.h"
+#include "certifier/residual/consistency.h"
+#include "certifier/residual/observations.h"
+
+namespace forereach {
+namespace {
+
+struct Judgement {
+  Decision decision;
+  std::string sentence;
+
+  [[nodiscard]] bool certified() const { return decision.outcome == Outcome::kCertified; }
+};
+
+Judgement JudgeBy(const Certifier& certifier, const Case& judged, Tube& tube) {
+  certifier.Require(judged.plan(), judged.initial_set, judged.obstacles);
+  const Decision decision = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
+  return {decision, Explain(decision, *judged.problem, judged.plan(), tube)};
+}
+
+// A change that no certifier accepts turns nothing.
+Judgement Judge(const Case& judged, Tube& tube) {
+  try {
+    return JudgeBy(Certifier(judged.problem), judged, tube);
+  } catch (const std::invalid_argument& error) {
+    return {{}, error.what()};
+  }
+}
+
+template <class Edit>
+Case WithProblem(Case changed, Edit edit) {
+  auto problem = std::make_shared<Problem>(*changed.problem);
+  edit(*problem);
+  changed.problem = std::move(problem);
+  return changed;
+}
+
+// The least amount in (0, most] that is enough, by halving: an amount that is enough, up to most / 2^halvings too large
+// where what is enough is an interval up to `most`. Nothing if `most` is not enough.
+template <class IsEnough>
+std::optional<double> Least(double most, int halvings, IsEnough is_enough) {
+  if (!is_enough(most)) return std::nullopt;
+  double too_little = 0, enough = most;
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = (too_little + enough) / 2;
+    (is_enough(middle) ? enough : too_little) = middle;
+  }
+  return enough;
+}
+
+// The same where the size is not known: tries first, 2 first, 4 first .. up to `most`.
+template <class IsEnough>
+std::optional<double> LeastFrom(double first, double most, IsEnough is_enough) {
+  for (double amount = first; amount <= most; amount *= 2)
+    if (is_enough(amount)) return Least(amount, 8, is_enough);
+  return std::nullopt;
+}
+
+std::string StateName(const NominalModel& model, int k) { return model.state_names()[ToSize(k)]; }
+std::string VariableName(const NominalModel& model, int l) { return model.variable_names()[ToSize(l)]; }
+
+Obstacle Shifted(const Obstacle& obstacle, const Eigen::VectorXd& by) {
+  const auto make = [&]() -> Obstacle {
+    const auto& points = obstacle.points();
+    switch (obstacle.kind()) {
+      case Obstacle::Kind::kCircle: return Obstacle::Circle(points[0] + by, obstacle.radius());
+      case Obstacle::Kind::kBox: return Obstacle::AxisBox(points[0] + by, points[1] + by);
+      case Obstacle::Kind::kPolygon: {
+        std::vector<Eigen::VectorXd> vertices;
+        for (const Eigen::VectorXd& vertex : points) vertices.push_back(vertex + by);
+        return Obstacle::Polygon(vertices);
+      }
+      case Obstacle::Kind::kHalfSpace: break;
+    }
+    return Obstacle::HalfSpace(points[0], obstacle.offset() + points[0].dot(by));
+  };
+  return obstacle.motion() ? make().Moving(*obstacle.motion()) : make();
+}
+
+std::string Text(const Eigen::VectorXd& direction) {
+  std::string text;
+  for (const double entry : direction) text += (text.empty() ? "(" : ", ") + RoundedDown(entry, 2);
+  return text + ")";
+}
+
+// Bounds of a domain that have to be wider, each with what it has to reach.
+class Widening {
+ public:
+  explicit Widening(const Domain& domain) : domain_(domain) {}
+
+  void Reach(const DomainExit& exit, double value) {
+    const auto i = static_cast<Eigen::Index>(exit.index);
+    switch (exit.kind) {
+      case DomainExit::Kind::kLower:
+      case DomainExit::Kind::kUpper: SetRange(exit.index, exit.kind == DomainExit::Kind::kLower, value); break;
+      case DomainExit::Kind::kInequality: domain_.inequalities[ToSize(static_cast<int>(i))].bound = value; break;
+      case DomainExit::Kind::kBall: domain_.balls[ToSize(static_cast<int>(i))].radius = value; break;
+      case DomainExit::Kind::kNone: return;
+    }
+    exits_.insert({exit.kind, exit.index});
+  }
+
+  // Brings the wider ranges of states back to what the tube reaches before its last slice.
+  void TightenTo(const Tube& tube) {
+    for (const auto& [kind, index] : exits_) {
+      const bool lower = kind == DomainExit::Kind::kLower;
+      if ((!lower && kind != DomainExit::Kind::kUpper) || index >= domain_.state.dim()) continue;
+      double reached = lower ? kInfinity : -kInfinity;
+      for (int t = 0; t < tube.length(); ++t)
+        reached = lower ? std::min(reached, tube.hull(t, index).lower) : std::max(reached, tube.hull(t, index).upper);
+      SetRange(index, lower, reached);
+    }
+  }
+
+  [[nodiscard]] std::string Describe(const NominalModel& model) const {
+    std::string text;
+    for (const auto& [kind, index] : exits_) {
+      text += text.empty() ? "" : ", ";
+      const auto [lower, upper] = domain_.Corners();
+      switch (kind) {
+        case DomainExit::Kind::kLower:
+          text += VariableName(model, index) + " from " + RoundedDown(lower[ToSize(index)]);
+          break;
+        case DomainExit::Kind::kUpper:
+          text += VariableName(model, index) + " to " + RoundedUp(upper[ToSize(index)]);
+          break;
+        case DomainExit::Kind::kInequality:
+          text += "inequality " + std::to_string(index) + " to " + RoundedUp(domain_.inequalities[ToSize(index)].bound);
+          break;
+        case DomainExit::Kind::kBall:
+          text += "ball " + std::to_string(index) + " to the radius " + RoundedUp(domain_.balls[ToSize(index)].radius);
+          break;
+        case DomainExit::Kind::kNone: break;
+      }
+    }
+    return text;
+  }
+
+  [[nodiscard]] const Domain& domain() const { return domain_; }
+  [[nodiscard]] std::size_t count() const { return exits_.size(); }
+
+ private:
+  void SetRange(int index, bool is_lower, double value) {
+    Box& box = index < domain_.state.dim() ? domain_.state : domain_.input;
+    const Eigen::Index l = index < domain_.state.dim() ? index : index - domain_.state.dim();
+    Eigen::VectorXd lower = box.lower(), upper = box.upper();
+    (is_lower ? lower : upper)[l] = value;
+    box = Box(lower, upper);
+  }
+
+  Domain domain_;
+  std::set<std::pair<DomainExit::Kind, int>> exits_;
+};
+
+// Where the declaration and the observations leave the residual at z, in plain arithmetic.
+struct Allowed {
+  Eigen::VectorXd lower, upper;
+
+  Allowed(const Problem& problem, const Observations& known, const Eigen::VectorXd& z) {
+    const Eigen::MatrixXd distance =
+        (known.z.rowwise() - z.transpose()).cwiseAbs() * problem.declaration.lipschitz.transpose();  // N-by-n
+    Eigen::VectorXd error(known.num_states());
+    for (Eigen::Index k = 0; k < error.size(); ++k) error[k] = problem.declaration.ObservationError(k);
+    lower = (known.lower - distance).colwise().maxCoeff().transpose() - error;
+    upper = (known.upper + distance).colwise().minCoeff().transpose() + error;
+  }
+
+  // The middle, then ends: all corners if few coordinates have two, otherwise the two outer ones.
+  [[nodiscard]] std::vector<Eigen::VectorXd> Outcomes() const {
+    const Eigen::VectorXd middle = (lower + upper) / 2, half = (upper - lower) / 2 * (1 - 1e-6);
+    std::vector<Eigen::Index> wide;
+    for (Eigen::Index k = 0; k < half.size(); ++k)
+      if (half[k] > 1e-12) wide.push_back(k);
+    std::vector<Eigen::VectorXd> outcomes{middle};
+    if (wide.empty()) return outcomes;
+    if (wide.size() > 4) return {middle, middle - half, middle + half};
+    for (std::size_t bits = 0; bits < std::size_t{1} << wide.size(); ++bits) {
+      Eigen::VectorXd corner = middle;
+      for (std::size_t i = 0; i < wide.size(); ++i) corner[wide[i]] += (bits >> i & 1 ? 1 : -1) * half[wide[i]];
+      outcomes.push_back(corner);
+    }
+    return outcomes;
+  }
+};
+
+// One more transition, from z to f0(z) + residual.
+void AddObservation(Problem& problem, const Eigen::VectorXd& z, const Eigen::VectorXd& residual) {
+  Transitions& all = problem.transitions;
+  const Eigen::Index row = all.z.rows();
+  Eigen::VectorXd next(residual.size());
+  problem.model->Evaluate({z.data(), ToSize(static_cast<int>(z.size()))},
+                          {next.data(), ToSize(static_cast<int>(next.size()))});
+  all.z.conservativeResize(row + 1, Eigen::NoChange);
+  all.x_next.conservativeResize(row + 1, Eigen::NoChange);
+  all.z.row(row) = z.transpose();
+  all.x_next.row(row) = (next + residual).transpose();
+}
+
+class Adviser {
+ public:
+  Adviser(const Case& abstained, const Certifier& certifier)
+      : case_(abstained), certifier_(certifier), model_(*abstained.problem->model) {
+    judgement_ = JudgeBy(certifier_, case_, tube_);
+  }
+
+  std::vector<Advice> Run(int most_observations) {
+    const Decision& decision = judgement_.decision;
+    switch (decision.outcome) {
+      case Outcome::kFalsified:
+        AdviseLargerSlopes();
+        AdviseNoise();
+        AdviseOutlier(decision.first_observation);
+        AdviseOutlier(decision.second_observation);
+        break;
+      case Outcome::kSafety:
+        if (decision.cause == Cause::kObstacle)
+          AdviseObstacles();
+        else
+          AdviseLimits();
+        AdviseTighterTube(most_observations);
+        break;
+      case Outcome::kDomain:
+        if (decision.cause == Cause::kDomainExit) AdviseDomain();
+        if (decision.cause == Cause::kNoStop) AdviseRest();
+        AdviseTighterTube(most_observations);
+        break;
+      case Outcome::kCertified:
+      case Outcome::kNone: break;
+    }
+    std::ranges::stable_partition(advices_, &Advice::turns);
+    return std::move(advices_);
+  }
+
+ private:
+  [[nodiscard]] Judgement Judged(const Case& changed) {
+    return changed.problem == case_.problem ? JudgeBy(certifier_, changed, scratch_) : Judge(changed, scratch_);
+  }
+  [[nodiscard]] bool Turns(const Case& changed) { return Judged(changed).certified(); }
+
+  // Every advice ends here: it turns the plan only if a certifier says so.
+  void Add(Advice advice) {
+    advice.turns = true;
+    for (const Case& changed : advice.after) {
+      const Judgement judgement = Judged(changed);
+      if (judgement.certified()) continue;
+      advice.turns = false;
+      advice.then = judgement.sentence;
+      break;
+    }
+    advices_.push_back(std::move(advice));
+  }
+
+  void AdviseTighterTube(int most_observations) {
+    AdviseInitialSet();
+    AdviseHorizon();
+    AdviseSlopes();
+    if (most_observations > 0) AdviseObservation(most_observations);
+  }
+
+  // ---- S
+
+  // The obstacles are tested one by one against one tube, so each has a least distance of its own.
+  void AdviseObstacles() {
+    Case changed = case_;
+    double farthest = 0;
+    std::string what;
+    for (std::size_t o = 0; o < case_.obstacles.size(); ++o) {
+      const Decision alone = certifier_.JudgeSafety(case_.plan(), {&case_.obstacles[o], 1}, tube_);
+      if (alone.outcome == Outcome::kCertified || alone.cause != Cause::kObstacle) continue;
+      const auto away = LeastShift(case_.obstacles[o], alone);
+      if (!away) return;
+      changed.obstacles[o] = Shifted(case_.obstacles[o], away->second);
+      farthest = std::max(farthest, away->first);
+      what += (what.empty() ? "" : ", ") + ("obstacle " + std::to_string(o)) + " by " + RoundedUp(away->first, 4) +
+              " m, to the side of " + Text(away->second / away->first) + " (first touched at step " +
+              std::to_string(alone.step) + ")";
+    }
+    if (what.empty()) return;
+    Add({.change = Change::kObstacles,
+         .what = "if it passed farther away, or these stood farther away: " + what,
+         .amount = farthest,
+         .after = {changed}});
+  }
+
+  // The least shift along one of some directions.
+  std::optional<std::pair<double, Eigen::VectorXd>> LeastShift(const Obstacle& obstacle, const Decision& alone) {
+    const Projection& projection = certifier_.projection();
+    const int p = projection.dim();
+    Zonotope place;
+    projection.Enclose(tube_.slice(alone.step), tube_.half_width(alone.step), place);
+    std::vector<Eigen::VectorXd> directions;
+    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
+      directions.push_back(obstacle.points()[0].normalized());
+    } else {
+      Eigen::VectorXd outward = (obstacle.lower() + obstacle.upper()).head(p) / 2 - place.CenterVector();
+      if (outward.norm() > 0) directions.push_back(outward.normalized());
+      for (int k = 0; k < p; ++k)
+        for (const double sign : {-1.0, 1.0}) directions.push_back(sign * Eigen::VectorXd::Unit(p, k));
+    }
+    std::optional<std::pair<double, Eigen::VectorXd>> best;
+    for (const Eigen::VectorXd& direction : directions) {
+      const double depth = std::max(alone.threshold - alone.margin, 1e-6);
+      const auto amount = LeastFrom(depth, best ? best->first : 1e6 * depth, [&](double distance) {
+        const Obstacle farther = Shifted(obstacle, distance * direction);
+        return certifier_.JudgeSafety(case_.plan(), {&farther, 1}, tube_).cause != Cause::kObstacle;
+      });
+      if (amount && (!best || *amount < best->first)) best = {*amount, *amount * direction};
+    }
+    return best;
+  }
+
+  void AdviseLimits() {
+    Case changed = case_;
+    std::set<int> wider;
+    for (std::size_t i = 0; i < case_.problem->limits.size(); ++i) {
+      const Judgement judgement = Judged(changed);
+      const Decision& decision = judgement.decision;
+      if (decision.cause != Cause::kLimit) break;
+      if (!std::isfinite(decision.margin)) return;
+      changed = WithProblem(changed, [&](Problem& problem) {
+        Limit& limit = problem.limits[ToSize(decision.coordinate)];
+        if (const auto reach = certifier_.limits().Reach(decision.coordinate, case_.plan(), tube_))
+          (decision.margin < decision.threshold ? limit.at_least : limit.at_most) =
+              decision.margin < decision.threshold ? reach->lower : reach->upper;
+      });
+      wider.insert(decision.coordinate);
+    }
+    std::string what;
+    for (const int i : wider) {
+      const Limit &before = case_.problem->limits[ToSize(i)], &now = changed.problem->limits[ToSize(i)];
+      what += (what.empty() ? "" : ", ") + now.name;
+      if (now.at_least != before.at_least) what += " at least " + RoundedDown(now.at_least);
+      if (now.at_most != before.at_most) what += " at most " + RoundedUp(now.at_most);
+    }
+    Add({.change = Change::kLimits,
+         .what = "if its limits were wider: " + what,
+         .amount = static_cast<double>(wider.size()),
+         .after = {changed}});
+  }
+
+  // ---- D
+
+  void AdviseDomain() {
+    constexpr int kRounds = 400;
+    Widening wider(case_.problem->domain);
+    const auto changed = [&] { return WithProblem(case_, [&](Problem& problem) { problem.domain = wider.domain(); }); };
+    for (int i = 0; i < kRounds; ++i) {
+      const Decision decision = Judged(changed()).decision;
+      if (decision.cause != Cause::kDomainExit || !std::isfinite(decision.exit.value)) break;
+      const double beyond = (decision.exit.value - decision.exit.bound) / 4;  // the next slices reach farther
+      wider.Reach(decision.exit, decision.exit.value + beyond);
+    }
+    if (Turns(changed())) {
+      const Widening loose = wider;
+      wider.TightenTo(scratch_);
+      if (!Turns(changed())) wider = loose;
+    }
+    Add({.change = Change::kDomain,
+         .what = "if the domain, and with it the declaration, reached farther: " + wider.Describe(model_),
+         .amount = static_cast<double>(wider.count()),
+         .after = {changed()}});
+  }
+
+  void AdviseRest() {
+    Case changed = case_;
+    for (std::size_t i = 0; i < case_.problem->rest.size(); ++i) {
+      const Decision decision = Judged(changed).decision;
+      if (decision.cause != Cause::kNoStop) break;
+      changed = WithProblem(changed, [&](Problem& problem) {
+        for (RestBound& bound : problem.rest)
+          if (bound.coordinate == decision.coordinate)
+            bound.tolerance = std::max(bound.tolerance, std::abs(decision.margin));
+      });
+    }
+    std::string what;
+    int count = 0;
+    for (std::size_t i = 0; i < changed.problem->rest.size(); ++i) {
+      const RestBound& bound = changed.problem->rest[i];
+      if (bound.tolerance == case_.problem->rest[i].tolerance) continue;
+      what += (what.empty() ? "" : ", ") + StateName(model_, bound.coordinate) + " up to " + RoundedUp(bound.tolerance);
+      ++count;
+    }
+    Add({.change = Change::kRest,
+         .what = "if standing allowed " + what + " at its end",
+         .amount = static_cast<double>(count),
+         .after = {changed}});
+  }
+
+  // ---- S and D: a tighter tube, or a shorter one
+
+  void AdviseInitialSet() {
+    const Eigen::MatrixXd generators = case_.initial_set.GeneratorMatrix();
+    const auto smaller = [&](double less) {
+      Case changed = case_;
+      changed.initial_set = Zonotope(case_.initial_set.CenterVector(), (1 - less) * generators);
+      return changed;
+    };
+    const auto less = Least(1, 8, [&](double amount) { return Turns(smaller(amount)); });
+    const double factor = 1 - less.value_or(1);
+    Add({.change = Change::kInitialSet,
+         .what = factor > 0 ? "from an initial set of " + RoundedDown(factor, 3) + " times its half-widths"
+                            : "from the center of its initial set alone",
+         .amount = factor,
+         .after = {smaller(less.value_or(1))}});
+  }
+
+  void AdviseHorizon() {
+    Case changed = case_;
+    for (Eigen::Index steps = case_.controls.cols() - 1; steps > 0; --steps) {
+      changed.controls = case_.controls.leftCols(steps);
+      if (!Turns(changed)) continue;
+      return Add({.change = Change::kHorizon,
+                  .what = "with its first " + std::to_string(steps) + " steps alone",
+                  .amount = static_cast<double>(steps),
+                  .after = {changed}});
+    }
+  }
+
+  void AdviseSlopes() {
+    const Eigen::MatrixXd& lipschitz = case_.problem->declaration.lipschitz;
+    std::vector<std::pair<int, int>> entries;
+    for (int k = 0; k < lipschitz.rows(); ++k)
+      for (int l = 0; l < lipschitz.cols(); ++l)
+        if (lipschitz(k, l) > 0) entries.emplace_back(k, l);
+    if (entries.empty()) return;
+    if (entries.size() > 1) entries.emplace_back(-1, -1);
+    constexpr std::size_t kMostEntries = 24;  // of a dense matrix only all together
+    if (entries.size() > kMostEntries) entries = {{-1, -1}};
+    for (const auto& [k, l] : entries) {
+      const auto smaller = [&, row = k, column = l](double less) {
+        return WithProblem(case_, [&](Problem& problem) {
+          if (row < 0)
+            problem.declaration.lipschitz *= 1 - less;
+          else
+            problem.declaration.lipschitz(row, column) *= 1 - less;
+        });
+      };
+      // Below some factor the observations contradict the declaration.
+      const double most = Least(1, 8, [&](double kept) {
+                            return Judged(smaller(1 - kept)).decision.outcome != Outcome::kFalsified;
+                          }).value_or(1);
+      const double less = Least(1 - most, 7, [&](double amount) { return Turns(smaller(amount)); }).value_or(1 - most);
+      const std::string which =
+          k < 0 ? "all slopes" : "the slope of " + StateName(model_, k) + " in " + VariableName(model_, l);
+      Add({.change = Change::kSlopes,
+           .what = "if " + which + " were declared " + RoundedDown(1 - less, 4) + " times as large",
+           .amount = 1 - less,
+           .row = k,
+           .column = l,
+           .after = {smaller(less)}});
+    }
+  }
+
+  // The centers of some slices before the failure, with their controls.
+  void AdviseObservation(int most) {
+    const Observations known = Observe(model_, case_.problem->transitions);
+    const int n = model_.num_states(),
+              steps = std::min<int>(tube_.length() + 1, static_cast<int>(case_.controls.cols()));
+    std::optional<Advice> best;
+    for (int i = 0; i < std::min(most, steps); ++i) {
+      const int t = std::min(most, steps) == 1 ? 0 : i * (steps - 1) / (std::min(most, steps) - 1);
+      Eigen::VectorXd z(model_.num_variables());
+      z << tube_.slice(t).CenterVector(), case_.controls.col(t);
+      if (!case_.problem->domain.Contains({z.data(), ToSize(model_.num_variables())})) continue;
+      const Allowed allowed(*case_.problem, known, z);
+      std::vector<Case> after;
+      for (const Eigen::VectorXd& outcome : allowed.Outcomes())
+        after.push_back(WithProblem(case_, [&](Problem& problem) { AddObservation(problem, z, outcome); }));
+      if (!Turns(after.front())) continue;
+      std::string what = "if one more transition were observed at";
+      what +=
+          " " + DescribePlace(*case_.problem, z) + " (step " + std::to_string(t) + "), where the declaration leaves";
+      bool is_first = true;
+      for (int k = 0; k < n; ++k) {
+        if (!(allowed.upper[k] - allowed.lower[k] > 1e-12)) continue;
+        what += (is_first ? " " : ", ") + StateName(model_, k) + " +-" +
+                RoundedUp((allowed.upper[k] - allowed.lower[k]) / 2, 3);
+        is_first = false;
+      }
+      if (is_first) what += " nothing open";
+      Advice advice{.change = Change::kObservation,
+                    .what = what,
+                    .amount = static_cast<double>(after.size()),
+                    .place = z,
+                    .after = std::move(after)};
+      if (std::ranges::all_of(advice.after, [&](const Case& changed) { return Turns(changed); })) {
+        advice.what += "; tried with its middle and its ends";
+        return Add(std::move(advice));
+      }
+      if (!best) best = std::move(advice);
+    }
+    if (!best) return;
+    best->what += "; it turns with the middle outcome, not with each of its ends";
+    Add(std::move(*best));
+  }
+
+  // ---- F
+
+  // Each row that has a violating pair, for itself: the test takes the rows in their order.
+  template <class Widen>
+  std::optional<double> ForEachContradictingRow(Declaration& declaration, const Observations& known, Widen widen,
+                                                std::string& what) {
+    double largest = 0;
+    while (const auto violation = FindViolation(declaration, known)) {
+      const int row = violation->coordinate;
+      const Declaration before = declaration;
+      const auto amount = LeastFrom(1e-3 * widen.unit(before, row, *violation), 0x1p40, [&](double tried) {
+        declaration = before;
+        widen.apply(declaration, row, tried);
+        const auto other = FindViolation(declaration, known);
+        return !other || other->coordinate > row;
+      });
+      if (!amount) return std::nullopt;
+      declaration = before;
+      widen.apply(declaration, row, *amount);
+      largest = std::max(largest, *amount);
+      what += (what.empty() ? "" : ", ") + widen.describe(StateName(model_, row), *amount);
+    }
+    return largest;
+  }
+
+  template <class Widen>
+  void AdviseWiderDeclaration(Change change, const std::string& begin, Widen widen) {
+    if (judgement_.decision.first_observation < 0) return;  // no pair is at fault
+    const Observations known = Observe(model_, case_.problem->transitions);
+    Declaration declaration = case_.problem->declaration;
+    std::string what;
+    const auto largest = ForEachContradictingRow(declaration, known, widen, what);
+    if (!largest || what.empty()) return;
+    Add({.change = change,
+         .what = begin + what,
+         .amount = widen.amount(*largest),
+         .after = {WithProblem(case_, [&](Problem& problem) { problem.declaration = declaration; })}});
+  }
+
+  void AdviseLargerSlopes() {
+    struct Widen {
+      static double unit(const Declaration&, int, const Violation&) { return 1; }
+      static void apply(Declaration& declaration, int row, double more) { declaration.lipschitz.row(row) *= 1 + more; }
+      static std::string describe(const std::string& state, double more) {
+        return "those of " + state + " times " + RoundedUp(1 + more, 4);
+      }
+      static double amount(double more) { return 1 + more; }
+    };
+    AdviseWiderDeclaration(Change::kLargerSlopes, "if larger slopes were declared: ", Widen{});
+  }
+
+  void AdviseNoise() {
+    struct Widen {
+      static double unit(const Declaration&, int, const Violation& violation) {
+        return violation.difference - violation.bound;
+      }
+      static void apply(Declaration& declaration, int row, double more) { declaration.noise_bound[row] += more; }
+      static std::string describe(const std::string& state, double more) {
+        return state + " " + RoundedUp(more, 4) + " more";
+      }
+      static double amount(double more) { return more; }
+    };
+    AdviseWiderDeclaration(Change::kNoise, "if larger noise bounds were declared: ", Widen{});
+  }
+
+  void AdviseOutlier(int observation) {
+    if (observation < 0 || observation >= case_.problem->transitions.size()) return;
+    const Case changed = WithProblem(case_, [&](Problem& problem) {
+      Transitions& all = problem.transitions;
+      const Eigen::Index behind = all.z.rows() - observation - 1;
+      all.z.middleRows(observation, behind) = all.z.bottomRows(behind).eval();
+      all.x_next.middleRows(observation, behind) = all.x_next.bottomRows(behind).eval();
+      all.z.conservativeResize(all.z.rows() - 1, Eigen::NoChange);
+      all.x_next.conservativeResize(all.x_next.rows() - 1, Eigen::NoChange);
+    });
+    Add({.change = Change::kOutlier,
+         .what = "without observation " + std::to_string(observation),
+         .amount = static_cast<double>(observation),
+         .after = {changed}});
+  }
+
+  const Case& case_;
+  const Certifier& certifier_;
+  const NominalModel& model_;
+  Judgement judgement_;
+  Tube tube_, scratch_;  // of the case, and of the last change
+  std::vector<Advice> advices_;
+};
+
+}  // namespace
+
+const char* Name(Change change) {
+  switch (change) {
+    case Change::kObstacles: return "obstacles";
+    case Change::kInitialSet: return "initial_set";
+    case Change::kHorizon: return "horizon";
+    case Change::kSlopes: return "slopes";
+    case Change::kObservation: return "observation";
+    case Change::kDomain: return "domain";
+    case Change::kRest: return "rest";
+    case Change::kLimits: return "limits";
+    case Change::kLargerSlopes: return "larger_slopes";
+    case Change::kNoise: return "noise";
+    case Change::kOutlier: return "outlier";
+  }
+  return "";
+}
+
+std::string DescribePlace(const Problem& problem, const Eigen::VectorXd& z) {
+  std::string text;
+  for (Eigen::Index l = 0; l < z.size(); ++l)
+    if ((problem.declaration.lipschitz.col(l).array() != 0).any())
+      text +=
+          (text.empty() ? "" : ", ") + VariableName(*problem.model, static_cast<int>(l)) + " = " + RoundedDown(z[l], 4);
+  return text.empty() ? "any place" : text;
+}
+
+std::vector<Advice> Advise(const Case& abstained, const Certifier& certifier, int most_observations) {
+  return Adviser(abstained, certifier).Run(most_observations);
+}
+
+std::vector<Place> RankPlaces(const std::vector<Case>& cases, const std::vector<Eigen::VectorXd>& places,
+                              std::size_t most) {
+  std::vector<Place> ranked;
+  if (cases.empty()) return ranked;
+  const Case& first = cases.front();
+  const Observations known = Observe(*first.problem->model, first.problem->transitions);
+  Tube tube;
+  const std::size_t count = std::min(most, places.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::VectorXd& z = places[i * places.size() / count];
+    const Eigen::VectorXd middle = Allowed(*first.problem, known, z).Outcomes().front();
+    const Case observed = WithProblem(first, [&](Problem& problem) { AddObservation(problem, z, middle); });
+    const Certifier certifier(observed.problem);
+    Place place{z};
+    for (const Case& each : cases) {
+      Case with = each;
+      with.problem = observed.problem;
+      place.turned += JudgeBy(certifier, with, tube).certified();
+    }
+    ranked.push_back(std::move(place));
+  }
+  std::ranges::stable_sort(ranked, std::ranges::greater{}, &Place::turned);
+  return ranked;
+}
+
+}  // namespace forereach

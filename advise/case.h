@@ -1,0 +1,28 @@
+/** A plan with everything that it was judged by, so that it can be judged again after a change. */
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "certifier/certify/decision.h"
+#include "certifier/certify/problem.h"
+#include "certifier/safety/obstacle.h"
+#include "certifier/sets/zonotope.h"
+
+namespace forereach {
+
+struct Case {
+  std::shared_ptr<const Problem> problem;  ///< With everything learned until then among its transitions.
+  Eigen::MatrixXd controls;                ///< m-by-T, a column a step
+  Schedule schedule{};
+  Zonotope initial_set;  ///< X_0
+  std::vector<Obstacle> obstacles;
+
+  /** Refers to `controls`. */
+  [[nodiscard]] Plan plan() const {
+    const auto inputs = static_cast<int>(controls.rows());
+    return {controls.data(), inputs, static_cast<int>(controls.cols()), inputs, schedule};
+  }
+};
+
+}  // namespace forereach

@@ -1,0 +1,144 @@
+#include "cli/abstentions.h"
+
+#include <map>
+#include <tuple>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/candidate_message.h"
+#include "certifier/task/files.h"
+#include "certifier/task/json_field.h"
+#include "certifier/task/json_text.h"
+#include "lcmtypes/names.h"
+#include "records/decision_json.h"
+#include "records/decision_record.h"
+#include "records/log_survey.h"
+#include "records/log_tasks.h"
+#include "records/timeline.h"
+
+namespace forereach {
+namespace {
+
+Abstentions FromDecision(const std::string& path, const std::string& config_path) {
+  const nlohmann::json json = ParseJson(ReadWhole(path, kLargestJsonFile));
+  Abstentions read;
+  read.tasks.push_back(
+      std::make_shared<const Config>(LoadConfig(config_path.empty() ? TaskOf(path, json) : config_path)));
+  const Config& task = *read.tasks.front();
+  if (IsCertificate(path, json)) {
+    read.certified = 1;
+    return read;
+  }
+  const JsonField document(path, json), steps = document["inputs"]["controls"], set = document["inputs"]["initial_set"];
+  const auto n = static_cast<std::size_t>(task.problem->model->num_states());
+  const auto m = static_cast<std::size_t>(task.problem->model->num_inputs());
+  RecordedAbstention& abstention = read.all.emplace_back();
+  abstention.name = path;
+  abstention.message = document["message"].Text();
+  abstention.task = &task;
+  for (const std::int16_t outcome :
+       {decision_t::ABSTAIN_FALSIFIED, decision_t::ABSTAIN_DOMAIN, decision_t::ABSTAIN_SAFETY})
+    if (document["outcome"].Text() == OutcomeName(outcome)) abstention.outcome = outcome;
+  Case& judged = abstention.judged;
+  judged.problem = task.problem;
+  judged.controls.resize(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(steps.Count()));
+  for (std::size_t t = 0; t < steps.Count(); ++t)
+    judged.controls.col(static_cast<Eigen::Index>(t)) = steps[t].Numbers(m);
+  judged.schedule = ScheduleFromZero(task, static_cast<int>(steps.Count()));
+  judged.initial_set = Zonotope::Enclose(Box(set["lower"].Numbers(n), set["upper"].Numbers(n)));
+  judged.obstacles = task.obstacles;
+  return read;
+}
+
+// Collects what was not certified. Problems with learned transitions are made at the end, when all of them are known.
+class AbstentionReader final : public TimelineUser {
+ public:
+  void OnDecision(const RecordedDecision& recorded) override {
+    const decision_t& decision = recorded.decision;
+    if (decision.outcome == decision_t::CERTIFIED) {
+      ++certified_;
+      return;
+    }
+    RecordedAbstention& abstention = all_.emplace_back();
+    bases_.push_back(recorded.basis);
+    abstention.name = recorded.event + ", plan " + std::to_string(decision.plan_id) + " of " + GetText(decision.source);
+    abstention.message = GetText(decision.message);
+    abstention.outcome = decision.outcome;
+    abstention.cause = decision.cause;
+    abstention.task = recorded.basis.task;
+    abstention.decision = decision;
+    if (!recorded.candidate) {
+      abstention.missing = "its candidate is not in the log";
+      return;
+    }
+    const auto candidate = Decoded<candidate_plan_t>(recorded.candidate->bytes);
+    if (!candidate) return;
+    abstention.candidate = *candidate;
+    if (decision.outcome == decision_t::REJECTED || decision.outcome == decision_t::ABSTAIN_DEADLINE ||
+        decision.outcome == decision_t::ABSTAIN_OBSTACLES)
+      return;
+    if (!recorded.is_of_known_task) {
+      abstention.missing = "it was decided under a task that is not kept next to the log";
+      return;
+    }
+    Case& judged = abstention.judged;
+    judged.schedule = ScheduleOf(*candidate, recorded.basis.task->gate);
+    const Plan plan = PlanOf(*candidate, judged.schedule);
+    judged.controls.resize(plan.num_inputs, plan.num_steps);
+    for (int t = 0; t < plan.num_steps; ++t)
+      judged.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.input(t).data(), plan.num_inputs);
+    judged.initial_set = InitialSetOf(*candidate);
+    judged.obstacles = *recorded.basis.obstacles;
+  }
+
+  Abstentions Finish(const Timeline& timeline, std::vector<std::shared_ptr<const Config>> tasks) {
+    std::map<std::tuple<const Config*, std::size_t, std::size_t>, std::shared_ptr<const Problem>> problems;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      const Basis& basis = bases_[i];
+      if (all_[i].judged.controls.size() == 0) continue;
+      auto& problem = problems[{basis.task, basis.learned_begin, basis.learned_end}];
+      if (!problem) problem = WithLearned(basis, timeline.learned(*basis.task));
+      all_[i].judged.problem = problem;
+    }
+    return {std::move(tasks), std::move(all_), certified_, timeline.passed_over()};
+  }
+
+ private:
+  static std::shared_ptr<const Problem> WithLearned(const Basis& basis,
+                                                    const std::vector<ExecutedTransition>& learned) {
+    if (basis.learned_begin == basis.learned_end) return basis.task->problem;
+    auto problem = std::make_shared<Problem>(*basis.task->problem);
+    Transitions& all = problem->transitions;
+    Eigen::Index row = all.z.rows();
+    const auto count = static_cast<Eigen::Index>(basis.learned_end - basis.learned_begin);
+    all.z.conservativeResize(row + count, Eigen::NoChange);
+    all.x_next.conservativeResize(row + count, Eigen::NoChange);
+    for (std::size_t i = basis.learned_begin; i < basis.learned_end; ++i, ++row) {
+      all.z.row(row) = Eigen::Map<const Eigen::RowVectorXd>(learned[i].z.data(), std::ssize(learned[i].z));
+      all.x_next.row(row) = Eigen::Map<const Eigen::RowVectorXd>(learned[i].next.data(), std::ssize(learned[i].next));
+    }
+    return problem;
+  }
+
+  std::vector<RecordedAbstention> all_;
+  std::vector<Basis> bases_;  // of each
+  std::int64_t certified_ = 0;
+};
+
+}  // namespace
+
+Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config, const LogKey& key) {
+  if (files.size() == 1 && KindOf(files[0]) == FileKind::kJson) return FromDecision(files[0], config);
+  std::vector<std::shared_ptr<const Config>> tasks;
+  std::vector<const Config*> pointers;
+  for (Config& task : TasksOf(files, config, key)) {
+    tasks.push_back(std::make_shared<const Config>(std::move(task)));
+    pointers.push_back(tasks.back().get());
+  }
+  AbstentionReader reader;
+  Timeline timeline(pointers, reader);
+  timeline.Read(files, files.size() > 1);
+  return reader.Finish(timeline, std::move(tasks));
+}
+
+}  // namespace forereach

@@ -1,0 +1,253 @@
+#include <algorithm>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <thread>
+
+#include <nlohmann/json.hpp>
+
+#include "advise/advice.h"
+#include "certifier/gate/gate.h"
+#include "certifier/numerics/parallel.h"
+#include "certifier/numerics/text.h"
+#include "certifier/task/json_text.h"
+#include "cli/abstentions.h"
+#include "cli/commands.h"
+#include "cli/key_options.h"
+#include "cli/offline.h"
+#include "cli/progress.h"
+#include "lcmtypes/names.h"
+#include "lcmtypes/printable.h"
+
+namespace forereach {
+namespace {
+
+struct Options {
+  std::vector<std::string> files;
+  std::string config;
+  LogKey key;
+  bool json = false;
+  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+};
+
+// The key of the gate that would have let a candidate in, and the value that it needs at least or at most.
+struct Setting {
+  std::string key;
+  double value;  // ms
+  std::string what;
+  bool turns;  // a gate with this value gives another answer
+};
+
+std::optional<Setting> SettingFor(const RecordedAbstention& abstention) {
+  const decision_t& decision = abstention.decision;
+  const candidate_plan_t& candidate = abstention.candidate;
+  if (!abstention.task || decision.utime == 0) return std::nullopt;
+  const auto ms = [](std::int64_t us) { return static_cast<double>(us) / 1e3; };
+  const auto checked = [&](const std::string& key, double GateOptions::*member, double value, const std::string& what) {
+    Config changed = *abstention.task;
+    changed.gate.*member = value;
+    const std::int16_t cause = Gate(changed).Decide(Encode(candidate), decision.utime).decision.cause;
+    return Setting{key, value, what, cause != decision.cause};
+  };
+  const std::int64_t until_start = candidate.start_utime - decision.utime;
+  switch (decision.cause) {
+    case decision_t::CAUSE_STALE: {
+      const double age = ms(decision.utime - candidate.utime);
+      return checked("gate.max_age_ms", &GateOptions::max_age_ms, age,
+                     "with gate.max_age_ms of at least " + RoundedUp(age));
+    }
+    case decision_t::CAUSE_FUTURE:
+      if (candidate.utime > decision.utime) {
+        const double ahead = ms(candidate.utime - decision.utime);
+        return checked("gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
+                       "with gate.max_ahead_ms of at least " + RoundedUp(ahead) +
+                           ", if the sender's clock is right and not this one");
+      } else {
+        const double life = ms(until_start);
+        return checked("gate.certificate_lifetime_ms", &GateOptions::certificate_lifetime_ms, life,
+                       "with gate.certificate_lifetime_ms of at least " + RoundedUp(life));
+      }
+    case decision_t::CAUSE_DEADLINE: {
+      const double left = ms(until_start);
+      if (left <= 0) return std::nullopt;
+      return checked("gate.decision_budget_ms", &GateOptions::decision_budget_ms, left,
+                     "with gate.decision_budget_ms of at most " + RoundedDown(left) + ", or sent " +
+                         RoundedUp(abstention.task->gate.decision_budget_ms - left) + " ms earlier");
+    }
+    case decision_t::CAUSE_OVERRUN: {
+      const double taken = decision.elapsed_us / 1e3;
+      return Setting{"gate.decision_budget_ms", taken,
+                     "with gate.decision_budget_ms of at least " + RoundedUp(taken) + ", if it takes no longer then",
+                     false};
+    }
+    default: return std::nullopt;
+  }
+}
+
+struct Advised {
+  std::vector<Advice> advices;
+  std::optional<Setting> setting;
+  std::string missing;
+
+  [[nodiscard]] bool turned() const {
+    return std::ranges::any_of(advices, &Advice::turns) || (setting && setting->turns);
+  }
+};
+
+Advised AdviseOn(const RecordedAbstention& abstention) {
+  if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
+  if (!abstention.judged.problem) return {{}, SettingFor(abstention), {}};
+  try {
+    const Certifier certifier(abstention.judged.problem);
+    Advised advised{forereach::Advise(abstention.judged, certifier), {}, {}};
+    if (advised.advices.empty()) advised.missing = "judged again by what the log has, nothing is found that turns it";
+    return advised;
+  } catch (const std::invalid_argument& error) {
+    return {{}, {}, std::string("it cannot be judged again: ") + error.what()};
+  }
+}
+
+// The places under the problem of the task's last abstention, which knows most.
+std::vector<std::pair<std::string, int>> PlacesOf(const Abstentions& read, const std::vector<Advised>& advised) {
+  std::vector<std::pair<std::string, int>> lines;
+  for (const auto& task : read.tasks) {
+    std::vector<Case> cases;
+    std::vector<Eigen::VectorXd> places;
+    for (std::size_t i = 0; i < read.all.size(); ++i) {
+      if (read.all[i].task != task.get() || advised[i].advices.empty()) continue;
+      cases.push_back(read.all[i].judged);
+      for (const Advice& advice : advised[i].advices)
+        if (advice.change == Change::kObservation) places.push_back(advice.place);
+    }
+    if (places.empty() || cases.size() < 2) continue;
+    for (Case& each : cases) each.problem = cases.back().problem;
+    for (const Place& place : RankPlaces(cases, places)) {
+      if (place.turned == 0) break;
+      lines.emplace_back(DescribePlace(*task->problem, place.z), place.turned);
+    }
+  }
+  std::ranges::stable_sort(lines, std::ranges::greater{}, &std::pair<std::string, int>::second);
+  return lines;
+}
+
+void PrintForPeople(const Abstentions& read, const std::vector<Advised>& advised) {
+  for (std::size_t i = 0; i < read.all.size(); ++i) {
+    const RecordedAbstention& abstention = read.all[i];
+    const auto& [advices, setting, missing] = advised[i];
+    if (advices.empty() && !setting && missing.empty()) continue;
+    std::cout << Printable(abstention.name) << "\n  " << Printable(abstention.message) << "\n";
+    if (!missing.empty()) std::cout << "  " << Printable(missing) << "\n";
+    if (setting)
+      std::cout << (setting->turns ? "  it would be judged\n    " : "  it might be judged\n    ") << setting->what
+                << "\n";
+    bool is_first = true;
+    for (const Advice& advice : advices) {
+      if (!advice.turns) continue;
+      std::cout << (is_first ? "  it would be certified\n" : "") << "    " << Printable(advice.what) << "\n";
+      is_first = false;
+    }
+    is_first = true;
+    for (const Advice& advice : advices) {
+      if (advice.turns) continue;
+      std::cout << (is_first ? "  not enough alone\n" : "") << "    " << Printable(advice.what) << ": then it is \""
+                << Printable(advice.then) << "\"\n";
+      is_first = false;
+    }
+  }
+  const auto turned = std::ranges::count_if(advised, &Advised::turned);
+  std::map<std::string, int> by_change;
+  for (const Advised& each : advised)
+    for (const Change change :
+         {Change::kObstacles, Change::kInitialSet, Change::kHorizon, Change::kSlopes, Change::kObservation,
+          Change::kDomain, Change::kRest, Change::kLimits, Change::kLargerSlopes, Change::kNoise, Change::kOutlier})
+      if (std::ranges::any_of(each.advices, [&](const Advice& a) { return a.turns && a.change == change; }))
+        ++by_change[Name(change)];
+  std::cout << "advise: " << read.all.size() << " abstentions and rejections, " << turned
+            << " have a change that turns them, verified by certifying again; " << read.certified << " were certified"
+            << DescribePassedOver(read.passed_over) << "\n";
+  for (const auto& [change, count] : by_change) std::cout << "  " << change << ": " << count << "\n";
+  const auto places = PlacesOf(read, advised);
+  if (!places.empty()) std::cout << "where one more observation would turn most of them\n";
+  for (std::size_t i = 0; i < std::min<std::size_t>(places.size(), 10); ++i)
+    std::cout << "  " << places[i].second << ": " << places[i].first << "\n";
+  std::cout << std::flush;
+}
+
+nlohmann::json ToJson(const Advice& advice) {
+  nlohmann::json document{
+      {"change", Name(advice.change)}, {"what", advice.what}, {"amount", advice.amount}, {"turns", advice.turns}};
+  if (advice.row >= 0) document["row"] = advice.row, document["column"] = advice.column;
+  if (advice.place.size() > 0) document["place"] = std::vector(advice.place.begin(), advice.place.end());
+  if (!advice.turns) document["then"] = advice.then;
+  return document;
+}
+
+void PrintJson(const Abstentions& read, const std::vector<Advised>& advised) {
+  nlohmann::json all = nlohmann::json::array();
+  for (std::size_t i = 0; i < read.all.size(); ++i) {
+    nlohmann::json advices = nlohmann::json::array();
+    for (const Advice& advice : advised[i].advices) advices.push_back(ToJson(advice));
+    nlohmann::json entry{{"name", read.all[i].name},
+                         {"outcome", OutcomeName(read.all[i].outcome)},
+                         {"message", read.all[i].message},
+                         {"advice", advices}};
+    if (!advised[i].missing.empty()) entry["missing"] = advised[i].missing;
+    if (const auto& setting = advised[i].setting)
+      entry["setting"] = {
+          {"key", setting->key}, {"value", setting->value}, {"what", setting->what}, {"turns", setting->turns}};
+    all.push_back(std::move(entry));
+  }
+  nlohmann::json places = nlohmann::json::array();
+  for (const auto& [place, turned] : PlacesOf(read, advised)) places.push_back({{"place", place}, {"turned", turned}});
+  std::cout << JsonText({{"abstentions", all},
+                         {"certified", read.certified},
+                         {"places", places},
+                         {"passed_over", ToJson(read.passed_over)}})
+            << std::endl;
+}
+
+int RunAdvise(const Options& options) {
+  const Abstentions read = ReadAbstentions(options.files, options.config, options.key);
+  std::vector<Advised> advised(read.all.size());
+  {
+    Progress progress("abstentions examined", read.all.size());
+    ForEachInParallel(read.all.size(), options.jobs, [&](std::size_t i, std::size_t) {
+      advised[i] = AdviseOn(read.all[i]);
+      progress.Advance();
+    });
+  }
+  options.json ? PrintJson(read, advised) : PrintForPeople(read, advised);
+  return std::ranges::all_of(advised, &Advised::turned) ? 0 : 1;
+}
+
+}  // namespace
+
+Command AdviseCommand() {
+  const auto options = std::make_shared<Options>();
+  Command command{
+      .name = kAdvise.name,
+      .purpose = kAdvise.purpose,
+      .footer =
+          "Each change is the least of its kind, found by a search, and verified by certifying again with it. It is "
+          "not\n"
+          "true because it would help: a smaller slope or a wider domain has to be declared, and to hold.\n\n"
+          "Examples:\n"
+          "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_safety.csv > "
+          "decision.json\n"
+          "  forereach advise decision.json\n"
+          "  forereach advise run/log/events-20260101-120000-000000.lcmlog",
+      .options = {Required(
+                      {"files", &options->files, "DECISION|LOG",
+                       "The abstentions: a decision (the output of certify --json), or the event logs of a run, in "
+                       "their order"}),
+                  {"--config", &options->config, "FILE",
+                   "The task file; by default the one that a decision names, or that the logger kept next to a log, in "
+                   "tasks/"},
+                  JobsOption(options->jobs),
+                  JsonFlag(options->json)},
+      .run = [options] { return RunAdvise(*options); }};
+  AddKeyOptions(command.options, options->key);
+  return command;
+}
+
+}  // namespace forereach

@@ -1,0 +1,111 @@
+// `forereach advise`: the shipped abstentions, a recorded course, and answers that are about time.
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/gate/gate.h"
+#include "tests/cli/program.h"
+#include "tests/records/logs.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+const std::string kCourse = "tests/data/course.lcmlog --config tests/data/course.yaml";
+
+class AdviseTest : public testing::Test {
+ protected:
+  Output AdviseOn(const std::string& task, const std::string& plan, const std::string& options = "") {
+    const std::string decision = scratch_ / "decision.json";
+    Forereach("certify --json --config config/" + task + " --plan config/plans/" + plan + " > " + decision);
+    return Forereach("advise " + decision + options + " 2>&1");
+  }
+
+  ScratchDirectory scratch_;
+};
+
+TEST_F(AdviseTest, NamesTheLeastDistanceToTheObstacle) {
+  const Output output = AdviseOn("bicycle.yaml", "bicycle_safety.csv");
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, AllOf(HasSubstr("it would be certified\n    if it passed farther away"),
+                                 HasSubstr("obstacle 0 by 1.14 m"), HasSubstr("with its first 10 steps alone"),
+                                 HasSubstr("1 have a change that turns them, verified by certifying again")));
+}
+
+TEST_F(AdviseTest, NamesTheBoundOfTheDomain) {
+  EXPECT_THAT(AdviseOn("bicycle.yaml", "bicycle_domain.csv").text,
+              HasSubstr("if the domain, and with it the declaration, reached farther: a to 4.41"));
+}
+
+TEST_F(AdviseTest, NamesWhatMakesTheDataConsistent) {
+  const Output output = AdviseOn("bicycle_falsified.yaml", "bicycle_certified.csv");
+  EXPECT_THAT(output.text, AllOf(HasSubstr("if larger slopes were declared: those of theta times 5.99"),
+                                 HasSubstr("without observation 0: then it is \"abstain F"),
+                                 HasSubstr("without observation 6: then it is \"abstain F")));
+}
+
+TEST_F(AdviseTest, HasNothingToSayOfACertificate) {
+  const Output output = AdviseOn("bicycle.yaml", "bicycle_certified.csv", " --json");
+  const auto document = nlohmann::json::parse(output.text);
+  EXPECT_EQ(document["certified"], 1);
+  EXPECT_EQ(document["abstentions"].size(), 0u);
+}
+
+TEST_F(AdviseTest, TurnsEveryAbstentionOfACourse) {
+  const Output output = Forereach("advise --json " + kCourse);
+  EXPECT_EQ(output.code, 0);
+  const auto document = nlohmann::json::parse(output.text);
+  EXPECT_EQ(document["certified"], 20);
+  EXPECT_EQ(document["abstentions"].size(), 47u);
+  for (const auto& abstention : document["abstentions"]) {
+    int turned = 0;
+    for (const auto& advice : abstention["advice"]) turned += advice["turns"].get<bool>();
+    EXPECT_GT(turned, 0) << abstention["name"];
+  }
+  EXPECT_GT(document["places"].size(), 0u);
+  EXPECT_GT(document["places"][0]["turned"], 1);
+}
+
+// One candidate, answered by a gate at several times.
+TEST_F(AdviseTest, NamesTheTimeThatWouldHaveHeld) {
+  const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  candidate_plan_t candidate{};
+  for (const LogEvent& event : ReadLog(FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog").events)
+    if (event.channel == config.bus.candidate) {
+      candidate = *Decoded<candidate_plan_t>(event.data);
+      break;
+    }
+  const std::string log = scratch_ / "events-20260101-120000-000000.lcmlog";
+  EventLogWriter writer(log);
+  const auto answer = [&](std::int64_t now_us) {
+    ++candidate.plan_id;
+    const auto bytes = Encode(candidate);
+    writer.Append(now_us, config.bus.candidate, bytes);
+    writer.Append(now_us, config.bus.decision, Encode(Gate(config).Decide(bytes, now_us).decision));
+  };
+  answer(candidate.utime + 700'000);
+  answer(candidate.utime - 60'000);
+  answer(candidate.start_utime - 3'000);
+  ASSERT_TRUE(writer.Flush());
+  const Output output = Forereach("advise " + log + " --config tests/data/course.yaml 2>&1");
+  EXPECT_THAT(output.text, AllOf(HasSubstr("with gate.max_age_ms of at least 700\n"),
+                                 HasSubstr("with gate.max_ahead_ms of at least 60, if"),
+                                 HasSubstr("with gate.decision_budget_ms of at most 3, or sent 2 ms earlier")));
+}
+
+TEST_F(AdviseTest, WhatIsNoRecordIsSaid) {
+  scratch_.Write("no.json", "{\"outcome\": \"domain\"}");
+  const Output output = Forereach("advise " + (scratch_ / "no.json") + " 2>&1");
+  EXPECT_EQ(output.code, 2);
+  EXPECT_THAT(output.text, HasSubstr("inputs"));
+  EXPECT_EQ(Forereach("advise README.md 2>&1").code, 2);
+}
+
+}  // namespace
+}  // namespace forereach
