@@ -38,6 +38,11 @@ TEST_F(AdviseTest, NamesTheLeastDistanceToTheObstacle) {
                                  HasSubstr("1 have a change that turns them, verified by certifying again")));
 }
 
+TEST_F(AdviseTest, PrintsWhatItsDocumentShows) {
+  const std::string text = AdviseOn("bicycle.yaml", "bicycle_safety.csv").text;
+  EXPECT_THAT(Read(FOREREACH_SOURCE_DIR "/docs/advise.md"), HasSubstr("decision.json" + text.substr(text.find('\n'))));
+}
+
 TEST_F(AdviseTest, NamesTheBoundOfTheDomain) {
   EXPECT_THAT(AdviseOn("bicycle.yaml", "bicycle_domain.csv").text,
               HasSubstr("if the domain, and with it the declaration, reached farther: a to 4.41"));
