@@ -45,7 +45,9 @@ Abstentions FromDecision(const std::string& path, const std::string& config_path
   for (std::size_t t = 0; t < steps.Count(); ++t)
     judged.controls.col(static_cast<Eigen::Index>(t)) = steps[t].Numbers(m);
   judged.schedule = ScheduleFromZero(task, static_cast<int>(steps.Count()));
-  judged.initial_set = Zonotope::Enclose(Box(set["lower"].Numbers(n), set["upper"].Numbers(n)));
+  const Eigen::VectorXd lower = set["lower"].Numbers(n), upper = set["upper"].Numbers(n);
+  if (!(lower.array() <= upper.array()).all()) set.Fail("a lower bound is above its upper one");
+  judged.initial_set = Zonotope::Enclose(Box(lower, upper));
   judged.obstacles = task.obstacles;
   return read;
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "advise/advice.h"
+#include "certifier/certify/explain.h"
 #include "certifier/gate/gate.h"
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
@@ -94,13 +95,17 @@ struct Advised {
   }
 };
 
-Advised AdviseOn(const RecordedAbstention& abstention) {
+Advised AdviceFor(const RecordedAbstention& abstention) {
   if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
   if (!abstention.judged.problem) return {{}, SettingFor(abstention), {}};
   try {
     const Certifier certifier(abstention.judged.problem);
-    Advised advised{forereach::Advise(abstention.judged, certifier), {}, {}};
-    if (advised.advices.empty()) advised.missing = "judged again by what the log has, nothing is found that turns it";
+    const Case& judged = abstention.judged;
+    Advised advised{Advise(judged, certifier), {}, {}};
+    Tube tube;
+    const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
+    if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
+      advised.missing = "judged again by what is recorded: " + Explain(again, *judged.problem, judged.plan(), tube);
     return advised;
   } catch (const std::invalid_argument& error) {
     return {{}, {}, std::string("it cannot be judged again: ") + error.what()};
@@ -212,7 +217,7 @@ int RunAdvise(const Options& options) {
   {
     Progress progress("abstentions examined", read.all.size());
     ForEachInParallel(read.all.size(), options.jobs, [&](std::size_t i, std::size_t) {
-      advised[i] = AdviseOn(read.all[i]);
+      advised[i] = AdviceFor(read.all[i]);
       progress.Advance();
     });
   }

@@ -110,6 +110,19 @@ TEST_F(AdviseTest, WhatIsNoRecordIsSaid) {
   EXPECT_EQ(output.code, 2);
   EXPECT_THAT(output.text, HasSubstr("inputs"));
   EXPECT_EQ(Forereach("advise README.md 2>&1").code, 2);
+
+  AdviseOn("bicycle.yaml", "bicycle_safety.csv");
+  auto document = nlohmann::json::parse(Read(scratch_ / "decision.json"));
+  document["inputs"]["initial_set"]["lower"][0] = 9;
+  scratch_.Write("turned.json", document.dump());
+  const Output turned = Forereach("advise " + (scratch_ / "turned.json") + " 2>&1");
+  EXPECT_EQ(turned.code, 2);
+  EXPECT_THAT(turned.text, HasSubstr("inputs.initial_set: a lower bound is above its upper one"));
+  document["inputs"]["initial_set"]["lower"][0] = -9;
+  document["inputs"]["initial_set"]["upper"][0] = -8.9;
+  scratch_.Write("moved.json", document.dump());
+  EXPECT_THAT(Forereach("advise " + (scratch_ / "moved.json") + " 2>&1").text,
+              HasSubstr("judged again by what is recorded: certified"));
 }
 
 }  // namespace
