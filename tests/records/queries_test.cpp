@@ -1,0 +1,116 @@
+// docs/queries.md: its columns are those of the database, and its queries answer.
+#include <map>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "certifier/task/config.h"
+#include "records/database.h"
+#include "records/interpreter.h"
+#include "tests/records/logs.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+const std::string kData = FOREREACH_SOURCE_DIR "/tests/data/";
+
+std::string Document() {
+  std::ostringstream text;
+  text << std::ifstream(FOREREACH_SOURCE_DIR "/docs/queries.md").rdbuf();
+  return text.str();
+}
+
+using Table = std::vector<std::vector<std::string>>;
+
+class QueriesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string path = scratch_ / "decisions.sqlite";
+    const Config config = LoadConfig(kData + "course.yaml");
+    Interpreter interpreter(config.bus, "course.lcmlog");
+    Rows rows;
+    std::int64_t events = 0;
+    for (const LogEvent& event : ReadLog(kData + "course.lcmlog").events) {
+      interpreter.Observe(event, rows);
+      ++events;
+    }
+    Database database(path);
+    database.BeginRun("course.lcmlog", 1);
+    ASSERT_TRUE(database.Write(rows, "course.lcmlog", events));
+    ASSERT_EQ(sqlite3_open_v2(path.c_str(), &handle_, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
+  }
+  ~QueriesTest() override { sqlite3_close(handle_); }
+
+  Table Ask(const std::string& sql) {
+    Table rows;
+    char* error = nullptr;
+    const auto add = [](void* to, int count, char** values, char**) {
+      std::vector<std::string>& row = static_cast<Table*>(to)->emplace_back();
+      for (int i = 0; i < count; ++i) row.emplace_back(values[i] ? values[i] : "NULL");
+      return 0;
+    };
+    EXPECT_EQ(sqlite3_exec(handle_, sql.c_str(), add, &rows, &error), SQLITE_OK) << sql << (error ? error : "");
+    sqlite3_free(error);
+    return rows;
+  }
+
+  ScratchDirectory scratch_;
+  sqlite3* handle_ = nullptr;
+};
+
+TEST_F(QueriesTest, EveryColumnIsExplained) {
+  std::map<std::string, std::set<std::string>> explained;
+  std::istringstream lines(Document());
+  std::string table;
+  const std::regex heading(R"(\*\*(\w+)\*\*: a row.*)"), row(R"(\| (`.*`) \| .* \|)"), name("`(\\w+)`");
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch match;
+    if (line.starts_with("## ") && line != "## Columns") break;
+    if (std::regex_match(line, match, heading)) table = match[1];
+    if (!std::regex_match(line, match, row)) continue;
+    const std::string cell = match[1].str().substr(0, match[1].str().find(" | "));
+    for (std::sregex_iterator each(cell.begin(), cell.end(), name), end; each != end; ++each)
+      explained[table].insert((*each)[1]);
+  }
+  std::set<std::string> tables;
+  for (const auto& entry : Ask("SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite%'")) {
+    std::set<std::string> columns;
+    for (const auto& column : Ask("PRAGMA table_info(" + entry[0] + ")")) columns.insert(column[1]);
+    EXPECT_EQ(explained[entry[0]], columns) << entry[0];
+    tables.insert(entry[0]);
+  }
+  EXPECT_EQ(tables.size(), 4u);
+  EXPECT_EQ(explained.size(), 4u);
+}
+
+TEST_F(QueriesTest, EveryQueryAnswers) {
+  const std::string text = Document();
+  int queries = 0, with_rows = 0;
+  for (std::size_t at = text.find("```sql\n"); at != std::string::npos; at = text.find("```sql\n", at + 1)) {
+    const std::string sql = text.substr(at + 7, text.find("```\n", at + 7) - at - 7);
+    with_rows += !Ask(sql).empty();
+    ++queries;
+  }
+  EXPECT_GE(queries, 15);
+  EXPECT_GE(with_rows, queries - 3) << "the course has gaps of no kind, and no rejections";
+}
+
+TEST_F(QueriesTest, TheFirstOneCountsWhatTheLogHas) {
+  const std::string text = Document();
+  const std::size_t at = text.find("```sql\n") + 7;
+  int decisions = 0, certified = 0;
+  for (const auto& row : Ask(text.substr(at, text.find("```\n", at) - at))) {
+    decisions += std::stoi(row[2]);
+    if (row[0] == "certified") certified = std::stoi(row[2]);
+  }
+  EXPECT_EQ(decisions, 67);
+  EXPECT_EQ(certified, 20);
+}
+
+}  // namespace
+}  // namespace forereach
