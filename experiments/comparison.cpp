@@ -63,14 +63,14 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
         return PaperOrNone(is_fore_reach ? "bicycle." + group + "." + figure + "." + n
                                          : method.name + "." + n + "." + group + "." + figure);
       };
-      const auto row = [&](const char* what, std::optional<PaperValue> value, Group group, Statistic statistic) {
+      const auto row = [&](const char* what, const Reference& reference, Group group, Statistic statistic) {
         bicycle.rows.push_back(
-            {where + what, value, OverSeeds(scope, results, cell, group, statistic), 4, WhatIsOurs(method)});
+            {where + what, reference, OverSeeds(scope, results, cell, group, statistic), 4, WhatIsOurs(method)});
         return bicycle.rows.back().ours.mean;
       };
       const auto coverage = paper("B", "coverage"), recall = paper("C", "recall");
-      const auto our_coverage = row("B coverage", coverage, Group::kB, Coverage);
-      const auto our_recall = row("C recall", recall, Group::kC, Recall);
+      const auto our_coverage = row("B coverage", {Mark::kOurs, coverage}, Group::kB, Coverage);
+      const auto our_recall = row("C recall", {is_fore_reach ? Mark::kFitted : Mark::kOurs, recall}, Group::kC, Recall);
       row("B certified", {}, Group::kB, CertificateRate);
       row("B false-safe", {}, Group::kB, FalseSafeRate);
       if (observations == Sizes(scope).back())
@@ -79,8 +79,11 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
     }
     const Cell cell = With(method, PaperCell(PointMassSystem(), 100, 0, 0));
     const auto row = [&](const char* what, const char* key, Group group, Statistic statistic) {
-      point_mass.rows.push_back({method.name + ": " + what, PaperOrNone("point_mass." + method.name + "." + key),
-                                 OverSeeds(scope, results, cell, group, statistic), 3, WhatIsOurs(method)});
+      point_mass.rows.push_back({method.name + ": " + what,
+                                 {Mark::kOurs, PaperOrNone("point_mass." + method.name + "." + key)},
+                                 OverSeeds(scope, results, cell, group, statistic),
+                                 3,
+                                 WhatIsOurs(method)});
     };
     row("B coverage", "B.coverage", Group::kB, Coverage);
     row("B certified", "B.certified", Group::kB, CertificateRate);
