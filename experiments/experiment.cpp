@@ -29,12 +29,17 @@ const CellResult& Results::Of(const Cell& cell) const {
 }
 
 std::span<const Experiment> Experiments() {
-  static const std::vector<Experiment> all{
-      MainResults(),           RecallByN(),       Comparison(),        CertificateBudget(),
-      ActionChunks(),          DomainExits(),     FirstAbstentions(),  TubeGeometry(),
-      BoxAgainstZonotope(),    ScalarEnvelope(),  NoiseSweep(),        NominalDegradation(),
-      IncorrectDeclarations(), EstimatedSlopes(), AdversarialFamily(), AssumptionFamilies(),
-      ParameterBoxes(),        NormRatios(),      InformationLimits(), CertifiedDeclarations()};
+  static const std::vector<Experiment> all{MainResults(),          RecallByN(),
+                                           DirectCoverage(),       Comparison(),
+                                           CertificateBudget(),    ActionChunks(),
+                                           DomainExits(),          FirstAbstentions(),
+                                           TubeGeometry(),         BoxAgainstZonotope(),
+                                           ScalarEnvelope(),       NoiseSweep(),
+                                           NominalDegradation(),   IncorrectDeclarations(),
+                                           EstimatedSlopes(),      AdversarialFamily(),
+                                           AssumptionFamilies(),   ParameterBoxes(),
+                                           NormRatios(),           InformationLimits(),
+                                           CertifiedDeclarations()};
   return all;
 }
 

@@ -76,6 +76,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 ///@{
 [[nodiscard]] Experiment MainResults();
 [[nodiscard]] Experiment RecallByN();
+[[nodiscard]] Experiment DirectCoverage();
 [[nodiscard]] Experiment Comparison();
 [[nodiscard]] Experiment CertificateBudget();
 [[nodiscard]] Experiment DomainExits();
