@@ -41,6 +41,7 @@ CpSlsBudget CountBudget(const CpSls& method, const Answer& answer, const Scenari
   budgets.tube.push_back(sum.starved ? -1 : sum.tube);
   budgets.total.push_back(sum.starved ? -1 : sum.total());
   budgets.least_mass.push_back(least_mass);
+  budgets.at_cap.push_back(sum.at_cap / known);
   budgets.complete.push_back(answer.IsComplete());
   return sum;
 }

@@ -44,6 +44,7 @@ struct Effort {
 struct PlanBudgets {
   std::vector<double> drift, tube, total;  ///< -1 for all three where a step is starved
   std::vector<double> least_mass;          ///< min_k sum_i w_i
+  std::vector<double> at_cap;              ///< Part of the weights whose d_TV is at its cap, mean over the steps
   std::vector<int> complete;               ///< 1 where all steps are in the sum
 };
 

@@ -30,7 +30,7 @@ const CellResult& Results::Of(const Cell& cell) const {
 
 std::span<const Experiment> Experiments() {
   static const std::vector<Experiment> all{
-      MainResults(),           RecallByN(),       Comparison(),        CertificateBudget(),
+      MainResults(),           RecallByN(),       Comparison(), Readings(),        CertificateBudget(),
       ActionChunks(),          DomainExits(),     FirstAbstentions(),  TubeGeometry(),
       BoxAgainstZonotope(),    ScalarEnvelope(),  NoiseSweep(),        NominalDegradation(),
       IncorrectDeclarations(), EstimatedSlopes(), AdversarialFamily(), AssumptionFamilies(),

@@ -76,6 +76,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment MainResults();
 [[nodiscard]] Experiment RecallByN();
 [[nodiscard]] Experiment Comparison();
+[[nodiscard]] Experiment Readings();
 [[nodiscard]] Experiment CertificateBudget();
 [[nodiscard]] Experiment DomainExits();
 [[nodiscard]] Experiment FirstAbstentions();

@@ -1,6 +1,7 @@
 #include "experiments/variants.h"
 #include "experiments/equations_slopes.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -174,6 +175,16 @@ System MakeEscaping(double lambda) {
 }
 
 }  // namespace
+
+const System& WithFewerPlans(const System& system, int scenarios) {
+  static std::map<std::pair<const System*, int>, System> known;
+  const auto [at, is_new] = known.try_emplace({&system, scenarios}, system);
+  if (is_new) {
+    at->second.name += "_" + std::to_string(scenarios) + "_plans";
+    at->second.scenarios = std::min(system.scenarios, scenarios);
+  }
+  return at->second;
+}
 
 const System& Degraded(const System& system, double part) {
   static std::map<std::pair<const System*, double>, System> known;

@@ -5,6 +5,10 @@
 
 namespace forereach::experiments {
 
+/** `system` with at most so many plans a group and seed, the first. Made once for each count; not for several threads at
+once. */
+[[nodiscard]] const System& WithFewerPlans(const System& system, int scenarios);
+
 /** `system` with a nominal model that knows only a part of the dynamics,  f0_d = (1 - d) f0,  of the same target. What
 the model lacks is residual, r_d = r + d f0, and the declaration is as much larger, L_d = L + d sup |D f0|. So d = 0 is
 the paper's model, and d = 1 none at all, where L_d is L_f of the norm ratios. "Nominal degradation" is not defined in
