@@ -68,8 +68,7 @@ Estimate EstimatedPart(const Scope& scope, double lambda) {
 
 double TruePart(double lambda) { return Escaping(lambda).deployed.maxCoeff() / PointMassSystem().deployed.maxCoeff(); }
 
-void AddOutcomes(const Scope& scope, const Results& results, const std::string& where, const Cell& cell, bool is_true,
-                 Table& table) {
+void AddOutcomes(const Scope& scope, const Results& results, const std::string& where, const Cell& cell, Table& table) {
   const auto row = [&](const char* what, Group group, Statistic statistic) {
     table.rows.push_back({where + what, {}, OverSeeds(scope, results, cell, group, statistic), 3, ""});
   };
@@ -77,9 +76,8 @@ void AddOutcomes(const Scope& scope, const Results& results, const std::string& 
   row("A certified", Group::kA, CertificateRate);
   row("C coverage", Group::kC, Coverage);
   row("C certified", Group::kC, CertificateRate);
-  table.rows.push_back({where + "false certificates, all groups",
-                        is_true ? std::optional(Paper("false_certificates")) : std::nullopt,
-                        Exactly(FalseCertificates(scope, results, cell)), 0, ""});
+  table.rows.push_back(
+      {where + "false certificates, all groups", {}, Exactly(FalseCertificates(scope, results, cell)), 0, ""});
 }
 
 std::vector<Table> FamilyTables(const Scope& scope, const Results& results) {
@@ -97,14 +95,17 @@ std::vector<Table> FamilyTables(const Scope& scope, const Results& results) {
   const double last = LambdasOf(scope).back();
   for (const double lambda : LambdasOf(scope)) {
     const std::string where = "lambda = " + std::to_string(static_cast<int>(lambda)) + ": ";
-    slopes.rows.push_back({where + "true", lambda == last ? std::optional(Paper("slopes.containment")) : std::nullopt,
-                           Exactly(TruePart(lambda)), 3,
-                           "which member the paper needs so much for is not in its text"});
-    slopes.rows.push_back({where + "estimate", Paper("slopes"), EstimatedPart(scope, lambda), 3,
+    slopes.rows.push_back(
+        {where + "true", lambda == last ? Reference(Mark::kOurs, Paper("slopes.containment")) : Reference(),
+         Exactly(TruePart(lambda)), 3, "which member the paper needs so much for is not in its text"});
+    slopes.rows.push_back({where + "estimate",
+                           {Mark::kOurs, Paper("slopes")},
+                           EstimatedPart(scope, lambda),
+                           3,
                            "the paper's residual is flat at every sample, the softplus not quite"});
-    AddOutcomes(scope, results, where + "true, ", TrueCell(lambda), true, outcomes);
-    AddOutcomes(scope, results, where + "kept, ", KeptCell(lambda), false, outcomes);
-    AddOutcomes(scope, results, where + "estimate, ", PlugInCell(lambda), false, outcomes);
+    AddOutcomes(scope, results, where + "true, ", TrueCell(lambda), outcomes);
+    AddOutcomes(scope, results, where + "kept, ", KeptCell(lambda), outcomes);
+    AddOutcomes(scope, results, where + "estimate, ", PlugInCell(lambda), outcomes);
   }
   return {slopes, outcomes};
 }

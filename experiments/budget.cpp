@@ -59,16 +59,23 @@ constexpr const char* kWhy = "weights, their bandwidth and the drift rate are ou
 
 void AddRowsOf(int observations, const Pooled& pooled, std::vector<Row>& rows) {
   const std::string n = std::to_string(observations);
-  const auto row = [&](const char* what, const char* key, const Estimate& ours, int decimals) {
+  // No weight exceeds one, so with fewer observations than the floor every plan is starved.
+  const bool is_fixed = observations < StarvationFloor(0.10, BicycleSystem().horizon);
+  const auto row = [&](const char* what, Mark mark, const char* key, const Estimate& ours, int decimals) {
     const std::optional<PaperValue> paper = PaperOrNone("budget." + n + "." + key);
-    if (ours.mean || paper) rows.push_back({"N = " + n + ": " + what, paper, ours, decimals, kWhy});
+    if (ours.mean || paper) rows.push_back({"N = " + n + ": " + what, {mark, paper}, ours, decimals, kWhy});
   };
-  row("median of the least mass", "mass", Median(pooled.mass), 1);
-  row("starved", "starved", Exactly(static_cast<double>(pooled.starved) / pooled.plans), 3);
-  rows.push_back({"N = " + n + ": budgets below one", Paper("budget.nonvacuous"), Exactly(pooled.meaningful), 0, kWhy});
-  row("median drift (TV)", "drift", Median(pooled.drift), 2);
-  row("median tube", "tube", Median(pooled.tube), 2);
-  row("median total", "total", Median(pooled.total), 2);
+  row("median of the least mass", Mark::kOurs, "mass", Median(pooled.mass), 1);
+  row("starved", is_fixed ? Mark::kExact : Mark::kOurs, "starved",
+      Exactly(static_cast<double>(pooled.starved) / pooled.plans), 3);
+  rows.push_back({"N = " + n + ": budgets below one",
+                  {Mark::kOurs, Paper("budget.nonvacuous")},
+                  Exactly(pooled.meaningful),
+                  0,
+                  kWhy});
+  row("median drift (TV)", Mark::kOurs, "drift", Median(pooled.drift), 2);
+  row("median tube", Mark::kOurs, "tube", Median(pooled.tube), 2);
+  row("median total", Mark::kOurs, "total", Median(pooled.total), 2);
 }
 
 std::vector<Table> BudgetTables(const Scope& scope, const Results& results) {
@@ -90,7 +97,7 @@ std::vector<Table> BudgetTables(const Scope& scope, const Results& results) {
       meaningful += pooled.meaningful;
     }
     plug_ins.rows.push_back(
-        {method.name + ": budgets below one", Paper("budget.nonvacuous"), Exactly(meaningful), 0, kWhy});
+        {method.name + ": budgets below one", {Mark::kOurs, Paper("budget.nonvacuous")}, Exactly(meaningful), 0, kWhy});
     plug_ins.rows.push_back({method.name + ": median total at the largest N", {}, Median(pooled.total), 2, ""});
   }
   return {budget, plug_ins};

@@ -66,7 +66,7 @@ std::vector<Table> TestTables(const Scope& scope) {
   for (const double factor : kFactors) {
     const std::string times = "L times " + Short(factor);
     table.rows.push_back({times + ": corridor",
-                          factor == 0.5 ? std::optional(Paper("incorrect.halved.rejections")) : std::nullopt,
+                          factor == 0.5 ? Reference(Mark::kOurs, Paper("incorrect.halved.rejections")) : Reference(),
                           Exactly(Rejections(scope, Layout::kCorridor, factor)), 0,
                           "the paper halves another bound, an underestimate that is not in its text"});
     table.rows.push_back(
@@ -88,9 +88,8 @@ std::vector<Table> IncorrectTables(const Scope& scope, const Results& results) {
       table.rows.push_back({where + "C coverage", {}, OverSeeds(scope, results, cell, Group::kC, Coverage), 3, ""});
       table.rows.push_back(
           {where + "C certified", {}, OverSeeds(scope, results, cell, Group::kC, CertificateRate), 3, ""});
-      table.rows.push_back({where + "false certificates, all groups",
-                            factor == 1 ? std::optional(Paper("false_certificates")) : std::nullopt,
-                            Exactly(FalseCertificates(scope, results, cell)), 0, ""});
+      table.rows.push_back(
+          {where + "false certificates, all groups", {}, Exactly(FalseCertificates(scope, results, cell)), 0, ""});
     }
   std::vector<Table> tables = TestTables(scope);
   tables.push_back(table);
@@ -150,13 +149,23 @@ std::vector<Table> BoxTables(const Scope& scope, const Results& results) {
   for (const int percent : kPercents) {
     const Cell cell = BoxCell(percent);
     const std::string key = "boxes." + std::to_string(percent) + ".", where = std::to_string(percent) + " %: ";
-    table.rows.push_back({where + "slack", Paper(key + "slack"), Exactly(cell.declared.matrix.norm() / norm), 3, why});
     table.rows.push_back(
-        {where + "C: recall", Paper(key + "recall"), OverSeeds(scope, results, cell, Group::kC, Recall), 3, why});
-    table.rows.push_back({where + "C: complete", Paper(key + "complete"),
-                          OverSeeds(scope, results, cell, Group::kC, CompleteRate), 3, why});
-    table.rows.push_back({where + "false certificates, all groups", Paper("false_certificates"),
-                          Exactly(FalseCertificates(scope, results, cell)), 0, ""});
+        {where + "slack", {Mark::kOurs, Paper(key + "slack")}, Exactly(cell.declared.matrix.norm() / norm), 3, why});
+    table.rows.push_back({where + "C: recall",
+                          {Mark::kOurs, Paper(key + "recall")},
+                          OverSeeds(scope, results, cell, Group::kC, Recall),
+                          3,
+                          why});
+    table.rows.push_back({where + "C: complete",
+                          {Mark::kOurs, Paper(key + "complete")},
+                          OverSeeds(scope, results, cell, Group::kC, CompleteRate),
+                          3,
+                          why});
+    table.rows.push_back({where + "B: false certificates",
+                          {Mark::kOurs, Paper(key + "false_certificates")},
+                          Exactly(FalseCertificates(scope, results, cell, Group::kB)),
+                          0,
+                          ""});
   }
   return {table};
 }
@@ -171,8 +180,11 @@ std::vector<Table> NormTables(const Scope&, const Results&) {
       "|L_f|_F / |L_r|_F: L_r is the deployed matrix over 1.5, L_f adds the largest |D_z f0| over the domain to it.",
       {}};
   for (const System* system : Systems())
-    table.rows.push_back(
-        {system->name, Paper("norms." + system->name), Exactly(NormRatio(*system, system->deployed / 1.5)), 3, ""});
+    table.rows.push_back({system->name,
+                          {Mark::kExact, Paper("norms." + system->name)},
+                          Exactly(NormRatio(*system, system->deployed / 1.5)),
+                          3,
+                          ""});
   return {table};
 }
 
@@ -186,16 +198,32 @@ std::vector<Table> GridTables(const Scope&, const Results&) {
       {"Certified declarations",
        "L_cert by the paper's fixed grids, with the paper's rounding. Proved bounds, which are slightly lower, are in "
        "declare.md.",
-       {{"point mass, position diagonal", Paper("grids.position_diagonal"),
-         Exactly(Rounded(point_mass.position_diagonal)), 9, ""},
-        {"point mass, position cross", Paper("grids.position_cross"), Exactly(Rounded(point_mass.position_cross)), 9,
+       {{"point mass, position diagonal",
+         {Mark::kExact, Paper("grids.position_diagonal")},
+         Exactly(Rounded(point_mass.position_diagonal)),
+         9,
          ""},
-        {"point mass, velocity diagonal", Paper("grids.velocity_diagonal"),
-         Exactly(Rounded(point_mass.velocity_diagonal)), 9, ""},
-        {"point mass, velocity cross", Paper("grids.velocity_cross"), Exactly(Rounded(point_mass.velocity_cross)), 9,
+        {"point mass, position cross",
+         {Mark::kExact, Paper("grids.position_cross")},
+         Exactly(Rounded(point_mass.position_cross)),
+         9,
          ""},
-        {"bicycle, heading by v", Paper("grids.by_speed"), Exactly(RoundedUp(bicycle.by_speed)), 9, ""},
-        {"bicycle, heading by delta", Paper("grids.by_steering"), Exactly(RoundedUp(bicycle.by_steering)), 9, ""}}}};
+        {"point mass, velocity diagonal",
+         {Mark::kExact, Paper("grids.velocity_diagonal")},
+         Exactly(Rounded(point_mass.velocity_diagonal)),
+         9,
+         ""},
+        {"point mass, velocity cross",
+         {Mark::kExact, Paper("grids.velocity_cross")},
+         Exactly(Rounded(point_mass.velocity_cross)),
+         9,
+         ""},
+        {"bicycle, heading by v", {Mark::kExact, Paper("grids.by_speed")}, Exactly(RoundedUp(bicycle.by_speed)), 9, ""},
+        {"bicycle, heading by delta",
+         {Mark::kExact, Paper("grids.by_steering")},
+         Exactly(RoundedUp(bicycle.by_steering)),
+         9,
+         ""}}}};
 }
 
 }  // namespace

@@ -57,11 +57,12 @@ std::vector<Table> DegradationTables(const Scope& scope, const Results& results)
       rows.push_back({system->name + ", d = " + text + ": C recall", {}, recall, 3, ""});
     }
     const std::optional<double> crossing = Crossing(percents, recalls);
-    table.rows.push_back({system->name + ": tolerated, %", Paper("degradation." + system->name),
-                          crossing ? Exactly(*crossing) : Estimate{}, 3,
+    table.rows.push_back({system->name + ": tolerated, %",
+                          {Mark::kOurs, Paper("degradation." + system->name)},
+                          crossing ? Exactly(*crossing) : Estimate{},
+                          3,
                           "the paper does not say what degrades, nor how much of it it declares"});
-    table.rows.push_back({system->name + ": false certificates, all groups", Paper("false_certificates"),
-                          Exactly(false_certificates), 0, ""});
+    table.rows.push_back({system->name + ": false certificates, all groups", {}, Exactly(false_certificates), 0, ""});
     table.rows.insert(table.rows.end(), rows.begin(), rows.end());
   }
   return {table};

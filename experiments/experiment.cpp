@@ -56,8 +56,13 @@ Estimate OverSeeds(const Scope& scope, const Results& results, Cell cell, Group 
 
 int FalseCertificates(const Scope& scope, const Results& results, Cell cell) {
   int count = 0;
-  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed)
-    for (const Tally& tally : results.Of(cell)) count += tally.false_certificates();
+  for (const Group group : kGroups) count += FalseCertificates(scope, results, cell, group);
+  return count;
+}
+
+int FalseCertificates(const Scope& scope, const Results& results, Cell cell, Group group) {
+  int count = 0;
+  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed) count += results.Of(cell, group).false_certificates();
   return count;
 }
 

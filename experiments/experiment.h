@@ -63,8 +63,9 @@ using Statistic = std::optional<double> (*)(const Tally&);
 /** Over the seeds of a scope, whatever the cell's own. */
 [[nodiscard]] Estimate OverSeeds(const Scope& scope, const Results& results, Cell cell, Group group,
                                  Statistic statistic);
-/** Certificates of plans that are not target-safe: all groups and seeds of the scope together. */
+/** Certificates of plans that are not target-safe, all seeds of the scope together: of every group, or of one. */
 [[nodiscard]] int FalseCertificates(const Scope& scope, const Results& results, Cell cell);
+[[nodiscard]] int FalseCertificates(const Scope& scope, const Results& results, Cell cell, Group group);
 /** The cell with each seed of the scope. */
 void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 

@@ -92,14 +92,15 @@ int main(int argc, char** argv) {
   if (seeds) options.scope.seeds = *seeds;
   options.directory = !directory.empty() ? directory : quick ? "run/experiments-quick" : "run/experiments";
   options.report = report;
-  options.command =
+  const std::string command =
       "experiments/run " + name + (quick ? " --quick" : "") + (seeds ? " --seeds " + std::to_string(*seeds) : "");
+  options.origin = OriginOf(command, options.threads);
   try {
     if (name == "train") return Train(policy, options.threads), 0;
     if (name == "real")
-      RunReal({data, others, options.directory, quick, options.command + " --data " + data}, std::cout);
+      RunReal({data, others, options.directory, quick, command + " --data " + data}, std::cout);
     else if (name == "drift")
-      RunDrift({options.directory, quick, options.command}, std::cout);
+      RunDrift({options.directory, quick, command}, std::cout);
     else
       RunExperiments(options, std::cout);
   } catch (const std::exception& error) {

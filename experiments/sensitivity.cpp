@@ -51,15 +51,16 @@ std::vector<Table> SetTables(const Scope& scope, const Results& results) {
       const Cell cell = PaperCell(*system, observations, 0, 0);
       const bool in_paper = observations == system->sample_sizes.back();
       const std::string where = system->name + ", C, N = " + std::to_string(observations) + ": ";
-      const auto paper = [&](const std::string& key) {
-        return in_paper ? std::optional(Paper("sets." + system->name + ".C." + key)) : std::nullopt;
+      const auto paper = [&](Mark mark, const std::string& key) {
+        return in_paper ? Reference(mark, Paper("sets." + system->name + ".C." + key)) : Reference();
       };
-      table.rows.push_back({where + "area ratio", paper("area_ratio"), AreaRatio(scope, results, cell, Group::kC), 3,
+      table.rows.push_back({where + "area ratio", paper(Mark::kOurs, "area_ratio"),
+                            AreaRatio(scope, results, cell, Group::kC), 3,
                             "scenario bounds are ours, and the paper does not say which slices it averages"});
       if (system == &PointMassSystem()) continue;
-      table.rows.push_back({where + "certified, zonotope", paper("zonotope"),
+      table.rows.push_back({where + "certified, zonotope", paper(Mark::kFitted, "zonotope"),
                             OverSeeds(scope, results, cell, Group::kC, CertificateRate), 3, ""});
-      table.rows.push_back({where + "certified, box", paper("box"),
+      table.rows.push_back({where + "certified, box", paper(Mark::kOurs, "box"),
                             OverSeeds(scope, results, WithOrder(cell, 1), Group::kC, CertificateRate), 3, ""});
     }
   return {table};
@@ -89,10 +90,16 @@ std::vector<Table> ScalarTables(const Scope& scope, const Results& results) {
               {}};
   for (const Group group : kGroups) {
     const std::string where(1, NameOf(group));
-    table.rows.push_back({where + ": certified", Paper("scalar.certified"),
-                          OverSeeds(scope, results, ScalarCell(), group, CertificateRate), 3, ""});
-    table.rows.push_back(
-        {where + ": D", Paper("scalar.domain"), OverSeeds(scope, results, ScalarCell(), group, DomainRate), 3, ""});
+    table.rows.push_back({where + ": certified",
+                          {Mark::kOurs, Paper("scalar.certified")},
+                          OverSeeds(scope, results, ScalarCell(), group, CertificateRate),
+                          3,
+                          ""});
+    table.rows.push_back({where + ": D",
+                          {Mark::kOurs, Paper("scalar.domain")},
+                          OverSeeds(scope, results, ScalarCell(), group, DomainRate),
+                          3,
+                          ""});
   }
   return {table};
 }
@@ -123,8 +130,10 @@ std::vector<Table> NoiseTables(const Scope& scope, const Results& results) {
     std::snprintf(text, sizeof text, "%g", multiple);
     const bool in_paper = multiple == 0 || multiple == 3.3;
     table.rows.push_back({std::string("recall at ") + text,
-                          in_paper ? std::optional(Paper(std::string("noise.recall.") + text)) : std::nullopt,
-                          OverSeeds(scope, results, NoisyCell(multiple), Group::kC, Recall), 3,
+                          {multiple == 0 ? Mark::kFitted : Mark::kOurs,
+                           in_paper ? PaperOrNone(std::string("noise.recall.") + text) : std::nullopt},
+                          OverSeeds(scope, results, NoisyCell(multiple), Group::kC, Recall),
+                          3,
                           "the paper does not say what sigma it declares of Gaussian noise; here 3 s"});
     table.rows.push_back({std::string("coverage at ") + text,
                           {},
@@ -132,8 +141,11 @@ std::vector<Table> NoiseTables(const Scope& scope, const Results& results) {
                           3,
                           ""});
   }
-  table.rows.push_back({"median residual over the data region", Paper("median_residual"),
-                        Exactly(MedianResidual(BicycleSystem())), 7, "the paper's data region is not in its text"});
+  table.rows.push_back({"median residual over the data region",
+                        {Mark::kOurs, Paper("median_residual")},
+                        Exactly(MedianResidual(BicycleSystem())),
+                        7,
+                        "the paper's data region is not in its text"});
   return {table};
 }
 

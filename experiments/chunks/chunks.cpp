@@ -71,13 +71,13 @@ Table OutcomeTable(const Scope& scope, const Results& results, double noise) {
     for (const int observations : scope.SizesOf(ChunkSystem())) {
       const std::string n = std::to_string(observations), where = Words(layout) + ", N = " + n + ": ";
       const std::string key = std::string("chunks.") + NameOf(layout) + ".";
-      const auto row = [&](const char* what, std::optional<PaperValue> paper, Statistic statistic) {
+      const auto row = [&](const char* what, const Reference& paper, Statistic statistic) {
         const Cell cell = ChunkCell(layout, observations, noise);
         table.rows.push_back({where + what, paper, OverSeedsAndGroups(scope, results, cell, statistic), 3, kWhy});
       };
-      row("certificate rate", Paper(key + "rate." + n), CertificateRate);
-      row("recall", Paper(key + "recall." + n), Recall);
-      row("coverage", Paper("chunks.coverage"), Coverage);
+      row("certificate rate", {Mark::kOurs, Paper(key + "rate." + n)}, CertificateRate);
+      row("recall", {Mark::kOurs, Paper(key + "recall." + n)}, Recall);
+      row("coverage", {Mark::kOurs, Paper("chunks.coverage")}, Coverage);
       row("D", {}, DomainRate);
       row("S", {}, SafetyRate);
     }
@@ -117,7 +117,7 @@ Table SupportTable(const Scope& scope, const Results& results) {
       {}};
   for (const Layout layout : kLayouts) {
     const auto paper = [&](const char* key) {
-      return layout == Layout::kFixedGrid ? std::optional(Paper(key)) : std::nullopt;
+      return layout == Layout::kFixedGrid ? Reference(Mark::kOurs, Paper(key)) : Reference();
     };
     const std::vector<SupportRecord> records = RecordsOf(CellsOf(scope, layout, 0), results);
     const SupportStatistic support = SupportOf(records);
@@ -148,10 +148,14 @@ Table SoundnessTable(const Scope& scope, const Results& results) {
     }
   return {"Action chunks, soundness",
           "Both layouts and channels, every N and seed.",
-          {{"cells", Paper("chunks.cells"), Exactly(double(cells.size())), 0, "this run has fewer"},
-           {"complete tubes that do not contain every rollout", Paper("chunks.uncovered"), Exactly(uncovered), 0, ""},
+          {{"cells", {Mark::kExact, Paper("chunks.cells")}, Exactly(double(cells.size())), 0, "this run has fewer"},
+           {"complete tubes that do not contain every rollout",
+            {Mark::kOurs, Paper("chunks.uncovered")},
+            Exactly(uncovered),
+            0,
+            ""},
            {"of these, membership undecided", {}, Exactly(undecided), 0, ""},
-           {"false certificates", Paper("false_certificates"), Exactly(wrong), 0, ""}}};
+           {"false certificates", {Mark::kOurs, Paper("chunks.false_certificates")}, Exactly(wrong), 0, ""}}};
 }
 
 // The part of all plans that abstains first at a step.

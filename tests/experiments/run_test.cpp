@@ -30,7 +30,7 @@ std::string Read(const fs::path& path) {
 class RunTest : public testing::Test {
  protected:
   [[nodiscard]] RunOptions Quick(std::vector<std::string> names, const std::string& directory) const {
-    return {std::move(names), {2, true}, {30, 24}, 1, root_ / directory, "", "experiments/run"};
+    return {std::move(names), {2, true}, {30, 24}, 1, root_ / directory, "", {}};
   }
 
   const ScratchDirectory scratch_;
@@ -113,17 +113,22 @@ TEST_F(RunTest, LimitsAndAssumptionsHoldInAQuickRun) {
   RunOptions options = Quick({"limits", "degradation", "assumptions"}, "limits");
   options.effort = {3, 8};
   RunExperiments(options, out);
-  EXPECT_THAT(out.str(), HasSubstr("| admissible pairs | 64 | Short-horizon lower-bound scan | 64 | 0 | same |"));
-  EXPECT_THAT(out.str(), HasSubstr("| of these with a positive bound | 64 | Short-horizon lower-bound scan | 64 |"));
-  EXPECT_THAT(out.str(), HasSubstr("| bicycle, N = 400: tubes that miss an extremal state, of 4 |  |  | 0 |"));
+  EXPECT_THAT(out.str(),
+              HasSubstr("| admissible pairs | exact | 64 | Short-horizon lower-bound scan | 64 | 0 | same |"));
+  EXPECT_THAT(out.str(),
+              HasSubstr("| of these with a positive bound | ours | 64 | Short-horizon lower-bound scan | 64 |"));
+  EXPECT_THAT(out.str(),
+              HasSubstr("| bicycle, N = 400: tubes that miss an extremal state, of 4 | not given |  |  | 0 |"));
   for (const char* system : {"bicycle", "point_mass"})
     EXPECT_THAT(out.str(), HasSubstr(std::string("| ") + system +
-                                     ": false certificates, all groups | 0 | "
-                                     "Experiments, text | 0 | 0 | same |"));
-  EXPECT_THAT(out.str(), HasSubstr("| Affine residual, linear target: F | 0.000 | Affine control example | 0.000 "));
-  EXPECT_THAT(out.str(), HasSubstr("| Affine residual, linear target: C coverage | 1.000 | Affine control example | "
-                                   "1.000 "));
-  EXPECT_THAT(out.str(), HasSubstr("| Affine residual, knee target: F | 1.000 | Affine control example | 1.000 "));
+                                     ": false certificates, all groups | not given |  |  | 0 |  |  |  |"));
+  EXPECT_THAT(out.str(),
+              HasSubstr("| Affine residual, linear target: F | ours | 0.000 | Affine control example | 0.000 "));
+  EXPECT_THAT(out.str(),
+              HasSubstr("| Affine residual, linear target: C coverage | ours | 1.000 | Affine control example | "
+                        "1.000 "));
+  EXPECT_THAT(out.str(),
+              HasSubstr("| Affine residual, knee target: F | ours | 1.000 | Affine control example | 1.000 "));
 }
 
 TEST_F(RunTest, FilesAreTheSameForAnyNumberOfThreads) {
@@ -138,8 +143,8 @@ TEST_F(RunTest, FilesAreTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(Read(root_ / "one" / name), Read(root_ / "two" / name)) << name;
   }
   EXPECT_EQ(out_one.str(), out_two.str());
-  EXPECT_THAT(out_one.str(), HasSubstr("| bicycle, C: recall | 0.983 |"));
-  EXPECT_THAT(out_one.str(), HasSubstr("| fixed grid, N = 400: recall | 0.695 ± 0.012 |"));
+  EXPECT_THAT(out_one.str(), HasSubstr("| bicycle, C: recall | fitted | 0.983 |"));
+  EXPECT_THAT(out_one.str(), HasSubstr("| fixed grid, N = 400: recall | ours | 0.695 ± 0.012 |"));
 }
 
 TEST_F(RunTest, AFinishedCellIsNotRunAgain) {
@@ -183,13 +188,12 @@ TEST_F(RunTest, TooSmallADeclarationIsSeenByTheTestOrByTheTruth) {
   std::ostringstream out;
   RunExperiments(Quick({"incorrect"}, "incorrect"), out);
   // 12 data sets: 2 seeds, 2 channels; N = 100 of the point mass, N = 25 and 400 of the bicycle.
-  EXPECT_THAT(out.str(), HasSubstr("| L times 1: corridor |  |  | 0 |"));
-  EXPECT_THAT(out.str(), HasSubstr("| L times 0.03154: corridor |  |  | 12 |"));
-  EXPECT_THAT(out.str(), HasSubstr("| L times 0.03154: below the knee |  |  | 0 |"));
-  EXPECT_THAT(out.str(),
-              HasSubstr("L times 1: false certificates, all groups | 0 | Experiments, text | 0 | 0 | same |"));
+  EXPECT_THAT(out.str(), HasSubstr("| L times 1: corridor | not given |  |  | 0 |"));
+  EXPECT_THAT(out.str(), HasSubstr("| L times 0.03154: corridor | not given |  |  | 12 |"));
+  EXPECT_THAT(out.str(), HasSubstr("| L times 0.03154: below the knee | not given |  |  | 0 |"));
+  EXPECT_THAT(out.str(), HasSubstr("L times 1: false certificates, all groups | not given |  |  | 0 |"));
   const auto false_certificates = [&](const std::string& system) {
-    const std::string row = "| " + system + ", L times 0.03154: false certificates, all groups |  |  | ";
+    const std::string row = "| " + system + ", L times 0.03154: false certificates, all groups | not given |  |  | ";
     const std::size_t at = out.str().find(row);
     return at == std::string::npos ? -1 : std::atoi(out.str().c_str() + at + row.size());
   };
@@ -225,7 +229,7 @@ TEST_F(RunTest, TheCommandTeachesRunsAndRefuses) {
   const std::string out = " --out " + (root_ / "run").string();
   const Output norms = Command("norms" + out);
   EXPECT_EQ(norms.code, 0) << norms.text;
-  EXPECT_THAT(norms.text, HasSubstr("| bicycle | 11.368 | Norm ratios | 11.368 | 0.000 | same |"));
+  EXPECT_THAT(norms.text, HasSubstr("| bicycle | exact | 11.368 | Norm ratios | 11.368 | 0.000 | same |"));
   const Output quick = Command("norms --quick" + out);
   EXPECT_EQ(quick.code, 2);
   EXPECT_THAT(quick.text, HasSubstr("run.json: scenarios: begun with 600, this run has 30"));
