@@ -23,10 +23,11 @@ struct Cell {
   Method method;
   NamedLipschitz declared;
   int observations = 0;  ///< N
-  double noise = 0;      ///< s; sigma_k = NoiseBound(s)
+  double noise = 0;      ///< s; sigma_k = NoiseBound(s, cut)
   int seed = 0;          ///< From 0
   int zonotope_order = 5;
   Layout layout = Layout::kCorridor;
+  double cut = kNoiseCut;  ///< Another cut needs another name of the declaration: the key has only that.
 
   /** What it is, in one word that is a file name: "bicycle-ForeReach-deployed-N400-s0-order5-corridor-seed0". */
   [[nodiscard]] std::string key() const;

@@ -30,10 +30,10 @@ const CellResult& Results::Of(const Cell& cell) const {
 
 std::span<const Experiment> Experiments() {
   static const std::vector<Experiment> all{
-      MainResults(),           RecallByN(),       Comparison(), Readings(),        CertificateBudget(),
+      MainResults(),           RecallByN(),       Comparison(), Readings(), NoisyComparison(),        CertificateBudget(),
       ActionChunks(),          DomainExits(),     FirstAbstentions(),  TubeGeometry(),
       BoxAgainstZonotope(),    ScalarEnvelope(),  NoiseSweep(),        NominalDegradation(),
-      IncorrectDeclarations(), EstimatedSlopes(), AdversarialFamily(), AssumptionFamilies(),
+      IncorrectDeclarations(), EstimatedSlopes(), AdversarialFamily(), KeptDeclaration(), AssumptionFamilies(),
       ParameterBoxes(),        NormRatios(),      InformationLimits(), CertifiedDeclarations()};
   return all;
 }
@@ -41,6 +41,7 @@ std::span<const Experiment> Experiments() {
 std::optional<double> Recall(const Tally& tally) { return Ratio(tally.certified_safe, tally.safe); }
 std::optional<double> Coverage(const Tally& tally) { return Ratio(tally.covered, tally.complete()); }
 std::optional<double> CompleteRate(const Tally& tally) { return Ratio(tally.complete(), tally.plans); }
+std::optional<double> JointRate(const Tally& tally) { return Ratio(tally.covered, tally.plans); }
 std::optional<double> CertificateRate(const Tally& tally) { return Ratio(tally.certified, tally.plans); }
 std::optional<double> FalseSafeRate(const Tally& tally) { return Ratio(tally.false_certificates(), tally.certified); }
 std::optional<double> DomainRate(const Tally& tally) { return Ratio(tally.domain, tally.plans); }

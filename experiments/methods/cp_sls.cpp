@@ -181,8 +181,7 @@ std::span<const Method> CpSlsMethods() {
 std::span<const Method> CpSlsVariants() {
   static const std::array methods{
       MethodOf("CP-SLS-MPC, least rate", {.least_rate = true}),
-      MethodOf("CP-SLS-MPC, active coordinates", {.active_only = true}),
-      MethodOf("CP-SLS-MPC, active coordinates, least rate", {.active_only = true, .least_rate = true})};
+      MethodOf("CP-SLS-MPC, active coordinates", {.active_only = true})};
   return methods;
 }
 
