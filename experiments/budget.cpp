@@ -18,9 +18,7 @@ Cell BudgetCell(const Method& method, int observations) {
 }
 
 // Those of the paper's table with a finite total.
-std::vector<int> VariantSizes(const Scope& scope) {
-  return scope.quick ? std::vector{400} : std::vector{200, 400};
-}
+std::vector<int> VariantSizes(const Scope& scope) { return scope.quick ? std::vector{400} : std::vector{200, 400}; }
 
 std::vector<Cell> BudgetCells(const Scope& scope) {
   std::vector<Cell> cells;
@@ -106,13 +104,14 @@ std::string Apart(const Scope& scope, const Results& results) {
 
 // What the drift's cap hides, and the choices with which it is not reached.
 Table CapTable(const Scope& scope, const Results& results) {
-  Table table{"CP-SLS-MPC, drift and its cap",
-              "d_TV is at most one, and eps^ times the distance mostly exceeds that. At the cap the drift is 2 T mass / (1 + "
-              "mass), just below 24, whatever eps^ is. So it says nothing that our total lies near the paper's: " +
-                  Apart(scope, results) +
-                  ". The other rows have other distances or another eps^: over the coordinates alone that the residual "
-                  "depends on; the least of the estimated rates.",
-              {}};
+  Table table{
+      "CP-SLS-MPC, drift and its cap",
+      "d_TV is at most one, and eps^ times the distance mostly exceeds that. At the cap the drift is 2 T mass / (1 + "
+      "mass), just below 24, whatever eps^ is. So it says nothing that our total lies near the paper's: " +
+          Apart(scope, results) +
+          ". The other rows have other distances or another eps^: over the coordinates alone that the residual "
+          "depends on; the least of the estimated rates.",
+      {}};
   std::vector<Method> methods{CpSlsMethods().front()};
   methods.insert(methods.end(), CpSlsVariants().begin(), CpSlsVariants().end());
   for (const Method& method : methods)

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "experiments/membership.h"
 #include "experiments/methods/method.h"
 #include "experiments/scenarios.h"
 
@@ -73,8 +75,21 @@ struct Tally {
 /** In the order of kGroups. */
 using CellResult = std::array<Tally, 3>;
 
+/** What came of one plan. */
+struct PlanOutcome {
+  char group = 'A';
+  int plan = 0;
+  char answer = 'S';  ///< As in Tally::answers
+  int step = -1;      ///< At which D or S was decided; else -1
+  bool safe = false, complete = false;
+  Membership cover = Membership::kInside;  ///< Of the tube, as far as it goes; undecided for F
+  double area = -1;                        ///< As in Tally::areas
+};
+
 /** Runs the pairwise test once, if the method is ForeReach: a violation makes every plan F. Then each plan in
-turn. Deterministic. Cost: for each plan its rollouts and one certify call, some 0.3 ms for the bicycle. */
-[[nodiscard]] CellResult RunCell(const Cell& cell, const Effort& effort);
+turn, each shown to `see` if there is one. Deterministic. Cost: for each plan its rollouts and one certify call, some
+0.3 ms for the bicycle. */
+[[nodiscard]] CellResult RunCell(const Cell& cell, const Effort& effort,
+                                 const std::function<void(const PlanOutcome&)>& see = {});
 
 }  // namespace forereach::experiments

@@ -26,7 +26,8 @@ Cell DegradedCell(const System& system, double percent) {
 constexpr int kPlans = 60;
 constexpr std::pair<Lacking, const char*> kReadings[] = {{Lacking::kModel, "(1 - d) f0"},
                                                          {Lacking::kMotion, "x + (1 - d)(f0 - x)"},
-                                                         {Lacking::kDeclaration, "f0, L enlarged"}};
+                                                         {Lacking::kDeclaration, "f0, L of the first"},
+                                                         {Lacking::kDeclarationOfMotion, "f0, L of the second"}};
 
 std::vector<double> CoarsePercents(const Scope& scope) {
   return scope.quick ? std::vector<double>{0, 40} : std::vector<double>{0, 0.5, 1, 2, 5, 10, 20, 40, 60};
@@ -62,14 +63,14 @@ std::string Percent(double value) {
 }
 
 Table ReadingTable(const Scope& scope, const Results& results) {
-  Table table{"Nominal degradation, readings",
-              "C, noiseless, the largest N, " + std::to_string(kPlans) +
-                  " plans a seed. What \"degraded\" may mean: the model is (1 - d) f0; or it moves the state by a part "
-                  "of what it should, x + (1 - d)(f0 - x); or it is f0, and only L is declared as of the first. L grows "
-                  "by what the model lacks. The paper: " +
-                  Percent(Paper("degradation.point_mass").value) + " and " + Percent(Paper("degradation.bicycle").value) +
-                  ".",
-              {}};
+  Table table{
+      "Nominal degradation, readings",
+      "C, noiseless, the largest N, " + std::to_string(kPlans) +
+          " plans a seed. What \"degraded\" may mean: the model is (1 - d) f0; or it moves the state by a part "
+          "of what it should, x + (1 - d)(f0 - x); or it is f0, and only L is declared as of one of them. L grows "
+          "by what the model lacks. The paper: " +
+          Percent(Paper("degradation.point_mass").value) + " and " + Percent(Paper("degradation.bicycle").value) + ".",
+      {}};
   const std::vector<double> percents = CoarsePercents(scope);
   for (const System* system : Systems())
     for (const auto& [lacking, name] : kReadings) {
@@ -77,8 +78,7 @@ Table ReadingTable(const Scope& scope, const Results& results) {
       std::vector<double> recalls;
       std::vector<Row> rows;
       for (const double percent : percents) {
-        const Estimate recall =
-            OverSeeds(scope, results, ReadingCell(*system, lacking, percent), Group::kC, Recall);
+        const Estimate recall = OverSeeds(scope, results, ReadingCell(*system, lacking, percent), Group::kC, Recall);
         recalls.push_back(recall.mean.value_or(0));
         rows.push_back({where + ", d = " + Percent(percent) + ": C recall", {}, recall, 3, ""});
       }

@@ -30,11 +30,11 @@ const CellResult& Results::Of(const Cell& cell) const {
 
 std::span<const Experiment> Experiments() {
   static const std::vector<Experiment> all{
-      MainResults(),           RecallByN(),       Comparison(), Readings(), NoisyComparison(),        CertificateBudget(),
-      ActionChunks(),          DomainExits(),     FirstAbstentions(),  TubeGeometry(),
-      BoxAgainstZonotope(),    ScalarEnvelope(),  NoiseSweep(),        NominalDegradation(),
-      IncorrectDeclarations(), EstimatedSlopes(), AdversarialFamily(), KeptDeclaration(), AssumptionFamilies(),
-      ParameterBoxes(),        NormRatios(),      InformationLimits(), CertifiedDeclarations()};
+      MainResults(),           RecallByN(),          DirectCoverage(),    Comparison(),           Readings(),
+      NoisyComparison(),       CertificateBudget(),  ActionChunks(),      DomainExits(),          FirstAbstentions(),
+      TubeGeometry(),          BoxAgainstZonotope(), ScalarEnvelope(),    NoiseSweep(),           NominalDegradation(),
+      IncorrectDeclarations(), EstimatedSlopes(),    AdversarialFamily(), KeptDeclaration(),      AssumptionFamilies(),
+      ParameterBoxes(),        NormRatios(),         InformationLimits(), CertifiedDeclarations()};
   return all;
 }
 

@@ -77,6 +77,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 ///@{
 [[nodiscard]] Experiment MainResults();
 [[nodiscard]] Experiment RecallByN();
+[[nodiscard]] Experiment DirectCoverage();
 [[nodiscard]] Experiment Comparison();
 [[nodiscard]] Experiment Readings();
 [[nodiscard]] Experiment NoisyComparison();

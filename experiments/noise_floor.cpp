@@ -81,11 +81,12 @@ NoiseFloor FindNoiseFloor(const System& system, double sigma) {
 }
 
 Table NoiseFloorTable() {
-  Table table{"Noise floor",
-              "Two systems f* +- shift, |shift_k| = sigma in every coordinate, give the same observations under noise of "
-              "at most sigma, and have the same slopes: every sound tube contains both. One plan in the middle of the "
-              "corridor from one state, the largest N. The paper names such a witness and prints no figure of it.",
-              {}};
+  Table table{
+      "Noise floor",
+      "Two systems f* +- shift, |shift_k| = sigma in every coordinate, give the same observations under noise of "
+      "at most sigma, and have the same slopes: every sound tube contains both. One plan in the middle of the "
+      "corridor from one state, the largest N. The paper names such a witness and prints no figure of it.",
+      {}};
   for (const System* system : {&PointMassSystem(), &BicycleSystem()})
     for (const double sigma : {1e-4, 1e-3, 1e-2}) {
       const NoiseFloor floor = FindNoiseFloor(*system, sigma);
@@ -95,7 +96,8 @@ Table NoiseFloorTable() {
         table.rows.push_back({std::string(text) + what, {}, ours, decimals, ""});
       };
       row("half the distance at T, m", Exactly(floor.half_distance), 5);
-      row("half-width of the tube at T, m", std::isfinite(floor.half_width) ? Exactly(floor.half_width) : Estimate{}, 5);
+      row("half-width of the tube at T, m", std::isfinite(floor.half_width) ? Exactly(floor.half_width) : Estimate{},
+          5);
       row("states outside the tube", Exactly(floor.escapes), 0);
     }
   return table;

@@ -1,6 +1,6 @@
-/** The two systems of the noise floor: f* + shift and f* - shift, |shift_k| = sigma_k. With the errors -shift and +shift
-both give the observations of f* without noise, and both have the slopes of f*'s residual, so whoever sees only the data
-and a declaration with that sigma cannot tell them apart: a sound tube contains both. */
+/** The two systems of the noise floor: f* + shift and f* - shift, |shift_k| = sigma_k. With the errors -shift and
++shift both give the observations of f* without noise, and both have the slopes of f*'s residual, so whoever sees only
+the data and a declaration with that sigma cannot tell them apart: a sound tube contains both. */
 #pragma once
 
 #include "experiments/systems.h"

@@ -44,8 +44,6 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
 
 }  // namespace
 
-Experiment NoisyComparison() {
-  return {"methods-noisy", "every method under the sub-Gaussian channel", Cells, Tables};
-}
+Experiment NoisyComparison() { return {"methods-noisy", "every method under the sub-Gaussian channel", Cells, Tables}; }
 
 }  // namespace forereach::experiments

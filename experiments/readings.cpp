@@ -37,9 +37,8 @@ Family GlobalReadings() {
   for (const Center center : {Center::kMean, Center::kZero})
     for (const double level : {0.05, 0.1, 0.2, 0.3, 0.4, 0.5}) {
       const CalibrationOptions options{level, center};
-      family.methods.push_back({Named("Global, level", level, center), [options](const Setting& setting) {
-                                  return MakeGlobalCalibration(setting, options);
-                                }});
+      family.methods.push_back({Named("Global, level", level, center),
+                                [options](const Setting& setting) { return MakeGlobalCalibration(setting, options); }});
     }
   return family;
 }
@@ -84,9 +83,9 @@ Family GaussianReadings() {
                 {}};
   for (const Center center : {Center::kMean, Center::kZero})
     for (const double deviations : {1.0, 1.645, 2.0, 3.0})
-      family.methods.push_back(
-          {Named("Plug-in, deviations", deviations, center),
-           [=](const Setting& setting) { return MakePlugInGaussian(setting, deviations, center); }});
+      family.methods.push_back({Named("Plug-in, deviations", deviations, center), [=](const Setting& setting) {
+                                  return MakePlugInGaussian(setting, deviations, center);
+                                }});
   return family;
 }
 
@@ -148,8 +147,11 @@ Table TableOf(const Family& family, const Scope& scope, const Results& results) 
       row("C recall", Group::kC, "C.recall", Recall);
     }
     table.rows.insert(table.rows.end(), rows.begin(), rows.end());
-    table.rows.push_back(
-        {method.name + ": root mean square distance to those of the paper's that it has", {}, Exactly(std::sqrt(squares / count)), 3, ""});
+    table.rows.push_back({method.name + ": root mean square distance to those of the paper's that it has",
+                          {},
+                          Exactly(std::sqrt(squares / count)),
+                          3,
+                          ""});
   }
   table.about += ". " + std::to_string(kPlans) + " plans a group and seed. None of these readings is the paper's own.";
   return table;

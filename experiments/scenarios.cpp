@@ -95,8 +95,7 @@ Scenario MakeScenario(const System& system, Group group, int seed, int index) {
   return {start.center, controls, PlaceBeside(system, start.center, controls, k, aside * start.side, start.radius)};
 }
 
-Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale,
-                     double cut) {
+Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale, double cut) {
   Random noise{kForNoise, static_cast<std::uint64_t>(system.num_states()), static_cast<std::uint64_t>(seed)};
   const int n = system.num_states();
   Transitions data{PointsOf(system, layout, seed, count), Eigen::MatrixXd(count, n)};

@@ -132,8 +132,8 @@ std::vector<Table> ScalarTables(const Scope& scope, const Results& results) {
 // ---- noise
 
 constexpr double kMultiples[] = {0, 0.33, 1, 3.3};
-constexpr double kCuts[] = {1, 2, 3, 6, 10};  // sigma / s
-constexpr double kWorst = 3.3;                // in multiples of the median residual
+constexpr double kCuts[] = {1, 2, 3, 4, 5, 6, 8, 10};  // sigma / s
+constexpr double kWorst = 3.3;                         // in multiples of the median residual
 
 std::string Digits(double value) {
   char text[16];
@@ -242,8 +242,8 @@ Table PartTable(const Scope& scope) {
   const auto middle = parts.begin() + static_cast<std::ptrdiff_t>(parts.size() / 2);
   std::ranges::nth_element(parts, middle);
   const std::string why = "scenario bounds and sigma = 3 s are ours";
-  table.rows = {{"s", {}, Exactly(*middle / kNoiseCut), 5, ""},
-                {"sigma", {Mark::kOurs, Paper("noise.envelope_part")}, Exactly(*middle), 5, why},
+  table.rows = {{"s", {Mark::kOurs, Paper("noise.envelope_part")}, Exactly(*middle / kNoiseCut), 5, why},
+                {"sigma", {}, Exactly(*middle), 5, ""},
                 {"2 sigma", {}, Exactly(2 * *middle), 5, ""}};
   return table;
 }

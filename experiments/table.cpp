@@ -187,16 +187,18 @@ std::string CountInMarkdown(const std::vector<Table>& tables) {
 }
 
 std::string ToCsv(const std::vector<Table>& tables) {
-  std::string text = "table,what,mark,paper,ours,deviation,difference,word,why\n";
+  std::string text = "table,what,mark,paper,ours,deviation,low,high,difference,word,why\n";
   for (const Table& table : tables)
     for (const Row& row : table.rows) {
       const std::optional<PaperValue>& paper = row.paper.value();
       const int decimals = std::max(DecimalsOf(row), 6);
+      const std::optional<Range> range = StudentRange(row.ours.mean.value_or(0), row.ours.deviation, row.ours.seeds);
       text += Quoted(table.title) + "," + Quoted(row.what) + "," + NameOf(row.paper.mark()) + "," +
               (paper ? Fixed(paper->value, paper->decimals) : "") + "," +
               (row.ours.mean ? Fixed(*row.ours.mean, decimals) : "") + "," +
-              (row.ours.seeds > 1 ? Fixed(row.ours.deviation, decimals) : "") + "," + Difference(row) + "," +
-              NameOf(WordOf(row)) + "," + Quoted(ReasonOf(row)) + "\n";
+              (row.ours.seeds > 1 ? Fixed(row.ours.deviation, decimals) : "") + "," +
+              (range ? Fixed(range->low, decimals) : "") + "," + (range ? Fixed(range->high, decimals) : "") + "," +
+              Difference(row) + "," + NameOf(WordOf(row)) + "," + Quoted(ReasonOf(row)) + "\n";
     }
   return text;
 }

@@ -99,7 +99,8 @@ struct JointTest {
 [[nodiscard]] std::string ToMarkdown(const Table& table);
 /** The number of rows by mark and word, as a table. */
 [[nodiscard]] std::string CountInMarkdown(const std::vector<Table>& tables);
-/** table,what,mark,paper,ours,deviation,difference,word,why: one line for each row, with a header line. */
+/** table,what,mark,paper,ours,deviation,low,high,difference,word,why: one line for each row, with a header line. Low
+and high are Student's interval over the seeds (statistics.h). */
 [[nodiscard]] std::string ToCsv(const std::vector<Table>& tables);
 
 }  // namespace forereach::experiments

@@ -83,14 +83,14 @@ Eigen::MatrixXd LargestSlopesOfMotion(const System& system) {
 }
 
 System MakeDegraded(const System& system, double part, Lacking what) {
-  static constexpr const char* kNames[] = {"_without_", "_unmoved_by_", "_declared_without_"};
+  static constexpr const char* kNames[] = {"_without_", "_unmoved_by_", "_declared_without_", "_declared_unmoved_by_"};
   const double known = 1 - part, lacking = 1 - known;
-  const bool of_motion = what == Lacking::kMotion;
+  const bool of_motion = what == Lacking::kMotion || what == Lacking::kDeclarationOfMotion;
   System degraded = system;
   degraded.name += kNames[static_cast<std::size_t>(what)] + ToText(100 * part) + "_percent";
   const Eigen::MatrixXd slopes = of_motion ? LargestSlopesOfMotion(system) : LargestSlopesOnce(system);
   degraded.deployed = (1 + kSlack) * (system.deployed + lacking * slopes);
-  if (what == Lacking::kDeclaration) return degraded;
+  if (what == Lacking::kDeclaration || what == Lacking::kDeclarationOfMotion) return degraded;
   degraded.model = of_motion ? MakePartly<true>(system, known) : MakePartly<false>(system, known);
   degraded.step = [whole = system.step, lacking, of_motion](std::span<const double> z, std::span<double> residual,
                                                             std::span<double> next) {

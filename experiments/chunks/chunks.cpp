@@ -191,13 +191,14 @@ Table StepTable(const Scope& scope, const Results& results) {
 }
 
 std::vector<Plot> Plots(const Scope& scope, const Results& results) {
-  Plot plot{"chunk-steps",
-            "The step at which a block of the learned policy first abstains, noiseless, N = 400, as a part of all blocks "
-            "of groups A to C; mean over the seeds.",
-            900, 400,
-            "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
-            "set style fill solid 0.9 noborder\nset yrange [0:0.35]\nset xlabel 'step'\n"
-            "set ylabel 'part of the blocks'\nset key top left\n"};
+  Plot plot{
+      "chunk-steps",
+      "The step at which a block of the learned policy first abstains, noiseless, N = 400, as a part of all blocks "
+      "of groups A to C; mean over the seeds.",
+      900, 400,
+      "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
+      "set style fill solid 0.9 noborder\nset yrange [0:0.35]\nset xlabel 'step'\n"
+      "set ylabel 'part of the blocks'\nset key top left\n"};
   std::string data;
   for (const Layout layout : kLayouts) {
     std::string lines;

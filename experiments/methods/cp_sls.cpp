@@ -162,26 +162,24 @@ CpSlsBudget CpSls::Budget(const QuerySet& query) const {
   for (std::size_t a = 0; a < measured_.size(); ++a) {
     const int l = measured_[a];
     if (l < query.slice.dim())
-      longest = std::max(longest,
-                         2 * query.half_width[static_cast<std::size_t>(l)] / reach_[static_cast<Eigen::Index>(a)]);
+      longest =
+          std::max(longest, 2 * query.half_width[static_cast<std::size_t>(l)] / reach_[static_cast<Eigen::Index>(a)]);
   }
   budget.tube = 2 * drift_rate_ * longest;
   return budget;
 }
 
 std::span<const Method> CpSlsMethods() {
-  static const std::array methods{
-      MethodOf("CP-SLS-MPC equations", {}),
-      MethodOf("CP-SLS-MPC, local diagonal", {.covariance = Covariance::kLocalDiagonal}),
-      MethodOf("CP-SLS-MPC, global", {.covariance = Covariance::kGlobal}),
-      MethodOf("CP-SLS-MPC, global diagonal", {.covariance = Covariance::kGlobalDiagonal})};
+  static const std::array methods{MethodOf("CP-SLS-MPC equations", {}),
+                                  MethodOf("CP-SLS-MPC, local diagonal", {.covariance = Covariance::kLocalDiagonal}),
+                                  MethodOf("CP-SLS-MPC, global", {.covariance = Covariance::kGlobal}),
+                                  MethodOf("CP-SLS-MPC, global diagonal", {.covariance = Covariance::kGlobalDiagonal})};
   return methods;
 }
 
 std::span<const Method> CpSlsVariants() {
-  static const std::array methods{
-      MethodOf("CP-SLS-MPC, least rate", {.least_rate = true}),
-      MethodOf("CP-SLS-MPC, active coordinates", {.active_only = true})};
+  static const std::array methods{MethodOf("CP-SLS-MPC, least rate", {.least_rate = true}),
+                                  MethodOf("CP-SLS-MPC, active coordinates", {.active_only = true})};
   return methods;
 }
 

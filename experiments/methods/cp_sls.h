@@ -9,10 +9,11 @@ less weight than that has no finite radius. What it leaves to its code is ours:
 - weights w_i = exp(-|d|^2 / (2 d_z)), one bandwidth unit for the mean square of the coordinates;
 - scores s_i = (r~_i^T C(z_i)^-1 r~_i)^(1/2), so E(z) = {e : e^T C(z)^-1 e <= q^2}, and its hull +- q C_kk(z)^(1/2);
 - C is one of four plug-ins, each with 1e-6 of its mean variance added to its diagonal;
-- eps^ is the largest or the least ratio over coordinates l of: the total variation between the scores of the observations below and
-  above the median of z_l, by histograms of equal shares, to the distance of the two halves' means;
+- eps^ is the largest or the least ratio over coordinates l of: the total variation between the scores of the
+observations below and above the median of z_l, by histograms of equal shares, to the distance of the two halves' means;
 - M(R_k) is the longest side of the hull of X_k, in the same units. d_TV is at most 1, and taken so.
-With the first of each choice nearly every d_TV is at that cap, so the drift is 2 T mass / (1 + mass) whatever eps^ is. */
+With the first of each choice nearly every d_TV is at that cap, so the drift is 2 T mass / (1 + mass) whatever eps^ is.
+*/
 #pragma once
 
 #include <limits>

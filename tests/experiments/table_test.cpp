@@ -92,6 +92,18 @@ TEST(Statistics, AreThoseOfTheTables) {
   EXPECT_EQ(SignTest(0, 0), 1);
   EXPECT_EQ(SignTest(3, 3), 1);
   EXPECT_NEAR(SignTest(0, 6), 2.0 / 64, 1e-12);
+  // Student's t: 12.7062, 4.3027, 2.2622 for one, two and nine degrees of freedom.
+  EXPECT_FALSE(StudentRange(0, 1, 1));
+  EXPECT_NEAR(StudentRange(0, std::sqrt(2), 2)->high, 12.7062, 1e-4);
+  EXPECT_NEAR(StudentRange(0, std::sqrt(3), 3)->low, -4.3027, 1e-4);
+  EXPECT_NEAR(StudentRange(1, std::sqrt(10), 10)->high, 3.2622, 1e-4);
+  // Wilson 1927 of 8 in 10, and of none and all, which have an interval too.
+  EXPECT_FALSE(WilsonRange(0, 0));
+  EXPECT_NEAR(WilsonRange(8, 10)->low, 0.4902, 1e-4);
+  EXPECT_NEAR(WilsonRange(8, 10)->high, 0.9433, 1e-4);
+  EXPECT_EQ(WilsonRange(0, 10)->low, 0);
+  EXPECT_NEAR(WilsonRange(0, 10)->high, 0.2775, 1e-4);
+  EXPECT_NEAR(WilsonRange(10, 10)->low, 0.7225, 1e-4);
 }
 
 TEST(Table, PrintsPaperOursAndTheDifference) {
@@ -102,10 +114,11 @@ TEST(Table, PrintsPaperOursAndTheDifference) {
   EXPECT_THAT(text, HasSubstr("| recall | fitted | 0.490 | Table 1 | 0.506 ± 0.020 | +0.016 | off | "
                               "scenario bounds are ours |"));
   EXPECT_THAT(text, HasSubstr("| none | not given |  |  | none |  |  |  |"));
-  EXPECT_EQ(ToCsv({table}),
-            "table,what,mark,paper,ours,deviation,difference,word,why\n"
-            "\"T\",\"recall\",fitted,0.490,0.506100,0.020000,+0.016,off,\"scenario bounds are ours\"\n"
-            "\"T\",\"none\",not given,,,,,,\"\"\n");
+  EXPECT_EQ(
+      ToCsv({table}),
+      "table,what,mark,paper,ours,deviation,low,high,difference,word,why\n"
+      "\"T\",\"recall\",fitted,0.490,0.506100,0.020000,0.491793,0.520407,+0.016,off,\"scenario bounds are ours\"\n"
+      "\"T\",\"none\",not given,,,,,,,,\"\"\n");
   EXPECT_EQ(CountInMarkdown({table}),
             "| rows | same | near | off | all |\n|---|---|---|---|---|\n| exact | 0 | 0 | 0 | 0 |\n"
             "| fitted | 0 | 0 | 1 | 1 |\n| ours | 0 | 0 | 0 | 0 |\n| not given | | | | 1 |\n");

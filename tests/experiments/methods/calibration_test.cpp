@@ -113,8 +113,8 @@ TEST(RegionalCalibration, IsNoNarrowerOnALargerQuery) {
   Random random(11);
   SCOPED_TRACE(random.trace());
   const Task task = BicycleTask(400, 5);
-  for (const Elsewhere elsewhere : {Elsewhere::kGlobal, Elsewhere::kNearest, Elsewhere::kWidest, Elsewhere::kDeclared,
-                                    Elsewhere::kUnbounded}) {
+  for (const Elsewhere elsewhere :
+       {Elsewhere::kGlobal, Elsewhere::kNearest, Elsewhere::kWidest, Elsewhere::kDeclared, Elsewhere::kUnbounded}) {
     const RegionalCalibration enclosure(task.setting(), {.elsewhere = elsewhere});
     EXPECT_GT(enclosure.num_calibrated(), 2);
     for (int trial = 0; trial < 100; ++trial) {
