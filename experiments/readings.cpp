@@ -72,6 +72,8 @@ Family RegionalReadings() {
   for (const Center center : {Center::kMean, Center::kZero})
     add(std::string("steering, ") + NameOf(center) + ", elsewhere widest, jointly",
         {.regional = {0.1, center}, .jointly = true, .cut = Cut::kSteepest, .elsewhere = Elsewhere::kWidest});
+  add("steering, around zero, elsewhere global, jointly",
+      {.global = {0.1, Center::kZero}, .regional = {0.1, Center::kZero}, .jointly = true, .cut = Cut::kSteepest});
   add("state and input, around the mean, elsewhere global", {.cut = Cut::kAll, .cells = 2});
   return family;
 }
