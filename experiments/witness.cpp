@@ -55,7 +55,9 @@ bool Undeclared::IsContradicted(double sigma) const {
 }
 
 bool Undeclared::Contains(const Scenario& scenario, double factor) const {
-  return Cover(Certify(scenario, factor), Rollouts(system, scenario, kRollouts)) == Membership::kInside;
+  const Answer answer = Certify(scenario, factor);
+  return answer.decision.outcome != Outcome::kFalsified &&
+         Cover(answer, Rollouts(system, scenario, kRollouts)) == Membership::kInside;
 }
 
 double Undeclared::EmpiricalFactor(const Scenario& scenario) const {

@@ -24,7 +24,8 @@ struct Undeclared {
   [[nodiscard]] Answer CertifyUnderNoise(const Scenario& scenario, double sigma) const;
   /** Whether two observations contradict L. With sigma: as CertifyUnderNoise. */
   [[nodiscard]] bool IsContradicted(double sigma = 0) const;
-  /** Whether the tube under factor * L, as far as it goes, contains every rollout of the plan. */
+  /** Whether the tube under factor * L, as far as it goes, contains every rollout of the plan. Not if F: the factor is
+  so small that an envelope is empty. */
   [[nodiscard]] bool Contains(const Scenario& scenario, double factor) const;
   /** The largest |r_k(z) - r_k(z_i)| over sum_l L_kl |z_l - z_il| of observations and states of the plan's rollouts. */
   [[nodiscard]] double EmpiricalFactor(const Scenario& scenario) const;
