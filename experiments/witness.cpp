@@ -18,7 +18,7 @@
 namespace forereach::experiments {
 namespace {
 
-constexpr int kPlans = 10, kPlansOfSmall = 60, kNoisyPlans = 20, kRollouts = 40, kBisections = 20;
+constexpr int kPlans = 10, kPlansOfSmall = 40, kNoisyPlans = 10, kRollouts = 40, kBisections = 20;
 constexpr double kLeastFactor = 0x1p-6, kLargestFactor = 0x1p10, kLargestNoise = 1;
 constexpr int kPapersStep = 7;
 
