@@ -198,7 +198,8 @@ std::vector<Plot> BudgetPlots(const Scope& scope, const Results& results) {
   }
   return {{"budget",
            "CP-SLS-MPC. Left: the weight that a plan's poorest step has, against the floor below which its radius is "
-           "infinite. Right: the medians of the budget's parts; a certificate needs a sum below 1.",
+           "infinite. Right: the medians of the budget's parts; a certificate needs a sum below 1. The drift of a step "
+           "is at most 2, as d_TV is at most 1, so that of 12 steps is at most 24.",
            900, 400, DataBlock("mass", mass) + DataBlock("parts", parts) + R"(set multiplot layout 1,2
 set key top left
 set xlabel 'observations N'; set ylabel 'effective mass'
@@ -206,14 +207,15 @@ set yrange [0:*]
 plot $mass using 1:2 with linespoints pt 7 lw 2 lc rgb blue title 'median of the least mass', \
   119 with lines lw 2 dt 2 lc rgb red title 'floor, 119'
 set xlabel ''; set ylabel 'budget, sum over the horizon'
-set yrange [0:48]
+set yrange [0:54]
 set bmargin 3.5
 set style data histogram
 set style histogram rowstacked
 set style fill solid 0.9 noborder
 set boxwidth 0.7
 plot $parts using 2:xtic(1) lc rgb red title 'alpha, 0.10', '' using 3 lc rgb blue title 'drift (TV)', \
-  '' using 4 lc rgb sky title 'tube', 1 with lines lw 2 dt 2 lc rgb '#333333' title 'of use below 1'
+  '' using 4 lc rgb sky title 'tube', 1 with lines lw 2 dt 2 lc rgb '#333333' title 'of use below 1', \
+  24.1 with lines lw 1.5 dt 3 lc rgb purple title 'cap of alpha + drift, 24.1'
 unset multiplot
 )"}};
 }

@@ -91,7 +91,7 @@ std::string Sides(const Scope& scope, const Results& results) {
       }
       lines += ".";
     }
-  char bands[160];
+  char bands[320];
   std::snprintf(
       bands, sizeof bands,
       "Unsound: coverage below %g. Uninformative: recall at most %g. Reproduced: on the paper's side, and coverage "
@@ -178,16 +178,18 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
     const Cell cell = PaperCell(PointMassSystem(), 100, 0, 0);
     const std::string own = PointLine(100, at(cell, Group::kB, Coverage), at(cell, Group::kC, Recall), none);
     none += !completes;
-    const std::string name = "m" + std::to_string(m), color = kColors[m % std::size(kColors)];
+    const std::string name = std::string(1, 'm').append(std::to_string(m)), color = kColors[m % std::size(kColors)];
     data += DataBlock(name, ours) + DataBlock(name + "p", own);
     const std::string mark = m == 0 ? "pt 3 ps 1.4" : "pt 7 ps 0.8";
     const auto series = [&](const std::string& block, bool titled) {
       return "$" + block + " using 2:4:3:5 with xyerrorbars " + mark + " lw 1 lc rgb " + color +
              (titled ? " title \"" + method.name + "\"" : " notitle") + ", ";
     };
-    bicycle += series(name, false) + "'' using 2:4 with lines lw 1 lc rgb " + color +
-               " notitle, '' using 2:4:(sprintf('%d', $1)) with labels left offset 0.6,0.5 font ',9' textcolor rgb " +
-               color + " notitle, ";
+    bicycle +=
+        series(name, false) + "'' using ($2 <= 1 ? $2 : 1/0):4 with lines lw 1 lc rgb " + color +
+        " notitle, '' using 2:4:($2 <= 1 || $4 > 0.02 ? sprintf('%d', $1) : '') with labels left offset 0.6,0.5 font "
+        "',9' textcolor rgb " +
+        color + " notitle, ";
     point_mass += series(name + "p", true);
     if (papers.empty()) continue;
     data += DataBlock(name + "paper", papers);
@@ -204,16 +206,16 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
        "dotted: the paper's; of the point mass it prints both figures for ForeReach only. A method that completes no "
        "tube "
        "in B has no coverage and stands in the strip on the right, side by side with the others.",
-       1180, 560,
+       1240, 560,
        data +
            "set multiplot layout 1,2\nset xrange [-0.04:1.24]; set yrange [-0.04:1.08]\n"
            "set xtics ('0' 0, '0.2' 0.2, '0.4' 0.4, '0.6' 0.6, '0.8' 0.8, '1' 1, 'none' 1.14)\n"
            "set arrow from 1.05, graph 0 to 1.05, graph 1 nohead dt 2 lc rgb grey\n"
            "set xlabel 'coverage, group B'; set ylabel 'certified recall, group C'\n"
-           "set lmargin at screen 0.06; set rmargin at screen 0.43; set title 'Bicycle'\nunset key\nplot " +
+           "set lmargin at screen 0.055; set rmargin at screen 0.40; set title 'Bicycle'\nunset key\nplot " +
            bicycle +
-           "1/0 notitle\nset lmargin at screen 0.49; set rmargin at screen 0.8; set title 'Point mass, N = 100'\n"
-           "set key at screen 0.99, 0.9 right top\nplot " +
+           "1/0 notitle\nset lmargin at screen 0.46; set rmargin at screen 0.79; set title 'Point mass, N = 100'\n"
+           "set key at screen 0.998, 0.9 right top\nplot " +
            point_mass + "$" + paper_name +
            " using 2:4 with points pt 6 ps 1.4 lc rgb green title 'the paper (hollow, dotted)'\nunset multiplot\n"}};
 }

@@ -87,7 +87,7 @@ int main(int argc, char** argv) {
                    {"--method", &plans.method, "", "a name as in the tables of `methods`"},
                    {"--N", &plans.observations, "", "how many observations", NumberRange{1, 100000}},
                    {"--horizon", &plans.horizon, "", "T, steps of a plan", NumberRange{4, 40}},
-                   {"--first-seed", &plans.first_seed, "", "the paper's ten are 0 to 9 here; take others for a test",
+                   {"--first-seed", &plans.first_seed, "", "the report's ten are 0 to 9; take others for a test",
                     NumberRange{0, 1000000}}}});
   program.commands.push_back(
       {.name = "real",

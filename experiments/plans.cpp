@@ -18,7 +18,7 @@
 namespace forereach::experiments {
 namespace {
 
-const Column kSeed{"seed", "from 0; the paper's ten are 0 to 9 here"}, kGroup{"group", "A, B or C"},
+const Column kSeed{"seed", "from 0; the report's ten are 0 to 9"}, kGroup{"group", "A, B or C"},
     kPlan{"plan", "from 0, in each group and seed"};
 
 // Puts lines together from values of any kind that has a text.
