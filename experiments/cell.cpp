@@ -41,6 +41,7 @@ CpSlsBudget CountBudget(const CpSls& method, const Answer& answer, const Scenari
   budgets.tube.push_back(sum.starved ? -1 : sum.tube);
   budgets.total.push_back(sum.starved ? -1 : sum.total());
   budgets.least_mass.push_back(least_mass);
+  budgets.at_cap.push_back(sum.at_cap / known);
   budgets.complete.push_back(answer.IsComplete());
   return sum;
 }
@@ -112,9 +113,9 @@ Cell PaperCell(const System& system, int observations, double noise, int seed) {
 
 CellResult RunCell(const Cell& cell, const Effort& effort, const std::function<void(const PlanOutcome&)>& see) {
   const System& system = *cell.system;
-  const Transitions data = MakeData(system, cell.layout, cell.seed, cell.observations, cell.noise);
+  const Transitions data = MakeData(system, cell.layout, cell.seed, cell.observations, cell.noise, cell.cut);
   const Declaration declaration{cell.declared.matrix,
-                                Eigen::VectorXd::Constant(system.num_states(), NoiseBound(cell.noise))};
+                                Eigen::VectorXd::Constant(system.num_states(), NoiseBound(cell.noise, cell.cut))};
   const auto residual =
       cell.method.make({*system.model, system.domain, declaration, data, static_cast<std::uint64_t>(cell.seed)});
   const auto* const budgeted = dynamic_cast<const CpSls*>(residual.get());

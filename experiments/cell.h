@@ -25,10 +25,11 @@ struct Cell {
   Method method;
   NamedLipschitz declared;
   int observations = 0;  ///< N
-  double noise = 0;      ///< s; sigma_k = NoiseBound(s)
+  double noise = 0;      ///< s; sigma_k = NoiseBound(s, cut)
   int seed = 0;          ///< From 0
   int zonotope_order = 5;
   Layout layout = Layout::kCorridor;
+  double cut = kNoiseCut;  ///< Another cut needs another name of the declaration: the key has only that.
 
   /** What it is, in one word that is a file name: "bicycle-ForeReach-deployed-N400-s0-order5-corridor-seed0". */
   [[nodiscard]] std::string key() const;
@@ -46,6 +47,7 @@ struct Effort {
 struct PlanBudgets {
   std::vector<double> drift, tube, total;  ///< -1 for all three where a step is starved
   std::vector<double> least_mass;          ///< min_k sum_i w_i
+  std::vector<double> at_cap;              ///< Part of the weights whose d_TV is at its cap, mean over the steps
   std::vector<int> complete;               ///< 1 where all steps are in the sum
 };
 

@@ -32,15 +32,21 @@ std::vector<Cell> Cells(const Scope& scope) {
 // What of a method the paper does not fix; docs/experiments-methods.md has all of it.
 std::string WhatIsOurs(const Method& method) {
   static const std::map<std::string, const char*> known{
-      {"Global calibration", "level and center are ours"},
-      {"Regional calibration", "regions, level and center are ours"},
-      {"Plug-in Gaussian", "its level is ours"},
+      {"Global calibration", "level and center are ours: `readings`"},
+      {"Regional calibration", "the reading is ours: `readings`"},
+      {"Plug-in Gaussian", "the reading is ours: `readings`"},
       {"GP (k=2)", "kernel, fit and the points of a query are ours"},
       {"GP (k=3)", "kernel, fit and the points of a query are ours"},
       {"Alanwar Alg. 6", "ours covers the whole domain, so no tube is complete"},
       {"CP-SLS-MPC equations", "weights and drift rate are ours"}};
   const auto at = known.find(method.name);
   return at == known.end() ? "" : at->second;
+}
+
+// The readings of these two were chosen by their figures: readings.cpp has those that were not.
+Mark MarkOf(const Method& method) {
+  const bool is_chosen = method.name == "Regional calibration" || method.name == "Plug-in Gaussian";
+  return is_chosen ? Mark::kFitted : Mark::kOurs;
 }
 
 Point OurPoint(const Scope& scope, const Results& results, const Cell& cell) {
@@ -80,6 +86,7 @@ std::string Sides(const Scope& scope, const Results& results) {
         const Point paper{coverage->value, recall->value};
         const bool is_so = IsReproduced(ours, paper);
         lines += "; the paper's: " + InWords(paper) + (is_so ? ": reproduced" : ": **not reproduced**");
+        if (is_so && MarkOf(method) == Mark::kFitted) lines += ", by a reading that was chosen for it";
         reproduced += is_so, ++all;
       }
       lines += ".";
@@ -111,8 +118,8 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
         bicycle.rows.push_back(
             {where + what, reference, OverSeeds(scope, results, cell, group, statistic), 4, WhatIsOurs(method)});
       };
-      row("B coverage", {Mark::kOurs, PaperOf(method, observations, "B", "coverage")}, Group::kB, Coverage);
-      row("C recall", {is_fore_reach ? Mark::kFitted : Mark::kOurs, PaperOf(method, observations, "C", "recall")},
+      row("B coverage", {MarkOf(method), PaperOf(method, observations, "B", "coverage")}, Group::kB, Coverage);
+      row("C recall", {is_fore_reach ? Mark::kFitted : MarkOf(method), PaperOf(method, observations, "C", "recall")},
           Group::kC, Recall);
       row("B certified", {}, Group::kB, CertificateRate);
       row("B false-safe", {}, Group::kB, FalseSafeRate);

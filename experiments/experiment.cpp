@@ -29,23 +29,19 @@ const CellResult& Results::Of(const Cell& cell) const {
 }
 
 std::span<const Experiment> Experiments() {
-  static const std::vector<Experiment> all{MainResults(),          RecallByN(),
-                                           DirectCoverage(),       Comparison(),
-                                           CertificateBudget(),    ActionChunks(),
-                                           DomainExits(),          FirstAbstentions(),
-                                           TubeGeometry(),         BoxAgainstZonotope(),
-                                           ScalarEnvelope(),       NoiseSweep(),
-                                           NominalDegradation(),   IncorrectDeclarations(),
-                                           EstimatedSlopes(),      AdversarialFamily(),
-                                           AssumptionFamilies(),   ParameterBoxes(),
-                                           NormRatios(),           InformationLimits(),
-                                           CertifiedDeclarations()};
+  static const std::vector<Experiment> all{
+      MainResults(),           RecallByN(),          DirectCoverage(),    Comparison(),           Readings(),
+      NoisyComparison(),       CertificateBudget(),  ActionChunks(),      DomainExits(),          FirstAbstentions(),
+      TubeGeometry(),          BoxAgainstZonotope(), ScalarEnvelope(),    NoiseSweep(),           NominalDegradation(),
+      IncorrectDeclarations(), EstimatedSlopes(),    AdversarialFamily(), KeptDeclaration(),      AssumptionFamilies(),
+      ParameterBoxes(),        NormRatios(),         InformationLimits(), CertifiedDeclarations()};
   return all;
 }
 
 std::optional<double> Recall(const Tally& tally) { return Ratio(tally.certified_safe, tally.safe); }
 std::optional<double> Coverage(const Tally& tally) { return Ratio(tally.covered, tally.complete()); }
 std::optional<double> CompleteRate(const Tally& tally) { return Ratio(tally.complete(), tally.plans); }
+std::optional<double> JointRate(const Tally& tally) { return Ratio(tally.covered, tally.plans); }
 std::optional<double> CertificateRate(const Tally& tally) { return Ratio(tally.certified, tally.plans); }
 std::optional<double> FalseSafeRate(const Tally& tally) { return Ratio(tally.false_certificates(), tally.certified); }
 std::optional<double> DomainRate(const Tally& tally) { return Ratio(tally.domain, tally.plans); }

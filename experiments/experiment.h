@@ -53,6 +53,7 @@ using Statistic = std::optional<double> (*)(const Tally&);
 [[nodiscard]] std::optional<double> Recall(const Tally& tally);           ///< certified and safe / safe
 [[nodiscard]] std::optional<double> Coverage(const Tally& tally);         ///< covered / complete
 [[nodiscard]] std::optional<double> CompleteRate(const Tally& tally);     ///< complete / plans
+[[nodiscard]] std::optional<double> JointRate(const Tally& tally);        ///< covered / plans
 [[nodiscard]] std::optional<double> CertificateRate(const Tally& tally);  ///< certified / plans
 [[nodiscard]] std::optional<double> FalseSafeRate(const Tally& tally);    ///< certified and not safe / certified
 [[nodiscard]] std::optional<double> DomainRate(const Tally& tally);       ///< D / plans
@@ -78,6 +79,8 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment RecallByN();
 [[nodiscard]] Experiment DirectCoverage();
 [[nodiscard]] Experiment Comparison();
+[[nodiscard]] Experiment Readings();
+[[nodiscard]] Experiment NoisyComparison();
 [[nodiscard]] Experiment CertificateBudget();
 [[nodiscard]] Experiment DomainExits();
 [[nodiscard]] Experiment FirstAbstentions();
@@ -93,6 +96,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment AssumptionFamilies();
 [[nodiscard]] Experiment EstimatedSlopes();
 [[nodiscard]] Experiment AdversarialFamily();
+[[nodiscard]] Experiment KeptDeclaration();
 [[nodiscard]] Experiment CertifiedDeclarations();
 [[nodiscard]] Experiment ActionChunks();
 ///@}

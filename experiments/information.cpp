@@ -12,6 +12,7 @@
 #include "experiments/experiment.h"
 #include "experiments/limits/extremal.h"
 #include "experiments/limits/width_bound.h"
+#include "experiments/noise_floor.h"
 
 namespace forereach::experiments {
 namespace {
@@ -200,7 +201,7 @@ Table InnerTable(const Scope& scope) {
 
 std::vector<Table> LimitTables(const Scope& scope, const Results&) {
   const Scene scene;
-  return {PairTable(scene), WidthTable(scene), ScanTable(scene), InnerTable(scope)};
+  return {PairTable(scene), WidthTable(scene), ScanTable(scene), InnerTable(scope), NoiseFloorTable()};
 }
 
 }  // namespace

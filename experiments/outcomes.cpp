@@ -47,11 +47,12 @@ std::vector<Table> MainTables(const Scope& scope, const Results& results) {
     row("coverage", Mark::kOurs, "C.coverage", Group::kC, Coverage);
     row("recall", Mark::kFitted, "C.recall", Group::kC, Recall);
     row("recall", Mark::kOurs, "A.recall", Group::kA, Recall);
-    table.rows.push_back({system->name + ": false certificates, all groups",
-                          {},
-                          Exactly(FalseCertificates(scope, results, cell)),
-                          0,
-                          ""});
+    for (const Group group : kGroups)
+      table.rows.push_back({system->name + ", " + NameOf(group) + ": false certificates",
+                            {},
+                            Exactly(FalseCertificates(scope, results, cell, group)),
+                            0,
+                            ""});
   }
   return {table};
 }

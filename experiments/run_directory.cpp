@@ -44,6 +44,7 @@ void VisitCounts(Tally& tally, const Visit& visit) {
   visit("budget_tube", tally.budgets.tube);
   visit("budget_total", tally.budgets.total);
   visit("budget_least_mass", tally.budgets.least_mass);
+  visit("budget_at_cap", tally.budgets.at_cap);
   visit("budget_complete", tally.budgets.complete);
 }
 

@@ -60,12 +60,16 @@ enum class Layout { kCorridor, kBelowKnee, kFixedGrid, kPolicyCorridor };
   return kNames[static_cast<std::size_t>(layout)];
 }
 
+inline constexpr double kNoiseCut = 3;
+/** sigma_k = cut s: the declared bound on noise of scale s, at which the noise is truncated. A Gaussian has no bound.
+ */
+[[nodiscard]] inline double NoiseBound(double scale, double cut = kNoiseCut) { return cut * scale; }
+
 /** `count` observed transitions, at points uniform in the layout's region or as chunks/blocks.h says. Those of a
 smaller count are the first of a larger, but for a grid, and noise does not move the points.
-@param noise_scale to each entry of a successor an error N(0, s^2), cut at NoiseBound(s), is added. */
-[[nodiscard]] Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale);
-
-/** sigma_k = 3 s: the declared bound on noise of scale s, at which the noise is truncated. A Gaussian has no bound. */
-[[nodiscard]] inline double NoiseBound(double scale) { return 3 * scale; }
+@param noise_scale to each entry of a successor an error N(0, s^2), cut at NoiseBound(s, cut), is added. @pre cut >= 1
+*/
+[[nodiscard]] Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale,
+                                   double cut = kNoiseCut);
 
 }  // namespace forereach::experiments

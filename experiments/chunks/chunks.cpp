@@ -190,6 +190,33 @@ Table StepTable(const Scope& scope, const Results& results) {
   return table;
 }
 
+std::vector<Plot> Plots(const Scope& scope, const Results& results) {
+  Plot plot{
+      "chunk-steps",
+      "The step at which a block of the learned policy first abstains, noiseless, N = 400, as a part of all blocks "
+      "of groups A to C; mean over the seeds.",
+      900, 400,
+      "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
+      "set style fill solid 0.9 noborder\nset yrange [0:0.35]\nset xlabel 'step'\n"
+      "set ylabel 'part of the blocks'\nset key top left\n"};
+  std::string data;
+  for (const Layout layout : kLayouts) {
+    std::string lines;
+    for (std::size_t t = 0; t <= kBlockSteps; ++t) {
+      const auto part = [&](bool is_domain) {
+        return *PartAt(scope, results, ChunkCell(layout, ChunkSystem().sample_sizes.back(), 0), is_domain, t).mean;
+      };
+      lines += DataLine({static_cast<double>(t), part(true), part(false)});
+    }
+    data += DataBlock(NameOf(layout), lines);
+    plot.script += "set title '" + Words(layout) + "'\nplot $" + NameOf(layout) +
+                   " using 2:xtic(1) lc rgb blue title 'leaves the domain (D)', "
+                   "'' using 3 lc rgb orange title 'may touch the obstacle (S)'\n";
+  }
+  plot.script = data + plot.script + "unset multiplot\n";
+  return {plot};
+}
+
 std::vector<Table> Tables(const Scope& scope, const Results& results) {
   return {OutcomeTable(scope, results, 0), OutcomeTable(scope, results, ChunkSystem().noise_scale),
           GroupTable(scope, results),      SupportTable(scope, results),
@@ -199,7 +226,7 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
 }  // namespace
 
 Experiment ActionChunks() {
-  return {"chunks", "plans of a learned policy: outcomes by layout and N, distance to the data", Cells, Tables};
+  return {"chunks", "plans of a learned policy: outcomes by layout and N, distance to the data", Cells, Tables, Plots};
 }
 
 }  // namespace forereach::experiments
