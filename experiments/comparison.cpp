@@ -87,6 +87,7 @@ std::string Sides(const Scope& scope, const Results& results) {
         const bool is_so = IsReproduced(ours, paper);
         lines += "; the paper's: " + InWords(paper) + (is_so ? ": reproduced" : ": **not reproduced**");
         if (is_so && MarkOf(method) == Mark::kFitted) lines += ", by a reading that was chosen for it";
+        if (is_so && &method == &Methods().front()) lines += ", its recall by the fit of the scenarios";
         reproduced += is_so, ++all;
       }
       lines += ".";
