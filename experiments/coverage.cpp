@@ -1,6 +1,8 @@
 // Coverage without the theorem: every state of a rollout is located in its slice of the tube, whatever the envelopes
 // say.
+#include <array>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -16,13 +18,14 @@ constexpr int kPlans = 9, kRollouts = 80, kQuickPlans = 2;
 constexpr double kNarrowed[] = {0.5, 0.2, 0.1};
 
 struct Count {
-  int tubes = 0, complete = 0;
-  int by_envelopes = 0, directly = 0;  // Complete tubes that contain every rollout
-  int left = 0, undecided_tubes = 0;   // Tubes, complete or not, that a rollout provably leaves; that one may leave
+  int tubes = 0;
+  std::array<int, std::size(kGroups)> complete{}, directly{};  // By group: complete tubes, and those with every rollout
+  int by_envelopes = 0;                                        // Complete tubes with every rollout, as everywhere else
+  int left = 0, undecided_tubes = 0;  // Tubes, complete or not, that a rollout provably leaves; that one may leave
   int rollouts = 0, states = 0, outside = 0, undecided = 0;  // Rollouts: outside, undecided
 };
 
-void Add(const Answer& answer, const Rollouts& rollouts, Count& count) {
+void Add(const Answer& answer, const Rollouts& rollouts, Group group, Count& count) {
   Membership all = Membership::kInside;
   for (int i = 0; i < rollouts.count(); ++i) {
     const Membership at = LocateRollout(answer, rollouts, i);
@@ -34,10 +37,9 @@ void Add(const Answer& answer, const Rollouts& rollouts, Count& count) {
   }
   ++count.tubes;
   count.left += all == Membership::kOutside;
-  count.undecided_tubes += all == Membership::kUndecided;
   if (!answer.IsComplete()) return;
-  ++count.complete;
-  count.directly += all == Membership::kInside;
+  ++count.complete[static_cast<std::size_t>(group)];
+  count.directly[static_cast<std::size_t>(group)] += all == Membership::kInside;
   count.by_envelopes += Cover(answer, rollouts) == Membership::kInside;
 }
 
@@ -55,7 +57,7 @@ Count CountAll(const Scope& scope, const System& system, double part) {
       for (int i = 0; i < (scope.quick ? kQuickPlans : kPlans); ++i) {
         const Scenario scenario = MakeScenario(system, group, seed, i);
         evaluator.Certify(scenario, answer);
-        Add(answer, Rollouts(system, scenario, kRollouts), count);
+        Add(answer, Rollouts(system, scenario, kRollouts), group, count);
       }
   }
   return count;
@@ -86,9 +88,18 @@ std::vector<Table> Tables(const Scope& scope, const Results&) {
     row("rollouts that leave the tube", count.outside);
     row("rollouts undecided", count.undecided);
     row("tubes, complete or ended by D", count.tubes);
-    row("of these complete", count.complete);
+    row("of these complete", std::reduce(count.complete.begin(), count.complete.end()));
     row("complete tubes that contain every rollout, by envelopes first", count.by_envelopes);
-    row("the same, directly", count.directly);
+    row("the same, directly", std::reduce(count.directly.begin(), count.directly.end()));
+    for (const Group group : {Group::kB, Group::kC}) {
+      const double complete = count.complete[static_cast<std::size_t>(group)];
+      table.rows.push_back(
+          {system->name + ", " + NameOf(group) + ": coverage, directly",
+           {Mark::kOurs, PaperOrNone(system->name + "." + NameOf(group) + ".coverage")},
+           complete > 0 ? Exactly(count.directly[static_cast<std::size_t>(group)] / complete) : Estimate{},
+           3,
+           ""});
+    }
     for (const double part : kNarrowed) {
       const Count narrowed = CountAll(scope, *system, part);
       row("envelope at " + std::to_string(static_cast<int>(100 * part + 0.5)) + " %: tubes that a rollout leaves, of " +

@@ -69,7 +69,8 @@ of a smaller N are the first of a larger, observations. So a small p is a warnin
 A plan is *target-safe* if no rollout from its initial set, corners included, touches the obstacle. *Recall* is the part
 of the target-safe plans that get a certificate. A certificate for any other plan is *false*. *Coverage* is the part of
 the complete tubes that contain every rollout. With more than one seed, a figure is the mean ± the sample standard
-deviation.
+deviation. In the run directory, tables.csv has Student's 95 % interval of each mean over the seeds, and the CSV file of an
+experiment Wilson's of recall and coverage over the plans of each cell.
 )";
 }
 

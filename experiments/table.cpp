@@ -59,6 +59,7 @@ std::string Count(int count, const char* what) { return std::to_string(count) + 
 
 std::string InWords(const JointTest& test) {
   std::string text = "All rows together: ";
+  if (test.rows + test.below + test.above == 0) return text + "nothing to test.";
   if (test.rows > 0)
     text += "chi-square " + Fixed(test.chi_square, 2) + " over the " + Count(test.rows, "row") +
             " with a standard error, p = " + Fixed(test.p, 4) + "; ";

@@ -167,14 +167,24 @@ TEST_F(RunTest, LimitsAndAssumptionsHoldInAQuickRun) {
               HasSubstr("| Affine residual, knee target: F | ours | 1.000 | Affine control example | 1.000 "));
 }
 
+std::string WithoutOrigin(std::string report) {
+  const std::size_t from = report.find(kOriginBegins), to = report.find(kOriginEnds);
+  return to == std::string::npos ? report : report.erase(from, to - from);
+}
+
 TEST_F(RunTest, FilesAreTheSameForAnyNumberOfThreads) {
   const std::vector<std::string> names{"main", "steps", "chunks"};
   RunOptions one = Quick(names, "one"), two = Quick(names, "two");
   two.threads = 2;
+  one.origin = OriginOf("experiments/run all", 1);
+  two.origin = OriginOf("experiments/run all --threads 2", 2);
   std::ostringstream out_one, out_two;
   RunExperiments(one, out_one);
   RunExperiments(two, out_two);
-  for (const char* name : {"main.csv", "steps.csv", "chunks.csv", "tables.csv", "report.md", "figures/steps.svg"}) {
+  const std::string report = WithoutOrigin(Read(root_ / "one/report.md"));
+  EXPECT_LT(report.size() + 100, Read(root_ / "one/report.md").size());
+  EXPECT_EQ(report, WithoutOrigin(Read(root_ / "two/report.md")));
+  for (const char* name : {"main.csv", "steps.csv", "chunks.csv", "tables.csv", "figures/steps.svg"}) {
     EXPECT_FALSE(Read(root_ / "one" / name).empty());
     EXPECT_EQ(Read(root_ / "one" / name), Read(root_ / "two" / name)) << name;
   }
