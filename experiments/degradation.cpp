@@ -23,14 +23,14 @@ Cell DegradedCell(const System& system, double percent) {
 }
 
 // The other readings, on fewer plans and parts.
-constexpr int kPlans = 60;
+constexpr int kPlans = 40;
 constexpr std::pair<Lacking, const char*> kReadings[] = {{Lacking::kModel, "(1 - d) f0"},
                                                          {Lacking::kMotion, "x + (1 - d)(f0 - x)"},
                                                          {Lacking::kDeclaration, "f0, L of the first"},
                                                          {Lacking::kDeclarationOfMotion, "f0, L of the second"}};
 
 std::vector<double> CoarsePercents(const Scope& scope) {
-  return scope.quick ? std::vector<double>{0, 40} : std::vector<double>{0, 0.5, 1, 2, 5, 10, 20, 40, 60};
+  return scope.quick ? std::vector<double>{0, 40} : std::vector<double>{0, 1, 2, 5, 10, 20, 40};
 }
 
 Cell ReadingCell(const System& system, Lacking lacking, double percent) {
