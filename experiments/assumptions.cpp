@@ -62,8 +62,11 @@ std::vector<Table> AssumptionTables(const Scope& scope, const Results& results) 
       const std::string key = "affine." + std::string(system == kTargets[0] ? "linear." : "knee.");
       const bool is_affine = method.name == kAffine.name;
       const auto row = [&](const char* what, const char* figure, Group group, Statistic statistic) {
-        table.rows.push_back({where + what, is_affine ? PaperOrNone(key + figure) : std::nullopt,
-                              OverSeeds(scope, results, cell, group, statistic), 3, why});
+        table.rows.push_back({where + what,
+                              {Mark::kOurs, is_affine ? PaperOrNone(key + figure) : std::nullopt},
+                              OverSeeds(scope, results, cell, group, statistic),
+                              3,
+                              why});
       };
       row("F", "refuted", Group::kC, FalsifiedRate);
       row("B coverage", "B.coverage", Group::kB, Coverage);
@@ -72,8 +75,11 @@ std::vector<Table> AssumptionTables(const Scope& scope, const Results& results) 
     }
     std::vector<std::optional<double>> bands;
     for (int seed = 0; seed < scope.seeds; ++seed) bands.push_back(SilentBand(*system, seed));
-    table.rows.push_back({target + ": silent band", Paper(system == kTargets[0] ? "band.linear" : "band.knee"),
-                          EstimateOf(bands), 3, why});
+    table.rows.push_back({target + ": silent band",
+                          {Mark::kOurs, Paper(system == kTargets[0] ? "band.linear" : "band.knee")},
+                          EstimateOf(bands),
+                          3,
+                          why});
   }
   return {table};
 }
@@ -100,7 +106,10 @@ std::vector<Table> SlopeTables(const Scope& scope, const Results&) {
       factors.push_back(std::ranges::max(
           EstimateSlopes(estimator, declared, Observe(*system.model, data), static_cast<std::uint64_t>(seed))));
     }
-    table.rows.push_back({name, Paper("slopes"), EstimateOf(factors), 3,
+    table.rows.push_back({name,
+                          {Mark::kOurs, Paper("slopes")},
+                          EstimateOf(factors),
+                          3,
                           "the paper's residual is flat at every sample, the softplus not quite"});
   }
   return {table};

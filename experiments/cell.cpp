@@ -41,23 +41,32 @@ CpSlsBudget CountBudget(const CpSls& method, const Answer& answer, const Scenari
   budgets.tube.push_back(sum.starved ? -1 : sum.tube);
   budgets.total.push_back(sum.starved ? -1 : sum.total());
   budgets.least_mass.push_back(least_mass);
+  budgets.at_cap.push_back(sum.at_cap / known);
   budgets.complete.push_back(answer.IsComplete());
   return sum;
 }
 
-void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollouts, bool is_vacuous, Tally& tally) {
+PlanOutcome Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollouts, bool is_vacuous,
+                  Tally& tally) {
+  PlanOutcome seen{.group = tally.group, .plan = tally.plans};
   const bool safe = rollouts.StayClearOf(scenario.obstacle);
   ++tally.plans;
   tally.safe += safe;
   tally.answers +=
       is_vacuous && answer.decision.outcome == Outcome::kCertified ? 'V' : LetterOf(answer.decision.outcome);
   tally.areas.push_back(answer.IsComplete() ? ProjectedArea(answer.tube.slice(answer.tube.length())) : -1);
+  seen.answer = tally.answers.back();
+  seen.safe = safe;
+  seen.complete = answer.IsComplete();
+  seen.area = tally.areas.back();
   if (answer.decision.outcome == Outcome::kFalsified) {
     ++tally.falsified;
-    return;
+    seen.cover = Membership::kUndecided;
+    return seen;
   }
   const Membership cover = Cover(answer, rollouts);
   const bool covered = cover == Membership::kInside;
+  seen.cover = cover;
   tally.undecided += cover == Membership::kUndecided;
   (answer.IsComplete() ? tally.covered : tally.prefix_covered) += covered;
   const auto step = static_cast<std::size_t>(std::max(answer.decision.step, 0));
@@ -65,22 +74,25 @@ void Count(const Answer& answer, const Scenario& scenario, const Rollouts& rollo
     case Outcome::kCertified:
       if (is_vacuous) {
         ++tally.vacuous;
-        return;
+        break;
       }
       ++tally.certified;
       tally.certified_safe += safe;
-      return;
+      break;
     case Outcome::kDomain:
       ++tally.domain;
       ++tally.domain_steps[step];
-      return;
+      seen.step = answer.decision.step;
+      break;
     case Outcome::kSafety:
       ++tally.safety;
       ++tally.safety_steps[step];
-      return;
+      seen.step = answer.decision.step;
+      break;
     case Outcome::kFalsified:  // counted above
-    case Outcome::kNone: return;
+    case Outcome::kNone: break;
   }
+  return seen;
 }
 
 }  // namespace
@@ -99,11 +111,11 @@ Cell PaperCell(const System& system, int observations, double noise, int seed) {
   return {&system, Methods().front(), {"deployed", system.deployed}, observations, noise, seed, 5, Layout::kCorridor};
 }
 
-CellResult RunCell(const Cell& cell, const Effort& effort) {
+CellResult RunCell(const Cell& cell, const Effort& effort, const std::function<void(const PlanOutcome&)>& see) {
   const System& system = *cell.system;
-  const Transitions data = MakeData(system, cell.layout, cell.seed, cell.observations, cell.noise);
+  const Transitions data = MakeData(system, cell.layout, cell.seed, cell.observations, cell.noise, cell.cut);
   const Declaration declaration{cell.declared.matrix,
-                                Eigen::VectorXd::Constant(system.num_states(), NoiseBound(cell.noise))};
+                                Eigen::VectorXd::Constant(system.num_states(), NoiseBound(cell.noise, cell.cut))};
   const auto residual =
       cell.method.make({*system.model, system.domain, declaration, data, static_cast<std::uint64_t>(cell.seed)});
   const auto* const budgeted = dynamic_cast<const CpSls*>(residual.get());
@@ -126,7 +138,8 @@ CellResult RunCell(const Cell& cell, const Effort& effort) {
       else
         evaluator.Certify(scenario, answer);
       const bool is_vacuous = budgeted && CountBudget(*budgeted, answer, scenario, tally.budgets).IsVacuous();
-      Count(answer, scenario, rollouts, is_vacuous, tally);
+      const PlanOutcome seen = Count(answer, scenario, rollouts, is_vacuous, tally);
+      if (see) see(seen);
       if (system.support_scale.size() > 0) tally.distances.push_back(DistanceToData(system, scenario, data));
     }
   }

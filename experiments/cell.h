@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "experiments/membership.h"
 #include "experiments/methods/method.h"
 #include "experiments/scenarios.h"
 
@@ -23,10 +25,11 @@ struct Cell {
   Method method;
   NamedLipschitz declared;
   int observations = 0;  ///< N
-  double noise = 0;      ///< s; sigma_k = NoiseBound(s)
+  double noise = 0;      ///< s; sigma_k = NoiseBound(s, cut)
   int seed = 0;          ///< From 0
   int zonotope_order = 5;
   Layout layout = Layout::kCorridor;
+  double cut = kNoiseCut;  ///< Another cut needs another name of the declaration: the key has only that.
 
   /** What it is, in one word that is a file name: "bicycle-ForeReach-deployed-N400-s0-order5-corridor-seed0". */
   [[nodiscard]] std::string key() const;
@@ -44,6 +47,7 @@ struct Effort {
 struct PlanBudgets {
   std::vector<double> drift, tube, total;  ///< -1 for all three where a step is starved
   std::vector<double> least_mass;          ///< min_k sum_i w_i
+  std::vector<double> at_cap;              ///< Part of the weights whose d_TV is at its cap, mean over the steps
   std::vector<int> complete;               ///< 1 where all steps are in the sum
 };
 
@@ -71,8 +75,21 @@ struct Tally {
 /** In the order of kGroups. */
 using CellResult = std::array<Tally, 3>;
 
+/** What came of one plan. */
+struct PlanOutcome {
+  char group = 'A';
+  int plan = 0;
+  char answer = 'S';  ///< As in Tally::answers
+  int step = -1;      ///< At which D or S was decided; else -1
+  bool safe = false, complete = false;
+  Membership cover = Membership::kInside;  ///< Of the tube, as far as it goes; undecided for F
+  double area = -1;                        ///< As in Tally::areas
+};
+
 /** Runs the pairwise test once, if the method is ForeReach: a violation makes every plan F. Then each plan in
-turn. Deterministic. Cost: for each plan its rollouts and one certify call, some 0.3 ms for the bicycle. */
-[[nodiscard]] CellResult RunCell(const Cell& cell, const Effort& effort);
+turn, each shown to `see` if there is one. Deterministic. Cost: for each plan its rollouts and one certify call, some
+0.3 ms for the bicycle. */
+[[nodiscard]] CellResult RunCell(const Cell& cell, const Effort& effort,
+                                 const std::function<void(const PlanOutcome&)>& see = {});
 
 }  // namespace forereach::experiments

@@ -30,17 +30,6 @@ bool ResidualsAreEnclosed(const Answer& answer, const Rollouts& rollouts, int i)
   return true;
 }
 
-// From the end, where what has left is farthest outside.
-Membership LocateAll(const Answer& answer, const Rollouts& rollouts, int i) {
-  Membership all = Membership::kInside;
-  for (int t = answer.tube.length(); t >= 0; --t) {
-    const Membership at = Locate(answer.tube.slice(t), rollouts.state(i, t));
-    if (at == Membership::kOutside) return at;
-    if (at == Membership::kUndecided) all = at;
-  }
-  return all;
-}
-
 }  // namespace
 
 Evaluator::Evaluator(const System& system, const ResidualEnclosure& residual, int zonotope_order)
@@ -54,11 +43,22 @@ void Evaluator::Certify(const Scenario& scenario, Answer& answer) const {
   answer.decision = certifier_.Certify(plan, initial_set, {&obstacle, 1}, answer.tube);
 }
 
+Membership LocateRollout(const Answer& answer, const Rollouts& rollouts, int i) {
+  Membership all = Membership::kInside;
+  // From the end, where what has left is farthest outside.
+  for (int t = answer.tube.length(); t >= 0; --t) {
+    const Membership at = Locate(answer.tube.slice(t), rollouts.state(i, t));
+    if (at == Membership::kOutside) return at;
+    if (at == Membership::kUndecided) all = at;
+  }
+  return all;
+}
+
 Membership Cover(const Answer& answer, const Rollouts& rollouts) {
   Membership all = Membership::kInside;
   for (int i = 0; i < rollouts.count(); ++i) {
     if (ResidualsAreEnclosed(answer, rollouts, i)) continue;
-    const Membership found = LocateAll(answer, rollouts, i);
+    const Membership found = LocateRollout(answer, rollouts, i);
     if (found == Membership::kOutside) return found;
     if (found == Membership::kUndecided) all = found;
   }

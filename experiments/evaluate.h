@@ -34,9 +34,13 @@ class Evaluator final {
   Certifier certifier_;
 };
 
+/** Whether each state of a rollout lies in its slice, as far as the tube goes: outside if one provably does not.
+Neither the envelopes nor any theorem is used. */
+[[nodiscard]] Membership LocateRollout(const Answer& answer, const Rollouts& rollouts, int i);
+
 /** Whether every rollout lies in every slice of the tube, as far as it goes: outside if one provably leaves, undecided
 if that is not known of all. A rollout is inside if its residuals lie in the recorded envelopes: it started in X_0, and
-the step from slice to slice is sound. If they do not, each of its states is located in its slice. */
+the step from slice to slice is sound. If they do not, LocateRollout decides. */
 [[nodiscard]] Membership Cover(const Answer& answer, const Rollouts& rollouts);
 
 /** The area of P X_t, by plain arithmetic. */

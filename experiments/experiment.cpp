@@ -30,17 +30,18 @@ const CellResult& Results::Of(const Cell& cell) const {
 
 std::span<const Experiment> Experiments() {
   static const std::vector<Experiment> all{
-      MainResults(),           RecallByN(),       Comparison(),        CertificateBudget(),
-      ActionChunks(),          DomainExits(),     FirstAbstentions(),  TubeGeometry(),
-      BoxAgainstZonotope(),    ScalarEnvelope(),  NoiseSweep(),        NominalDegradation(),
-      IncorrectDeclarations(), EstimatedSlopes(), AdversarialFamily(), AssumptionFamilies(),
-      ParameterBoxes(),        NormRatios(),      InformationLimits(), CertifiedDeclarations()};
+      MainResults(),           RecallByN(),          DirectCoverage(),    Comparison(),           Readings(),
+      NoisyComparison(),       CertificateBudget(),  ActionChunks(),      DomainExits(),          FirstAbstentions(),
+      TubeGeometry(),          BoxAgainstZonotope(), ScalarEnvelope(),    NoiseSweep(),           NominalDegradation(),
+      IncorrectDeclarations(), EstimatedSlopes(),    AdversarialFamily(), KeptDeclaration(),      AssumptionFamilies(),
+      ParameterBoxes(),        NormRatios(),         InformationLimits(), CertifiedDeclarations()};
   return all;
 }
 
 std::optional<double> Recall(const Tally& tally) { return Ratio(tally.certified_safe, tally.safe); }
 std::optional<double> Coverage(const Tally& tally) { return Ratio(tally.covered, tally.complete()); }
 std::optional<double> CompleteRate(const Tally& tally) { return Ratio(tally.complete(), tally.plans); }
+std::optional<double> JointRate(const Tally& tally) { return Ratio(tally.covered, tally.plans); }
 std::optional<double> CertificateRate(const Tally& tally) { return Ratio(tally.certified, tally.plans); }
 std::optional<double> FalseSafeRate(const Tally& tally) { return Ratio(tally.false_certificates(), tally.certified); }
 std::optional<double> DomainRate(const Tally& tally) { return Ratio(tally.domain, tally.plans); }
@@ -56,8 +57,13 @@ Estimate OverSeeds(const Scope& scope, const Results& results, Cell cell, Group 
 
 int FalseCertificates(const Scope& scope, const Results& results, Cell cell) {
   int count = 0;
-  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed)
-    for (const Tally& tally : results.Of(cell)) count += tally.false_certificates();
+  for (const Group group : kGroups) count += FalseCertificates(scope, results, cell, group);
+  return count;
+}
+
+int FalseCertificates(const Scope& scope, const Results& results, Cell cell, Group group) {
+  int count = 0;
+  for (cell.seed = 0; cell.seed < scope.seeds; ++cell.seed) count += results.Of(cell, group).false_certificates();
   return count;
 }
 

@@ -53,6 +53,7 @@ using Statistic = std::optional<double> (*)(const Tally&);
 [[nodiscard]] std::optional<double> Recall(const Tally& tally);           ///< certified and safe / safe
 [[nodiscard]] std::optional<double> Coverage(const Tally& tally);         ///< covered / complete
 [[nodiscard]] std::optional<double> CompleteRate(const Tally& tally);     ///< complete / plans
+[[nodiscard]] std::optional<double> JointRate(const Tally& tally);        ///< covered / plans
 [[nodiscard]] std::optional<double> CertificateRate(const Tally& tally);  ///< certified / plans
 [[nodiscard]] std::optional<double> FalseSafeRate(const Tally& tally);    ///< certified and not safe / certified
 [[nodiscard]] std::optional<double> DomainRate(const Tally& tally);       ///< D / plans
@@ -63,8 +64,9 @@ using Statistic = std::optional<double> (*)(const Tally&);
 /** Over the seeds of a scope, whatever the cell's own. */
 [[nodiscard]] Estimate OverSeeds(const Scope& scope, const Results& results, Cell cell, Group group,
                                  Statistic statistic);
-/** Certificates of plans that are not target-safe: all groups and seeds of the scope together. */
+/** Certificates of plans that are not target-safe, all seeds of the scope together: of every group, or of one. */
 [[nodiscard]] int FalseCertificates(const Scope& scope, const Results& results, Cell cell);
+[[nodiscard]] int FalseCertificates(const Scope& scope, const Results& results, Cell cell, Group group);
 /** The cell with each seed of the scope. */
 void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 
@@ -75,7 +77,10 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 ///@{
 [[nodiscard]] Experiment MainResults();
 [[nodiscard]] Experiment RecallByN();
+[[nodiscard]] Experiment DirectCoverage();
 [[nodiscard]] Experiment Comparison();
+[[nodiscard]] Experiment Readings();
+[[nodiscard]] Experiment NoisyComparison();
 [[nodiscard]] Experiment CertificateBudget();
 [[nodiscard]] Experiment DomainExits();
 [[nodiscard]] Experiment FirstAbstentions();
@@ -91,6 +96,7 @@ void AddSeeds(const Scope& scope, Cell cell, std::vector<Cell>& cells);
 [[nodiscard]] Experiment AssumptionFamilies();
 [[nodiscard]] Experiment EstimatedSlopes();
 [[nodiscard]] Experiment AdversarialFamily();
+[[nodiscard]] Experiment KeptDeclaration();
 [[nodiscard]] Experiment CertifiedDeclarations();
 [[nodiscard]] Experiment ActionChunks();
 ///@}

@@ -82,6 +82,21 @@ std::string Slices(const Answer& answer) {
   return lines;
 }
 
+// "x y step" at the center of every third slice, for labels; of the last, with D where the tube ends before the plan.
+std::string Steps(const Answer& answer, int horizon) {
+  std::string lines;
+  for (int t = 0; t <= answer.tube.length(); ++t) {
+    const bool is_last = t == answer.tube.length();
+    if (t % 3 != 0 && !is_last) continue;
+    const Eigen::VectorXd center = answer.tube.slice(t).CenterVector();
+    const bool is_exit = is_last && t < horizon;
+    lines += DataLine({center[0], center[1]});
+    lines.back() = ' ';
+    lines += (is_exit ? "\"D at " : "\"") + std::to_string(t) + "\"\n";
+  }
+  return lines;
+}
+
 std::string Paths(const Rollouts& target) {
   std::string lines;
   for (int i = 0; i < target.count(); ++i) {
@@ -94,13 +109,19 @@ std::string Paths(const Rollouts& target) {
 std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
   Plot plot{"geometry",
             "Tubes in position space, metres: left without data near the plan, right with them; above the point mass, "
-            "below the bicycle. A tube that leaves the certification domain ends there.",
+            "below the bicycle. Numbers are steps, at the center of ForeReach's slices; a cross and D: the tube leaves "
+            "the certification domain there and ends.",
             900, 760, ""};
   const std::vector<Panel> panels = Panels();
   for (const Panel& panel : panels) {
     plot.script += DataBlock(panel.name() + "_ours", Slices(panel.ours));
     plot.script += DataBlock(panel.name() + "_global", Slices(panel.global));
     plot.script += DataBlock(panel.name() + "_target", Paths(panel.target));
+    plot.script += DataBlock(panel.name() + "_steps", Steps(panel.ours, panel.system.horizon));
+    const Zonotope& last = panel.ours.tube.slice(panel.ours.tube.length());
+    const bool exits = panel.ours.tube.length() < panel.system.horizon;
+    plot.script +=
+        DataBlock(panel.name() + "_exit", DataLine({exits ? last.center(0) : NAN, exits ? last.center(1) : NAN}));
     const Circle& circle = panel.scenario.obstacle;
     plot.script +=
         DataBlock(panel.name() + "_obstacle", DataLine({circle.center.x(), circle.center.y(), circle.radius}));
@@ -113,12 +134,16 @@ std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
     plot.script += "set title '" + std::string(&panel.system == &PointMassSystem() ? "Point mass" : "Bicycle") +
                    (panel.group == Group::kB ? ", no data near the plan" : ", data along the plan") + "'\n";
     plot.script += &panel == &panels.front()
-                       ? "set key at screen 0.5, 0.985 center top horizontal maxrows 1 samplen 2\n"
+                       ? "set key at screen 0.5, 0.985 center top horizontal maxrows 2 samplen 2\n"
                        : "unset key\n";
-    plot.script += "plot " + name + "_ours with filledcurves closed lc rgb green title 'ForeReach', " + name +
+    plot.script += "set xlabel 'x, m'; set ylabel 'y, m'\n";
+    plot.script += "plot " + name + "_target with lines lw 0.3 lc rgb '#b0b0b0' title 'target', " + name +
+                   "_ours with filledcurves closed lc rgb green title 'ForeReach', " + name +
                    "_ours with lines lw 0.7 lc rgb green notitle, " + name +
                    "_global with lines lw 1 lc rgb blue title 'global calibration', " + name +
-                   "_target with lines lw 0.5 lc rgb '#333333' title 'target', " + name +
+                   "_ours every :::0::0 with lines lw 1.8 lc rgb '#222222' title 'X_0', " + name +
+                   "_steps using 1:2:3 with labels offset 0,1.1 font ',9' textcolor rgb '#222222' notitle, " + name +
+                   "_exit with points pt 2 ps 1.3 lw 2 lc rgb purple title 'ends: domain left', " + name +
                    "_obstacle with circles fs transparent solid 0.6 lc rgb red title 'obstacle'\n";
   }
   plot.script += "unset multiplot\n";

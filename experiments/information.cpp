@@ -12,6 +12,7 @@
 #include "experiments/experiment.h"
 #include "experiments/limits/extremal.h"
 #include "experiments/limits/width_bound.h"
+#include "experiments/noise_floor.h"
 
 namespace forereach::experiments {
 namespace {
@@ -78,11 +79,17 @@ Table WidthTable(const Scene& scene) {
   const std::vector<WidthBound> bounds = scene.Scan(1);
   const WidthBound& widest = Widest(bounds);
   const auto positive = std::ranges::count_if(bounds, [](const WidthBound& b) { return b.half_width > 0; });
-  const auto row = [&](const char* what, const char* key, double ours, int decimals) {
-    table.rows.push_back({what, PaperOrNone(std::string("width.") + key), Exactly(ours), decimals,
+  const auto add = [&](const char* what, Mark mark, const char* key, double ours, int decimals) {
+    table.rows.push_back({what,
+                          {mark, PaperOrNone(std::string("width.") + key)},
+                          Exactly(ours),
+                          decimals,
                           "the paper's class, plan and r0 are not in its text"});
   };
-  row("admissible pairs", "pairs", static_cast<double>(bounds.size()), 0);
+  const auto row = [&](const char* what, const char* key, double ours, int decimals) {
+    add(what, Mark::kOurs, key, ours, decimals);
+  };
+  add("admissible pairs", Mark::kExact, "pairs", static_cast<double>(bounds.size()), 0);
   row("of these with a positive bound", "positive", static_cast<double>(positive), 0);
   row("tau of the largest", "tau", widest.tau, 0);
   row("k of the largest", "k", widest.k, 0);
@@ -194,7 +201,7 @@ Table InnerTable(const Scope& scope) {
 
 std::vector<Table> LimitTables(const Scope& scope, const Results&) {
   const Scene scene;
-  return {PairTable(scene), WidthTable(scene), ScanTable(scene), InnerTable(scope)};
+  return {PairTable(scene), WidthTable(scene), ScanTable(scene), InnerTable(scope), NoiseFloorTable()};
 }
 
 }  // namespace

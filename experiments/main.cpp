@@ -10,6 +10,7 @@
 #include "command_line/command_line.h"
 #include "experiments/chunks/training.h"
 #include "experiments/drift/drift.h"
+#include "experiments/plans.h"
 #include "experiments/real/real.h"
 #include "experiments/run.h"
 
@@ -25,6 +26,8 @@ stopped goes on where it was; NAME.csv, tables.csv and report.md are made of the
   forereach-experiments all --quick            a look, in seconds
   forereach-experiments recall --seeds 3       one experiment on three of the ten seeds
   forereach-experiments all --out run/paper    everything, in minutes
+  forereach-experiments plans --first-seed 100 --N 60 --method "Plug-in Gaussian"
+                                               your own: scenarios, observations and outcomes as CSV, with intervals
   forereach-experiments train                  the policy of `chunks` and of config/policy.yaml, taught anew
   forereach-experiments real --data ../dart    declarations from a real car's logs, judged by others: docs/real-car.md
   forereach-experiments drift                  a published car of nine states: docs/higher-order-car.md
@@ -57,6 +60,7 @@ int main(int argc, char** argv) {
 
   std::string name, policy = "config/policies/bicycle.json", data;
   std::vector<std::string> others;
+  PlansOptions plans;
   Command program{
       .name = "forereach-experiments",
       .purpose = "The paper's experiments, done again.",
@@ -77,6 +81,15 @@ int main(int argc, char** argv) {
                               .purpose = "make the policy that `chunks` asks for its plans",
                               .options = {{"--policy", &policy, "", "where it goes"}}});
   program.commands.push_back(
+      {.name = "plans",
+       .purpose = "plans of your choice of method, size, seeds and horizon, each written out as CSV",
+       .options = {{"--system", &plans.system, "", "point_mass or bicycle"},
+                   {"--method", &plans.method, "", "a name as in the tables of `methods`"},
+                   {"--N", &plans.observations, "", "how many observations", NumberRange{1, 100000}},
+                   {"--horizon", &plans.horizon, "", "T, steps of a plan", NumberRange{4, 40}},
+                   {"--first-seed", &plans.first_seed, "", "the report's ten are 0 to 9; take others for a test",
+                    NumberRange{0, 1000000}}}});
+  program.commands.push_back(
       {.name = "real",
        .purpose = "what a declaration from a real car's logs is worth on other logs of it",
        .options = {{"--data", &data, "FOLDER", "the drives: every CSV file of the recorder"},
@@ -92,16 +105,24 @@ int main(int argc, char** argv) {
   if (seeds) options.scope.seeds = *seeds;
   options.directory = !directory.empty() ? directory : quick ? "run/experiments-quick" : "run/experiments";
   options.report = report;
-  options.command =
+  const std::string command =
       "experiments/run " + name + (quick ? " --quick" : "") + (seeds ? " --seeds " + std::to_string(*seeds) : "");
+  options.origin = OriginOf(command, options.threads);
   try {
     if (name == "train") return Train(policy, options.threads), 0;
-    if (name == "real")
-      RunReal({data, others, options.directory, quick, options.command + " --data " + data}, std::cout);
-    else if (name == "drift")
-      RunDrift({options.directory, quick, options.command}, std::cout);
-    else
+    if (name == "real") {
+      RunReal({data, others, options.directory, quick, command + " --data " + data}, std::cout);
+    } else if (name == "plans") {
+      plans.seeds = options.scope.seeds;
+      plans.effort = options.effort;
+      plans.threads = options.threads;
+      plans.directory = options.directory;
+      RunPlans(plans, std::cout);
+    } else if (name == "drift") {
+      RunDrift({options.directory, quick, command}, std::cout);
+    } else {
       RunExperiments(options, std::cout);
+    }
   } catch (const std::exception& error) {
     std::cerr << "forereach-experiments: " << error.what() << "\n";
     return 2;

@@ -1,14 +1,52 @@
 #include "experiments/membership.h"
 
 #include <algorithm>
+#include <vector>
 
+#include <ClpSimplex.hpp>
 #include <Eigen/QR>
 
 namespace forereach::experiments {
 namespace {
 
-constexpr int kRounds = 5000, kRoundsBetweenTests = 5;
+constexpr int kRounds = 200, kRoundsBetweenTests = 5;
 constexpr double kClose = 1e-9;
+
+bool IsNothing(const Eigen::VectorXd& rest) { return rest.size() == 0 || rest.cwiseAbs().maxCoeff() <= kClose; }
+
+bool Separates(const Eigen::VectorXd& direction, const Eigen::MatrixXd& generators, const Eigen::VectorXd& target) {
+  return direction.dot(target) > (generators.transpose() * direction).cwiseAbs().sum() * (1 + 1e-12);
+}
+
+// Maximises s over G b = s target, |b|_inf <= 1: the target is inside if s reaches one, and else the rows' prices
+// separate.
+Membership LocateByProgram(const Eigen::MatrixXd& generators, const Eigen::VectorXd& target) {
+  const auto rows = static_cast<int>(target.size()), columns = static_cast<int>(generators.cols());
+  std::vector<int> all(static_cast<std::size_t>(rows));
+  for (int k = 0; k < rows; ++k) all[static_cast<std::size_t>(k)] = k;
+  CoinPackedMatrix matrix;
+  matrix.setDimensions(rows, 0);
+  for (int j = 0; j < columns; ++j) matrix.appendCol(rows, all.data(), generators.col(j).data());
+  const Eigen::VectorXd opposite = -target;
+  matrix.appendCol(rows, all.data(), opposite.data());
+  const auto last = static_cast<std::size_t>(columns);
+  std::vector<double> below(last + 1, -1), above(last + 1, 1), cost(last + 1, 0);
+  below[last] = 0, above[last] = 2, cost[last] = -1;
+  const std::vector<double> zero(static_cast<std::size_t>(rows), 0);
+  ClpSimplex program;
+  program.setLogLevel(0);
+  program.scaling(
+      0);  // The rows are in units of the hull, and a slack's column of 1e-13 spoils what Clp makes of them.
+  program.setPrimalTolerance(kClose / 10);
+  program.loadProblem(matrix, below.data(), above.data(), cost.data(), zero.data(), zero.data());
+  program.primal();
+  const Eigen::Map<const Eigen::VectorXd> found(program.getColSolution(), columns), prices(program.getRowPrice(), rows);
+  const Eigen::VectorXd b = (found / std::max(program.getColSolution()[columns], 1.0)).cwiseMax(-1).cwiseMin(1);
+  if (IsNothing(target - generators * b)) return Membership::kInside;
+  for (const double sign : {1.0, -1.0})
+    if (Separates(sign * prices, generators, target)) return Membership::kOutside;
+  return Membership::kUndecided;
+}
 
 }  // namespace
 
@@ -29,9 +67,8 @@ Membership Locate(const Zonotope& set, std::span<const double> x) {
   rest -= generators * b;
   for (int round = 0; round < kRounds; ++round) {
     if (round % kRoundsBetweenTests == 0) {
-      if (rest.size() == 0 || rest.cwiseAbs().maxCoeff() <= kClose) return Membership::kInside;
-      const double reach = (generators.transpose() * rest).cwiseAbs().sum();
-      if (rest.dot(target) > reach * (1 + 1e-12)) return Membership::kOutside;
+      if (IsNothing(rest)) return Membership::kInside;
+      if (Separates(rest, generators, target)) return Membership::kOutside;
     }
     for (Eigen::Index j = 0; j < b.size(); ++j) {
       if (squares[j] == 0) continue;
@@ -40,7 +77,7 @@ Membership Locate(const Zonotope& set, std::span<const double> x) {
       b[j] = better;
     }
   }
-  return Membership::kUndecided;
+  return LocateByProgram(generators, target);
 }
 
 }  // namespace forereach::experiments

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "experiments/experiment.h"
+#include "experiments/origin.h"
 
 namespace forereach::experiments {
 
@@ -17,7 +18,7 @@ struct RunOptions {
   unsigned threads = 1;
   std::filesystem::path directory;  ///< Results; see RunDirectory
   std::filesystem::path report;     ///< The report in Markdown; empty: directory/report.md
-  std::string command;              ///< The command that the report names as its origin
+  Origin origin;                    ///< That the report names
 };
 
 /** Every cell of the experiments that is not finished is run, then written:
@@ -25,7 +26,7 @@ struct RunOptions {
     DIR/tables.csv  all tables
     DIR/report.md   the same for people; also printed to `out`
     DIR/plots/NAME.gp  the pictures' scripts; the pictures are in figures/ beside the report, which links them
-The CSV files are the same for any number of threads.
+For any number of threads the files are the same, but for the lines about the origin of the report.
 @throws std::invalid_argument for an unknown name, std::runtime_error as RunDirectory does. */
 void RunExperiments(const RunOptions& options, std::ostream& out);
 

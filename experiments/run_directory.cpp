@@ -11,6 +11,7 @@
 #include "certifier/task/files.h"
 #include "certifier/task/json_text.h"
 #include "cli/progress.h"
+#include "experiments/statistics.h"
 
 namespace forereach::experiments {
 namespace {
@@ -43,6 +44,7 @@ void VisitCounts(Tally& tally, const Visit& visit) {
   visit("budget_tube", tally.budgets.tube);
   visit("budget_total", tally.budgets.total);
   visit("budget_least_mass", tally.budgets.least_mass);
+  visit("budget_at_cap", tally.budgets.at_cap);
   visit("budget_complete", tally.budgets.complete);
 }
 
@@ -82,6 +84,17 @@ std::string StepList(const std::vector<int>& counts) {
     text.append(std::to_string(t)).append(1, ':').append(std::to_string(counts[t]));
   }
   return text;
+}
+
+// ",part,low,high" of a count.
+void AppendPart(int count, int of, std::string& text) {
+  const std::optional<Range> range = WilsonRange(count, of);
+  if (!range) {
+    text += ",,,";
+    return;
+  }
+  for (const double number : {static_cast<double>(count) / of, range->low, range->high})
+    text.append(1, ',').append(ToText(number));
 }
 
 }  // namespace
@@ -149,7 +162,8 @@ std::vector<CellResult> RunAll(const std::vector<Cell>& cells, const RunDirector
 std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>& results) {
   std::string text =
       "system,method,declaration,observations,noise,order,layout,seed,group,plans,safe,certified,certified_safe,"
-      "false_certificates,falsified,domain,safety,vacuous,covered,prefix_covered,undecided,domain_steps,safety_steps\n";
+      "false_certificates,falsified,domain,safety,vacuous,covered,prefix_covered,undecided,domain_steps,safety_steps,"
+      "recall,recall_low,recall_high,coverage,coverage_low,coverage_high\n";
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell& cell = cells[i];
     for (const Tally& tally : results[i]) {
@@ -161,7 +175,10 @@ std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>&
             tally.domain, tally.safety, tally.vacuous, tally.covered, tally.prefix_covered, tally.undecided})
         text.append(1, ',').append(std::to_string(count));
       text.append(1, ',').append(StepList(tally.domain_steps));
-      text.append(1, ',').append(StepList(tally.safety_steps)).append(1, '\n');
+      text.append(1, ',').append(StepList(tally.safety_steps));
+      AppendPart(tally.certified_safe, tally.safe, text);
+      AppendPart(tally.covered, tally.complete(), text);
+      text.append(1, '\n');
     }
   }
   return text;

@@ -40,7 +40,8 @@ So results do not depend on the number of threads. Shows progress on standard er
 [[nodiscard]] std::vector<CellResult> RunAll(const std::vector<Cell>& cells, const RunDirectory& directory,
                                              unsigned threads);
 
-/** One line for each cell and group, with a header line. Counts, and the steps of D and S as "step:count" lists. */
+/** One line for each cell and group, with a header line. Counts, the steps of D and S as "step:count" lists,
+and recall and coverage with their Wilson intervals over the plans of the cell; empty where there are no plans. */
 [[nodiscard]] std::string ToCsv(const std::vector<Cell>& cells, const std::vector<CellResult>& results);
 
 }  // namespace forereach::experiments

@@ -95,7 +95,7 @@ Scenario MakeScenario(const System& system, Group group, int seed, int index) {
   return {start.center, controls, PlaceBeside(system, start.center, controls, k, aside * start.side, start.radius)};
 }
 
-Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale) {
+Transitions MakeData(const System& system, Layout layout, int seed, int count, double noise_scale, double cut) {
   Random noise{kForNoise, static_cast<std::uint64_t>(system.num_states()), static_cast<std::uint64_t>(seed)};
   const int n = system.num_states();
   Transitions data{PointsOf(system, layout, seed, count), Eigen::MatrixXd(count, n)};
@@ -105,7 +105,7 @@ Transitions MakeData(const System& system, Layout layout, int seed, int count, d
     system.target(z, next);
     for (int k = 0; k < n; ++k)
       data.x_next(i, k) = static_cast<double>(next[static_cast<std::size_t>(k)] +
-                                              noise.TruncatedNormal(noise_scale, NoiseBound(noise_scale)));
+                                              noise.TruncatedNormal(noise_scale, NoiseBound(noise_scale, cut)));
   }
   return data;
 }

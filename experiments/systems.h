@@ -1,7 +1,7 @@
 /** The paper's two systems: the certifier's inputs for each, and the true system, which the certifier does not know.
 
 Model, residual, step, horizon and the deployed declaration are the paper's. Domain extents, data regions and the sizes
-of X0 are not in its text; they are ours. */
+of X0 are not in its text. They are ours, and fitted with the scenarios: scenarios.h. */
 #pragma once
 
 #include <functional>

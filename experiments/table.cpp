@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <stdexcept>
+#include <utility>
 
 #include "experiments/paper_values.h"
+#include "experiments/statistics.h"
 
 namespace forereach::experiments {
 namespace {
@@ -23,7 +26,7 @@ std::string Signed(double value, int decimals) {
   return (value < 0 ? "-" : "+") + size;
 }
 
-int DecimalsOf(const Row& row) { return row.paper ? row.paper->decimals : row.decimals; }
+int DecimalsOf(const Row& row) { return row.paper.value() ? row.paper.value()->decimals : row.decimals; }
 
 std::string Ours(const Row& row) {
   if (!row.ours.mean) return "none";
@@ -32,13 +35,38 @@ std::string Ours(const Row& row) {
 }
 
 std::string Papers(const Row& row) {
-  if (!row.paper) return "";
-  const std::string text = Fixed(row.paper->value, row.paper->decimals);
-  return row.paper->deviation < 0 ? text : text + " ± " + Fixed(row.paper->deviation, row.paper->decimals);
+  if (!row.paper.value()) return "";
+  const PaperValue& paper = *row.paper.value();
+  const std::string text = Fixed(paper.value, paper.decimals);
+  return paper.deviation < 0 ? text : text + " ± " + Fixed(paper.deviation, paper.decimals);
 }
 
 std::string Difference(const Row& row) {
-  return row.paper && row.ours.mean ? Signed(*row.ours.mean - row.paper->value, row.paper->decimals) : "";
+  const std::optional<PaperValue>& paper = row.paper.value();
+  return paper && row.ours.mean ? Signed(*row.ours.mean - paper->value, paper->decimals) : "";
+}
+
+// Of the difference of means; none where a spread is not known.
+std::optional<double> StandardError(const Row& row) {
+  constexpr double kPaperSeeds = 10;
+  const std::optional<PaperValue>& paper = row.paper.value();
+  if (!paper || paper->deviation < 0 || row.ours.seeds < 2) return std::nullopt;
+  return std::sqrt(paper->deviation * paper->deviation / kPaperSeeds +
+                   row.ours.deviation * row.ours.deviation / row.ours.seeds);
+}
+
+std::string Count(int count, const char* what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
+
+std::string InWords(const JointTest& test) {
+  std::string text = "All rows together: ";
+  if (test.rows + test.below + test.above == 0) return text + "nothing to test.";
+  if (test.rows > 0)
+    text += "chi-square " + Fixed(test.chi_square, 2) + " over the " + Count(test.rows, "row") +
+            " with a standard error, p = " + Fixed(test.p, 4) + "; ";
+  else
+    text += "no row has a standard error, since the paper prints no spread or neither varies; ";
+  return text + Count(test.below, "row") + " below the paper, " + std::to_string(test.above) +
+         " above, sign test p = " + Fixed(test.p_of_signs, 4) + ".";
 }
 
 std::string Quoted(const std::string& text) {
@@ -72,38 +100,106 @@ Estimate EstimateOf(const std::vector<std::optional<double>>& of_each_seed) {
   return {mean, seeds > 1 ? std::sqrt(squares / (seeds - 1)) : 0, seeds};
 }
 
-std::string Verdict(const Row& row) {
-  if (!row.paper) return "";
-  if (!row.ours.mean) return row.reason.empty() ? "no plan to measure it on" : row.reason;
-  if (Fixed(*row.ours.mean, row.paper->decimals) == Fixed(row.paper->value, row.paper->decimals)) return "same";
-  constexpr double kPaperSeeds = 10;
-  if (row.paper->deviation >= 0 && row.ours.seeds > 1) {
-    const double error = std::sqrt(row.paper->deviation * row.paper->deviation / kPaperSeeds +
-                                   row.ours.deviation * row.ours.deviation / row.ours.seeds);
-    if (std::abs(*row.ours.mean - row.paper->value) <= 2 * error) return "within the seeds' spread";
+const char* NameOf(Mark mark) {
+  switch (mark) {
+    case Mark::kExact: return "exact";
+    case Mark::kFitted: return "fitted";
+    case Mark::kOurs: return "ours";
+    case Mark::kNotGiven: break;
   }
-  return row.reason.empty() ? "scenario bounds are ours" : row.reason;
+  return "not given";
+}
+
+const char* NameOf(Word word) {
+  switch (word) {
+    case Word::kSame: return "same";
+    case Word::kNear: return "near";
+    case Word::kOff: return "off";
+    case Word::kNone: break;
+  }
+  return "";
+}
+
+Reference::Reference(Mark mark, std::optional<PaperValue> value)
+    : mark_(value ? mark : Mark::kNotGiven), value_(std::move(value)) {
+  if (value_ && mark == Mark::kNotGiven)
+    throw std::invalid_argument("paper: " + std::string(value_->key) + " is given, but marked as not given");
+}
+
+Word WordOf(const Row& row) {
+  const std::optional<PaperValue>& paper = row.paper.value();
+  if (!paper) return Word::kNone;
+  if (!row.ours.mean) return Word::kOff;
+  if (Fixed(*row.ours.mean, paper->decimals) == Fixed(paper->value, paper->decimals)) return Word::kSame;
+  const std::optional<double> error = StandardError(row);
+  return error && std::abs(*row.ours.mean - paper->value) <= 2 * *error ? Word::kNear : Word::kOff;
+}
+
+std::string ReasonOf(const Row& row) {
+  if (WordOf(row) != Word::kOff) return "";
+  if (!row.reason.empty()) return row.reason;
+  return row.ours.mean ? "scenario bounds are ours" : "no plan to measure it on";
+}
+
+JointTest TestJointly(const Table& table) {
+  JointTest test;
+  for (const Row& row : table.rows) {
+    if (!row.paper.value() || !row.ours.mean) continue;
+    const double difference = *row.ours.mean - row.paper.value()->value;
+    if (WordOf(row) != Word::kSame) ++(difference < 0 ? test.below : test.above);
+    const double error = StandardError(row).value_or(0);
+    if (error == 0) continue;
+    ++test.rows;
+    test.chi_square += difference * difference / (error * error);
+  }
+  test.p = ChiSquareTail(test.chi_square, test.rows);
+  test.p_of_signs = SignTest(test.below, test.above);
+  return test;
 }
 
 std::string ToMarkdown(const Table& table) {
   std::string text = "## " + table.title + "\n" + table.about + "\n\n";
-  text += "| | paper | from | ours | difference | where they differ |\n|---|---|---|---|---|---|\n";
-  for (const Row& row : table.rows)
-    text += "| " + row.what + " | " + Papers(row) + " | " + std::string(row.paper ? row.paper->where : "") + " | " +
-            Ours(row) + " | " + Difference(row) + " | " + Verdict(row) + " |\n";
+  text += "| | mark | paper | from | ours | difference | word | why |\n|---|---|---|---|---|---|---|---|\n";
+  bool compares = false;
+  for (const Row& row : table.rows) {
+    const std::optional<PaperValue>& paper = row.paper.value();
+    compares |= paper.has_value();
+    text += "| " + row.what + " | " + NameOf(row.paper.mark()) + " | " + Papers(row) + " | " +
+            std::string(paper ? paper->where : "") + " | " + Ours(row) + " | " + Difference(row) + " | " +
+            NameOf(WordOf(row)) + " | " + ReasonOf(row) + " |\n";
+  }
+  return compares ? text + "\n" + InWords(TestJointly(table)) + "\n" : text;
+}
+
+std::string CountInMarkdown(const std::vector<Table>& tables) {
+  std::string text = "| rows | same | near | off | all |\n|---|---|---|---|---|\n";
+  for (const Mark mark : kMarks) {
+    std::map<Word, int> count;
+    int all = 0;
+    for (const Table& table : tables)
+      for (const Row& row : table.rows)
+        if (row.paper.mark() == mark) ++count[WordOf(row)], ++all;
+    text.append("| ").append(NameOf(mark)).append(" |");
+    for (const Word word : {Word::kSame, Word::kNear, Word::kOff})
+      text.append(mark == Mark::kNotGiven ? "" : ' ' + std::to_string(count[word])).append(" |");
+    text.append(1, ' ').append(std::to_string(all)).append(" |\n");
+  }
   return text;
 }
 
 std::string ToCsv(const std::vector<Table>& tables) {
-  std::string text = "table,what,paper,ours,deviation,difference,word\n";
+  std::string text = "table,what,mark,paper,ours,deviation,low,high,difference,word,why\n";
   for (const Table& table : tables)
     for (const Row& row : table.rows) {
+      const std::optional<PaperValue>& paper = row.paper.value();
       const int decimals = std::max(DecimalsOf(row), 6);
-      text += Quoted(table.title) + "," + Quoted(row.what) + "," +
-              (row.paper ? Fixed(row.paper->value, row.paper->decimals) : "") + "," +
+      const std::optional<Range> range = StudentRange(row.ours.mean.value_or(0), row.ours.deviation, row.ours.seeds);
+      text += Quoted(table.title) + "," + Quoted(row.what) + "," + NameOf(row.paper.mark()) + "," +
+              (paper ? Fixed(paper->value, paper->decimals) : "") + "," +
               (row.ours.mean ? Fixed(*row.ours.mean, decimals) : "") + "," +
-              (row.ours.seeds > 1 ? Fixed(row.ours.deviation, decimals) : "") + "," + Difference(row) + "," +
-              Quoted(Verdict(row)) + "\n";
+              (row.ours.seeds > 1 ? Fixed(row.ours.deviation, decimals) : "") + "," +
+              (range ? Fixed(range->low, decimals) : "") + "," + (range ? Fixed(range->high, decimals) : "") + "," +
+              Difference(row) + "," + NameOf(WordOf(row)) + "," + Quoted(ReasonOf(row)) + "\n";
     }
   return text;
 }

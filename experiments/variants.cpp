@@ -1,9 +1,13 @@
 #include "experiments/variants.h"
 #include "experiments/equations_slopes.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "certifier/declare/slope_bound.h"
@@ -17,8 +21,8 @@
 namespace forereach::experiments {
 namespace {
 
-// The nominal model with one more parameter: its known part.
-template <class Equations>
+// The nominal model with one more parameter: its known part, or that of the motion.
+template <class Equations, bool kOfMotion>
 struct Partly {
   static constexpr int kStates = Equations::kStates, kInputs = Equations::kInputs;
   static constexpr std::size_t kOwn = Equations::kParameterNames.size();
@@ -37,18 +41,27 @@ struct Partly {
   template <class T>
   static constexpr void Step(std::span<const T> parameters, std::span<const T> z, std::span<T> next) {
     Equations::template Step<T>(parameters, z, next);
-    for (std::size_t k = 0; k < next.size(); ++k) next[k] = parameters[kOwn] * next[k];
+    for (std::size_t k = 0; k < next.size(); ++k)
+      next[k] = kOfMotion ? z[k] + parameters[kOwn] * (next[k] - z[k]) : parameters[kOwn] * next[k];
   }
 
   [[nodiscard]] std::array<double, kOwn + 1> parameters() const { return values; }
 };
 
-template <class Equations>
+template <class Equations, bool kOfMotion>
 std::shared_ptr<const NominalModel> MakePartly(const NominalModel& whole, double known) {
-  Partly<Equations> equations{};
+  using Degraded = Partly<Equations, kOfMotion>;
+  Degraded equations{};
   std::ranges::copy(whole.parameters(), equations.values.begin());
   equations.values.back() = known;
-  return std::make_shared<EquationsModel<Partly<Equations>>>(equations);
+  return std::make_shared<EquationsModel<Degraded>>(equations);
+}
+
+template <bool kOfMotion>
+std::shared_ptr<const NominalModel> MakePartly(const System& system, double known) {
+  return system.num_states() == KinematicBicycle::kStates
+             ? MakePartly<KinematicBicycle, kOfMotion>(*system.model, known)
+             : MakePartly<PointMass, kOfMotion>(*system.model, known);
 }
 
 // Entries of L lie above the true slopes by this part of them, so that rounding makes no declaration false.
@@ -61,17 +74,29 @@ const Eigen::MatrixXd& LargestSlopesOnce(const System& system) {
   return at->second;
 }
 
-System MakeDegraded(const System& system, double part) {
+// sup |D(f0 - x)|: the diagonal of D f0 is one, everywhere and in both models.
+Eigen::MatrixXd LargestSlopesOfMotion(const System& system) {
+  Eigen::MatrixXd slopes = LargestSlopesOnce(system);
+  for (Eigen::Index k = 0; k < slopes.rows(); ++k)
+    if (std::exchange(slopes(k, k), 0) != 1) throw std::logic_error("the motion's slopes are not known");
+  return slopes;
+}
+
+System MakeDegraded(const System& system, double part, Lacking what) {
+  static constexpr const char* kNames[] = {"_without_", "_unmoved_by_", "_declared_without_", "_declared_unmoved_by_"};
   const double known = 1 - part, lacking = 1 - known;
+  const bool of_motion = what == Lacking::kMotion || what == Lacking::kDeclarationOfMotion;
   System degraded = system;
-  degraded.name += "_without_" + ToText(100 * part) + "_percent";
-  degraded.model = &system == &BicycleSystem() ? MakePartly<KinematicBicycle>(*system.model, known)
-                                               : MakePartly<PointMass>(*system.model, known);
-  degraded.deployed = (1 + kSlack) * (system.deployed + lacking * LargestSlopesOnce(system));
-  degraded.step = [whole = system.step, lacking](std::span<const double> z, std::span<double> residual,
-                                                 std::span<double> next) {
+  degraded.name += kNames[static_cast<std::size_t>(what)] + ToText(100 * part) + "_percent";
+  const Eigen::MatrixXd slopes = of_motion ? LargestSlopesOfMotion(system) : LargestSlopesOnce(system);
+  degraded.deployed = (1 + kSlack) * (system.deployed + lacking * slopes);
+  if (what == Lacking::kDeclaration || what == Lacking::kDeclarationOfMotion) return degraded;
+  degraded.model = of_motion ? MakePartly<true>(system, known) : MakePartly<false>(system, known);
+  degraded.step = [whole = system.step, lacking, of_motion](std::span<const double> z, std::span<double> residual,
+                                                            std::span<double> next) {
     whole(z, residual, next);
-    for (std::size_t k = 0; k < next.size(); ++k) residual[k] += lacking * (next[k] - residual[k]);
+    for (std::size_t k = 0; k < next.size(); ++k)
+      residual[k] += lacking * (next[k] - residual[k] - (of_motion ? z[k] : 0));
   };
   return degraded;
 }
@@ -175,10 +200,20 @@ System MakeEscaping(double lambda) {
 
 }  // namespace
 
-const System& Degraded(const System& system, double part) {
-  static std::map<std::pair<const System*, double>, System> known;
-  const auto [at, is_new] = known.try_emplace({&system, part});
-  if (is_new) at->second = MakeDegraded(system, part);
+const System& WithFewerPlans(const System& system, int scenarios) {
+  static std::map<std::pair<const System*, int>, System> known;
+  const auto [at, is_new] = known.try_emplace({&system, scenarios}, system);
+  if (is_new) {
+    at->second.name += "_" + std::to_string(scenarios) + "_plans";
+    at->second.scenarios = std::min(system.scenarios, scenarios);
+  }
+  return at->second;
+}
+
+const System& Degraded(const System& system, double part, Lacking lacking) {
+  static std::map<std::tuple<const System*, double, Lacking>, System> known;
+  const auto [at, is_new] = known.try_emplace({&system, part, lacking});
+  if (is_new) at->second = MakeDegraded(system, part, lacking);
   return at->second;
 }
 

@@ -5,12 +5,18 @@
 
 namespace forereach::experiments {
 
+/** `system` with at most so many plans a group and seed, the first. Made once for each count; not for several threads
+at once. */
+[[nodiscard]] const System& WithFewerPlans(const System& system, int scenarios);
+
 /** `system` with a nominal model that knows only a part of the dynamics,  f0_d = (1 - d) f0,  of the same target. What
 the model lacks is residual, r_d = r + d f0, and the declaration is as much larger, L_d = L + d sup |D f0|. So d = 0 is
 the paper's model, and d = 1 none at all, where L_d is L_f of the norm ratios. "Nominal degradation" is not defined in
-the paper; this path between its two ends is ours. Made once for each d; not for several threads at once. @pre 0 <= d <
-1 */
-[[nodiscard]] const System& Degraded(const System& system, double part);
+the paper; this path between its two ends is ours. The others: a model that moves the state by a part of what it
+should, f0_d = x + (1 - d)(f0 - x), with L_d = L + d sup |D(f0 - x)|; and f0 itself, with the L_d of the one or the
+other. Made once for each; not for several threads at once. @pre 0 <= d < 1 */
+enum class Lacking { kModel, kMotion, kDeclaration, kDeclarationOfMotion };
+[[nodiscard]] const System& Degraded(const System& system, double part, Lacking lacking = Lacking::kModel);
 
 /** The point mass of the affine control example: the target's residual is affine, drag and sideways force
 a = 0.15 M v in place of the knee, and declared exactly; the paper gives no figure for it. The knee's target has the

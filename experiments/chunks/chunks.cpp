@@ -71,13 +71,13 @@ Table OutcomeTable(const Scope& scope, const Results& results, double noise) {
     for (const int observations : scope.SizesOf(ChunkSystem())) {
       const std::string n = std::to_string(observations), where = Words(layout) + ", N = " + n + ": ";
       const std::string key = std::string("chunks.") + NameOf(layout) + ".";
-      const auto row = [&](const char* what, std::optional<PaperValue> paper, Statistic statistic) {
+      const auto row = [&](const char* what, const Reference& paper, Statistic statistic) {
         const Cell cell = ChunkCell(layout, observations, noise);
         table.rows.push_back({where + what, paper, OverSeedsAndGroups(scope, results, cell, statistic), 3, kWhy});
       };
-      row("certificate rate", Paper(key + "rate." + n), CertificateRate);
-      row("recall", Paper(key + "recall." + n), Recall);
-      row("coverage", Paper("chunks.coverage"), Coverage);
+      row("certificate rate", {Mark::kOurs, Paper(key + "rate." + n)}, CertificateRate);
+      row("recall", {Mark::kOurs, Paper(key + "recall." + n)}, Recall);
+      row("coverage", {Mark::kOurs, Paper("chunks.coverage")}, Coverage);
       row("D", {}, DomainRate);
       row("S", {}, SafetyRate);
     }
@@ -117,7 +117,7 @@ Table SupportTable(const Scope& scope, const Results& results) {
       {}};
   for (const Layout layout : kLayouts) {
     const auto paper = [&](const char* key) {
-      return layout == Layout::kFixedGrid ? std::optional(Paper(key)) : std::nullopt;
+      return layout == Layout::kFixedGrid ? Reference(Mark::kOurs, Paper(key)) : Reference();
     };
     const std::vector<SupportRecord> records = RecordsOf(CellsOf(scope, layout, 0), results);
     const SupportStatistic support = SupportOf(records);
@@ -148,10 +148,14 @@ Table SoundnessTable(const Scope& scope, const Results& results) {
     }
   return {"Action chunks, soundness",
           "Both layouts and channels, every N and seed.",
-          {{"cells", Paper("chunks.cells"), Exactly(double(cells.size())), 0, "this run has fewer"},
-           {"complete tubes that do not contain every rollout", Paper("chunks.uncovered"), Exactly(uncovered), 0, ""},
+          {{"cells", {Mark::kExact, Paper("chunks.cells")}, Exactly(double(cells.size())), 0, "this run has fewer"},
+           {"complete tubes that do not contain every rollout",
+            {Mark::kOurs, Paper("chunks.uncovered")},
+            Exactly(uncovered),
+            0,
+            ""},
            {"of these, membership undecided", {}, Exactly(undecided), 0, ""},
-           {"false certificates", Paper("false_certificates"), Exactly(wrong), 0, ""}}};
+           {"false certificates", {Mark::kOurs, Paper("chunks.false_certificates")}, Exactly(wrong), 0, ""}}};
 }
 
 // The part of all plans that abstains first at a step.
@@ -186,6 +190,33 @@ Table StepTable(const Scope& scope, const Results& results) {
   return table;
 }
 
+std::vector<Plot> Plots(const Scope& scope, const Results& results) {
+  Plot plot{
+      "chunk-steps",
+      "The step at which a block of the learned policy first abstains, noiseless, N = 400, as a part of all blocks "
+      "of groups A to C; mean over the seeds.",
+      900, 400,
+      "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
+      "set style fill solid 0.9 noborder\nset yrange [0:0.35]\nset xlabel 'step'\n"
+      "set ylabel 'part of the blocks'\nset key top left\n"};
+  std::string data;
+  for (const Layout layout : kLayouts) {
+    std::string lines;
+    for (std::size_t t = 0; t <= kBlockSteps; ++t) {
+      const auto part = [&](bool is_domain) {
+        return *PartAt(scope, results, ChunkCell(layout, ChunkSystem().sample_sizes.back(), 0), is_domain, t).mean;
+      };
+      lines += DataLine({static_cast<double>(t), part(true), part(false)});
+    }
+    data += DataBlock(NameOf(layout), lines);
+    plot.script += "set title '" + Words(layout) + "'\nplot $" + NameOf(layout) +
+                   " using 2:xtic(1) lc rgb blue title 'leaves the domain (D)', "
+                   "'' using 3 lc rgb orange title 'may touch the obstacle (S)'\n";
+  }
+  plot.script = data + plot.script + "unset multiplot\n";
+  return {plot};
+}
+
 std::vector<Table> Tables(const Scope& scope, const Results& results) {
   return {OutcomeTable(scope, results, 0), OutcomeTable(scope, results, ChunkSystem().noise_scale),
           GroupTable(scope, results),      SupportTable(scope, results),
@@ -195,7 +226,7 @@ std::vector<Table> Tables(const Scope& scope, const Results& results) {
 }  // namespace
 
 Experiment ActionChunks() {
-  return {"chunks", "plans of a learned policy: outcomes by layout and N, distance to the data", Cells, Tables};
+  return {"chunks", "plans of a learned policy: outcomes by layout and N, distance to the data", Cells, Tables, Plots};
 }
 
 }  // namespace forereach::experiments

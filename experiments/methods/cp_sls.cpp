@@ -40,9 +40,8 @@ double TotalVariation(std::vector<double> a, std::vector<double> b) {
   return sum / 2;
 }
 
-template <Covariance kCovariance>
-std::unique_ptr<ResidualEnclosure> Make(const Setting& setting) {
-  return std::make_unique<CpSls>(setting, CpSlsOptions{.covariance = kCovariance});
+Method MethodOf(const std::string& name, const CpSlsOptions& options) {
+  return {name, [options](const Setting& setting) { return std::make_unique<CpSls>(setting, options); }};
 }
 
 }  // namespace
@@ -55,12 +54,17 @@ CpSls::CpSls(const Setting& setting, const CpSlsOptions& options) : options_(opt
   residuals_ = ObservedResiduals(observations);
   recording_ = RecordingError(observations);
   const std::vector<Interval> ranges = setting.domain.Ranges();
-  reach_.resize(static_cast<Eigen::Index>(ranges.size()));
-  for (Eigen::Index l = 0; l < reach_.size(); ++l) {
-    const Interval& range = ranges[static_cast<std::size_t>(l)];
-    reach_[l] = range.upper > range.lower ? (range.upper - range.lower) / 2 : 1;
+  if (options.active_only) measured_ = ActiveCoordinates(setting.declaration);
+  if (!options.active_only || measured_.empty()) {
+    measured_.resize(ranges.size());
+    std::iota(measured_.begin(), measured_.end(), 0);
   }
-  locations_ = observations.z * reach_.cwiseInverse().asDiagonal();
+  reach_.resize(static_cast<Eigen::Index>(measured_.size()));
+  for (Eigen::Index a = 0; a < reach_.size(); ++a) {
+    const Interval& range = ranges[static_cast<std::size_t>(measured_[static_cast<std::size_t>(a)])];
+    reach_[a] = range.upper > range.lower ? (range.upper - range.lower) / 2 : 1;
+  }
+  locations_ = observations.z(Eigen::all, measured_) * reach_.cwiseInverse().asDiagonal();
   scores_.resize(residuals_.rows());
   for (Eigen::Index i = 0; i < scores_.size(); ++i) {
     const Eigen::VectorXd residual = residuals_.row(i);
@@ -101,8 +105,12 @@ double CpSls::EstimateDriftRate() const {
     const double distance =
         (locations_(low, Eigen::all).colwise().mean() - locations_(high, Eigen::all).colwise().mean()).norm();
     const Eigen::VectorXd below = scores_(low), above = scores_(high);
-    if (distance > 0)
-      rate = std::max(rate, TotalVariation({below.begin(), below.end()}, {above.begin(), above.end()}) / distance);
+    if (!(distance > 0)) continue;
+    const double ratio = TotalVariation({below.begin(), below.end()}, {above.begin(), above.end()}) / distance;
+    if (!options_.least_rate || rate == 0)
+      rate = std::max(rate, ratio);
+    else if (ratio > 0)
+      rate = std::min(rate, ratio);
   }
   return rate;
 }
@@ -145,20 +153,33 @@ CpSlsBudget CpSls::Budget(const QuerySet& query) const {
   budget.alpha = options_.miscoverage / options_.horizon;
   budget.starved = mass < StarvationFloor(options_.miscoverage, options_.horizon);
   const Eigen::VectorXd distances = (locations_.rowwise() - scaled.transpose()).rowwise().norm();
-  for (Eigen::Index i = 0; i < weights.size(); ++i)
-    budget.drift += 2 * weights[i] / (1 + mass) * std::min(1.0, drift_rate_ * distances[i]);
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    const double variation = drift_rate_ * distances[i];
+    budget.drift += 2 * weights[i] / (1 + mass) * std::min(1.0, variation);
+    if (variation >= 1) budget.at_cap += weights[i] / mass;
+  }
   double longest = 0;
-  for (int k = 0; k < query.slice.dim(); ++k)
-    longest = std::max(longest, 2 * query.half_width[static_cast<std::size_t>(k)] / reach_[k]);
+  for (std::size_t a = 0; a < measured_.size(); ++a) {
+    const int l = measured_[a];
+    if (l < query.slice.dim())
+      longest =
+          std::max(longest, 2 * query.half_width[static_cast<std::size_t>(l)] / reach_[static_cast<Eigen::Index>(a)]);
+  }
   budget.tube = 2 * drift_rate_ * longest;
   return budget;
 }
 
 std::span<const Method> CpSlsMethods() {
-  static const std::array<Method, 4> methods{{{"CP-SLS-MPC equations", Make<Covariance::kLocal>},
-                                              {"CP-SLS-MPC, local diagonal", Make<Covariance::kLocalDiagonal>},
-                                              {"CP-SLS-MPC, global", Make<Covariance::kGlobal>},
-                                              {"CP-SLS-MPC, global diagonal", Make<Covariance::kGlobalDiagonal>}}};
+  static const std::array methods{MethodOf("CP-SLS-MPC equations", {}),
+                                  MethodOf("CP-SLS-MPC, local diagonal", {.covariance = Covariance::kLocalDiagonal}),
+                                  MethodOf("CP-SLS-MPC, global", {.covariance = Covariance::kGlobal}),
+                                  MethodOf("CP-SLS-MPC, global diagonal", {.covariance = Covariance::kGlobalDiagonal})};
+  return methods;
+}
+
+std::span<const Method> CpSlsVariants() {
+  static const std::array methods{MethodOf("CP-SLS-MPC, least rate", {.least_rate = true}),
+                                  MethodOf("CP-SLS-MPC, active coordinates", {.active_only = true})};
   return methods;
 }
 

@@ -4,17 +4,21 @@ hold, Pr[all eps_k in E_k] >= 1 - sum_k sigma_k, sigma_k = alpha_k + 2 sum_i w~_
 alpha_k = alpha / T, w~_i = w_i / (1 + sum_j w_j),   d_TV(S^i, S^k) <= eps^ |z_k - z_i|_2. From the paper: these
 equations, alpha = 0.10 and T = 12, hence alpha_k = 1/120 and the starvation floor 1/alpha_k - 1 = 119: a query with
 less weight than that has no finite radius. What it leaves to its code is ours:
-- distances are in half-widths of the domain: d(z, z')_l = (z_l - z'_l) / R_l;
+- distances are in half-widths of the domain: d(z, z')_l = (z_l - z'_l) / R_l, over all coordinates or over those alone
+  that the residual may depend on;
 - weights w_i = exp(-|d|^2 / (2 d_z)), one bandwidth unit for the mean square of the coordinates;
 - scores s_i = (r~_i^T C(z_i)^-1 r~_i)^(1/2), so E(z) = {e : e^T C(z)^-1 e <= q^2}, and its hull +- q C_kk(z)^(1/2);
 - C is one of four plug-ins, each with 1e-6 of its mean variance added to its diagonal;
-- eps^ is the largest ratio over coordinates l of: the total variation between the scores of the observations below and
-  above the median of z_l, by histograms of equal shares, to the distance of the two halves' means;
-- M(R_k) is the longest side of the hull of X_k, in the same units. d_TV is at most 1, and taken so. */
+- eps^ is the largest or the least ratio over coordinates l of: the total variation between the scores of the
+observations below and above the median of z_l, by histograms of equal shares, to the distance of the two halves' means;
+- M(R_k) is the longest side of the hull of X_k, in the same units. d_TV is at most 1, and taken so.
+With the first of each choice nearly every d_TV is at that cap, so the drift is 2 T mass / (1 + mass) whatever eps^ is.
+*/
 #pragma once
 
 #include <limits>
 #include <memory>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -34,6 +38,8 @@ struct CpSlsOptions {
   Covariance covariance = Covariance::kLocal;
   double miscoverage = 0.10;  ///< alpha, in (0, 1)
   int horizon = 12;           ///< T, at least 1
+  bool active_only = false;   ///< Distances over the coordinates that L names
+  bool least_rate = false;    ///< eps^ is the least of the ratios that are not zero
 };
 
 /** T / alpha - 1: the least weight with which a radius is finite. */
@@ -42,6 +48,7 @@ struct CpSlsOptions {
 /** sigma_k of one step, or the sum of several. */
 struct CpSlsBudget {
   double alpha = 0, drift = 0, tube = 0;
+  double at_cap = 0;     ///< Part of the weights whose d_TV is 1; of a sum, their sum
   double mass = 0;       ///< sum_i w_i at the center; of a sum, the last step's
   bool starved = false;  ///< A step had no finite radius.
 
@@ -55,6 +62,7 @@ struct CpSlsBudget {
     alpha += step.alpha;
     drift += step.drift;
     tube += step.tube;
+    at_cap += step.at_cap;
     mass = step.mass;
     starved |= step.starved;
     return *this;
@@ -83,13 +91,15 @@ class CpSls final : public ResidualEnclosure {
   [[nodiscard]] double drift_rate() const { return drift_rate_; }
 
  private:
-  [[nodiscard]] Eigen::VectorXd Scaled(const Eigen::VectorXd& z) const { return z.cwiseQuotient(reach_); }
+  /** The coordinates that count, in half-widths. */
+  [[nodiscard]] Eigen::VectorXd Scaled(const Eigen::VectorXd& z) const { return z(measured_).cwiseQuotient(reach_); }
   /** w_i at a scaled location. */
   [[nodiscard]] Eigen::VectorXd Weights(const Eigen::VectorXd& scaled) const;
   [[nodiscard]] Eigen::MatrixXd CovarianceAt(const Eigen::VectorXd& weights) const;
   [[nodiscard]] double EstimateDriftRate() const;
 
   CpSlsOptions options_;
+  std::vector<int> measured_;
   Eigen::VectorXd reach_, recording_;
   Eigen::MatrixXd locations_;  // scaled, N-by-d_z
   Eigen::MatrixXd residuals_;
@@ -99,5 +109,7 @@ class CpSls final : public ResidualEnclosure {
 
 /** All four plug-ins, the local one first, which is the one among Methods(). */
 [[nodiscard]] std::span<const Method> CpSlsMethods();
+/** The local plug-in with the other choices of distance and drift rate. */
+[[nodiscard]] std::span<const Method> CpSlsVariants();
 
 }  // namespace forereach::experiments

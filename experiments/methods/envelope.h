@@ -14,6 +14,10 @@ Claims: contains r_k(z) for every z of the query, if the declaration holds. Soun
 /** ForeReach under another declaration than the setting's. */
 [[nodiscard]] std::unique_ptr<ResidualEnclosure> MakeForeReach(const Setting& setting, const Declaration& declaration);
 
+/** ForeReach with every bound `part` times as wide about its middle: what a wrong envelope would be. Sound at best for
+part >= 1. */
+[[nodiscard]] std::unique_ptr<ResidualEnclosure> MakeScaledForeReach(const Setting& setting, double part);
+
 /** The scalar-envelope ablation: L_kl is replaced by lambda = max_kl L_kl for every k and l, the one number for which
 |r_k(z) - r_k(z')| <= lambda |z - z'|_1 follows from the declaration for all k. The paper says only that the bound is
 "collapsed to a single scalar"; the 1-norm is ours, the one its declaration is written in.

@@ -133,8 +133,8 @@ GaussianProcess FitGaussianProcess(const Eigen::MatrixXd& inputs, const Eigen::V
   return {inputs, outputs, found.get()};
 }
 
-GaussianProcessBand::GaussianProcessBand(const Setting& setting, double deviations)
-    : deviations_(deviations), active_(ActiveCoordinates(setting.declaration)) {
+GaussianProcessBand::GaussianProcessBand(const Setting& setting, double deviations, bool corners)
+    : deviations_(deviations), corners_(corners), active_(ActiveCoordinates(setting.declaration)) {
   if (active_.size() > kMostCorners)
     throw std::invalid_argument("Gaussian process: " + std::to_string(active_.size()) +
                                 " coordinates, must be at most " + std::to_string(kMostCorners));
@@ -161,7 +161,7 @@ GaussianProcessBand::GaussianProcessBand(const Setting& setting, double deviatio
 
 void GaussianProcessBand::Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept {
   const auto a = static_cast<Eigen::Index>(active_.size());
-  const unsigned corners = 1U << a;
+  const unsigned corners = corners_ ? 1U << a : 0;
   Eigen::MatrixXd points(a, corners + 1);  // the center last
   for (Eigen::Index l = 0; l < a; ++l) {
     const Interval hull = HullOf(query, active_[static_cast<std::size_t>(l)]);
@@ -186,11 +186,11 @@ void GaussianProcessBand::Enclose(const QuerySet& query, ResidualBounds& bounds)
 }
 
 std::unique_ptr<ResidualEnclosure> MakeGaussianProcess2(const Setting& setting) {
-  return std::make_unique<GaussianProcessBand>(setting, 2);
+  return std::make_unique<GaussianProcessBand>(setting, 2, true);
 }
 
 std::unique_ptr<ResidualEnclosure> MakeGaussianProcess3(const Setting& setting) {
-  return std::make_unique<GaussianProcessBand>(setting, 3);
+  return std::make_unique<GaussianProcessBand>(setting, 3, true);
 }
 
 }  // namespace forereach::experiments

@@ -7,7 +7,7 @@ The paper gives only k = 2 and k = 3. The other settings are textbook defaults:
 - hyperparameters that maximise the log marginal likelihood, Eq. (5.8), by its gradient, Eq. (5.9), with 100 steps of
   Rprop (Blum & Riedmiller 2013) from unit length-scales, unit signal and noise 0.1; the noise stays above 1e-3, which
   is what keeps the matrix well conditioned on noiseless data;
-- the band is that of the latent function, at the center and the corners of the hull of Z.
+- the band is that of the latent function, at the center of the hull of Z and, if asked, at its corners.
 A coordinate that L declares constant has the hull of its observations. */
 #pragma once
 
@@ -70,8 +70,9 @@ probability of k standard deviations. Not sound: neither prior nor fit is justif
 points of Z that are looked at all of it. */
 class GaussianProcessBand final : public ResidualEnclosure {
  public:
-  /** @throws std::invalid_argument if L names more than 10 coordinates. */
-  GaussianProcessBand(const Setting& setting, double deviations);
+  /** @param corners whether a query is looked at in the corners of its hull, too, or at its center alone.
+  @throws std::invalid_argument if L names more than 10 coordinates. */
+  GaussianProcessBand(const Setting& setting, double deviations, bool corners);
 
   void Enclose(const QuerySet& query, ResidualBounds& bounds) const noexcept override;
 
@@ -83,6 +84,7 @@ class GaussianProcessBand final : public ResidualEnclosure {
   };
 
   double deviations_;
+  bool corners_;
   std::vector<int> active_;
   Eigen::VectorXd input_mean_, input_scale_;
   std::vector<Row> rows_;

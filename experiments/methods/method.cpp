@@ -12,10 +12,11 @@
 namespace forereach::experiments {
 
 std::span<const Method> Methods() {
-  static const std::array<Method, 9> methods{{{"ForeReach", MakeForeReach},
-                                              {"Global calibration", MakeGlobalCalibration},
+  using Make = std::unique_ptr<ResidualEnclosure> (*)(const Setting&);
+  static const std::array<Method, 9> methods{{{"ForeReach", static_cast<Make>(MakeForeReach)},
+                                              {"Global calibration", static_cast<Make>(MakeGlobalCalibration)},
                                               {"Regional calibration", MakeRegionalCalibration},
-                                              {"Plug-in Gaussian", MakePlugInGaussian},
+                                              {"Plug-in Gaussian", static_cast<Make>(MakePlugInGaussian)},
                                               {"GP (k=2)", MakeGaussianProcess2},
                                               {"GP (k=3)", MakeGaussianProcess3},
                                               {"Alanwar Alg. 6", MakeAlanwar},

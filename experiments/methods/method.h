@@ -6,6 +6,7 @@ how a remainder is bounded.) */
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -30,7 +31,7 @@ struct Setting {
 /** A peer of the envelope: residual bounds over a query set in, tube out (by the same Propagator). */
 struct Method {
   std::string name;  // as in the paper's tables
-  std::unique_ptr<ResidualEnclosure> (*make)(const Setting&);
+  std::function<std::unique_ptr<ResidualEnclosure>(const Setting&)> make;
 };
 
 /** All of them, ForeReach first, in the order of the paper's tables. */

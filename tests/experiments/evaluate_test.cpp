@@ -7,6 +7,7 @@
 
 #include "certifier/certify/certifier.h"
 #include "experiments/cell.h"
+#include "experiments/methods/envelope.h"
 
 namespace forereach::experiments {
 namespace {
@@ -124,6 +125,65 @@ TEST(Cover, AnEnvelopeThatIsLeftMayStillLeadToATubeThatIsNot) {
   }
   EXPECT_EQ(residuals, 20);
   EXPECT_GT(inside, 10);
+}
+
+int CountOf(Membership wanted, const Answer& answer, const Rollouts& rollouts) {
+  int count = 0;
+  for (int i = 0; i < rollouts.count(); ++i) count += LocateRollout(answer, rollouts, i) == wanted;
+  return count;
+}
+
+TEST(LocateRollout, FindsEachRolloutInAValidTubeAndLeavesNoneOpen) {
+  for (const System* system : Systems()) {
+    const Deployed deployed{*system};
+    const Evaluator evaluator(*system, *deployed.envelope, 5);
+    Answer answer;
+    for (const Group group : kGroups)
+      for (int i = 0; i < 3; ++i) {
+        const Scenario s = MakeScenario(*system, group, 0, i);
+        evaluator.Certify(s, answer);
+        EXPECT_EQ(CountOf(Membership::kInside, answer, Rollouts(*system, s, 80)), 80)
+            << system->name << NameOf(group) << i;
+      }
+  }
+}
+
+TEST(LocateRollout, CatchesANarrowedTubeThatTheEnvelopesDoNotShow) {
+  // X0 of half the width, so every later slice is too narrow; the residuals still lie in the recorded envelopes, and
+  // the theorem, whose premise does not hold, would have every rollout inside.
+  for (const System* system : Systems()) {
+    const Deployed deployed{*system};
+    System narrowed = *system;
+    narrowed.initial_half_width /= 2;
+    const Evaluator evaluator(narrowed, *deployed.envelope, 5);
+    Answer answer;
+    int trusted = 0, caught = 0;
+    for (int i = 0; i < 10; ++i) {
+      const Scenario s = MakeScenario(*system, Group::kC, 0, i);
+      const Rollouts rollouts(*system, s, 80);
+      evaluator.Certify(s, answer);
+      trusted += Cover(answer, rollouts) == Membership::kInside;
+      caught += CountOf(Membership::kOutside, answer, rollouts) > 0;
+    }
+    EXPECT_GT(trusted, 0) << system->name;
+    EXPECT_EQ(caught, 10) << system->name;
+  }
+}
+
+TEST(LocateRollout, CatchesANarrowedEnvelope) {
+  const System& system = PointMassSystem();
+  const Deployed deployed{system};
+  const auto narrowed =
+      MakeScaledForeReach({*system.model, system.domain, deployed.declaration, deployed.data, 0}, 0.1);
+  const Evaluator evaluator(system, *narrowed, 5);
+  Answer answer;
+  int caught = 0;
+  for (int i = 0; i < 10; ++i) {
+    const Scenario s = MakeScenario(system, Group::kB, 0, i);
+    evaluator.Certify(s, answer);
+    caught += CountOf(Membership::kOutside, answer, Rollouts(system, s, 80)) > 0;
+  }
+  EXPECT_GE(caught, 5);
 }
 
 TEST(Evaluator, LeavesTheDomainWhereTheResidualMayTakeItThere) {

@@ -46,6 +46,37 @@ void ExpectDeclared(const System& system, int seed) {
   }
 }
 
+TEST(Degraded, OfAnyReadingDeclaresTheSlopesOfItsResidual) {
+  for (const System* system : Systems())
+    for (const Lacking lacking :
+         {Lacking::kModel, Lacking::kMotion, Lacking::kDeclaration, Lacking::kDeclarationOfMotion}) {
+      const System& degraded = Degraded(*system, 0.3, lacking);
+      ExpectDeclared(degraded, 3);
+      const bool is_whole = lacking == Lacking::kDeclaration || lacking == Lacking::kDeclarationOfMotion;
+      EXPECT_EQ(degraded.model == system->model, is_whole) << degraded.name;
+      // Of the motion nothing lacks that the state keeps by itself.
+      const bool of_motion = lacking == Lacking::kMotion || lacking == Lacking::kDeclarationOfMotion;
+      EXPECT_EQ(degraded.deployed(0, 0) > 0.2, !of_motion) << degraded.name;
+    }
+}
+
+TEST(Degraded, OfMotionMovesByAPart) {
+  const System& half = Degraded(PointMassSystem(), 0.5, Lacking::kMotion);
+  std::vector<double> next(4);
+  half.model->Evaluate(std::vector<double>{1, 2, 3, -4, 0, 0}, next);
+  EXPECT_NEAR(next[0], 1 + 0.5 * 0.15 * 3, 1e-12);
+  EXPECT_NEAR(next[1], 2 - 0.5 * 0.15 * 4, 1e-12);
+  EXPECT_NEAR(next[2], 3, 1e-12);
+}
+
+TEST(WithFewerPlans, KeepsTheFirstPlans) {
+  const System& few = WithFewerPlans(BicycleSystem(), 40);
+  EXPECT_EQ(few.scenarios, 40);
+  EXPECT_NE(few.name, BicycleSystem().name);
+  EXPECT_EQ(MakeScenario(few, Group::kC, 1, 7).center, MakeScenario(BicycleSystem(), Group::kC, 1, 7).center);
+  EXPECT_EQ(WithFewerPlans(PointMassSystem(), 10'000).scenarios, PointMassSystem().scenarios);
+}
+
 TEST(Degraded, LeavesTheTargetAndDeclaresWhatTheModelLacks) {
   for (const System* system : Systems())
     for (const double part : {0.02, 0.5, 0.9}) {

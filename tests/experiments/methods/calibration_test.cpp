@@ -1,9 +1,12 @@
 // The calibrated methods against values worked by hand.
 #include "experiments/methods/calibration.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "experiments/methods/envelope.h"
 #include "experiments/methods/plug_in_gaussian.h"
 #include "tests/experiments/methods/small_task.h"
 
@@ -68,7 +71,7 @@ Task TwoRegions() {
 
 TEST(RegionalCalibration, HasABoxForEachCell) {
   const Task task = TwoRegions();
-  const RegionalCalibration enclosure(task.setting());
+  const RegionalCalibration enclosure(task.setting(), {});
   EXPECT_EQ(enclosure.num_calibrated(), 2);
   const ResidualBounds high = HandQuery(0, 3, 0, 0.5).Of(enclosure), low = HandQuery(0, 1, 0, 0.5).Of(enclosure);
   EXPECT_NEAR(high.lower[2], 2.5, kRounding);
@@ -79,7 +82,7 @@ TEST(RegionalCalibration, HasABoxForEachCell) {
 
 TEST(RegionalCalibration, TakesTheHullOfTheCellsThatAQueryMeets) {
   const Task task = TwoRegions();
-  const RegionalCalibration enclosure(task.setting());
+  const RegionalCalibration enclosure(task.setting(), {});
   const ResidualBounds both = HandQuery(0, 2, 0, 0.5).Of(enclosure);
   EXPECT_NEAR(both.lower[2], 0.5, kRounding);
   EXPECT_NEAR(both.upper[2], 3.5, kRounding);
@@ -87,7 +90,7 @@ TEST(RegionalCalibration, TakesTheHullOfTheCellsThatAQueryMeets) {
 
 TEST(RegionalCalibration, FallsBackToTheGlobalBoxWhereDataAreMissing) {
   const Task task = TwoRegions();
-  const RegionalCalibration enclosure(task.setting());
+  const RegionalCalibration enclosure(task.setting(), {});
   const ResidualBounds there = HandQuery(0, -3).Of(enclosure),
                        global = HandQuery(0, -3).Of(*MakeGlobalCalibration(task.setting()));
   EXPECT_EQ(there.lower[2], global.lower[2]);
@@ -100,7 +103,7 @@ TEST(RegionalCalibration, EqualsTheGlobalOneWhileNoCellHasNineObservations) {
     ObserveAt(task, 0, 3, i);
     ObserveAt(task, 0, 1, -i);
   }
-  const RegionalCalibration enclosure(task.setting());
+  const RegionalCalibration enclosure(task.setting(), {});
   EXPECT_EQ(enclosure.num_calibrated(), 0);
   EXPECT_EQ(HandQuery(0, 3).Of(enclosure).upper[2],
             HandQuery(0, 3).Of(*MakeGlobalCalibration(task.setting())).upper[2]);
@@ -110,24 +113,83 @@ TEST(RegionalCalibration, IsNoNarrowerOnALargerQuery) {
   Random random(11);
   SCOPED_TRACE(random.trace());
   const Task task = BicycleTask(400, 5);
-  const RegionalCalibration enclosure(task.setting());
-  EXPECT_GT(enclosure.num_calibrated(), 2);
-  for (int trial = 0; trial < 200; ++trial) {
-    const Query small = AnyQueryIn(random, task, 0.2);
-    const Eigen::VectorXd center = small.set().slice.CenterVector();
-    const Query large(Zonotope(center, 1.5 * small.set().slice.GeneratorMatrix()), {0, 0});
-    const ResidualBounds inner = small.Of(enclosure), outer = large.Of(enclosure);
-    ASSERT_LE(outer.lower[2], inner.lower[2]);
-    ASSERT_GE(outer.upper[2], inner.upper[2]);
+  for (const Elsewhere elsewhere :
+       {Elsewhere::kGlobal, Elsewhere::kNearest, Elsewhere::kWidest, Elsewhere::kDeclared, Elsewhere::kUnbounded}) {
+    const RegionalCalibration enclosure(task.setting(), {.elsewhere = elsewhere});
+    EXPECT_GT(enclosure.num_calibrated(), 2);
+    for (int trial = 0; trial < 100; ++trial) {
+      const Query small = AnyQueryIn(random, task, 0.2);
+      const Eigen::VectorXd center = small.set().slice.CenterVector();
+      const Query large(Zonotope(center, 1.5 * small.set().slice.GeneratorMatrix()), {0, 0});
+      const ResidualBounds inner = small.Of(enclosure), outer = large.Of(enclosure);
+      ASSERT_LE(outer.lower[2], inner.lower[2]);
+      ASSERT_GE(outer.upper[2], inner.upper[2]);
+    }
   }
+}
+
+// Cells of vx: [-4, -2], [-2, 0], [0, 2] with r in [0.5, 1.5], [2, 4] with r in [2.5, 3.5].
+TEST(RegionalCalibration, BoundsAQueryElsewhereByItsRule) {
+  const Task task = TwoRegions();
+  const auto at = [&](double vx, Elsewhere elsewhere) {
+    return HandQuery(0, vx).Of(RegionalCalibration(task.setting(), {.elsewhere = elsewhere}));
+  };
+  const ResidualBounds nearest = at(-1, Elsewhere::kNearest), widest = at(-1, Elsewhere::kWidest),
+                       unbounded = at(-1, Elsewhere::kUnbounded), declared = at(-1, Elsewhere::kDeclared);
+  EXPECT_NEAR(nearest.lower[2], 0.5, kRounding);
+  EXPECT_NEAR(nearest.upper[2], 1.5, kRounding);
+  EXPECT_NEAR(widest.lower[2], 0.5, kRounding);
+  EXPECT_NEAR(widest.upper[2], 3.5, kRounding);
+  EXPECT_EQ(unbounded.upper[2], kInfinity);
+  EXPECT_LT(unbounded.upper[0], kInfinity);
+  EXPECT_EQ(declared.upper[2], HandQuery(0, -1).Of(*MakeForeReach(task.setting())).upper[2]);
+  // With data in its cell, no rule says anything.
+  EXPECT_EQ(at(3, Elsewhere::kUnbounded).upper[2], at(3, Elsewhere::kNearest).upper[2]);
+}
+
+TEST(RegionalCalibration, SharesTheLevelOutAmongItsCells) {
+  Task task = TwoRegions();  // ten each: enough for 0.10, of 0.05 nineteen are wanted
+  const CalibrationOptions level{0.10, Center::kZero};
+  EXPECT_EQ(RegionalCalibration(task.setting(), {.regional = level}).num_calibrated(), 2);
+  EXPECT_EQ(RegionalCalibration(task.setting(), {.regional = level, .jointly = true}).num_calibrated(), 0);
+  for (int i = 0; i < 9; ++i) ObserveAt(task, 0, 3, 3);
+  EXPECT_EQ(RegionalCalibration(task.setting(), {.regional = level, .jointly = true}).num_calibrated(), 1);
+}
+
+// What the paper says of its regional calibration, and what the one of the comparison was chosen for.
+TEST(RegionalCalibration, OfTheComparisonIsGlobalWithFewDataAndWiderThanItElsewhereWithMany) {
+  const Task few = BicycleTask(25, 5), many = BicycleTask(400, 5);
+  Eigen::VectorXd center(6), half_width = Eigen::VectorXd::Constant(6, 0.01);
+  center << 0, 0, 0, 12, 0, -0.3;
+  const Query mirrored(Zonotope::FromBox(center, half_width), {0, 0});
+  const ResidualBounds sparse = mirrored.Of(*MakeRegionalCalibration(few.setting())),
+                       global = mirrored.Of(*MakeGlobalCalibration(few.setting()));
+  EXPECT_EQ(sparse.lower[2], global.lower[2]);
+  EXPECT_EQ(sparse.upper[2], global.upper[2]);
+  const ResidualBounds dense = mirrored.Of(*MakeRegionalCalibration(many.setting())),
+                       narrow = mirrored.Of(*MakeGlobalCalibration(many.setting()));
+  EXPECT_LT(dense.lower[2], narrow.lower[2]);
+  EXPECT_GT(dense.upper[2], 0.02);  // the mirrored plans turn the other way
+  EXPECT_LT(narrow.upper[2], 0.02);
+}
+
+TEST(Calibration, AroundZeroIsAsWideOnBothSides) {
+  Task task = HandTask(0, 0.5);
+  for (int i = 0; i < 10; ++i) ObserveAt(task, 0, 0, 2 + i % 2);
+  const auto enclosure = MakeGlobalCalibration(task.setting(), {0.10, Center::kZero});
+  EXPECT_NEAR(HandQuery(0, 0).Of(*enclosure).lower[2], -3, kRounding);
+  EXPECT_NEAR(HandQuery(0, 0).Of(*enclosure).upper[2], 3, kRounding);
 }
 
 TEST(PlugInGaussian, IsMeanAndScaledDeviation) {
   Task task = HandTask(0, 0.5);
   for (const double r : {1.0, 2.0, 3.0}) ObserveAt(task, 0, 0, r);  // mean 2, s = 1
   const ResidualBounds bounds = HandQuery(0, -2).Of(*MakePlugInGaussian(task.setting()));
-  EXPECT_NEAR(bounds.lower[2], 2 - 1.6448536, 1e-7);
-  EXPECT_NEAR(bounds.upper[2], 2 + 1.6448536, 1e-7);
+  EXPECT_NEAR(bounds.lower[2], 1, kRounding);
+  EXPECT_NEAR(bounds.upper[2], 3, kRounding);
+  const ResidualBounds twice = HandQuery(0, -2).Of(*MakePlugInGaussian(task.setting(), 2, Center::kZero));
+  EXPECT_NEAR(twice.upper[2], 2 * std::sqrt(7), kRounding);  // (1 + 4 + 9) / 2
+  EXPECT_NEAR(twice.lower[2], -2 * std::sqrt(7), kRounding);
 }
 
 TEST(PlugInGaussian, OfOneObservationIsThatOne) {

@@ -14,7 +14,7 @@ namespace {
 constexpr Covariance kAll[] = {Covariance::kLocal, Covariance::kLocalDiagonal, Covariance::kGlobal,
                                Covariance::kGlobalDiagonal};
 
-CpSlsOptions With(Covariance covariance) { return {covariance, 0.1, 12}; }
+CpSlsOptions With(Covariance covariance) { return {.covariance = covariance, .miscoverage = 0.1, .horizon = 12}; }
 
 TEST(CpSls, StarvationFloorIsThePapers) { EXPECT_EQ(StarvationFloor(0.10, 12), 119.0); }
 
@@ -94,6 +94,32 @@ TEST(CpSls, BudgetByHand) {
   for (int t = 0; t < 12; ++t) sum += budget;
   EXPECT_NEAR(sum.alpha, 0.1, 1e-15);
   EXPECT_TRUE(sum.IsVacuous());
+}
+
+TEST(CpSls, TheCapHidesTheRateAndActiveCoordinatesCountAlone) {
+  const Task task = TwoPlaces();
+  const Query query = HandQuery(0, 0, 0, 0.4);
+  const CpSls all(task.setting(), With(Covariance::kGlobal));
+  CpSlsOptions options = With(Covariance::kGlobal);
+  // The far ones are one half-width away, and eps^ is 1.
+  const double far = std::exp(-1.0 / 12);
+  EXPECT_NEAR(all.Budget(query.set()).at_cap, 50 * far / (150 + 50 * far), 1e-12);
+  options.active_only = true;  // vx alone: a mean square over one coordinate
+  const CpSls active(task.setting(), options);
+  EXPECT_NEAR(active.Mass(Eigen::VectorXd::Zero(6)), 150 + 50 * std::exp(-0.5), 1e-12);
+  // A position of the plan is no distance.
+  EXPECT_EQ(active.Budget(HandQuery(3, 0).set()).drift, active.Budget(HandQuery(0, 0).set()).drift);
+  EXPECT_NE(all.Budget(HandQuery(3, 0).set()).drift, all.Budget(HandQuery(0, 0).set()).drift);
+}
+
+TEST(CpSls, TheLeastRateIsNoLarger) {
+  const Task task = BicycleTask(200, 6);
+  CpSlsOptions options = With(Covariance::kLocal);
+  const double largest = CpSls(task.setting(), options).drift_rate();
+  options.least_rate = true;
+  const double least = CpSls(task.setting(), options).drift_rate();
+  EXPECT_GT(least, 0);
+  EXPECT_LT(least, largest);
 }
 
 TEST(CpSls, BudgetWithoutDriftIsTheMiscoverage) {

@@ -74,7 +74,7 @@ TEST(GaussianProcess, FitFindsALengthScaleAndPredictsBetweenTheData) {
 TEST(GaussianProcessBand, ContainsAFunctionOnItsDataAndWidensWithK) {
   Task task = HandTask(0, 1);
   for (int i = -20; i <= 20; ++i) ObserveAt(task, 0, i * 0.1, std::sin(i * 0.1));
-  const GaussianProcessBand two(task.setting(), 2), three(task.setting(), 3);
+  const GaussianProcessBand two(task.setting(), 2, true), three(task.setting(), 3, true);
   for (const double vx : {-1.55, 0.05, 1.0}) {
     const ResidualBounds narrow = HandQuery(0, vx).Of(two), wide = HandQuery(0, vx).Of(three);
     EXPECT_LT(wide.lower[2], narrow.lower[2]);
