@@ -139,7 +139,7 @@ std::vector<Plot> DegradationPlots(const Scope& scope, const Results& results) {
        720, 400, DataBlock("recall", lines) + DataBlock("paper", paper) + R"(set yrange [0:1.05]; set xrange [0:100]
 set xlabel 'degradation d, %'; set ylabel 'certified recall, C'
 set key outside top center horizontal maxcols 3
-plot 0.5 with lines dt 2 lc rgb grey title 'reference', \
+plot 0.5 with lines dt 2 lc rgb grey title 'half: the paper''s reference', \
   $recall using 1:2:3 with yerrorlines pt 7 ps 0.6 lw 1.8 lc rgb blue title 'point mass, N = 100', \
   '' using 1:4:5 with yerrorlines pt 5 ps 0.6 lw 1.8 lc rgb green title 'bicycle, N = 400', \
   $paper index 0 using 1:2 with points pt 6 ps 1.4 lw 2 lc rgb blue title 'the paper, point mass', \

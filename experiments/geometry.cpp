@@ -127,14 +127,14 @@ std::vector<Plot> GeometryPlots(const Scope&, const Results&) {
         DataBlock(panel.name() + "_obstacle", DataLine({circle.center.x(), circle.center.y(), circle.radius}));
   }
   plot.script +=
-      "set multiplot layout 2,2 title ' '\nset size ratio -1\nset offsets 0.3, 0.3, 0.6, 0.6\n"
+      "set multiplot layout 2,2 title \"\\n\\n\"\nset size ratio -1\nset offsets 0.3, 0.3, 0.6, 0.6\n"
       "set style fill transparent solid 0.25\n";
   for (const Panel& panel : panels) {
     const std::string name = std::string(1, '$').append(panel.name());
     plot.script += "set title '" + std::string(&panel.system == &PointMassSystem() ? "Point mass" : "Bicycle") +
                    (panel.group == Group::kB ? ", no data near the plan" : ", data along the plan") + "'\n";
     plot.script += &panel == &panels.front()
-                       ? "set key at screen 0.5, 0.985 center top horizontal maxrows 2 samplen 2\n"
+                       ? "set key at screen 0.5, 0.985 center top horizontal maxcols 6 samplen 1.5 width -1\n"
                        : "unset key\n";
     plot.script += "set xlabel 'x, m'; set ylabel 'y, m'\n";
     plot.script += "plot " + name + "_target with lines lw 0.3 lc rgb '#b0b0b0' title 'target', " + name +

@@ -197,7 +197,7 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
       "of groups A to C; mean over the seeds.",
       900, 400,
       "set multiplot layout 1,2\nset style data histogram\nset style histogram clustered gap 1\n"
-      "set style fill solid 0.9 noborder\nset yrange [0:0.35]\nset xlabel 'step'\n"
+      "set style fill solid 0.9 noborder\nset yrange [0:0.14<*]\nset xlabel 'step'\n"
       "set ylabel 'part of the blocks'\nset key top left\n"};
   std::string data;
   for (const Layout layout : kLayouts) {
@@ -210,7 +210,7 @@ std::vector<Plot> Plots(const Scope& scope, const Results& results) {
     }
     data += DataBlock(NameOf(layout), lines);
     plot.script += "set title '" + Words(layout) + "'\nplot $" + NameOf(layout) +
-                   " using 2:xtic(1) lc rgb blue title 'leaves the domain (D)', "
+                   " using 2:xtic(int($1) % 2 ? '' : stringcolumn(1)) lc rgb blue title 'leaves the domain (D)', "
                    "'' using 3 lc rgb orange title 'may touch the obstacle (S)'\n";
   }
   plot.script = data + plot.script + "unset multiplot\n";
