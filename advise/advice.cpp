@@ -100,12 +100,11 @@ class Widening {
   explicit Widening(const Domain& domain) : domain_(domain) {}
 
   void Reach(const DomainExit& exit, double value) {
-    const auto i = static_cast<Eigen::Index>(exit.index);
     switch (exit.kind) {
       case DomainExit::Kind::kLower:
       case DomainExit::Kind::kUpper: SetRange(exit.index, exit.kind == DomainExit::Kind::kLower, value); break;
-      case DomainExit::Kind::kInequality: domain_.inequalities[ToSize(static_cast<int>(i))].bound = value; break;
-      case DomainExit::Kind::kBall: domain_.balls[ToSize(static_cast<int>(i))].radius = value; break;
+      case DomainExit::Kind::kInequality: domain_.inequalities[ToSize(exit.index)].bound = value; break;
+      case DomainExit::Kind::kBall: domain_.balls[ToSize(exit.index)].radius = value; break;
       case DomainExit::Kind::kNone: return;
     }
     exits_.insert({exit.kind, exit.index});
@@ -478,9 +477,8 @@ class Adviser {
       for (const Eigen::VectorXd& outcome : allowed.Outcomes())
         after.push_back(WithProblem(case_, [&](Problem& problem) { AddObservation(problem, z, outcome); }));
       if (!Turns(after.front())) continue;
-      std::string what = "if one more transition were observed at";
-      what +=
-          " " + DescribePlace(*case_.problem, z) + " (step " + std::to_string(t) + "), where the declaration leaves";
+      std::string what = "if one more transition were observed at " + DescribePlace(*case_.problem, z) + " (step " +
+                         std::to_string(t) + "), where the declaration leaves";
       bool is_first = true;
       for (int k = 0; k < n; ++k) {
         if (!(allowed.upper[k] - allowed.lower[k] > 1e-12)) continue;

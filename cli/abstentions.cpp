@@ -1,6 +1,8 @@
 #include "cli/abstentions.h"
 
 #include <map>
+#include <span>
+#include <stdexcept>
 #include <tuple>
 
 #include <nlohmann/json.hpp>
@@ -83,13 +85,27 @@ class AbstentionReader final : public TimelineUser {
       abstention.missing = "it was decided under a task that is not kept next to the log";
       return;
     }
+    const Config& task = *recorded.basis.task;
+    if (!HasSizes(*candidate, *task.problem->model)) {  // a log may hold anything
+      abstention.missing = "its candidate is not of this task's sizes";
+      return;
+    }
+    for (const std::string& why :
+         {WhyNoSchedule(*candidate, task.gate), WhyNotBounded(*candidate, task.problem->between)})
+      if (abstention.missing.empty()) abstention.missing = why;
+    if (!abstention.missing.empty()) return;
     Case& judged = abstention.judged;
-    judged.schedule = ScheduleOf(*candidate, recorded.basis.task->gate);
+    try {
+      judged.initial_set = InitialSetOf(*candidate);
+    } catch (const std::invalid_argument& error) {
+      abstention.missing = std::string("its initial set: ") + error.what();
+      return;
+    }
+    judged.schedule = ScheduleOf(*candidate, task.gate);
     const Plan plan = PlanOf(*candidate, judged.schedule);
     judged.controls.resize(plan.num_inputs, plan.num_steps);
     for (int t = 0; t < plan.num_steps; ++t)
       judged.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.input(t).data(), plan.num_inputs);
-    judged.initial_set = InitialSetOf(*candidate);
     judged.obstacles = *recorded.basis.obstacles;
   }
 
@@ -99,29 +115,16 @@ class AbstentionReader final : public TimelineUser {
       const Basis& basis = bases_[i];
       if (all_[i].judged.controls.size() == 0) continue;
       auto& problem = problems[{basis.task, basis.learned_begin, basis.learned_end}];
-      if (!problem) problem = WithLearned(basis, timeline.learned(*basis.task));
+      if (!problem)
+        problem = WithLearned(basis.task->problem,
+                              std::span(timeline.learned(*basis.task))
+                                  .subspan(basis.learned_begin, basis.learned_end - basis.learned_begin));
       all_[i].judged.problem = problem;
     }
     return {std::move(tasks), std::move(all_), certified_, timeline.passed_over()};
   }
 
  private:
-  static std::shared_ptr<const Problem> WithLearned(const Basis& basis,
-                                                    const std::vector<ExecutedTransition>& learned) {
-    if (basis.learned_begin == basis.learned_end) return basis.task->problem;
-    auto problem = std::make_shared<Problem>(*basis.task->problem);
-    Transitions& all = problem->transitions;
-    Eigen::Index row = all.z.rows();
-    const auto count = static_cast<Eigen::Index>(basis.learned_end - basis.learned_begin);
-    all.z.conservativeResize(row + count, Eigen::NoChange);
-    all.x_next.conservativeResize(row + count, Eigen::NoChange);
-    for (std::size_t i = basis.learned_begin; i < basis.learned_end; ++i, ++row) {
-      all.z.row(row) = Eigen::Map<const Eigen::RowVectorXd>(learned[i].z.data(), std::ssize(learned[i].z));
-      all.x_next.row(row) = Eigen::Map<const Eigen::RowVectorXd>(learned[i].next.data(), std::ssize(learned[i].next));
-    }
-    return problem;
-  }
-
   std::vector<RecordedAbstention> all_;
   std::vector<Basis> bases_;  // of each
   std::int64_t certified_ = 0;

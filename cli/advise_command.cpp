@@ -2,6 +2,7 @@
 #include <iostream>
 #include <map>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include <nlohmann/json.hpp>
@@ -31,6 +32,8 @@ struct Options {
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
+constexpr double kHourMs = 3'600'000;  // the most that these keys take
+
 // The key of the gate that would have let a candidate in, and the value that it needs at least or at most.
 struct Setting {
   std::string key;
@@ -43,38 +46,38 @@ std::optional<Setting> SettingFor(const RecordedAbstention& abstention) {
   const decision_t& decision = abstention.decision;
   const candidate_plan_t& candidate = abstention.candidate;
   if (!abstention.task || decision.utime == 0) return std::nullopt;
-  const auto ms = [](std::int64_t us) { return static_cast<double>(us) / 1e3; };
-  const auto checked = [&](const std::string& key, double GateOptions::*member, double value, const std::string& what) {
+  // In doubles: a log may hold any stamps, and those of this age are exact.
+  const auto ms = [](std::int64_t from, std::int64_t to) {
+    return (static_cast<double>(to) - static_cast<double>(from)) / 1e3;
+  };
+  const auto checked = [&](const std::string& key, double GateOptions::*member, double value,
+                           const std::string& what) -> std::optional<Setting> {
+    if (!(0 < value && value <= kHourMs)) return std::nullopt;
     Config changed = *abstention.task;
     changed.gate.*member = value;
     const std::int16_t cause = Gate(changed).Decide(Encode(candidate), decision.utime).decision.cause;
     return Setting{key, value, what, cause != decision.cause};
   };
-  const std::int64_t until_start = candidate.start_utime - decision.utime;
+  const double until_start = ms(decision.utime, candidate.start_utime);
   switch (decision.cause) {
     case decision_t::CAUSE_STALE: {
-      const double age = ms(decision.utime - candidate.utime);
+      const double age = ms(candidate.utime, decision.utime);
       return checked("gate.max_age_ms", &GateOptions::max_age_ms, age,
                      "with gate.max_age_ms of at least " + RoundedUp(age));
     }
     case decision_t::CAUSE_FUTURE:
       if (candidate.utime > decision.utime) {
-        const double ahead = ms(candidate.utime - decision.utime);
+        const double ahead = ms(decision.utime, candidate.utime);
         return checked("gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
                        "with gate.max_ahead_ms of at least " + RoundedUp(ahead) +
                            ", if the sender's clock is right and not this one");
-      } else {
-        const double life = ms(until_start);
-        return checked("gate.certificate_lifetime_ms", &GateOptions::certificate_lifetime_ms, life,
-                       "with gate.certificate_lifetime_ms of at least " + RoundedUp(life));
       }
-    case decision_t::CAUSE_DEADLINE: {
-      const double left = ms(until_start);
-      if (left <= 0) return std::nullopt;
-      return checked("gate.decision_budget_ms", &GateOptions::decision_budget_ms, left,
-                     "with gate.decision_budget_ms of at most " + RoundedDown(left) + ", or sent " +
-                         RoundedUp(abstention.task->gate.decision_budget_ms - left) + " ms earlier");
-    }
+      return checked("gate.certificate_lifetime_ms", &GateOptions::certificate_lifetime_ms, until_start,
+                     "with gate.certificate_lifetime_ms of at least " + RoundedUp(until_start));
+    case decision_t::CAUSE_DEADLINE:
+      return checked("gate.decision_budget_ms", &GateOptions::decision_budget_ms, until_start,
+                     "with gate.decision_budget_ms of at most " + RoundedDown(until_start) + ", or sent " +
+                         RoundedUp(abstention.task->gate.decision_budget_ms - until_start) + " ms earlier");
     case decision_t::CAUSE_OVERRUN: {
       const double taken = decision.elapsed_us / 1e3;
       return Setting{"gate.decision_budget_ms", taken,
@@ -161,12 +164,12 @@ void PrintForPeople(const Abstentions& read, const std::vector<Advised>& advised
   }
   const auto turned = std::ranges::count_if(advised, &Advised::turned);
   std::map<std::string, int> by_change;
-  for (const Advised& each : advised)
-    for (const Change change :
-         {Change::kObstacles, Change::kInitialSet, Change::kHorizon, Change::kSlopes, Change::kObservation,
-          Change::kDomain, Change::kRest, Change::kLimits, Change::kLargerSlopes, Change::kNoise, Change::kOutlier})
-      if (std::ranges::any_of(each.advices, [&](const Advice& a) { return a.turns && a.change == change; }))
-        ++by_change[Name(change)];
+  for (const Advised& each : advised) {
+    std::set<Change> kinds;
+    for (const Advice& advice : each.advices)
+      if (advice.turns) kinds.insert(advice.change);
+    for (const Change change : kinds) ++by_change[Name(change)];
+  }
   std::cout << "advise: " << read.all.size() << " abstentions and rejections, " << turned
             << " have a change that turns them, verified by certifying again; " << read.certified << " were certified"
             << DescribePassedOver(read.passed_over) << "\n";
@@ -245,9 +248,7 @@ Command AdviseCommand() {
                       {"files", &options->files, "DECISION|LOG",
                        "The abstentions: a decision (the output of certify --json), or the event logs of a run, in "
                        "their order"}),
-                  {"--config", &options->config, "FILE",
-                   "The task file; by default the one that a decision names, or that the logger kept next to a log, in "
-                   "tasks/"},
+                  {"--config", &options->config, "FILE", kTaskOfRecords},
                   JobsOption(options->jobs),
                   JsonFlag(options->json)},
       .run = [options] { return RunAdvise(*options); }};

@@ -13,6 +13,9 @@ inline constexpr const char* kLogs = "LCM event log; several if the run was reco
 /** The help text for --config. */
 inline constexpr const char* kTaskOfLogs =
     "The task file of the recording; by default the one that the logger kept next to the log, in tasks/";
+/** The same where a decision may be read, too. */
+inline constexpr const char* kTaskOfRecords =
+    "The task file; by default the one that a decision names, or that the logger kept next to a log, in tasks/";
 
 // Options that several commands share.
 [[nodiscard]] inline Option ConfigOption(std::string& path, const char* help = "Task file (YAML)") {

@@ -182,9 +182,7 @@ Command VerifyCommand() {
                {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
                 "The certificates: a decision (the output of certify --json), an LCM event log (all logs of the run, "
                 "in their order), a decision database with its logs in the same directory, or the directory of both"}),
-           {"--config", &options->config, "FILE",
-            "The task file of the certificates; by default the one that a decision names, or that the logger "
-            "kept next to a log, in tasks/"},
+           {"--config", &options->config, "FILE", kTaskOfRecords},
            JobsOption(options->jobs),
            JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};

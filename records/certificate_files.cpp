@@ -49,21 +49,6 @@ CertificateFile FromDecision(const std::string& path, const Json& document, cons
 
 // ---- An event log.
 
-// The task's problem with all learned transitions behind its own.
-std::shared_ptr<const Problem> WithLearned(const Config& task, const std::vector<ExecutedTransition>& learned) {
-  auto problem = std::make_shared<Problem>(*task.problem);
-  Transitions& all = problem->transitions;
-  const int base = all.size();
-  all.z.conservativeResize(base + std::ssize(learned), Eigen::NoChange);
-  all.x_next.conservativeResize(base + std::ssize(learned), Eigen::NoChange);
-  for (Eigen::Index i = 0; i < std::ssize(learned); ++i) {
-    const ExecutedTransition& row = learned[static_cast<std::size_t>(i)];
-    all.z.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.z.data(), std::ssize(row.z));
-    all.x_next.row(base + i) = Eigen::Map<const Eigen::RowVectorXd>(row.next.data(), std::ssize(row.next));
-  }
-  return problem;
-}
-
 verifier::KnownRows KnownRowsOf(const Basis& basis) {
   const int base = basis.task->problem->transitions.size();
   return {base, base + static_cast<int>(basis.learned_begin), base + static_cast<int>(basis.learned_end)};
@@ -188,7 +173,7 @@ class CertificateReader final : public TimelineUser {
   std::vector<CertificateFile> Finish(const Timeline& timeline) {
     for (const auto& [task, i] : file_of_) {
       files_[i].config = *task;
-      files_[i].config.problem = WithLearned(*task, timeline.learned(*task));
+      files_[i].config.problem = WithLearned(task->problem, timeline.learned(*task));
     }
     files_.front().passed_over = timeline.passed_over();
     return {std::make_move_iterator(files_.begin()), std::make_move_iterator(files_.end())};
@@ -209,11 +194,6 @@ class CertificateReader final : public TimelineUser {
   CertificateFile& FileOf(const Config& task) {
     const auto [found, is_new] = file_of_.try_emplace(&task, files_.size());
     return is_new ? files_.emplace_back() : files_[found->second];
-  }
-
-  static bool HasSizes(const candidate_plan_t& plan, const NominalModel& model) {
-    return plan.num_states == model.num_states() && plan.num_inputs == model.num_inputs() && 1 <= plan.num_steps &&
-           plan.num_steps <= kMaxSteps;
   }
 
   static std::string DigestOfInput(const char* name) { return std::string(kOtherInput) + "digest of the " + name; }

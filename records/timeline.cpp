@@ -24,6 +24,21 @@ std::ptrdiff_t CountTaken(const Ahead& ahead, const Digest& now, const Digest& n
 
 }  // namespace
 
+std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
+                                           std::span<const ExecutedTransition> learned) {
+  if (learned.empty()) return problem;
+  auto known = std::make_shared<Problem>(*problem);
+  Transitions& all = known->transitions;
+  Eigen::Index row = all.z.rows();
+  all.z.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
+  all.x_next.conservativeResize(row + std::ssize(learned), Eigen::NoChange);
+  for (const ExecutedTransition& each : learned) {
+    all.z.row(row) = Eigen::Map<const Eigen::RowVectorXd>(each.z.data(), std::ssize(each.z));
+    all.x_next.row(row++) = Eigen::Map<const Eigen::RowVectorXd>(each.next.data(), std::ssize(each.next));
+  }
+  return known;
+}
+
 std::vector<const Config*> PointersTo(const std::vector<Config>& tasks) {
   std::vector<const Config*> pointers;
   for (const Config& task : tasks) pointers.push_back(&task);

@@ -23,6 +23,7 @@ before the candidate; then the digests of the basis differ from those that the d
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -99,6 +100,10 @@ class TimelineUser {
   virtual void OnCertified(const RecordedPlan&) {}
   virtual void OnWithdrawn(const RecordedWithdrawal&) {}
 };
+
+/** The problem with these transitions behind its own; the problem itself if there are none. */
+[[nodiscard]] std::shared_ptr<const Problem> WithLearned(const std::shared_ptr<const Problem>& problem,
+                                                         std::span<const ExecutedTransition> learned);
 
 /** Pointers for Timeline, which does not own its tasks. */
 [[nodiscard]] std::vector<const Config*> PointersTo(const std::vector<Config>& tasks);

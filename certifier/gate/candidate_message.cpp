@@ -8,6 +8,11 @@
 
 namespace forereach {
 
+bool HasSizes(const candidate_plan_t& candidate, const NominalModel& model) {
+  return candidate.num_states == model.num_states() && candidate.num_inputs == model.num_inputs() &&
+         1 <= candidate.num_steps && candidate.num_steps <= kMaxSteps;
+}
+
 Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule) {
   return {candidate.control[0], candidate.num_inputs, candidate.num_steps, kMaxInputs, schedule};
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "certifier/certify/decision.h"
+#include "certifier/dynamics/model.h"
 #include "certifier/safety/body.h"
 #include "certifier/task/gate_options.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -16,6 +17,10 @@ namespace forereach {
 /** u_0 .. u_{T-1} and their schedule. Refers to the candidate's numbers; whether its counts fit is for
 Certifier::Require to say. */
 [[nodiscard]] Plan PlanOf(const candidate_plan_t& candidate, const Schedule& schedule = {});
+
+/** Whether the candidate has the model's states and inputs, and 1 to kMaxSteps steps: whether its numbers may be read.
+ */
+[[nodiscard]] bool HasSizes(const candidate_plan_t& candidate, const NominalModel& model);
 
 /** When a plan's samples are, by start_utime, step_us and gate.max_clock_error_ms. Without that key the plan has no
 schedule. Whether the candidate's times are within the bounds of a schedule is for WhyNoSchedule to say. */

@@ -1,5 +1,6 @@
 // `forereach advise`: the shipped abstentions, a recorded course, and answers that are about time.
 #include <string>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -102,6 +103,40 @@ TEST_F(AdviseTest, NamesTheTimeThatWouldHaveHeld) {
   EXPECT_THAT(output.text, AllOf(HasSubstr("with gate.max_age_ms of at least 700\n"),
                                  HasSubstr("with gate.max_ahead_ms of at least 60, if"),
                                  HasSubstr("with gate.decision_budget_ms of at most 3, or sent 2 ms earlier")));
+}
+
+// Anyone may have written a log: its numbers need not fit each other.
+TEST_F(AdviseTest, AFalseLogIsNotReadBeyondItsMessages) {
+  const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  const std::string log = scratch_ / "events-20260101-120000-000000.lcmlog";
+  EventLogWriter writer(log);
+  std::int64_t plan_id = 0;
+  const auto claim = [&](candidate_plan_t candidate, std::int16_t outcome, std::int16_t cause, std::int64_t utime) {
+    candidate.plan_id = ++plan_id;
+    decision_t decision = MakeDecision(candidate, plan_id, outcome, cause);
+    decision.utime = utime;
+    SetGrounds(decision, config.grounds);
+    writer.Append(plan_id, config.bus.candidate, Encode(candidate));
+    writer.Append(plan_id, config.bus.decision, Encode(decision));
+  };
+  candidate_plan_t candidate = MakeCandidate(0, 0);
+  for (const auto& [states, inputs, steps] : {std::tuple(6, 2, 32767), {6, 32767, 12}, {32767, 2, 12}, {-1, -1, -1}}) {
+    candidate.num_states = static_cast<std::int16_t>(states);
+    candidate.num_inputs = static_cast<std::int16_t>(inputs);
+    candidate.num_steps = static_cast<std::int16_t>(steps);
+    claim(candidate, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE, 1);
+  }
+  candidate.num_states = 6, candidate.num_inputs = 2, candidate.num_steps = 12, candidate.step_us = 100'000;
+  candidate.initial_half_width[3] = -1;
+  claim(candidate, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE, 1);
+  candidate.utime = candidate.start_utime = INT64_MAX;
+  for (const std::int16_t cause : {decision_t::CAUSE_STALE, decision_t::CAUSE_FUTURE, decision_t::CAUSE_DEADLINE})
+    claim(candidate, decision_t::REJECTED, cause, INT64_MIN);
+  ASSERT_TRUE(writer.Flush());
+  const Output output = Forereach("advise " + log + " --config tests/data/course.yaml 2>&1");
+  EXPECT_EQ(output.code, 1) << output.text;
+  EXPECT_THAT(output.text, AllOf(HasSubstr("its candidate is not of this task's sizes"), HasSubstr("its initial set: "),
+                                 HasSubstr("8 abstentions and rejections, 0 have")));
 }
 
 TEST_F(AdviseTest, WhatIsNoRecordIsSaid) {
