@@ -22,7 +22,9 @@ std::vector<double> Successor(const NominalModel& model, const Eigen::VectorXd& 
 ModelText TextOf(std::string name, const std::vector<std::string>& states, const std::vector<std::string>& inputs,
                  const std::map<std::string, double>& parameters, const std::vector<std::string>& equations,
                  Integrator integrator) {
-  ModelText text{.name = std::move(name), .integrator = integrator};
+  ModelText text;
+  text.name = std::move(name);
+  text.integrator = integrator;
   for (const std::string& state : states) text.states.push_back({state, ""});
   for (const std::string& input : inputs) text.inputs.push_back({input, ""});
   for (const auto& [parameter, value] : parameters) text.parameters.push_back({parameter, value, value});

@@ -72,10 +72,14 @@ class Nearest {
 
   /** The first of those with the least clearance; null if there is none. */
   [[nodiscard]] Pair* Least() noexcept {
-    const auto is_less = [](const Pair& a, const Pair& b) {
-      return std::tie(a.clearance, a.step, a.obstacle) < std::tie(b.clearance, b.step, b.obstacle);
-    };
-    return count_ > 0 ? &*std::ranges::min_element(pairs(), is_less) : nullptr;
+    Pair* least = count_ > 0 ? pairs_.data() : nullptr;
+    for (Pair& pair : pairs()) {
+      if (pair.clearance > least->clearance) continue;
+      if (pair.clearance < least->clearance ||
+          std::tie(pair.step, pair.obstacle) < std::tie(least->step, least->obstacle))
+        least = &pair;
+    }
+    return least;
   }
   /** The least clearance for which there was no room. */
   [[nodiscard]] double left_out() const { return left_out_; }

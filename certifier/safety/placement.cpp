@@ -292,19 +292,41 @@ void Placement::EncloseAtExpressions(const Sample& sample, std::size_t i, Zonoto
   for (int k = 0; k < dim(); ++k) place.AppendAxis(k, sample.points[i].spread[ToSize(k)]);
 }
 
+namespace {
+
+struct Term {
+  double weight;
+  const double* row;
+};
+
+FOREREACH_INLINE Lanes AbsSum(const Term* terms, std::size_t count, std::size_t j) noexcept {
+  Lanes sum = AllLanes(terms[0].weight) * LoadLanes(terms[0].row + j);
+  for (std::size_t l = 1; l < count; ++l) sum += AllLanes(terms[l].weight) * LoadLanes(terms[l].row + j);
+  return Abs(sum);
+}
+
+// The sum over the columns of |the sum of the terms|. Two sums side by side: an addition waits for the one before.
+FOREREACH_INLINE double Spread(const Term* terms, std::size_t count, std::size_t columns) noexcept {
+  Lanes even = AllLanes(0), odd = AllLanes(0);
+  std::size_t j = 0;
+  for (; j + kLaneCount < columns; j += 2 * kLaneCount) {
+    even += AbsSum(terms, count, j);
+    odd += AbsSum(terms, count, j + kLaneCount);
+  }
+  if (j < columns) even += AbsSum(terms, count, j);
+  return Sum(even + odd);
+}
+
+}  // namespace
+
 // The generators of the image of the slice along d are sums over the states of a weight times a row each.
 double Placement::SupportInline(const Sample& sample, const Part& part, const Eigen::Vector3d& d) const noexcept {
-  struct Term {
-    double weight;
-    const double* row;
-  };
   const Zonotope& slice = *sample.slice;
   std::array<Term, kMaxSafetyDim * kMaxStates + 1> terms;
   std::size_t count = 0;
   for (const MatrixEntry& entry : projection_.entries())
     terms[count++] = {d[entry.row] * entry.value.lower, slice.padded_row(entry.column).data()};
   if (heading_ >= 0) terms[count++] = {0, slice.padded_row(heading_).data()};
-  const double length = d.norm();
   double largest = -kInfinity;
   for (int i = part.first; i < part.first + part.count; ++i) {
     if (points_[ToSize(i)].linear >= 0) {
@@ -314,7 +336,7 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
       continue;
     }
     const Sample::Point& point = sample.points[ToSize(i)];
-    const double turn = length * points_[ToSize(i)].turn;
+    const double turn = points_[ToSize(i)].turn == 0 ? 0 : d.norm() * points_[ToSize(i)].turn;
     double turned = 0, support = 0, size = 0;
     for (std::size_t k = 0; k < ToSize(dim()); ++k) {
       const double along = d[static_cast<Eigen::Index>(k)], magnitude = std::abs(along);
@@ -323,13 +345,10 @@ double Placement::SupportInline(const Sample& sample, const Part& part, const Ei
       size += magnitude * (sample.size[k] + point.size);
     }
     if (heading_ >= 0) terms[count - 1].weight = turned;
-    Lanes spread = AllLanes(0);
-    for (std::size_t j = 0; j < slice.padded_size(); j += kLaneCount) {
-      Lanes sum = AllLanes(terms[0].weight) * LoadLanes(terms[0].row + j);
-      for (std::size_t l = 1; l < count; ++l) sum += AllLanes(terms[l].weight) * LoadLanes(terms[l].row + j);
-      spread += Abs(sum);
-    }
-    support += Sum(spread) + (turn + RoundingError(kMargin, size + turn)) + kTiny;
+    const std::size_t columns = slice.padded_size();
+    const double spread = count == 3 ? Spread(terms.data(), 3, columns)  // what turns in the plane: unrolled
+                                     : Spread(terms.data(), count, columns);
+    support += spread + (turn + RoundingError(kMargin, size + turn)) + kTiny;
     if (!(support <= largest)) largest = support;
     if (std::isnan(support)) break;
   }
