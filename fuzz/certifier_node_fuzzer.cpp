@@ -59,7 +59,7 @@ class WitnessBus final : public Bus {
   bool Publish(const std::string& channel, Bytes bytes) override {
     if (channel == "PLAN_CERTIFIED") {
       Require(!certified_ && may_certify);
-      certified_ = Decoded<certified_plan_t>(bytes);
+      certified_ = Decoded<certified_plan_v2_t>(bytes);
       Require(certified_ && FindSealFaults(*certified_).empty());
       has_certified = true;
       standing_[GetDigest(certified_->certificate_digest)] = certified_->plan.num_steps + 1;
@@ -107,7 +107,7 @@ class WitnessBus final : public Bus {
   std::map<Digest, int> standing_;  // controls, by certificate; of a whole one: one more than it has
   std::int64_t withdrawals_ = 0;
   std::map<Digest, int> unanswered_;
-  std::optional<certified_plan_t> certified_;
+  std::optional<certified_plan_v2_t> certified_;
 };
 
 robot_state_t RobotState(FuzzedDataProvider& input, std::int64_t sequence, std::int64_t now) {

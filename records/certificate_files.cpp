@@ -58,7 +58,7 @@ RecordedCertificate DamagedLog(const std::string& log, std::int64_t places) {
   return {log, {}, "the log is damaged in " + std::to_string(places) + " places", {}};
 }
 
-verifier::Certificate CertificateOf(const certified_plan_t& certified, const std::vector<Obstacle>& obstacles) {
+verifier::Certificate CertificateOf(const certified_plan_v2_t& certified, const std::vector<Obstacle>& obstacles) {
   const candidate_plan_t& plan = certified.plan;
   const int n = plan.num_states;
   verifier::Certificate certificate;
@@ -91,7 +91,7 @@ class CertificateReader final : public TimelineUser {
   }
 
   void OnCertified(const RecordedPlan& recorded) override {
-    const certified_plan_t& certified = recorded.certified;
+    const certified_plan_v2_t& certified = recorded.certified.plan;
     const Config& task = *recorded.basis.task;
     CertificateFile& file = FileOf(task);
     RecordedCertificate& certificate = file.certificates.emplace_back();
@@ -107,9 +107,12 @@ class CertificateReader final : public TimelineUser {
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);
     certificate.certificate.known = KnownRowsOf(recorded.basis);
-    for (const SealFault& fault : FindSealFaults(certified))
+    for (const SealFault& fault : recorded.certified.seal_faults)
       certificate.mismatches.push_back({kAltered + fault.field, fault.expected, fault.found});
     CompareGrounds(certificate, recorded.basis.grounds, GroundsOf(certified));
+    if (recorded.certified.names_transitions)
+      certificate.Compare(DigestOfInput("transitions of the task"), ToHex(task.grounds.observations),
+                          ToHex(GetDigest(certified.transitions_digest)));
     if (!recorded.has_candidate) certificate.Compare("its candidate is in the log", "a candidate", "none");
     of_plan_.insert(
         {DigestOf(Encode(certified.plan)), {&file, file.certificates.size() - 1, task.problem.get(), certified}});
@@ -133,7 +136,7 @@ class CertificateReader final : public TimelineUser {
                                                    : "it was judged under a task that is not kept next to the log";
       return;
     }
-    const certified_plan_t& certified = plan->second.certified;
+    const certified_plan_v2_t& certified = plan->second.certified;
     if (withdrawal.valid_steps > certified.plan.num_steps) {
       certificate.missing = "its plan has " + std::to_string(certified.plan.num_steps) + " controls";
       return;
@@ -188,7 +191,7 @@ class CertificateReader final : public TimelineUser {
     CertificateFile* file;
     std::size_t certificate;  // its place
     const Problem* problem;
-    certified_plan_t certified;
+    certified_plan_v2_t certified;
   };
 
   CertificateFile& FileOf(const Config& task) {
@@ -235,7 +238,7 @@ class CertificateReader final : public TimelineUser {
     const auto compare = [&](const std::string& field, const std::string& expected, const std::string& found) {
       certificate.Compare(kAltered + ("its decision's " + field), expected, found);
     };
-    const certified_plan_t& certified = plan.certified;
+    const certified_plan_v2_t& certified = plan.certified;
     const Grounds expected = GroundsOf(certified), found = GroundsOf(decision);
     for (const auto& [name, digest] : kGrounds)
       compare(std::string(name) + "_digest", ToHex(expected.*digest), ToHex(found.*digest));

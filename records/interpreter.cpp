@@ -5,6 +5,7 @@
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
@@ -79,7 +80,10 @@ std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std
     return {Stream{channel, GetText(candidate->source)}, StreamPosition{candidate->sequence, candidate->utime}};
   }
   if (channel == channels_.decision) return {plain, PositionOf<decision_t>(bytes)};
-  if (channel == channels_.certified) return {plain, PositionOf<certified_plan_t>(bytes)};
+  if (channel == channels_.certified) {
+    const auto position = PositionOf<certified_plan_v2_t>(bytes);
+    return {plain, position ? position : PositionOf<certified_plan_t>(bytes)};
+  }
   if (channel == channels_.withdrawn) return {plain, PositionOf<withdrawal_t>(bytes)};
   if (channel == channels_.robot_state) return {plain, PositionOf<robot_state_t>(bytes)};
   if (channel == channels_.transition) return {plain, PositionOf<transition_t>(bytes)};

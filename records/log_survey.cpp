@@ -11,6 +11,7 @@
 #include "certifier/task/files.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "lcmtypes/heartbeat.h"
@@ -75,8 +76,10 @@ class Surveyor final {
     if (const auto decision = Decoded<decision_t>(message)) {
       ++survey_.decisions;
       Record(GetDigest(decision->config_digest), GetDigest(decision->observations_digest));
-    } else if (const auto certified = Decoded<certified_plan_t>(message)) {
+    } else if (const auto certified = Decoded<certified_plan_v2_t>(message)) {
       Record(GetDigest(certified->config_digest), GetDigest(certified->observations_digest));
+    } else if (const auto old = Decoded<certified_plan_t>(message)) {
+      Record(GetDigest(old->config_digest), GetDigest(old->observations_digest));
     } else if (Decoded<candidate_plan_t>(message)) {
       ++survey_.candidates;
     } else if (const auto heartbeat = ReadHeartbeat(message)) {

@@ -88,11 +88,12 @@ class Replayer final : public TimelineUser {
   }
 
   void OnCertified(const RecordedPlan& recorded) override {
-    for (const SealFault& fault : FindSealFaults(recorded.certified))
-      Differ(recorded.event, recorded.certified.plan.plan_id,
+    const certified_plan_v2_t& certified = recorded.certified.plan;
+    for (const SealFault& fault : recorded.certified.seal_faults)
+      Differ(recorded.event, certified.plan.plan_id,
              "the seal does not hold: " + fault.field + " is " + fault.found + ", it has to be " + fault.expected);
     if (plans_.size() == kPlans) plans_.pop_front();
-    plans_.emplace_back(GetDigest(recorded.certified.certificate_digest), recorded.certified.plan);
+    plans_.emplace_back(GetDigest(certified.certificate_digest), certified.plan);
   }
 
   void OnWithdrawn(const RecordedWithdrawal& recorded) override {

@@ -246,14 +246,15 @@ void Timeline::TakeDecision(const LogEvent& event, const std::string& name) {
 }
 
 void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
-  const auto certified = Decoded<certified_plan_t>(event.message());
+  const auto certified = ReadCertified(event.message());
   if (!certified) {
     ++undecodable_;
     return;
   }
-  if (Heed(certified_, {certified->sequence, certified->utime}, event) == Told::kStarts) Start();
-  const Digest plan = DigestOf(Encode(certified->plan));
-  const Grounds named = GroundsOf(*certified);
+  const certified_plan_v2_t& message = certified->plan;
+  if (Heed(certified_, {message.sequence, message.utime}, event) == Told::kStarts) Start();
+  const Digest plan = DigestOf(Encode(message.plan));
+  const Grounds named = GroundsOf(message);
   const Config* task = TaskOf(named.config);
   RecordedPlan recorded{*certified, name, false, task != nullptr, {}};
   const RecordedCandidate* const waiting = undecided_.Find(plan);

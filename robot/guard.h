@@ -18,10 +18,10 @@ Check fails stops executing. If Check finds a state outside its slice, the guard
 the next certificate is false too. A step that is off its schedule only ends the plan: TryStart looks at the time of the
 next one. Apply only what `control` returns.
 
-Check compares with interval hulls: a certified_plan_t contains, for t = 0..T, the interval hull of the certified slice
-X_t, rounded outward. X_t lies in its hull. So a state outside the hull has left X_t, and the certificate does not cover
-it. The guard uses hulls instead of zonotopes because 2n comparisons need no arithmetic. A state that is an angle may
-differ by whole turns (GuardOptions::angles); then it has to be inside by more than the rounding of the turns.
+Check compares with interval hulls: a certified_plan_v2_t contains, for t = 0..T, the interval hull of the certified
+slice X_t, rounded outward. X_t lies in its hull. So a state outside the hull has left X_t, and the certificate does not
+cover it. The guard uses hulls instead of zonotopes because 2n comparisons need no arithmetic. A state that is an angle
+may differ by whole turns (GuardOptions::angles); then it has to be inside by more than the rounding of the turns.
 
 Plan ids of all sources are compared with each other, because a robot follows one planner. Single-threaded. */
 #pragma once
@@ -36,7 +36,7 @@ Plan ids of all sources are compared with each other, because a robot follows on
 #include <vector>
 
 #include "bus/authentic.h"
-#include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/angle.h"
 #include "lcmtypes/codec.h"
@@ -179,8 +179,9 @@ class Guard final {
     message never extends what stands.
   - Neither: it is not accepted later. Until its certificate has expired, a plan_id has to exceed it (see Accept).
   Cause UNKNOWN_PLAN comes from a certifier that has not certified the plan, and does not count if the plan was
-  certified under exactly the message's five digests: then nothing has changed. A valid_steps outside 0 .. num_steps
-  counts as the nearest of these numbers. */
+  certified under the message's configuration, model, declaration and obstacles, and the message's observations are the
+  plan's `transitions_digest`: then nothing was taken back, whatever had been learned before the certificate. A
+  valid_steps outside 0 .. num_steps counts as the nearest of these numbers. */
   [[nodiscard]] GuardWithdrawal Withdraw(Bytes withdrawal_bytes) noexcept;
 
   /** Ends the executing plan. */
@@ -205,8 +206,8 @@ class Guard final {
   [[nodiscard]] std::optional<int> standing_steps() const { return executing_ ? standing_steps_ : std::nullopt; }
   /** The plan whose controls may be applied, or nullptr. Valid until the next call of TryStart, Check, Finish or
   Halt. */
-  [[nodiscard]] const certified_plan_t* executing() const { return executing_.get(); }
-  [[nodiscard]] const certified_plan_t* pending() const { return pending_.get(); }
+  [[nodiscard]] const certified_plan_v2_t* executing() const { return executing_.get(); }
+  [[nodiscard]] const certified_plan_v2_t* pending() const { return pending_.get(); }
 
  private:
   struct Task {
@@ -217,11 +218,11 @@ class Guard final {
 
   [[nodiscard]] GuardVerdict Authenticated(const std::string& channel, Bytes& bytes);
   void Take(const withdrawal_t& message, GuardWithdrawal& answer);
-  [[nodiscard]] GuardVerdict Examine(const certified_plan_t& certified, std::int64_t now_us) const;
-  [[nodiscard]] std::vector<Task>::const_iterator FindExpected(const certified_plan_t& certified) const;
+  [[nodiscard]] GuardVerdict Examine(const certified_plan_v2_t& certified, std::int64_t now_us) const;
+  [[nodiscard]] std::vector<Task>::const_iterator FindExpected(const certified_plan_v2_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineSizes(const candidate_plan_t& plan) const;
-  [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_t& certified) const;
-  [[nodiscard]] GuardVerdict ExamineDomain(const certified_plan_t& certified) const;
+  [[nodiscard]] GuardVerdict ExamineNumbers(const certified_plan_v2_t& certified) const;
+  [[nodiscard]] GuardVerdict ExamineDomain(const certified_plan_v2_t& certified) const;
   [[nodiscard]] GuardVerdict ExamineStart(std::int64_t boundary_utime, std::int64_t now_us,
                                           std::span<const double> state) const;
   [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const;
@@ -235,7 +236,7 @@ class Guard final {
   bool halted_ = false;
   std::optional<std::int64_t> last_accepted_;  // plan_id
   std::int64_t last_expiry_ = INT64_MIN;       // the latest expiry of the accepted plans
-  std::unique_ptr<certified_plan_t> pending_, executing_;
+  std::unique_ptr<certified_plan_v2_t> pending_, executing_;
   Angles pending_angles_, executing_angles_;
   int last_step_ = 0;                  // last checked step of the executing plan
   std::optional<int> standing_steps_;  // of the executing plan

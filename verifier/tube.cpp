@@ -524,11 +524,20 @@ std::optional<Failure> TubeMaker::LeavesDomain(const Query& query) const {
 // stays in half the box, and that part of the integral of 1 - s weighs 3/4.
 std::vector<Bounds> TubeMaker::Remainder(const Query& query, bool split) const {
   const int n = query.slice.dim();
-  const std::vector<SecondDerivative> whole = equations_.Second(query.hull);
+  // A variable that is a point has d = 0. f0 is a function of the others alone then: what has no bound along a point,
+  // as at a kink, is no part of its remainder.
+  const auto second = [&](const std::vector<Real>& box) {
+    std::vector<SecondDerivative> hessian = equations_.Second(box);
+    for (SecondDerivative& entry : hessian)
+      if (query.half_width[ToSize(entry.row)].IsZero() || query.half_width[ToSize(entry.column)].IsZero())
+        entry.value = Real();
+    return hessian;
+  };
+  const std::vector<SecondDerivative> whole = second(query.hull);
   if (!AllFinite(whole)) return {};
   std::vector<Bounds> bounds = RemainderOver(whole, query.slice, query.half_width, n, method_);
   if (!split) return bounds;
-  const auto inner = RemainderOver(equations_.Second(query.Box(Real(0.5))), query.slice, query.half_width, n, method_);
+  const auto inner = RemainderOver(second(query.Box(Real(0.5))), query.slice, query.half_width, n, method_);
   for (std::size_t k = 0; k < bounds.size(); ++k) {
     bounds[k].lower = Real(0.25) * bounds[k].lower + Real(0.75) * inner[k].lower;
     bounds[k].upper = Real(0.25) * bounds[k].upper + Real(0.75) * inner[k].upper;

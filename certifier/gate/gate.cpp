@@ -251,7 +251,7 @@ void Gate::DropIfLate(GateAnswer& answer, std::int64_t now_us) const {
                                        " ms, it may take " + ToText(options_.decision_budget_ms) + " ms");
 }
 
-void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified) {
+void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_v2_t& certified) {
   certified.utime = decision.utime;
   certified.sequence = certificates_;
   certified.expires_utime = decision.utime + Microseconds(options_.certificate_lifetime_ms);
@@ -265,6 +265,7 @@ void Gate::Attest(const candidate_plan_t& candidate, const decision_t& decision,
   }
   std::ranges::copy(decision.plan_digest, certified.plan_digest);
   SetGrounds(certified, grounds());
+  SetDigest(certified.transitions_digest, transitions_);
   SetDigest(certified.certificate_digest, CertificateDigest(certified));
 }
 

@@ -18,7 +18,7 @@ not, the caller calls Refuse. */
 #include "certifier/gate/sources.h"
 #include "certifier/task/config.h"
 #include "forereach/candidate_plan_t.hpp"
-#include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -30,7 +30,7 @@ namespace forereach {
 /** A decision and, only with a certificate, the certified plan. */
 struct GateAnswer {
   decision_t decision{};
-  std::optional<certified_plan_t> certified;
+  std::optional<certified_plan_v2_t> certified;
 };
 
 /** Which controls of a certified plan stand: 0 .. steps - 1. */
@@ -131,7 +131,7 @@ class Gate final {
   void Certify(const candidate_plan_t& candidate, const Zonotope& initial_set, GateAnswer& answer);
   void DropIfLate(GateAnswer& answer, std::int64_t now_us) const;
   /** Sets all fields of a message of zeros, and its seal. */
-  void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_t& certified);
+  void Attest(const candidate_plan_t& candidate, const decision_t& decision, certified_plan_v2_t& certified);
   void Count(const decision_t& decision);
 
   Certifier certifier_;

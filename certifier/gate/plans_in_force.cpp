@@ -28,6 +28,17 @@ withdrawal_t Unjudged(std::int16_t cause, const std::string& why) {
   return message;
 }
 
+// A plan stands that another process certified under these. What was learned takes nothing back, by whichever of the
+// two, unless it contradicts the declaration. Then the observations are not those of the file alone: no plan stands.
+Grounds GroundsForStranger(const Gate& gate, bool is_falsified) {
+  Grounds grounds = gate.grounds();
+  if (!is_falsified)
+    grounds.observations = gate.transitions();
+  else if (grounds.observations == gate.transitions())
+    grounds.observations = {};
+  return grounds;
+}
+
 withdrawal_t Judged(const Standing& standing, const Problem& problem) {
   const Decision& verdict = standing.verdict;
   if (verdict.outcome == Outcome::kNone) return Unjudged(withdrawal_t::NOT_JUDGED, "it cannot be judged again");
@@ -54,7 +65,7 @@ void PlansInForce::Follow(const GateOptions& gate) {
 // The messages with its first and its last state may each be delayed.
 std::int64_t PlansInForce::LongestRun(int num_steps) const { return 2 * delay_us_ + num_steps * step_us_; }
 
-void PlansInForce::Add(const certified_plan_t& certified, std::int64_t steady_us) {
+void PlansInForce::Add(const certified_plan_v2_t& certified, std::int64_t steady_us) {
   while (!plans_.empty() && plans_.front().may_run_until_us < steady_us) plans_.pop_front();
   const candidate_plan_t& plan = certified.plan;
   Entry entry;
@@ -129,10 +140,9 @@ void PlansInForce::TakeAnswer(const execution_event_t& event) {
   }
 }
 
-void PlansInForce::Judge(Gate& gate, std::int64_t now_us) {
+void PlansInForce::Judge(Gate& gate, std::int64_t now_us, bool is_contradicted) {
   const Grounds grounds = gate.grounds();
-  const Premises premises{grounds.config, gate.transitions(), grounds.obstacles,
-                          gate.certifier().violation().has_value()};
+  const Premises premises{grounds.config, gate.transitions(), grounds.obstacles, is_contradicted};
   if (premises_ != premises) {
     if (premises_)
       for (Entry& entry : plans_) entry.is_changed = is_any_changed_ = true;
@@ -154,10 +164,7 @@ void PlansInForce::Judge(Entry& entry, Gate& gate) {
   if (!entry.is_known) {
     withdrawal_t message =
         Unjudged(withdrawal_t::UNKNOWN_PLAN, "this certifier has not certified it, and cannot judge whether it holds");
-    Grounds grounds = gate.grounds();
-    // What this certifier has learned itself takes nothing back, unless it contradicts the declaration.
-    if (!gate.certifier().violation()) grounds.observations = gate.transitions();
-    SetGrounds(message, grounds);
+    SetGrounds(message, GroundsForStranger(gate, premises_->is_falsified));
     return Withdraw(entry, message);
   }
   if (entry.is_withdrawn && entry.standing_steps <= entry.first_step) return;  // nothing is left

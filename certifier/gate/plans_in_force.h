@@ -20,9 +20,9 @@ withdrawn when something changes (NOT_JUDGED).
 
 A plan that the robot executes and that is not known was certified by another process, for example by this certifier
 before a restart. It cannot be judged. It is withdrawn as UNKNOWN_PLAN, at once and after each change, as soon as the
-obstacles are known; a guard heeds this unless the plan was certified under exactly what is in force: the task, its
-file of transitions without learned ones, the obstacles. So a plan that another process certified under learned
-transitions is withdrawn: its digest does not tell which file they were added to.
+obstacles are known. A guard heeds this unless the plan was certified under what is in force: the task, its file of
+transitions, the obstacles. The transitions that the other process had learned before do not count: the certificate
+proves what it proves under them, and they stay true if this process does not know them (docs/soundness.md, 3.13).
 
 No bus, no clock. Times of a monotonic clock and of the wall clock in microseconds. */
 #pragma once
@@ -36,7 +36,7 @@ No bus, no clock. Times of a monotonic clock and of the wall clock in microsecon
 
 #include "certifier/gate/gate.h"
 #include "certifier/task/gate_options.h"
-#include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/withdrawal_t.hpp"
@@ -66,16 +66,18 @@ class PlansInForce final {
   /** True if no further plan may be certified, because it could not be withdrawn. */
   [[nodiscard]] bool IsFull() const { return plans_.size() >= kPlans; }
   /** Adds a plan that was certified and sent. @pre not IsFull(). Cost: a copy of the candidate. */
-  void Add(const certified_plan_t& certified, std::int64_t steady_us);
+  void Add(const certified_plan_v2_t& certified, std::int64_t steady_us);
   /** Takes a usable state of the robot. Cost O(plans). */
   void SeeRobot(const robot_state_t& state, std::int64_t steady_us);
   /** Takes the robot's answer to a withdrawal. @pre event.kind == execution_event_t::WITHDRAWN. */
   void TakeAnswer(const execution_event_t& event);
 
   /** Judges the plans again if obstacles, task, its file of transitions or the truth of the declaration have changed
-  since the last call. Cost:
-  at most kJudged + 1 times that of Certify; without a change O(1). */
-  void Judge(Gate& gate, std::int64_t now_us);
+  since the last call. @param is_contradicted the declaration is known to be false, by this gate's observations or by
+  what was learned before a restart. Then no plan that is not known stands. Cost: at most kJudged + 1 times that of
+  Certify; without a change O(1). */
+  void Judge(Gate& gate, std::int64_t now_us, bool is_contradicted);
+  void Judge(Gate& gate, std::int64_t now_us) { Judge(gate, now_us, gate.certifier().violation().has_value()); }
 
   /** True if a withdrawal is unanswered. */
   [[nodiscard]] bool withdraws() const { return is_any_unanswered_; }

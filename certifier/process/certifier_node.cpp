@@ -346,7 +346,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
 void CertifierNode::WithdrawPlans(std::int64_t now_us) {
   withdraws_more_ = false;
   if (!is_in_charge()) return;
-  plans_.Judge(*gate_, now_us);
+  plans_.Judge(*gate_, now_us, gate_->certifier().violation() || contradictions_.ContradictInForce());
   for (int i = 0; i < kAtOnce && plans_.withdraws(); ++i) {
     const auto due = plans_.TakeDue(clocks_.wall(), clocks_.steady());
     if (!due) return;

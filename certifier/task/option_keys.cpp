@@ -105,7 +105,7 @@ struct ChannelRow {
 constexpr std::array kChannels{
     ChannelRow{"candidate", &BusOptions::candidate, "candidate_plan_t, from planners."},
     ChannelRow{"decision", &BusOptions::decision, "decision_t, one for each candidate."},
-    ChannelRow{"certified", &BusOptions::certified, "certified_plan_t, what a robot may execute."},
+    ChannelRow{"certified", &BusOptions::certified, "certified_plan_v2_t, what a robot may execute."},
     ChannelRow{"withdrawn", &BusOptions::withdrawn, "withdrawal_t, what of it a robot may no longer execute."},
     ChannelRow{"robot_state", &BusOptions::robot_state, "robot_state_t, from the robot."},
     ChannelRow{"obstacles", &BusOptions::obstacles,

@@ -285,7 +285,7 @@ class Campaign final {
   // It executes the plan certified last, from a state outside its slice, by the least or by some metres.
   robot_state_t StateOutside(Rig& rig) {
     robot_state_t state = State(rig);
-    const certified_plan_t& certified = *rig.witness().last_certified();
+    const certified_plan_v2_t& certified = *rig.witness().last_certified();
     const int step = Below(certified.plan.num_steps), k = Below(state.num_states);
     state.mode = robot_state_t::EXECUTING;
     state.executing_plan_id = certified.plan.plan_id;
@@ -381,7 +381,7 @@ class Campaign final {
           robot_state_t state = State(rig);
           state.mode = robot_state_t::EXECUTING;
           state.sequence = sequence++;
-          const certified_plan_t& last = *rig.witness().last_certified();
+          const certified_plan_v2_t& last = *rig.witness().last_certified();
           state.executing_plan_id = i % 2 == 0 ? WallClockUs() : last.plan.plan_id;
           state.executing_step = i % 2 == 0 ? 0 : last.plan.num_steps;
           if (i % 2 != 0) std::copy_n(last.slice_lower[last.plan.num_steps], state.num_states, state.state);
@@ -439,20 +439,20 @@ class Campaign final {
     withdrawal_t withdrawal{};
     withdrawal.sequence = kForgedSequence;
     withdrawal.expires_utime = INT64_MAX;
-    if (const certified_plan_t* certified = rig.witness().last_certified())
+    if (const certified_plan_v2_t* certified = rig.witness().last_certified())
       withdrawal.plan_id = certified->plan.plan_id;
     harmful[channels.withdrawn] = Encode(withdrawal);
     obstacles_t nothing_there{};
     nothing_there.utime = WallClockUs();
     nothing_there.sequence = kForgedSequence;
     harmful[channels.obstacles] = Encode(nothing_there);
-    if (const certified_plan_t* certified = rig.witness().last_certified())
+    if (const certified_plan_v2_t* certified = rig.witness().last_certified())
       harmful[channels.certified] = Encode(Widened(*certified));
     return harmful;
   }
 
   // What an attacker's certificate looks like: slices that nothing leaves, for a plan that starts soon.
-  static certified_plan_t Widened(certified_plan_t certified) {
+  static certified_plan_v2_t Widened(certified_plan_v2_t certified) {
     certified.utime = WallClockUs();
     certified.plan.plan_id += std::int64_t{1} << 32;
     certified.plan.start_utime = certified.utime + 200'000;
@@ -563,7 +563,7 @@ class Campaign final {
         [&](int i) {
           const Role stolen = kAllRoles[1 + static_cast<std::size_t>(i) % (kAllRoles.size() - 1)];
           for (int j = 0; j < 20; ++j) {
-            certified_plan_t certified = Widened(*rig.witness().last_certified());
+            certified_plan_v2_t certified = Widened(*rig.witness().last_certified());
             certified.plan.plan_id += j;
             certified.plan.start_utime += 40'000 * j;
             SetDigest(certified.plan_digest, DigestOf(Encode(certified.plan)));
@@ -830,7 +830,7 @@ class Campaign final {
                   rig.perception().SetSilent(false);
                 });
     MovingTries("A moving obstacle jumps in front of the robot, and away again", [&](Row&, Rig& rig, int, auto& seen) {
-      const certified_plan_t* plan = rig.witness().last_certified();
+      const certified_plan_v2_t* plan = rig.witness().last_certified();
       const double ahead = plan ? plan->plan.initial_center[0] + 8 + Below(12) : 20;
       const auto jump = [&](const Obstacle& to) {
         const Digest before = ObstaclesDigest(seen);
@@ -873,7 +873,7 @@ class Campaign final {
           const std::int64_t before = withdrawn;
           for (int walls = 0; walls < 5 && withdrawn == before; ++walls) {
             rig.Listen(milliseconds(1500));
-            const certified_plan_t* plan = rig.witness().last_certified();
+            const certified_plan_v2_t* plan = rig.witness().last_certified();
             std::vector<Obstacle> walled = seen;
             const double ahead = (plan ? plan->plan.initial_center[0] : 0) + 2 + Below(6);
             walled.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), ahead));

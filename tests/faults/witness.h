@@ -13,7 +13,7 @@
 
 #include "bus/bus.h"
 #include "certifier/task/config.h"
-#include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
@@ -59,7 +59,7 @@ class Witness final {
   [[nodiscard]] std::int64_t unjudged() const { return std::ssize(unjudged_); }
   /** Certified plans, signed and sealed. */
   [[nodiscard]] std::int64_t certificates() const { return certificates_; }
-  [[nodiscard]] const certified_plan_t* last_certified() const { return last_certified_; }
+  [[nodiscard]] const certified_plan_v2_t* last_certified() const { return last_certified_; }
   /** The newest of them that a robot has executed, counted from 1 in the order in which they came; 0 for none. */
   [[nodiscard]] std::int64_t executed() const { return executed_; }
   /** The last one that the certifier has latched, and the certificates heard since. */
@@ -87,11 +87,11 @@ class Witness final {
   const BusOptions channels_;
   const bool spoiled_;
   struct Certified {
-    certified_plan_t plan;
+    certified_plan_v2_t plan;
     std::int64_t number;  // counts certificates from 1
   };
   std::map<std::int64_t, Certified> plans_;
-  const certified_plan_t* last_certified_ = nullptr;  // in plans_
+  const certified_plan_v2_t* last_certified_ = nullptr;  // in plans_
   struct Answer {
     Digest decision;  // of the message
     std::int16_t cause;

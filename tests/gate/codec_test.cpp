@@ -9,6 +9,7 @@
 
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
@@ -49,6 +50,7 @@ const std::map<std::string, Contract> kContracts = {
     {"obstacle_v2_t", {0xbbad85e96469971b, 488}},
     {"obstacles_v2_t", {0xc1a2a66356f23f34, 30746}},
     {"withdrawal_t", {0x143744ac67af3ba6, 482}},
+    {"certified_plan_v2_t", {0xef35232fd0f5e514, 41840}},
 };
 
 template <class Message>
@@ -66,9 +68,10 @@ class MessageTest : public testing::Test {
   std::mt19937 random_{seed_};
 };
 
-using Messages = testing::Types<candidate_plan_t, certified_plan_t, certifier_status_v2_t, certifier_status_v3_t,
-                                command_t, decision_t, execution_event_t, fault_t, logger_status_t, obstacle_t,
-                                obstacle_v2_t, obstacles_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>;
+using Messages =
+    testing::Types<candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t,
+                   certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t,
+                   obstacle_t, obstacle_v2_t, obstacles_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {
@@ -116,8 +119,10 @@ TYPED_TEST(MessageTest, EveryBitOfTheFingerprintCounts) {
 }
 
 TEST(CodecTest, NoMessageIsTakenForAnother) {
-  EXPECT_FALSE(Decoded<candidate_plan_t>(Encode(certified_plan_t{})));
-  EXPECT_FALSE(Decoded<certified_plan_t>(Encode(candidate_plan_t{})));
+  EXPECT_FALSE(Decoded<candidate_plan_t>(Encode(certified_plan_v2_t{})));
+  EXPECT_FALSE(Decoded<certified_plan_v2_t>(Encode(candidate_plan_t{})));
+  EXPECT_FALSE(Decoded<certified_plan_v2_t>(Encode(certified_plan_t{})));
+  EXPECT_FALSE(Decoded<certified_plan_t>(Encode(certified_plan_v2_t{})));
   EXPECT_FALSE(Decoded<decision_t>(Encode(transition_t{})));
 }
 

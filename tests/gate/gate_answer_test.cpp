@@ -102,13 +102,28 @@ TEST_F(GateAnswerTest, Certificate) {
   ExpectDigestsOf(config_, decision);
 
   ASSERT_TRUE(answer.certified);
-  const certified_plan_t& certified = *answer.certified;
+  const certified_plan_v2_t& certified = *answer.certified;
   EXPECT_EQ(certified.utime, kNow);
   EXPECT_EQ(certified.expires_utime, kNow + 2'000'000);
   EXPECT_EQ(Encode(certified.plan), Encode(candidate));
   EXPECT_EQ(GetDigest(certified.plan_digest), DigestOf(Encode(candidate)));
   EXPECT_THAT(FindSealFaults(certified), IsEmpty());
   ExpectDigestsOf(config_, certified);
+  EXPECT_EQ(GetDigest(certified.transitions_digest), config_.grounds.observations);
+}
+
+TEST_F(GateAnswerTest, ACertificateNamesTheTransitionsOfTheTaskWithoutWhatWasLearned) {
+  Gate gate(config_);
+  transition_t learned{};
+  learned.utime = kNow;
+  learned.num_states = 4;
+  learned.num_inputs = 2;
+  ASSERT_EQ(gate.Learn(Encode(learned)), "");
+  const GateAnswer answer = gate.Decide(Encode(Candidate(7)), kNow);
+  ASSERT_TRUE(answer.certified);
+  EXPECT_EQ(GetDigest(answer.certified->transitions_digest), config_.grounds.observations);
+  EXPECT_EQ(GetDigest(answer.certified->observations_digest),
+            ChainedDigest(config_.grounds.observations, Encode(learned)));
 }
 
 TEST_F(GateAnswerTest, AbstentionForAnObstacle) {
@@ -283,7 +298,7 @@ TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheSeal) {
   for (std::size_t i = random() % 7; i < good.size(); i += 7) {
     std::vector<std::uint8_t> bytes = good;
     bytes[i] ^= static_cast<std::uint8_t>(1u << random() % 8);
-    const auto tampered = Decoded<certified_plan_t>(bytes);
+    const auto tampered = Decoded<certified_plan_v2_t>(bytes);
     ASSERT_EQ(tampered.has_value(), i >= 8) << i;
     if (tampered) {
       ASSERT_THAT(FindSealFaults(*tampered), Not(IsEmpty())) << i;

@@ -37,7 +37,7 @@ class PlansInForceTest : public testing::Test {
     EXPECT_EQ(See({Obstacle::HalfSpace(Eigen::Vector2d(1, 0), offset)}), "");
     plans_.Judge(gate_, now_);
   }
-  certified_plan_t Certify(std::int64_t plan_id, const char* source = "test") {
+  certified_plan_v2_t Certify(std::int64_t plan_id, const char* source = "test") {
     candidate_plan_t candidate = Candidate(plan_id, kAccelerationThatCertifies, now_);
     SetText(candidate.source, source);
     const GateAnswer answer = gate_.Decide(Encode(candidate), now_);
@@ -46,7 +46,7 @@ class PlansInForceTest : public testing::Test {
     return *answer.certified;
   }
   // The task with a domain that the plan just leaves at a step.
-  Config NarrowerFrom(const certified_plan_t& plan, int step) const {
+  Config NarrowerFrom(const certified_plan_v2_t& plan, int step) const {
     Config narrower = config_;
     Problem problem = *config_.problem;
     Eigen::VectorXd upper = problem.domain.state.upper();
@@ -78,7 +78,7 @@ class PlansInForceTest : public testing::Test {
     return due ? std::optional(due->message) : std::nullopt;
   }
   // The greatest px of slice t of the plan, by its certificate.
-  static double Reach(const certified_plan_t& certified, int t) { return certified.slice_upper[t][0]; }
+  static double Reach(const certified_plan_v2_t& certified, int t) { return certified.slice_upper[t][0]; }
 
   std::int64_t now_ = kNow, sequence_ = 0, states_ = 0;
   Config config_ = SmallTaskOnTheBus();
@@ -88,7 +88,7 @@ class PlansInForceTest : public testing::Test {
 
 TEST_F(PlansInForceTest, AWallLeavesTheControlsBeforeTheFirstSliceThatMayTouchIt) {
   for (int t = 1; t <= kSteps; ++t) {
-    const certified_plan_t plan = Certify(t);
+    const certified_plan_v2_t plan = Certify(t);
     // 1e-9: the separation's own rounding
     SeeWall(Reach(plan, t) + 1e-9);
     const auto just_outside = Due();
@@ -144,7 +144,7 @@ TEST_F(PlansInForceTest, BetweenTheSamplesTheStepThatMayTouchIsTheFirstToFall) {
 }
 
 TEST_F(PlansInForceTest, AWithdrawalNamesThePlanTheWitnessAndWhatItRestsOn) {
-  const certified_plan_t plan = Certify(3);
+  const certified_plan_v2_t plan = Certify(3);
   now_ += 1000;
   SeeWall(Reach(plan, 6) - 1e-9);
   const withdrawal_t message = Due().value();
@@ -228,7 +228,7 @@ TEST_F(PlansInForceTest, PlansOfTwoSourcesWithOneIdAreAnsweredEachForItself) {
 }
 
 TEST_F(PlansInForceTest, NothingStandsAgainAndLessIsSaidAnew) {
-  const certified_plan_t plan = Certify(1);
+  const certified_plan_v2_t plan = Certify(1);
   SeeWall(Reach(plan, 6) - 1e-9);
   EXPECT_EQ(Due()->valid_steps, 5);
   Answer(1, 5, 0);
@@ -245,7 +245,7 @@ TEST_F(PlansInForceTest, NothingStandsAgainAndLessIsSaidAnew) {
 }
 
 TEST_F(PlansInForceTest, WithoutAChangeNothingIsJudged) {
-  const certified_plan_t plan = Certify(1);
+  const certified_plan_v2_t plan = Certify(1);
   See({});
   plans_.Judge(gate_, now_);
   EXPECT_FALSE(Due());
@@ -309,7 +309,7 @@ TEST_F(PlansInForceTest, TheExecutingPlanIsJudgedHoweverManyArePending) {
 
 // To contradict, not to be added, is what ends a certificate.
 TEST_F(PlansInForceTest, AnObservationThatContradictsNothingWithdrawsNothing) {
-  const certified_plan_t plan = Certify(1);
+  const certified_plan_v2_t plan = Certify(1);
   SeeWall(Reach(plan, kSteps) + 0.01);
   transition_t transition{};
   transition.utime = now_;
@@ -341,7 +341,7 @@ TEST_F(PlansInForceTest, AFalsifiedDeclarationLeavesNothing) {
 }
 
 TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
-  const certified_plan_t plan = Certify(1);
+  const certified_plan_v2_t plan = Certify(1);
   Gate gate(NarrowerFrom(plan, 8));
   gate.Inherit(gate_);
   plans_.Judge(gate, now_);
@@ -353,7 +353,7 @@ TEST_F(PlansInForceTest, ATaskThatWasReadAgainIsJudgedUnder) {
 
 // The task file is the same, its file of transitions is not.
 TEST_F(PlansInForceTest, UnderOtherTransitionsOfTheTaskItIsJudgedAgain) {
-  const certified_plan_t plan = Certify(1);
+  const certified_plan_v2_t plan = Certify(1);
   SeeWall(Reach(plan, kSteps) + 0.01);
   EXPECT_FALSE(Due());
   Problem problem = *config_.problem;
@@ -369,7 +369,7 @@ TEST_F(PlansInForceTest, UnderOtherTransitionsOfTheTaskItIsJudgedAgain) {
 }
 
 TEST_F(PlansInForceTest, AnObstacleBeforeTheStepThatLeavesTheDomainCounts) {
-  const certified_plan_t plan = Certify(1);
+  const certified_plan_v2_t plan = Certify(1);
   Config narrower = NarrowerFrom(plan, 8);
   narrower.obstacles.push_back(Obstacle::HalfSpace(Eigen::Vector2d(1, 0), Reach(plan, 4) - 1e-9));
   Gate gate(narrower);
@@ -397,7 +397,7 @@ TEST_F(PlansInForceTest, AnEndThatIsNotAtRestKeepsItsControls) {
 
 // It is exceeded first where the robot has come that far: the control that leads there does not stand.
 TEST_F(PlansInForceTest, ALimitOfANewTaskLeavesTheControlsBeforeIt) {
-  const certified_plan_t plan = Certify(1);
+  const certified_plan_v2_t plan = Certify(1);
   const auto judge = [&](double most) {
     Config limited = config_;
     Problem problem = *config_.problem;
@@ -457,6 +457,15 @@ TEST_F(PlansInForceTest, AnUnknownPlanIsWithdrawnOnceTheObstaclesAreKnownAndAfte
   ASSERT_TRUE(restarted.certifier().violation());
   judge();
   EXPECT_NE(GetDigest(Due()->observations_digest), restarted.transitions()) << "no guard has these";
+}
+
+// As after a restart, by a latch file or the heartbeats of a predecessor: no observation of this gate contradicts.
+TEST_F(PlansInForceTest, NoUnknownPlanStandsUnderADeclarationThatIsKnownToBeFalse) {
+  SeeRobot(77, 4);
+  plans_.Judge(gate_, now_, false);
+  EXPECT_EQ(GetDigest(Due().value().observations_digest), gate_.transitions());
+  plans_.Judge(gate_, now_, true);
+  EXPECT_EQ(GetDigest(Due().value().observations_digest), Digest{}) << "no certificate names these";
 }
 
 }  // namespace

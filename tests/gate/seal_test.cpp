@@ -2,6 +2,7 @@
 #include "lcmtypes/seal.h"
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <random>
 #include <string>
@@ -10,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "lcmtypes/grounds.h"
 #include "tests/robot/sealed_plan.h"
 
 namespace forereach {
@@ -22,8 +24,8 @@ using Kind = SealFault::Kind;
 constexpr int kAllStates = 16, kAllSlices = 129;
 constexpr std::size_t kFingerprint = 8, kRow = kAllStates * sizeof(double);
 
-certified_plan_t Plan(int states, int steps) {
-  certified_plan_t certified{};
+certified_plan_v2_t Plan(int states, int steps) {
+  certified_plan_v2_t certified{};
   certified.utime = 1'700'000'000'000'000;
   certified.sequence = 3;
   certified.expires_utime = certified.utime + 2'000'000;
@@ -42,12 +44,13 @@ certified_plan_t Plan(int states, int steps) {
   SetDigest(certified.declaration_digest, DigestOf("declaration"));
   SetDigest(certified.observations_digest, DigestOf("observations"));
   SetDigest(certified.obstacles_digest, DigestOf("obstacles"));
+  SetDigest(certified.transitions_digest, DigestOf("transitions"));
   Seal(certified);
   return certified;
 }
 
 std::vector<Kind> FaultsAfter(const auto& change) {
-  certified_plan_t certified = Plan(6, 12);
+  certified_plan_v2_t certified = Plan(6, 12);
   change(certified);
   std::vector<Kind> kinds;
   for (const SealFault& fault : FindSealFaults(certified)) kinds.push_back(fault.kind);
@@ -62,7 +65,7 @@ TEST(Seal, HoldsFromTheSmallestPlanToTheLargest) {
 // The definition, read off the message as it is on the bus.
 TEST(Seal, DigestIsOfTheBytesOnTheBusThatAreInUse) {
   for (const auto& [states, steps] : {std::pair(1, 1), {6, 12}, {16, 128}}) {
-    const certified_plan_t certified = Plan(states, steps);
+    const certified_plan_v2_t certified = Plan(states, steps);
     const std::vector<std::uint8_t> message = Encode(certified);
     std::vector<std::uint8_t> covered;
     const auto cover = [&](std::size_t offset, std::size_t size) {
@@ -74,15 +77,34 @@ TEST(Seal, DigestIsOfTheBytesOnTheBusThatAreInUse) {
     for (int bound = 0; bound < 2; ++bound, slices += kAllSlices * kRow)
       for (std::size_t t = 0; t <= static_cast<std::size_t>(steps); ++t)
         cover(slices + t * kRow, static_cast<std::size_t>(states) * sizeof(double));
-    cover(slices, 6 * sizeof(Digest));
+    cover(slices, 7 * sizeof(Digest));
     EXPECT_EQ(CertificateDigest(certified), DigestOf(covered));
-    EXPECT_EQ(covered.size(), 224u + 16u * static_cast<unsigned>(states * (steps + 1)));
+    EXPECT_EQ(covered.size(), 256u + 16u * static_cast<unsigned>(states * (steps + 1)));
   }
 }
 
 // Fast for good: other implementations have to come to the same.
 TEST(Seal, DigestOfAnExample) {
-  EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "2b4840076cfe98bd996951ae451cd5eaac7b9e3b0313de4caea5cf294273f184");
+  EXPECT_EQ(ToHex(CertificateDigest(Plan(6, 12))), "f7d10124a54a007bccd52d554097834e3a705860ebdb4ca31e9a304a4c29e4ce");
+}
+
+// Of logs that were recorded before.
+TEST(Seal, OfTheTypeBeforeIsWhatItWas) {
+  const certified_plan_v2_t plan = Plan(6, 12);
+  certified_plan_t old{};
+  old.utime = plan.utime;
+  old.sequence = plan.sequence;
+  old.expires_utime = plan.expires_utime;
+  old.plan = plan.plan;
+  std::memcpy(old.slice_lower, plan.slice_lower, sizeof old.slice_lower);
+  std::memcpy(old.slice_upper, plan.slice_upper, sizeof old.slice_upper);
+  SetGrounds(old, GroundsOf(plan));
+  Seal(old);
+  EXPECT_EQ(ToHex(CertificateDigest(old)), "2b4840076cfe98bd996951ae451cd5eaac7b9e3b0313de4caea5cf294273f184");
+  EXPECT_THAT(FindSealFaults(old), IsEmpty());
+  old.slice_upper[13][0] = 1;
+  ++old.sequence;
+  ASSERT_EQ(FindSealFaults(old).size(), 2u);
 }
 
 TEST(Seal, BreaksWithAnyBit) {
@@ -94,7 +116,7 @@ TEST(Seal, BreaksWithAnyBit) {
     std::vector<std::uint8_t> bad = good;
     for (std::size_t i = kFingerprint; i < good.size(); ++i) {
       bad[i] ^= static_cast<std::uint8_t>(1u << random() % 8);
-      const auto certified = Decoded<certified_plan_t>(bad);
+      const auto certified = Decoded<certified_plan_v2_t>(bad);
       ASSERT_TRUE(certified);
       ASSERT_FALSE(FindSealFaults(*certified).empty()) << "byte " << i << " of " << states << " states";
       bad[i] = good[i];
@@ -119,7 +141,7 @@ TEST(Seal, AnEntryBeyondThoseInUse) {
 }
 
 TEST(Seal, TheFirstStrayEntryIsNamed) {
-  certified_plan_t certified = Plan(6, 12);
+  certified_plan_v2_t certified = Plan(6, 12);
   certified.slice_upper[3][7] = 2;
   certified.slice_lower[40][3] = 1e-300;
   Seal(certified);  // no digest covers it
@@ -148,12 +170,14 @@ TEST(Seal, TimesAndDigests) {
   EXPECT_THAT(FaultsAfter([](auto& c) { ++c.expires_utime; }), ElementsAre(Kind::kCertificateDigest));
   EXPECT_THAT(FaultsAfter([](auto& c) { std::swap(c.config_digest, c.model_digest); }),
               ElementsAre(Kind::kCertificateDigest));
+  EXPECT_THAT(FaultsAfter([](auto& c) { c.transitions_digest[31] ^= 1; }), ElementsAre(Kind::kCertificateDigest));
+  EXPECT_THAT(FaultsAfter([](auto& c) { SetDigest(c.transitions_digest, {}); }), ElementsAre(Kind::kCertificateDigest));
 }
 
 // Fewer slices in use, or the same numbers as more slices of fewer states: the plan says otherwise.
 TEST(Seal, Counts) {
   const auto with = [](int states, int steps) {
-    return FaultsAfter([=](certified_plan_t& c) {
+    return FaultsAfter([=](certified_plan_v2_t& c) {
       c.plan.num_states = static_cast<std::int16_t>(states);
       c.plan.num_steps = static_cast<std::int16_t>(steps);
       SetDigest(c.certificate_digest, CertificateDigest(c));

@@ -168,6 +168,74 @@ inline ModelText TameText(Random& random) {
   return TextModel(equations, inputs, parameters, definitions, integrator);
 }
 
+/** Writes random expressions with kinks and edges of domains where names are whole halves. */
+class KinkedExpression {
+ public:
+  KinkedExpression(Random& random, std::vector<std::string> names) : random_(random), names_(std::move(names)) {}
+
+  void Add(const std::string& name) { names_.push_back(name); }
+
+  [[nodiscard]] std::string operator()(int depth) {
+    if (depth == 0 || random_.Coin(0.15)) return Leaf();
+    const std::string a = (*this)(depth - 1);
+    switch (random_.Below(18)) {
+      case 0: return a + " + " + (*this)(depth - 1);
+      case 1: return a + " - (" + (*this)(depth - 1) + ")";
+      case 2:
+      case 3: return "(" + a + ")*(" + (*this)(depth - 1) + ")";
+      case 4: return "(" + a + ")^" + std::to_string(random_.Integer(2, 3));
+      case 5:
+      case 6:
+      case 7: return "abs(" + a + ")";
+      case 8:
+      case 9: return "min(" + a + ", " + (*this)(depth - 1) + ")";
+      case 10:
+      case 11: return "max(" + a + ", " + (*this)(depth - 1) + ")";
+      case 12: return "sqrt(" + a + ")";
+      case 13: return "hypot(" + a + ", " + (*this)(depth - 1) + ")";
+      case 14: return "(" + a + ")/(" + (*this)(depth - 1) + ")";
+      case 15: return "asin(" + a + ")";
+      case 16: return "atan2(" + a + ", " + (*this)(depth - 1) + ")";
+      default: return "sin(" + a + ")";
+    }
+  }
+
+ private:
+  std::string Leaf() {
+    static const std::vector<std::string> numbers{"0", "0.5", "1", "2"};
+    const auto& all = random_.Coin(0.25) ? numbers : names_;
+    return all[static_cast<std::size_t>(random_.Below(static_cast<int>(all.size())))];
+  }
+
+  Random& random_;
+  std::vector<std::string> names_;
+};
+
+/** One to four states; all integrators. */
+inline ModelText KinkedText(Random& random) {
+  std::vector<std::string> states, inputs{"u0"};
+  for (int k = random.Integer(1, 4); k > 0; --k) states.push_back("x" + std::to_string(k));
+  std::vector<std::string> known = states;
+  known.insert(known.end(), inputs.begin(), inputs.end());
+  std::vector<ModelText::Parameter> parameters{{"dt", 0.125, 0.125}};
+  if (random.Coin(0.3)) {
+    parameters.push_back({"p", 0, random.Coin() ? 0 : 0.03125});
+    known.emplace_back("p");
+  }
+  KinkedExpression expression(random, known);
+  Lines definitions, equations;
+  if (random.Coin()) {
+    definitions.emplace_back("d", expression(2));
+    expression.Add("d");
+  }
+  const auto integrator = static_cast<ModelText::Integrator>(random.Coin() ? 0 : random.Below(4));
+  for (const std::string& name : states) {
+    const std::string rate = expression(random.Integer(1, 3));
+    equations.emplace_back(name, integrator == ModelText::Integrator::kNone ? name + " + dt*(" + rate + ")" : rate);
+  }
+  return TextModel(equations, inputs, parameters, definitions, integrator);
+}
+
 inline ModelText AnyText(Random& random) { return random.Coin() ? WeaklyCoupledText(random) : TameText(random); }
 
 /** f0(z) of a text in high precision, by the formulas of the integrators. @param parameters their values. */
@@ -237,9 +305,8 @@ constexpr double kTextReach = 3;  ///< Of each state; of each input it is 1.
 
 /** A random text with transitions of it and an admissible residual, for some value of its parameters. Null if the text
 has no value at most points. */
-inline std::shared_ptr<Problem> AnyTextProblem(Random& random) {
+inline std::shared_ptr<Problem> AnyTextProblem(Random& random, const ModelText& text) {
   auto problem = std::make_shared<Problem>();
-  const ModelText text = AnyText(random);
   problem->model = MakeTextModel(text);
   const int n = problem->model->num_states(), inputs = problem->model->num_inputs(), variables = n + inputs;
   problem->domain.state = Box(Eigen::VectorXd::Constant(n, -kTextReach), Eigen::VectorXd::Constant(n, kTextReach));
@@ -273,6 +340,30 @@ inline std::shared_ptr<Problem> AnyTextProblem(Random& random) {
     problem->transitions.x_next.row(i++) = next;
   }
   return problem;
+}
+
+inline std::shared_ptr<Problem> AnyTextProblem(Random& random) {
+  const ModelText text = AnyText(random);
+  return AnyTextProblem(random, text);
+}
+
+/** Of states that are points, at kinks and beside them, or touch a kink with an end; and of boxes. */
+inline Query KinkedQuery(Random& random, const Problem& problem) {
+  const int n = problem.model->num_states(), inputs = problem.model->num_inputs();
+  const auto whole_half = [&] { return 0.5 * random.Integer(-3, 3); };
+  Eigen::VectorXd center(n), half(n);
+  for (int k = 0; k < n; ++k) {
+    center[k] = random.Coin(0.7) ? whole_half() : random.Uniform(-1.5, 1.5);
+    half[k] = random.Coin(0.6) ? 0 : std::ldexp(1, -random.Integer(3, 12));
+    if (random.Coin(0.2)) center[k] += random.Sign() * half[k];
+    if (random.Coin(0.1)) center[k] += random.Sign() * std::ldexp(1, -random.Integer(20, 60));
+  }
+  Query query;
+  query.initial_set = Zonotope::FromBox(center, half);
+  query.controls = random.Matrix(inputs, random.Integer(1, 4), 0.7);
+  for (Eigen::Index i = 0; i < query.controls.size(); ++i)
+    if (random.Coin()) query.controls(i) = 0.5 * random.Integer(-2, 2);
+  return query;
 }
 
 inline Query AnyTextQuery(Random& random, const Problem& problem) {

@@ -34,6 +34,7 @@ struct Options {
   bool wide =
       false;  ///< Problems and queries are then changed as Tighten and Widen do, by random numbers of their own.
   bool texts = false;   ///< Random models as text.
+  bool kinks = false;   ///< Random models as text with kinks in and at the ends of slices, many of them points.
   bool worlds = false;  ///< Bodies, bounds between samples and obstacles that move, instead of the problems above.
   bool limits = false;  ///< Limits on random functions, instead of the problems above.
 };
@@ -445,9 +446,10 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
   Random random(start), wide(~start), winds(start ^ 0x5851f42d4c957f2d);
   Counts counts;
   counts.problems = 1;
-  const bool absurd = random.Coin(0.25) && !options.texts;
-  const auto problem =
-      options.texts ? AnyTextProblem(random) : AnyProblem(random, random.Coin(), random.Integer(1, 20));
+  const bool absurd = random.Coin(0.25) && !options.texts && !options.kinks;
+  const auto problem = options.kinks   ? AnyTextProblem(random, KinkedText(random))
+                       : options.texts ? AnyTextProblem(random)
+                                       : AnyProblem(random, random.Coin(), random.Integer(1, 20));
   if (!problem) return counts;
   problem->method = options.method;
   Vary(random, *problem);
@@ -466,7 +468,9 @@ Counts RunProblem(const Options& options, long number, Tube& tube, std::mutex& o
   }
   std::unique_ptr<verifier::Verifier> judge;
   for (int i = 0; i < options.calls; ++i) {
-    Query query = options.texts ? AnyTextQuery(random, *problem) : AnyCall(random, *problem, absurd);
+    Query query = options.kinks   ? KinkedQuery(random, *problem)
+                  : options.texts ? AnyTextQuery(random, *problem)
+                                  : AnyCall(random, *problem, absurd);
     if (options.wide) Widen(wide, query);
     if (random.Coin(0.3) &&
         certifier->Certify(query.plan(), query.initial_set, {}, tube).outcome == Outcome::kCertified) {
@@ -517,6 +521,9 @@ int main(int argc, char** argv) {
                    .variable = &options.wide,
                    .help = "Wider initial sets, and domains whose inequalities the data just meet"},
                   {.name = "--texts", .variable = &options.texts, .help = "Random models as text"},
+                  {.name = "--kinks",
+                   .variable = &options.kinks,
+                   .help = "Random models as text with kinks at the states, many of them points"},
                   {.name = "--worlds",
                    .variable = &options.worlds,
                    .help = "Bodies, bounds between samples and obstacles that move, just accepted and just met"},
@@ -558,7 +565,7 @@ int main(int argc, char** argv) {
               << total.contacts_confirmed << " confirmed" << std::endl;
   const bool enough = only >= 0 || total.certified * 20 >= total.calls;  // a fuzz that certifies nothing tests nothing
   // Of wide sets the reduction's choices are now and then too close for the verifier to follow: it then says so.
-  const bool is_wide = options.wide || options.worlds || options.texts;
+  const bool is_wide = options.wide || options.worlds || options.texts || options.kinks;
   const bool followed = total.cannot_verify * (is_wide ? 200 : total.calls + 1) <= total.certified;
   return total.refuted == 0 && total.contacts_confirmed == 0 &&
                  (total.inside - total.inside_refuted) * 100 <= total.inside && followed && enough

@@ -50,7 +50,7 @@ class CertifierNodeTest : public testing::Test {
       order_ += 'd';
     });
     bus_->Subscribe("PLAN_CERTIFIED", [this](const Received& r) {
-      certified_.push_back(Decoded<certified_plan_t>(r.bytes).value());
+      certified_.push_back(Decoded<certified_plan_v2_t>(r.bytes).value());
       order_ += 'c';
     });
     bus_->Subscribe("CERTIFIER_STATUS",
@@ -75,7 +75,7 @@ class CertifierNodeTest : public testing::Test {
   std::unique_ptr<Bus> bus_;
   std::unique_ptr<CertifierNode> node_;
   std::vector<decision_t> decisions_;
-  std::vector<certified_plan_t> certified_;
+  std::vector<certified_plan_v2_t> certified_;
   std::vector<certifier_status_v3_t> status_;
   std::string order_;
 };
@@ -806,7 +806,7 @@ TEST_F(ArmedNodeTest, HeartbeatsGoOnWhereTheClockJumpsToAndFro) {
 TEST_F(ArmedNodeTest, AStateOutsideItsSliceLatchesAndNamesTheTransition) {
   SayState(State());
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
-  const certified_plan_t plan = certified_.back();
+  const certified_plan_v2_t plan = certified_.back();
   for (const bool outside : {false, true}) {
     ++sequence_;  // a lost message between, so that each is judged by what it says itself
     robot_state_t state = State(plan.plan.plan_id, 1);
@@ -904,7 +904,7 @@ TEST_F(StrangerTest, WhatThisCertifierCertifiedMayBeExecutedAndNoFurther) {
   SayState(State());
   StandFor(kTolerated + 1);
   ASSERT_EQ(Ask().outcome, decision_t::CERTIFIED);
-  const certified_plan_t plan = certified_.back();
+  const certified_plan_v2_t plan = certified_.back();
   const auto at = [&](int step) {
     ++sequence_;  // each is judged by itself
     robot_state_t state = State(plan.plan.plan_id, step);

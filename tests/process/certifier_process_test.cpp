@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/obstacle_message.h"
-#include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/transition_t.hpp"
@@ -122,9 +122,9 @@ TEST_F(CertifierProcessTest, AnswersGoodAndBadExactlyOnceAndPassesOnOnlyWhatItCe
   EXPECT_EQ(decisions.size(), expected_.size());
   EXPECT_EQ(causes, expected_);
 
-  const auto certified = probe_.Heard<certified_plan_t>("PLAN_CERTIFIED");
+  const auto certified = probe_.Heard<certified_plan_v2_t>("PLAN_CERTIFIED");
   ASSERT_EQ(certified.size(), 3u);
-  for (const certified_plan_t& plan : certified) {
+  for (const certified_plan_v2_t& plan : certified) {
     EXPECT_EQ(expected_.at(ToHex(DigestOf(Encode(plan.plan)))), "none");
     EXPECT_TRUE(FindSealFaults(plan).empty());
     EXPECT_EQ(GetDigest(plan.config_digest), config_.grounds.config);

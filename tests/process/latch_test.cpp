@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "certifier/process/certifier_node.h"
+#include "forereach/withdrawal_t.hpp"
 #include "tests/gate/small_task.h"
 #include "tests/reset.h"
 #include "tests/scratch.h"
@@ -61,6 +62,8 @@ class LatchTest : public testing::Test {
     bus_->Subscribe("FAULT", [this](const Received& r) { faults_.push_back(Decoded<fault_t>(r.bytes).value()); });
     bus_->Subscribe("PLAN_DECISION", [this](const Received& r) { decision_ = Decoded<decision_t>(r.bytes).value(); });
     bus_->Subscribe("PLAN_CERTIFIED", [this](const Received&) { ++certified_; });
+    bus_->Subscribe("PLAN_WITHDRAWN",
+                    [this](const Received& r) { withdrawal_ = Decoded<withdrawal_t>(r.bytes).value(); });
     bus_->Subscribe("CERTIFIER_STATUS",
                     [this](const Received& r) { status_ = Decoded<certifier_status_v3_t>(r.bytes).value(); });
     node_ = std::make_unique<CertifierNode>(config_, *bus_, Clocks{clock_, clock_}, 0,
@@ -76,12 +79,12 @@ class LatchTest : public testing::Test {
     now_us_ += CertifierNode::kHeartbeatUs;
     SayState();
   }
-  void SayState() {
+  void SayState(std::int64_t executing = -1) {
     robot_state_t state{};
     state.utime = now_us_;
     state.sequence = sequence_++;
-    state.mode = robot_state_t::STANDING;
-    state.executing_plan_id = -1;
+    state.mode = executing < 0 ? robot_state_t::STANDING : robot_state_t::EXECUTING;
+    state.executing_plan_id = executing;
     state.num_states = 4;
     bus_->Publish("ROBOT_STATE", state);
     Run();
@@ -158,6 +161,7 @@ class LatchTest : public testing::Test {
   std::vector<fault_t> faults_;
   decision_t decision_{};
   certifier_status_v3_t status_{};
+  withdrawal_t withdrawal_{};
   int certified_ = 0;
   std::int64_t next_plan_id_ = 1, sequence_ = 0;
 };
@@ -255,6 +259,21 @@ TEST_F(LatchTest, AFalsifiedDeclarationStaysSoOverRestartsAndResets) {
   config_.grounds.model = DigestOf(std::string_view("another model"));
   Begin();
   ExpectArmed();
+}
+
+// The guard leaves a plan whose certificate names the digest of the file's transitions.
+TEST_F(LatchTest, NoPlanOfAPredecessorStandsUnderAFalsifiedDeclaration) {
+  Begin();
+  SayState(99);
+  EXPECT_EQ(withdrawal_.cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_EQ(GetDigest(withdrawal_.observations_digest), config_.grounds.observations);
+  FalsifyAndEnd();
+  Begin();
+  Reset();
+  withdrawal_ = {};
+  SayState(99);
+  EXPECT_EQ(withdrawal_.cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_EQ(GetDigest(withdrawal_.observations_digest), Digest{});
 }
 
 TEST_F(LatchTest, OneContradictionOfADeclarationIsEnough) {

@@ -191,7 +191,7 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
     });
   if (channel == "PLAN_CERTIFIED")
     return Robot([](int number) {
-      certified_plan_t certified{};
+      certified_plan_v2_t certified{};
       certified.plan.plan_id = certified.sequence = number;
       return Encode(certified);
     });

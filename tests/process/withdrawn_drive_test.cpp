@@ -140,7 +140,7 @@ class WithdrawnDriveTest : public testing::Test {
   RobotSimNode robot_{config_, *bus_, out_};
   std::unique_ptr<CertifierNode> certifier_;
   std::vector<withdrawal_t> withdrawn_;
-  std::vector<certified_plan_t> certified_;
+  std::vector<certified_plan_v2_t> certified_;
   std::vector<decision_t> decisions_;
   std::vector<execution_event_t> events_;
   std::vector<robot_state_t> states_;
@@ -342,6 +342,25 @@ class RestartedCertifierTest : public WithdrawnDriveTest {
     Gate predecessor(config_);
     Drive(predecessor);
   }
+  Config WithOtherTransitions() const {
+    Config config = config_;
+    Problem problem = *config_.problem;
+    problem.transitions.z.row(1).swap(problem.transitions.z.row(0));
+    problem.transitions.x_next.row(1).swap(problem.transitions.x_next.row(0));
+    config.grounds = GroundsOf(config_.grounds.config, problem, config_.obstacles);
+    config.problem = std::make_shared<const Problem>(problem);
+    return config;
+  }
+  transition_t Learned() const {
+    transition_t learned{};
+    learned.utime = now_;
+    learned.num_states = 4;
+    learned.num_inputs = 2;
+    learned.state[2] = 1.5;
+    learned.next_state[0] = 1.5 * 0.15;
+    learned.next_state[2] = 1.5;
+    return learned;
+  }
   void SendPlan(Gate& predecessor) {
     obstacles_t message = ToMessage(obstacles_);
     message.utime = now_;
@@ -370,33 +389,59 @@ TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereNothingHasChanged) {
 }
 
 TEST_F(RestartedCertifierTest, ThePlanStopsWhereItHadOtherTransitionsOfTheTask) {
-  Config before = config_;
-  Problem problem = *config_.problem;
-  problem.transitions.z.row(1).swap(problem.transitions.z.row(0));
-  problem.transitions.x_next.row(1).swap(problem.transitions.x_next.row(0));
-  before.grounds = GroundsOf(config_.grounds.config, problem, config_.obstacles);
-  before.problem = std::make_shared<const Problem>(problem);
-  Gate predecessor(before);
+  Gate predecessor(WithOtherTransitions());
   Drive(predecessor);
   Begin();
   RunFor(300'000);
   EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
 }
 
-// The certificate does not say which transitions were learned, and to which file of transitions they were added.
-TEST_F(RestartedCertifierTest, ThePlanStopsWhereItRestsOnLearnedTransitions) {
+// What its predecessor had learned stays true.
+TEST_F(RestartedCertifierTest, ThePlanGoesOnWhereItRestsOnLearnedTransitions) {
   Gate predecessor(config_);
-  transition_t learned{};
-  learned.utime = now_;
-  learned.num_states = 4;
-  learned.num_inputs = 2;
-  learned.state[2] = 1.5;
-  learned.next_state[0] = 1.5 * 0.15;
-  learned.next_state[2] = 1.5;
-  ASSERT_EQ(predecessor.Learn(Encode(learned)), "");
+  ASSERT_EQ(predecessor.Learn(Encode(Learned())), "");
   ASSERT_NE(predecessor.grounds().observations, predecessor.transitions());
   Drive(predecessor);
   Begin();
+  RunFor(6'000'000);
+  ASSERT_EQ(withdrawn_.size(), 1u);
+  EXPECT_EQ(withdrawn_[0].cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::STANDING));
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+}
+
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereTheSameWasLearnedAfterAnotherFile) {
+  Gate predecessor(WithOtherTransitions());
+  ASSERT_EQ(predecessor.Learn(Encode(Learned())), "");
+  Drive(predecessor);
+  Begin();
+  RunFor(300'000);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+}
+
+// The restarted certifier learns what contradicts the declaration: what it names then, no certificate rests on.
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereSomethingIsLearnedThatContradicts) {
+  Gate predecessor(config_);
+  ASSERT_EQ(predecessor.Learn(Encode(Learned())), "");
+  Drive(predecessor);
+  Begin();
+  RunFor(300'000);
+  EXPECT_THAT(Kinds(), Not(Contains(execution_event_t::EMERGENCY_STOP)));
+  lossy_.to_lose["FAULT"] = 1000;
+  transition_t contradiction = Learned();
+  contradiction.utime = now_;
+  contradiction.next_state[2] = 3;
+  bus_->Publish("TRANSITION", contradiction);
+  RunFor(300'000);
+  EXPECT_EQ(withdrawn_.back().cause, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
+}
+
+TEST_F(RestartedCertifierTest, ThePlanStopsWhereACertifierOfAnotherTaskWasInBetween) {
+  Drive();
+  Config other = config_;
+  other.grounds.config = DigestOf("another task");
+  certifier_ = std::make_unique<CertifierNode>(other, lossy_, Clocks{clock_, clock_});
   RunFor(300'000);
   EXPECT_THAT(Kinds(), Contains(execution_event_t::EMERGENCY_STOP).Times(1));
 }

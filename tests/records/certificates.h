@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "forereach/certified_plan_t.hpp"
 #include "records/certificate_files.h"
+#include "records/certified_message.h"
 #include "records/event_log.h"
 
 namespace forereach {
@@ -26,7 +26,7 @@ inline candidate_plan_t FirstCertified(const std::string& log) {
   EventLogReader reader(log);
   LogEvent event;
   while (reader.Next(event) == LogStatus::kEvent)
-    if (const auto certified = Decoded<certified_plan_t>(event.data)) return certified->plan;
+    if (const auto certified = ReadCertified(event.data)) return certified->plan.plan;
   return {};
 }
 

@@ -14,6 +14,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/gate/plans_in_force.h"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
@@ -215,14 +216,14 @@ class VerifyObstacles : public testing::Test {
     edit_decision_ = edit;
     return Record();
   }
-  std::string Record(const std::function<void(obstacles_t&, certified_plan_t&)>& edit = {}) {
+  std::string Record(const std::function<void(obstacles_t&, certified_plan_v2_t&)>& edit = {}) {
     Gate gate(config_);
     obstacles_t obstacles = Message(80, 0, kStart);
     EXPECT_EQ(gate.UpdateObstacles(Encode(obstacles), kStart + 1), "");
     const auto bytes = Encode(candidate_);
     GateAnswer answer = gate.Decide(bytes, kStart + 3);
     EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
-    certified_plan_t certified = answer.certified.value_or(certified_plan_t{});
+    certified_plan_v2_t certified = answer.certified.value_or(certified_plan_v2_t{});
     if (edit) edit(obstacles, certified);
     if (edit_decision_) edit_decision_(answer.decision);
     const std::string path = scratch_ / "log.lcmlog";
@@ -252,7 +253,7 @@ TEST_F(VerifyObstacles, ThoseInForceAreTaken) {
 }
 
 TEST_F(VerifyObstacles, MovedOntoThePath) {
-  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+  const auto file = ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_v2_t& certified) {
                                        obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
                                        obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
                                      }),
@@ -264,7 +265,7 @@ TEST_F(VerifyObstacles, MovedOntoThePath) {
 
 TEST_F(VerifyObstacles, MovedOntoThePathAndResealed) {
   const auto file =
-      ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_t& certified) {
+      ReadCertificates(Record([&](obstacles_t& obstacles, certified_plan_v2_t& certified) {
                          obstacles.obstacle[0].point[0][0] = certified.slice_lower[20][0];
                          obstacles.obstacle[0].point[0][1] = certified.slice_lower[20][1];
                          SetDigest(certified.obstacles_digest, ObstaclesDigest(FromMessage(obstacles, 2)));
@@ -274,6 +275,17 @@ TEST_F(VerifyObstacles, MovedOntoThePathAndResealed) {
   for (const Mismatch& mismatch : file.certificates[0].mismatches)
     EXPECT_THAT(mismatch.what, HasSubstr("its decision's"));
   EXPECT_EQ(Judge(file, 0).status, Status::kRefuted);
+}
+
+// The robot goes by them after a restart of the certifier.
+TEST_F(VerifyObstacles, OtherTransitionsOfTheTaskAndResealed) {
+  const auto file = ReadCertificates(Record([](obstacles_t&, certified_plan_v2_t& certified) {
+                                       certified.transitions_digest[7] ^= 1;
+                                       SetDigest(certified.certificate_digest, CertificateDigest(certified));
+                                     }),
+                                     kConfig);
+  ASSERT_EQ(file.certificates[0].mismatches.size(), 1u);
+  EXPECT_THAT(file.certificates[0].mismatches[0].what, HasSubstr("digest of the transitions of the task"));
 }
 
 // The sentence and the numbers of the decision that goes with a certified plan.
@@ -434,7 +446,7 @@ class VerifyMovingObstacles : public VerifyObstacles {
     const auto bytes = Encode(candidate_);
     GateAnswer answer = gate.Decide(bytes, kStart + 3);
     EXPECT_TRUE(answer.certified) << GetText(answer.decision.message);
-    certified_plan_t certified = answer.certified.value_or(certified_plan_t{});
+    certified_plan_v2_t certified = answer.certified.value_or(certified_plan_v2_t{});
     const Digest digest = ObstaclesDigest(FromMessage(Message(logged), 2));
     SetDigest(answer.decision.obstacles_digest, digest);
     SetDigest(certified.obstacles_digest, digest);
@@ -501,7 +513,7 @@ TEST_F(VerifyMovingObstacles, AStepLongerThanTheBoundedTimeIsNotDerived) {
   const auto missing = [&](std::int64_t step_us) {
     const std::string path = scratch_ / ("step" + std::to_string(step_us) + ".lcmlog");
     CopyLog(scratch_ / "log.lcmlog", path, [&](LogEvent& event) {
-      if (auto certified = Decoded<certified_plan_t>(event.data)) {
+      if (auto certified = Decoded<certified_plan_v2_t>(event.data)) {
         certified->plan.step_us = step_us;
         event.data = Encode(*certified);
       }
@@ -527,7 +539,7 @@ TEST_F(VerifyMovingObstacles, WhatIsNowhereDuringThePlanIsNotNamed) {
 
 TEST_F(VerifyObstacles, StaleOnesWereNeverInForce) {
   const auto file = ReadCertificates(
-      Record([](obstacles_t& obstacles, certified_plan_t&) { obstacles.utime -= 10'000'000; }), kConfig);
+      Record([](obstacles_t& obstacles, certified_plan_v2_t&) { obstacles.utime -= 10'000'000; }), kConfig);
   EXPECT_GE(file.certificates[0].mismatches.size(), 1u);
   EXPECT_EQ(file.certificates[0].certificate.obstacles.size(), LoadConfig(kConfig).obstacles.size());
 }

@@ -33,8 +33,8 @@ GuardOptions TwoStates() {
 }
 
 // Of a plan of SmallPlan's kind.
-withdrawal_t Withdrawal(const certified_plan_t& plan, int valid_steps, std::int16_t cause = withdrawal_t::OBSTACLE) {
-  certified_plan_t sealed = plan;
+withdrawal_t Withdrawal(const certified_plan_v2_t& plan, int valid_steps, std::int16_t cause = withdrawal_t::OBSTACLE) {
+  certified_plan_v2_t sealed = plan;
   Seal(sealed);
   withdrawal_t message{};
   message.utime = kNow;
@@ -43,7 +43,10 @@ withdrawal_t Withdrawal(const certified_plan_t& plan, int valid_steps, std::int1
   message.cause = cause;
   message.valid_steps = static_cast<std::int16_t>(valid_steps);
   SetGrounds(message, GroundsOf(plan));
-  if (cause != withdrawal_t::UNKNOWN_PLAN) SetDigest(message.certificate_digest, GetDigest(sealed.certificate_digest));
+  if (cause == withdrawal_t::UNKNOWN_PLAN)
+    SetDigest(message.observations_digest, GetDigest(plan.transitions_digest));
+  else
+    SetDigest(message.certificate_digest, GetDigest(sealed.certificate_digest));
   return message;
 }
 
@@ -111,13 +114,13 @@ TEST_F(GuardWithdrawTest, APendingPlanIsDroppedHoweverManyStepsStand) {
 
 TEST_F(GuardWithdrawTest, ItTakesNoOtherPlan) {
   Start(7);
-  certified_plan_t next = SmallPlan(8);
+  certified_plan_v2_t next = SmallPlan(8);
   next.plan.start_utime += 2 * kStep;
   EXPECT_TRUE(guard_.Accept(Sealed(next), kNow).ok());
   EXPECT_EQ(Withdraw(0, 6), 0);
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
   EXPECT_NE(guard_.pending(), nullptr);
-  certified_plan_t namesake = SmallPlan(7);  // of another source
+  certified_plan_v2_t namesake = SmallPlan(7);  // of another source
   namesake.plan.control[0][0] = 1;
   EXPECT_TRUE(guard_.Withdraw(Encode(Withdrawal(namesake, 0))).verdict.ok());
   EXPECT_EQ(guard_.standing_steps(), std::nullopt);
@@ -164,6 +167,41 @@ TEST_F(GuardWithdrawTest, AnUnknownPlanStandsOnlyUnderTheGroundsOfItsCertificate
   EXPECT_EQ(standing_after(&withdrawal_t::obstacles_digest), 0);
   unknown.cause = withdrawal_t::FALSIFIED;
   EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 0) << "only an unknown plan may stand";
+}
+
+// Of the observations of its certificate the guard asks which file they began with, and nothing else.
+TEST_F(GuardWithdrawTest, AnUnknownPlanStandsWhateverWasLearnedAfterTheFile) {
+  const auto standing_steps = [](const Digest& observations, const Digest& named) {
+    certified_plan_v2_t plan = SmallPlan();
+    SetDigest(plan.observations_digest, observations);
+    Guard guard(TwoStates());
+    EXPECT_TRUE(guard.Accept(Sealed(plan), kNow).ok() && guard.TryStart(kStart, kStart, kInside).ok());
+    withdrawal_t unknown = Withdrawal(plan, 0, withdrawal_t::UNKNOWN_PLAN);
+    SetDigest(unknown.observations_digest, named);
+    return guard.Withdraw(Encode(unknown)).standing_steps;
+  };
+  const Digest file = DigestOf("transitions");  // of SmallPlan
+  const std::vector<std::uint8_t> row{1, 2, 3};
+  const Digest learned = ChainedDigest(file, row);
+  EXPECT_EQ(standing_steps(file, file), 3);
+  EXPECT_EQ(standing_steps(learned, file), 3);
+  EXPECT_EQ(standing_steps(learned, DigestOf("another file")), 0);
+  EXPECT_EQ(standing_steps(ChainedDigest(DigestOf("another file"), row), DigestOf("another file")), 0)
+      << "its observations are those of the other file, what it was certified under says that it is not";
+  EXPECT_EQ(standing_steps(learned, learned), 0) << "as a certifier names that has learned a contradiction";
+  EXPECT_EQ(standing_steps(file, ChainedDigest(file, row)), 0);
+  EXPECT_EQ(standing_steps(file, Digest{}), 0) << "as one names that knows of a contradiction and has not learned it";
+}
+
+TEST_F(GuardWithdrawTest, WhatACertifierOfAnotherTaskWithdrewStandsUnderNone) {
+  Start();
+  withdrawal_t unknown = Withdrawal(SmallPlan(), 0, withdrawal_t::UNKNOWN_PLAN);
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 3);
+  withdrawal_t of_another = unknown;
+  SetDigest(of_another.config_digest, DigestOf("another task"));
+  EXPECT_EQ(guard_.Withdraw(Encode(of_another)).standing_steps, 0);
+  EXPECT_EQ(guard_.Withdraw(Encode(unknown)).standing_steps, 0) << "the first task's is back";
+  EXPECT_TRUE(guard_.control().empty());
 }
 
 TEST_F(GuardWithdrawTest, BytesThatAreNoWithdrawalChangeNothing) {
@@ -240,14 +278,14 @@ class SupervisorWithdrawTest : public testing::Test, protected Supervisor::Robot
     supervisor_.emplace(options, robot);
   }
   static std::int64_t At(int boundary) { return kStart + boundary * kStep; }
-  static certified_plan_t PlanFrom(int boundary, std::int64_t plan_id) {
-    certified_plan_t plan = SmallPlan(plan_id);
+  static certified_plan_v2_t PlanFrom(int boundary, std::int64_t plan_id) {
+    certified_plan_v2_t plan = SmallPlan(plan_id);
     plan.plan.start_utime = At(boundary);
     plan.expires_utime = At(boundary + 1);
     return plan;
   }
-  void Accept(const certified_plan_t& plan) { supervisor_->OnCertified(Sealed(plan), kNow); }
-  void Withdraw(const certified_plan_t& plan, int valid_steps, std::int64_t sequence = 4) {
+  void Accept(const certified_plan_v2_t& plan) { supervisor_->OnCertified(Sealed(plan), kNow); }
+  void Withdraw(const certified_plan_v2_t& plan, int valid_steps, std::int64_t sequence = 4) {
     withdrawal_t message = Withdrawal(plan, valid_steps);
     message.sequence = sequence;
     SetText(message.message, "a wall");

@@ -3,6 +3,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -169,6 +170,71 @@ TEST(AngleCertificates, TheUnitOfAnAngleCounts) {
   narrow.slices[1].upper[2] = 0x1.ffp-50;
   EXPECT_EQ(judge.Verify(narrow).status, Status::kRefuted);
 }
+
+// A state that is a point has no part in the remainder, so neither has a kink or an infinite slope along it. The second
+// one leaves the kink in the first step.
+class PointAtAKink : public testing::TestWithParam<std::tuple<const char*, forereach::Method>> {
+ protected:
+  // x is a box, and y = place +- half_width.
+  static Zonotope Initial(double place, double half_width) {
+    return Zonotope::FromBox(Eigen::Vector2d(0.1, place), Eigen::Vector2d(0.01, half_width));
+  }
+  static std::shared_ptr<Problem> ProblemOfTerm() {
+    const std::string term = std::get<0>(GetParam());
+    auto problem =
+        ProblemOf(TextModel({{"x", "x + 0.1*(" + term + ")"}, {"y", "y + 0.5"}}, {"u"}, {{"dt", 0.1, 0.1}}), 2);
+    problem->method = std::get<1>(GetParam());
+    return problem;
+  }
+
+  const std::shared_ptr<Problem> problem_ = ProblemOfTerm();
+  const Certifier certifier_{problem_};
+  const Verifier judge_{problem_, MethodOf(*problem_)};
+  const Eigen::MatrixXd controls_ = Eigen::MatrixXd::Zero(1, 2);
+  const Plan plan_{controls_.data(), 1, 2, 1, {}};
+  forereach::Tube tube_;
+};
+
+TEST_P(PointAtAKink, IsConfirmed) {
+  ASSERT_EQ(certifier_.Certify(plan_, Initial(0, 0), {}, tube_).outcome, Outcome::kCertified);
+  const Certificate certificate = CertificateOf(certifier_, plan_, Initial(0, 0), {}, tube_);
+  const Verdict verdict = judge_.Verify(certificate);
+  EXPECT_EQ(verdict.status, Status::kConfirmed) << verdict.failure.what << ": " << verdict.failure.found;
+  Certificate smaller = certificate;
+  smaller.slices.back().upper[0] -= 1e-6;
+  EXPECT_EQ(judge_.Verify(smaller).status, Status::kRefuted);
+}
+
+TEST_P(PointAtAKink, IsNotIfItIsNoPoint) {
+  ASSERT_EQ(certifier_.Certify(plan_, Initial(0, 0), {}, tube_).outcome, Outcome::kCertified);
+  Certificate certificate = CertificateOf(certifier_, plan_, Initial(0, 0), {}, tube_);
+  for (const double half_width : {0x1p-1074, 0x1p-60, 1e-3}) {
+    EXPECT_EQ(certifier_.Certify(plan_, Initial(0, half_width), {}, tube_).cause, Cause::kNoFiniteEnclosure);
+    certificate.initial_set.generators = Initial(0, half_width).GeneratorMatrix();
+    for (const bool has_slices : {true, false}) {
+      Certificate wider = certificate;
+      if (!has_slices) wider.slices.clear();
+      EXPECT_EQ(judge_.Verify(wider).status, Status::kRefuted) << half_width;
+    }
+  }
+}
+
+// The kink comes in the second step, where the residual has made a box of the point.
+TEST_P(PointAtAKink, IsNotInTheNextStep) {
+  const Zonotope initial = Initial(-0.5, 0);
+  const Decision decision = certifier_.Certify(plan_, initial, {}, tube_);
+  EXPECT_EQ(decision.outcome, Outcome::kDomain);
+  verifier::Certificate certificate;
+  certificate.initial_set = {{}, {}, initial.CenterVector(), initial.GeneratorMatrix()};
+  certificate.controls = controls_;
+  EXPECT_EQ(judge_.Verify(certificate).status, Status::kRefuted);
+}
+
+INSTANTIATE_TEST_SUITE_P(Terms, PointAtAKink,
+                         testing::Combine(testing::Values("abs(y)", "abs(y + sqrt(2)^2 - 2)",
+                                                          "x*abs(y + sqrt(2)^2 - 2) + sin(x)^2",
+                                                          "cos(x)*max(y, 2 - sqrt(2)^2)", "x - min(y, sqrt(3)^2 - 3)"),
+                                          testing::Values(forereach::Method::kPaper, forereach::Method::kCentred)));
 
 INSTANTIATE_TEST_SUITE_P(Integrators, TextCertificates,
                          testing::Values(Integrator::kEuler, Integrator::kMidpoint, Integrator::kRk4));
