@@ -123,7 +123,7 @@ class TimelineTest : public testing::Test {
       void OnCertified(const RecordedPlan& recorded) override {
         ++plans;
         EXPECT_TRUE(recorded.has_candidate);
-        EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.certified)) << recorded.event;
+        EXPECT_EQ(recorded.basis.grounds, GroundsOf(recorded.certified.plan)) << recorded.event;
       }
       int decisions = 0, plans = 0;
     } comparer;
