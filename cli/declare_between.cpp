@@ -95,7 +95,7 @@ Proposal FromPositions(const Config& config) {
   const Problem& problem = *config.problem;
   RequireFrame(config);
   const MeasuredMotion measured =
-      MeasureMotion(problem.transitions, problem.projection, problem.body.heading, config.period);
+      MeasureMotion(*problem.model, problem.transitions, problem.projection, problem.body.heading, config.period);
   if (measured.triples == 0)
     throw ConfigError(
         config.path +

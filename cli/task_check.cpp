@@ -15,6 +15,7 @@
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "certifier/residual/observations.h"
+#include "certifier/safety/clearance.h"
 #include "certifier/task/config.h"
 #include "certifier/task/document.h"
 #include "certifier/task/draft.h"
@@ -437,7 +438,7 @@ class Examination final {
                 "] of the domain: no certified plan gets there",
             "move the goal, or widen the domain, if the declaration holds there");
     }
-    for (std::size_t i = 0; i < config_.obstacles.size(); ++i)
+    for (std::size_t i = 0; HasFrame(problem_.body) && i < config_.obstacles.size(); ++i)
       if (!config_.obstacles[i].motion() &&
           -ApproximateDistance(config_.obstacles[i], place) >= config_.planner.goal_radius)
         Add("planner.goal", "task.obstacles[" + std::to_string(i) + "] covers the goal", "move one of them");

@@ -24,7 +24,7 @@ class PlanSearch final {
         half_width_((config.initial_set.upper() - config.initial_set.lower()) / 2),
         schedule_(schedule),
         seed_(seed * kSpread),
-        lessons_(config.planner) {}
+        lessons_(config.planner, config.problem->limits.size()) {}
 
   CertifiedPlan Run() {
     Eigen::VectorXd start = (config_.initial_set.lower() + config_.initial_set.upper()) / 2;
@@ -40,6 +40,7 @@ class PlanSearch final {
     for (int attempt = 0; attempt < config_.planner.candidates; ++attempt) {
       PlanRequest request{start, lessons_.clearance(), lessons_.DomainMargin(half_width_, config_.problem->projection),
                           seed_++, attempt};
+      request.limit_margin = lessons_.limit_margin();
       request.schedule = schedule_;
       request.schedule.start_us += found_.progress_steps * schedule_.step_us;
       const std::optional<Proposal> part = proposer_.Propose(request);
@@ -57,7 +58,7 @@ class PlanSearch final {
       }
       if (before == 0) found_.decision = decision;
       if (decision.outcome == Outcome::kFalsified) return false;
-      lessons_.Learn(decision.outcome, decision.cause);
+      lessons_.Learn(decision);
     }
     return false;
   }

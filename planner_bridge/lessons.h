@@ -1,6 +1,9 @@
 /** Requirements on the next candidate from one start, learned from the abstentions of earlier candidates from it. */
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "certifier/certify/decision.h"
@@ -10,16 +13,19 @@ namespace forereach {
 
 class Lessons final {
  public:
-  /** Starts with planner.clearance and without a margin from the domain's bounds. */
-  explicit Lessons(const PlannerOptions& options) : clearance_(options.clearance), step_(options.clearance_step) {}
+  /** Starts with planner.clearance and without a margin from the domain's bounds or those of the task's limits. */
+  Lessons(const PlannerOptions& options, std::size_t num_limits)
+      : clearance_(options.clearance), step_(options.clearance_step), limit_margin_(num_limits, 0.0) {}
 
-  /** An abstention S adds planner.clearance_step to the clearance, an abstention D adds to the margin. No other outcome
-  changes anything. Neither do the causes kNoStop and kLimit: they
-  say nothing about the domain's bounds and the obstacles. */
-  void Learn(Outcome outcome, Cause cause);
+  /** An abstention S by an obstacle adds planner.clearance_step to the clearance, one by a limit adds what the tube may
+  reach beyond it to the margin from this limit, and an abstention D adds to the margin from the domain's bounds. No
+  other outcome changes anything. Neither does the cause kNoStop: it says nothing about bounds and obstacles. */
+  void Learn(const Decision& decision);
 
   /** The distance that the next candidate keeps from obstacles, metres. */
   [[nodiscard]] double clearance() const { return clearance_; }
+  /** The distances that the next candidate keeps from the bounds of the limits, one for each limit in its unit. */
+  [[nodiscard]] const std::vector<double>& limit_margin() const { return limit_margin_; }
   /** The distance that the next candidate keeps from the bounds of the state domain, n entries in model units. Each
   abstention D adds twice the half-width of X_0, because the tube reaches at least one half-width beyond its center, or
   planner.clearance_step for a state that the projection uses.
@@ -30,6 +36,7 @@ class Lessons final {
  private:
   double clearance_, step_;
   int domain_exits_ = 0;
+  std::vector<double> limit_margin_;
 };
 
 }  // namespace forereach

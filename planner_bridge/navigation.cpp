@@ -10,35 +10,42 @@
 namespace forereach {
 namespace {
 
-constexpr double kFinestCell = 0.25, kCellsAlong = 240, kStartCells = 4;
+constexpr double kCellsAlong = 240, kStartCells = 4;
 // A metre inside a grown obstacle counts as many; one at its edge as kNear, which falls to 1 over kMargin metres.
 constexpr double kInside = 20, kNear = 2, kMargin = 2;
 
-double Slowness(const Box& region, const std::vector<Obstacle>& obstacles, double clearance, const Eigen::VectorXd& y) {
+double Slowness(const Box& region, const RoomAt& room_at, double clearance, const Eigen::VectorXd& y) {
   const double from_edge = std::min((y - region.lower()).minCoeff(), (region.upper() - y).minCoeff());
-  double room = std::min(kMargin, from_edge - clearance);
-  for (const Obstacle& obstacle : obstacles) {
-    const auto& motion = obstacle.motion();
-    if (motion && !motion->velocity.isZero(0)) continue;
-    room = std::min(room, ApproximateDistance(obstacle, y) - (motion ? motion->uncertainty : 0) - clearance);
-  }
+  const double room = std::min(kMargin, std::min(from_edge, room_at(y)) - clearance);
   return room < 0 ? kInside : kNear - (kNear - 1) * room / kMargin;
 }
 
 }  // namespace
 
-NavigationField::NavigationField(const Box& region, const std::vector<Obstacle>& obstacles, double clearance,
-                                 const Eigen::VectorXd& goal)
+RoomAt RoomOfPoint(const std::vector<Obstacle>& obstacles) {
+  return [&obstacles](const Eigen::VectorXd& y) {
+    double room = kInfinity;
+    for (const Obstacle& obstacle : obstacles) {
+      const auto& motion = obstacle.motion();
+      if (motion && !motion->velocity.isZero(0)) continue;
+      room = std::min(room, ApproximateDistance(obstacle, y) - (motion ? motion->uncertainty : 0));
+    }
+    return room;
+  };
+}
+
+NavigationField::NavigationField(const Box& region, const RoomAt& room, double clearance, const Eigen::VectorXd& goal,
+                                 double finest_cell)
     : goal_(goal) {
   if (goal.size() != 2) return;
   const Eigen::VectorXd extent = region.upper() - region.lower();
   origin_ = region.lower();
-  cell_ = std::max(kFinestCell, extent.maxCoeff() / kCellsAlong);
+  cell_ = std::max(finest_cell, extent.maxCoeff() / kCellsAlong);
   columns_ = static_cast<int>(extent(0) / cell_) + 2;
   rows_ = static_cast<int>(extent(1) / cell_) + 2;
   std::vector<double> slowness(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
   for (std::size_t k = 0; k < slowness.size(); ++k)
-    slowness[k] = Slowness(region, obstacles, clearance, NodeAt(static_cast<int>(k)));
+    slowness[k] = Slowness(region, room, clearance, NodeAt(static_cast<int>(k)));
   March(slowness);
 }
 

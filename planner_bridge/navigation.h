@@ -1,6 +1,7 @@
 /** The travel distance to the goal around the obstacles. The search minimises it. */
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -10,17 +11,25 @@
 
 namespace forereach {
 
+/** How far the robot is from obstacles when it is at y, metres; negative inside one. */
+using RoomAt = std::function<double(const Eigen::VectorXd& y)>;
+
+/** Of a point: the least distance to the obstacles; those with a velocity are left out. It refers to its argument. */
+[[nodiscard]] RoomAt RoomOfPoint(const std::vector<Obstacle>& obstacles);
+
 /** For p = 2: the travel distance from y to the goal inside a region and around obstacles grown by a clearance, with a
-small penalty close to either. Obstacles with a velocity are left out. It is computed once on a grid by the fast
+small penalty close to either. It is computed once on a grid by the fast
 marching method. For p = 1 and p = 3: the straight distance. Use it for planning, not for bounds. It keeps no reference
 to its arguments. */
 class NavigationField final {
  public:
+  static constexpr double kFinestCell = 0.25;
+
   /** @param region the region of the robot's positions, metres; a point outside has the value at the nearest edge.
-  @param clearance metres. @param goal p entries, metres. Cost O(cells (obstacles + log cells)) with at most 60,000
-  cells. */
-  NavigationField(const Box& region, const std::vector<Obstacle>& obstacles, double clearance,
-                  const Eigen::VectorXd& goal);
+  @param clearance metres. @param goal p entries, metres. @param finest_cell the least width of a cell, metres. Cost
+  O(cells (room + log cells)) with at most 60,000 cells. */
+  NavigationField(const Box& region, const RoomAt& room, double clearance, const Eigen::VectorXd& goal,
+                  double finest_cell = kFinestCell);
 
   /** The distance in metres. Inside a grown obstacle it is finite and large, and decreases towards the outside. */
   [[nodiscard]] double DistanceToGo(const Eigen::VectorXd& y) const;

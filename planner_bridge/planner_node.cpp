@@ -144,7 +144,8 @@ void PlannerNode::BeginRound(const robot_state_t& state, std::int64_t lead_steps
   const std::optional<Eigen::VectorXd> center = PredictStart(state, lead_steps);
   if (!center) return;
   ++(stops ? stopping_rounds_ : rounds_);
-  round_ = Round{state.utime + lead_steps * period_us_, *center, Lessons(config_.planner), stops};
+  round_ = Round{state.utime + lead_steps * period_us_, *center,
+                 Lessons(config_.planner, config_.problem->limits.size()), stops};
 }
 
 // ---- Withdrawals.
@@ -233,7 +234,8 @@ PlanRequest PlannerNode::RequestOf(const Round& round) const {
           round.lessons.DomainMargin(half_width_, config_.problem->projection),
           static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1,
-          {round.start_utime, period_us_, Microseconds(config_.gate.max_clock_error_ms.value_or(0))}};
+          {round.start_utime, period_us_, Microseconds(config_.gate.max_clock_error_ms.value_or(0))},
+          round.lessons.limit_margin()};
 }
 
 candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us) {
@@ -280,7 +282,13 @@ void PlannerNode::Learn(const decision_t& decision) {
       decision.cause == decision_t::CAUSE_FAULT || decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE ||
       decision.outcome == decision_t::ABSTAIN_FALSIFIED)
     return EndRound(false);
-  round_->lessons.Learn(static_cast<Outcome>(decision.outcome), static_cast<Cause>(decision.cause));
+  Decision learned;
+  learned.outcome = static_cast<Outcome>(decision.outcome);
+  learned.cause = static_cast<Cause>(decision.cause);
+  learned.coordinate = decision.coordinate;
+  learned.margin = decision.margin;
+  learned.threshold = decision.threshold;
+  round_->lessons.Learn(learned);
 }
 
 void PlannerNode::OnObstacles(const Received& received) {

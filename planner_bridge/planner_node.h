@@ -3,12 +3,16 @@
 A round searches for a certified plan in response to one robot state. The plan starts lead_steps boundaries later, at
 the state that the executing plan will have reached by then. A round begins while the robot holds still, or when that
 start is at or after the end of the executing plan's progress part. No round begins while a certified plan waits for its
-start. A round sends one candidate at a time and waits for its decision: certified          -> the round ends, the plan
-waits for its start abstention S       -> the next candidate keeps clearance_step more from obstacles abstention D ->
-the next candidate keeps further inside the domain's bounds (a policy's candidate follows another reference instead,
-policy_proposer.h) abstention F       -> the round ends, because no candidate can be certified rejected           -> the
-next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has latched a fault
-    abstained, no time -> the next candidate
+start. A round sends one candidate at a time and waits for its decision:
+ - certified: the round ends, the plan waits for its start;
+ - abstention S: the next candidate keeps more distance, by clearance_step from obstacles or from the limit of the task
+   by what the tube may reach beyond it (lessons.h);
+ - abstention D: the next candidate keeps further inside the domain's bounds (a policy's candidate follows another
+   reference instead, policy_proposer.h);
+ - abstention F: the round ends, because no candidate can be certified;
+ - rejected: the next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has
+   latched a fault;
+ - abstained, no time: the next candidate.
 A round ends without a certificate after `candidates` searches, or when too little time is left until its start; the
 next state begins another round. With gate.obstacles bus, no round begins before the obstacles are known, and a round
 ends when they become unknown (obstacles_in_force.h). All planning runs in Tick, one search at a time. After the robot

@@ -38,7 +38,10 @@ void RequireFits(const Problem& problem, const PlannerOptions& options, const Po
 }  // namespace
 
 PolicyProposer::PolicyProposer(const Config& config, Policy policy)
-    : problem_(config.problem), options_(config.planner), policy_(std::move(policy)) {
+    : problem_(config.problem),
+      limits_(*problem_->model, problem_->limits),
+      options_(config.planner),
+      policy_(std::move(policy)) {
   RequireFits(*problem_, options_, policy_);
   motion_ = MakeMotion(config, Braking::kPlanned);
   wheelbase_ = problem_->model->parameters()[1];
@@ -84,7 +87,20 @@ std::optional<Proposal> PolicyProposer::Propose(const PlanRequest& request) {
   Proposal proposal{Eigen::MatrixXd(progress.rows(), progress.cols() + tail.cols()), options_.progress_steps, {}};
   proposal.controls << progress, tail;
   proposal.states = Rollout(model, request.state, proposal.controls);
+  if (!KeepsAllLimits(proposal)) return std::nullopt;
   return proposal;
+}
+
+bool PolicyProposer::KeepsAllLimits(const Proposal& proposal) const {
+  const std::vector<double> no_margin(limits_.size(), 0.0);
+  for (Eigen::Index t = 0; t < proposal.states.cols(); ++t) {
+    const auto x = proposal.states.col(t);
+    std::span<const double> u;
+    if (t < proposal.controls.cols())
+      u = {proposal.controls.col(t).data(), static_cast<std::size_t>(proposal.controls.rows())};
+    if (!limits_.Keep({x.data(), static_cast<std::size_t>(x.size())}, u, no_margin)) return false;
+  }
+  return true;
 }
 
 }  // namespace forereach

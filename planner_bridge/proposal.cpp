@@ -22,8 +22,11 @@
 #include <ompl/control/spaces/RealVectorControlSpace.h>
 #include <ompl/util/Console.h>
 #include <ompl/util/RandomNumbers.h>
+#include <Eigen/QR>
 
+#include "certifier/numerics/size.h"
 #include "certifier/safety/clearance.h"
+#include "certifier/safety/limit_values.h"
 #include "planner_bridge/navigation.h"
 #include "planner_bridge/reference.h"
 
@@ -44,6 +47,7 @@ constexpr double kReverse = 1e-3;  // m/s, what counts as standing still
 constexpr double kRoomAhead = 1;   // s at cruise speed, kept free beyond a braking tail: enough to turn away in
 constexpr int kRoomSamples = 9;
 constexpr double kLeastCell = 1.0 / 9;  // of a cruising step
+constexpr double kCellsOfJoints = 60;   // along the longer side of a field around a body at expressions
 constexpr double kArrivalTime = 2.5;    // s: a robot that is nearer to the goal than this takes its speed back ...
 constexpr double kArrivalSpeed = 0.35;  // ... down to this share of the cruise speed
 
@@ -97,7 +101,7 @@ MakeAlgorithm AlgorithmNamed(const std::string& name) {
 double HalfBreadth(const Body& body) {
   double breadth = 0;
   for (const BodyPart& part : body.parts)
-    for (const Eigen::Vector3d& point : part.points)
+    for (const Eigen::Vector3d& point : part.points)  // parts at expressions have none
       breadth = std::max(breadth, (body.heading >= 0 ? std::abs(point.y()) : point.norm()) + part.radius);
   return breadth;
 }
@@ -206,6 +210,8 @@ class Planner final : public Proposer {
         options_(config.planner),
         make_algorithm_(AlgorithmNamed(options_.algorithm)),
         motion_(MakeMotion(config, Braking::kPlanned)),
+        places_(*problem_->model, problem_->projection, problem_->body),
+        limits_(*problem_->model, problem_->limits),
         region_(ProjectedRegion(*problem_)),
         goal_(Eigen::Map<const Eigen::VectorXd>(options_.goal.data(), std::ssize(options_.goal))),
         obstacles_(config.obstacles) {
@@ -222,7 +228,8 @@ class Planner final : public Proposer {
   const NavigationField& Field(double clearance) {
     constexpr std::size_t kKept = 64;
     if (fields_.size() > kKept) fields_.clear();
-    return fields_.try_emplace(clearance, region_, obstacles_, clearance + half_breadth_, goal_).first->second;
+    const auto found = fields_.find(clearance);
+    return found != fields_.end() ? found->second : fields_.emplace(clearance, MakeField(clearance)).first->second;
   }
 
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
@@ -230,10 +237,30 @@ class Planner final : public Proposer {
  private:
   class Search;
 
+  // Around obstacles. Where no part of the body is in its frame, P x is no place among them: what counts is where the
+  // body is in a state with this P x, at rest.
+  [[nodiscard]] NavigationField MakeField(double clearance) const {
+    if (HasFrame(problem_->body)) return {region_, RoomOfPoint(obstacles_), clearance + half_breadth_, goal_};
+    const RoomAt room = [this](const Eigen::VectorXd& y) {
+      const Eigen::VectorXd x = shift_ * y;
+      double least = kInfinity;
+      for (const BodyPart& part : places_.At({x.data(), ToSize(x.size())}))
+        for (const Obstacle& obstacle : obstacles_)
+          if (!obstacle.motion()) least = std::min(least, ApproximateDistance(obstacle, part));
+      return least;
+    };
+    return {region_, room, clearance, goal_, (region_.upper() - region_.lower()).maxCoeff() / kCellsOfJoints};
+  }
+
   std::shared_ptr<const Problem> problem_;
   PlannerOptions options_;
   MakeAlgorithm make_algorithm_;
   std::unique_ptr<RobotMotion> motion_;
+  BodyPlaces places_;
+  LimitValues limits_;
+  const bool inputs_are_limited_ = limits_.SomeUseInputs();
+  // Moves a state so that P x moves by a vector.
+  const Eigen::MatrixXd shift_ = problem_->projection.completeOrthogonalDecomposition().pseudoInverse();
   Box region_;
   Eigen::VectorXd goal_;
   double half_breadth_ = HalfBreadth(problem_->body);
@@ -269,6 +296,7 @@ class Planner::Search {
                                           (deviation_.empty() ? 0 : deviation_[i]));
       clearances_.push_back(std::clamp(distance - kTouch, 0.0, request.clearance));
     }
+    limit_margin_ = LimitMargin(request);
     start_distance_ = field.DistanceToGo(Position(x));
     gain_ = IdealGain();
     top_speed_ = std::max(kOverspeed * planner.options_.cruise_speed, planner.motion_->Speed(x));
@@ -335,8 +363,23 @@ class Planner::Search {
     ++work_;
   }
 
-  [[nodiscard]] Sweep::Parts BodyAt(std::span<const double> x) const {
-    return PlaceBody(planner_.problem_->body, planner_.problem_->projection, x);
+  [[nodiscard]] Sweep::Parts BodyAt(std::span<const double> x) const { return planner_.places_.At(x); }
+
+  // What the request asks for, or what the start has.
+  [[nodiscard]] std::vector<double> LimitMargin(const PlanRequest& request) const {
+    std::vector<double> margin(planner_.limits_.size());
+    planner_.limits_.Room({start_.data(), n_}, {}, margin);
+    for (std::size_t i = 0; i < margin.size(); ++i)
+      margin[i] = std::clamp(margin[i], 0.0, i < request.limit_margin.size() ? request.limit_margin[i] : 0.0);
+    return margin;
+  }
+
+  // Of a state, or of one with the input that is applied there.
+  [[nodiscard]] bool KeepsLimitsOfStates(std::span<const double> x) const {
+    return planner_.limits_.Keep(x, {}, limit_margin_);
+  }
+  [[nodiscard]] bool KeepsLimitsOfInputs(std::span<const double> z) const {
+    return !planner_.inputs_are_limited_ || planner_.limits_.Keep(z.first(n_), z.subspan(n_), limit_margin_);
   }
 
   // A state at sample t.
@@ -344,7 +387,7 @@ class Planner::Search {
     const Eigen::Map<const Eigen::ArrayXd> state(x.data(), start_.size());
     if (!((lower_.array() <= state).all() && (state <= upper_.array()).all())) return false;
     const double speed = planner_.motion_->Speed(x);
-    if (!(least_speed_ <= speed && speed <= top_speed_)) return false;
+    if (!(least_speed_ <= speed && speed <= top_speed_) || !KeepsLimitsOfStates(x)) return false;
     return Clear(Sweep(BodyAt(x), t));
   }
 
@@ -365,7 +408,9 @@ class Planner::Search {
     std::array<double, kMaxVariables> z;
     std::copy_n(u, m_, std::copy_n(from, n_, z.begin()));
     const double steps = StepsOf(from) + 1, best = BestOf(from);  // `to` may be `from`
-    bool inside = steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains({z.data(), n_ + m_});
+    const std::span<const double> all(z.data(), n_ + m_);
+    bool inside = steps <= planner_.options_.progress_steps && planner_.problem_->domain.Contains(all) &&
+                  KeepsLimitsOfInputs(all);
     Step({z.data(), n_}, z.data() + n_, {to, n_});
     inside = inside && WayIsClear({z.data(), n_}, {to, n_}, static_cast<int>(steps) - 1);
     to[n_] = inside ? steps : planner_.options_.progress_steps + 1;
@@ -443,7 +488,8 @@ class Planner::Search {
     Eigen::VectorXd position = Position(x), direction = Eigen::VectorXd::Zero(position.size());
     for (int t = 0; t < tail.cols(); ++t) {
       std::copy_n(tail.col(t).data(), m_, z.begin() + static_cast<std::ptrdiff_t>(n_));
-      if (!planner_.problem_->domain.Contains({z.data(), n_ + m_})) return false;
+      const std::span<const double> all(z.data(), n_ + m_);
+      if (!planner_.problem_->domain.Contains(all) || !KeepsLimitsOfInputs(all)) return false;
       std::array<double, kMaxStates> next;
       Step({z.data(), n_}, z.data() + n_, {next.data(), n_});
       const int sample = planner_.options_.progress_steps + t;
@@ -461,11 +507,11 @@ class Planner::Search {
   // the place. What moves may have gone by then.
   [[nodiscard]] bool HasRoom(std::span<const double> x, const Eigen::VectorXd& position,
                              const Eigen::VectorXd& direction) const {
-    const Body& body = planner_.problem_->body;
-    const double heading = body.heading >= 0 ? x[static_cast<std::size_t>(body.heading)] : 0;
+    const Eigen::Map<const Eigen::VectorXd> state(x.data(), std::ssize(x));
     const double room = kRoomAhead * planner_.options_.cruise_speed;
     for (int i = 1; i <= kRoomSamples; ++i) {
-      const Sweep sweep(PlaceBody(body, position + room * i / kRoomSamples * direction, heading), 0);
+      const Eigen::VectorXd ahead = state + planner_.shift_ * (room * i / kRoomSamples * direction);
+      const Sweep sweep(BodyAt({ahead.data(), n_}), 0);
       for (std::size_t o = 0; o < clearances_.size(); ++o)
         if (!planner_.obstacles_[o].motion() && !sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_))
           return false;
@@ -546,7 +592,8 @@ class Planner::Search {
   const Schedule schedule_;
   Eigen::VectorXd lower_, upper_;
   std::vector<double> clearances_;  // to each obstacle
-  std::vector<double> deviation_;   // of each part between two samples; empty: only the samples count
+  std::vector<double> limit_margin_;
+  std::vector<double> deviation_;  // of each part between two samples; empty: only the samples count
   double start_distance_, gain_, top_speed_, least_speed_;
   bool at_rest_, start_valid_;
   mutable std::int64_t work_ = 0;  // model steps

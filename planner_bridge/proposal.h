@@ -2,9 +2,11 @@
 
 The progress part is not a path to the goal. It has exactly `progress_steps` controls that reduce the travel distance to
 the goal around the obstacles, and a braking tail fits after it. The whole nominal rollout is checked in the certifier's
-discretisation, against obstacles grown by a clearance and against the domain: the body, from sample to sample if the
-problem has bounds between them, and each moving obstacle at the time of the step. The travel distance takes moving
-obstacles into account only if their velocity is zero. */
+discretisation, against obstacles grown by a clearance, against the domain and against the task's limits: the body, with
+its parts at expressions, from sample to sample if the problem has bounds between them, and each moving obstacle at the
+time of the step. The travel distance takes moving obstacles into account only if their velocity is zero. It is that of
+P x; if all parts of the body stand at expressions, P x is no place among obstacles, but the joints of an arm perhaps,
+and the room there is that of the body in the state with this P x and zeros. */
 #pragma once
 
 #include <memory>

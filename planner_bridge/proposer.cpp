@@ -9,8 +9,6 @@
 namespace forereach {
 
 std::unique_ptr<Proposer> MakeProposer(const Config& config) try {
-  if (config.problem->body.HasPlaces())
-    throw std::invalid_argument("task.body: parts at expressions (place, places) are not planned for");
   const std::string& source = config.planner.source;
   if (source == "policy") return std::make_unique<PolicyProposer>(config, LoadPolicy(config.planner.policy));
   if (source == "ompl") return MakeOmplProposer(config);
@@ -26,6 +24,8 @@ void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options) 
   if (std::ssize(options.goal) != problem.projection.rows())
     throw std::invalid_argument("planner.goal: " + std::to_string(options.goal.size()) + " entries, it has to have " +
                                 std::to_string(problem.projection.rows()));
+  if (problem.projection.isZero(0))
+    throw std::invalid_argument("task.body.pose: missing: planner.goal is given in these states");
   if (options.progress_steps < 1 || options.tail_steps < 0 || options.progress_steps + options.tail_steps > kMaxSteps)
     throw std::invalid_argument("planner.progress_steps + planner.tail_steps: more than " + std::to_string(kMaxSteps) +
                                 " steps, or none");

@@ -23,6 +23,9 @@ struct PlanRequest {
   std::uint32_t seed = 1;
   int attempt = 0;      ///< Number of earlier requests for this start.
   Schedule schedule{};  ///< Of the plan: it is where moving obstacles are at each step.
+  /** Distance to keep from the bounds of each limit of the task, in its unit, or empty for none; less if the start is
+  nearer to them. */
+  std::vector<double> limit_margin;
 };
 
 struct Proposal {
@@ -46,8 +49,8 @@ class Proposer {
 task for certifying that has no goal; PolicyError if the policy cannot be used. */
 [[nodiscard]] std::unique_ptr<Proposer> MakeProposer(const Config& config);
 
-/** Checks goal and steps. @throws std::invalid_argument unless the goal has an entry for each safety coordinate, and
-progress part and braking tail together have 1 to kMaxSteps steps. */
+/** Checks goal and steps. @throws std::invalid_argument unless the goal has an entry for each safety coordinate, these
+are states of the robot, and progress part and braking tail together have 1 to kMaxSteps steps. */
 void RequireGoalAndSteps(const Problem& problem, const PlannerOptions& options);
 
 }  // namespace forereach

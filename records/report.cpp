@@ -209,6 +209,8 @@ std::vector<std::string> KeyNumbers(const Summary& summary) {
   numbers.push_back(
       fmt::format("{} of {} steps inside", summary.steps_inside, summary.steps_inside + summary.steps_outside));
   numbers.push_back(fmt::format("{} contacts", summary.contacts));
+  if (summary.has_limits || summary.limits_exceeded > 0)
+    numbers.push_back(fmt::format("{} times a limit exceeded", summary.limits_exceeded));
   return numbers;
 }
 

@@ -72,6 +72,8 @@ std::string ToText(const Summary& summary) {
   line("certify step", Microseconds(summary.certify_us));
   if (summary.distance_to_goal_m) line("distance to goal", DistanceToGoal(summary));
   line("contacts", std::to_string(summary.contacts));
+  if (summary.has_limits || summary.limits_exceeded > 0)
+    line("limits exceeded", std::to_string(summary.limits_exceeded));
   line("steps in certified slice",
        fmt::format("{} of {}", summary.steps_inside, summary.steps_inside + summary.steps_outside));
   line("stops", fmt::format("{} ({} braking tails begun)", summary.stops, summary.tails));
@@ -105,6 +107,7 @@ nlohmann::json ToJson(const Summary& summary) {
   if (summary.distance_to_goal_m) json["distance_to_goal_m"] = *summary.distance_to_goal_m;
   json["goal_reached"] = summary.goal_reached;
   json["contacts"] = summary.contacts;
+  json["limits_exceeded"] = summary.limits_exceeded;
   json["steps"] = {{"inside", summary.steps_inside}, {"outside", summary.steps_outside}};
   json["tails"] = summary.tails;
   json["stops"] = summary.stops;
@@ -127,6 +130,7 @@ SummaryBuilder::SummaryBuilder(const Config& config)
   certify_.values.reserve(kMaxSamples);
   if (!config.problem) return;
   projection_ = config.problem->projection;
+  summary_.has_limits = !config.problem->limits.empty();
   summary_.holds = HoldsName(*config.problem);
 }
 
@@ -181,6 +185,7 @@ void SummaryBuilder::Add(const EventRow& row) {
     withdrawn_ = {row.plan_id, static_cast<int>(row.step)};
   }
   if (row.kind == "contact") ++summary_.contacts;
+  if (row.kind == "limit_exceeded") ++summary_.limits_exceeded;
   if (!row.state.empty()) state_ = row.state;
 }
 

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "certifier/numerics/size.h"
-#include "certifier/safety/clearance.h"
 
 namespace forereach {
 namespace {
@@ -15,10 +14,7 @@ struct Pose {
   double heading;
 };
 
-Pose PoseOf(const Problem& problem, std::span<const double> x) {
-  return {problem.projection * Eigen::Map<const Eigen::VectorXd>(x.data(), std::ssize(x)),
-          problem.body.heading >= 0 ? x[ToSize(problem.body.heading)] : 0};
-}
+Pose PoseOf(const BodyPlaces& places, std::span<const double> x) { return {places.Position(x), places.Heading(x)}; }
 
 // The nearest approach to each obstacle.
 using Approaches = std::vector<Contact>;
@@ -58,11 +54,24 @@ double TurnAcceleration(const Between& between, double change) {
   return std::clamp(2 * rate_left / between.period, 0.0, between.turn_acceleration);
 }
 
+// Every point on the chord between its two places, and off it.
+std::vector<BodyPart> Blend(std::vector<BodyPart> begin, const std::vector<BodyPart>& end, double s,
+                            const Eigen::VectorXd& off) {
+  for (std::size_t i = 0; i < begin.size(); ++i)
+    for (std::size_t j = 0; j < begin[i].points.size(); ++j) {
+      Eigen::Vector3d& point = begin[i].points[j];
+      point = (1 - s) * point + s * end[i].points[j];
+      point.head(off.size()) += off;
+    }
+  return begin;
+}
+
 // The motion with one choice of signs: bit k for coordinate k, bit p for the heading.
-Approaches Follow(const Problem& problem, std::span<const Obstacle> obstacles, const Sample& from, const Sample& to,
-                  const Between& between, unsigned signs) {
-  const Pose first = PoseOf(problem, from.x);
-  Pose last = PoseOf(problem, to.x);
+Approaches Follow(const Problem& problem, const BodyPlaces& places, std::span<const Obstacle> obstacles,
+                  const Sample& from, const Sample& to, const Between& between, unsigned signs) {
+  const Pose first = PoseOf(places, from.x);
+  Pose last = PoseOf(places, to.x);
+  const std::vector<BodyPart> begin = places.At(from.x), end = places.At(to.x);
   if (problem.body.heading >= 0 && problem.model->IsAngle(problem.body.heading))  // the shorter way round
     last.heading = first.heading + std::remainder(last.heading - first.heading, 2 * std::numbers::pi);
   const auto sign = [&](Eigen::Index bit) { return signs >> bit & 1U ? 1.0 : -1.0; };
@@ -72,8 +81,9 @@ Approaches Follow(const Problem& problem, std::span<const Obstacle> obstacles, c
   Approaches approaches = Far(obstacles.size());
   for (int i = 1; i <= kSubsteps; ++i) {
     const double s = static_cast<double>(i) / kSubsteps, bulge = between.period * between.period * s * (1 - s) / 2;
-    const auto placed = PlaceBody(problem.body, (1 - s) * first.position + s * last.position + bulge * acceleration,
-                                  (1 - s) * first.heading + s * last.heading + bulge * turn_acceleration);
+    std::vector<BodyPart> placed = Blend(begin, end, s, bulge * acceleration);
+    places.MoveFrame((1 - s) * first.position + s * last.position + bulge * acceleration,
+                     (1 - s) * first.heading + s * last.heading + bulge * turn_acceleration, placed);
     const auto passed = std::llround(s * static_cast<double>(to.utime - from.utime));
     Approach(placed, obstacles, from.utime + passed, s, approaches);
   }
@@ -82,18 +92,19 @@ Approaches Follow(const Problem& problem, std::span<const Obstacle> obstacles, c
 
 }  // namespace
 
-std::vector<Contact> FindContacts(const Problem& problem, std::span<const Obstacle> obstacles, const Sample& sample) {
+std::vector<Contact> FindContacts(const BodyPlaces& places, std::span<const Obstacle> obstacles, const Sample& sample) {
   Approaches approaches = Far(obstacles.size());
-  Approach(PlaceBody(problem.body, problem.projection, sample.x), obstacles, sample.utime, 1, approaches);
+  Approach(places.At(sample.x), obstacles, sample.utime, 1, approaches);
   return ContactsOf(std::move(approaches));
 }
 
-std::vector<Contact> FindContacts(const Problem& problem, std::span<const Obstacle> obstacles, const Sample& from,
-                                  const Sample& to, const Between& between) {
+std::vector<Contact> FindContacts(const Problem& problem, const BodyPlaces& places, std::span<const Obstacle> obstacles,
+                                  const Sample& from, const Sample& to, const Between& between) {
   const Eigen::Index free_signs = problem.projection.rows() + (problem.body.heading >= 0 ? 1 : 0);
   Approaches nearest = Far(obstacles.size());
   for (unsigned signs = 0; signs < 1U << free_signs; ++signs)
-    if (Approaches found = Follow(problem, obstacles, from, to, between, signs); Nearest(found) <= Nearest(nearest))
+    if (Approaches found = Follow(problem, places, obstacles, from, to, between, signs);
+        Nearest(found) <= Nearest(nearest))
       nearest = std::move(found);
   return ContactsOf(std::move(nearest));
 }

@@ -3,7 +3,8 @@
 Between samples it uses bounds on its motion (body.h), those that the task declares, to the full. With s from 0 to 1, T
 the period and a sign +1 or -1 for each coordinate, y_k(s) = (1 - s) y_k(0) + s y_k(1) + sign_k a_k T^2 s (1 - s) / 2,
 so |y_k''| = a_k, and the sampled states are kept. The heading does the same with turn_acceleration, or with as much of
-it as turn_rate leaves. Of all signs it takes those that bring the body nearest to an obstacle, or deepest into one. */
+it as turn_rate leaves. Each point at expressions does what y does, with the same signs. Of all signs it takes those
+that bring the body nearest to an obstacle, or deepest into one. */
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,7 @@ it as turn_rate leaves. Of all signs it takes those that bring the body nearest 
 #include <vector>
 
 #include "certifier/certify/problem.h"
+#include "certifier/safety/clearance.h"
 
 namespace forereach {
 
@@ -30,13 +32,14 @@ struct Sample {
 inline constexpr int kSubsteps = 16;
 
 /** The obstacles that the body meets in a state, one contact each. Moving obstacles are where they are at that time,
-with their growth. Plain arithmetic. */
-[[nodiscard]] std::vector<Contact> FindContacts(const Problem& problem, std::span<const Obstacle> obstacles,
+with their growth. Plain arithmetic. @param places those of the problem's body. */
+[[nodiscard]] std::vector<Contact> FindContacts(const BodyPlaces& places, std::span<const Obstacle> obstacles,
                                                 const Sample& sample);
 
 /** The obstacles that the body meets after sample `from`, up to and with sample `to`.
 @param between the bounds that it uses up; all zero: it moves in a straight line, or stands. */
-[[nodiscard]] std::vector<Contact> FindContacts(const Problem& problem, std::span<const Obstacle> obstacles,
-                                                const Sample& from, const Sample& to, const Between& between);
+[[nodiscard]] std::vector<Contact> FindContacts(const Problem& problem, const BodyPlaces& places,
+                                                std::span<const Obstacle> obstacles, const Sample& from,
+                                                const Sample& to, const Between& between);
 
 }  // namespace forereach

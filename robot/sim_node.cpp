@@ -91,6 +91,8 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
       sender_(bus),
       out_(out),
       target_(MakeTarget(config)),
+      places_(*config.problem->model, config.problem->projection, config.problem->body),
+      limits_(*config.problem->model, config.problem->limits),
       disturbance_(config.problem->declaration, config.robot),
       period_us_(Microseconds(config.robot.step_period_ms)),
       brake_(BrakeOf(config_)),
@@ -98,10 +100,6 @@ RobotSimNode::RobotSimNode(const Config& config, Bus& bus, std::ostream& out)
       obstacles_(config),
       state_(config.robot.start),
       supervisor_(OptionsOf(config_), *this) {
-  if (config.problem->body.HasPlaces())
-    throw ConfigError(config.path +
-                      ": task.body: parts at expressions (place, places): the simulated robot judges contacts of parts "
-                      "in its frame only");
   RequireSize(config, "robot.start", state_.size(), config.problem->model->num_states());
   if (!config.planner.goal.empty())
     RequireSize(config, "planner.goal", config.planner.goal.size(), config.problem->projection.rows());
@@ -156,8 +154,10 @@ void RobotSimNode::Boundary(std::int64_t utime, std::int64_t now_us) {
     for (const int k : config_.problem->model->angles())
       state_[ToSize(k)] = std::remainder(state_[ToSize(k)], 2 * std::numbers::pi);
   heard_utime_ = utime;
+  const std::vector<double> room = LimitRoom(control);
   supervisor_.FinishStep(utime, now_us);
   ReportContacts(utime, moves);
+  ReportLimits(utime, room);
   state_before_ = state_;
   ReportGoal(utime);
   const bool ends = goal_reached_ || static_cast<double>(utime - *start_utime_) >= config_.robot.time_limit_s * 1e6;
@@ -201,9 +201,9 @@ void RobotSimNode::OnObstacles(const Received& received) {
 std::vector<Contact> RobotSimNode::Contacts(std::int64_t utime, bool moved) const {
   const Problem& problem = *config_.problem;
   const Sample now{state_, utime};
-  if (!problem.between || state_before_.empty()) return FindContacts(problem, obstacles_.all(), now);
+  if (!problem.between || state_before_.empty()) return FindContacts(places_, obstacles_.all(), now);
   const Between standing{Eigen::VectorXd::Zero(problem.projection.rows()), 0, 0, problem.between->period};
-  return FindContacts(problem, obstacles_.all(), {state_before_, utime - period_us_}, now,
+  return FindContacts(problem, places_, obstacles_.all(), {state_before_, utime - period_us_}, now,
                       moved ? *problem.between : standing);
 }
 
@@ -215,6 +215,30 @@ void RobotSimNode::ReportContacts(std::int64_t utime, bool moved) {
       text = "part " + std::to_string(contact.part) + " meets obstacle " + std::to_string(contact.obstacle);
     if (config_.problem->between) text += ", " + ToText(contact.at) + " of a step after the last sample";
     supervisor_.Report(utime, execution_event_t::CONTACT, contact.clearance, text);
+  }
+}
+
+// At this boundary, and of limits that use an input at the one before, where the control was applied first.
+std::vector<double> RobotSimNode::LimitRoom(std::span<const double> control) const {
+  std::vector<double> room(limits_.size()), before = room;
+  limits_.Room(state_, {}, room);
+  if (control.empty()) return room;
+  limits_.Room(state_before_, control, before);
+  for (std::size_t i = 0; i < room.size(); ++i)
+    if (limits_.UsesInput(i)) room[i] = before[i];
+  return room;
+}
+
+void RobotSimNode::ReportLimits(std::int64_t utime, std::span<const double> room) {
+  for (std::size_t i = 0; i < room.size(); ++i) {
+    if (room[i] >= 0) continue;
+    ++limits_exceeded_;
+    const std::string& name = limits_[i].name;
+    if (std::isfinite(room[i]))
+      supervisor_.Report(utime, execution_event_t::LIMIT_EXCEEDED, -room[i],
+                         name + " is " + ToText(-room[i]) + " beyond its bound");
+    else
+      supervisor_.Report(utime, execution_event_t::LIMIT_EXCEEDED, 0, name + " has no finite value");
   }
 }
 
@@ -246,6 +270,7 @@ std::string RobotSimNode::Summary() const {
   summary["steps_executed"] = counts.steps;
   summary["steps_inside_slice"] = counts.steps_inside;
   summary["contacts"] = contacts_;
+  summary["limits_exceeded"] = limits_exceeded_;
   summary["goal_reached"] = goal_reached_;
   summary["distance_to_goal"] = DistanceToGoal();  // NaN becomes null
   summary["stops"] = stops_;

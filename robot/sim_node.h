@@ -3,8 +3,9 @@
 Step boundaries lie at t_j = t_0 + j * step_period, where t_0 is the first Tick. At each boundary, in this order:
  1. The target takes the control of the step that has ended, is disturbed (disturbance.h), its angles (model.angles) are
     turned into [-pi, pi], and the supervisor finishes the step.
- 2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h), and
-    GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
+ 2. The node reports CONTACT for every obstacle that the body has met since the last boundary (contacts.h),
+    LIMIT_EXCEEDED for every limit of the task that does not hold at this boundary or, if it uses an input, with the
+    control of the step that has ended, and GOAL_REACHED at the first boundary with |P x - goal| <= goal_radius.
  3. The supervisor starts the pending plan, continues the current one, or holds; then it reports (supervisor.h).
 
 While the robot holds, the states of robot.hold are zero: by default v and a of the bicycle, vx and vy of the point
@@ -33,6 +34,7 @@ accepts plans that are certified under the new file (Guard::Expect); its state a
 #include "bus/node.h"
 #include "bus/reloading.h"
 #include "certifier/gate/obstacles_in_force.h"
+#include "certifier/safety/limit_values.h"
 #include "certifier/task/config.h"
 #include "robot/brake.h"
 #include "robot/contacts.h"
@@ -59,9 +61,10 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   /** Prints Summary() as one line. */
   void Stop() override;
 
-  /** One JSON object: boundaries, steps_executed, steps_inside_slice, contacts, goal_reached, distance_to_goal
-  (current, in metres; null without a goal), stops (before the goal, emergency stops included), emergency_stops (for a
-  withdrawal), plans_accepted, plans_started, plans_refused (count by GuardCauseName), messages_not_sent. */
+  /** One JSON object: boundaries, steps_executed, steps_inside_slice, contacts, limits_exceeded (counted at
+  each boundary), goal_reached, distance_to_goal (current, in metres; null without a goal), stops (before the goal,
+  emergency stops included), emergency_stops (for a withdrawal), plans_accepted, plans_started, plans_refused (count by
+  GuardCauseName), messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 
   [[nodiscard]] std::span<const double> state() const override { return state_; }
@@ -76,6 +79,8 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   void Boundary(std::int64_t utime, std::int64_t now_us);
   void BrakeUntil(std::int64_t utime);
   void ReportContacts(std::int64_t utime, bool moved);
+  [[nodiscard]] std::vector<double> LimitRoom(std::span<const double> control) const;
+  void ReportLimits(std::int64_t utime, std::span<const double> room);
   [[nodiscard]] std::vector<Contact> Contacts(std::int64_t utime, bool moved) const;
   void OnObstacles(const Received& received);
   void ReportGoal(std::int64_t utime);
@@ -87,6 +92,8 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   Sender sender_;
   std::ostream& out_;
   const std::unique_ptr<Target> target_;
+  const BodyPlaces places_;
+  const LimitValues limits_;
   Disturbance disturbance_;
   const std::int64_t period_us_;
   const Brake brake_;
@@ -102,7 +109,7 @@ class RobotSimNode final : public Node, private Supervisor::Robot {
   std::int64_t brakes_since_utime_ = 0;
   bool goal_reached_ = false;
   int finished_boundaries_ = 0;
-  std::int64_t contacts_ = 0, stops_ = 0;
+  std::int64_t contacts_ = 0, limits_exceeded_ = 0, stops_ = 0;
 
   Supervisor supervisor_;
 };

@@ -1,8 +1,10 @@
 #include "certifier/declare/motion_bound.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <optional>
 #include <queue>
 #include <stdexcept>
@@ -211,6 +213,34 @@ Quantity AccelerationAlong(const Eigen::VectorXd& row) {
   };
 }
 
+// ---- Recorded motion.
+
+constexpr double kTurn = 2 * std::numbers::pi;
+
+// From the state in which transition i begins to its successor, without the turns of an angle that a record adds.
+Eigen::VectorXd StepOf(const NominalModel& model, const Transitions& transitions, Eigen::Index i) {
+  const Eigen::Index n = transitions.x_next.cols();
+  Eigen::VectorXd next = transitions.x_next.row(i);
+  if (!model.angles().empty()) {
+    const Eigen::VectorXd z = transitions.z.row(i);
+    std::array<double, kMaxStates> expected;
+    model.Evaluate({z.data(), ToSize(z.size())}, {expected.data(), ToSize(n)});
+    for (const int k : model.angles()) next[k] += kTurn * std::round((expected[ToSize(k)] - next[k]) / kTurn);
+  }
+  return next - transitions.z.row(i).head(n).transpose();
+}
+
+// Whether transition i begins where the one before it ends; an angle, up to turns and their rounding.
+bool FollowsTheOneBefore(const NominalModel& model, const Transitions& transitions, Eigen::Index i) {
+  constexpr double kRounding = 0x1p-48;
+  for (int k = 0; k < static_cast<int>(transitions.x_next.cols()); ++k) {
+    const double ended = transitions.x_next(i - 1, k), begins = transitions.z(i, k);
+    if (ended != begins && !(model.IsAngle(k) && std::abs(std::remainder(ended - begins, kTurn)) <= kRounding))
+      return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options) {
@@ -235,22 +265,24 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
   return bounds;
 }
 
-MeasuredMotion MeasureMotion(const Transitions& transitions, const Eigen::MatrixXd& projection, int heading,
-                             double period) {
+MeasuredMotion MeasureMotion(const NominalModel& model, const Transitions& transitions,
+                             const Eigen::MatrixXd& projection, int heading, double period) {
   MeasuredMotion measured;
   measured.acceleration = Eigen::VectorXd::Zero(projection.rows());
-  const Eigen::Index n = transitions.x_next.cols();
-  for (Eigen::Index i = 0; i + 1 < transitions.x_next.rows(); ++i) {
-    const Eigen::VectorXd first = transitions.z.row(i).head(n), second = transitions.x_next.row(i),
-                          third = transitions.x_next.row(i + 1);
-    if (second.transpose() != transitions.z.row(i + 1).head(n)) continue;
-    ++measured.triples;
-    const Eigen::VectorXd difference = (first - 2 * second + third) / (period * period);
-    measured.acceleration = measured.acceleration.cwiseMax((projection * difference).cwiseAbs());
-    if (heading < 0) continue;
-    for (const double rate : {(second - first)[heading] / period, (third - second)[heading] / period})
-      measured.turn_rate = std::max(measured.turn_rate, std::abs(rate));
-    measured.turn_acceleration = std::max(measured.turn_acceleration, std::abs(difference[heading]));
+  Eigen::VectorXd before;  // the step from the sample before
+  for (Eigen::Index i = 0; i < transitions.x_next.rows(); ++i) {
+    const Eigen::VectorXd step = StepOf(model, transitions, i);
+    if (i > 0 && FollowsTheOneBefore(model, transitions, i)) {
+      ++measured.triples;
+      const Eigen::VectorXd difference = (step - before) / (period * period);
+      measured.acceleration = measured.acceleration.cwiseMax((projection * difference).cwiseAbs());
+      if (heading >= 0) {
+        for (const double turned : {before[heading], step[heading]})
+          measured.turn_rate = std::max(measured.turn_rate, std::abs(turned / period));
+        measured.turn_acceleration = std::max(measured.turn_acceleration, std::abs(difference[heading]));
+      }
+    }
+    before = step;
   }
   return measured;
 }

@@ -9,6 +9,7 @@ reach between two samples. */
 
 #include "certifier/declare/flow.h"
 #include "certifier/declare/slope_bound.h"
+#include "certifier/dynamics/model.h"
 #include "certifier/reach/domain.h"
 #include "certifier/residual/transitions.h"
 #include "certifier/sets/eigen.h"
@@ -57,8 +58,10 @@ struct MeasuredMotion {
   int triples = 0;  ///< Of samples that follow one another: a transition begins with the state in which the last ended.
 };
 
-/** @param heading as in SampledMotion. */
-[[nodiscard]] MeasuredMotion MeasureMotion(const Transitions& transitions, const Eigen::MatrixXd& projection,
-                                           int heading, double period);
+/** An angle of the model (angles.h) may be recorded with any number of turns: in each step it moves to where it is
+nearest to the model's next value, and samples follow one another if they are equal up to turns.
+@param model of the transitions. @param heading as in SampledMotion. */
+[[nodiscard]] MeasuredMotion MeasureMotion(const NominalModel& model, const Transitions& transitions,
+                                           const Eigen::MatrixXd& projection, int heading, double period);
 
 }  // namespace forereach

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -80,21 +81,50 @@ double CoreDistance(const Obstacle& obstacle, std::span<const Vector> points) {
 
 }  // namespace
 
-std::vector<BodyPart> PlaceBody(const Body& body, const Eigen::VectorXd& position, double heading) {
+bool HasFrame(const Body& body) {
+  return std::ranges::any_of(body.parts, [](const BodyPart& part) { return part.places.empty(); });
+}
+
+BodyPlaces::BodyPlaces(const NominalModel& model, Eigen::MatrixXd projection, const Body& body)
+    : projection_(std::move(projection)), body_(body) {
+  for (const BodyPart& part : body.parts)
+    unplaced_.push_back({std::vector<Vector>(ToSize(part.num_points()), Vector::Zero()), part.radius});
+  if (body.HasPlaces()) coordinates_.emplace(NamesOf(model), body.Coordinates());
+}
+
+Eigen::VectorXd BodyPlaces::Position(std::span<const double> x) const {
+  return projection_ * Eigen::Map<const Eigen::VectorXd>(x.data(), std::ssize(x));
+}
+
+double BodyPlaces::Heading(std::span<const double> x) const {
+  return body_.heading >= 0 ? x[ToSize(body_.heading)] : 0;
+}
+
+void BodyPlaces::MoveFrame(const Eigen::VectorXd& position, double heading, std::vector<BodyPart>& parts) const {
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  if (body.heading >= 0)
+  if (body_.heading >= 0)
     turn.topLeftCorner<2, 2>() << std::cos(heading), -std::sin(heading), std::sin(heading), std::cos(heading);
   Vector origin = Vector::Zero();
   origin.head(position.size()) = position;
-  std::vector<BodyPart> placed = body.parts;
-  for (BodyPart& part : placed)
-    for (Vector& point : part.points) point = origin + turn * point;
-  return placed;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    for (std::size_t j = 0; !IsAtExpressions(i) && j < parts[i].points.size(); ++j)
+      parts[i].points[j] = origin + turn * body_.parts[i].points[j];
 }
 
-std::vector<BodyPart> PlaceBody(const Body& body, const Eigen::MatrixXd& projection, std::span<const double> x) {
-  return PlaceBody(body, projection * Eigen::Map<const Eigen::VectorXd>(x.data(), std::ssize(x)),
-                   body.heading >= 0 ? x[ToSize(body.heading)] : 0);
+std::vector<BodyPart> BodyPlaces::At(std::span<const double> x) const {
+  std::vector<BodyPart> parts = unplaced_;
+  MoveFrame(Position(x), Heading(x), parts);
+  if (!coordinates_) return parts;
+  std::array<double, kMaxVariables> z{};  // no place uses an input
+  std::ranges::copy(x, z.begin());
+  std::array<long double, ToSize(kMaxBodyPoints * kMaxSafetyDim)> values;
+  coordinates_->Evaluate({z.data(), ToSize(coordinates_->num_variables())},
+                         {values.data(), ToSize(coordinates_->num_values())});
+  const long double* value = values.data();
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    for (std::size_t j = 0; IsAtExpressions(i) && j < parts[i].points.size(); ++j)
+      for (Eigen::Index k = 0; k < projection_.rows(); ++k) parts[i].points[j][k] = static_cast<double>(*value++);
+  return parts;
 }
 
 double Deviation(const Between& between, const BodyPart& part) {

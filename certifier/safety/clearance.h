@@ -3,22 +3,48 @@ and display, not for bounds. */
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "certifier/dynamics/model.h"
+#include "certifier/dynamics/text_program.h"
 #include "certifier/safety/body.h"
 #include "certifier/safety/motion.h"
 #include "certifier/safety/obstacle.h"
 
 namespace forereach {
 
-/** The parts of the body in the safety coordinates: each point q is at position + R(heading) q.
-@param position p entries, metres. @param heading radians; unused if the body does not turn. */
-[[nodiscard]] std::vector<BodyPart> PlaceBody(const Body& body, const Eigen::VectorXd& position, double heading);
+/** Whether a part is in the robot's frame. Otherwise P x says nothing about where the body is. */
+[[nodiscard]] bool HasFrame(const Body& body);
 
-/** The same in the state x. @param projection P, p-by-n. @param x n entries. */
-[[nodiscard]] std::vector<BodyPart> PlaceBody(const Body& body, const Eigen::MatrixXd& projection,
-                                              std::span<const double> x);
+/** Where the parts of a body are in the states of a model: those in the robot's frame by g_q(x) of body.h, those at
+expressions by the values of these for the middles of the parameters. */
+class BodyPlaces final {
+ public:
+  /** @param projection P, p-by-n. @pre Placement (placement.h) takes model, projection and body.
+  @throws as MakeProgram (text_program.h) if an expression is wrong. */
+  BodyPlaces(const NominalModel& model, Eigen::MatrixXd projection, const Body& body);
+
+  /** The parts in the state x, as points and radius in the safety coordinates, metres. @param x n entries. */
+  [[nodiscard]] std::vector<BodyPart> At(std::span<const double> x) const;
+
+  /** Places the parts in the robot's frame at P x = position, metres, with this heading, radians, and leaves those at
+  expressions as they are. @param parts of an At, is changed. */
+  void MoveFrame(const Eigen::VectorXd& position, double heading, std::vector<BodyPart>& parts) const;
+
+  /** Whether part i stands at expressions. */
+  [[nodiscard]] bool IsAtExpressions(std::size_t i) const { return !body_.parts[i].places.empty(); }
+  /** P x, metres, and the heading in x, radians; 0 if the body does not turn. */
+  [[nodiscard]] Eigen::VectorXd Position(std::span<const double> x) const;
+  [[nodiscard]] double Heading(std::span<const double> x) const;
+
+ private:
+  Eigen::MatrixXd projection_;
+  Body body_;
+  std::vector<BodyPart> unplaced_;           // one point for each of a part, without texts
+  std::optional<TextFunction> coordinates_;  // of all parts at expressions
+};
 
 /** How far a point of this part may be from the chord between its places at two samples, metres: the length of e and
 |q| (w^2 + alpha) period^2 / 8 (body.h). */

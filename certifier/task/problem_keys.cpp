@@ -10,6 +10,7 @@
 #include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
+#include "certifier/safety/clearance.h"
 #include "certifier/task/key_rows.h"
 
 namespace forereach::key_rows {
@@ -237,10 +238,9 @@ BodyPart ReadPart(const Document& file, const std::string& key, Eigen::Index& si
 
 // A body without a point in the robot's frame needs no frame.
 void ReadPose(const Document& file, const std::string& key, Eigen::Index size, Body& body, TaskDraft& draft) {
-  const bool has_frame = std::ranges::any_of(body.parts, [](const BodyPart& part) { return part.places.empty(); });
   const auto& states = draft.scope.states;
   if (!Has(file, "task.body", "pose")) {
-    if (has_frame) file.Fail(key, "missing: the states that are the position of the robot's frame");
+    if (HasFrame(body)) file.Fail(key, "missing: the states that are the position of the robot's frame");
     draft.scope.safety_dim = static_cast<int>(size);
     draft.problem.projection = Eigen::MatrixXd::Zero(size, std::ssize(states));
     return;
@@ -389,7 +389,8 @@ std::vector<Key> TaskKeys() {
       Names("task.body.pose", Between(2, kMaxSafetyDim + 1), Size::kStates,
             "The 2 or 3 states that are the position of the robot's frame, in metres, as many as a point of a part has "
             "entries. One name more is the heading, in radians: the frame turns by it in the first two coordinates. "
-            "Without it the frame does not turn. Required if a part is in the frame."),
+            "Without it the frame does not turn. Required if a part is in the frame. If none is: any states, those in "
+            "which planner.goal is given."),
       Required(List(
           "task.body.parts", Between(1, kMaxBodyParts),
           "Convex parts, with at most " + std::to_string(kMaxBodyPoints) +

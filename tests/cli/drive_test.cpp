@@ -38,6 +38,7 @@ TEST_P(Drive, ReachesItsGoal) {
   ASSERT_TRUE(robot.is_object());
   EXPECT_EQ(robot["goal_reached"], true);
   EXPECT_EQ(robot["contacts"], 0);
+  EXPECT_EQ(robot["limits_exceeded"], 0);
   EXPECT_GE(robot["steps_executed"], 20);
   EXPECT_EQ(robot["steps_inside_slice"], robot["steps_executed"]);
   EXPECT_EQ(robot["emergency_stops"], 0);

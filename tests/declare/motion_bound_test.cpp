@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -235,20 +236,46 @@ TEST(MotionBound, HoldsForAllParameters) {
   EXPECT_LE(bound.upper, 10 * (1 + 1e-12));
 }
 
+// A position and a heading, which may turn by 0.2 rad more than the model says.
+std::shared_ptr<const NominalModel> Turning(std::vector<std::string> angles) {
+  ModelText text;
+  text.name = "turning";
+  text.angles = std::move(angles);
+  for (const char* state : {"s", "theta"}) text.states.push_back({state, ""});
+  text.inputs.push_back({"rate", ""});
+  text.parameters = {{"dt", 0.5, 0.5}};
+  text.equations = {{"s"}, {"theta + dt*rate"}};
+  return MakeTextModel(text);
+}
+
+// It turns by 1.5, 2 and 4.5 rad from 2.5 on: to 4, 6 and 10.5.
+TEST(MeasureMotion, KnowsAnAngleThatIsRecordedWrapped) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  Transitions transitions;
+  transitions.z = Eigen::MatrixXd{{0, 2.5, 2.8}, {0, 4 - kTurn, 4.2}, {0, 6 - kTurn, 8.8}};
+  transitions.x_next = Eigen::MatrixXd{{0, 4 - kTurn}, {0, 6}, {0, 10.5 - 2 * kTurn}};  // the second is not wrapped
+  const Eigen::MatrixXd projection{{1, 0}};
+  const MeasuredMotion measured = MeasureMotion(*Turning({"theta"}), transitions, projection, 1, 0.5);
+  EXPECT_EQ(measured.triples, 2);
+  EXPECT_NEAR(measured.turn_rate, 4.5 / 0.5, 1e-13);
+  EXPECT_NEAR(measured.turn_acceleration, 2.5 / 0.25, 1e-12);
+  EXPECT_GT(MeasureMotion(*Turning({}), transitions, projection, 1, 0.5).turn_rate, 9) << "no angle is unwrapped";
+}
+
 TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {
   Transitions transitions;
   // From 0 by 1, 4 and 9; then elsewhere.
   transitions.z = Eigen::MatrixXd{{0, 0, 0}, {1, 0.5, 0}, {5, 0.25, 0}, {7, 1, 0}};
   transitions.x_next = Eigen::MatrixXd{{1, 0.5}, {5, 0.25}, {14, 0}, {8, 3}};
   const Eigen::MatrixXd projection{{1, 0}};
-  const MeasuredMotion measured = MeasureMotion(transitions, projection, 1, 0.5);
+  const MeasuredMotion measured = MeasureMotion(*Turning({}), transitions, projection, 1, 0.5);
   EXPECT_EQ(measured.triples, 2);
   EXPECT_EQ(measured.acceleration[0], (14 - 2 * 5 + 1) / 0.25);
   EXPECT_EQ(measured.turn_rate, 1);
   EXPECT_EQ(measured.turn_acceleration, 0.75 / 0.25);
-  EXPECT_EQ(MeasureMotion(transitions, projection, -1, 0.5).turn_rate, 0);
+  EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, -1, 0.5).turn_rate, 0);
   transitions.z(1, 0) = std::nextafter(1.0, 2.0);
-  EXPECT_EQ(MeasureMotion(transitions, projection, 1, 0.5).triples, 1);
+  EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, 1, 0.5).triples, 1);
 }
 
 }  // namespace

@@ -169,7 +169,8 @@ TEST(NamesTest, NumbersAreNeverReused) {
                                                          {"RESET", 11},
                                                          {"WITHDRAWN", 12},
                                                          {"EMERGENCY_STOP", 13},
-                                                         {"OFF_SCHEDULE", 14}}));
+                                                         {"OFF_SCHEDULE", 14},
+                                                         {"LIMIT_EXCEEDED", 15}}));
   EXPECT_EQ(ConstantsOf("withdrawal_t"), (Constants{{"FALSIFIED", 1},
                                                     {"DOMAIN_EXIT", 2},
                                                     {"NO_FINITE_ENCLOSURE", 3},

@@ -1,7 +1,10 @@
 #include "planner_bridge/certified_plan.h"
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
+#include "planner_bridge/lessons.h"
 #include "tests/planner/tasks.h"
 
 namespace forereach {
@@ -45,6 +48,49 @@ TEST(CertifiedPlan, WithoutACertificateItHasNoControlsAndTheLastAnswer) {
   EXPECT_EQ(plan.controls.cols(), 0);
   EXPECT_EQ(plan.decision.outcome, Outcome::kDomain);
   EXPECT_GT(plan.candidates, 1);
+}
+
+// The tube's half-width of 0.03 m/s counts: a nominal speed at the limit is not certified.
+TEST(CertifiedPlan, LearnsTheMarginFromALimit) {
+  Config config = WithInitialSet(PointMass());
+  auto problem = std::make_shared<Problem>(*config.problem);
+  config.planner.cruise_speed = 1;
+  problem->limits = {{.name = "forwards", .that = {"vx", 1, 1}, .at_most = 1}};
+  config.problem = problem;
+  config.planner.tail_steps = 20;
+  const auto proposer = MakeProposer(config);
+  for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    EXPECT_TRUE(FindCertifiedPlan(*proposer, Certifier(problem), config, seed).reaches_goal);
+  }
+}
+
+TEST(Lessons, OfALimitAreHowFarTheTubeReachesBeyondIt) {
+  Lessons lessons(PlannerOptions{}, 2);
+  Decision decision;
+  decision.outcome = Outcome::kSafety;
+  decision.cause = Cause::kLimit;
+  decision.coordinate = 1;
+  decision.margin = -3.5;
+  decision.threshold = -3;
+  lessons.Learn(decision);
+  decision.margin = 4.25;
+  decision.threshold = 4;
+  lessons.Learn(decision);
+  for (const double margin : {kInfinity, std::numeric_limits<double>::quiet_NaN()}) {
+    decision.margin = margin;
+    lessons.Learn(decision);
+  }
+  decision.margin = 9;
+  for (const int coordinate : {-1, 2, 1000}) {
+    decision.coordinate = coordinate;
+    lessons.Learn(decision);
+  }
+  EXPECT_EQ(lessons.limit_margin(), (std::vector<double>{0, 0.75}));
+  EXPECT_EQ(lessons.clearance(), PlannerOptions{}.clearance);
+  decision.cause = Cause::kObstacle;
+  lessons.Learn(decision);
+  EXPECT_GT(lessons.clearance(), PlannerOptions{}.clearance);
 }
 
 }  // namespace

@@ -127,6 +127,23 @@ TEST(PolicyProposer, ItsPlansAreThePolicysBlocksAndEndInAStop) {
   EXPECT_FALSE(proposer.Propose(request));
 }
 
+TEST(PolicyProposer, LeavesOutBlocksThatExceedALimit) {
+  Config config = LoadConfig(kTask);
+  const Policy policy = LoadPolicy(config.planner.policy);
+  PlanRequest request;
+  request.state = Vec({0, 0, 0, 5, 0, 0});
+  const auto proposed = [&](const char* that, double at_most) {
+    Problem problem = *config.problem;
+    problem.limits = {{.name = "it", .that = {that, 1, 1}, .at_most = at_most}};
+    config.problem = std::make_shared<const Problem>(problem);
+    return PolicyProposer(config, policy).Propose(request).has_value();
+  };
+  EXPECT_TRUE(proposed("v", 9));
+  EXPECT_FALSE(proposed("v", 5.5)) << "it accelerates to 7 m/s";
+  EXPECT_TRUE(proposed("abs(jerk)", 10));
+  EXPECT_FALSE(proposed("abs(jerk)", 0.1));
+}
+
 TEST(PolicyProposer, RefusesWhatDoesNotFit) {
   const Config config = LoadConfig(kTask);
   const Policy policy = LoadPolicy(config.planner.policy);

@@ -1,5 +1,6 @@
 #include "planner_bridge/proposal.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -170,6 +171,7 @@ Config Car() {
 // At twenty times in each step the body, moved along the chord of its poses, keeps the clearance and its own deviation.
 void ExpectClear(const Config& config, const PlanRequest& request, const Proposal& proposal) {
   const Problem& problem = *config.problem;
+  const BodyPlaces places(*problem.model, problem.projection, problem.body);
   const auto pose = [&](int t, double s) -> Eigen::VectorXd {
     return (1 - s) * proposal.states.col(t) + s * proposal.states.col(t + 1);
   };
@@ -177,7 +179,7 @@ void ExpectClear(const Config& config, const PlanRequest& request, const Proposa
     for (int i = 0; i <= 20; ++i) {
       const double s = i / 20.0;
       const Eigen::VectorXd x = pose(t, s);
-      const auto placed = PlaceBody(problem.body, problem.projection, {x.data(), static_cast<std::size_t>(x.size())});
+      const auto placed = places.At({x.data(), static_cast<std::size_t>(x.size())});
       const auto time =
           request.schedule.start_us + std::llround((t + s) * static_cast<double>(request.schedule.step_us));
       for (const Obstacle& obstacle : config.obstacles)
@@ -234,6 +236,90 @@ TEST(Planner, MeetsMovingObstaclesWhereTheyAreAtEachStep) {
   EXPECT_FALSE(proposed({Obstacle::AxisBox(Vec({60, -15}), Vec({62, 15})).Moving(motion)}));
   motion.until_us = 5'400'000;  // gone before they meet
   EXPECT_TRUE(proposed({Obstacle::AxisBox(Vec({60, -15}), Vec({62, 15})).Moving(motion)}));
+}
+
+Limit AtMost(const char* that, double bound) { return {.name = that, .that = {that, 1, 1}, .at_most = bound}; }
+
+// The point mass with limits of its speed, 1.2 m/s, and of its acceleration.
+Config Limited() {
+  Config config = PointMass();
+  Problem problem = *config.problem;
+  problem.limits = {AtMost("vx^2 + vy^2", 1.44), AtMost("abs(ax)", 1)};
+  config.problem = std::make_shared<const Problem>(problem);
+  config.planner.braking = 0.8;
+  return config;
+}
+
+// The least room of each limit in a proposal.
+std::vector<double> Room(const Config& config, const Proposal& proposal) {
+  std::vector<double> room(config.problem->limits.size(), kInfinity);
+  for (Eigen::Index t = 0; t < proposal.states.cols(); ++t) {
+    const auto x = proposal.states.col(t);
+    room[0] = std::min(room[0], 1.44 - x[2] * x[2] - x[3] * x[3]);
+    if (t < proposal.controls.cols()) room[1] = std::min(room[1], 1 - std::abs(proposal.controls(0, t)));
+  }
+  return room;
+}
+
+TEST(Planner, KeepsLimitsOfStatesAndInputsByTheMarginThatIsAskedFor) {
+  const Config config = Limited();
+  Config without = config;
+  Problem problem = *config.problem;
+  problem.limits.clear();
+  without.problem = std::make_shared<const Problem>(problem);
+  int found = 0, faster = 0;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    PlanRequest request = From(Vec({0, 0, 0.9, 0}), seed);
+    request.limit_margin = {0.25, 0.125};
+    const auto proposal = PlannerOf(config)->Propose(request), free = PlannerOf(without)->Propose(request);
+    if (free) faster += Room(config, *free)[0] < 0 && Room(config, *free)[1] < 0;
+    if (!proposal) continue;
+    ++found;
+    ExpectSound(config, request, *proposal, {2, 3});
+    EXPECT_GE(Room(config, *proposal)[0], 0.25);
+    EXPECT_GE(Room(config, *proposal)[1], 0.125);
+  }
+  EXPECT_GT(found, 10);
+  EXPECT_GT(faster, 10) << "otherwise the limits show nothing";
+}
+
+TEST(Planner, AStartNearerToALimitThanTheMarginDoesNotStopItButOneBeyondDoes) {
+  const auto planner = PlannerOf(Limited());
+  PlanRequest request = From(Vec({0, 0, 1.1, 0}), 3);
+  request.limit_margin = {0.5, 0};
+  EXPECT_TRUE(planner->Propose(request));
+  request.state[2] = 1.25;
+  EXPECT_FALSE(planner->Propose(request));
+}
+
+// Each part of the arm keeps the clearance, and its deviation between the samples.
+TEST(Planner, KeepsPartsAtExpressionsAwayFromObstacles) {
+  const Config config = LoadConfig(FOREREACH_SOURCE_DIR "/config/drive/reaching_arm.yaml");
+  Config without = config;
+  without.obstacles.clear();
+  const Problem& problem = *config.problem;
+  const BodyPlaces places(*problem.model, problem.projection, problem.body);
+  const auto least = [&](const Proposal& proposal) {
+    double distance = kInfinity;
+    for (Eigen::Index t = 0; t < proposal.states.cols(); ++t)
+      for (const BodyPart& part : places.At({proposal.states.col(t).data(), 4}))
+        for (const Obstacle& obstacle : config.obstacles)
+          distance = std::min(distance, ApproximateDistance(obstacle, part));
+    return distance;
+  };
+  int found = 0, nearer = 0;
+  for (std::uint32_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const PlanRequest request = From(Vec({-0.2, 0.9, 0.4, 0}), seed, 0.05);  // on the way into the post
+    const auto proposal = PlannerOf(config)->Propose(request), free = PlannerOf(without)->Propose(request);
+    if (free) nearer += least(*free) < 0.05;
+    if (!proposal) continue;
+    ++found;
+    EXPECT_GT(least(*proposal), 0.05 + Deviation(*problem.between, problem.body.parts[1]));
+  }
+  EXPECT_GT(found, 5);
+  EXPECT_GT(nearer, 5);
 }
 
 TEST(Planner, RefusesOptionsThatDoNotFit) {

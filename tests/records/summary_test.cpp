@@ -38,7 +38,7 @@ void WriteRun(const std::string& path) {
   using E = execution_event_t;
   for (const std::int16_t kind :
        {E::ACCEPTED, E::REFUSED, E::STARTED, E::STEP_INSIDE, E::STEP_INSIDE, E::STEP_INSIDE, E::TAIL_BEGUN, E::STANDING,
-        E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::GOAL_REACHED})
+        E::STEP_OUTSIDE, E::STANDING, E::CONTACT, E::LIMIT_EXCEEDED, E::GOAL_REACHED})
     writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence++, kind)));
   writer.Append(now, "EXECUTION_EVENT", Encode(MakeEvent(sequence + 4, E::STANDING)));
   robot_state_t state{};
@@ -64,6 +64,7 @@ TEST(Summary, CountsAHandMadeLog) {
   EXPECT_EQ(summary.distance_to_goal_m, 0.5);
   EXPECT_TRUE(summary.goal_reached);
   EXPECT_EQ(summary.contacts, 1);
+  EXPECT_EQ(summary.limits_exceeded, 1);
   EXPECT_EQ(summary.steps_inside, 3);
   EXPECT_EQ(summary.steps_outside, 1);
   EXPECT_EQ(summary.tails, 1);

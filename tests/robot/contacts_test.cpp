@@ -25,11 +25,14 @@ Problem Bicycle() {
   return problem;
 }
 
+BodyPlaces PlacesOf(const Problem& problem) { return {*problem.model, problem.projection, problem.body}; }
+
 const std::vector<double> kFrom{0, 0, 0, 12, 0, 0}, kTo{2.4, 0, 0, 12, 0, 0};
 
 std::vector<Contact> Contacts(const Problem& problem, const Obstacle& obstacle, const std::vector<double>& from = kFrom,
                               const std::vector<double>& to = kTo) {
-  return FindContacts(problem, std::vector{obstacle}, {from, kT0}, {to, kT0 + 200'000}, *problem.between);
+  return FindContacts(problem, PlacesOf(problem), std::vector{obstacle}, {from, kT0}, {to, kT0 + 200'000},
+                      *problem.between);
 }
 
 Obstacle Post(double x, double y) { return Obstacle::Circle(Vector2d(x, y), 0.05); }
@@ -92,11 +95,29 @@ TEST(Contacts, WithAMovingObstacleAreMetAtTheirTime) {
   EXPECT_THAT(Contacts(problem, crossing(-1)), IsEmpty()) << "it is nowhere by then";
 }
 
+// A mast at the end of an arm of 2 m along the heading, which swings to the left in the step.
+TEST(Contacts, OfPartsAtExpressionsAreMetOnTheirOwnWay) {
+  Problem problem = Bicycle();
+  problem.body.parts = {BodyPart{{}, 0.5, {{{"x + 2*cos(theta)"}, {"y + 2*sin(theta)"}}}}};
+  problem.between->acceleration = Vector2d(0, 4);
+  const std::vector<double> from{0, 0, 0, 0, 0, 0}, to{0, 0, 0.1, 0, 0, 0};
+  const double bulge = 4 * 0.2 * 0.2 / 8;
+  const auto met = Contacts(problem, Post(2 * std::cos(0.1), 2 * std::sin(0.1) + 0.55 - kLittle), from, to);
+  ASSERT_THAT(met, SizeIs(1)) << "at the end of the step";
+  EXPECT_EQ(met[0].at, 1);
+  EXPECT_THAT(Contacts(problem, Post(2 * std::cos(0.1), 2 * std::sin(0.1) + 0.55 + kLittle), from, to), IsEmpty());
+  const auto standing = Contacts(problem, Post(2, bulge + 0.55 - kLittle), from, from);
+  ASSERT_THAT(standing, SizeIs(1));
+  EXPECT_EQ(standing[0].at, 0.5);
+  EXPECT_THAT(Contacts(problem, Post(2, bulge + 0.55 + kLittle), from, from), IsEmpty());
+  EXPECT_THAT(Contacts(problem, Post(0, 0), from, to), IsEmpty()) << "the frame is no part of this body";
+}
+
 TEST(Contacts, InASampleAreThoseOfTheWholeBody) {
   Problem problem = Bicycle();
   problem.body = {.heading = 2, .parts = {{{{2, 1, 0}, {2, -1, 0}, {-1, -1, 0}, {-1, 1, 0}}, 0}}};
   const std::vector<Obstacle> obstacles{Post(2 + 0.05 + kLittle, 0), Post(2 + 0.05 - kLittle, 0), Post(9, 9)};
-  const auto met = FindContacts(problem, obstacles, {kFrom, kT0});
+  const auto met = FindContacts(PlacesOf(problem), obstacles, {kFrom, kT0});
   ASSERT_THAT(met, SizeIs(1));
   EXPECT_EQ(met[0].obstacle, 1);
 }

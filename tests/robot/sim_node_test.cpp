@@ -660,6 +660,48 @@ TEST(RobotSim, ReportsContactAtEveryBoundaryInsideAnObstacle) {
   EXPECT_EQ(rig.Summary()["contacts"], 2);
 }
 
+// The plan goes forward for two steps and back for two: vx is 0, 0.15, 0.3, 0.15, 0 from boundary 1 on.
+TEST(RobotSim, ReportsLimitsThatDoNotHoldAtABoundaryOrWithItsControl) {
+  Config config = PointMassTask();
+  Problem problem = *config.problem;
+  problem.limits = {{.name = "speed", .that = {"vx", 1, 1}, .at_most = 0.2},
+                    {.name = "braking", .that = {"ax", 1, 1}, .at_least = -0.75},
+                    {.name = "force", .that = {"ax", 1, 1}, .at_least = -1, .at_most = 1}};
+  config.problem = std::make_shared<const Problem>(problem);
+  Rig rig(config);
+  rig.RunTo(0);
+  rig.Send(Plan(config, 1, 1, kOrigin));
+  rig.RunTo(8);
+  std::vector<std::string> reported;
+  std::vector<std::int64_t> times;
+  for (const execution_event_t& event : rig.events)
+    if (event.kind == execution_event_t::LIMIT_EXCEEDED) {
+      reported.emplace_back(GetText(event.message));
+      times.push_back(event.utime);
+      EXPECT_NEAR(event.value, reported.size() == 1 ? 0.1 : 0.25, 1e-12);
+    }
+  ASSERT_EQ(reported.size(), 3u);
+  EXPECT_THAT(reported[0], testing::StartsWith("speed is 0.0999"));
+  EXPECT_THAT(reported[0], testing::EndsWith(" beyond its bound"));
+  EXPECT_EQ(reported[1], "braking is 0.25 beyond its bound");
+  EXPECT_THAT(times, ElementsAre(BoundaryTime(3), BoundaryTime(4), BoundaryTime(5)));
+  EXPECT_EQ(rig.Summary()["limits_exceeded"], 3);
+  EXPECT_EQ(rig.Summary()["contacts"], 0);
+}
+
+TEST(RobotSim, JudgesPartsAtExpressions) {
+  Config config = PointMassTask();
+  Problem problem = *config.problem;
+  problem.body.parts = {BodyPart{{}, 0.25, {{{"px + 1"}, {"py"}}}}};
+  config.problem = std::make_shared<const Problem>(problem);
+  config.obstacles = {Obstacle::Circle(Eigen::Vector2d(1, 0.5), 0.125), Obstacle::Circle(Eigen::Vector2d(1, 0.3), 0.1),
+                      Obstacle::Circle(Eigen::Vector2d(0, 0), 0.1)};
+  Rig rig(config);
+  rig.RunTo(1);
+  EXPECT_EQ(rig.Summary()["contacts"], 2);
+  EXPECT_EQ(GetText(rig.First(kContact).message), "part 0 meets obstacle 1");
+}
+
 TEST(RobotSim, ReportsContactWithAnObstacleOfTheBusThatAppearsOnTheWay) {
   Config config = PointMassTask();
   config.gate.obstacles = ObstaclesSource::kBus;
@@ -782,8 +824,8 @@ TEST(RobotSim, StopPrintsOneLineOfJson) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
   const auto summary = nlohmann::json::parse(text);
   for (const char* key :
-       {"boundaries", "steps_executed", "steps_inside_slice", "contacts", "goal_reached", "distance_to_goal", "stops",
-        "plans_accepted", "plans_started", "plans_refused", "messages_not_sent"})
+       {"boundaries", "steps_executed", "steps_inside_slice", "contacts", "limits_exceeded", "goal_reached",
+        "distance_to_goal", "stops", "plans_accepted", "plans_started", "plans_refused", "messages_not_sent"})
     EXPECT_TRUE(summary.contains(key)) << key;
   EXPECT_EQ(summary["boundaries"], 3);
   EXPECT_EQ(summary["distance_to_goal"], 100);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "certifier/dynamics/text_model.h"
 #include "tests/oracle/random.h"
 
 namespace forereach {
@@ -19,11 +20,22 @@ BodyPart Square(double x, double y, double half) {
   return Hull({{x - half, y - half, 0}, {x + half, y - half, 0}, {x + half, y + half, 0}, {x - half, y + half, 0}});
 }
 
-TEST(PlaceBody, TurnsThePartsInTheirFirstTwoCoordinatesAndMovesThem) {
+// x, y, theta; its hitch is at 2.5 to 3.5 m.
+std::shared_ptr<const NominalModel> Unicycle() {
+  ModelText text{.name = "unicycle"};
+  for (const char* state : {"x", "y", "theta"}) text.states.push_back({state, ""});
+  for (const char* input : {"v", "omega"}) text.inputs.push_back({input, ""});
+  text.parameters = {{"dt", 0.1, 0.1}, {"hitch", 2.5, 3.5}};
+  text.equations = {{"x + dt*v*cos(theta)"}, {"y + dt*v*sin(theta)"}, {"theta + dt*omega"}};
+  return MakeTextModel(text);
+}
+
+TEST(BodyPlaces, TurnPartsInTheirFirstTwoCoordinatesAndMoveThem) {
+  const auto model = Unicycle();
   const Body body{.heading = 2, .parts = {Hull({{2, 0, 0}, {0, 1, 0}}, 0.5), Hull({{-1, 0, 0}})}};
   const Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(2, 3);
   const std::array x{10.0, 20.0, std::numbers::pi / 2};
-  const std::vector<BodyPart> placed = PlaceBody(body, projection, x);
+  const std::vector<BodyPart> placed = BodyPlaces(*model, projection, body).At(x);
   ASSERT_EQ(placed.size(), 2u);
   EXPECT_TRUE(placed[0].points[0].isApprox(Vector3d(10, 22, 0)));
   EXPECT_TRUE(placed[0].points[1].isApprox(Vector3d(9, 20, 0)));
@@ -31,7 +43,29 @@ TEST(PlaceBody, TurnsThePartsInTheirFirstTwoCoordinatesAndMovesThem) {
   EXPECT_TRUE(placed[1].points[0].isApprox(Vector3d(10, 19, 0)));
 
   const Body fixed{.heading = -1, .parts = {Hull({{2, 0, 3}})}};
-  EXPECT_EQ(PlaceBody(fixed, Eigen::MatrixXd::Identity(3, 3), x)[0].points[0], Vector3d(12, 20, 3 + x[2]));
+  const BodyPlaces places(*model, Eigen::MatrixXd::Identity(3, 3), fixed);
+  EXPECT_EQ(places.At(x)[0].points[0], Vector3d(12, 20, 3 + x[2]));
+}
+
+TEST(BodyPlaces, AtExpressionsAreWhereTheseSayForTheMiddlesOfTheParameters) {
+  const auto model = Unicycle();
+  const auto expression = [](const char* text) { return ExpressionText{text, 1, 1}; };
+  Body body{.heading = 2, .parts = {Hull({{2, 0, 0}}, 0.5), BodyPart{{}, 0.25, {}}}};
+  body.parts[1].places = {{expression("x"), expression("y")},
+                          {expression("x - hitch*cos(theta)"), expression("y - hitch*sin(theta)")}};
+  const BodyPlaces places(*model, Eigen::MatrixXd::Identity(2, 3), body);
+  EXPECT_FALSE(places.IsAtExpressions(0));
+  EXPECT_TRUE(places.IsAtExpressions(1));
+  std::vector<BodyPart> placed = places.At(std::array{10.0, 20.0, std::numbers::pi / 2});
+  ASSERT_EQ(placed.size(), 2u);
+  EXPECT_TRUE(placed[0].points[0].isApprox(Vector3d(10, 22, 0)));
+  ASSERT_EQ(placed[1].points.size(), 2u);
+  EXPECT_EQ(placed[1].points[0], Vector3d(10, 20, 0));
+  EXPECT_TRUE(placed[1].points[1].isApprox(Vector3d(10, 17, 0)));
+  EXPECT_EQ(placed[1].radius, 0.25);
+  places.MoveFrame(Vector2d(0, 0), 0, placed);
+  EXPECT_EQ(placed[0].points[0], Vector3d(2, 0, 0));
+  EXPECT_EQ(placed[1].points[0], Vector3d(10, 20, 0));
 }
 
 TEST(PartDistance, OfOnePointIsThatOfThePointLessTheRadius) {
