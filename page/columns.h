@@ -23,9 +23,9 @@ namespace forereach {
 template <class Number>
 [[nodiscard]] nlohmann::json Column(std::span<const Number> values) {
   static_assert(std::is_arithmetic_v<Number>);
-  const char* kind = std::is_floating_point_v<Number> ? "f" : std::is_signed_v<Number> ? "i" : "u";
-  return {{"type", kind + std::to_string(8 * sizeof(Number))},
-          {"data", Packed({reinterpret_cast<const char*>(values.data()), values.size_bytes()})}};
+  std::string type(1, std::is_floating_point_v<Number> ? 'f' : std::is_signed_v<Number> ? 'i' : 'u');
+  type += std::to_string(8 * sizeof(Number));
+  return {{"type", type}, {"data", Packed({reinterpret_cast<const char*>(values.data()), values.size_bytes()})}};
 }
 template <class Number>
 [[nodiscard]] nlohmann::json Column(const std::vector<Number>& values) {

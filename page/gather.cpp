@@ -148,8 +148,8 @@ class DetailMaker final : public TimelineUser {
     detail.steps = candidate->num_steps;
     if (recorded.decision.outcome == decision_t::CERTIFIED) executing_[candidate->plan_id] = {place, &task};
     obstacles_ = recorded.basis.obstacles;
-    pending_.push_back({place, *candidate, ScheduleOf(*candidate, task.gate), recorded.decision.outcome,
-                        recorded.decision.step});
+    pending_.push_back(
+        {place, *candidate, ScheduleOf(*candidate, task.gate), recorded.decision.outcome, recorded.decision.step});
     if (pending_.size() >= kBatch) CertifyAgain();
   }
 
@@ -161,7 +161,8 @@ class DetailMaker final : public TimelineUser {
     if (found == executing_.end()) return;
     const auto& [place, task] = found->second;
     const Eigen::MatrixXd& projection = task->problem->projection;
-    if (state->num_states != projection.cols() || projection.rows() != 2 || !steps_.insert({place, state->executing_step}).second)
+    if (state->num_states != projection.cols() || projection.rows() != 2 ||
+        !steps_.insert({place, state->executing_step}).second)
       return;
     const Eigen::Vector2d at = projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
     if (at.allFinite() && 0 <= state->executing_step && state->executing_step <= kMaxSteps)
@@ -284,7 +285,8 @@ void AddTasks(const std::vector<Config>& tasks, PageRun& run) {
     const std::string digest = ToHex(task.grounds.config);
     if (std::ranges::find(run.tasks, digest, &PageTask::config_digest) != run.tasks.end()) continue;
     const NominalModel& model = *task.problem->model;
-    run.tasks.push_back({digest, model.name(), model.state_names(), model.input_names(), HoldsName(*task.problem)});
+    run.tasks.push_back({digest, model.name(), model.state_names(), model.input_names(), HoldsName(*task.problem),
+                         task.problem->body.parts.size()});
   }
 }
 
@@ -316,7 +318,8 @@ void AddReplays(const Logs& logs, const std::string& config, const LogKey& key, 
 PageRun FromLogs(const Logs& logs, const std::string& config, const LogKey& key, const DetailBounds& bounds) {
   const std::vector<Config> tasks = TasksOf(logs, config, key);
   PageRun run;
-  run.name = logs.size() == 1 ? FileName(logs[0]) : FileName(logs[0]) + " and " + std::to_string(logs.size() - 1) + " more";
+  run.name =
+      logs.size() == 1 ? FileName(logs[0]) : FileName(logs[0]) + " and " + std::to_string(logs.size() - 1) + " more";
   run.files = logs;
   AddTasks(tasks, run);
   ReadRows(logs, tasks, true, run);

@@ -353,6 +353,8 @@ const showSteps = (run) => {
 };
 
 const QUANTILES = [['p50', .5], ['p90', .9], ['p99', .99], ['p99.9', .999], ['most', 1]];
+// Of a logarithmic axis, labels at powers of ten alone.
+const powers = {color: SOFT, maxRotation: 0, callback: (value) => (Math.abs(Math.log10(value) % 1) < 1e-9 ? String(value) : '')};
 const showTimes = (run) => {
   const sides = [['Latency', sortedOf(run, run.decisions.latency.values), '#0072B2'],
     ['Gate', sortedOf(run, run.decisions.elapsed.values), '#D55E00']];
@@ -368,8 +370,8 @@ const showTimes = (run) => {
     type: 'scatter',
     data: {datasets: sides.filter(([, sorted]) => sorted.length).map(([label, sorted, color]) => ({label, data: points(sorted), showLine: true, borderColor: color, backgroundColor: color, pointRadius: 0, borderWidth: 2}))},
     options: {plugins: {legend: legend(true)},
-      scales: {x: axis('milliseconds', {type: 'logarithmic', ticks: {color: SOFT, maxRotation: 0, autoSkipPadding: 14}}),
-        y: axis('% took longer', {type: 'logarithmic', max: 100})}},
+      scales: {x: axis('milliseconds', {type: 'logarithmic', ticks: powers}),
+        y: axis('% took longer', {type: 'logarithmic', max: 100, ticks: powers})}},
   });
   fillTable(byId('times'), 'Percentiles', ['', ...sides.map(([name]) => name)],
     [...QUANTILES.map(([name, q]) => [name, ...sides.map(([, sorted]) => duration(quantile(sorted, q)))]),
@@ -394,7 +396,7 @@ const fillTable = (table, caption, heads, rows, numeric = []) => {
   table.replaceChildren(make('caption', caption), head, body);
 };
 
-const MOST_GROUPS = 12;
+const MOST_GROUPS = 8;
 const showGroups = (run, id, caption, name, label) => {
   const d = run.decisions, groups = new Map();
   for (let k = 0; k < run.size; ++k) {
@@ -445,7 +447,7 @@ const grid = {order: new Uint32Array(0), sort: 'time', falls: false, chosen: -1,
 const clearanceAt = (d, i) => d.margin.values[i] - d.threshold.values[i];
 const COLUMNS = [
   {id: 'time', title: 'Time (UTC)', key: (run) => run.time, text: (run, i) => (narrow.matches ? clockText(run.time[i]).slice(0, 10) : timeText(run.time[i]))},
-  {id: 'plan', title: 'Plan', rare: true, number: true, key: (run) => toNumbers(run.decisions.plan.values), text: (run, i) => String(run.decisions.plan.values[i])},
+  {id: 'plan', title: 'Plan', rare: true, number: true, key: (run) => toNumbers(run.decisions.plan.values), text: (run, i) => lastDigits(String(run.decisions.plan.values[i]))},
   {id: 'source', title: 'Source', rare: true, text: (run, i) => nameAt(run.decisions.source, i), names: 'source'},
   {id: 'outcome', title: 'Outcome', text: (run, i) => outcomeLabel(nameAt(run.decisions.outcome, i)), names: 'outcome', chip: true},
   {id: 'cause', title: 'Cause', text: (run, i) => { const cause = nameAt(run.decisions.cause, i); return cause === 'none' ? '' : cause.replaceAll('_', ' '); }, names: 'cause'},
@@ -457,6 +459,8 @@ const COLUMNS = [
   {id: 'message', title: 'Sentence', rare: true, text: (run, i) => textAt(run.decisions.message, i)},
 ];
 const narrow = matchMedia('(max-width: 46rem)');
+// Of a long number, as a planner makes of the time, the digits that differ.
+const lastDigits = (text) => (text.length > 8 ? `…${text.slice(-7)}` : text);
 const indexText = (index) => (index < 0 ? '' : String(index));
 const rowHeight = () => (narrow.matches ? 40 : 30);
 const MOST_PIXELS = 12e6;  // browsers lay out no more than about 16 million
@@ -601,6 +605,7 @@ const loadDrawings = async (raw) => {
   let part = 0, polygon = 0, point = 0;
   for (const detail of texts.details) {  // where its numbers begin
     detail.at = {part, polygon, point};
+    detail.executed = detail.executed.filter(([, x, y]) => canBeDrawn(x, y));
     for (let u = 0; u < detail.units; ++u)
       for (let k = parts.values[part++]; k > 0; --k) point += 2 * corners.values[polygon++];
     ofRow.set(detail.row, detail);
@@ -635,6 +640,9 @@ const outline = (points, attributes) =>
 
 const view = {x: 0, y: 0, width: 1, height: 1, whole: null, scene: null};
 
+// Beyond this, numbers of a log are no places in a drawing.
+const canBeDrawn = (...numbers) => numbers.every((x) => Math.abs(x) < 1e9);
+
 // Where an obstacle is at a time: its points and its radius, or null.
 const placeOf = (obstacle, time) => {
   if (!obstacle?.points) return null;
@@ -653,6 +661,7 @@ const drawObstacle = (obstacle, place, isBinding) => {
   if (obstacle.normal) {
     const [nx, ny] = obstacle.normal, norm = Math.hypot(nx, ny), far = 50 * Math.max(view.whole.width, view.whole.height);
     const [ux, uy] = [nx / norm, ny / norm], [cx, cy] = [ux * obstacle.offset / norm, uy * obstacle.offset / norm];
+    if (!canBeDrawn(cx, cy)) return shape('g', {});
     return outline([[cx - far * uy, cy + far * ux], [cx + far * uy, cy - far * ux], [cx + far * (uy + ux), cy + far * (uy - ux)],
       [cx + far * (ux - uy), cy + far * (uy + ux)]], {fill: color, 'fill-opacity': .28, stroke: color, 'stroke-width': isBinding ? 2 : 1});
   }
@@ -728,11 +737,16 @@ const startView = () => {
   new ResizeObserver(() => { if (view.whole) showView(); }).observe(svg);
 };
 
-const extentOf = (units, executed) => {
+// The tube, and the obstacle that decides if it is not much larger.
+const extentOf = (units, executed, place) => {
   let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
   const add = ([x, y]) => { left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y); };
   units.flat(2).forEach(add);
   executed.forEach(([, x, y]) => add([x, y]));
+  const size = Math.max(right - left, top - bottom, 1e-3);
+  for (const [x, y] of place && place.radius < size && canBeDrawn(...place.points.flat()) ? place.points : [])
+    if (Math.abs(x - (left + right) / 2) < 1.5 * size && Math.abs(y - (top + bottom) / 2) < 1.5 * size)
+      for (const way of [-1, 1]) add([x + way * place.radius, y + way * place.radius]);
   const border = Math.max(.12 * Math.max(right - left, top - bottom), 1e-3);
   const width = right - left + 2 * border, height = Math.max(top - bottom + 2 * border, .45 * width);
   return {x: left - border, y: -(top + bottom) / 2 - height / 2, width, height};
@@ -743,12 +757,13 @@ const drawTube = (run, i, detail) => {
   const units = unitsOf(run.drawings, detail), outcome = nameAt(run.decisions.outcome, i), color = outcomeColor(outcome);
   const binding = outcome === 'rejected' ? -1 : run.decisions.obstacle.values[i];
   const executed = new Set(detail.executed.map(([step]) => step));
-  view.whole = extentOf(units, detail.executed);
+  const set = run.drawings.sets[detail.obstacles] ?? [];
+  view.whole = extentOf(units, detail.executed, placeOf(set[binding], detail.start + Math.max(detail.binding, 0) * detail.step_us));
   const tube = shape('g', {}), path = shape('g', {}), now = shape('g', {}), obstacles = shape('g', {}), labels = shape('g', {});
   units.forEach((polygons, u) => polygons.forEach((polygon) => tube.append(outline(polygon, {
-    fill: executed.has(u) ? EXECUTED : color, 'fill-opacity': executed.has(u) ? .22 : .16,
-    stroke: u === detail.binding ? WRONG : executed.has(u) ? EXECUTED : color, 'stroke-opacity': u === detail.binding ? 1 : .45,
-    'stroke-width': u === detail.binding ? 2 : .8}))));
+    fill: executed.has(u) ? EXECUTED : color, 'fill-opacity': executed.has(u) ? .2 : .13,
+    stroke: executed.has(u) ? EXECUTED : color, 'stroke-opacity': .45, 'stroke-width': .8}))));
+  for (const polygon of units[detail.binding] ?? []) path.append(outline(polygon, {fill: 'none', stroke: WRONG, 'stroke-width': 2}));
   if (detail.executed.length > 1)
     path.append(shape('polyline', {points: pointsText(detail.executed.map(([, x, y]) => [x, y])), fill: 'none', stroke: INK, 'stroke-width': 1, 'vector-effect': 'non-scaling-stroke'}));
   for (const [step, x, y] of detail.executed) {
@@ -757,7 +772,7 @@ const drawTube = (run, i, detail) => {
     path.append(dot);
   }
   byId('svg').replaceChildren(obstacles, tube, path, now, labels);
-  view.scene = {units, detail, color, binding, obstacles, now, path, labels, set: run.drawings.sets[detail.obstacles] ?? []};
+  view.scene = {units, detail, color, binding, obstacles, now, path, labels, set};
   const slider = byId('step');
   slider.max = String(Math.max(0, units.length - 1));
   slider.value = String(Math.max(0, Math.min(detail.binding, units.length - 1)));
@@ -777,7 +792,7 @@ const showStep = () => {
   scene.labels.replaceChildren();
   scene.set.forEach((obstacle, k) => {
     const place = placeOf(obstacle, time), isBinding = k === scene.binding;
-    if (!obstacle || (!place && !obstacle.normal)) return;
+    if (!obstacle || !(obstacle.normal ? canBeDrawn(...obstacle.normal, obstacle.offset) : place && canBeDrawn(place.radius, ...place.points.flat()))) return;
     scene.obstacles.append(drawObstacle(obstacle, place, isBinding));
     if (!place) return;
     const [x, y] = centerOf(place.points);
@@ -815,9 +830,9 @@ const showEnvelope = (detail, task) => {
   const [lower, upper] = detail?.hull ?? [[], []], [low, up] = detail?.envelope ?? [[], []];
   byId('envelope').hidden = lower.length === 0;
   if (lower.length === 0) return;
-  const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 5)} … ${number(b ?? NaN, 5)}`);
+  const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 4)} … ${number(b ?? NaN, 4)}`);
   fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual'],
-    lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k])]), [1, 2]);
+    lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k])]));
 };
 
 const showDetail = (run, i) => {
@@ -836,7 +851,7 @@ const showDetail = (run, i) => {
     ['Took', `${duration(d.elapsed.values[i])} in the gate, latency ${duration(d.latency.values[i])}`],
     ['Binding step', d.step.values[i] >= 0 ? `${d.step.values[i]}, the first that fails` : detail?.binding >= 0 ? `${detail.binding}, the closest` : ''],
     ['Obstacle', index(d.obstacle)],
-    ['Part of the body', detail?.part >= 0 ? String(detail.part) : ''],
+    ['Part of the body', detail?.part >= 0 && run.raw.tasks[detail.task]?.parts > 1 ? String(detail.part) : ''],
     ['Coordinate', coordinateText(d, i, task)],
     ['Observations', d.first.values[i] >= 0 ? `${d.first.values[i]} and ${d.second.values[i]} contradict each other` : ''],
     ['Value, bound', `${number(margin)}, ${number(threshold)}; margin ${number(margin - threshold)}`],

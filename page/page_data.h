@@ -16,8 +16,9 @@ namespace forereach {
 /** A task under which decisions were made. */
 struct PageTask {
   std::string config_digest, name;          ///< Of the task file, and of the model.
-  std::vector<std::string> states, inputs;   ///< Names of the coordinates.
+  std::vector<std::string> states, inputs;  ///< Names of the coordinates.
   std::string holds;                        ///< HoldsName
+  std::size_t parts = 1;                    ///< Of the body.
 };
 
 struct PageFault {
@@ -48,7 +49,8 @@ struct PageDetail {
   int steps = 0;     ///< Of the plan.
   int binding = -1;  ///< The step that decided: the first that fails, or the closest.
   int part = -1;     ///< Of the body.
-  /** At the binding step, of each state: the hull of the slice, and the envelope of the residual if the step was made. */
+  /** At the binding step, of each state: the hull of the slice, and the envelope of the residual if the step was made.
+   */
   std::vector<double> hull_lower, hull_upper, envelope_lower, envelope_upper;
   std::vector<PageState> executed;
 };

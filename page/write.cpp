@@ -60,13 +60,10 @@ Json TextColumn(const std::vector<Row>& rows, const Of& of) {
 
 // Digests are 64 hexadecimal digits; what is none becomes zeros.
 std::string BytesOf(const std::string& hex) {
-  const auto value = [](char c) {
-    return '0' <= c && c <= '9' ? c - '0' : 'a' <= c && c <= 'f' ? c - 'a' + 10 : -1;
-  };
+  const auto value = [](char c) { return '0' <= c && c <= '9' ? c - '0' : 'a' <= c && c <= 'f' ? c - 'a' + 10 : -1; };
   std::string bytes(32, '\0');
   if (hex.size() != 64 || std::ranges::any_of(hex, [&](char c) { return value(c) < 0; })) return bytes;
-  for (std::size_t i = 0; i < 32; ++i)
-    bytes[i] = static_cast<char>(value(hex[2 * i]) << 4 | value(hex[2 * i + 1]));
+  for (std::size_t i = 0; i < 32; ++i) bytes[i] = static_cast<char>(value(hex[2 * i]) << 4 | value(hex[2 * i + 1]));
   return bytes;
 }
 
@@ -158,7 +155,8 @@ Json TasksJson(const std::vector<PageTask>& tasks) {
                    {"name", Printable(task.name)},
                    {"states", TextsJson(task.states)},
                    {"inputs", TextsJson(task.inputs)},
-                   {"holds", task.holds}});
+                   {"holds", task.holds},
+                   {"parts", task.parts}});
   return all;
 }
 
@@ -177,12 +175,9 @@ Json ObstacleJson(const Obstacle& obstacle) {
     json["points"] = std::move(points);
   }
   if (const auto& motion = obstacle.motion())
-    json["motion"] = {{"stamp", motion->stamp_us},
-                      {"velocity", {motion->velocity.x(), motion->velocity.y()}},
-                      {"uncertainty", motion->uncertainty},
-                      {"growth", motion->growth},
-                      {"growth_rate", motion->growth_rate},
-                      {"from", motion->from_us},
+    json["motion"] = {{"stamp", motion->stamp_us},          {"velocity", {motion->velocity.x(), motion->velocity.y()}},
+                      {"uncertainty", motion->uncertainty}, {"growth", motion->growth},
+                      {"growth_rate", motion->growth_rate}, {"from", motion->from_us},
                       {"until", motion->until_us}};
   return json;
 }
@@ -219,7 +214,8 @@ Json DetailJson(const PageDetail& detail) {
 template <class Number>
 Json Joined(const std::vector<PageDetail>& details, std::vector<Number> Sketch::*member) {
   std::vector<Number> all;
-  for (const PageDetail& detail : details) all.insert(all.end(), (detail.sketch.*member).begin(), (detail.sketch.*member).end());
+  for (const PageDetail& detail : details)
+    all.insert(all.end(), (detail.sketch.*member).begin(), (detail.sketch.*member).end());
   return Column(all);
 }
 
@@ -264,7 +260,8 @@ std::string PageHtml(const PageRun& run, const PageRun* before) {
       "img-src data:; style-src ";
   html += PolicyHash(kPageStyle) + "; script-src " + PolicyHash(kChartScript) + " " + PolicyHash(kPageScript) + "\">\n";
   html +=
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>ForeReach report</title>\n<style>";
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>ForeReach "
+      "report</title>\n<style>";
   html += kPageStyle.text;
   html += "</style>\n</head>\n";
   html += kPageBody.text;

@@ -27,7 +27,7 @@ def equal(found, wanted, what):
 def is_quiet(browser, path):
     """Without errors, and without any request but the page itself."""
     equal(browser.errors, [], "no errors in the console")
-    others = [url for url in browser.requests if url != "file://" + os.path.abspath(path)]
+    others = [url for url in browser.requests if url != "file://" + os.path.abspath(path) and not url.startswith("data:")]
     equal(others, [], "no requests")
 
 

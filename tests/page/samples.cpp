@@ -51,7 +51,8 @@ PageRun Many(int count) {
     } else {
       row.outcome = "rejected", row.cause = "stale";
     }
-    row.message = row.outcome + " at step " + std::to_string(row.step) + ", margin " + std::to_string(row.margin) + " m";
+    row.message =
+        row.outcome + " at step " + std::to_string(row.step) + ", margin " + std::to_string(row.margin) + " m";
     run.decisions.push_back(row);
   }
   return run;
@@ -59,7 +60,8 @@ PageRun Many(int count) {
 
 // Texts that try to become elements, scripts and line ends, and numbers that are none.
 PageRun Hostile() {
-  const std::string evil = "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=2'>\n\xe2\x80\xae\xff\x1b[31m";
+  const std::string evil =
+      "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=2'>\n\xe2\x80\xae\xff\x1b[31m";
   const double infinity = std::numeric_limits<double>::infinity();
   PageRun run = Many(20);
   run.name = evil;
@@ -81,10 +83,10 @@ PageRun Hostile() {
   run.withdrawals = {{0, -1, evil, evil, evil, 7}};
   run.gaps = {{{evil, 1, evil}, evil, evil, 0, 9, std::numeric_limits<std::int64_t>::max(), -1, evil}};
   run.events = {{{evil, 2, evil}, 5, 6, 7, evil, evil, -1, -1, {}, infinity}};
-  run.tasks = {{at(0).grounds[0], evil, {evil}, {evil}, evil}};
+  run.tasks = {{at(0).grounds[0], evil, {evil}, {evil}, evil, 2}};
   run.replays[evil] = evil;
-  run.obstacle_sets = {{Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1e300),
-                        Obstacle::HalfSpace(Eigen::Vector2d(1e-300, 1), 1e300)}};
+  run.obstacle_sets = {
+      {Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1e300), Obstacle::HalfSpace(Eigen::Vector2d(1e-300, 1), 1e300)}};
   PageDetail detail;
   detail.decision = 4;
   detail.obstacles = detail.task = 0;
@@ -110,7 +112,9 @@ int main(int argc, char** argv) {
     std::cerr << "usage: forereach_page_samples hostile|many|empty FILE.html [COUNT]\n";
     return 2;
   }
-  const PageRun run = kind == "hostile" ? Hostile() : kind == "many" ? Many(argc > 3 ? std::stoi(argv[3]) : 100'000) : PageRun{};
+  const PageRun run = kind == "hostile" ? Hostile()
+                      : kind == "many"  ? Many(argc > 3 ? std::stoi(argv[3]) : 100'000)
+                                        : PageRun{};
   std::ofstream(argv[2], std::ios::binary) << PageHtml(run);
   return 0;
 }
