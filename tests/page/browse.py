@@ -107,10 +107,10 @@ def use_course(browser, path):
     binding = browser.run("Number(document.getElementById('step').value)")
     check(text(browser, "#sentence").find(f"step {binding}") >= 0 or text(browser, "#sentence").find(f"steps {binding}") >= 0,
           "the slider begins at the binding step")
-    before = browser.run("document.querySelector('#svg g:nth-of-type(4)').innerHTML")
+    before = browser.run("document.querySelector('#svg > g:nth-of-type(4)').innerHTML")
     browser.key("ArrowLeft", 37)
     equal(browser.run("Number(document.getElementById('step').value)"), binding - 1, "an arrow moves the slider")
-    check(browser.run("document.querySelector('#svg g:nth-of-type(4)').innerHTML") != before, "the slice moves along")
+    check(browser.run("document.querySelector('#svg > g:nth-of-type(4)').innerHTML") != before, "the slice moves along")
     check(browser.run("document.querySelectorAll('#svg polygon').length") > 10, "the tube is drawn")
     check(browser.run("document.querySelectorAll('#svg circle').length") > 5, "obstacles are drawn")
     box = browser.run("document.getElementById('svg').getAttribute('viewBox')")

@@ -7,6 +7,10 @@
 #include "page/gather.h"
 #include "page/sketch.h"
 #include "page/write.h"
+#include "records/database.h"
+#include "records/interpreter.h"
+#include "tests/cli/program.h"
+#include "tests/scratch.h"
 #include "tests/tries.h"
 
 namespace forereach {
@@ -93,7 +97,9 @@ TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
     EXPECT_FALSE(detail.sketch.parts.empty());
     ASSERT_GE(detail.binding, 0);
     EXPECT_EQ(detail.hull_lower.size(), 6u);
-    if (run.decisions[detail.decision].step >= 0) EXPECT_EQ(detail.binding, run.decisions[detail.decision].step);
+    if (const int step = run.decisions[detail.decision].step; step >= 0) {
+      EXPECT_EQ(detail.binding, step);
+    }
     executed += detail.executed.size();
   }
   EXPECT_GT(executed, 50u);
@@ -109,6 +115,76 @@ TEST(GatherTest, DrawsNoMoreThanItsBounds) {
     EXPECT_THAT(detail.missing, HasSubstr("reached their bound"));
     EXPECT_TRUE(detail.sketch.points.empty());
   }
+}
+
+/** A logger's directory with the course's log and its rows. */
+class DirectoryTest : public testing::Test {
+ protected:
+  DirectoryTest() {
+    std::filesystem::copy(kLog, log_);
+    Database database(directory_ / "decisions.sqlite");
+    database.BeginRun("events-20260101-120000-000000.lcmlog", 1);
+    Interpreter interpreter({}, "events-20260101-120000-000000.lcmlog");
+    Rows rows;
+    std::int64_t events = 0;
+    ForEachEvent({log_}, [&](const LogEvent& event, const std::string&) {
+      interpreter.Observe(event, rows);
+      ++events;
+    });
+    EXPECT_TRUE(database.Write(rows, "events-20260101-120000-000000.lcmlog", events));
+  }
+
+  const ScratchDirectory directory_;
+  const std::string log_ = directory_ / "events-20260101-120000-000000.lcmlog";
+};
+
+TEST_F(DirectoryTest, HasTheRowsOfTheDatabaseAndTheTubesOfTheLog) {
+  const PageRun of_log = GatherPage({kLog}, kTask, {}, {});
+  const PageRun run = GatherPage({directory_.path()}, kTask, {}, {});
+  EXPECT_EQ(run.decisions.size(), of_log.decisions.size());
+  EXPECT_EQ(run.events.size(), of_log.events.size());
+  EXPECT_EQ(run.details.size(), of_log.details.size());
+  for (const PageDetail& detail : run.details) EXPECT_EQ(detail.missing, "");
+  EXPECT_THAT(run.notes, testing::IsEmpty());
+}
+
+TEST_F(DirectoryTest, WithoutTheLogItHasTheRowsAlone) {
+  std::filesystem::remove(log_);
+  const PageRun run = GatherPage({directory_ / "decisions.sqlite"}, "", {}, {});
+  EXPECT_EQ(run.decisions.size(), 67u);
+  EXPECT_TRUE(run.details.empty());
+  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not beside the database")));
+}
+
+TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
+  const PageRun run = GatherPage({directory_.path()}, "", {}, {});
+  EXPECT_EQ(run.decisions.size(), 67u);
+  EXPECT_TRUE(run.details.empty());
+  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not kept next to it")));
+}
+
+TEST_F(DirectoryTest, WithoutADatabaseItHasItsLogs) {
+  std::filesystem::remove(directory_ / "decisions.sqlite");
+  EXPECT_EQ(GatherPage({directory_.path()}, kTask, {}, {0, 0, 0}).decisions.size(), 67u);
+  std::filesystem::remove(log_);
+  EXPECT_THROW(static_cast<void>(GatherPage({directory_.path()}, kTask, {}, {})), BadInput);
+}
+
+TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
+  const ScratchDirectory directory;
+  const std::string page = directory / "a page.html", report = "report '" + kLog + "' --config '" + kTask + "' --out '";
+  const Output first = Forereach(report + page + "' 2>&1");
+  EXPECT_EQ(first.code, 0) << first.text;
+  EXPECT_THAT(first.text, HasSubstr("67 decisions"));
+  EXPECT_THAT(Read(page), testing::StartsWith("<!DOCTYPE html>"));
+  directory.Write("a page.html", "mine");
+  const Output second = Forereach(report + page + "' 2>&1");
+  EXPECT_EQ(second.code, 2);
+  EXPECT_THAT(second.text, HasSubstr("the file exists"));
+  EXPECT_EQ(Read(page), "mine");
+  EXPECT_EQ(Forereach(report + page + "' --force 2>&1").code, 0);
+  EXPECT_THAT(Read(page), testing::EndsWith("</html>\n"));
+  EXPECT_EQ(Forereach(report + directory.path() + "/none/page.html' 2>&1").code, 2);
 }
 
 TEST(WriteTest, TextsOfARunBeginNoTag) {
