@@ -15,7 +15,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> logs;
-  std::string config;
+  std::string config, plan_digest;
   LogKey key;
   bool json = false, other_task = false;
 };
@@ -29,7 +29,7 @@ int RunReplay(const Options& options) {
   } else {
     tasks = TasksOf(options.logs, options.config, options.key);
   }
-  const ReplayResult result = Replay(options.logs, tasks);
+  const ReplayResult result = Replay(options.logs, tasks, options.plan_digest);
   if (options.json) {
     std::cout << JsonText({{"candidates", result.candidates},
                            {"agreed", result.agreed},
@@ -37,9 +37,11 @@ int RunReplay(const Options& options) {
                            {"circumstances", result.circumstances},
                            {"corruptions", result.corruptions},
                            {"passed_over", ToJson(result.passed_over)},
+                           {"shown", result.shown},
                            {"differences", result.differences}})
               << std::endl;
   } else {
+    for (const std::string& line : result.shown) std::cout << Printable(line) << "\n";
     for (const std::string& difference : result.differences) std::cout << Printable(difference) << "\n";
     std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
               << result.differences.size() << " differ";
@@ -70,6 +72,8 @@ Command ReplayCommand() {
                    .variable = &options->other_task,
                    .help = "Replay it through the gate of another task, given by --config, and show its decisions",
                    .needs = "--config"},
+                  {"--plan-digest", &options->plan_digest, "HEX",
+                   "Also print what was recorded and what is decided again on the candidates whose digest begins so"},
                   JsonFlag(options->json)},
       .run = [options] { return RunReplay(*options); }};
   AddKeyOptions(command.options, options->key);

@@ -50,6 +50,8 @@ bool IsCircumstance(const decision_t& decision) {
 
 class Replayer final : public TimelineUser {
  public:
+  explicit Replayer(std::string plan_digest) : plan_digest_(std::move(plan_digest)) {}
+
   void OnStart(const Config& task) override {
     gate_ = std::make_unique<Gate>(task);
     plans_.clear();
@@ -78,9 +80,13 @@ class Replayer final : public TimelineUser {
     if (IsCircumstance(decision)) {
       static_cast<void>(gate_->Refuse(bytes, decision.utime, decision.cause, ""));
       ++result_.circumstances;
+      Show(recorded.event, "recorded", decision, ", which depends on the moment");
       return;
     }
-    const std::string difference = Difference(decision, gate_->Decide(bytes, decision.utime).decision);
+    const decision_t again = gate_->Decide(bytes, decision.utime).decision;
+    const std::string difference = Difference(decision, again);
+    Show(recorded.event, "recorded", decision);
+    Show(recorded.event, "replayed", again);
     if (difference.empty())
       ++result_.agreed;
     else
@@ -144,7 +150,16 @@ class Replayer final : public TimelineUser {
     result_.differences.push_back(event + ", plan " + std::to_string(plan_id) + ": " + what);
   }
 
+  void Show(const std::string& event, const std::string& how, const decision_t& decision,
+            const std::string& remark = "") {
+    if (plan_digest_.empty() || !ToHex(GetDigest(decision.plan_digest)).starts_with(plan_digest_)) return;
+    result_.shown.push_back(event + ", plan " + std::to_string(decision.plan_id) + ": " + how + " " +
+                            DescribeDecision(decision) + remark + ": " + GetText(decision.message));
+  }
+
   using Plan = std::pair<Digest, candidate_plan_t>;  // by its certificate
+
+  const std::string plan_digest_;
 
   std::unique_ptr<Gate> gate_;
   std::deque<Plan> plans_;  // the last ones
@@ -153,8 +168,9 @@ class Replayer final : public TimelineUser {
 
 }  // namespace
 
-ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
-  Replayer replayer;
+ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
+                    const std::string& plan_digest) {
+  Replayer replayer(plan_digest);
   Timeline timeline(PointersTo(tasks), replayer);
   timeline.Read(logs, logs.size() > 1);
   return replayer.Finish(timeline);

@@ -22,6 +22,8 @@ struct ReplayResult {
   /** A line for each decision and withdrawal that differs, each candidate without a recorded decision, each recorded
   decision without a candidate, and each fault of a certified plan's seal. */
   std::vector<std::string> differences;
+  /** What was recorded and what was decided again on the candidates that were asked for, a line each. */
+  std::vector<std::string> shown;
 };
 
 /** Gives the candidates of consecutive logs to a new gate, each at the time of its recorded decision and with the
@@ -31,7 +33,10 @@ withdrawn are judged again under the grounds that the withdrawal names. It also 
 messages count. Each decision is compared under the task of its config digest; a decision of an unknown digest differs.
 With a single task, every decision is compared under that task.
 @param tasks at least one; channels and key are those of the first.
+@param plan_digest the beginning of a candidate's digest, in hexadecimal: ReplayResult::shown has the decisions on such
+candidates. Empty: on none.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
-[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
+[[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
+                                  const std::string& plan_digest = "");
 
 }  // namespace forereach

@@ -1,0 +1,76 @@
+/** What the page of a run shows, as plain data: it knows neither logs nor HTML. */
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "certifier/safety/obstacle.h"
+#include "page/sketch.h"
+#include "records/event_log.h"
+#include "records/rows.h"
+
+namespace forereach {
+
+/** A task under which decisions were made. */
+struct PageTask {
+  std::string config_digest, name;          ///< Of the task file, and of the model.
+  std::vector<std::string> states, inputs;  ///< Names of the coordinates.
+  std::string holds;                        ///< HoldsName
+  std::size_t parts = 1;                    ///< Of the body.
+};
+
+struct PageFault {
+  std::int64_t utime = 0, plan_id = -1;
+  std::string cause, message;
+};
+
+struct PageWithdrawal {
+  std::int64_t utime = 0, plan_id = -1;
+  std::string source, cause, message;
+  int valid_steps = 0;
+};
+
+/** A state that the robot measured while it executed a plan, in the plane. */
+struct PageState {
+  int step = 0;
+  double x = 0, y = 0;
+};
+
+/** What was found by certifying a recorded candidate again. */
+struct PageDetail {
+  std::size_t decision = 0;  ///< Index in PageRun::decisions.
+  std::string missing;       ///< Why there is no tube; empty if there is one.
+  Sketch sketch;             ///< What the body sweeps in each unit of the tube.
+  int task = -1;             ///< Index in PageRun::tasks.
+  int obstacles = -1;        ///< Index in PageRun::obstacle_sets.
+  std::int64_t start_utime = 0, step_us = 0;
+  int steps = 0;     ///< Of the plan.
+  int binding = -1;  ///< The step that decided: the first that fails, or the closest.
+  int part = -1;     ///< Of the body.
+  /** At the binding step, of each state: the hull of the slice, and the envelope of the residual if the step was made.
+   */
+  std::vector<double> hull_lower, hull_upper, envelope_lower, envelope_upper;
+  std::vector<PageState> executed;
+};
+
+/** One side of a page: a run, or several that a database has. */
+struct PageRun {
+  std::string name;
+  std::vector<std::string> files;  ///< What it was read from.
+  std::vector<DecisionRow> decisions;
+  std::vector<EventRow> events;
+  std::vector<GapRow> gaps;
+  std::vector<PageFault> faults;            ///< Without repetitions. Only logs have them.
+  std::vector<PageWithdrawal> withdrawals;  ///< Likewise.
+  std::vector<PageTask> tasks;
+  std::vector<std::vector<Obstacle>> obstacle_sets;
+  std::vector<PageDetail> details;
+  /** By log file: the start of a command that decides again, "forereach replay run/log/a.lcmlog". */
+  std::map<std::string, std::string> replays;
+  LogDamage damage;
+  std::vector<std::string> notes;  ///< What is not on the page, as sentences.
+};
+
+}  // namespace forereach

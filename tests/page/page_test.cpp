@@ -1,0 +1,211 @@
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "page/columns.h"
+#include "page/gather.h"
+#include "page/sketch.h"
+#include "page/write.h"
+#include "records/database.h"
+#include "records/interpreter.h"
+#include "tests/cli/program.h"
+#include "tests/scratch.h"
+#include "tests/tries.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+const std::string kTask = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+TEST(ColumnsTest, Base64IsThatOfTheStandard) {
+  EXPECT_EQ(Base64(""), "");
+  EXPECT_EQ(Base64("f"), "Zg==");
+  EXPECT_EQ(Base64("fo"), "Zm8=");
+  EXPECT_EQ(Base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(Base64("\xff\xfe\xfd"), "//79");
+}
+
+TEST(ColumnsTest, ColumnNamesItsType) {
+  EXPECT_EQ(Column(std::vector<std::int16_t>{1})["type"], "i16");
+  EXPECT_EQ(Column(std::vector<std::uint8_t>{1})["type"], "u8");
+  EXPECT_EQ(Column(std::vector<double>{1})["type"], "f64");
+  EXPECT_EQ(Column(std::vector<float>{})["type"], "f32");
+}
+
+/** The corners of a sketch's polygon, in metres. */
+Picture::Polygon Corners(const Sketch& sketch) {
+  Picture::Polygon corners;
+  int x = 0, y = 0;
+  for (std::size_t i = 0; i < sketch.points.size(); i += 2) {
+    x += sketch.points[i], y += sketch.points[i + 1];
+    corners.emplace_back(sketch.x + sketch.quantum * x, sketch.y + sketch.quantum * y);
+  }
+  return corners;
+}
+
+// How far a point lies outside of a convex polygon whose corners are in counter-clockwise order.
+double Outside(const Picture::Polygon& polygon, const Eigen::Vector2d& point) {
+  double most = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2d from = polygon[i], edge = polygon[(i + 1) % polygon.size()] - from, to = point - from;
+    most = std::max(most, (edge.y() * to.x() - edge.x() * to.y()) / edge.norm());
+  }
+  return most;
+}
+
+TEST(SketchTest, OutlineIsWithinItsTolerance) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> size(0.01, 50), place(-1000, 1000);
+  for (int i = 0; i < Tries(200); ++i) {
+    const double a = size(random), b = size(random), x = place(random), y = place(random);
+    Picture::Polygon ellipse;
+    for (int k = 0; k < 60; ++k)
+      ellipse.emplace_back(x + a * std::cos(2 * M_PI * k / 60), y + b * std::sin(2 * M_PI * k / 60));
+    const auto sketch = MakeSketch({{ellipse}});
+    ASSERT_TRUE(sketch);
+    ASSERT_EQ(sketch->corners.size(), 1u);
+    EXPECT_LT(sketch->corners[0], 60);
+    const double tolerance = 2 * std::max(a, b) * (Sketch::kTolerance + 2.0 / Sketch::kGrid);
+    for (const Eigen::Vector2d& corner : ellipse) EXPECT_LE(Outside(Corners(*sketch), corner), tolerance);
+  }
+}
+
+TEST(SketchTest, RefusesWhatIsNotFinite) {
+  EXPECT_FALSE(MakeSketch({{{{0, 0}, {1, 0}, {0, std::nan("")}}}}));
+  EXPECT_FALSE(MakeSketch({{{{0, 0}, {1, 0}, {0, kInfinity}}}}));
+  EXPECT_FALSE(MakeSketch({{{{0, 0}, {1e300, 0}, {0, 1e300}}}}));
+  EXPECT_FALSE(MakeSketch({std::vector<Picture::Polygon>(256, {{0, 0}, {1, 0}, {0, 1}})}));
+  EXPECT_FALSE(MakeSketch({}));
+}
+
+TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
+  const PageRun run = GatherPage({kLog}, kTask, {}, {});
+  ASSERT_GT(run.decisions.size(), 20u);
+  std::size_t judged = 0;
+  for (const DecisionRow& row : run.decisions)
+    judged += row.outcome == "certified" || row.outcome.starts_with("abstain_");
+  EXPECT_EQ(run.details.size(), judged);
+  std::size_t executed = 0;
+  for (const PageDetail& detail : run.details) {
+    SCOPED_TRACE(run.decisions[detail.decision].message);
+    EXPECT_EQ(detail.missing, "");
+    EXPECT_FALSE(detail.sketch.parts.empty());
+    ASSERT_GE(detail.binding, 0);
+    EXPECT_EQ(detail.hull_lower.size(), 6u);
+    if (const int step = run.decisions[detail.decision].step; step >= 0) {
+      EXPECT_EQ(detail.binding, step);
+    }
+    executed += detail.executed.size();
+  }
+  EXPECT_GT(executed, 50u);
+  EXPECT_EQ(run.tasks.size(), 1u);
+  EXPECT_THAT(run.replays.at("course.lcmlog"), HasSubstr("--config"));
+}
+
+TEST(GatherTest, DrawsNoMoreThanItsBounds) {
+  const PageRun few = GatherPage({kLog}, kTask, {}, {.certified = 3, .abstained = 2, .numbers = 1'000'000});
+  EXPECT_EQ(few.details.size(), 5u);
+  const PageRun none = GatherPage({kLog}, kTask, {}, {.certified = 3, .abstained = 2, .numbers = 10});
+  for (const PageDetail& detail : none.details) {
+    EXPECT_THAT(detail.missing, HasSubstr("reached their bound"));
+    EXPECT_TRUE(detail.sketch.points.empty());
+  }
+}
+
+/** A logger's directory with the course's log and its rows. */
+class DirectoryTest : public testing::Test {
+ protected:
+  DirectoryTest() {
+    std::filesystem::copy(kLog, log_);
+    Database database(directory_ / "decisions.sqlite");
+    database.BeginRun("events-20260101-120000-000000.lcmlog", 1);
+    Interpreter interpreter({}, "events-20260101-120000-000000.lcmlog");
+    Rows rows;
+    std::int64_t events = 0;
+    ForEachEvent({log_}, [&](const LogEvent& event, const std::string&) {
+      interpreter.Observe(event, rows);
+      ++events;
+    });
+    EXPECT_TRUE(database.Write(rows, "events-20260101-120000-000000.lcmlog", events));
+  }
+
+  const ScratchDirectory directory_;
+  const std::string log_ = directory_ / "events-20260101-120000-000000.lcmlog";
+};
+
+TEST_F(DirectoryTest, HasTheRowsOfTheDatabaseAndTheTubesOfTheLog) {
+  const PageRun of_log = GatherPage({kLog}, kTask, {}, {});
+  const PageRun run = GatherPage({directory_.path()}, kTask, {}, {});
+  EXPECT_EQ(run.decisions.size(), of_log.decisions.size());
+  EXPECT_EQ(run.events.size(), of_log.events.size());
+  EXPECT_EQ(run.details.size(), of_log.details.size());
+  for (const PageDetail& detail : run.details) EXPECT_EQ(detail.missing, "");
+  EXPECT_THAT(run.notes, testing::IsEmpty());
+}
+
+TEST_F(DirectoryTest, WithoutTheLogItHasTheRowsAlone) {
+  std::filesystem::remove(log_);
+  const PageRun run = GatherPage({directory_ / "decisions.sqlite"}, "", {}, {});
+  EXPECT_EQ(run.decisions.size(), 67u);
+  EXPECT_TRUE(run.details.empty());
+  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not beside the database")));
+}
+
+TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
+  const PageRun run = GatherPage({directory_.path()}, "", {}, {});
+  EXPECT_EQ(run.decisions.size(), 67u);
+  EXPECT_TRUE(run.details.empty());
+  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not kept next to it")));
+}
+
+TEST_F(DirectoryTest, WithoutADatabaseItHasItsLogs) {
+  std::filesystem::remove(directory_ / "decisions.sqlite");
+  EXPECT_EQ(GatherPage({directory_.path()}, kTask, {}, {0, 0, 0}).decisions.size(), 67u);
+  std::filesystem::remove(log_);
+  EXPECT_THROW(static_cast<void>(GatherPage({directory_.path()}, kTask, {}, {})), BadInput);
+}
+
+TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {
+  const ScratchDirectory directory;
+  const std::string page = directory / "a page.html", report = "report '" + kLog + "' --config '" + kTask + "' --out '";
+  const Output first = Forereach(report + page + "' 2>&1");
+  EXPECT_EQ(first.code, 0) << first.text;
+  EXPECT_THAT(first.text, HasSubstr("67 decisions"));
+  EXPECT_THAT(Read(page), testing::StartsWith("<!DOCTYPE html>"));
+  directory.Write("a page.html", "mine");
+  const Output second = Forereach(report + page + "' 2>&1");
+  EXPECT_EQ(second.code, 2);
+  EXPECT_THAT(second.text, HasSubstr("the file exists"));
+  EXPECT_EQ(Read(page), "mine");
+  EXPECT_EQ(Forereach(report + page + "' --force 2>&1").code, 0);
+  EXPECT_THAT(Read(page), testing::EndsWith("</html>\n"));
+  EXPECT_EQ(Forereach(report + directory.path() + "/none/page.html' 2>&1").code, 2);
+}
+
+TEST(WriteTest, TextsOfARunBeginNoTag) {
+  PageRun run = GatherPage({kLog}, kTask, {}, {0, 0, 0});
+  const std::string plain = PageHtml(run);
+  const auto tags = [](const std::string& html) { return std::ranges::count(html, '<'); };
+  for (DecisionRow& row : run.decisions) row.source = row.cause = "</script><!--<b>";
+  run.name = run.notes.emplace_back("<script>");
+  run.faults.push_back({1, 1, "<i>", "<i>"});
+  const std::string html = PageHtml(run);
+  EXPECT_EQ(tags(html), tags(plain));
+  EXPECT_THAT(html, Not(HasSubstr("</script><!--")));
+}
+
+TEST(WriteTest, PolicyForbidsRequests) {
+  const std::string html = PageHtml({});
+  EXPECT_THAT(html, HasSubstr("default-src 'none'"));
+  EXPECT_THAT(html, HasSubstr("script-src 'sha256-"));
+  EXPECT_THAT(html, Not(HasSubstr("unsafe-inline")));
+  EXPECT_THAT(html, Not(HasSubstr(" src=\"http")));
+}
+
+}  // namespace
+}  // namespace forereach

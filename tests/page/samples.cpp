@@ -1,0 +1,120 @@
+/** forereach_page_samples hostile|many|empty FILE.html [COUNT]: pages of invented runs, for tests in a browser. */
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "page/write.h"
+
+namespace forereach {
+namespace {
+
+constexpr std::int64_t kBegin = 1'767'268'800'000'000;  // 2026-01-01 12:00 UTC
+
+std::string Digest(std::mt19937_64& random) {
+  std::string hex;
+  for (int i = 0; i < 64; ++i) hex += "0123456789abcdef"[random() % 16];
+  return hex;
+}
+
+PageRun Many(int count) {
+  std::mt19937_64 random(1);
+  std::lognormal_distribution<double> took(6, 0.8);
+  PageRun run;
+  run.name = "many";
+  const std::string configs[] = {Digest(random), Digest(random)};
+  for (int i = 0; i < count; ++i) {
+    DecisionRow row;
+    row.event = {"events-20260101-120000-000000.lcmlog", 5 * i, Digest(random)};
+    row.utime = kBegin + i * 400'000ll + static_cast<std::int64_t>(random() % 90'000);
+    row.sequence = row.plan_id = i;
+    row.source = "planner " + std::to_string(random() % 3);
+    row.elapsed_us = took(random);
+    row.latency_us = row.elapsed_us + 200;
+    row.plan_digest = Digest(random);
+    row.grounds = {configs[i % 7 == 0], configs[0], configs[0], configs[1], configs[i % 100 == 0]};
+    row.margin = 1e-3 * static_cast<double>(random() % 3000);
+    row.threshold = 0.5;
+    const auto kind = random() % 100;
+    if (kind < 60) {
+      row.outcome = "certified", row.cause = "none";
+      row.obstacle = static_cast<int>(random() % 12);
+    } else if (kind < 85) {
+      row.outcome = "abstain_safety", row.cause = kind < 80 ? "obstacle" : "limit";
+      row.obstacle = static_cast<int>(random() % 12), row.step = static_cast<int>(random() % 60);
+    } else if (kind < 95) {
+      row.outcome = "abstain_domain", row.cause = "domain_exit", row.coordinate = 4;
+      row.step = static_cast<int>(random() % 60);
+    } else {
+      row.outcome = "rejected", row.cause = "stale";
+    }
+    row.message =
+        row.outcome + " at step " + std::to_string(row.step) + ", margin " + std::to_string(row.margin) + " m";
+    run.decisions.push_back(row);
+  }
+  return run;
+}
+
+// Texts that try to become elements, scripts and line ends, and numbers that are none.
+PageRun Hostile() {
+  const std::string evil =
+      "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=2'>\n\xe2\x80\xae\xff\x1b[31m";
+  const double infinity = std::numeric_limits<double>::infinity();
+  PageRun run = Many(20);
+  run.name = evil;
+  run.files = run.notes = {evil};
+  for (DecisionRow& row : run.decisions) {
+    row.source = evil, row.message = evil, row.outcome = evil, row.cause = "__proto__";
+    row.event.log_file = evil, row.plan_digest = evil;
+    for (std::string& digest : row.grounds) digest = evil;
+  }
+  const auto at = [&](std::size_t i) -> DecisionRow& { return run.decisions[i]; };
+  at(0).utime = at(0).plan_id = std::numeric_limits<std::int64_t>::min();
+  at(1).utime = at(1).plan_id = at(1).event.event_number = std::numeric_limits<std::int64_t>::max();
+  at(2).margin = infinity, at(2).threshold = -infinity, at(2).elapsed_us = infinity;
+  at(3).margin = at(3).latency_us = std::nan("");
+  at(4).step = std::numeric_limits<int>::max(), at(4).outcome = "abstain_safety";
+  at(5).outcome = "constructor", at(5).coordinate = 77;
+  at(6).obstacle = std::numeric_limits<int>::min(), at(6).step = std::numeric_limits<int>::min();
+  run.faults = {{std::numeric_limits<std::int64_t>::min(), 3, evil, evil}};
+  run.withdrawals = {{0, -1, evil, evil, evil, 7}};
+  run.gaps = {{{evil, 1, evil}, evil, evil, 0, 9, std::numeric_limits<std::int64_t>::max(), -1, evil}};
+  run.events = {{{evil, 2, evil}, 5, 6, 7, evil, evil, -1, -1, {}, infinity}};
+  run.tasks = {{at(0).grounds[0], evil, {evil}, {evil}, evil, 2}};
+  run.replays[evil] = evil;
+  run.obstacle_sets = {
+      {Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1e300), Obstacle::HalfSpace(Eigen::Vector2d(1e-300, 1), 1e300)}};
+  PageDetail detail;
+  detail.decision = 4;
+  detail.obstacles = detail.task = 0;
+  detail.start_utime = detail.step_us = std::numeric_limits<std::int64_t>::max();
+  detail.binding = detail.steps = std::numeric_limits<int>::max();
+  detail.hull_lower = {-infinity}, detail.hull_upper = {infinity};
+  detail.sketch = *MakeSketch({{{{0, 0}, {1, 0}, {0, 1}}}, {}, {{{2, 2}}}});
+  detail.executed = {{3, 1e308, -1e308}};
+  run.details.push_back(detail);
+  detail.decision = 5;
+  detail.missing = evil;
+  run.details.push_back(detail);
+  return run;
+}
+
+}  // namespace
+}  // namespace forereach
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  const std::string kind = argc > 2 ? argv[1] : "";
+  if (kind != "hostile" && kind != "many" && kind != "empty") {
+    std::cerr << "usage: forereach_page_samples hostile|many|empty FILE.html [COUNT]\n";
+    return 2;
+  }
+  const PageRun run = kind == "hostile" ? Hostile()
+                      : kind == "many"  ? Many(argc > 3 ? std::stoi(argv[3]) : 100'000)
+                                        : PageRun{};
+  std::ofstream(argv[2], std::ios::binary) << PageHtml(run);
+  return 0;
+}
