@@ -1,0 +1,107 @@
+// Drives tasks in this thread and without waiting, each with many seeds of the planner and of what disturbs the robot.
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "bus/log.h"
+#include "bus/process.h"
+#include "cli/lockstep.h"
+#include "command_line/command_line.h"
+
+namespace forereach {
+namespace {
+
+struct Options {
+  std::vector<std::string> tasks;
+  int seeds = 20, first_seed = 1;
+};
+
+/** What became of one drive, or of several. */
+struct Drives {
+  std::int64_t count = 0, goals = 0, contacts = 0, limits = 0, steps = 0, outside = 0, emergency_stops = 0,
+               proposed = 0, certified = 0;
+
+  [[nodiscard]] bool good() const { return goals == count && contacts == 0 && limits == 0 && outside == 0; }
+  Drives& operator+=(const Drives& other) {
+    for (const auto member : {&Drives::count, &Drives::goals, &Drives::contacts, &Drives::limits, &Drives::steps,
+                              &Drives::outside, &Drives::emergency_stops, &Drives::proposed, &Drives::certified})
+      this->*member += other.*member;
+    return *this;
+  }
+  [[nodiscard]] std::string Text() const {
+    const double share = proposed > 0 ? 100.0 * static_cast<double>(certified) / static_cast<double>(proposed) : 0;
+    return fmt::format("{:>3} of {:<3} {:>8} {:>6} {:>4} of {:<6} {:>9} {:>4} of {:<5} {:>3.0f} %", goals, count,
+                       contacts, limits, outside, steps, emergency_stops, certified, proposed, share);
+  }
+};
+
+// Even seeds have an adversary, odd ones a disturbance at random, both within what the task declares.
+Drives Drive(Config config, int seed) {
+  constexpr std::int64_t kStartUs = 1'700'000'000'000'000;
+  config.planner.seed = seed;
+  config.robot.disturbance_seed = seed;
+  if (config.problem->declaration.IsDisturbed()) config.robot.disturbance = seed % 2 == 0 ? "adversarial" : "random";
+  Lockstep lockstep(config, config, kStartUs);
+  lockstep.Run();
+  const auto robot = nlohmann::json::parse(lockstep.robot().Summary());
+  const auto planner = nlohmann::json::parse(lockstep.planner().Summary());
+  const auto of = [](const nlohmann::json& summary, const char* key) { return summary.at(key).get<std::int64_t>(); };
+  Drives drive{.count = 1, .goals = robot.at("goal_reached").get<bool>() ? 1 : 0};
+  drive.contacts = of(robot, "contacts");
+  drive.limits = of(robot, "limits_exceeded");
+  drive.steps = of(robot, "steps_executed");
+  drive.outside = drive.steps - of(robot, "steps_inside_slice");
+  drive.emergency_stops = of(robot, "emergency_stops");
+  drive.proposed = of(planner, "proposed");
+  drive.certified = of(planner, "certified");
+  return drive;
+}
+
+int Run(const Options& options) {
+  bool all_good = true;
+  std::cout << fmt::format("{:<26} {:^10} {:>8} {:>6} {:^14} {:>9} {:^20} {:>6}\n", "task", "goals", "contacts",
+                           "limits", "steps outside", "emergency", "plans certified", "time");
+  for (const std::string& task : options.tasks) {
+    const Config config = LoadConfig(task);
+    const auto begin = std::chrono::steady_clock::now();
+    Drives all;
+    std::string bad;
+    for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
+      const Drives drive = Drive(config, seed);
+      if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), drive.Text());
+      all += drive;
+    }
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    std::cout << fmt::format("{:<26} {} {:>5.1f} s\n", std::filesystem::path(task).stem().string(), all.Text(),
+                             seconds.count())
+              << bad << std::flush;
+    all_good = all_good && all.good();
+  }
+  return all_good ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace forereach
+
+int main(int argc, char** argv) {
+  using namespace forereach;
+  Options options;
+  const Command program{
+      .name = "forereach_drives",
+      .purpose =
+          "Drives each task with many seeds of planner and disturbance on a simulated clock. Exits with 1 if a "
+          "goal is missed, something is touched, a limit is exceeded or a step leaves its slice.",
+      .footer = "Example:\n  forereach_drives config/drive/unicycle.yaml config/drive/reaching_arm.yaml --seeds 20",
+      .options = {Required({"tasks", &options.tasks, "TASK", "Task files (YAML)"}),
+                  {"--seeds", &options.seeds, "N", "The number of drives of each task", NumberRange{1, 1'000'000}},
+                  {"--first-seed", &options.first_seed, "K", "The first seed", NumberRange{1, 1'000'000'000}}}};
+  if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
+  logging::Silence();
+  return Guarded("forereach_drives", [&] { return Run(options); });
+}
