@@ -309,7 +309,7 @@ TEST(Planner, KeepsPartsAtExpressionsAwayFromObstacles) {
   int found = 0;
   for (std::uint32_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const PlanRequest request = From(Vec({-0.2, 0.9, 0.4, 0}), seed, 0.05);  // on the way into the post
+    const PlanRequest request = From(Vec({-0.2, 0.9, 0.4, 0}), seed, 0.05);
     const auto proposal = PlannerOf(config)->Propose(request);
     if (!proposal) continue;
     ++found;
