@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 
 from browser import Browser
 
@@ -46,13 +45,12 @@ def choose(browser, name, value):
 
 def type_into(browser, field, value):
     browser.run(f"(() => {{ const s = document.getElementById({field!r}); s.value = {value!r};"
-                "s.dispatchEvent(new Event('input')); })()")
-    time.sleep(.4)  # the page waits until typing has paused
+                "s.dispatchEvent(new Event('input'));"
+                "return new Promise(done => setTimeout(done, 150)); })()")  # the page waits until typing has paused
 
 
 def reset(browser):
-    browser.run("document.getElementById('reset').click()")
-    time.sleep(.1)
+    browser.run("(() => { document.getElementById('reset').click(); return new Promise(done => setTimeout(done, 10)); })()")
 
 
 def column(browser, index):
@@ -186,6 +184,8 @@ def main():
             command = use_course(browser, page("course"))
             if len(sys.argv) > 3:
                 take_pictures(browser, page("course"), directory)
+            browser.open(page("course"), 390, 844, phone=True)
+            check(browser.run("document.documentElement.scrollWidth <= 390"), "the page is no wider than a phone")
             browser.open(page("before"))
             check("before: " in text(browser, "#figures"), "figures before are beside the others")
             is_quiet(browser, page("before"))
