@@ -1,7 +1,10 @@
 #include "cli/abstentions.h"
 
+#include <algorithm>
+#include <iterator>
 #include <map>
 #include <tuple>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -14,6 +17,7 @@
 #include "records/decision_record.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
+#include "records/run_logs.h"
 #include "records/timeline.h"
 
 namespace forereach {
@@ -102,7 +106,7 @@ class AbstentionReader final : public TimelineUser {
       if (!problem) problem = WithLearned(basis, timeline.learned(*basis.task));
       all_[i].judged.problem = problem;
     }
-    return {std::move(tasks), std::move(all_), certified_, timeline.passed_over()};
+    return {std::move(tasks), std::move(all_), certified_, timeline.passed_over(), {}};
   }
 
  private:
@@ -129,18 +133,49 @@ class AbstentionReader final : public TimelineUser {
 
 }  // namespace
 
-Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config, const LogKey& key) {
-  if (files.size() == 1 && KindOf(files[0]) == FileKind::kJson) return FromDecision(files[0], config);
+namespace {
+
+Abstentions FromRun(const std::vector<std::string>& logs, const std::string& config, const LogKey& key,
+                    bool names_files) {
   std::vector<std::shared_ptr<const Config>> tasks;
   std::vector<const Config*> pointers;
-  for (Config& task : TasksOf(files, config, key)) {
+  for (Config& task : TasksOf(logs, config, key)) {
     tasks.push_back(std::make_shared<const Config>(std::move(task)));
     pointers.push_back(tasks.back().get());
   }
   AbstentionReader reader;
   Timeline timeline(pointers, reader);
-  timeline.Read(files, files.size() > 1);
+  timeline.Read(logs, names_files);
   return reader.Finish(timeline, std::move(tasks));
+}
+
+// All runs of a database. One that cannot be read is named.
+Abstentions FromRuns(NamedRuns named, const std::string& config, const LogKey& key) {
+  Abstentions all;
+  all.missing = std::move(named.missing);
+  for (const std::vector<std::string>& run : named.runs) {
+    const LogSurvey survey = Survey(run, LogOrder::kAny);
+    if (survey.candidates == 0 && survey.decisions == 0 && survey.configs.empty()) continue;
+    try {
+      Abstentions read = FromRun(run, config, key, true);
+      std::ranges::move(read.tasks, std::back_inserter(all.tasks));
+      std::ranges::move(read.all, std::back_inserter(all.all));
+      all.certified += read.certified;
+      all.passed_over.not_authentic += read.passed_over.not_authentic;
+      all.passed_over.undecodable += read.passed_over.undecodable;
+    } catch (const BadInput& error) {
+      all.missing.emplace_back(error.what());
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config, const LogKey& key) {
+  if (files.size() == 1 && KindOf(files[0]) == FileKind::kJson) return FromDecision(files[0], config);
+  NamedRuns named = RunsNamedBy(files);
+  return named.of_database ? FromRuns(std::move(named), config, key) : FromRun(files, config, key, files.size() > 1);
 }
 
 }  // namespace forereach

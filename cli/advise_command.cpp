@@ -136,6 +136,7 @@ std::vector<std::pair<std::string, int>> PlacesOf(const Abstentions& read, const
 }
 
 void PrintForPeople(const Abstentions& read, const std::vector<Advised>& advised) {
+  for (const std::string& missing : read.missing) std::cout << Printable(missing) << "\n";
   for (std::size_t i = 0; i < read.all.size(); ++i) {
     const RecordedAbstention& abstention = read.all[i];
     const auto& [advices, setting, missing] = advised[i];
@@ -207,6 +208,7 @@ void PrintJson(const Abstentions& read, const std::vector<Advised>& advised) {
   std::cout << JsonText({{"abstentions", all},
                          {"certified", read.certified},
                          {"places", places},
+                         {"missing", read.missing},
                          {"passed_over", ToJson(read.passed_over)}})
             << std::endl;
 }
@@ -222,7 +224,7 @@ int RunAdvise(const Options& options) {
     });
   }
   options.json ? PrintJson(read, advised) : PrintForPeople(read, advised);
-  return std::ranges::all_of(advised, &Advised::turned) ? 0 : 1;
+  return std::ranges::all_of(advised, &Advised::turned) && read.missing.empty() ? 0 : 1;
 }
 
 }  // namespace
@@ -240,11 +242,12 @@ Command AdviseCommand() {
           "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_safety.csv > "
           "decision.json\n"
           "  forereach advise decision.json\n"
-          "  forereach advise run/log/events-20260101-120000-000000.lcmlog",
+          "  forereach advise run/log/events-20260101-120000-000000.lcmlog\n"
+          "  forereach advise run/log",
       .options = {Required(
-                      {"files", &options->files, "DECISION|LOG",
-                       "The abstentions: a decision (the output of certify --json), or the event logs of a run, in "
-                       "their order"}),
+                      {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
+                       "The abstentions: a decision (the output of certify --json), the event logs of a run, in their "
+                       "order, a decision database with its logs beside it, or the directory of both"}),
                   {"--config", &options->config, "FILE",
                    "The task file; by default the one that a decision names, or that the logger kept next to a log, in "
                    "tasks/"},

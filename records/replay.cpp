@@ -33,21 +33,6 @@ std::string Difference(const decision_t& recorded, const decision_t& replayed) {
   return {};
 }
 
-// What no replay can give again.
-bool IsCircumstance(const decision_t& decision) {
-  switch (decision.cause) {
-    case decision_t::CAUSE_PAIRWISE:  // by what the certifier was told by its latch file: no pair of its own
-      return decision.step < 0 && decision.first_observation < 0;
-    case decision_t::CAUSE_QUEUE_FULL:
-    case decision_t::CAUSE_OVERRUN:
-    case decision_t::CAUSE_NOT_ARMED:
-    case decision_t::CAUSE_FAULT:
-    case decision_t::CAUSE_LATCH_UNWRITABLE:
-    case decision_t::CAUSE_NO_OBSTACLES: return true;
-    default: return false;
-  }
-}
-
 class Replayer final : public TimelineUser {
  public:
   void OnStart(const Config& task) override {
@@ -151,6 +136,20 @@ class Replayer final : public TimelineUser {
 };
 
 }  // namespace
+
+bool IsCircumstance(const decision_t& decision) {
+  switch (decision.cause) {
+    case decision_t::CAUSE_PAIRWISE:  // by what the certifier was told by its latch file: no pair of its own
+      return decision.step < 0 && decision.first_observation < 0;
+    case decision_t::CAUSE_QUEUE_FULL:
+    case decision_t::CAUSE_OVERRUN:
+    case decision_t::CAUSE_NOT_ARMED:
+    case decision_t::CAUSE_FAULT:
+    case decision_t::CAUSE_LATCH_UNWRITABLE:
+    case decision_t::CAUSE_NO_OBSTACLES: return true;
+    default: return false;
+  }
+}
 
 ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks) {
   Replayer replayer;

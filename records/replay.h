@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "certifier/task/config.h"
+#include "forereach/decision_t.hpp"
 #include "records/log_trust.h"
 
 namespace forereach {
@@ -33,5 +34,8 @@ With a single task, every decision is compared under that task.
 @param tasks at least one; channels and key are those of the first.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks);
+
+/** Whether a decision depends on the moment and not on the plan, so that no replay can give it again. */
+[[nodiscard]] bool IsCircumstance(const decision_t& decision);
 
 }  // namespace forereach
