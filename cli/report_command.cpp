@@ -46,7 +46,7 @@ Command ReportCommand() {
           "With --out it writes a page for a browser: one HTML file that needs no network. See docs/analysis.md.\n\n"
           "Examples:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo\n"
           "  forereach report run/log --out report.html\n"
-          "  forereach report run/log --before old/log/decisions.sqlite --out report.html",
+          "  forereach report run/log --before old/log/decisions.sqlite --out both.html",
       .options = {Required({"logs", &report.logs, "LOG|DATABASE|DIRECTORY",
                             std::string(kLogs) + "; with --out also a decision database, or the directory of both"}),
                   {"--config", &report.config, "FILE", kTaskOfLogs},

@@ -369,11 +369,12 @@ TEST(Program, CommandsForARunningSystemLoadNoLibraryOfTheOthers) {
 }
 
 // Each example is run as it stands, in a directory that has the repository's config/ and a recorded log under the name
-// that the examples use, too. Not run: what needs a bus, and declare's covers, which take long and have tests of their
-// own.
+// that the examples use, too. "old" is the same run. Not run: what needs a bus, and declare's covers, which take long
+// and have tests of their own.
 TEST(Help, EveryExampleRuns) {
   const forereach::ScratchDirectory scratch;
   std::filesystem::create_directory_symlink(FOREREACH_SOURCE_DIR "/config", scratch / "config");
+  std::filesystem::create_directory_symlink("run", scratch / "old");
   std::filesystem::create_directories(scratch / "bin");
   std::filesystem::create_symlink(FOREREACH_PROGRAM, scratch / "bin/forereach");
   std::set<std::string> ran;

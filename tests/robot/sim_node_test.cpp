@@ -96,7 +96,8 @@ certified_plan_v2_t Plan(const Config& config, std::int64_t id, int start, const
   }
   SetDigest(certified.config_digest, config.grounds.config);
   SetDigest(certified.model_digest, config.grounds.model);
-  for (auto* digest : {&certified.declaration_digest, &certified.observations_digest, &certified.obstacles_digest})
+  for (auto* digest : {&certified.declaration_digest, &certified.observations_digest, &certified.obstacles_digest,
+                       &certified.transitions_digest})
     SetDigest(*digest, DigestOf("something"));
   return certified;
 }
