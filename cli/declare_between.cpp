@@ -76,7 +76,7 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
   for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
   const auto begin = std::chrono::steady_clock::now();
   const MotionBounds bounds =
-      BoundMotion({*flow, problem.domain, config.period, problem.projection, problem.body.heading, rest}, search);
+      BoundMotion({*flow, problem.domain, LongestPeriod(config), problem.projection, problem.body.heading, rest}, search);
   Proposal proposal;
   proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);

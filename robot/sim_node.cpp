@@ -50,7 +50,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
   options.guard.angles = config.problem->model->angles();
-  if (const auto& error_ms = config.gate.max_clock_error_ms) options.guard.max_jitter_us = Microseconds(*error_ms) / 2;
+  options.guard.max_jitter_us = config.gate.max_jitter_us();
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
   options.fault = config.bus.fault;

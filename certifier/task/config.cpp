@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "certifier/dynamics/models.h"
+#include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -116,6 +117,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   config.path = path;
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
+  if (problem.between) problem.between->period = LongestPeriod(config);
   if (problem.between && config.robot.step_period_ms > config.period * 1e3)
     file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", longer than model.dt, " +
                                           ToText(config.period * 1e3) +
@@ -137,6 +139,11 @@ NamedFiles FilesNamedBy(const std::string& path) {
   TaskDraft draft;
   ReadKeys(file, draft);
   return {draft.transitions, draft.config.planner.policy, draft.model_file.path};
+}
+
+double LongestPeriod(const Config& config) {
+  const std::int64_t longer_us = config.gate.max_jitter_us().value_or(0);
+  return longer_us > 0 ? AddUp(config.period, DivUp(static_cast<double>(longer_us), 1e6)) : config.period;
 }
 
 void RequireForCertifying(const Config& config) {
