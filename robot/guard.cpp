@@ -251,6 +251,10 @@ GuardVerdict Guard::Authenticated(const std::string& channel, Bytes& bytes) {
   return Refuse(GuardCause::kSignatureReplayed, "the signature on " + channel + " was used before");
 }
 
+std::int64_t StartTolerance(const GuardOptions& options) {
+  return std::min(options.step_us / 2, options.max_jitter_us.value_or(INT64_MAX));
+}
+
 GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept {
   GuardVerdict verdict;
   try {
@@ -471,8 +475,7 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_u
                                  std::span<const double> state) const {
   if (!pending_) return Refuse(halted_ ? GuardCause::kHalted : GuardCause::kNothingPending, {});
   const candidate_plan_t& plan = pending_->plan;
-  const std::int64_t most = std::min(options_.step_us / 2, options_.max_jitter_us.value_or(INT64_MAX));
-  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(most)) {
+  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(StartTolerance(options_))) {
     const bool early = boundary_utime < plan.start_utime;
     return Refuse(early ? GuardCause::kTooEarly : GuardCause::kTooLate,
                   Sentence("plan %" PRId64 " starts at %" PRId64 " us, this boundary is %" PRId64 " us", plan.plan_id,

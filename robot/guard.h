@@ -143,6 +143,10 @@ struct GuardOptions {
   std::optional<std::int64_t> max_jitter_us = {};
 };
 
+/** How far a plan's start_utime may be from the boundary at which it starts: half a step, or max_jitter_us if that is less.
+Microseconds. */
+[[nodiscard]] std::int64_t StartTolerance(const GuardOptions& options);
+
 class Guard final {
  public:
   /** @throws std::invalid_argument if an option is out of range. */
@@ -159,7 +163,7 @@ class Guard final {
   trailer costs one short keyed hash. */
   [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
 
-  /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= step_us / 2;
+  /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= StartTolerance;
   now_us <= expires_utime, because a delayed robot reaches a boundary late; the measured state lies in X_0 = {x : |x -
   initial_center| <= initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN lies in no
   set. With max_jitter_us, boundary_utime and now_us have to be within it of start_utime, too. kNothingPending and
