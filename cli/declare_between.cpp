@@ -14,6 +14,7 @@
 #include "certifier/numerics/text.h"
 #include "certifier/task/config.h"
 #include "certifier/task/json_text.h"
+#include "certifier/task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -71,8 +72,8 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
   Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
   for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
   const auto begin = std::chrono::steady_clock::now();
-  const MotionBounds bounds =
-      BoundMotion({*flow, problem.domain, LongestPeriod(config), problem.projection, problem.body.heading, rest}, search);
+  const MotionBounds bounds = BoundMotion(
+      {*flow, problem.domain, LongestPeriod(config), problem.projection, problem.body.heading, rest}, search);
   Proposal proposal;
   proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
@@ -147,8 +148,7 @@ void PrintForPeople(const Proposal& proposal, const Config& config) {
   const bool proven = proposal.source == "equations";
   std::ostringstream text;
   text << std::left << "declare: motion between two samples, at most " << RoundedUp(LongestPeriod(config), kDigits)
-       << " s apart, from the "
-       << (proven ? "equations of " + config.problem->model->name() : "logged positions")
+       << " s apart, from the " << (proven ? "equations of " + config.problem->model->name() : "logged positions")
        << (AllReached(proposal.rows) ? "" : "; stopped at --max-boxes") << "\n";
   for (const Row& row : proposal.rows) {
     text << "  " << std::setw(10) << row.name << (proven ? " at most " : " at least ") << std::setw(9)

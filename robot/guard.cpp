@@ -519,11 +519,11 @@ GuardVerdict Guard::ExamineDuration(int step, std::int64_t now_us) const {
   const std::uint64_t most =
       static_cast<std::uint64_t>(options_.step_us) + static_cast<std::uint64_t>(*options_.max_jitter_us);
   if (lasted <= most) return {};
-  return RefuseAt(GuardCause::kOffSchedule, step, -1, static_cast<double>(lasted) - static_cast<double>(plan.step_us),
-                  static_cast<double>(*options_.max_jitter_us),
-                  Sentence("plan %" PRId64 ": the step before step %d lasted %" PRIu64 " us, at most %" PRIu64
-                           " us are allowed",
-                           plan.plan_id, step, lasted, most));
+  return RefuseAt(
+      GuardCause::kOffSchedule, step, -1, static_cast<double>(lasted) - static_cast<double>(plan.step_us),
+      static_cast<double>(*options_.max_jitter_us),
+      Sentence("plan %" PRId64 ": the step before step %d lasted %" PRIu64 " us, at most %" PRIu64 " us are allowed",
+               plan.plan_id, step, lasted, most));
 }
 
 GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const {

@@ -137,14 +137,14 @@ struct GuardOptions {
   /** The states that are angles, the task's model.angles, by their indices: a measured state is inside X_0 or a slice
   if it is there after whole turns of these (lcmtypes/angle.h). */
   std::vector<int> angles = {};
-  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, and no later than this after
-  step_us from the last step, microseconds, not negative. It is half of the task's gate.max_clock_error_ms
-  (GateOptions::max_jitter_us): certificates assume it of obstacles that move, and of the motion between two samples. */
+  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, and no later than this
+  after step_us from the last step, microseconds, not negative. It is half of the task's gate.max_clock_error_ms
+  (certifier/task/step_time.h): certificates assume it of obstacles that move, and of the motion between two samples. */
   std::optional<std::int64_t> max_jitter_us = {};
 };
 
-/** How far a plan's start_utime may be from the boundary at which it starts: half a step, or max_jitter_us if that is less.
-Microseconds. */
+/** How far a plan's start_utime may be from the boundary at which it starts: half a step, or max_jitter_us if that is
+less. Microseconds. */
 [[nodiscard]] std::int64_t StartTolerance(const GuardOptions& options);
 
 class Guard final {
@@ -175,7 +175,8 @@ class Guard final {
 
   /** Checks the state measured after control step - 1 against the hull of slice `step`, and then, with max_jitter_us,
   |now_us - start_utime - step * step_us| <= max_jitter_us and now_us - (that of the step before, or of TryStart) <=
-  step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
+  step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing. Cost O(n);
+  it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
 
   /** Takes one message of PLAN_WITHDRAWN, also while the guard is halted. With keys, the certifier has to have signed

@@ -36,8 +36,8 @@ class Flow final {
 
   [[nodiscard]] std::size_t num_places() const { return num_places_; }
 
-  /** Encloses all of it over a box z, for all values of the parameters. An interval that is not finite means that there is
-  no finite bound. */
+  /** Encloses all of it over a box z, for all values of the parameters. An interval that is not finite means that there
+  is no finite bound. */
   void Enclose(std::span<const Interval> z, Derivatives& out) const;
 
  private:

@@ -267,13 +267,15 @@ class PlaceDifferences {
     Eigen::VectorXd largest = Eigen::VectorXd::Zero(dim_);
     for (std::size_t part = 0; part < a.size(); ++part)
       for (std::size_t j = 0; places_.IsAtExpressions(part) && j < a[part].points.size(); ++j)
-        largest = largest.cwiseMax(
-            (c[part].points[j] - 2 * b[part].points[j] + a[part].points[j]).head(dim_).cwiseAbs());
+        largest =
+            largest.cwiseMax((c[part].points[j] - 2 * b[part].points[j] + a[part].points[j]).head(dim_).cwiseAbs());
     return largest;
   }
 
  private:
-  [[nodiscard]] std::vector<BodyPart> At(const Eigen::VectorXd& x) const { return places_.At({x.data(), ToSize(x.size())}); }
+  [[nodiscard]] std::vector<BodyPart> At(const Eigen::VectorXd& x) const {
+    return places_.At({x.data(), ToSize(x.size())});
+  }
 
   BodyPlaces places_;
   Eigen::Index dim_;
@@ -299,18 +301,18 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
   }
   if (motion.heading < 0) return bounds;
   const auto heading = ToSize(motion.heading);
-  bounds.turn_rate = BoundMagnitude(
-      motion.flow, {[&](const Flow::Derivatives& d) { return d.first[heading]; }}, regions, options);
-  bounds.turn_acceleration = BoundMagnitude(
-      motion.flow, {[&](const Flow::Derivatives& d) { return d.second[heading]; }}, regions, options);
+  bounds.turn_rate =
+      BoundMagnitude(motion.flow, {[&](const Flow::Derivatives& d) { return d.first[heading]; }}, regions, options);
+  bounds.turn_acceleration =
+      BoundMagnitude(motion.flow, {[&](const Flow::Derivatives& d) { return d.second[heading]; }}, regions, options);
   return bounds;
 }
 
 MeasuredMotion MeasureMotion(const NominalModel& model, const Transitions& transitions,
                              const Eigen::MatrixXd& projection, const Body& body, double period) {
   const int heading = body.heading;
-  const std::optional<PlaceDifferences> places =
-      body.HasPlaces() ? std::optional<PlaceDifferences>({model, projection, body}) : std::nullopt;
+  std::optional<PlaceDifferences> places;
+  if (body.HasPlaces()) places.emplace(model, projection, body);
   MeasuredMotion measured;
   measured.acceleration = Eigen::VectorXd::Zero(projection.rows());
   Eigen::VectorXd before;  // the step from the sample before
@@ -322,8 +324,8 @@ MeasuredMotion MeasureMotion(const NominalModel& model, const Transitions& trans
       measured.acceleration = measured.acceleration.cwiseMax((projection * difference).cwiseAbs());
       if (places) {
         const Eigen::VectorXd begins = transitions.z.row(i).head(step.size());
-        measured.acceleration = measured.acceleration.cwiseMax(
-            places->Largest(begins - before, begins, begins + step) / (period * period));
+        measured.acceleration =
+            measured.acceleration.cwiseMax(places->Largest(begins - before, begins, begins + step) / (period * period));
       }
       if (heading >= 0) {
         for (const double turned : {before[heading], step[heading]})

@@ -51,8 +51,8 @@ it lies in the box B with Z + [0, period] f(B) in B, where Z is the domain's box
 @throws std::invalid_argument if a size is wrong. Cost: at most options.max_boxes evaluations for each bound. */
 [[nodiscard]] MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options = {});
 
-/** What recorded transitions show: the largest second difference of positions, of the frame and of places at expressions,
-over a period squared, in plain arithmetic. It is at most the largest acceleration between the samples. */
+/** What recorded transitions show: the largest second difference of positions, of the frame and of places at
+expressions, over a period squared, in plain arithmetic. It is at most the largest acceleration between the samples. */
 struct MeasuredMotion {
   Eigen::VectorXd acceleration;
   double turn_rate = 0, turn_acceleration = 0;

@@ -31,8 +31,8 @@ than Schedule::kLatest from the epoch. Empty if they are one, and without gate.m
 [[nodiscard]] std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& options);
 
 /** Why the task's bounds between samples do not hold for the candidate's steps: step_us is not positive, or a step that
-lasts longer by what the guard allows (GateOptions::max_jitter_us) is longer than `between`'s period. Empty if they hold,
-and without bounds. */
+lasts longer by what the guard allows (MaxJitterUs of task/step_time.h) is longer than `between`'s period. Empty if they
+hold, and without bounds. */
 [[nodiscard]] std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between,
                                         const GateOptions& options);
 

@@ -213,7 +213,7 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noe
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
     certifier_.Require(plan, initial_set, obstacles_.all());
-    return certifier_.JudgeAgain(plan, initial_set, obstacles_.all(), tube_, first_step);
+    return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.all(), tube_, first_step);
   } catch (const std::exception&) {
     return {};
   }

@@ -14,6 +14,7 @@ not, the caller calls Refuse. */
 #include <vector>
 
 #include "certifier/certify/certifier.h"
+#include "certifier/certify/standing.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/sources.h"
 #include "certifier/task/config.h"
@@ -58,7 +59,7 @@ class Gate final {
   /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** Certifier::JudgeAgain under what is in force now. Outcome kNone: the plan cannot be judged under this task.
+  /** JudgeAgain (standing.h) under what is in force now. Outcome kNone: the plan cannot be judged under this task.
   @param plan a candidate that this gate or one before a reload has certified. @param first_step 0..num_steps. */
   [[nodiscard]] Standing JudgeAgain(const candidate_plan_t& plan, int first_step) noexcept;
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "certifier/dynamics/models.h"
-#include "certifier/numerics/directed.h"
 #include "certifier/numerics/limits.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
@@ -15,6 +14,7 @@
 #include "certifier/task/document.h"
 #include "certifier/task/draft.h"
 #include "certifier/task/key_rows.h"
+#include "certifier/task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -139,11 +139,6 @@ NamedFiles FilesNamedBy(const std::string& path) {
   TaskDraft draft;
   ReadKeys(file, draft);
   return {draft.transitions, draft.config.planner.policy, draft.model_file.path};
-}
-
-double LongestPeriod(const Config& config) {
-  const std::int64_t longer_us = config.gate.max_jitter_us().value_or(0);
-  return longer_us > 0 ? AddUp(config.period, DivUp(static_cast<double>(longer_us), 1e6)) : config.period;
 }
 
 void RequireForCertifying(const Config& config) {

@@ -64,10 +64,6 @@ struct NamedFiles {
 @throws ConfigError as it does. */
 [[nodiscard]] Config LoadConfig(const std::string& path, const NamedFiles& instead);
 
-/** The longest time from one sample of a plan to the next, seconds, from above: model.dt, and how much longer a robot's
-step may last (GateOptions::max_jitter_us). task.between bounds the motion in this time. */
-[[nodiscard]] double LongestPeriod(const Config& config);
-
 /** @name What LoadConfig does not require, so that logs recorded before these keys can be read again.
 @throws ConfigError that says which line to add or to change. */
 ///@{

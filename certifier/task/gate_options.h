@@ -1,8 +1,6 @@
 /** The options of the gate, from `gate` in a task file. Times in milliseconds. */
 #pragma once
 
-#include <cmath>
-#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -33,14 +31,6 @@ struct GateOptions {
   bool learns = true;                  ///< Adds executed transitions to the observations.
   std::string state = "state";         ///< The directory that keeps a latched fault across restarts.
   double longest_step_ms = 150;  ///< An upper bound on a step. The larger of the model's dt and robot.step_period_ms.
-
-  /** How far a step of a plan may be from its time, and how much longer than step_us it may last, on the robot's own
-  clock, in microseconds: half of max_clock_error_ms. The guard stops a plan at a step that is further off. Nothing:
-  no clock is looked at. */
-  [[nodiscard]] std::optional<std::int64_t> max_jitter_us() const {
-    if (!max_clock_error_ms) return std::nullopt;
-    return std::llround(*max_clock_error_ms * 1e3) / 2;
-  }
 };
 
 }  // namespace forereach

@@ -259,15 +259,17 @@ TEST(MeasureMotion, KnowsAnAngleThatIsRecordedWrapped) {
   EXPECT_EQ(measured.triples, 2);
   EXPECT_NEAR(measured.turn_rate, 4.5 / 0.5, 1e-13);
   EXPECT_NEAR(measured.turn_acceleration, 2.5 / 0.25, 1e-12);
-  EXPECT_GT(MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5).turn_rate, 9) << "no angle is unwrapped";
+  EXPECT_GT(MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5).turn_rate, 9)
+      << "no angle is unwrapped";
 }
 
-// A point that turns with q on a circle of 1 m: q' = w, w' = u. Its acceleration has the length of w^2 and u together, and
-// some q turns that into any direction.
+// A point that turns with q on a circle of 1 m: q' = w, w' = u. Its acceleration has the length of w^2 and u together,
+// and some q turns that into any direction.
 class OnACircle : public testing::Test {
  protected:
   static std::shared_ptr<const NominalModel> Model() {
-    return MakeTextModel(TextModel({{"q", "w"}, {"w", "u"}}, {"u"}, {{"dt", 0.01, 0.01}}, {}, ModelText::Integrator::kRk4));
+    return MakeTextModel(
+        TextModel({{"q", "w"}, {"w", "u"}}, {"u"}, {{"dt", 0.01, 0.01}}, {}, ModelText::Integrator::kRk4));
   }
   Body body_{-1, {BodyPart{{}, 0, {{{"0", 1, 1}, {"0", 1, 1}}, {{"cos(q)", 1, 1}, {"sin(q)", 1, 1}}}}}};
   const Eigen::MatrixXd none_ = Eigen::MatrixXd::Zero(2, 2);
@@ -277,8 +279,7 @@ TEST_F(OnACircle, TheAccelerationOfAPlaceIsBounded) {
   const auto model = Model();
   const auto flow = MakeFlow(*model, body_.Coordinates());
   ASSERT_EQ(flow->num_places(), 4u);
-  const Domain domain =
-      DomainOf(Eigen::Vector2d(-4, -2), Eigen::Vector2d(4, 2), Eigen::VectorXd::Constant(1, 3));
+  const Domain domain = DomainOf(Eigen::Vector2d(-4, -2), Eigen::Vector2d(4, 2), Eigen::VectorXd::Constant(1, 3));
   const MotionBounds bounds = BoundMotion({*flow, domain, 0.01, none_, -1, NoRest(2)}, {.gap = 0.01});
   const double least = std::hypot(2.03 * 2.03, 3), most = 1.01 * std::hypot(2.032 * 2.032, 3);  // in the last step
   for (const MotionBound& bound : bounds.acceleration) {

@@ -317,8 +317,7 @@ std::optional<verifier::Certificate> Remainder(Random& random, const Certifier& 
   });
   if (!away) return std::nullopt;
   verifier::Certificate certificate = Among(whole, approach->At(*away));
-  const Standing standing =
-      certifier.JudgeAgain(query.plan(), query.initial_set, certificate.obstacles, tube, first);
+  const Standing standing = JudgeAgain(certifier, query.plan(), query.initial_set, certificate.obstacles, tube, first);
   if (standing.steps <= first || standing.steps == steps) return std::nullopt;
   certificate.controls.conservativeResize(Eigen::NoChange, standing.steps);
   certificate.is_remainder = true;
@@ -326,9 +325,10 @@ std::optional<verifier::Certificate> Remainder(Random& random, const Certifier& 
   return certificate;
 }
 
-// Obstacles that the certifier just accepts, in the whole plan and in a part of it; the same a micrometre further in, where no body turns (what a turn sweeps
-// the verifier encloses more tightly); and obstacles that are met. Of very wide tubes the verifier's remainder is now
-// and then tighter, too, so that a few of those further in are clear of its own tube.
+// Obstacles that the certifier just accepts, in the whole plan and in a part of it; the same a micrometre further in,
+// where no body turns (what a turn sweeps the verifier encloses more tightly); and obstacles that are met. Of very wide
+// tubes the verifier's remainder is now and then tighter, too, so that a few of those further in are clear of its own
+// tube.
 Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& output) {
   const std::uint64_t start = options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number);
   Random random(start);
@@ -391,9 +391,8 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
     ++counts.contacts;
     const verifier::Certificate claim = Among(certificate, met->obstacle);
     const verifier::Verdict verdict = judge.Verify(claim);
-    const Standing standing = certifier.JudgeAgain(query.plan(), query.initial_set, claim.obstacles, tube, 0);
-    const bool is_wrong =
-        verdict.status == verifier::Status::kConfirmed || standing.steps > met->most_standing;
+    const Standing standing = JudgeAgain(certifier, query.plan(), query.initial_set, claim.obstacles, tube, 0);
+    const bool is_wrong = verdict.status == verifier::Status::kConfirmed || standing.steps > met->most_standing;
     counts.contacts_refuted += verdict.status == verifier::Status::kRefuted;
     counts.contacts_confirmed += is_wrong;
     if (!is_wrong) continue;

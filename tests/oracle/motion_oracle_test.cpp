@@ -34,7 +34,8 @@ TEST_P(WithoutOnePart, MeetsObstacles) {
 }
 
 std::string NameOf(const testing::TestParamInfo<Untold>& tested) {
-  static constexpr std::array kNames{"Nothing", "Acceleration", "Turn", "Body", "Velocity", "Growth", "ClockError", "Lateness"};
+  static constexpr std::array kNames{"Nothing",  "Acceleration", "Turn",       "Body",
+                                     "Velocity", "Growth",       "ClockError", "Lateness"};
   return kNames[static_cast<std::size_t>(tested.param)];
 }
 

@@ -19,6 +19,7 @@ followed in the same way. */
 #include <vector>
 
 #include "certifier/certify/certifier.h"
+#include "certifier/certify/standing.h"
 #include "certifier/numerics/size.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/exact.h"
@@ -49,7 +50,8 @@ struct Tally {
   [[nodiscard]] std::string Text() const {
     std::ostringstream text;
     text << problems << " problems, " << plans << " plans, " << certified << " certified, " << withdrawn
-         << " withdrawn in part; " << motions << " motions, " << moments << " moments, " << decided_exactly << " of them decided in 256 bits";
+         << " withdrawn in part; " << motions << " motions, " << moments << " moments, " << decided_exactly
+         << " of them decided in 256 bits";
     return text.str();
   }
 };
@@ -294,7 +296,7 @@ class MotionTrial {
     const auto neighbour = PlaceNeighbour(certifier, judge.problem(), query.schedule, plan.schedule, first, kept);
     if (!neighbour) return;
     const Standing standing =
-        certifier.JudgeAgain(plan, query.initial_set, std::vector<Obstacle>{neighbour->told}, tube_, first);
+        JudgeAgain(certifier, plan, query.initial_set, std::vector<Obstacle>{neighbour->told}, tube_, first);
     if (standing.steps < kept) throw std::logic_error("what is judged alone stands among the same obstacles");
     if (standing.steps <= first || standing.steps == plan.num_steps) return;
     ++tally_.withdrawn;

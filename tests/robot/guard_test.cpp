@@ -525,9 +525,9 @@ TEST(GuardSchedule, AStepLastsNoLongerThanTheJitterAllows) {
     EXPECT_EQ(second.step, 2);
     EXPECT_EQ(second.value, static_cast<double>(kJitter + 1));
     EXPECT_EQ(second.bound, static_cast<double>(kJitter));
-    EXPECT_THAT(second.message, testing::HasSubstr("the step before step 2 lasted " +
-                                                   std::to_string(kStep + kJitter + 1) + " us, at most " +
-                                                   std::to_string(kStep + kJitter) + " us are allowed"));
+    EXPECT_THAT(second.message,
+                testing::HasSubstr("the step before step 2 lasted " + std::to_string(kStep + kJitter + 1) +
+                                   " us, at most " + std::to_string(kStep + kJitter) + " us are allowed"));
     EXPECT_EQ(guard.executing(), nullptr);
     EXPECT_FALSE(guard.halted());
   }
