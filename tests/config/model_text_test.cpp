@@ -386,6 +386,17 @@ TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
                                                   "theta by 2 pi: write it with sin, cos or tan of it"));
 }
 
+TEST_F(AnglesTest, APlaceOfTheBodyIsTheSameAfterATurn) {
+  const auto with = [](const std::string& place) {
+    return Replaced(Turning("  angles: [theta]\n"), "  projection: [x, y]\n",
+                    "  body: {parts: [{disc: {place: [x, \"" + place + "\"], radius: 0.1}}]}\n");
+  };
+  EXPECT_EQ(Error(with("y + sin(theta)")), "");
+  EXPECT_EQ(Error(with("y + theta")),
+            "task.yaml:12: task: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
+            "2 pi: write it with sin, cos or tan of it");
+}
+
 TEST_F(AnglesTest, ATransitionWhoseTurnsCannotBeToldIsRefusedWithItsLine) {
   EXPECT_EQ(Error(Turning("  angles: [theta]\n"), std::string(kTurns) + "0,0,0,0,0,0,0,0,2,0\n"),
             "steps.csv:4: transition 2: theta is 2 rad away from the nominal model's next value, up to whole turns, "

@@ -564,7 +564,8 @@ TEST(Certifier, ABodysPlacesAreTheSameAfterATurn) {
   problem.body.parts[0].places[0][1].text = "y + theta";
   EXPECT_THAT([&] { Certifier(std::make_shared<Problem>(problem)); },
               ThrowsMessage<std::invalid_argument>(
-                  Eq("body: the place y + theta is not seen to be the same after a turn of the angle theta by 2 pi")));
+                  Eq("body: the place y + theta is not seen to be the same after a turn of the angle theta by 2 pi: write it "
+                     "with sin, cos or tan of it")));
 }
 
 TEST(Certifier, RequireNamesWhatItCannotJudge) {
