@@ -35,7 +35,8 @@ bool IsNullOfYaml(const std::string& name) { return name == "null" || name == "N
 // A path stands in comments and texts of the task.
 void RequireOneLine(const char* option, const std::string& path) {
   if (std::ranges::any_of(path, [](unsigned char c) { return std::iscntrl(c) != 0; }))
-    throw ConfigError(std::string(option) + ": the path has a control character, as a line break, which no task file "
+    throw ConfigError(std::string(option) +
+                      ": the path has a control character, as a line break, which no task file "
                       "can name");
 }
 
@@ -166,12 +167,11 @@ Header ReadHeader(const std::string& path) {
   Header header;
   for (const std::string& column : columns) {
     if (column.ends_with(kNextEnding)) continue;
-    if (!IsName(column) || IsReserved(column) || column == "dt" || IsNullOfYaml(column) ||
-        column.size() > kLongestName)
+    if (!IsName(column) || IsReserved(column) || column == "dt" || IsNullOfYaml(column) || column.size() > kLongestName)
       throw ConfigError(path + ":1: '" + column.substr(0, kLongestName) +
                         "' cannot be the name of a state or an input: that is a letter, then letters, digits and "
-                        "underscores, " + std::to_string(kLongestName) +
-                        " at most, and no function, pi, dt or null; rename the column");
+                        "underscores, " +
+                        std::to_string(kLongestName) + " at most, and no function, pi, dt or null; rename the column");
     const bool is_state = std::ranges::find(columns, column + kNextEnding) != columns.end();
     (is_state ? header.states : header.inputs).push_back(column);
   }

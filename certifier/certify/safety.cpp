@@ -320,9 +320,9 @@ Placement PlacementOf(const Problem& problem) {
     for (std::size_t i = 0; i < all.size(); ++i)
       for (const int angle : model.angles())
         if (!IsSameAfterTurn(program.View(), static_cast<int>(i), angle))
-          throw std::invalid_argument("body: the place " + all[i].text +
-                                      " is not seen to be the same after a turn of the angle " +
-                                      model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+          throw std::invalid_argument(
+              "body: the place " + all[i].text + " is not seen to be the same after a turn of the angle " +
+              model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
   }
   return {problem.projection, problem.body, problem.between, problem.model->num_states(),
           problem.body.HasPlaces() ? NamesOf(*problem.model) : ExpressionNames{}};

@@ -413,8 +413,6 @@ int NameList::Find(std::string_view name) const {
   return found == places_.end() ? -1 : found->second;
 }
 
-Expression ParseExpression(const ExpressionText& text, const NameList& names) {
-  return Parser(text, names).Parse();
-}
+Expression ParseExpression(const ExpressionText& text, const NameList& names) { return Parser(text, names).Parse(); }
 
 }  // namespace forereach

@@ -22,7 +22,7 @@ namespace forereach {
 inline constexpr std::size_t kLargestExpression = 1 << 16;  ///< Bytes.
 /** Of all expressions of one file, in bytes: each is read several times, by whatever may use it. */
 inline constexpr std::size_t kLargestExpressions = 1 << 20;
-inline constexpr int kDeepestExpression = 200;              ///< Parentheses, signs and powers inside each other.
+inline constexpr int kDeepestExpression = 200;  ///< Parentheses, signs and powers inside each other.
 inline constexpr int kLargestWholePower = 64;
 
 /** A text is not an expression, or uses a name that is not known. */

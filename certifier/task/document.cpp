@@ -368,8 +368,9 @@ class Checker {
   void CheckText(const YAML::Node& node, const Key& row, const std::string& key) {
     const std::string& text = node.Scalar();
     if (row.type == Type::kExpression && (expressions_ += text.size()) > kLargestExpressions)
-      Fail(node, key, "the expressions of this file, up to this one, have " + std::to_string(expressions_) +
-                          " bytes, at most " + std::to_string(kLargestExpressions) + " are allowed");
+      Fail(node, key,
+           "the expressions of this file, up to this one, have " + std::to_string(expressions_) + " bytes, at most " +
+               std::to_string(kLargestExpressions) + " are allowed");
     if (text.empty() || text.find('\0') != std::string::npos) Fail(node, key, "is empty or not text");
     if (row.type == Type::kWord && std::find(row.words.begin(), row.words.end(), text) == row.words.end())
       Fail(node, key, Shown(node) + " is not known; " + Suggestion(text, {row.words.begin(), row.words.end()}));

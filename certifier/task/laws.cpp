@@ -27,8 +27,7 @@ void CheckDefinitions(const NominalModel& model, const Laws& laws) {
   for (const std::string& name : Desired()) static_cast<void>(known.Add(name));
   for (const ModelText::Definition& definition : names.definitions) static_cast<void>(known.Add(definition.name));
   for (const ModelText::Definition& definition : laws.definitions) {
-    if (known.Find(definition.name) >= 0)
-      throw std::invalid_argument("the name " + definition.name + " is used twice");
+    if (known.Find(definition.name) >= 0) throw std::invalid_argument("the name " + definition.name + " is used twice");
     static_cast<void>(ParseExpression(definition.value, known));
     static_cast<void>(known.Add(definition.name));
   }

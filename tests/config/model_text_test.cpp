@@ -392,9 +392,10 @@ TEST_F(AnglesTest, APlaceOfTheBodyIsTheSameAfterATurn) {
                     "  body: {parts: [{disc: {place: [x, \"" + place + "\"], radius: 0.1}}]}\n");
   };
   EXPECT_EQ(Error(with("y + sin(theta)")), "");
-  EXPECT_EQ(Error(with("y + theta")),
-            "task.yaml:12: task: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
-            "2 pi: write it with sin, cos or tan of it");
+  EXPECT_EQ(
+      Error(with("y + theta")),
+      "task.yaml:12: task: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
+      "2 pi: write it with sin, cos or tan of it");
 }
 
 TEST_F(AnglesTest, ATransitionWhoseTurnsCannotBeToldIsRefusedWithItsLine) {
