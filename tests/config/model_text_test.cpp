@@ -201,7 +201,7 @@ TEST_F(ModelTextTest, ExpressionsAreBoundedInAll) {
   constexpr std::size_t kMost = kLargestExpressions / kLargestExpression;
   EXPECT_EQ(with(kMost - 1), "");
   EXPECT_THAT(with(kMost + 1),
-              AllOf(StartsWith("task.yaml:22: model.let.d15: the expressions of this file, up to this one, have "),
+              AllOf(StartsWith("task.yaml:23: model.let.d16: the expressions of this file, up to this one, have "),
                     HasSubstr(" bytes, at most 1048576 are allowed")));
 }
 
@@ -394,7 +394,7 @@ TEST_F(AnglesTest, APlaceOfTheBodyIsTheSameAfterATurn) {
   EXPECT_EQ(Error(with("y + sin(theta)")), "");
   EXPECT_EQ(
       Error(with("y + theta")),
-      "task.yaml:12: task: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
+      "task.yaml:13: task: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
       "2 pi: write it with sin, cos or tan of it");
 }
 
