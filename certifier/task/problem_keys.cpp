@@ -269,7 +269,8 @@ void ReadBody(const Document& file, const std::string& key, TaskDraft& draft) {
 }
 
 void ReadBetween(const Document& file, const std::string& key, TaskDraft& draft) {
-  forereach::Between between{.acceleration = file.Vector(key + ".acceleration")};
+  // Load lengthens the period by what the gate's options, which are not read yet, allow a step.
+  forereach::Between between{.acceleration = file.Vector(key + ".acceleration"), .period = draft.config.period};
   const bool turns = draft.problem.body.heading >= 0;
   for (const auto& [name, member] :
        {std::pair{".turn_rate", &forereach::Between::turn_rate}, {".turn_acceleration", &Between::turn_acceleration}}) {
