@@ -118,7 +118,7 @@ TEST_F(FilesTest, CsvRowsAcrossTheReadersChunks) {
 struct Mount {
   std::mutex mutex;
   std::condition_variable changed;
-  int value = 0, reading = 0;
+  int value = 0, reading = 0, told = 0;
   bool stalls = false;
 
   int Read() {
@@ -127,13 +127,15 @@ struct Mount {
     changed.notify_all();
     const int read = value;
     const bool waits = stalls;
-    if (waits) changed.wait(lock, [&] { return !stalls; });
+    const int told_before = told;  // another reader wakes it, too
+    if (waits) changed.wait(lock, [&] { return !stalls && told != told_before; });
     return read;
   }
   void Set(int next, bool stall) {
     const std::lock_guard lock(mutex);
     value = next;
     stalls = stall;
+    ++told;
     changed.notify_all();
   }
   void AwaitReaders(int count) {
