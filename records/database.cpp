@@ -50,6 +50,9 @@ constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
   ALTER TABLE decisions ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
   ALTER TABLE execution_events ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
   ALTER TABLE gaps ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
+)sql",
+                                                                        R"sql(
+  ALTER TABLE runs ADD COLUMN robot TEXT NOT NULL DEFAULT '';
 )sql"};
 
 // A column that is NULL where the number is -1.
@@ -77,7 +80,7 @@ auto ColumnsOf(auto& row) {
                           std::tie(row.lost, row.utime, row.reason, row.event.digest));
   else if constexpr (std::is_same_v<Row, RunRow>)
     return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.schema, row.recovered, row.continues,
-                    row.log_deleted_utime);
+                    row.log_deleted_utime, row.robot);
   else if constexpr (std::is_same_v<Row, LogReference>)
     return std::tie(row.log_file, row.event_number, row.digest);
   else if constexpr (std::is_same_v<Row, std::pair<std::string, std::int64_t>>)
@@ -295,9 +298,10 @@ void Database::RunDurably(const char* sql, const Values&... values) {
   Execute(kLazily);
 }
 
-void Database::BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues) {
-  RunDurably("INSERT INTO runs (log_file, start_utime, schema, continues) VALUES (?, ?, ?, ?)", log_file, start_utime,
-             kSchemaVersion, continues);
+void Database::BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues,
+                        const std::string& robot) {
+  RunDurably("INSERT INTO runs (log_file, start_utime, schema, continues, robot) VALUES (?, ?, ?, ?, ?)", log_file,
+             start_utime, kSchemaVersion, continues, robot);
 }
 
 void Database::EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered) {
@@ -310,7 +314,7 @@ void Database::MarkLogDeleted(const std::string& log_file, std::int64_t utime) {
 
 std::vector<RunRow> Database::Runs() {
   const std::vector<RunRow> runs = Select<RunRow>(R"sql(SELECT log_file, start_utime, end_utime, events, schema,
-      recovered, continues, log_deleted_utime FROM runs ORDER BY rowid)sql");
+      recovered, continues, log_deleted_utime, robot FROM runs ORDER BY rowid)sql");
   for (const RunRow& run : runs)
     for (const std::string& file : {run.log_file, run.continues})
       if (file.find_first_of(std::string_view("/\0", 2)) != std::string::npos || file == "." || file == "..")

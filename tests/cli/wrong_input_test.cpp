@@ -218,12 +218,16 @@ TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
   for (const std::string& config : {std::string(), " --config " + TaskOf("one")}) {
     for (const char* command : {"replay ", "report "}) {
       for (const auto& [input, sentence] : no_logs) ExpectRefused(command + input + config, {sentence, input});
-      ExpectRefused(command + database + config, {"is an SQLite database"});
-      ExpectRefused(command + foreign + config, {"is an SQLite database"});
-      ExpectRefused(command + directory + config, {"is a directory"});
-      ExpectRefused(command + logs_->front() + " " + database + config, {"is an SQLite database"});
       ExpectRefused(command + logs_->front() + " " + text + config, {"no LCM event log"});
+      ExpectRefused(command + own.path() + config, {"is a directory"});
     }
+    ExpectRefused("report " + database + config, {"is an SQLite database"});
+    ExpectRefused("report " + foreign + config, {"is an SQLite database"});
+    ExpectRefused("report " + directory + config, {"is a directory"});
+    ExpectRefused("report " + logs_->front() + " " + database + config, {"is an SQLite database"});
+    ExpectRefused("replay " + foreign + config, {"not a decision database"});
+    ExpectRefused("replay " + logs_->front() + " " + database + config, {"is named by itself"});
+    ExpectRefused("replay " + logs_->front() + " " + directory + config, {"is named by itself"});
     for (const auto& [input, sentence] : no_logs) ExpectRefused("verify " + input + config, {input});
     ExpectRefused("verify " + foreign + config, {"not a decision database"});
     ExpectRefused("verify " + own.path() + config, {"no decision database"});
