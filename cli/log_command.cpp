@@ -111,7 +111,7 @@ int RunLog(Options options) {
     throw LogError(writes ? "log " + options.action + ": name the new log with --out FILE"
                           : "log list: writes no --out");
   if (writes && options.json) throw LogError("log " + options.action + ": --json is for log list");
-  options.selection.drops_others = !writes;
+  options.selection.drops_others = options.action == "list" || options.action == "filter";
   return writes ? Write(options) : List(options);
 }
 
@@ -131,29 +131,31 @@ Command LogCommand() {
       .purpose = kLog.purpose,
       .footer =
           "list    a line for each event: time (UTC), number, channel, type, plan, and its outcome, kind or cause\n"
-          "cut     the chosen events, in the order of the logs named, into a new log\n"
-          "merge   the same, by time; events of one log keep their order\n\n"
+          "filter  the chosen events, in the order of the logs named, into a new log\n"
+          "cut     the same; with --outcome it keeps what is not about a plan, so that the new log can be replayed\n"
+          "merge   as cut, by time; events of one log keep their order\n\n"
           "Times, bytes and signatures stay as they are. Event numbers stay if one log is cut; those of several are "
           "counted anew.\nA TIME is microseconds since the Unix epoch, 2026-01-01T12:00:00 (UTC), or +SECONDS after "
           "the first event.\n\n"
           "Examples:\n"
           "  forereach log list run/log/events-*.lcmlog --channel PLAN_DECISION\n"
+          "  forereach log filter run/log/events-*.lcmlog --outcome abstain_safety -o refused.lcmlog\n"
           "  forereach log cut run/log/events-20260101-120000-000000.lcmlog --from +10 --to +20 -o part.lcmlog\n"
           "  forereach log merge robot.lcmlog camera.lcmlog -o both.lcmlog",
       .options = {Required({.name = "action",
                             .variable = &options->action,
                             .help = "What to do",
-                            .one_of = {"list", "cut", "merge"}}),
+                            .one_of = {"list", "filter", "cut", "merge"}}),
                   Required({"logs", &options->logs, "LOG", "LCM event logs"}),
                   {"--from", &options->selection.from, "TIME", "Events from this time on"},
                   {"--to", &options->selection.to, "TIME", "Events before this time"},
                   {"--channel", &options->selection.channels, "NAME", "Events of this channel; may be repeated"},
                   {.name = "--outcome",
                    .variable = &options->selection.outcome,
-                   .help = "Candidates, decisions and certified plans only of plans with this outcome; cut and "
-                           "merge keep all other messages",
+                   .help = "Candidates, decisions and certified plans of plans with this outcome only; cut and merge "
+                           "keep all other messages",
                    .one_of = OutcomeNames()},
-                  {"-o,--out", &options->output, "FILE", "For cut and merge: the new log"},
+                  {"-o,--out", &options->output, "FILE", "The new log; list has none"},
                   JsonFlag(options->json, "For list: a JSON object a line")},
       .run = [options] { return RunLog(*options); }};
 }

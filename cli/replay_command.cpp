@@ -44,12 +44,6 @@ Config OtherTask(const Options& options) {
   return std::move(task.front());
 }
 
-// The given task is that of some runs; the others have their own.
-std::vector<Config> TasksOfRun(const RunLogs& run, const Options& options, const std::optional<Digest>& given) {
-  const bool is_given = !given || Survey(run.logs, LogOrder::kAny).configs.contains(*given);
-  return TasksOf(run.logs, is_given ? options.config : "", options.key);
-}
-
 // Lines about a run, with its robot's name if there are several runs.
 void NameRobot(const NamedRuns& named, const RunLogs& run, std::vector<std::string>& lines) {
   if (!named.is_many) return;
@@ -95,15 +89,14 @@ void PrintForPeople(const ReplayResult& result, const NamedRuns& named) {
 int RunReplay(const Options& options) {
   NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
   const std::optional<Config> other = options.other_task ? std::optional(OtherTask(options)) : std::nullopt;
-  std::optional<Digest> given;
-  if (named.is_many && !options.config.empty()) given = LoadConfig(options.config).grounds.config;
+  const RunTasks own(other ? "" : options.config, options.key, named.is_many);
   const auto finished =
       ResultsOf(options.each_run, std::string("replay ") + (other ? "other " : "") + options.plan_digest,
                 options.config, options.key);
   const auto replay = [&](const RunLogs& run, RunWork&) -> ReplayResult {
     if (named.is_many && !HasPlans(run)) return {};
     if (other) static_cast<void>(SurveyRun(run.logs));
-    const std::vector<Config> tasks = other ? std::vector{*other} : TasksOfRun(run, options, given);
+    const std::vector<Config> tasks = other ? std::vector{*other} : own.Of(run.logs);
     return Replay(run.logs, tasks, options.plan_digest, named.is_many || run.logs.size() > 1);
   };
   ReplayResult sum;

@@ -7,11 +7,11 @@
 #include <optional>
 #include <set>
 #include <span>
-#include <system_error>
+#include <stdexcept>
 #include <utility>
 
-#include "certifier/task/config_error.h"
 #include "lcmtypes/printable.h"
+#include "records/database.h"
 #include "records/export_table.h"
 #include "records/log_survey.h"
 #include "records/mcap.h"
@@ -19,42 +19,44 @@
 #include "records/npz.h"
 #include "records/output_file.h"
 #include "records/record_reader.h"
-#include "records/run_logs.h"
 
 namespace forereach {
 namespace {
 
-namespace fs = std::filesystem;
-
 // A format. It counts what it writes.
 class Sink : public RecordUser {
  public:
+  explicit Sink(std::string robot) : robot(std::move(robot)) {}
   virtual void Finish() = 0;
+
+  const std::string robot;
   ExportResult result;
 };
+
+OutputFile FileOf(const std::string& path) { return OutputFile(path, OutputFile::Existing::kReplaced); }
 
 // ---- Tables.
 
 class JsonLinesSink final : public Sink {
  public:
-  explicit JsonLinesSink(const std::string& path) : file_(path) {}
+  JsonLinesSink(const std::string& robot, const std::string& path) : Sink(robot), file_(FileOf(path)) {}
 
   void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
     ++result.decisions;
     result.without_candidate += candidate == nullptr;
-    file_.Write(JsonLine("decision", CellsOf(row, candidate), candidate));
+    file_.Write(JsonLine("decision", CellsOf(robot, row, candidate), candidate));
   }
   void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) override {
     ++result.withdrawals;
-    file_.Write(JsonLine("withdrawal", CellsOf(withdrawal, event)));
+    file_.Write(JsonLine("withdrawal", CellsOf(robot, withdrawal, event)));
   }
   void OnExecution(const EventRow& row) override {
     ++result.executions;
-    file_.Write(JsonLine("execution_event", CellsOf(row)));
+    file_.Write(JsonLine("execution_event", CellsOf(robot, row)));
   }
   void OnGap(const GapRow& row) override {
     ++result.gaps;
-    file_.Write(JsonLine("gap", CellsOf(row)));
+    file_.Write(JsonLine("gap", CellsOf(robot, row)));
   }
   void Finish() override { file_.Close(); }
 
@@ -64,68 +66,64 @@ class JsonLinesSink final : public Sink {
 
 class CsvSink final : public Sink {
  public:
-  explicit CsvSink(const std::string& directory) : directory_(Made(directory)) {
+  CsvSink(const std::string& robot, const std::vector<std::string>& files)
+      : Sink(robot),
+        decisions_(FileOf(files[0])),
+        controls_(FileOf(files[1])),
+        executions_(FileOf(files[2])),
+        withdrawals_(FileOf(files[3])),
+        gaps_(FileOf(files[4])) {
     static const candidate_plan_t none{};
-    decisions_.Write(CsvHeader(CellsOf(DecisionRow{}, nullptr)));
-    controls_.Write(CsvHeader(CellsOfControl(DecisionRow{}, none, 0)));
-    executions_.Write(CsvHeader(CellsOf(EventRow{})));
-    withdrawals_.Write(CsvHeader(CellsOf(withdrawal_t{}, LogReference{})));
-    gaps_.Write(CsvHeader(CellsOf(GapRow{})));
+    decisions_.Write(CsvHeader(CellsOf("", DecisionRow{}, nullptr)));
+    controls_.Write(CsvHeader(CellsOfControl("", DecisionRow{}, none, 0)));
+    executions_.Write(CsvHeader(CellsOf("", EventRow{})));
+    withdrawals_.Write(CsvHeader(CellsOf("", withdrawal_t{}, LogReference{})));
+    gaps_.Write(CsvHeader(CellsOf("", GapRow{})));
   }
 
   void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
     ++result.decisions;
     result.without_candidate += candidate == nullptr;
-    decisions_.Write(CsvLine(CellsOf(row, candidate)));
+    decisions_.Write(CsvLine(CellsOf(robot, row, candidate)));
     if (!candidate || !HasCounts(*candidate)) return;
-    for (int t = 0; t < candidate->num_steps; ++t) controls_.Write(CsvLine(CellsOfControl(row, *candidate, t)));
+    for (int t = 0; t < candidate->num_steps; ++t)
+      controls_.Write(CsvLine(CellsOfControl(robot, row, *candidate, t)));
   }
   void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) override {
     ++result.withdrawals;
-    withdrawals_.Write(CsvLine(CellsOf(withdrawal, event)));
+    withdrawals_.Write(CsvLine(CellsOf(robot, withdrawal, event)));
   }
   void OnExecution(const EventRow& row) override {
     ++result.executions;
-    executions_.Write(CsvLine(CellsOf(row)));
+    executions_.Write(CsvLine(CellsOf(robot, row)));
   }
   void OnGap(const GapRow& row) override {
     ++result.gaps;
-    gaps_.Write(CsvLine(CellsOf(row)));
+    gaps_.Write(CsvLine(CellsOf(robot, row)));
   }
   void Finish() override {
     for (OutputFile* file : {&decisions_, &controls_, &executions_, &withdrawals_, &gaps_}) file->Close();
   }
 
  private:
-  static fs::path Made(const std::string& directory) {
-    std::error_code error;
-    fs::create_directories(directory, error);
-    if (error || !fs::is_directory(directory, error))
-      throw OutputError(directory + ": cannot be made a directory: " + error.message());
-    return directory;
-  }
-  [[nodiscard]] OutputFile File(const char* name) const { return OutputFile((directory_ / name).string()); }
-
-  const fs::path directory_;
-  OutputFile decisions_ = File("decisions.csv"), controls_ = File("controls.csv"), executions_ = File("executions.csv"),
-             withdrawals_ = File("withdrawals.csv"), gaps_ = File("gaps.csv");
+  OutputFile decisions_, controls_, executions_, withdrawals_, gaps_;
 };
 
 // ---- Tubes.
 
 class NpzSink final : public Sink {
  public:
-  explicit NpzSink(const std::string& path) : arrays_(path) {
+  NpzSink(const std::string& robot, const std::string& path) : Sink(robot), arrays_(FileOf(path)) {
     for (const char* name : {"plan_id", "utime", "start_utime", "step_us", "expires_utime", "event_number",
                              "num_states", "num_inputs", "num_steps"})
       arrays_.Declare(name, 'i');
-    for (const char* name : {"source", "log_file", "plan_digest"}) arrays_.Declare(name, 'S');
+    for (const char* name : {"robot", "source", "log_file", "plan_digest"}) arrays_.Declare(name, 'S');
     for (const char* name : {"slice_lower", "slice_upper", "controls", "initial_center", "initial_half_width"})
       arrays_.Declare(name, 'f');
     AddBegins();
   }
 
-  void OnCertified(const certified_plan_t& certified, const LogReference& event) override {
+  void OnCertified(const certified_plan_v2_t& certified, const LogReference& event) override {
     const candidate_plan_t& plan = certified.plan;
     if (!HasCounts(plan)) {
       ++result.left_out;
@@ -150,6 +148,7 @@ class NpzSink final : public Sink {
     arrays_.Add("num_states", std::int64_t{plan.num_states});
     arrays_.Add("num_inputs", std::int64_t{plan.num_inputs});
     arrays_.Add("num_steps", std::int64_t{plan.num_steps});
+    arrays_.Add("robot", Printable(robot));
     arrays_.Add("source", GetText(plan.source));
     arrays_.Add("log_file", Printable(event.log_file));
     arrays_.Add("plan_digest", ToHex(GetDigest(certified.plan_digest)));
@@ -174,7 +173,8 @@ class NpzSink final : public Sink {
 
 class McapSink final : public Sink {
  public:
-  explicit McapSink(const std::string& path) : file_(path) {}
+  McapSink(const std::string& robot, bool names_robot, const std::string& path)
+      : Sink(robot), prefix_(names_robot ? Printable(robot) + "/" : ""), file_(FileOf(path)) {}
 
   void OnMessage(const LogEvent& event) override {
     const auto message = ToJsonMessage(event.message());
@@ -200,79 +200,93 @@ class McapSink final : public Sink {
     auto schema = schemas_.find(type);
     if (schema == schemas_.end())
       schema = schemas_.emplace(type, file_.AddSchema("forereach." + std::string(type), SchemaOf(type))).first;
-    std::string topic = Printable(name);
+    std::string topic = prefix_ + Printable(name);
     if (!topics_.insert(topic).second) topics_.insert(topic += " (" + std::string(type) + ")");
-    return channels_.emplace(std::pair(name, type), file_.AddChannel(schema->second, topic)).first->second;
+    return channels_.emplace(std::pair(name, type), file_.AddChannel(schema->second, topic, {{"robot", Printable(robot)}})).first->second;
   }
 
+  const std::string prefix_;  // of all channels
   McapWriter file_;
   std::map<std::string_view, std::uint16_t> schemas_;
   std::map<std::pair<std::string, std::string_view>, std::uint16_t> channels_;
   std::set<std::string> topics_;
 };
 
-std::unique_ptr<Sink> SinkOf(const ExportOptions& options) {
-  if (options.format == "csv") return std::make_unique<CsvSink>(options.output);
-  if (options.format == "jsonl") return std::make_unique<JsonLinesSink>(options.output);
-  if (options.format == "npz") return std::make_unique<NpzSink>(options.output);
-  if (options.format == "mcap") return std::make_unique<McapSink>(options.output);
-  throw ConfigError("no format: " + options.format);
+std::unique_ptr<Sink> SinkOf(const std::string& robot, const ExportOptions& options,
+                             const std::vector<std::string>& files) {
+  switch (options.format) {
+    case ExportFormat::kCsv: return std::make_unique<CsvSink>(robot, files);
+    case ExportFormat::kJsonLines: return std::make_unique<JsonLinesSink>(robot, files.at(0));
+    case ExportFormat::kNpz: return std::make_unique<NpzSink>(robot, files.at(0));
+    case ExportFormat::kMcap: return std::make_unique<McapSink>(robot, options.names_robot, files.at(0));
+  }
+  throw std::invalid_argument("no format of an export");
 }
 
-// ---- The runs.
+// All that is left of a log that is gone.
+void TakeRows(const Rows& rows, Sink& sink) {
+  for (const DecisionRow& row : rows.decisions) sink.OnDecision(row, nullptr);
+  for (const EventRow& row : rows.events) sink.OnExecution(row);
+  for (const GapRow& row : rows.gaps) sink.OnGap(row);
+}
 
-class Exporter final {
- public:
-  Exporter(const ExportOptions& options, Sink& sink, std::function<void(std::int64_t)> on_bytes)
-      : options_(options), sink_(sink), on_bytes_(std::move(on_bytes)) {}
-
-  void ReadLogs(const std::vector<std::string>& logs, LogOrder order) {
-    const LogSurvey survey = Survey(logs, order);
-    const std::string directory = fs::path(logs.front()).parent_path().string();
-    RecordReader reader(ChannelsOf(survey, directory, options_.config, options_.key), sink_, on_bytes_);
-    reader.Read(logs);
-    sink_.result.damage += reader.damage();
-    const PassedOver passed_over = reader.passed_over();
-    sink_.result.passed_over.not_authentic += passed_over.not_authentic;
-    sink_.result.passed_over.undecodable += passed_over.undecodable;
-  }
-
-  void ReadDatabase(const std::string& path) {
-    Database database(path);
-    for (const RunLogs& run : RunsOf(database)) {
-      for (const RunRow& missing : run.missing) {
-        sink_.result.missing.push_back(missing.log_file + ": " + WhyMissing(missing));
-        TakeRows(database.Read(missing.log_file));
-      }
-      if (!run.logs.empty()) ReadLogs(run.logs, LogOrder::kAny);
-    }
-  }
-
- private:
-  // All that is left of a log that is gone.
-  void TakeRows(const Rows& rows) {
-    for (const DecisionRow& row : rows.decisions) sink_.OnDecision(row, nullptr);
-    for (const EventRow& row : rows.events) sink_.OnExecution(row);
-    for (const GapRow& row : rows.gaps) sink_.OnGap(row);
-  }
-
-  const ExportOptions& options_;
-  Sink& sink_;
-  const std::function<void(std::int64_t)> on_bytes_;
-};
+void ReadLogs(const std::vector<std::string>& logs, const ExportOptions& options,
+              const std::function<void(std::int64_t)>& on_bytes, Sink& sink) {
+  const LogSurvey survey = Survey(logs, LogOrder::kAny);
+  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
+  RecordReader reader(ChannelsOf(survey, directory, options.config, options.key), sink, on_bytes);
+  reader.Read(logs);
+  sink.result.damage = reader.damage();
+  sink.result.passed_over = reader.passed_over();
+}
 
 }  // namespace
 
-ExportResult Export(const ExportOptions& options, std::function<void(std::int64_t)> on_bytes) {
-  const std::optional<std::string> database = DatabaseAmong(options.inputs);
-  const std::unique_ptr<Sink> sink = SinkOf(options);
-  Exporter exporter(options, *sink, std::move(on_bytes));
-  if (database)
-    exporter.ReadDatabase(*database);
-  else
-    exporter.ReadLogs(options.inputs, LogOrder::kOneRun);
+const std::vector<std::string>& ExportFiles(ExportFormat format) {
+  static const std::vector<std::string> csv{"decisions.csv", "controls.csv", "executions.csv", "withdrawals.csv",
+                                            "gaps.csv"},
+      jsonl{"jsonl"}, npz{"npz"}, mcap{"mcap"};
+  switch (format) {
+    case ExportFormat::kCsv: return csv;
+    case ExportFormat::kJsonLines: return jsonl;
+    case ExportFormat::kNpz: return npz;
+    default: return mcap;
+  }
+}
+
+ExportResult& ExportResult::operator+=(const ExportResult& other) {
+  decisions += other.decisions;
+  without_candidate += other.without_candidate;
+  executions += other.executions;
+  withdrawals += other.withdrawals;
+  gaps += other.gaps;
+  tubes += other.tubes;
+  messages += other.messages;
+  left_out += other.left_out;
+  damage += other.damage;
+  passed_over += other.passed_over;
+  return *this;
+}
+
+ExportResult ExportRun(const RunLogs& run, const ExportOptions& options, const std::vector<std::string>& files,
+                       const std::function<void(std::int64_t)>& on_bytes) {
+  const std::unique_ptr<Sink> sink = SinkOf(run.robot, options, files);
+  if (!run.missing.empty()) {
+    Database database(run.database);
+    for (const RunRow& missing : run.missing) TakeRows(database.Read(missing.log_file), *sink);
+  }
+  if (!run.logs.empty()) ReadLogs(run.logs, options, on_bytes, *sink);
   sink->Finish();
+  sink->result.files = files;
   return std::move(sink->result);
+}
+
+void JoinTables(ExportFormat format, const std::vector<std::string>& parts, const std::string& path) {
+  OutputFile joined(path);
+  bool is_first = true;
+  for (const std::string& part : parts)
+    joined.WriteContentOf(part, format == ExportFormat::kCsv && !std::exchange(is_first, false));
+  joined.Close();
 }
 
 }  // namespace forereach

@@ -24,7 +24,8 @@ constexpr const char* kGroundNames[] = {"config_digest", "model_digest", "declar
 Cell Index(std::int64_t value) { return value < 0 ? Cell() : Cell(value); }
 Cell TextOrNone(const std::string& text) { return text.empty() ? Cell() : Cell(text); }
 
-void AddReference(Cells& cells, const LogReference& event) {
+void AddReference(Cells& cells, const std::string& robot, const LogReference& event) {
+  cells.emplace_back("robot", robot);
   cells.emplace_back("log_file", event.log_file);
   cells.emplace_back("event_number", Index(event.event_number));
 }
@@ -89,9 +90,9 @@ bool HasCounts(const candidate_plan_t& candidate) {
          candidate.num_inputs <= 8 && 1 <= candidate.num_steps && candidate.num_steps <= 128;
 }
 
-Cells CellsOf(const DecisionRow& row, const candidate_plan_t* candidate) {
+Cells CellsOf(const std::string& robot, const DecisionRow& row, const candidate_plan_t* candidate) {
   Cells cells;
-  AddReference(cells, row.event);
+  AddReference(cells, robot, row.event);
   cells.emplace_back("utime", row.utime);
   cells.emplace_back("candidate_utime", row.candidate_utime);
   cells.emplace_back("sequence", row.sequence);
@@ -116,9 +117,9 @@ Cells CellsOf(const DecisionRow& row, const candidate_plan_t* candidate) {
   return cells;
 }
 
-Cells CellsOfControl(const DecisionRow& row, const candidate_plan_t& candidate, int step) {
+Cells CellsOfControl(const std::string& robot, const DecisionRow& row, const candidate_plan_t& candidate, int step) {
   Cells cells;
-  AddReference(cells, row.event);
+  AddReference(cells, robot, row.event);
   cells.emplace_back("source", row.source);
   cells.emplace_back("plan_id", row.plan_id);
   cells.emplace_back("step", step);
@@ -129,9 +130,9 @@ Cells CellsOfControl(const DecisionRow& row, const candidate_plan_t& candidate, 
   return cells;
 }
 
-Cells CellsOf(const withdrawal_t& withdrawal, const LogReference& event) {
+Cells CellsOf(const std::string& robot, const withdrawal_t& withdrawal, const LogReference& event) {
   Cells cells;
-  AddReference(cells, event);
+  AddReference(cells, robot, event);
   cells.emplace_back("utime", withdrawal.utime);
   cells.emplace_back("sequence", withdrawal.sequence);
   cells.emplace_back("source", GetText(withdrawal.source));
@@ -153,9 +154,9 @@ Cells CellsOf(const withdrawal_t& withdrawal, const LogReference& event) {
   return cells;
 }
 
-Cells CellsOf(const EventRow& row) {
+Cells CellsOf(const std::string& robot, const EventRow& row) {
   Cells cells;
-  AddReference(cells, row.event);
+  AddReference(cells, robot, row.event);
   cells.emplace_back("utime", row.utime);
   cells.emplace_back("sequence", row.sequence);
   cells.emplace_back("plan_id", Index(row.plan_id));
@@ -169,9 +170,9 @@ Cells CellsOf(const EventRow& row) {
   return cells;
 }
 
-Cells CellsOf(const GapRow& row) {
+Cells CellsOf(const std::string& robot, const GapRow& row) {
   Cells cells;
-  AddReference(cells, row.event);
+  AddReference(cells, robot, row.event);
   cells.emplace_back("channel", row.channel);
   cells.emplace_back("source", TextOrNone(row.source));
   cells.emplace_back("expected", Index(row.expected));

@@ -77,7 +77,7 @@ void McapWriter::Range::Take(std::uint64_t time) {
   ++messages;
 }
 
-McapWriter::McapWriter(const std::string& path) : file_(path) {
+McapWriter::McapWriter(OutputFile file) : file_(std::move(file)) {
   Put(kMagic);
   std::string header;
   PutText(header, "");  // no profile
@@ -102,14 +102,18 @@ std::uint16_t McapWriter::AddSchema(const std::string& name, const std::string& 
   return id;
 }
 
-std::uint16_t McapWriter::AddChannel(std::uint16_t schema, const std::string& topic) {
+std::uint16_t McapWriter::AddChannel(std::uint16_t schema, const std::string& topic,
+                                    const std::map<std::string, std::string>& metadata) {
   const auto id = static_cast<std::uint16_t>(channels_.size());
   std::string content;
   PutInteger(content, id);
   PutInteger(content, schema);
   PutText(content, topic);
   PutText(content, "json");
-  PutText(content, "");  // no metadata
+  PutEntries(content, metadata, [](std::string& bytes, const std::string& key, const std::string& value) {
+    PutText(bytes, key);
+    PutText(bytes, value);
+  });
   records_ += channels_.emplace_back(Record(Op::kChannel, content));
   return id;
 }

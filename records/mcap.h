@@ -14,13 +14,14 @@ namespace forereach {
 
 class McapWriter final {
  public:
-  /** @throws OutputError if the file exists or cannot be written; so do the others. */
-  explicit McapWriter(const std::string& path);
+  /** All throw OutputError if the file cannot be written. */
+  explicit McapWriter(OutputFile file);
 
   /** @param name of a type. @param schema a JSON Schema of an object. @return the number for AddChannel. */
   [[nodiscard]] std::uint16_t AddSchema(const std::string& name, const std::string& schema);
-  /** @return the number for Write. */
-  [[nodiscard]] std::uint16_t AddChannel(std::uint16_t schema, const std::string& topic);
+  /** @param metadata names and texts. @return the number for Write. */
+  [[nodiscard]] std::uint16_t AddChannel(std::uint16_t schema, const std::string& topic,
+                                         const std::map<std::string, std::string>& metadata = {});
   /** @param log_us, publish_us microseconds since the Unix epoch; times after the year 2554 become that year's.
   @param json one object. */
   void Write(std::uint16_t channel, std::uint32_t sequence, std::int64_t log_us, std::int64_t publish_us,

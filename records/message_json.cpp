@@ -11,6 +11,7 @@
 #include "certifier/task/json_text.h"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/command_t.hpp"
@@ -84,8 +85,9 @@ void Fields(const decision_t& m, To& to) {
   to.Text("message", m.message);
 }
 
-template <class To>
-void Fields(const certified_plan_t& m, To& to) {
+template <class Certified, class To>
+requires(std::same_as<Certified, certified_plan_t> ||
+         std::same_as<Certified, certified_plan_v2_t>) void Fields(const Certified& m, To& to) {
   to("utime", m.utime);
   to("sequence", m.sequence);
   to("expires_utime", m.expires_utime);
@@ -94,6 +96,7 @@ void Fields(const certified_plan_t& m, To& to) {
   to.Rows("slice_upper", m.slice_upper, m.plan.num_steps + 1, m.plan.num_states);
   to.Digest("plan_digest", m.plan_digest);
   GroundFields(m, to);
+  if constexpr (std::same_as<Certified, certified_plan_v2_t>) to.Digest("transitions_digest", m.transitions_digest);
   to.Digest("certificate_digest", m.certificate_digest);
 }
 
@@ -403,7 +406,7 @@ struct Types {
   static std::vector<std::string_view> Names() { return {Messages::getTypeName()...}; }
 };
 
-using AllTypes = Types<candidate_plan_t, certified_plan_t, certifier_status_v2_t, certifier_status_v3_t, command_t,
+using AllTypes = Types<candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t, certifier_status_v3_t, command_t,
                        decision_t, execution_event_t, fault_t, logger_status_t, obstacles_t, obstacles_v2_t,
                        robot_state_t, transition_t, withdrawal_t>;
 
@@ -430,7 +433,9 @@ void Describe(const decision_t& m, Bytes, MessageSummary& summary) {
   summary.plan = GetDigest(m.plan_digest);
   summary.is_of_plan = true;
 }
-void Describe(const certified_plan_t& m, Bytes, MessageSummary& summary) {
+template <class Certified>
+requires(std::same_as<Certified, certified_plan_t> ||
+         std::same_as<Certified, certified_plan_v2_t>) void Describe(const Certified& m, Bytes, MessageSummary& summary) {
   summary.plan_id = m.plan.plan_id;
   summary.plan = GetDigest(m.plan_digest);
   summary.is_of_plan = true;

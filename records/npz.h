@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "records/output_file.h"
 
@@ -14,8 +15,8 @@ namespace forereach {
 /** Arrays that grow row by row. The rows wait in files without a name beside the output, not in memory. */
 class NpzWriter final {
  public:
-  /** @throws OutputError if the file exists or cannot be written; so do the others. */
-  explicit NpzWriter(const std::string& path) : file_(path) {}
+  /** All throw OutputError if the file cannot be written. */
+  explicit NpzWriter(OutputFile file) : file_(std::move(file)) {}
 
   /** One more row of a matrix of doubles. Rows may differ in length, up to kMostColumns: Finish fills the shorter ones
   with NaN. */

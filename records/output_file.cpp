@@ -79,10 +79,19 @@ void OutputFile::Write(std::string_view bytes) {
   size_ += static_cast<std::int64_t>(bytes.size());
 }
 
-void OutputFile::WriteContentOf(const std::string& path) {
+void OutputFile::WriteContentOf(const std::string& path, bool without_first_line) {
   InputFile file(path, std::numeric_limits<std::int64_t>::max());
   std::vector<char> block(1 << 20);
-  while (const std::size_t bytes = file.Read(block.data(), block.size())) Write({block.data(), bytes});
+  while (const std::size_t bytes = file.Read(block.data(), block.size())) {
+    std::string_view text(block.data(), bytes);
+    if (without_first_line) {
+      const std::size_t end = text.find('\n');
+      if (end == std::string_view::npos) continue;
+      text.remove_prefix(end + 1);
+      without_first_line = false;
+    }
+    Write(text);
+  }
 }
 
 void OutputFile::Close() {

@@ -33,8 +33,8 @@ class OutputFile final {
 
   /** @throws OutputError, for example on a full disk. */
   void Write(std::string_view bytes);
-  /** Adds the content of a file. @throws OutputError, BadInput. */
-  void WriteContentOf(const std::string& path);
+  /** Adds the content of a file, or what is behind its first line. @throws OutputError, BadInput. */
+  void WriteContentOf(const std::string& path, bool without_first_line = false);
   /** Bytes written so far. */
   [[nodiscard]] std::int64_t size() const { return size_; }
   /** The file gets its name, after the disk has confirmed its content. @throws OutputError if that fails. */

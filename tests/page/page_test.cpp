@@ -104,7 +104,7 @@ TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
   }
   EXPECT_GT(executed, 50u);
   EXPECT_EQ(run.tasks.size(), 1u);
-  EXPECT_THAT(run.replays.at("course.lcmlog"), HasSubstr("--config"));
+  EXPECT_THAT(run.parts.at(0).replays.at("course.lcmlog"), HasSubstr("--config"));
 }
 
 TEST(GatherTest, DrawsNoMoreThanItsBounds) {
@@ -153,7 +153,7 @@ TEST_F(DirectoryTest, WithoutTheLogItHasTheRowsAlone) {
   const PageRun run = GatherPage({directory_ / "decisions.sqlite"}, "", {}, {});
   EXPECT_EQ(run.decisions.size(), 67u);
   EXPECT_TRUE(run.details.empty());
-  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not beside the database")));
+  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("the log is not in the database's directory")));
 }
 
 TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
