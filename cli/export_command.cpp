@@ -121,8 +121,8 @@ void Describe(const Options& options, const ExportResult& result, const NamedRun
 }
 
 int RunExport(Options options) {
-  options.what.format = static_cast<ExportFormat>(std::ranges::find(kExportFormats, options.format) -
-                                                  kExportFormats.begin());
+  options.what.format =
+      static_cast<ExportFormat>(std::ranges::find(kExportFormats, options.format) - kExportFormats.begin());
   if (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
   NamedRuns named = RunsNamedBy(options.inputs, options.each_run.jobs);
   options.what.names_robot = named.is_many;

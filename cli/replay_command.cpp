@@ -132,8 +132,7 @@ std::vector<std::pair<Key, std::int64_t>> ByCount(const std::map<Key, std::int64
 
 std::string Verdict(const Comparison& compared) {
   const std::int64_t lost = compared.num_lost();
-  return std::to_string(compared.num_gained()) + " of " +
-         std::to_string(compared.candidates - compared.certificates) +
+  return std::to_string(compared.num_gained()) + " of " + std::to_string(compared.candidates - compared.certificates) +
          " abstentions and rejections would have been certificates, " +
          (lost == 0 ? "and none" : "and " + std::to_string(lost)) + " of the " + std::to_string(compared.certificates) +
          " certificates lost";

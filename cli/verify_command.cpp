@@ -180,8 +180,7 @@ void PrintForPeople(const Verified& sum, const NamedRuns& named) {
             << " refuted, " << sum.cannot_verify << " cannot be verified";
   if (sum.not_certificates > 0)
     std::cout << "; " << sum.not_certificates << " abstentions and rejections are not certificates";
-  if (sum.remainders > 0)
-    std::cout << "; " << sum.remainders << " of the certificates: what a withdrawal leaves";
+  if (sum.remainders > 0) std::cout << "; " << sum.remainders << " of the certificates: what a withdrawal leaves";
   if (named.is_many) std::cout << "; " << named.runs.size() << " runs";
   if (!named.missing.empty()) std::cout << "; " << named.missing.size() << " logs or runs could not be read";
   std::cout << DescribePassedOver(sum.passed_over) << "\n" << Extent(sum) << std::endl;
@@ -230,12 +229,10 @@ Command VerifyCommand() {
           "  forereach verify decision.json\n"
           "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach verify run/log",
-      .options =
-          {Required(
-               {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
-                std::string("The certificates: a decision (the output of certify --json), or ") + kRuns}),
-           {"--config", &options->config, "FILE", kTaskOfRecords},
-           JsonFlag(options->json)},
+      .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
+                            std::string("The certificates: a decision (the output of certify --json), or ") + kRuns}),
+                  {"--config", &options->config, "FILE", kTaskOfRecords},
+                  JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};
   options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, options->key);

@@ -317,7 +317,8 @@ void ReadDatabase(const RunLogs& run, PageRun& page) {
 void AddPart(const RunLogs& run, const PageTasks& tasks, PageRun& page) {
   PagePart& part = page.parts.emplace_back();
   part.robot = run.robot;
-  for (const std::string& log : run.logs) part.replays[FileName(log)] = ReplayCommandOf(run.logs, tasks.config, tasks.key);
+  for (const std::string& log : run.logs)
+    part.replays[FileName(log)] = ReplayCommandOf(run.logs, tasks.config, tasks.key);
   part.decisions = page.decisions.size();
   part.events = page.events.size();
   part.gaps = page.gaps.size();

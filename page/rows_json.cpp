@@ -127,9 +127,15 @@ std::vector<Row> FromArray(const nlohmann::json& all) {
 }  // namespace
 
 void to_json(nlohmann::json& json, const PageRun& rows) {
-  json = {{"decisions", ToArray(rows.decisions)}, {"events", ToArray(rows.events)}, {"gaps", ToArray(rows.gaps)},
-          {"faults", rows.faults},                {"withdrawals", rows.withdrawals}, {"tasks", rows.tasks},
-          {"parts", rows.parts},                  {"damage", rows.damage},           {"notes", rows.notes}};
+  json = {{"decisions", ToArray(rows.decisions)},
+          {"events", ToArray(rows.events)},
+          {"gaps", ToArray(rows.gaps)},
+          {"faults", rows.faults},
+          {"withdrawals", rows.withdrawals},
+          {"tasks", rows.tasks},
+          {"parts", rows.parts},
+          {"damage", rows.damage},
+          {"notes", rows.notes}};
 }
 
 void from_json(const nlohmann::json& json, PageRun& rows) {

@@ -354,7 +354,8 @@ std::vector<CertificateFile> ReadRuns(const std::string& path, const std::string
       named.missing.emplace_back(error.what());
     }
   if (files.empty())
-    throw ConfigError(path + ": " + (named.missing.empty() ? "no run in it has a log with decisions" : named.missing.back()));
+    throw ConfigError(path + ": " +
+                      (named.missing.empty() ? "no run in it has a log with decisions" : named.missing.back()));
   for (const std::string& missing : named.missing) files.front().certificates.push_back({missing, {}, missing, {}});
   return files;
 }

@@ -86,8 +86,7 @@ class CsvSink final : public Sink {
     result.without_candidate += candidate == nullptr;
     decisions_.Write(CsvLine(CellsOf(robot, row, candidate)));
     if (!candidate || !HasCounts(*candidate)) return;
-    for (int t = 0; t < candidate->num_steps; ++t)
-      controls_.Write(CsvLine(CellsOfControl(robot, row, *candidate, t)));
+    for (int t = 0; t < candidate->num_steps; ++t) controls_.Write(CsvLine(CellsOfControl(robot, row, *candidate, t)));
   }
   void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) override {
     ++result.withdrawals;
@@ -202,7 +201,9 @@ class McapSink final : public Sink {
       schema = schemas_.emplace(type, file_.AddSchema("forereach." + std::string(type), SchemaOf(type))).first;
     std::string topic = prefix_ + Printable(name);
     if (!topics_.insert(topic).second) topics_.insert(topic += " (" + std::string(type) + ")");
-    return channels_.emplace(std::pair(name, type), file_.AddChannel(schema->second, topic, {{"robot", Printable(robot)}})).first->second;
+    return channels_
+        .emplace(std::pair(name, type), file_.AddChannel(schema->second, topic, {{"robot", Printable(robot)}}))
+        .first->second;
   }
 
   const std::string prefix_;  // of all channels

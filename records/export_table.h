@@ -23,14 +23,13 @@ using Cell = std::variant<std::monostate, std::int64_t, double, std::string, std
 using Cells = std::vector<std::pair<const char*, Cell>>;
 
 /** @param robot whose log it is (records/run_logs.h). @param candidate null if it is not known. */
-[[nodiscard]] Cells CellsOf(const std::string& robot, const DecisionRow& row,
-                            const candidate_plan_t* candidate);
+[[nodiscard]] Cells CellsOf(const std::string& robot, const DecisionRow& row, const candidate_plan_t* candidate);
 [[nodiscard]] Cells CellsOf(const std::string& robot, const withdrawal_t& withdrawal, const LogReference& event);
 [[nodiscard]] Cells CellsOf(const std::string& robot, const EventRow& row);
 [[nodiscard]] Cells CellsOf(const std::string& robot, const GapRow& row);
 /** One control of a candidate with as many as `step`. */
-[[nodiscard]] Cells CellsOfControl(const std::string& robot, const DecisionRow& row,
-                                   const candidate_plan_t& candidate, int step);
+[[nodiscard]] Cells CellsOfControl(const std::string& robot, const DecisionRow& row, const candidate_plan_t& candidate,
+                                   int step);
 
 /** The columns' names, as a line of a CSV file with its end. */
 [[nodiscard]] std::string CsvHeader(const Cells& cells);

@@ -58,6 +58,11 @@ FinishedRuns::FinishedRuns(std::string directory, const std::string& job) : dire
   job_ = DigestOfFile(fs::read_symlink("/proc/self/exe").string()) + "\n" + job + "\n";
 }
 
+FinishedRuns::~FinishedRuns() {
+  std::error_code ignored;
+  fs::remove(directory_, ignored);  // fails unless it is empty
+}
+
 std::string FinishedRuns::KeyOf(const RunLogs& run) const {
   std::string inputs = job_ + run.robot + "\n" + run.database + "\n";
   for (const std::string& log : run.logs) inputs += log + "\n" + DigestOfFile(log) + "\n";

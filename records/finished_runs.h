@@ -1,8 +1,8 @@
 /** The results of runs that a command has finished, in a directory, so that an interrupted command goes on there.
 
-A result belongs to what it was made of: the bytes and paths of the run's logs and of the tasks that are kept beside them,
-the command with its options, and the program itself. When any of these changes, the run is read again. A file appears
-whole or not at all, and a damaged one counts as none. The directory may be deleted at any time. */
+A result belongs to what it was made of: the bytes and paths of the run's logs and of the tasks that are kept beside
+them, the command with its options, and the program itself. When any of these changes, the run is read again. A file
+appears whole or not at all, and a damaged one counts as none. The directory may be deleted at any time. */
 #pragma once
 
 #include <optional>
@@ -20,6 +20,10 @@ class FinishedRuns final {
   /** @param directory made if necessary. @param job the command, and the content of everything else on which a result
   depends. @throws OutputError if the directory cannot be made. */
   FinishedRuns(std::string directory, const std::string& job);
+  /** Removes the directory if nothing was kept. */
+  ~FinishedRuns();
+  FinishedRuns(const FinishedRuns&) = delete;
+  FinishedRuns& operator=(const FinishedRuns&) = delete;
 
   /** Names the run's results, in hexadecimal digits. Cost: one pass over its logs. @throws BadInput if one cannot be
   read. */

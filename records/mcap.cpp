@@ -103,7 +103,7 @@ std::uint16_t McapWriter::AddSchema(const std::string& name, const std::string& 
 }
 
 std::uint16_t McapWriter::AddChannel(std::uint16_t schema, const std::string& topic,
-                                    const std::map<std::string, std::string>& metadata) {
+                                     const std::map<std::string, std::string>& metadata) {
   const auto id = static_cast<std::uint16_t>(channels_.size());
   std::string content;
   PutInteger(content, id);

@@ -406,9 +406,9 @@ struct Types {
   static std::vector<std::string_view> Names() { return {Messages::getTypeName()...}; }
 };
 
-using AllTypes = Types<candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t, certifier_status_v3_t, command_t,
-                       decision_t, execution_event_t, fault_t, logger_status_t, obstacles_t, obstacles_v2_t,
-                       robot_state_t, transition_t, withdrawal_t>;
+using AllTypes = Types<candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t,
+                       certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t,
+                       obstacles_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>;
 
 // Calls `use` with the decoded message.
 template <class Use>
@@ -435,7 +435,8 @@ void Describe(const decision_t& m, Bytes, MessageSummary& summary) {
 }
 template <class Certified>
 requires(std::same_as<Certified, certified_plan_t> ||
-         std::same_as<Certified, certified_plan_v2_t>) void Describe(const Certified& m, Bytes, MessageSummary& summary) {
+         std::same_as<Certified, certified_plan_v2_t>) void Describe(const Certified& m, Bytes,
+                                                                     MessageSummary& summary) {
   summary.plan_id = m.plan.plan_id;
   summary.plan = GetDigest(m.plan_digest);
   summary.is_of_plan = true;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
+#include <set>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -12,6 +14,7 @@
 #include "certifier/task/config.h"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/withdrawal_t.hpp"
+#include "records/certified_message.h"
 #include "records/database.h"
 #include "records/event_log.h"
 #include "records/export_table.h"
@@ -62,6 +65,12 @@ std::vector<json> ParseLines(const std::string& text) {
   return lines;
 }
 
+std::set<std::string> FilesIn(const std::string& directory) {
+  std::set<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(directory)) files.insert(entry.path().filename());
+  return files;
+}
+
 class ExportTest : public testing::Test {
  protected:
   Output ExportTo(const std::string& format, const std::string& out, const std::string& input = kCourse,
@@ -72,6 +81,13 @@ class ExportTest : public testing::Test {
   json ReadBack(const std::string& reader, const std::string& file) const {
     const Output output =
         Shell("'" FOREREACH_SOURCE_DIR "/tests/export/" + reader + "' '" + (scratch_ / file) + "' 2>&1");
+    EXPECT_EQ(output.code, 0) << output.text;
+    return json::parse(output.text, nullptr, false);
+  }
+  // By npm's @mcap/core.
+  json ReadByMcapCore(const std::string& file) const {
+    const Output output = Shell("'" FOREREACH_SOURCE_DIR "/tests/export/read_mcap_core' '" + (scratch_ / file) + "' '" +
+                                FOREREACH_BINARY_DIR "/tests/export/mcap_core' 2>&1");
     EXPECT_EQ(output.code, 0) << output.text;
     return json::parse(output.text, nullptr, false);
   }
@@ -148,9 +164,9 @@ TEST_F(ExportTest, TubesAreThoseOfTheCertifiedPlans) {
   const Output output = ExportTo("npz", "tubes.npz");
   EXPECT_EQ(output.code, 0) << output.text;
   const json arrays = ReadBack("read_npz", "tubes.npz");
-  std::vector<certified_plan_t> plans;
+  std::vector<certified_plan_v2_t> plans;
   for (const LogEvent& event : ReadLog(kCourse).events)
-    if (const auto certified = Decoded<certified_plan_t>(event.message())) plans.push_back(*certified);
+    if (const auto certified = ReadCertified(event.message())) plans.push_back(certified->plan);
   ASSERT_EQ(plans.size(), 20u);
   EXPECT_EQ(arrays["plan_id"]["shape"], json({20}));
   EXPECT_EQ(arrays["slice_begin"]["shape"], json({21}));
@@ -172,7 +188,7 @@ TEST_F(ExportTest, TubesAreThoseOfTheCertifiedPlans) {
 }
 
 TEST_F(ExportTest, ArraysMayBeEmptyAndRowsMayDiffer) {
-  NpzWriter arrays(scratch_ / "some.npz");
+  NpzWriter arrays{OutputFile(scratch_ / "some.npz")};
   arrays.Declare("none", 'f');
   arrays.Declare("no_text", 'S');
   arrays.AddRow("rows", std::vector{1.0, 2.0, std::numeric_limits<double>::infinity()});
@@ -204,13 +220,39 @@ TEST_F(ExportTest, AnMcapFileHasEveryMessage) {
   EXPECT_EQ(message["json"]["message"], GetText(Decoded<decision_t>(first->message())->message));
 }
 
+// The reader of Foxglove.
+TEST_F(ExportTest, AnMcapFileIsReadByItsOwnLibrary) {
+  ASSERT_EQ(ExportTo("mcap", "run.mcap").code, 0);
+  const json found = ReadByMcapCore("run.mcap"), same = ReadBack("read_mcap", "run.mcap");
+  EXPECT_EQ(found["library"], "forereach");
+  EXPECT_EQ(found["messages"], same["messages"]);
+  ASSERT_EQ(found["channels"].size(), same["channels"].size());
+  for (const auto& [topic, channel] : found["channels"].items()) {
+    EXPECT_EQ(channel["type"], same["channels"][topic]["type"]);
+    EXPECT_EQ(channel["count"], same["channels"][topic]["count"]);
+    EXPECT_THAT(channel["robot"], testing::EndsWith("tests/data"));
+    EXPECT_EQ(found["first"][topic]["json"], same["first"][topic]["json"]);
+    EXPECT_EQ(found["first"][topic]["log"], std::to_string(same["first"][topic]["log"].get<std::int64_t>()));
+  }
+  McapWriter many{OutputFile(scratch_ / "many.mcap")};
+  const auto schema = many.AddSchema("t", R"({"type":"object","properties":{"text":{"type":"string"}}})");
+  const auto a = many.AddChannel(schema, "A"), b = many.AddChannel(schema, "B");
+  const std::string text = "{\"text\":\"" + std::string(100'000, 'x') + "\"}";
+  for (int i = 0; i < 30; ++i) many.Write(i % 3 ? a : b, 1, 1000 - i, INT64_MAX, text);
+  many.Finish();
+  EXPECT_EQ(ReadByMcapCore("many.mcap")["channels"]["A"]["count"], 20);
+  McapWriter none{OutputFile(scratch_ / "none.mcap")};
+  none.Finish();
+  EXPECT_EQ(ReadByMcapCore("none.mcap")["messages"], 0);
+}
+
 TEST_F(ExportTest, AnMcapFileMayHaveManyChunksOrNone) {
   {
-    McapWriter none(scratch_ / "none.mcap");
+    McapWriter none{OutputFile(scratch_ / "none.mcap")};
     none.Finish();
   }
   EXPECT_EQ(ReadBack("read_mcap", "none.mcap")["messages"], 0);
-  McapWriter many(scratch_ / "many.mcap");
+  McapWriter many{OutputFile(scratch_ / "many.mcap")};
   const auto schema = many.AddSchema("t", R"({"type":"object","properties":{"text":{"type":"string"}}})");
   const auto a = many.AddChannel(schema, "A"), b = many.AddChannel(schema, "B");
   const std::string json = "{\"text\":\"" + std::string(100'000, 'x') + "\"}";
@@ -241,7 +283,7 @@ TEST_F(ExportTest, TextsAreQuotedAndAreNoFormulas) {
   row.margin = std::numeric_limits<double>::infinity();
   row.threshold = -1.5;
   row.event.log_file = "@a\nb";
-  const auto cells = ParseCsv(CsvHeader(CellsOf(row, nullptr)) + CsvLine(CellsOf(row, nullptr)));
+  const auto cells = ParseCsv(CsvHeader(CellsOf("-robot", row, nullptr)) + CsvLine(CellsOf("-robot", row, nullptr)));
   ASSERT_EQ(cells.size(), 2u);
   ASSERT_EQ(cells[0].size(), cells[1].size());
   std::map<std::string, std::string> of;
@@ -252,8 +294,9 @@ TEST_F(ExportTest, TextsAreQuotedAndAreNoFormulas) {
   EXPECT_EQ(of["threshold"], "-1.5") << "a number is no formula";
   EXPECT_EQ(of["elapsed_us"], "") << "not a number";
   EXPECT_EQ(of["step"], "") << "does not apply";
-  EXPECT_EQ(of["log_file"], "'@a\\x0Ab");
-  const json line = json::parse(JsonLine("decision", CellsOf(row, nullptr)));
+  EXPECT_EQ(of["log_file"], "'@a\\x0ab");
+  EXPECT_EQ(of["robot"], "'-robot");
+  const json line = json::parse(JsonLine("decision", CellsOf("a", row, nullptr)));
   EXPECT_EQ(line["source"], row.source);
   EXPECT_TRUE(line["margin"].is_null());
   EXPECT_TRUE(line["num_steps"].is_null());
@@ -300,9 +343,7 @@ TEST_F(ExportTest, AHostileLogIsExported) {
   EXPECT_EQ(mcap.code, 0) << mcap.text;
   EXPECT_LE(ReadBack("read_mcap", "hostile.mcap")["channels"].size(), 256u);
   EXPECT_THAT(mcap.text, HasSubstr("messages of other types left out"));
-  std::set<std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(scratch_.path())) files.insert(entry.path().filename());
-  EXPECT_EQ(files,
+  EXPECT_EQ(FilesIn(scratch_.path()),
             (std::set<std::string>{"hostile", "hostile.lcmlog", "hostile.jsonl", "hostile.npz", "hostile.mcap"}));
 }
 
@@ -329,8 +370,12 @@ TEST_F(ExportTest, AFileThatExistsIsNotChanged) {
   EXPECT_EQ(ExportTo("csv", "tables").code, 2);
   EXPECT_EQ(Read(scratch_ / "precious"), "mine");
   EXPECT_EQ(Read(scratch_ / "tables/gaps.csv"), "mine");
-  EXPECT_FALSE(std::filesystem::exists(scratch_ / "tables/decisions.csv"))
-      << "nothing is left of an export that failed";
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "tables/decisions.csv"));
+  std::filesystem::create_symlink("nowhere", scratch_ / "link");
+  EXPECT_EQ(ExportTo("jsonl", "link").code, 2) << "a link is a file that exists";
+  std::filesystem::create_directory(scratch_ / "empty");
+  EXPECT_EQ(ExportTo("csv", "empty/").code, 0) << "an empty directory may be filled";
+  EXPECT_EQ(FilesIn(scratch_.path()), (std::set<std::string>{"precious", "tables", "link", "empty"}));
 }
 
 TEST_F(ExportTest, WhatCannotBeExportedIsSaid) {
@@ -338,7 +383,7 @@ TEST_F(ExportTest, WhatCannotBeExportedIsSaid) {
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "x/decisions.csv"));
   EXPECT_EQ(Forereach("export '" + kCourse + "' --format xlsx -o '" + (scratch_ / "x.xlsx") + "' 2>&1").code, 2);
   EXPECT_THAT(Forereach("export '" + scratch_.path() + "' --format csv -o '" + (scratch_ / "y") + "' 2>&1").text,
-              HasSubstr("it has no decision database"));
+              HasSubstr("neither a decision database nor event logs"));
 }
 
 TEST_F(ExportTest, AFullDiskIsAnErrorAndLeavesNothing) {
@@ -348,7 +393,7 @@ TEST_F(ExportTest, AFullDiskIsAnErrorAndLeavesNothing) {
                                "' --config '" + kConfig + "' --format mcap -o '" + (scratch_ / "big.mcap") + "' 2>&1");
   EXPECT_EQ(limited.code, 2) << limited.text;
   EXPECT_THAT(limited.text, HasSubstr("cannot be written"));
-  EXPECT_FALSE(std::filesystem::exists(scratch_ / "big.mcap"));
+  EXPECT_TRUE(FilesIn(scratch_.path()).empty()) << "neither the file nor what was begun";
 }
 
 TEST_F(ExportTest, OnlyAuthenticMessagesCount) {
@@ -383,6 +428,88 @@ TEST_F(ExportTest, ADirectoryIsExportedByItsDatabase) {
   EXPECT_EQ(lines[0]["log_file"], "events-0.lcmlog");
   EXPECT_EQ(lines[0]["event_digest"], "ab");
   EXPECT_EQ(lines[1]["log_file"], "events-1.lcmlog");
+}
+
+// Two robots, of which one has a log that is damaged and one that is none.
+class ManyRunsTest : public ExportTest {
+ protected:
+  ManyRunsTest() {
+    for (const char* robot : {"night/a", "night/b/log"}) {
+      std::filesystem::create_directories(scratch_ / robot);
+      std::filesystem::copy_file(kCourse, scratch_ / (std::string(robot) + "/one.lcmlog"));
+    }
+    scratch_.Write("night/b/log/two.lcmlog", "no log");
+    std::filesystem::create_symlink("one.lcmlog", scratch_ / "night/a/latest.lcmlog");
+    std::filesystem::create_directory_symlink("..", scratch_ / "night/a/up");
+  }
+};
+
+TEST_F(ManyRunsTest, RowsHaveTheRobotAndRunsAFileEach) {
+  const Output lines = ExportTo("jsonl", "night.jsonl", scratch_ / "night");
+  EXPECT_EQ(lines.code, 1) << "two.lcmlog cannot be read";
+  EXPECT_THAT(lines.text, HasSubstr("two.lcmlog: is no LCM event log"));
+  EXPECT_THAT(lines.text, HasSubstr("134 decisions"));
+  std::map<std::string, int> decisions;
+  for (const json& line : ParseLines(Read(scratch_ / "night.jsonl")))
+    decisions[line["robot"]] += line["record"] == "decision";
+  EXPECT_EQ(decisions, (std::map<std::string, int>{{scratch_ / "night/a", 67}, {scratch_ / "night/b/log", 67}}));
+
+  EXPECT_EQ(ExportTo("csv", "tables", scratch_ / "night").code, 1);
+  const auto table = ParseCsv(Read(scratch_ / "tables/decisions.csv"));
+  ASSERT_EQ(table.size(), 135u) << "one line of names";
+  EXPECT_EQ(table[0][0], "robot");
+  EXPECT_EQ(table[1][0], scratch_ / "night/a");
+  EXPECT_EQ(table[134][0], scratch_ / "night/b/log");
+
+  EXPECT_EQ(ExportTo("mcap", "mcaps", scratch_ / "night").code, 1);
+  EXPECT_EQ(FilesIn(scratch_ / "mcaps"), (std::set<std::string>{"0001-one.mcap", "0002-one.mcap"}));
+  const json found = ReadByMcapCore("mcaps/0002-one.mcap");
+  EXPECT_EQ(found["channels"][(scratch_ / "night/b/log") + "/PLAN_DECISION"]["robot"], scratch_ / "night/b/log");
+  EXPECT_EQ(ExportTo("npz", "tubes", scratch_ / "night").code, 1);
+  EXPECT_EQ(ReadBack("read_npz", "tubes/0001-one.npz")["robot"]["values"][19], scratch_ / "night/a");
+  EXPECT_EQ(FilesIn(scratch_.path()), (std::set<std::string>{"night", "night.jsonl", "tables", "mcaps", "tubes"}));
+}
+
+// What a killed command has finished is not made again: here a log that is gone since.
+TEST_F(ManyRunsTest, GoesOnAfterAnInterruption) {
+  std::filesystem::remove(scratch_ / "night/b/log/two.lcmlog");
+  const std::string resume = "--resume '" + (scratch_ / "kept") + "'";
+  ASSERT_EQ(ExportTo("jsonl", "first.jsonl", scratch_ / "night", resume).code, 0);
+  EXPECT_EQ(FilesIn(scratch_ / "kept").size(), 4u);
+  // The bytes of one of the kept files are changed, and with them the new output: it was taken.
+  for (const std::string& file : FilesIn(scratch_ / "kept"))
+    if (file.ends_with(".jsonl")) {
+      std::string text = Read(scratch_ / ("kept/" + file));
+      text[text.find("certified")] = 'C';
+      scratch_.Write("kept/" + file, text);
+    }
+  ASSERT_EQ(ExportTo("jsonl", "second.jsonl", scratch_ / "night", resume).code, 0);
+  const std::string first = Read(scratch_ / "first.jsonl"), second = Read(scratch_ / "second.jsonl");
+  EXPECT_NE(first, second);
+  EXPECT_EQ(first.size(), second.size());
+  // A changed log, a shorter file and a damaged result are made again.
+  for (const std::string& file : FilesIn(scratch_ / "kept"))
+    scratch_.Write("kept/" + file, file.ends_with(".jsonl") ? "" : "0123");
+  ASSERT_EQ(ExportTo("jsonl", "third.jsonl", scratch_ / "night", resume).code, 0);
+  EXPECT_EQ(Read(scratch_ / "third.jsonl"), first);
+  auto bytes = ReadBytes(scratch_ / "night/a/one.lcmlog");
+  bytes.resize(bytes.size() / 2);
+  WriteBytes(scratch_ / "night/a/one.lcmlog", bytes);
+  static_cast<void>(ExportTo("jsonl", "fourth.jsonl", scratch_ / "night", resume));
+  EXPECT_LT(Read(scratch_ / "fourth.jsonl").size(), first.size());
+}
+
+TEST_F(ManyRunsTest, AKilledCommandLeavesNothingUnderTheNameOfItsOutput) {
+  const std::string command = "'" FOREREACH_PROGRAM "' export '" + (scratch_ / "night") + "' --config '" + kConfig +
+                              "' --format csv -o '" + (scratch_ / "tables") + "'";
+  for (const char* after : {"0.01", "0.03", "0.06", "0.1", "0.2"}) {
+    static_cast<void>(Shell(std::string("timeout -s KILL ") + after + " " + command + " 2>&1"));
+    if (!std::filesystem::exists(scratch_ / "tables")) continue;
+    EXPECT_EQ(FilesIn(scratch_ / "tables").size(), 5u) << "all or nothing";
+    break;
+  }
+  if (!std::filesystem::exists(scratch_ / "tables")) static_cast<void>(Shell(command + " 2>&1"));
+  EXPECT_EQ(ParseCsv(Read(scratch_ / "tables/decisions.csv")).size(), 135u);
 }
 
 }  // namespace

@@ -53,7 +53,8 @@ TEST_F(LogTest, ListsAsJson) {
     const auto line = nlohmann::json::parse(text);
     decisions += line["type"] == "decision_t";
     if (line["type"] == "decision_t") EXPECT_EQ(line["what"], "certified");
-    others += line["type"] != "decision_t" && line["type"] != "candidate_plan_t" && line["type"] != "certified_plan_t";
+    others += line["type"] != "decision_t" && line["type"] != "candidate_plan_t" &&
+              line["type"] != "certified_plan_t" && line["type"] != "certified_plan_v2_t";
   }
   EXPECT_EQ(decisions, 20);
   EXPECT_EQ(others, 0);
@@ -88,6 +89,18 @@ TEST_F(LogTest, ACutByOutcomeKeepsTheRest) {
   };
   EXPECT_EQ(std::ranges::count_if(ReadLog(out).events, is_other),
             std::ranges::count_if(ReadLog(kCourse).events, is_other));
+}
+
+TEST_F(LogTest, AFilterKeepsTheChosenAlone) {
+  const std::string out = scratch_ / "out.lcmlog";
+  EXPECT_EQ(Log("filter '" + kCourse + "' --outcome certified -o '" + out + "'").code, 0);
+  int decisions = 0;
+  for (const LogEvent& event : ReadLog(out).events) {
+    const auto summary = Summarize(event.message());
+    ASSERT_TRUE(summary && summary->is_of_plan);
+    decisions += summary->type == "decision_t";
+  }
+  EXPECT_EQ(decisions, 20);
 }
 
 TEST_F(LogTest, MergesByTime) {
@@ -145,7 +158,7 @@ TEST_F(LogTest, NamesOfAHostileLogDoNotReachTheTerminal) {
   const Output output = Log("list '" + (scratch_ / "hostile") + "'");
   EXPECT_EQ(output.code, 0) << output.text;
   EXPECT_THAT(output.text, Not(HasSubstr("\x1b")));
-  EXPECT_THAT(output.text, HasSubstr("\\x1B[2J"));
+  EXPECT_THAT(output.text, HasSubstr("\\x1b[2J"));
 }
 
 TEST_F(LogTest, WhatCannotBeDoneIsSaid) {

@@ -101,7 +101,7 @@ TEST_F(CompareTest, SaysItAsJsonToo) {
   EXPECT_TRUE(document["lost_by"].empty());
 }
 
-TEST_F(CompareTest, ADirectoryIsReplayedAndComparedAndAdvised) {
+TEST_F(CompareTest, ADirectoryIsReplayedAndCompared) {
   const std::string directory = scratch_ / "log";
   std::filesystem::create_directory(directory);
   {
@@ -115,16 +115,30 @@ TEST_F(CompareTest, ADirectoryIsReplayedAndComparedAndAdvised) {
   EXPECT_EQ(replay.code, 0) << replay.text;
   EXPECT_THAT(replay.text, HasSubstr("replay: 134 candidates, 134 decisions agree, 0 differ"));
   EXPECT_THAT(CompareUnder(kConfig, directory).text, HasSubstr("none of the 40 certificates lost"));
-  const Output advise = Forereach("advise '" + directory + "' --config '" + kConfig + "' --json 2>&1");
-  EXPECT_EQ(advise.code, 0);
-  EXPECT_EQ(nlohmann::json::parse(advise.text)["abstentions"].size(), 94u);
   std::filesystem::remove(directory + "/events-1.lcmlog");
-  for (const char* command : {"replay", "advise"}) {
-    const Output missing = Forereach(command + (" '" + directory + "' --config '" + kConfig + "' 2>&1"));
-    EXPECT_EQ(missing.code, 1) << command;
-    EXPECT_THAT(missing.text, HasSubstr("events-1.lcmlog: the log is not in the database's directory"));
+  const Output missing = Forereach("replay '" + directory + "' --config '" + kConfig + "' 2>&1");
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_THAT(missing.text, HasSubstr("events-1.lcmlog: the log is not in the database's directory"));
+  EXPECT_EQ(Forereach("replay '" + directory + "' '" + directory + "' --config '" + kConfig + "' 2>&1").code, 2);
+}
+
+// Every line about a plan names its robot.
+TEST_F(CompareTest, ManyRobotsAreToldApart) {
+  for (const char* robot : {"a", "b"}) {
+    std::filesystem::create_directories(scratch_ / ("night/" + std::string(robot)));
+    std::filesystem::copy_file(kLog, scratch_ / ("night/" + std::string(robot) + "/one.lcmlog"));
   }
-  EXPECT_EQ(Forereach("replay '" + directory + "' '" + kLog + "' --config '" + kConfig + "' 2>&1").code, 2);
+  const Output output = CompareUnder(kConfig, scratch_ / "night", "--json");
+  const auto document = nlohmann::json::parse(output.text);
+  ASSERT_EQ(document["by_robot"].size(), 2u) << output.text;
+  EXPECT_EQ(document["by_robot"][0]["robot"], scratch_ / "night/a");
+  EXPECT_EQ(document["by_robot"][1]["certificates"], 20);
+  EXPECT_EQ(document["candidates"], 134);
+  const std::string options = "--resume '" + (scratch_ / "kept") + "'";
+  const Output first = CompareUnder(kConfig, scratch_ / "night", options);
+  const Output second = CompareUnder(kConfig, scratch_ / "night", options);
+  EXPECT_EQ(first.text, second.text);
+  EXPECT_THAT(first.text, HasSubstr((scratch_ / "night/a") + ": 0 of 47 abstentions"));
 }
 
 TEST_F(CompareTest, NeedsATask) {
