@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <random>
 #include <set>
 #include <sstream>
 
@@ -17,6 +18,7 @@
 #include "records/certified_message.h"
 #include "records/database.h"
 #include "records/event_log.h"
+#include "records/export.h"
 #include "records/export_table.h"
 #include "records/mcap.h"
 #include "records/npz.h"
@@ -25,6 +27,7 @@
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 #include "tests/scratch.h"
+#include "tests/tries.h"
 
 namespace forereach {
 namespace {
@@ -355,6 +358,31 @@ TEST_F(ExportTest, DamageIsSaidAndTheRestIsExported) {
   EXPECT_EQ(output.code, 1);
   EXPECT_THAT(output.text, HasSubstr("damaged in 1 places"));
   EXPECT_GT(ParseLines(Read(scratch_ / "run.jsonl")).size(), 60u);
+}
+
+// Bytes of a recorded log are changed at random; what is left is exported in every format.
+TEST_F(ExportTest, AnyLogIsExportedOrRefused) {
+  const std::uint64_t seed = 20261124;
+  std::mt19937_64 random(seed);
+  SCOPED_TRACE(seed);
+  const auto whole = ReadBytes(kCourse);
+  for (int i = 0; i < Tries(8); ++i) {
+    auto bytes = whole;
+    for (int k = 0; k < 3000; ++k) bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
+    bytes.resize(bytes.size() - random() % 1000);
+    WriteBytes(scratch_ / "any.lcmlog", bytes);
+    const RunLogs run{"r", {scratch_ / "any.lcmlog"}, "", {}};
+    for (const ExportFormat format :
+         {ExportFormat::kCsv, ExportFormat::kJsonLines, ExportFormat::kNpz, ExportFormat::kMcap}) {
+      std::vector<std::string> files;
+      for (const std::string& name : ExportFiles(format)) files.push_back(scratch_ / ("any." + name));
+      const ExportResult result = ExportRun(run, {.format = format, .config = kConfig}, files);
+      EXPECT_GT(result.damage.places + result.left_out + result.decisions, 0);
+    }
+    for (const json& line : ParseLines(Read(scratch_ / "any.jsonl"))) EXPECT_EQ(line["robot"], "r");
+    static_cast<void>(ReadBack("read_mcap", "any.mcap"));
+    static_cast<void>(ReadBack("read_npz", "any.npz"));
+  }
 }
 
 TEST_F(ExportTest, AFileThatExistsIsNotChanged) {

@@ -103,10 +103,10 @@ TEST_F(RunLogsTest, WhatIsNamedTwiceIsAnError) {
   const std::string a = Log("log/a.lcmlog", 0, 3);
   std::filesystem::create_symlink(a, scratch_ / "link");
   std::filesystem::create_hard_link(a, scratch_ / "hard");
-  for (const std::vector<std::string>& inputs : std::initializer_list<std::vector<std::string>>{
-           {a, a}, {a, scratch_ / "link"}, {a, scratch_ / "hard"}, {scratch_ / "log", a}, {a, scratch_ / "log"},
-           {scratch_ / "log", scratch_ / "log"}, {scratch_ / "log", scratch_ / "log/../log"}})
-    try {
+  const std::string log = scratch_ / "log";
+  const std::vector<std::vector<std::string>> wrong{
+      {a, a}, {a, scratch_ / "link"}, {a, scratch_ / "hard"}, {log, a}, {a, log}, {log, log}, {log, log + "/../log"}};
+  for (const std::vector<std::string>& inputs : wrong) try {
       static_cast<void>(RunsNamedBy(inputs, 1));
       FAIL() << inputs[1];
     } catch (const BadInput& error) {
