@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/numerics/parallel.h"
+#include "certifier/task/config.h"
 #include "cli/commands.h"
 #include "cli/progress.h"
 #include "lcmtypes/bad_input.h"
@@ -35,9 +36,6 @@ struct EachRunOptions {
                        "that was interrupted goes on where it was"});
   }
 };
-
-/** The content of a task file and of a key, for the job of FinishedRuns. @throws ConfigError, KeyError. */
-[[nodiscard]] std::string DescribeInputs(const std::string& config, const LogKey& key);
 
 /** What the work on one run is given. */
 class RunWork final {
@@ -124,8 +122,10 @@ std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOpt
 }
 
 /** The results of finished runs of one command, or null without --resume.
-@param command its name and every option that changes a result. */
-[[nodiscard]] std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, const std::string& command,
-                                                      const std::string& config, const LogKey& key);
+@param command its name and every option that changes a result; task file and key are added to it.
+@param transitions whether results depend on those that the task file names. @throws BadInput if one cannot be read. */
+[[nodiscard]] std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command,
+                                                      const std::string& config, const LogKey& key,
+                                                      TransitionsFile transitions = TransitionsFile::kRead);
 
 }  // namespace forereach

@@ -3,14 +3,12 @@
 #include <filesystem>
 #include <iostream>
 
-#include "certifier/task/files.h"
 #include "cli/commands.h"
 #include "cli/each_run.h"
 #include "cli/key_options.h"
 #include "cli/log_commands.h"
 #include "cli/new_file.h"
 #include "cli/result_json.h"
-#include "lcmtypes/codec.h"
 #include "lcmtypes/printable.h"
 #include "records/export.h"
 
@@ -92,11 +90,6 @@ void Write(const Options& options, const NamedRuns& named, const std::vector<std
   if (error) throw OutputError(options.output + ": cannot be written: " + error.message());
 }
 
-// The content of the task file, for its channels.
-std::string DescribeTask(const std::string& config) {
-  return config.empty() ? "" : ToHex(DigestOf(ReadWhole(config, kLargestTaskFile)));
-}
-
 void Describe(const Options& options, const ExportResult& result, const NamedRuns& named) {
   for (const std::string& missing : named.missing) std::cerr << "forereach: " << Printable(missing) << std::endl;
   if (result.damage.places > 0)
@@ -130,7 +123,8 @@ int RunExport(Options options) {
   const bool is_own = options.each_run.resume.empty();
   if (is_own) options.each_run.resume = options.output + ".part";
   const std::string command = "export " + options.format + (named.is_many ? " many " : " ");
-  const auto finished = ResultsOf(options.each_run, command + DescribeTask(options.what.config), "", options.what.key);
+  const auto finished =
+      ResultsOf(options.each_run, command, options.what.config, options.what.key, TransitionsFile::kIgnore);
   const auto results = ForEachRun<ExportResult>(
       named, options.each_run, "exported", finished.get(), [&](const RunLogs& run, RunWork& work) {
         std::vector<std::string> files;

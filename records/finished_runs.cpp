@@ -12,6 +12,7 @@
 #include "certifier/task/files.h"
 #include "certifier/task/json_text.h"
 #include "lcmtypes/codec.h"
+#include "records/database.h"
 #include "records/output_file.h"
 
 namespace forereach {
@@ -66,7 +67,14 @@ FinishedRuns::~FinishedRuns() {
 std::string FinishedRuns::KeyOf(const RunLogs& run) const {
   std::string inputs = job_ + run.robot + "\n" + run.database + "\n";
   for (const std::string& log : run.logs) inputs += log + "\n" + DigestOfFile(log) + "\n";
-  for (const RunRow& row : run.missing) inputs += row.log_file + "\n";
+  if (!run.database.empty()) {
+    Database database(run.database);
+    const auto add = [&](const std::string& file) {
+      inputs += file + "\n" + ToHex(database.DigestOfRows(file)) + "\n";
+    };
+    for (const std::string& log : run.logs) add(fs::path(log).filename().string());
+    for (const RunRow& row : run.missing) add(row.log_file);
+  }
   const std::string& path = run.logs.empty() ? run.database : run.logs.front();
   return ToHex(DigestOf(inputs + DescribeTasks(fs::path(path).parent_path())));
 }

@@ -1,8 +1,9 @@
 /** The results of runs that a command has finished, in a directory, so that an interrupted command goes on there.
 
-A result belongs to what it was made of: the bytes and paths of the run's logs and of the tasks that are kept beside
-them, the command with its options, and the program itself. When any of these changes, the run is read again. A file
-appears whole or not at all, and a damaged one counts as none. The directory may be deleted at any time. */
+A result belongs to what it was made of: the names and bytes of the run's logs, its rows in a database, the tasks that
+are kept beside them, the command with its options, and the program itself. When any of these changes, the run is read
+again. A file appears whole or not at all, and a damaged one counts as none. The directory may be deleted at any time.
+*/
 #pragma once
 
 #include <optional>
