@@ -40,8 +40,8 @@ struct EachRunOptions {
 /** What the work on one run is given. */
 class RunWork final {
  public:
-  RunWork(unsigned threads, Progress& progress, const FinishedRuns* finished, std::string key)
-      : threads(threads), progress_(progress), finished_(finished), key_(std::move(key)) {}
+  RunWork(unsigned most, Progress& progress, const FinishedRuns* finished, std::string key)
+      : threads(most), progress_(progress), finished_(finished), key_(std::move(key)) {}
 
   /** Tells that these bytes of its logs were read. Not necessary. */
   void Read(std::int64_t bytes) {

@@ -8,7 +8,7 @@
 #include "cli/key_options.h"
 #include "cli/log_commands.h"
 #include "cli/new_file.h"
-#include "cli/result_json.h"
+#include "records/result_json.h"
 #include "lcmtypes/printable.h"
 #include "records/export.h"
 

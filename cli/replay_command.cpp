@@ -11,13 +11,13 @@
 #include "cli/each_run.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
-#include "cli/result_json.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
 #include "records/compare.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/replay.h"
+#include "records/result_json.h"
 
 namespace forereach {
 namespace {
@@ -130,7 +130,7 @@ std::vector<std::pair<Key, std::int64_t>> ByCount(const std::map<Key, std::int64
   return sorted;
 }
 
-std::string Verdict(const Comparison& compared) {
+std::string GainsAndLosses(const Comparison& compared) {
   const std::int64_t lost = compared.num_lost();
   return std::to_string(compared.num_gained()) + " of " + std::to_string(compared.candidates - compared.certificates) +
          " abstentions and rejections would have been certificates, " +
@@ -150,8 +150,9 @@ void PrintForPeople(const Comparison& compared, const ByRobot& robots, const Nam
   for (const auto& [whys, count] : ByCount(compared.otherwise))
     std::cout << "  " << count << ": " << Describe(whys.first) << "; then " << Describe(whys.second) << "\n";
   if (robots.size() > 1)
-    for (const auto& [robot, of_robot] : robots) std::cout << Printable(robot) << ": " << Verdict(of_robot) << "\n";
-  std::cout << "compare: had " << config << " been declared, " << Verdict(compared);
+    for (const auto& [robot, of_robot] : robots)
+      std::cout << Printable(robot) << ": " << GainsAndLosses(of_robot) << "\n";
+  std::cout << "compare: had " << config << " been declared, " << GainsAndLosses(compared);
   if (compared.circumstances > 0)
     std::cout << "; " << compared.circumstances
               << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";

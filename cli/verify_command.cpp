@@ -13,7 +13,7 @@
 #include "cli/key_options.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
-#include "cli/result_json.h"
+#include "records/result_json.h"
 #include "lcmtypes/printable.h"
 #include "records/certificate_files.h"
 #include "records/log_survey.h"

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "lcmtypes/printable.h"
+#include "records/result_json.h"
 
 namespace forereach {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LogDamage, places, bytes)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LogReference, log_file, event_number, digest)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PageTask, config_digest, name, states, inputs, holds, parts)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PageFault, utime, plan_id, cause, message)

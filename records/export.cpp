@@ -26,7 +26,7 @@ namespace {
 // A format. It counts what it writes.
 class Sink : public RecordUser {
  public:
-  explicit Sink(std::string robot) : robot(std::move(robot)) {}
+  explicit Sink(std::string name) : robot(std::move(name)) {}
   virtual void Finish() = 0;
 
   const std::string robot;
@@ -39,7 +39,7 @@ OutputFile FileOf(const std::string& path) { return OutputFile(path, OutputFile:
 
 class JsonLinesSink final : public Sink {
  public:
-  JsonLinesSink(const std::string& robot, const std::string& path) : Sink(robot), file_(FileOf(path)) {}
+  JsonLinesSink(const std::string& name, const std::string& path) : Sink(name), file_(FileOf(path)) {}
 
   void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
     ++result.decisions;
@@ -66,8 +66,8 @@ class JsonLinesSink final : public Sink {
 
 class CsvSink final : public Sink {
  public:
-  CsvSink(const std::string& robot, const std::vector<std::string>& files)
-      : Sink(robot),
+  CsvSink(const std::string& name, const std::vector<std::string>& files)
+      : Sink(name),
         decisions_(FileOf(files[0])),
         controls_(FileOf(files[1])),
         executions_(FileOf(files[2])),
@@ -112,7 +112,7 @@ class CsvSink final : public Sink {
 
 class NpzSink final : public Sink {
  public:
-  NpzSink(const std::string& robot, const std::string& path) : Sink(robot), arrays_(FileOf(path)) {
+  NpzSink(const std::string& name, const std::string& path) : Sink(name), arrays_(FileOf(path)) {
     for (const char* name : {"plan_id", "utime", "start_utime", "step_us", "expires_utime", "event_number",
                              "num_states", "num_inputs", "num_steps"})
       arrays_.Declare(name, 'i');
@@ -172,8 +172,8 @@ class NpzSink final : public Sink {
 
 class McapSink final : public Sink {
  public:
-  McapSink(const std::string& robot, bool names_robot, const std::string& path)
-      : Sink(robot), prefix_(names_robot ? Printable(robot) + "/" : ""), file_(FileOf(path)) {}
+  McapSink(const std::string& name, bool names_robot, const std::string& path)
+      : Sink(name), prefix_(names_robot ? Printable(name) + "/" : ""), file_(FileOf(path)) {}
 
   void OnMessage(const LogEvent& event) override {
     const auto message = ToJsonMessage(event.message());

@@ -90,12 +90,16 @@ std::optional<nlohmann::json> FinishedRuns::Find(const std::string& key) const {
   const std::string_view text = std::string_view(bytes).substr(std::min(bytes.size(), kHexDigits));
   if (bytes.size() < kHexDigits || ToHex(DigestOf(key + std::string(text))) != bytes.substr(0, kHexDigits))
     return std::nullopt;
-  const nlohmann::json kept = ParseJson(text);
-  for (const auto& [path, bytes] : kept.at("files").items()) {
-    std::error_code error;
-    if (fs::file_size(path, error) != bytes.get<std::uintmax_t>() || error) return std::nullopt;
+  try {
+    const nlohmann::json kept = ParseJson(text);
+    for (const auto& [file, size] : kept.at("files").items()) {
+      std::error_code error;
+      if (fs::file_size(file, error) != size.get<std::uintmax_t>() || error) return std::nullopt;
+    }
+    return kept.at("result");
+  } catch (const nlohmann::json::exception&) {  // not what Keep writes
+    return std::nullopt;
   }
-  return kept.at("result");
 }
 
 void FinishedRuns::Keep(const std::string& key, const nlohmann::json& result,

@@ -13,7 +13,7 @@ namespace {
 constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
 constexpr std::size_t kChunkBytes = 1 << 20;
 
-enum class Op : std::uint8_t {
+enum class Opcode : std::uint8_t {
   kHeader = 0x01,
   kFooter = 0x02,
   kSchema = 0x03,
@@ -53,7 +53,7 @@ void PutCounts(std::string& out, const std::map<std::uint16_t, std::uint64_t>& c
   });
 }
 
-std::string Record(Op op, std::string_view content) {
+std::string Record(Opcode op, std::string_view content) {
   std::string record(1, static_cast<char>(op));
   PutInteger(record, static_cast<std::uint64_t>(content.size()));
   record += content;
@@ -82,7 +82,7 @@ McapWriter::McapWriter(OutputFile file) : file_(std::move(file)) {
   std::string header;
   PutText(header, "");  // no profile
   PutText(header, "forereach");
-  Put(Record(Op::kHeader, header));
+  Put(Record(Opcode::kHeader, header));
 }
 
 // Of the data section, which has a checksum of its own.
@@ -98,7 +98,7 @@ std::uint16_t McapWriter::AddSchema(const std::string& name, const std::string& 
   PutText(content, name);
   PutText(content, "jsonschema");
   PutText(content, schema);
-  records_ += schemas_.emplace_back(Record(Op::kSchema, content));
+  records_ += schemas_.emplace_back(Record(Opcode::kSchema, content));
   return id;
 }
 
@@ -114,7 +114,7 @@ std::uint16_t McapWriter::AddChannel(std::uint16_t schema, const std::string& to
     PutText(bytes, key);
     PutText(bytes, value);
   });
-  records_ += channels_.emplace_back(Record(Op::kChannel, content));
+  records_ += channels_.emplace_back(Record(Opcode::kChannel, content));
   return id;
 }
 
@@ -128,7 +128,7 @@ void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::int64
   PutInteger(content, Nanoseconds(publish_us));
   content += json;
   index_[channel].emplace_back(time, records_.size());
-  records_ += Record(Op::kMessage, content);
+  records_ += Record(Opcode::kMessage, content);
   ++counts_[channel];
   chunk_times_.Take(time);
   times_.Take(time);
@@ -146,7 +146,7 @@ void McapWriter::EndChunk() {
   PutInteger(content, static_cast<std::uint64_t>(records_.size()));
   content += records_;
   Chunk chunk{chunk_times_, static_cast<std::uint64_t>(file_.size()), 0, {}, 0, records_.size()};
-  Put(Record(Op::kChunk, content));
+  Put(Record(Opcode::kChunk, content));
   const auto begin = static_cast<std::uint64_t>(file_.size());
   chunk.length = begin - chunk.at;
   for (const auto& [channel, entries] : index_) {
@@ -157,7 +157,7 @@ void McapWriter::EndChunk() {
       PutInteger(bytes, place);
     });
     chunk.indexes[channel] = static_cast<std::uint64_t>(file_.size());
-    Put(Record(Op::kMessageIndex, index));
+    Put(Record(Opcode::kMessageIndex, index));
   }
   chunk.indexes_length = static_cast<std::uint64_t>(file_.size()) - begin;
   chunks_.push_back(std::move(chunk));
@@ -170,24 +170,24 @@ void McapWriter::Finish() {
   EndChunk();
   std::string content;
   PutInteger(content, data_crc_);
-  file_.Write(Record(Op::kDataEnd, content));
+  file_.Write(Record(Opcode::kDataEnd, content));
 
   const auto begin = static_cast<std::uint64_t>(file_.size());
   std::string summary, offsets;
   std::uint64_t group = begin;
-  const auto end_group = [&](Op op) {
+  const auto end_group = [&](Opcode op) {
     const std::uint64_t end = begin + summary.size();
     if (end == group) return;
     std::string offset(1, static_cast<char>(op));
     PutInteger(offset, group);
     PutInteger(offset, end - group);
-    offsets += Record(Op::kSummaryOffset, offset);
+    offsets += Record(Opcode::kSummaryOffset, offset);
     group = end;
   };
   for (const std::string& schema : schemas_) summary += schema;
-  end_group(Op::kSchema);
+  end_group(Opcode::kSchema);
   for (const std::string& channel : channels_) summary += channel;
-  end_group(Op::kChannel);
+  end_group(Opcode::kChannel);
   for (const Chunk& chunk : chunks_) {
     std::string index;
     PutInteger(index, chunk.times.first);
@@ -199,9 +199,9 @@ void McapWriter::Finish() {
     PutText(index, "");
     PutInteger(index, chunk.size);
     PutInteger(index, chunk.size);
-    summary += Record(Op::kChunkIndex, index);
+    summary += Record(Opcode::kChunkIndex, index);
   }
-  end_group(Op::kChunkIndex);
+  end_group(Opcode::kChunkIndex);
   std::string statistics;
   PutInteger(statistics, times_.messages);
   PutInteger(statistics, static_cast<std::uint16_t>(schemas_.size()));
@@ -212,15 +212,15 @@ void McapWriter::Finish() {
   PutInteger(statistics, times_.first);
   PutInteger(statistics, times_.last);
   PutCounts(statistics, counts_);
-  summary += Record(Op::kStatistics, statistics);
-  end_group(Op::kStatistics);
+  summary += Record(Opcode::kStatistics, statistics);
+  end_group(Opcode::kStatistics);
 
   std::string footer;
   PutInteger(footer, begin);
   PutInteger(footer, begin + summary.size());
   summary += offsets;
   // The checksum includes the beginning of the footer's record: its length is that of two places and the checksum.
-  std::string head(1, static_cast<char>(Op::kFooter));
+  std::string head(1, static_cast<char>(Opcode::kFooter));
   PutInteger(head, std::uint64_t{20});
   summary += head + footer;
   const std::uint32_t crc = Crc(0, summary);
