@@ -163,20 +163,20 @@ void PrintForPeople(const Comparison& compared, const ByRobot& robots, const Nam
   std::cout << DescribePassedOver(compared.passed_over) << std::endl;
 }
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json ToJson(const WhyNot& why) {
-  const auto index = [](int value) { return value < 0 ? Json(nullptr) : Json(value); };
+OrderedJson ToJson(const WhyNot& why) {
+  const auto index = [](int value) { return value < 0 ? OrderedJson(nullptr) : OrderedJson(value); };
   return {{"outcome", OutcomeName(why.outcome)},
           {"cause", CauseName(why.cause)},
           {"obstacle", index(why.obstacle)},
           {"step", index(why.step)}};
 }
 
-Json ToJson(const std::map<WhyNot, std::int64_t>& counts) {
-  Json all = Json::array();
+OrderedJson ToJson(const std::map<WhyNot, std::int64_t>& counts) {
+  OrderedJson all = OrderedJson::array();
   for (const auto& [why, count] : ByCount(counts)) {
-    Json entry = ToJson(why);
+    OrderedJson entry = ToJson(why);
     entry["count"] = count;
     all.push_back(std::move(entry));
   }
@@ -184,7 +184,7 @@ Json ToJson(const std::map<WhyNot, std::int64_t>& counts) {
 }
 
 void PrintJson(const Comparison& compared, const ByRobot& robots, const NamedRuns& named, const std::string& config) {
-  Json otherwise = Json::array(), by_robot = Json::array();
+  OrderedJson otherwise = OrderedJson::array(), by_robot = OrderedJson::array();
   for (const auto& [whys, count] : ByCount(compared.otherwise))
     otherwise.push_back({{"recorded", ToJson(whys.first)}, {"then", ToJson(whys.second)}, {"count", count}});
   for (const auto& [robot, of_robot] : robots)
@@ -193,24 +193,24 @@ void PrintJson(const Comparison& compared, const ByRobot& robots, const NamedRun
                         {"certificates", of_robot.certificates},
                         {"gained", of_robot.num_gained()},
                         {"lost", of_robot.num_lost()}});
-  std::cout << JsonText(Json{{"config", config},
-                             {"candidates", compared.candidates},
-                             {"certificates", compared.certificates},
-                             {"gained", compared.num_gained()},
-                             {"lost", compared.num_lost()},
-                             {"gained_by", ToJson(compared.gained)},
-                             {"lost_by", ToJson(compared.lost)},
-                             {"lost_plans", compared.lost_plans},
-                             {"refused_alike", compared.refused_alike},
-                             {"refused_otherwise", otherwise},
-                             {"by_robot", by_robot},
-                             {"circumstances", compared.circumstances},
-                             {"without_candidate", compared.without_candidate},
-                             {"undecided", compared.undecided},
-                             {"corruptions", compared.corruptions},
-                             {"runs", named.runs.size()},
-                             {"missing", named.missing},
-                             {"passed_over", ParseJson<Json>(JsonText(ToJson(compared.passed_over)))}})
+  std::cout << JsonText(OrderedJson{{"config", config},
+                                    {"candidates", compared.candidates},
+                                    {"certificates", compared.certificates},
+                                    {"gained", compared.num_gained()},
+                                    {"lost", compared.num_lost()},
+                                    {"gained_by", ToJson(compared.gained)},
+                                    {"lost_by", ToJson(compared.lost)},
+                                    {"lost_plans", compared.lost_plans},
+                                    {"refused_alike", compared.refused_alike},
+                                    {"refused_otherwise", otherwise},
+                                    {"by_robot", by_robot},
+                                    {"circumstances", compared.circumstances},
+                                    {"without_candidate", compared.without_candidate},
+                                    {"undecided", compared.undecided},
+                                    {"corruptions", compared.corruptions},
+                                    {"runs", named.runs.size()},
+                                    {"missing", named.missing},
+                                    {"passed_over", ParseJson<OrderedJson>(JsonText(ToJson(compared.passed_over)))}})
             << std::endl;
 }
 
