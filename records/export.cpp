@@ -112,7 +112,7 @@ class CsvSink final : public Sink {
 
 class NpzSink final : public Sink {
  public:
-  NpzSink(const std::string& name, const std::string& path) : Sink(name), arrays_(FileOf(path)) {
+  NpzSink(const std::string& of, const std::string& path) : Sink(of), arrays_(FileOf(path)) {
     for (const char* name : {"plan_id", "utime", "start_utime", "step_us", "expires_utime", "event_number",
                              "num_states", "num_inputs", "num_steps"})
       arrays_.Declare(name, 'i');
