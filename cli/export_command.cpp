@@ -8,9 +8,9 @@
 #include "cli/key_options.h"
 #include "cli/log_commands.h"
 #include "cli/new_file.h"
-#include "records/result_json.h"
 #include "lcmtypes/printable.h"
 #include "records/export.h"
+#include "records/result_json.h"
 
 namespace forereach {
 namespace {

@@ -13,11 +13,11 @@
 #include "cli/key_options.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
-#include "records/result_json.h"
 #include "lcmtypes/printable.h"
 #include "records/certificate_files.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
+#include "records/result_json.h"
 
 namespace forereach {
 namespace {
