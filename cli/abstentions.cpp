@@ -91,7 +91,7 @@ class AbstentionReader final : public TimelineUser {
       return;
     }
     for (const std::string& why :
-         {WhyNoSchedule(*candidate, task.gate), WhyNotBounded(*candidate, task.problem->between)})
+         {WhyNoSchedule(*candidate, task.gate), WhyNotBounded(*candidate, task.problem->between, task.gate)})
       if (abstention.missing.empty()) abstention.missing = why;
     if (!abstention.missing.empty()) return;
     Case& judged = abstention.judged;

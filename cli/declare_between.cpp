@@ -14,6 +14,7 @@
 #include "certifier/numerics/text.h"
 #include "certifier/task/config.h"
 #include "certifier/task/json_text.h"
+#include "certifier/task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -50,7 +51,9 @@ std::vector<Row> RowsOf(const Config& config, const std::vector<MotionBound>& ac
       const double weight = problem.projection(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
       if (weight != 0) name += (name.empty() ? "" : " + ") + (weight == 1 ? "" : ToText(weight) + " ") + states[k];
     }
-    rows.push_back({"acceleration", name + "''", "m/s^2", acceleration[i]});
+    if (!name.empty()) name += "''";
+    if (problem.body.HasPlaces()) name += (name.empty() ? "" : ", ") + ("places''[" + std::to_string(i) + "]");
+    rows.push_back({"acceleration", name, "m/s^2", acceleration[i]});
   }
   if (problem.body.heading < 0) return rows;
   const std::string& heading = states[ToSize(problem.body.heading)];
@@ -59,24 +62,18 @@ std::vector<Row> RowsOf(const Config& config, const std::vector<MotionBound>& ac
   return rows;
 }
 
-void RequireFrame(const Config& config) {
-  if (config.problem->body.HasPlaces())
-    throw ConfigError(config.path +
-                      ": task.body: has parts at expressions (place, places); no bounds on their motion are proposed");
-}
-
 Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
   const Problem& problem = *config.problem;
-  RequireFrame(config);
-  const auto flow = MakeFlow(*problem.model);
+  const std::vector<ExpressionText> places = problem.body.Coordinates();
+  const auto flow = MakeFlow(*problem.model, places);
   if (!flow)
     throw ConfigError(config.path + ": model: the equations of " + problem.model->name() +
                       " in continuous time are not known; use --from positions");
   Eigen::VectorXd rest = Eigen::VectorXd::Constant(problem.model->num_states(), kInfinity);
   for (const RestBound& bound : problem.rest) rest[bound.coordinate] = bound.tolerance;
   const auto begin = std::chrono::steady_clock::now();
-  const MotionBounds bounds =
-      BoundMotion({*flow, problem.domain, config.period, problem.projection, problem.body.heading, rest}, search);
+  const MotionBounds bounds = BoundMotion(
+      {*flow, problem.domain, LongestPeriod(config), problem.projection, problem.body.heading, rest}, search);
   Proposal proposal;
   proposal.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   proposal.rows = RowsOf(config, bounds.acceleration, bounds.turn_rate, bounds.turn_acceleration);
@@ -93,9 +90,8 @@ Proposal FromEquations(const Config& config, const SlopeBoundOptions& search) {
 
 Proposal FromPositions(const Config& config) {
   const Problem& problem = *config.problem;
-  RequireFrame(config);
   const MeasuredMotion measured =
-      MeasureMotion(*problem.model, problem.transitions, problem.projection, problem.body.heading, config.period);
+      MeasureMotion(*problem.model, problem.transitions, problem.projection, problem.body, config.period);
   if (measured.triples == 0)
     throw ConfigError(
         config.path +
@@ -151,8 +147,8 @@ Json ToJson(const Proposal& proposal, const Config& config) {
 void PrintForPeople(const Proposal& proposal, const Config& config) {
   const bool proven = proposal.source == "equations";
   std::ostringstream text;
-  text << std::left << "declare: motion between two samples, " << ToText(config.period) << " s apart, from the "
-       << (proven ? "equations of " + config.problem->model->name() : "logged positions")
+  text << std::left << "declare: motion between two samples, at most " << RoundedUp(LongestPeriod(config), kDigits)
+       << " s apart, from the " << (proven ? "equations of " + config.problem->model->name() : "logged positions")
        << (AllReached(proposal.rows) ? "" : "; stopped at --max-boxes") << "\n";
   for (const Row& row : proposal.rows) {
     text << "  " << std::setw(10) << row.name << (proven ? " at most " : " at least ") << std::setw(9)

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <filesystem>
 #include <iostream>
 #include <numbers>
@@ -27,6 +28,17 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kNextEnding = "_next";
+constexpr std::size_t kLongestName = 64;  // that task files take
+
+bool IsNullOfYaml(const std::string& name) { return name == "null" || name == "Null" || name == "NULL"; }
+
+// A path stands in comments and texts of the task.
+void RequireOneLine(const char* option, const std::string& path) {
+  if (std::ranges::any_of(path, [](unsigned char c) { return std::iscntrl(c) != 0; }))
+    throw ConfigError(std::string(option) +
+                      ": the path has a control character, as a line break, which no task file "
+                      "can name");
+}
 
 struct Options {
   std::string model, transitions, out;
@@ -155,10 +167,11 @@ Header ReadHeader(const std::string& path) {
   Header header;
   for (const std::string& column : columns) {
     if (column.ends_with(kNextEnding)) continue;
-    if (!IsName(column) || IsReserved(column) || column == "dt")
-      throw ConfigError(path + ":1: '" + column.substr(0, 64) +
+    if (!IsName(column) || IsReserved(column) || column == "dt" || IsNullOfYaml(column) || column.size() > kLongestName)
+      throw ConfigError(path + ":1: '" + column.substr(0, kLongestName) +
                         "' cannot be the name of a state or an input: that is a letter, then letters, digits and "
-                        "underscores, and no function, pi or dt; rename the column");
+                        "underscores, " +
+                        std::to_string(kLongestName) + " at most, and no function, pi, dt or null; rename the column");
     const bool is_state = std::ranges::find(columns, column + kNextEnding) != columns.end();
     (is_state ? header.states : header.inputs).push_back(column);
   }
@@ -232,6 +245,9 @@ int Init(const Options& options) {
   if (options.model.empty() == options.transitions.empty())
     throw ConfigError(
         "init: needs one of --model, a model of the library, and --transitions, a file of recorded steps");
+  RequireOneLine("--model", options.model);
+  RequireOneLine("--transitions", options.transitions);
+  RequireOneLine("--out", options.out);
   TaskTemplate task = options.model.empty() ? FromTransitions(options) : FromModel(options);
   task.path = options.out;
   WriteNewFile(options.out, TaskText(task), options.force);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 namespace forereach {
@@ -24,6 +25,17 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+// How many letters a word may differ from this one and still be meant for it.
+std::size_t NearLimit(const std::string& known) { return 1 + known.size() / 4; }
+
+// Nothing for words that are not near: whoever wrote them may have made them as long as a file.
+std::optional<std::size_t> NearDistance(std::string_view word, const std::string& known) {
+  const std::size_t limit = NearLimit(known);
+  if (std::max(word.size(), known.size()) - std::min(word.size(), known.size()) > limit) return std::nullopt;
+  const std::size_t distance = EditDistance(word, known);
+  return distance <= limit ? std::optional(distance) : std::nullopt;
+}
+
 }  // namespace
 
 std::string Joined(const std::vector<std::string>& words) {
@@ -33,10 +45,18 @@ std::string Joined(const std::vector<std::string>& words) {
 }
 
 std::string Suggestion(std::string_view word, const std::vector<std::string>& known) {
-  const auto nearest =
-      std::ranges::min_element(known, {}, [&](const std::string& other) { return EditDistance(word, other); });
-  const bool near = nearest != known.end() && EditDistance(word, *nearest) <= 1 + nearest->size() / 4;
-  return near ? "did you mean " + *nearest + "?" : "known here: " + Joined(known);
+  constexpr std::size_t kShown = 100;
+  const std::string* nearest = nullptr;
+  std::size_t least = 0;
+  for (const std::string& other : known)
+    if (const auto distance = NearDistance(word, other); distance && (nearest == nullptr || *distance < least)) {
+      nearest = &other;
+      least = *distance;
+    }
+  if (nearest != nullptr) return "did you mean " + *nearest + "?";
+  if (known.size() <= kShown) return "known here: " + Joined(known);
+  return "known here: " + Joined({known.begin(), known.begin() + kShown}) + " and " +
+         std::to_string(known.size() - kShown) + " more";
 }
 
 }  // namespace forereach

@@ -7,7 +7,7 @@
 
 namespace forereach {
 
-/** "did you mean X?" if a known word differs by few letters, else "known here: X, Y, Z". */
+/** "did you mean X?" if a known word differs by few letters, else "known here: X, Y, Z", of many words the first. */
 [[nodiscard]] std::string Suggestion(std::string_view word, const std::vector<std::string>& known);
 
 /** The words, separated by commas. */

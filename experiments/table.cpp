@@ -55,6 +55,11 @@ std::optional<double> StandardError(const Row& row) {
                    row.ours.deviation * row.ours.deviation / row.ours.seeds);
 }
 
+std::string Probability(double p) {
+  constexpr double kLeastShown = 1e-4;
+  return p < kLeastShown ? "p < 0.0001" : "p = " + Fixed(p, 4);
+}
+
 std::string Count(int count, const char* what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
 
 std::string InWords(const JointTest& test) {
@@ -62,11 +67,11 @@ std::string InWords(const JointTest& test) {
   if (test.rows + test.below + test.above == 0) return text + "nothing to test.";
   if (test.rows > 0)
     text += "chi-square " + Fixed(test.chi_square, 2) + " over the " + Count(test.rows, "row") +
-            " with a standard error, p = " + Fixed(test.p, 4) + "; ";
+            " with a standard error, " + Probability(test.p) + "; ";
   else
     text += "no row has a standard error, since the paper prints no spread or neither varies; ";
-  return text + Count(test.below, "row") + " below the paper, " + std::to_string(test.above) +
-         " above, sign test p = " + Fixed(test.p_of_signs, 4) + ".";
+  return text + Count(test.below, "row") + " below the paper, " + std::to_string(test.above) + " above, sign test " +
+         Probability(test.p_of_signs) + ".";
 }
 
 std::string Quoted(const std::string& text) {

@@ -237,8 +237,9 @@ Table SmallTable(const Scope& scope) {
       "Group C, seed 0, noiseless data from below the knee, the largest N; a part of the deployed matrix is declared. "
       "Each plan has its own obstacle, and others that the target meets at step 7; counted are those it does meet. "
       "Of the plans with a false certificate: the factor on the declaration for containment, by bisection; the largest "
-      "slope between an observation and a state of the target, over what is declared. Then uniform noise of the least "
-      "sigma that takes the certificate away, declared. The paper has one such certificate, a factor of 31.710 and S "
+      "slope between an observation and a state of the target, over what is declared. Then, for the first ten, uniform "
+      "noise of the least sigma that takes the certificate away, declared. The paper has one such certificate, a "
+      "factor of 31.710 and S "
       "at step 7 under noise, for a plan and data that are not in its text.",
       {}};
   for (const System* system : Systems())

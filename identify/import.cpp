@@ -19,7 +19,7 @@ namespace {
 constexpr long double kTurn = 2 * std::numbers::pi_v<long double>;
 
 struct Sample {
-  long double time;  // s after the log's first stamp
+  long double time;  // s; only differences within a piece are exact enough to mean something
   Eigen::Index row;
   bool begins_piece;  // no transition spans the boundary before it
 };
@@ -98,7 +98,7 @@ class Importer {
         for (Eigen::Index i = row + 1; i < end; ++i) Drop(Dropped::kRepeatedRow, i);
         const long double since = time - origin;
         if (options_.from <= since && since <= options_.until)
-          samples_.push_back({since, row, std::exchange(broken, false)});
+          samples_.push_back({time, row, std::exchange(broken, false)});
         else
           Drop(Dropped::kOutsideWindow, row), broken = true;
       }
@@ -137,9 +137,11 @@ class Importer {
                                table_.values(samples_[i].row, first_column_ + variable));
   }
 
+  [[nodiscard]] long double TargetOf(std::size_t i) const { return samples_[i].time + options_.period; }
+
   // The sample nearest to a step behind sample i in its piece, 0 with the cause counted if there is none.
   std::size_t EndOf(std::size_t i) {
-    const long double target = samples_[i].time + options_.period;
+    const long double target = TargetOf(i);
     std::size_t j = i + 1;
     while (j < samples_.size() && !samples_[j].begins_piece && samples_[j].time < target) ++j;
     const auto offset = [&](std::size_t at) { return std::abs(samples_[at].time - target); };
@@ -222,7 +224,7 @@ class Importer {
 
   void Note(std::size_t i, std::size_t j, std::span<const double> z, std::span<const double> next,
             std::span<const double> deviation) {
-    const long double offset = std::abs(samples_[j].time - samples_[i].time - options_.period);
+    const long double offset = std::abs(samples_[j].time - TargetOf(i));
     log_.largest_offset = std::max(log_.largest_offset, static_cast<double>(offset));
     for (Eigen::Index k = 0; k < n_; ++k)
       log_.largest_rate[k] = std::max(log_.largest_rate[k], std::abs(Change(k, z, next)) / options_.period);

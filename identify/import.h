@@ -43,7 +43,7 @@ struct ImportOptions {
 
 /** Why a row is no sample, or a sample starts no transition. */
 enum class Dropped {
-  kRowLost,         ///< The row has another number of fields than the header, or breaks the rules of quotes.
+  kRowLost,         ///< The row has another number of fields than the header, or breaks the rules of CSV.
   kNoStamp,         ///< No number.
   kRepeatedRow,     ///< The same stamp as the row before, and the same values.
   kRepeatedStamp,   ///< The same stamp as another row, with other values: neither counts.

@@ -36,15 +36,22 @@ class RowParser {
   RowParser(const RowParser&) = delete;
   RowParser& operator=(const RowParser&) = delete;
 
-  // False if the line breaks the rules of quotes; the row is then given up.
-  bool Feed(const std::string& line) {
+  // Empty, or why the row is given up.
+  std::string Feed(const std::string& line) {
     if (complete_) fields_.clear(), bytes_ = 0;
-    complete_ = false;
+    complete_ = goes_on_ = false;
     bytes_ += line.size() + 1;
-    if (Parse(line) && Parse("\n") && bytes_ <= kLongestRow) return true;
+    std::string problem;
+    if (!Parse(line) || !Parse("\n"))
+      problem = "quotes inside a field";
+    else if (goes_on_)  // libcsv ends a row there, which may be one of another recorder, or a row that was cut off
+      problem = "a carriage return inside a row";
+    else if (bytes_ > kLongestRow)
+      problem = "longer than " + std::to_string(kLongestRow) + " bytes";
+    if (problem.empty()) return "";
     csv_free(&parser_);
     Begin();
-    return false;
+    return problem;
   }
 
   [[nodiscard]] bool is_complete() const { return complete_; }
@@ -61,7 +68,9 @@ class RowParser {
            text.size();
   }
   static void TakeField(void* text, std::size_t size, void* self) noexcept {
-    static_cast<RowParser*>(self)->fields_.emplace_back(static_cast<const char*>(text), size);
+    auto& parser = *static_cast<RowParser*>(self);
+    parser.goes_on_ |= parser.complete_;
+    parser.fields_.emplace_back(static_cast<const char*>(text), size);
   }
   static void EndRow(int, void* self) noexcept { static_cast<RowParser*>(self)->complete_ = true; }
 
@@ -70,6 +79,7 @@ class RowParser {
   std::vector<std::string> fields_;
   std::size_t bytes_ = 0;
   bool complete_ = true;  // no row is begun and not ended
+  bool goes_on_ = false;  // the line has a field behind the end of a row
 };
 
 class Reader {
@@ -114,9 +124,9 @@ class Reader {
 
   void Take(const std::string& line) {
     if (!parser_) parser_ = std::make_unique<RowParser>(DelimiterOf(line));
-    if (!parser_->Feed(line)) {
-      if (num_fields_ == 0) Fail(first_line_, "the names of the columns break the rules of quotes");
-      Lose("quotes inside a field");
+    if (const std::string problem = parser_->Feed(line); !problem.empty()) {
+      if (num_fields_ == 0) Fail(first_line_, "the names of the columns: " + problem);
+      Lose(problem);
     } else if (parser_->is_complete()) {
       if (num_fields_ == 0)
         TakeHeader(parser_->fields());

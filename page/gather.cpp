@@ -138,7 +138,7 @@ class DetailMaker final : public TimelineUser {
     const Config& task = *recorded.basis.task;
     if (!HasSizes(*candidate, *task.problem->model)) return Miss(detail, "its candidate is not of its task's sizes");
     for (const std::string& why :
-         {WhyNoSchedule(*candidate, task.gate), WhyNotBounded(*candidate, task.problem->between)})
+         {WhyNoSchedule(*candidate, task.gate), WhyNotBounded(*candidate, task.problem->between, task.gate)})
       if (!why.empty()) return Miss(detail, why);
     detail.task = TaskIndex(task);
     detail.obstacles = ObstaclesIndex(recorded.basis);

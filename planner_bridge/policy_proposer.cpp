@@ -77,6 +77,7 @@ std::optional<Proposal> PolicyProposer::Propose(const PlanRequest& request) {
     return std::nullopt;
   const Reference reference = MakeReference(model, ReferenceStart(request.state, request.attempt), policy_.num_steps());
   Eigen::MatrixXd progress = policy_.Act(Features(request.state, reference)).leftCols(options_.progress_steps);
+  if (!progress.allFinite()) return std::nullopt;  // weights are finite, their sums need not be
   const Box& inputs = problem_->domain.input;
   for (auto column : progress.colwise()) column = column.cwiseMax(inputs.lower()).cwiseMin(inputs.upper());
 
@@ -87,7 +88,7 @@ std::optional<Proposal> PolicyProposer::Propose(const PlanRequest& request) {
   Proposal proposal{Eigen::MatrixXd(progress.rows(), progress.cols() + tail.cols()), options_.progress_steps, {}};
   proposal.controls << progress, tail;
   proposal.states = Rollout(model, request.state, proposal.controls);
-  if (!KeepsAllLimits(proposal)) return std::nullopt;
+  if (!proposal.states.allFinite() || !KeepsAllLimits(proposal)) return std::nullopt;
   return proposal;
 }
 

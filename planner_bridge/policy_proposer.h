@@ -28,8 +28,9 @@ class PolicyProposer final : public Proposer {
 
   void SetObstacles(std::vector<Obstacle>) override {}
   [[nodiscard]] const RobotMotion& motion() const override { return *motion_; }
-  /** One candidate. Nothing after 1 + kFan attempts, if no braking tail of at most tail_steps ends the plan, or if the
-  candidate exceeds a limit. Clearance, margins and seed of the request are ignored. */
+  /** One candidate. Nothing after 1 + kFan attempts, if no braking tail of at most tail_steps ends the plan, if the
+  candidate exceeds a limit, or if one of its numbers is not finite. Clearance, margins and seed of the request are
+  ignored. */
   [[nodiscard]] std::optional<Proposal> Propose(const PlanRequest& request) override;
 
  private:

@@ -101,7 +101,7 @@ class CertificateReader final : public TimelineUser {
     }
     certificate.name += ", plan " + std::to_string(certified.plan.plan_id) + " of " + GetText(certified.plan.source);
     if (certificate.missing = WhyNoSchedule(certified.plan, task.gate); !certificate.missing.empty()) return;
-    certificate.missing = WhyNotBounded(certified.plan, task.problem->between);
+    certificate.missing = WhyNotBounded(certified.plan, task.problem->between, task.gate);
     if (!certificate.missing.empty()) return;
     certificate.certificate = CertificateOf(certified, *recorded.basis.obstacles);
     certificate.certificate.schedule = ScheduleOf(certified.plan, task.gate);

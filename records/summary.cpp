@@ -16,6 +16,8 @@
 namespace forereach {
 namespace {
 
+constexpr std::size_t kRepeated = 256;  // answers to withdrawals that may be repeated at one time
+
 double NearestRank(std::vector<double>& values, double fraction) {
   if (values.empty()) return kUnknown;
   const auto rank = static_cast<std::ptrdiff_t>(std::ceil(fraction * static_cast<double>(values.size()))) - 1;
@@ -180,9 +182,11 @@ void SummaryBuilder::Add(const EventRow& row) {
     if (row.kind == "standing" || row.kind == "step_outside" || row.kind == "emergency_stop") ++summary_.stops;
   }
   if (row.kind == "emergency_stop") ++summary_.emergency_stops;
-  if (row.kind == "withdrawn" && withdrawn_ != std::pair(row.plan_id, static_cast<int>(row.step))) {
+  const std::pair left(row.plan_id, static_cast<int>(row.step));
+  if (row.kind == "withdrawn" && std::ranges::find(withdrawn_, left) == withdrawn_.end()) {
     ++summary_.withdrawals;
-    withdrawn_ = {row.plan_id, static_cast<int>(row.step)};
+    withdrawn_.push_back(left);
+    if (withdrawn_.size() > kRepeated) withdrawn_.pop_front();
   }
   if (row.kind == "contact") ++summary_.contacts;
   if (row.kind == "limit_exceeded") ++summary_.limits_exceeded;

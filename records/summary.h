@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -98,7 +99,8 @@ class SummaryBuilder final {
   std::optional<std::int64_t> first_utime_;
   std::int64_t last_utime_ = 0;
   std::vector<double> state_;
-  std::optional<std::pair<std::int64_t, int>> withdrawn_;  // the last plan, and how many steps stand
+  // Plans, and how many steps stand: the last ones, of which answers may be repeated at one time.
+  std::deque<std::pair<std::int64_t, int>> withdrawn_;
 };
 
 /** The summary of consecutive logs, the files of one run. With bus.key only authentic messages count. Damage is skipped

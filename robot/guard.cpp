@@ -251,6 +251,10 @@ GuardVerdict Guard::Authenticated(const std::string& channel, Bytes& bytes) {
   return Refuse(GuardCause::kSignatureReplayed, "the signature on " + channel + " was used before");
 }
 
+std::int64_t StartTolerance(const GuardOptions& options) {
+  return std::min(options.step_us / 2, options.max_jitter_us.value_or(INT64_MAX));
+}
+
 GuardVerdict Guard::Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept {
   GuardVerdict verdict;
   try {
@@ -460,6 +464,7 @@ GuardVerdict Guard::TryStart(std::int64_t boundary_utime, std::int64_t now_us,
     executing_ = std::move(pending_);
     executing_angles_ = pending_angles_;
     last_step_ = 0;
+    last_step_utime_ = now_us;
     standing_steps_.reset();
   }
   pending_.reset();
@@ -470,8 +475,7 @@ GuardVerdict Guard::ExamineStart(std::int64_t boundary_utime, std::int64_t now_u
                                  std::span<const double> state) const {
   if (!pending_) return Refuse(halted_ ? GuardCause::kHalted : GuardCause::kNothingPending, {});
   const candidate_plan_t& plan = pending_->plan;
-  const std::int64_t most = std::min(options_.step_us / 2, options_.max_jitter_us.value_or(INT64_MAX));
-  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(most)) {
+  if (Apart(plan.start_utime, boundary_utime) > static_cast<std::uint64_t>(StartTolerance(options_))) {
     const bool early = boundary_utime < plan.start_utime;
     return Refuse(early ? GuardCause::kTooEarly : GuardCause::kTooLate,
                   Sentence("plan %" PRId64 " starts at %" PRId64 " us, this boundary is %" PRId64 " us", plan.plan_id,
@@ -507,6 +511,21 @@ GuardVerdict Guard::ExamineTime(const candidate_plan_t& plan, int step, std::int
                            plan.plan_id, step, due, apart, late ? "late" : "early", *options_.max_jitter_us));
 }
 
+// Of the step that ends: its motion is bounded for so long.
+GuardVerdict Guard::ExamineDuration(int step, std::int64_t now_us) const {
+  if (!options_.max_jitter_us || now_us <= last_step_utime_) return {};
+  const candidate_plan_t& plan = executing_->plan;
+  const std::uint64_t lasted = Apart(now_us, last_step_utime_);
+  const std::uint64_t most =
+      static_cast<std::uint64_t>(options_.step_us) + static_cast<std::uint64_t>(*options_.max_jitter_us);
+  if (lasted <= most) return {};
+  return RefuseAt(
+      GuardCause::kOffSchedule, step, -1, static_cast<double>(lasted) - static_cast<double>(plan.step_us),
+      static_cast<double>(*options_.max_jitter_us),
+      Sentence("plan %" PRId64 ": the step before step %d lasted %" PRIu64 " us, at most %" PRIu64 " us are allowed",
+               plan.plan_id, step, lasted, most));
+}
+
 GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const {
   if (!executing_) return Refuse(GuardCause::kNotExecuting, "no plan is executing");
   const int num_steps = executing_->plan.num_steps;
@@ -517,7 +536,8 @@ GuardVerdict Guard::ExamineStep(int step, std::span<const double> state, std::in
                   Sentence("control %d of plan %" PRId64 " had been withdrawn", step - 1, executing_->plan.plan_id));
   GuardVerdict verdict = ExamineStateSize(state);
   if (verdict.ok()) verdict = CheckSlice(*executing_, executing_angles_, step, state);
-  return verdict.ok() ? ExamineTime(executing_->plan, step, now_us) : verdict;
+  if (verdict.ok()) verdict = ExamineTime(executing_->plan, step, now_us);
+  return verdict.ok() ? ExamineDuration(step, now_us) : verdict;
 }
 
 GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept {
@@ -529,6 +549,7 @@ GuardVerdict Guard::Check(int step, std::span<const double> measured_state, std:
   }
   if (executing_) verdict.plan_id = executing_->plan.plan_id;
   last_step_ = step;
+  last_step_utime_ = now_us;
   if (verdict.cause == GuardCause::kOutsideSlice) Halt();
   if (!verdict.ok()) executing_.reset();
   return verdict;

@@ -7,7 +7,7 @@ PLAN_CERTIFIED and, at every step boundary, its measured state:
     TryStart  -> at the plan's start boundary, with the state inside X_0: the plan executes from step 0 and replaces
                  the plan before it
     Check     -> after each control: the state is inside X_t, so the next control may be applied. With
-                 GuardOptions::max_jitter_us also: the step is on time
+                 GuardOptions::max_jitter_us also: the step is on time and has not lasted too long
     Withdraw  -> controls of a plan stand no longer: a pending plan is dropped, and of the executing one only the
                  controls before `standing_steps` may still be applied
     Finish    -> no plan is executing
@@ -76,7 +76,8 @@ enum class GuardCause {
   kTooLate,
   kOutsideInitialSet,
   // TryStart and Check
-  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us.
+  kOffSchedule,  ///< With max_jitter_us: further than this from start_utime + step * step_us, or from step_us after the
+                 ///< last step.
   kWrongStateSize,
   kOutsideSlice,
   // Check
@@ -136,10 +137,15 @@ struct GuardOptions {
   /** The states that are angles, the task's model.angles, by their indices: a measured state is inside X_0 or a slice
   if it is there after whole turns of these (lcmtypes/angle.h). */
   std::vector<int> angles = {};
-  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, microseconds, not
-  negative. Where obstacles may move, it is half of the task's gate.max_clock_error_ms. */
+  /** If set, step t of a plan has to be taken within this time of start_utime + t * step_us, and no later than this
+  after step_us from the last step, microseconds, not negative. It is half of the task's gate.max_clock_error_ms
+  (certifier/task/step_time.h): certificates assume it of obstacles that move, and of the motion between two samples. */
   std::optional<std::int64_t> max_jitter_us = {};
 };
+
+/** How far a plan's start_utime may be from the boundary at which it starts: half a step, or max_jitter_us if that is
+less. Microseconds. */
+[[nodiscard]] std::int64_t StartTolerance(const GuardOptions& options);
 
 class Guard final {
  public:
@@ -157,7 +163,7 @@ class Guard final {
   trailer costs one short keyed hash. */
   [[nodiscard]] GuardVerdict Accept(Bytes certified_plan_bytes, std::int64_t now_us) noexcept;
 
-  /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= step_us / 2;
+  /** Starts the pending plan at a step boundary if all of these hold: |start_utime - boundary_utime| <= StartTolerance;
   now_us <= expires_utime, because a delayed robot reaches a boundary late; the measured state lies in X_0 = {x : |x -
   initial_center| <= initial_half_width}, compared as exact real numbers, and in the hull of slice 0. NaN lies in no
   set. With max_jitter_us, boundary_utime and now_us have to be within it of start_utime, too. kNothingPending and
@@ -168,8 +174,9 @@ class Guard final {
                                       std::span<const double> measured_state) noexcept;
 
   /** Checks the state measured after control step - 1 against the hull of slice `step`, and then, with max_jitter_us,
-  |now_us - start_utime - step * step_us| <= max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal
-  no plan is executing. Cost O(n); it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
+  |now_us - start_utime - step * step_us| <= max_jitter_us and now_us - (that of the step before, or of TryStart) <=
+  step_us + max_jitter_us. Call it for step = 1, 2, .. T in this order. After a refusal no plan is executing. Cost O(n);
+  it allocates nothing if it passes. @param now_us the robot's clock, microseconds. */
   [[nodiscard]] GuardVerdict Check(int step, std::span<const double> measured_state, std::int64_t now_us) noexcept;
 
   /** Takes one message of PLAN_WITHDRAWN, also while the guard is halted. With keys, the certifier has to have signed
@@ -227,6 +234,7 @@ class Guard final {
                                           std::span<const double> state) const;
   [[nodiscard]] GuardVerdict ExamineStep(int step, std::span<const double> state, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineTime(const candidate_plan_t& plan, int step, std::int64_t now_us) const;
+  [[nodiscard]] GuardVerdict ExamineDuration(int step, std::int64_t now_us) const;
   [[nodiscard]] GuardVerdict ExamineStateSize(std::span<const double> state) const;
 
   GuardOptions options_;
@@ -239,6 +247,7 @@ class Guard final {
   std::unique_ptr<certified_plan_v2_t> pending_, executing_;
   Angles pending_angles_, executing_angles_;
   int last_step_ = 0;                  // last checked step of the executing plan
+  std::int64_t last_step_utime_ = 0;   // when it was checked
   std::optional<int> standing_steps_;  // of the executing plan
 };
 

@@ -13,6 +13,7 @@
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/json_text.h"
+#include "certifier/task/step_time.h"
 #include "forereach/execution_event_t.hpp"
 
 namespace forereach {
@@ -50,7 +51,7 @@ SupervisorOptions OptionsOf(const Config& config) {
   options.guard.withdrawn = config.bus.withdrawn;
   options.guard.domain = DomainOf(config);
   options.guard.angles = config.problem->model->angles();
-  if (const auto& error_ms = config.gate.max_clock_error_ms) options.guard.max_jitter_us = Microseconds(*error_ms) / 2;
+  options.guard.max_jitter_us = MaxJitterUs(config.gate);
   options.max_age_us = Microseconds(config.gate.max_age_ms);
   options.max_ahead_us = Microseconds(config.gate.max_ahead_ms);
   options.fault = config.bus.fault;

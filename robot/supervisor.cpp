@@ -149,14 +149,17 @@ bool Supervisor::MustStop() const {
   return left < 0 || !TakesOver(*standing);
 }
 
-// Whether the pending plan starts within what stands. A plan takes over at the boundary nearest to its start.
+// Whether the pending plan starts within what stands, at a boundary that the guard takes for its start.
 bool Supervisor::TakesOver(int standing) const {
   const certified_plan_v2_t* const next = guard_.pending();
   if (!next || next->plan.start_utime < step_utime_) return false;
   const std::uint64_t ahead =
       static_cast<std::uint64_t>(next->plan.start_utime) - static_cast<std::uint64_t>(step_utime_);
   const auto step_us = static_cast<std::uint64_t>(options_.guard.step_us);
-  return ahead <= static_cast<std::uint64_t>(standing - step_) * step_us + step_us / 2;
+  const std::uint64_t after = ahead % step_us, off = std::min(after, step_us - after);  // from the nearest boundary
+  const std::uint64_t boundary = ahead / step_us + (after > step_us - after ? 1 : 0);
+  return off <= static_cast<std::uint64_t>(StartTolerance(options_.guard)) &&
+         boundary <= static_cast<std::uint64_t>(std::max(standing - step_, 0));
 }
 
 void Supervisor::StopInEmergency(std::int64_t utime) {

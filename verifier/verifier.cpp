@@ -48,8 +48,8 @@ const char* FindMisfit(const Between& between, Eigen::Index p, const NominalMode
       !IsSize(between.turn_acceleration) || !IsSize(between.period))
     return "the bounds between samples are finite and not negative";
   for (std::size_t i = 0; i < model.parameters().size(); ++i)
-    if (model.parameter_names()[i] == "dt" && model.parameters()[i] != between.period)
-      return "the bounds between samples are those of the model's step";
+    if (model.parameter_names()[i] == "dt" && !(model.parameters()[i] <= between.period))
+      return "the bounds between samples are those of the model's step, or of a longer one";
   return nullptr;
 }
 

@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "certifier/dynamics/angles.h"
-#include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/arithmetic.h"
 #include "certifier/numerics/size.h"
 
@@ -17,21 +15,14 @@ void RequireThat(bool good, const std::string& what) {
   if (!good) throw std::invalid_argument(what);
 }
 
-// The place of the body has to be that of the configuration, however often an angle has turned.
+// The place of the robot's frame has to be that of the configuration, however often an angle has turned. PlacementOf
+// requires it of places at expressions.
 void RequireSameAfterTurns(const Problem& problem) {
   const NominalModel& model = *problem.model;
   for (const int angle : model.angles())
     RequireThat(angle >= problem.projection.cols() || problem.projection.col(angle).isZero(0),
                 "projection: depends on " + model.state_names()[ToSize(angle)] +
                     ", which is an angle: how often it has turned is not known");
-  if (model.angles().empty() || !problem.body.HasPlaces()) return;
-  const std::vector<ExpressionText> all = problem.body.Coordinates();
-  const ProgramDraft program = MakeProgram(NamesOf(model), all);
-  for (std::size_t i = 0; i < all.size(); ++i)
-    for (const int angle : model.angles())
-      RequireThat(IsSameAfterTurn(program.View(), static_cast<int>(i), angle),
-                  "body: the place " + all[i].text + " is not seen to be the same after a turn of the angle " +
-                      model.state_names()[ToSize(angle)] + " by 2 pi");
 }
 
 // What every certifier reads of a problem.

@@ -5,8 +5,13 @@
 #include <cmath>
 #include <functional>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <tuple>
+#include <vector>
 
+#include "certifier/dynamics/angles.h"
+#include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 
 namespace forereach {
@@ -308,6 +313,17 @@ class SafetyTest::Unit {
 };
 
 Placement PlacementOf(const Problem& problem) {
+  const NominalModel& model = *problem.model;
+  if (!model.angles().empty() && problem.body.HasPlaces()) {
+    const std::vector<ExpressionText> all = problem.body.Coordinates();
+    const ProgramDraft program = MakeProgram(NamesOf(model), all);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      for (const int angle : model.angles())
+        if (!IsSameAfterTurn(program.View(), static_cast<int>(i), angle))
+          throw std::invalid_argument(
+              "body: the place " + all[i].text + " is not seen to be the same after a turn of the angle " +
+              model.state_names()[ToSize(angle)] + " by 2 pi: write it with sin, cos or tan of it");
+  }
   return {problem.projection, problem.body, problem.between, problem.model->num_states(),
           problem.body.HasPlaces() ? NamesOf(*problem.model) : ExpressionNames{}};
 }

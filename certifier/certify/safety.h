@@ -22,7 +22,7 @@ struct PartSeparation {
   int part = -1;
 };
 
-/** The places of a problem's body. @throws std::invalid_argument as Placement does. */
+/** A body's places. @throws std::invalid_argument as Placement does, and if one tells how often an angle has turned. */
 [[nodiscard]] Placement PlacementOf(const Problem& problem);
 
 /** Immutable, so any number of threads may use it, each with its own tube. */

@@ -12,7 +12,18 @@ FOREREACH_ARITHMETIC_BEGIN
 
 namespace forereach {
 
-Flow::Flow(const ExpressionNames& names, std::span<const ExpressionText> rates) : program_(MakeProgram(names, rates)) {
+namespace {
+
+std::vector<ExpressionText> Joined(std::span<const ExpressionText> first, std::span<const ExpressionText> last) {
+  std::vector<ExpressionText> all(first.begin(), first.end());
+  all.insert(all.end(), last.begin(), last.end());
+  return all;
+}
+
+}  // namespace
+
+Flow::Flow(const ExpressionNames& names, std::span<const ExpressionText> rates, std::span<const ExpressionText> places)
+    : program_(MakeProgram(names, Joined(rates, places))), num_places_(places.size()) {
   const Program program = program_.View();
   if (rates.size() != ToSize(program.states))
     throw std::invalid_argument(std::to_string(rates.size()) + " rates for " + std::to_string(program.states) +
@@ -26,33 +37,38 @@ Flow::Flow(const ExpressionNames& names, std::span<const ExpressionText> rates) 
   for (const auto& [name, lower, upper] : names.parameters) parameters_.emplace_back(Interval(lower, upper));
 }
 
-void Flow::Evaluate(std::span<const Jet> z, std::span<Jet> rates) const {
+std::vector<Jet> Flow::Evaluate(std::span<const Jet> z) const {
   const Program program = program_.View();
-  std::vector<Jet> values(program.nodes.size());
+  std::vector<Jet> values(program.nodes.size()), wanted;
   forereach::Evaluate<Jet, Jet>(program, needed_, parameters_, z, values);
-  for (std::size_t k = 0; k < rates.size(); ++k) rates[k] = values[ToSize(program.value[k])];
+  for (const int value : program.value) wanted.push_back(values[ToSize(value)]);
+  return wanted;
 }
 
 void Flow::Enclose(std::span<const Interval> z, Derivatives& out) const {
-  std::vector<Jet> arguments, rate(ToSize(program_.View().states)), change(rate.size());
+  std::vector<Jet> arguments;
   for (std::size_t l = 0; l < z.size(); ++l) arguments.push_back(Jet::Argument(z[l], static_cast<int>(l), false));
-  Evaluate(arguments, rate);
+  const std::vector<Jet> rate = Evaluate(arguments);
+  const auto states = ToSize(program_.View().states);
   // A Jet's slope is its derivative along one direction. Here this is the flow: dx_l/ds = f_l, du/ds = 0.
-  for (std::size_t l = 0; l < rate.size(); ++l) {
+  for (std::size_t l = 0; l < states; ++l) {
     arguments[l].slope = rate[l].value;
     arguments[l].curvature = rate[l].gradient;
     arguments[l].size = static_cast<int>(z.size());
   }
-  Evaluate(arguments, change);
-  for (std::size_t k = 0; k < rate.size(); ++k) {
+  const std::vector<Jet> change = Evaluate(arguments);
+  for (std::size_t k = 0; k < states; ++k) {
     out.first[k] = {rate[k].value, rate[k].gradient};
     out.second[k] = {change[k].slope, change[k].curvature};
   }
+  out.places.assign(num_places_, Interval(0));
+  for (std::size_t i = 0; i < num_places_; ++i)
+    for (std::size_t l = 0; l < states; ++l) out.places[i] += change[states + i].curvature[l] * rate[l].value;
 }
 
-std::unique_ptr<Flow> MakeFlow(const NominalModel& model) {
+std::unique_ptr<Flow> MakeFlow(const NominalModel& model, std::span<const ExpressionText> places) {
   const std::vector<ExpressionText> rates = RatesOf(model);
-  return rates.empty() ? nullptr : std::make_unique<Flow>(NamesOf(model), rates);
+  return rates.empty() ? nullptr : std::make_unique<Flow>(NamesOf(model), rates, places);
 }
 
 }  // namespace forereach

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "certifier/numerics/arithmetic.h"
+#include "certifier/safety/clearance.h"
 
 namespace forereach {
 namespace {
@@ -182,16 +183,19 @@ RangeWithSlopes Negated(RangeWithSlopes range) {
   return range;
 }
 
-MotionBound BoundMagnitude(const Flow& flow, const Quantity& quantity, const std::vector<Arguments>& regions,
-                           const SlopeBoundOptions& options) {
+// The largest magnitude of any of the quantities.
+MotionBound BoundMagnitude(const Flow& flow, const std::vector<Quantity>& quantities,
+                           const std::vector<Arguments>& regions, const SlopeBoundOptions& options) {
   MotionBound all;
-  for (const Arguments& region : regions) {
-    for (const bool negated : {false, true}) {
-      const auto side = [&](const Flow::Derivatives& d) { return negated ? Negated(quantity(d)) : quantity(d); };
-      const MotionBound one = Search(flow, side, options, all.lower).Run(region);
-      all.upper = std::max(all.upper, one.upper);
-      all.lower = std::max(all.lower, one.lower);
-      all.boxes += one.boxes;
+  for (const Quantity& quantity : quantities) {
+    for (const Arguments& region : regions) {
+      for (const bool negated : {false, true}) {
+        const auto side = [&](const Flow::Derivatives& d) { return negated ? Negated(quantity(d)) : quantity(d); };
+        const MotionBound one = Search(flow, side, options, all.lower).Run(region);
+        all.upper = std::max(all.upper, one.upper);
+        all.lower = std::max(all.lower, one.lower);
+        all.boxes += one.boxes;
+      }
     }
   }
   if (!(all.upper < kInfinity)) FailWithoutBound();
@@ -210,6 +214,15 @@ Quantity AccelerationAlong(const Eigen::VectorXd& row) {
       for (std::size_t i = 0; i < sum.gradient.size(); ++i) sum.gradient[i] += Interval(row[k]) * second.gradient[i];
     }
     return sum;
+  };
+}
+
+// A coordinate of a place. Nothing is known of its slopes.
+Quantity AccelerationOfPlace(std::size_t i) {
+  return [i](const Flow::Derivatives& derivatives) {
+    RangeWithSlopes range{derivatives.places[i], {}};
+    range.gradient.fill(Interval(-kInfinity, kInfinity));
+    return range;
   };
 }
 
@@ -241,6 +254,33 @@ bool FollowsTheOneBefore(const NominalModel& model, const Transitions& transitio
   return true;
 }
 
+// The second differences of the places of points at expressions, by their largest in each safety coordinate.
+class PlaceDifferences {
+ public:
+  PlaceDifferences(const NominalModel& model, const Eigen::MatrixXd& projection, const Body& body)
+      : places_(model, projection, body), dim_(projection.rows()) {}
+
+  // @param last x_{i+1}, with first and second before it.
+  [[nodiscard]] Eigen::VectorXd Largest(const Eigen::VectorXd& first, const Eigen::VectorXd& second,
+                                        const Eigen::VectorXd& last) const {
+    const auto a = At(first), b = At(second), c = At(last);
+    Eigen::VectorXd largest = Eigen::VectorXd::Zero(dim_);
+    for (std::size_t part = 0; part < a.size(); ++part)
+      for (std::size_t j = 0; places_.IsAtExpressions(part) && j < a[part].points.size(); ++j)
+        largest =
+            largest.cwiseMax((c[part].points[j] - 2 * b[part].points[j] + a[part].points[j]).head(dim_).cwiseAbs());
+    return largest;
+  }
+
+ private:
+  [[nodiscard]] std::vector<BodyPart> At(const Eigen::VectorXd& x) const {
+    return places_.At({x.data(), ToSize(x.size())});
+  }
+
+  BodyPlaces places_;
+  Eigen::Index dim_;
+};
+
 }  // namespace
 
 MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options) {
@@ -253,20 +293,26 @@ MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& o
   std::vector<Arguments> regions{BetweenSamples(motion, start, reachable)};
   if (auto last = LastStep(motion, reachable)) regions.push_back(std::move(*last));
   MotionBounds bounds;
-  for (Eigen::Index i = 0; i < motion.projection.rows(); ++i)
-    bounds.acceleration.push_back(
-        BoundMagnitude(motion.flow, AccelerationAlong(motion.projection.row(i)), regions, options));
+  const auto p = ToSize(motion.projection.rows());
+  for (std::size_t k = 0; k < p; ++k) {
+    std::vector<Quantity> quantities{AccelerationAlong(motion.projection.row(static_cast<Eigen::Index>(k)))};
+    for (std::size_t i = k; i < motion.flow.num_places(); i += p) quantities.push_back(AccelerationOfPlace(i));
+    bounds.acceleration.push_back(BoundMagnitude(motion.flow, quantities, regions, options));
+  }
   if (motion.heading < 0) return bounds;
   const auto heading = ToSize(motion.heading);
-  bounds.turn_rate = BoundMagnitude(
-      motion.flow, [&](const Flow::Derivatives& d) { return d.first[heading]; }, regions, options);
-  bounds.turn_acceleration = BoundMagnitude(
-      motion.flow, [&](const Flow::Derivatives& d) { return d.second[heading]; }, regions, options);
+  bounds.turn_rate =
+      BoundMagnitude(motion.flow, {[&](const Flow::Derivatives& d) { return d.first[heading]; }}, regions, options);
+  bounds.turn_acceleration =
+      BoundMagnitude(motion.flow, {[&](const Flow::Derivatives& d) { return d.second[heading]; }}, regions, options);
   return bounds;
 }
 
 MeasuredMotion MeasureMotion(const NominalModel& model, const Transitions& transitions,
-                             const Eigen::MatrixXd& projection, int heading, double period) {
+                             const Eigen::MatrixXd& projection, const Body& body, double period) {
+  const int heading = body.heading;
+  std::optional<PlaceDifferences> places;
+  if (body.HasPlaces()) places.emplace(model, projection, body);
   MeasuredMotion measured;
   measured.acceleration = Eigen::VectorXd::Zero(projection.rows());
   Eigen::VectorXd before;  // the step from the sample before
@@ -276,6 +322,11 @@ MeasuredMotion MeasureMotion(const NominalModel& model, const Transitions& trans
       ++measured.triples;
       const Eigen::VectorXd difference = (step - before) / (period * period);
       measured.acceleration = measured.acceleration.cwiseMax((projection * difference).cwiseAbs());
+      if (places) {
+        const Eigen::VectorXd begins = transitions.z.row(i).head(step.size());
+        measured.acceleration =
+            measured.acceleration.cwiseMax(places->Largest(begins - before, begins, begins + step) / (period * period));
+      }
       if (heading >= 0) {
         for (const double turned : {before[heading], step[heading]})
           measured.turn_rate = std::max(measured.turn_rate, std::abs(turned / period));

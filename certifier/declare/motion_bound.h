@@ -12,6 +12,7 @@ reach between two samples. */
 #include "certifier/dynamics/model.h"
 #include "certifier/reach/domain.h"
 #include "certifier/residual/transitions.h"
+#include "certifier/safety/body.h"
 #include "certifier/sets/eigen.h"
 
 namespace forereach {
@@ -25,15 +26,15 @@ struct MotionBound {
 };
 
 struct MotionBounds {
-  std::vector<MotionBound> acceleration;     ///< Of each (P x)_k''.
+  std::vector<MotionBound> acceleration;     ///< Of each (P x)_k'' and of coordinate k of each place.
   MotionBound turn_rate, turn_acceleration;  ///< Of the heading's first and second derivative; 0 without a heading.
 };
 
 /** The motion between two samples, a period apart, of a plan that is certified. */
 struct SampledMotion {
-  const Flow& flow;
+  const Flow& flow;                   ///< Its places: those of points of a body, p coordinates each.
   const Domain& domain;               ///< Only its box is used.
-  double period;                      ///< s
+  double period;                      ///< The longest time between the samples, s.
   const Eigen::MatrixXd& projection;  ///< P, p-by-n
   int heading;                        ///< The state that is the heading; -1: none.
   /** A plan ends with |x_k| <= rest_k; infinite where nothing is known. n entries. */
@@ -50,8 +51,8 @@ it lies in the box B with Z + [0, period] f(B) in B, where Z is the domain's box
 @throws std::invalid_argument if a size is wrong. Cost: at most options.max_boxes evaluations for each bound. */
 [[nodiscard]] MotionBounds BoundMotion(const SampledMotion& motion, const SlopeBoundOptions& options = {});
 
-/** What recorded transitions show: the largest second difference of positions over a period squared, in plain
-arithmetic. It is at most the largest acceleration between the samples. */
+/** What recorded transitions show: the largest second difference of positions, of the frame and of places at
+expressions, over a period squared, in plain arithmetic. It is at most the largest acceleration between the samples. */
 struct MeasuredMotion {
   Eigen::VectorXd acceleration;
   double turn_rate = 0, turn_acceleration = 0;
@@ -60,8 +61,8 @@ struct MeasuredMotion {
 
 /** An angle of the model (angles.h) may be recorded with any number of turns: in each step it moves to where it is
 nearest to the model's next value, and samples follow one another if they are equal up to turns.
-@param model of the transitions. @param heading as in SampledMotion. */
+@param model of the transitions. @param body its heading is measured, and the places of its points at expressions. */
 [[nodiscard]] MeasuredMotion MeasureMotion(const NominalModel& model, const Transitions& transitions,
-                                           const Eigen::MatrixXd& projection, int heading, double period);
+                                           const Eigen::MatrixXd& projection, const Body& body, double period);
 
 }  // namespace forereach

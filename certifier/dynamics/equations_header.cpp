@@ -21,10 +21,13 @@ struct Part {
   bool is_number = false;
 };
 
-std::string NumberText(double number) {
+// A double of C++: a whole number that is larger than any integer of C++ would not be one, and -0 no negative zero.
+std::string DoubleText(double number) {
   const std::string text = ToText(number);
-  return "T(" + text + (text.find_first_of(".e") == std::string::npos ? ".0)" : ")");
+  return text + (text.find_first_of(".e") == std::string::npos ? ".0" : "");
 }
+
+std::string NumberText(double number) { return "T(" + DoubleText(number) + ")"; }
 
 // No word of C++, and of no other name.
 std::string Variable(const std::string& name, std::size_t index) {
@@ -78,8 +81,8 @@ class Writer final {
   static std::string Line(const std::string& statement) { return "    [[maybe_unused]] " + statement + ";\n"; }
 
   void Add(const std::string& name, bool is_number) {
-    parts_.push_back({Variable(name, names_.size()), is_number});
-    names_.push_back(name);
+    parts_.push_back({Variable(name, parts_.size()), is_number});
+    static_cast<void>(names_.Add(name));
   }
 
   [[nodiscard]] std::size_t Step() const {
@@ -136,7 +139,7 @@ class Writer final {
   }
 
   const ModelText& text_;
-  std::vector<std::string> names_;
+  NameList names_;
   std::vector<Part> parts_;  // of the names
 };
 
@@ -155,11 +158,12 @@ std::string NameArray(const std::string& type, const char* member, const List& l
          Joined(list, [](const auto& named) { return Quoted(named); }) + "};\n";
 }
 
-// Units and paths are anybody's text, and end no comment.
+// Units and paths are anybody's text; they neither end a comment nor seem to begin one.
 std::string InComment(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
-  for (std::size_t end = 0; (end = text.find("*/", end)) != std::string::npos;) text.insert(end + 1, " ");
+  for (const char* mark : {"*/", "/*"})
+    for (std::size_t at = 0; (at = text.find(mark, at)) != std::string::npos;) text.insert(at + 1, " ");
   return text;
 }
 
@@ -193,7 +197,9 @@ std::string StructName(const std::string& name) {
     text += starts ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c;
     starts = false;
   }
-  return text.empty() || std::isdigit(static_cast<unsigned char>(text[0])) != 0 ? "Model" + text : text;
+  const bool is_free = std::ranges::any_of(text, [](unsigned char c) { return std::islower(c) != 0; }) &&
+                       std::isdigit(static_cast<unsigned char>(text[0])) == 0 && text != "Eigen";
+  return is_free ? text : "Model" + text;
 }
 
 std::string EquationsHeader(const ModelText& text, const std::string& name, const std::string& origin) {
@@ -216,7 +222,7 @@ std::string EquationsHeader(const ModelText& text, const std::string& name, cons
          "\n  /** The values of the parameters, in this order. */\n"
          "  std::array<double, " +
          parameters + "> values{" +
-         Joined(text.parameters, [](const auto& parameter) { return ToText(parameter.lower); }) + "};\n" +
+         Joined(text.parameters, [](const auto& parameter) { return DoubleText(parameter.lower); }) + "};\n" +
          "  [[nodiscard]] std::array<double, " + parameters + "> parameters() const { return values; }\n" +
          "\n  /** The equations for every scalar type. @param z the states, then the inputs. @param next the states "
          "after the\n"

@@ -26,7 +26,8 @@ an operation on numbers alone; for a program above kMostCompiled.
 @throws ExpressionError, std::invalid_argument as MakeTextModel does. */
 [[nodiscard]] std::string EquationsHeader(const ModelText& text, const std::string& name, const std::string& origin);
 
-/** The struct's name. */
+/** The struct's name: the words of `name`, each with a capital. "Model" stands before one that would not do: it begins
+with a digit, or is in capitals, as macros are (EOF, NAN), or is Eigen. */
 [[nodiscard]] std::string StructName(const std::string& name);
 
 }  // namespace forereach

@@ -175,7 +175,7 @@ class Lexer final {
 // Operator precedence with a stack of the operators whose last operand is not complete yet.
 class Parser final {
  public:
-  Parser(const ExpressionText& text, std::span<const std::string> names) : lexer_(text), names_(names) {
+  Parser(const ExpressionText& text, const NameList& names) : lexer_(text), names_(names) {
     if (text.text.size() > kLargestExpression)
       Fail({text.line, text.column}, "has " + std::to_string(text.text.size()) + " bytes, at most " +
                                          std::to_string(kLargestExpression) + " are allowed");
@@ -241,19 +241,19 @@ class Parser final {
       Emit({.kind = Kind::kNumber, .number = std::numbers::pi}, token.place);
       return true;
     }
-    const auto found = std::ranges::find(names_, token.text);
-    if (found == names_.end()) {
-      std::vector<std::string> known(names_.begin(), names_.end());
+    const int found = names_.Find(token.text);
+    if (found < 0) {
+      std::vector<std::string> known = names_.all();
       known.emplace_back(kPi);
       throw ExpressionError(token.place.line, token.place.column, Shown(token) + " is not a name that is known here",
                             std::string(token.text), std::move(known));
     }
-    Emit({.kind = Kind::kName, .a = static_cast<int>(found - names_.begin())}, token.place);
+    Emit({.kind = Kind::kName, .a = found}, token.place);
     return true;
   }
 
   [[noreturn]] void FailAsFunction(const Token& token) const {
-    if (token.text == kPi || std::ranges::find(names_, token.text) != names_.end())
+    if (token.text == kPi || names_.Find(token.text) >= 0)
       Fail(token.place, Shown(token) + " is not a function; write * for a product: " + Shown(token) + "*(");
     throw ExpressionError(token.place.line, token.place.column, Shown(token) + " is not a function",
                           std::string(token.text), FunctionNames());
@@ -384,7 +384,7 @@ class Parser final {
   }
 
   Lexer lexer_;
-  std::span<const std::string> names_;
+  const NameList& names_;
   Expression expression_;
   std::vector<Pending> pending_;
   std::vector<int> operands_;  // complete, and not yet used
@@ -402,8 +402,17 @@ bool IsName(std::string_view text) {
 
 bool IsReserved(std::string_view name) { return name == kPi || FindFunction(name) != nullptr; }
 
-Expression ParseExpression(const ExpressionText& text, std::span<const std::string> names) {
-  return Parser(text, names).Parse();
+bool NameList::Add(const std::string& name) {
+  const bool is_new = places_.emplace(name, static_cast<int>(names_.size())).second;
+  names_.push_back(name);
+  return is_new;
 }
+
+int NameList::Find(std::string_view name) const {
+  const auto found = places_.find(name);
+  return found == places_.end() ? -1 : found->second;
+}
+
+Expression ParseExpression(const ExpressionText& text, const NameList& names) { return Parser(text, names).Parse(); }
 
 }  // namespace forereach

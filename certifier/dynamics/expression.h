@@ -5,6 +5,7 @@ Symbol, which records a program (program.h), or to numbers. */
 #pragma once
 
 #include <cmath>
+#include <map>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -19,7 +20,9 @@ Symbol, which records a program (program.h), or to numbers. */
 namespace forereach {
 
 inline constexpr std::size_t kLargestExpression = 1 << 16;  ///< Bytes.
-inline constexpr int kDeepestExpression = 200;              ///< Parentheses, signs and powers inside each other.
+/** Of all expressions of one file, in bytes: each is read several times, by whatever may use it. */
+inline constexpr std::size_t kLargestExpressions = 1 << 20;
+inline constexpr int kDeepestExpression = 200;  ///< Parentheses, signs and powers inside each other.
 inline constexpr int kLargestWholePower = 64;
 
 /** A text is not an expression, or uses a name that is not known. */
@@ -75,6 +78,25 @@ struct NamedFunction {
 /** Whether a name belongs to the language: a function or pi. */
 [[nodiscard]] bool IsReserved(std::string_view name);
 
+/** Names and their places in an order, found in logarithmic time: a hostile text uses many names often. */
+class NameList final {
+ public:
+  NameList() = default;
+  explicit NameList(std::span<const std::string> names) {
+    for (const std::string& name : names) static_cast<void>(Add(name));
+  }
+
+  /** Appends a name. False if an equal one was there before, which Find then goes on to find. */
+  bool Add(const std::string& name);
+  /** The place of a name; -1 if it is not there. */
+  [[nodiscard]] int Find(std::string_view name) const;
+  [[nodiscard]] const std::vector<std::string>& all() const { return names_; }
+
+ private:
+  std::vector<std::string> names_;
+  std::map<std::string, int, std::less<>> places_;
+};
+
 /** A parsed expression: operations in the order of evaluation, which is that of the text. The last one is the value. */
 struct Expression {
   enum class Kind : unsigned char {
@@ -100,11 +122,14 @@ struct Expression {
   std::vector<Node> nodes;
 };
 
-/** Parses a text. Neither the time nor the stack grows faster than the text's length.
+/** Parses a text. The stack is bounded, and the time is that of finding each name.
 @param names the names that may be used. The first of equal names counts.
 @throws ExpressionError if the text is not an expression, is larger than kLargestExpression, is nested deeper than
 kDeepestExpression, or uses another name. */
-[[nodiscard]] Expression ParseExpression(const ExpressionText& text, std::span<const std::string> names);
+[[nodiscard]] Expression ParseExpression(const ExpressionText& text, const NameList& names);
+[[nodiscard]] inline Expression ParseExpression(const ExpressionText& text, std::span<const std::string> names) {
+  return ParseExpression(text, NameList(names));
+}
 
 namespace internal {
 

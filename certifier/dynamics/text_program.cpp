@@ -22,9 +22,7 @@ class Known final {
   void Add(const std::string& name, Symbol value) {
     if (!IsName(name)) throw std::invalid_argument("\"" + name + "\" is no name");
     if (IsReserved(name)) throw std::invalid_argument("the name " + name + " belongs to the language");
-    if (std::ranges::find(names_, name) != names_.end())
-      throw std::invalid_argument("the name " + name + " is used twice");
-    names_.push_back(name);
+    if (!names_.Add(name)) throw std::invalid_argument("the name " + name + " is used twice");
     values_.push_back(value);
   }
   [[nodiscard]] Symbol ValueOf(const ExpressionText& expression, ProgramDraft& program) const {
@@ -33,7 +31,7 @@ class Known final {
   }
 
  private:
-  std::vector<std::string> names_;
+  NameList names_;
   std::vector<Symbol> values_;
 };
 

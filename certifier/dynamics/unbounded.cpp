@@ -110,15 +110,15 @@ Value Evaluate(const Expression& expression, std::span<const Value> names) {
 // The equations over a box of variables.
 std::vector<Value> Equations(const NominalModel& model, std::span<const Interval> box) {
   const ModelText& text = *model.text();
-  std::vector<std::string> names = model.variable_names();
+  NameList names(model.variable_names());
   std::vector<Value> values;
   for (int l = 0; l < model.num_variables(); ++l)
     values.push_back({box[ToSize(l)], l < model.num_states() ? std::uint32_t{1} << l : 0, {}});
-  names.insert(names.end(), model.parameter_names().begin(), model.parameter_names().end());
+  for (const std::string& name : model.parameter_names()) static_cast<void>(names.Add(name));
   for (const Interval& range : model.parameter_ranges()) values.push_back({range, 0, {}});
   for (const auto& [name, value] : text.definitions) {
     values.push_back(Evaluate(ParseExpression(value, names), values));
-    names.push_back(name);
+    static_cast<void>(names.Add(name));
   }
   std::vector<Value> equations;
   for (const ExpressionText& equation : text.equations)

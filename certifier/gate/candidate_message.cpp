@@ -5,6 +5,7 @@
 
 #include "certifier/gate/stamp.h"
 #include "certifier/numerics/text.h"
+#include "certifier/task/step_time.h"
 
 namespace forereach {
 
@@ -32,13 +33,15 @@ std::string WhyNoSchedule(const candidate_plan_t& candidate, const GateOptions& 
   return {};
 }
 
-std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between) {
+std::string WhyNotBounded(const candidate_plan_t& candidate, const std::optional<Between>& between,
+                          const GateOptions& options) {
   if (!between) return {};
   const std::string step = "step_us is " + std::to_string(candidate.step_us);
   if (candidate.step_us < 1) return step + ", must be at least 1";
-  if (candidate.step_us <= Microseconds(between->period * 1e3)) return {};
-  return step + ", longer than model.dt, " + ToText(between->period) +
-         " s: task.between bounds the motion in this time";
+  const std::int64_t longest = Microseconds(between->period * 1e3) - MaxJitterUs(options).value_or(0);
+  if (candidate.step_us <= longest) return {};
+  return step + ", longer than model.dt, " + std::to_string(longest) +
+         " us: task.between bounds the motion in this time";
 }
 
 Zonotope InitialSetOf(const candidate_plan_t& candidate) {

@@ -108,7 +108,7 @@ std::optional<Gate::Rejection> Gate::Admit(Bytes bytes, candidate_plan_t& candid
   if (auto rejection = CheckContent(candidate, initial_set)) return rejection;
   if (auto rejection = CheckTimes(candidate, now_us)) return rejection;
   for (const std::string& why :
-       {WhyNoSchedule(candidate, options_), WhyNotBounded(candidate, certifier_.problem().between)})
+       {WhyNoSchedule(candidate, options_), WhyNotBounded(candidate, certifier_.problem().between, options_)})
     if (!why.empty()) return Rejection{decision_t::CAUSE_WRONG_DIMENSION, why};
   return CheckSource(candidate, now_us);
 }
@@ -205,36 +205,15 @@ void Gate::Certify(const candidate_plan_t& candidate, const Zonotope& initial_se
   SetText(decision.message, "rejected: shadow mode; else: " + Explain(verdict, certifier_.problem(), plan, tube_));
 }
 
-namespace {
-
-// Of a plan whose first failure is this verdict.
-int StandingSteps(const Decision& verdict, int num_steps, bool is_swept) {
-  if (verdict.outcome == Outcome::kCertified || verdict.cause == Cause::kNoStop) return num_steps;
-  if (verdict.outcome == Outcome::kDomain) return verdict.step;
-  if (verdict.outcome == Outcome::kSafety)
-    return std::max(is_swept && verdict.cause == Cause::kObstacle ? verdict.step : verdict.step - 1, 0);
-  return 0;
-}
-
-}  // namespace
-
 Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noexcept {
   try {
+    // The task may have been read again, with another time from one sample to the next.
+    if (!WhyNoSchedule(candidate, options_).empty()) return {};
+    if (!WhyNotBounded(candidate, certifier_.problem().between, options_).empty()) return {};
     const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
     const Zonotope initial_set = InitialSetOf(candidate);
     certifier_.Require(plan, initial_set, obstacles_.all());
-    const bool is_swept = certifier_.problem().between.has_value();
-    const auto standing = [&](const Decision& verdict) {
-      return Standing{StandingSteps(verdict, plan.num_steps, is_swept), verdict};
-    };
-    const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
-    const Standing whole = standing(verdict);
-    if (verdict.outcome == Outcome::kCertified || verdict.outcome == Outcome::kFalsified) return whole;
-    // Certify has not tested S after D. A failure of S before first_step is past.
-    const Decision rest = certifier_.JudgeSafety(plan, obstacles_.all(), tube_, first_step);
-    if (verdict.outcome == Outcome::kSafety) return standing(rest);
-    const Standing safe = standing(rest);
-    return rest.outcome == Outcome::kSafety && safe.steps < whole.steps ? safe : whole;
+    return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.all(), tube_, first_step);
   } catch (const std::exception&) {
     return {};
   }

@@ -14,6 +14,7 @@ not, the caller calls Refuse. */
 #include <vector>
 
 #include "certifier/certify/certifier.h"
+#include "certifier/certify/standing.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/sources.h"
 #include "certifier/task/config.h"
@@ -31,13 +32,6 @@ namespace forereach {
 struct GateAnswer {
   decision_t decision{};
   std::optional<certified_plan_v2_t> certified;
-};
-
-/** Which controls of a certified plan stand: 0 .. steps - 1. */
-struct Standing {
-  int steps = 0;
-  /** A certificate: all stand. Otherwise why not. Outcome kNone: the plan could not be judged. */
-  Decision verdict = {};
 };
 
 class Gate final {
@@ -65,17 +59,8 @@ class Gate final {
   /** The same at a given time in microseconds since the Unix epoch, as if the decision took no time. */
   [[nodiscard]] GateAnswer Decide(Bytes candidate, std::int64_t now_us) noexcept;
 
-  /** Judges a plan that was certified under what is in force now. The controls that stand are those whose motions are
-  all proven safe, from sample `first_step` on; earlier ones are past. They are found from the first failure, at step t:
-  - D: X_t is proven, but no step from it. Control t does not stand: t controls stand. If only the end of the plan is
-  not at rest (kNoStop), all its controls stand, and no hold after them is certified.
-  - S with Problem::between: the motion under control t may touch: t controls stand.
-  - S at the samples, or by a limit: X_t may touch or exceed it, and control t - 1 leads there: t - 1 controls stand,
-  and none for t = 0.
-  - F: the declaration is false: none stands.
-  If D and S both fail, the fewer. The tube is computed again from the plan's X_0, with all observations so far.
-  @param plan a candidate that this gate or one before a reload has certified. @param first_step 0..num_steps.
-  Cost as Certify's. */
+  /** JudgeAgain (standing.h) under what is in force now. Outcome kNone: the plan cannot be judged under this task.
+  @param plan a candidate that this gate or one before a reload has certified. @param first_step 0..num_steps. */
   [[nodiscard]] Standing JudgeAgain(const candidate_plan_t& plan, int first_step) noexcept;
 
   /** Answers a candidate without certifying it, for a cause outside the candidate. The candidate's own defects take

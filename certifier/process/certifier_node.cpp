@@ -347,6 +347,7 @@ void CertifierNode::WithdrawPlans(std::int64_t now_us) {
   withdraws_more_ = false;
   if (!is_in_charge()) return;
   plans_.Judge(*gate_, now_us, gate_->certifier().violation() || contradictions_.ContradictInForce());
+  reporter_.counts.withdrawals = plans_.withdrawals();
   for (int i = 0; i < kAtOnce && plans_.withdraws(); ++i) {
     const auto due = plans_.TakeDue(clocks_.wall(), clocks_.steady());
     if (!due) return;

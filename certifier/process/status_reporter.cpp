@@ -124,6 +124,7 @@ std::string StatusReporter::Summary(const Gate& gate) const {
                    {"learned", status.learned},
                    {"left_to_another_certifier", counts.left_to_other},
                    {"faults", counts.faults},
+                   {"withdrawals", counts.withdrawals},
                    {"messages_refused", counts.refused},
                    {"messages_not_sent", parts_.sender.refused()},
                    {"elapsed_us", {{"p50", ElapsedPercentile(0.5)}, {"p99", ElapsedPercentile(0.99)}}}});

@@ -41,6 +41,7 @@ class StatusReporter final {
   /** Counted by the node. */
   struct Counts {
     std::int64_t faults = 0;
+    std::int64_t withdrawals = 0;    ///< Without repetitions.
     std::int64_t refused = 0;        ///< Messages.
     std::int64_t left_to_other = 0;  ///< Candidates that another certifier has to decide on.
     bool obstacles_refused = false;  ///< Since the last report.

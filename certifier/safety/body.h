@@ -51,7 +51,7 @@ struct Body {
   friend bool operator==(const Body&, const Body&) = default;
 };
 
-/** The declared bounds on the true motion between two samples, which are `period` apart. With y(s) = P x(s):
+/** The declared bounds on the true motion between two samples, which are at most `period` apart. With y(s) = P x(s):
     |y_k''| <= acceleration_k,    |theta'| <= turn_rate,    |theta''| <= turn_acceleration.
 The first is also the bound on each coordinate of a place that expressions give. So y(s) lies in conv(P X_t u P X_{t+1})
 + [-e, e] with e_k = acceleration_k period^2 / 8, and the place of a body's point q deviates by |q| (turn_rate^2 +
@@ -60,7 +60,7 @@ struct Between {
   Eigen::VectorXd acceleration;  ///< p entries, m/s^2, not negative.
   double turn_rate = 0;          ///< rad/s, not negative.
   double turn_acceleration = 0;  ///< rad/s^2, not negative.
-  double period = 0;             ///< Seconds from one sample to the next: the model's dt.
+  double period = 0;             ///< The longest time from one sample to the next, s (task/step_time.h).
 };
 
 }  // namespace forereach

@@ -14,6 +14,7 @@
 #include "certifier/task/document.h"
 #include "certifier/task/draft.h"
 #include "certifier/task/key_rows.h"
+#include "certifier/task/step_time.h"
 
 namespace forereach {
 namespace {
@@ -116,6 +117,7 @@ Config Load(const std::string& path, TransitionsFile transitions, const NamedFil
   config.path = path;
   config.grounds = GroundsOf(TaskDigest(file.text(), model_file.bytes), problem, config.obstacles);
   config.gate.longest_step_ms = std::max(config.robot.step_period_ms, config.gate.longest_step_ms);
+  if (problem.between) problem.between->period = LongestPeriod(config);
   if (problem.between && config.robot.step_period_ms > config.period * 1e3)
     file.Fail("robot.step_period_ms", "is " + ToText(config.robot.step_period_ms) + ", longer than model.dt, " +
                                           ToText(config.period * 1e3) +

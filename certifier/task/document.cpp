@@ -365,8 +365,12 @@ class Checker {
     }
   }
 
-  void CheckText(const YAML::Node& node, const Key& row, const std::string& key) const {
+  void CheckText(const YAML::Node& node, const Key& row, const std::string& key) {
     const std::string& text = node.Scalar();
+    if (row.type == Type::kExpression && (expressions_ += text.size()) > kLargestExpressions)
+      Fail(node, key,
+           "the expressions of this file, up to this one, have " + std::to_string(expressions_) + " bytes, at most " +
+               std::to_string(kLargestExpressions) + " are allowed");
     if (text.empty() || text.find('\0') != std::string::npos) Fail(node, key, "is empty or not text");
     if (row.type == Type::kWord && std::find(row.words.begin(), row.words.end(), text) == row.words.end())
       Fail(node, key, Shown(node) + " is not known; " + Suggestion(text, {row.words.begin(), row.words.end()}));
@@ -382,6 +386,7 @@ class Checker {
   const SchemaScope& scope_;
   const Document::Visitor& visit_;
   Values& values_;
+  std::size_t expressions_ = 0;  // bytes of those so far
 };
 
 class Nobody final : public YAML::EventHandler {

@@ -23,14 +23,13 @@ std::vector<std::string> Given(const ExpressionNames& names) {
 // something else.
 void CheckDefinitions(const NominalModel& model, const Laws& laws) {
   const ExpressionNames names = NamesOf(model);
-  std::vector<std::string> known = Given(names);
-  for (const std::string& name : Desired()) known.push_back(name);
-  for (const ModelText::Definition& definition : names.definitions) known.push_back(definition.name);
+  NameList known(Given(names));
+  for (const std::string& name : Desired()) static_cast<void>(known.Add(name));
+  for (const ModelText::Definition& definition : names.definitions) static_cast<void>(known.Add(definition.name));
   for (const ModelText::Definition& definition : laws.definitions) {
-    if (std::ranges::find(known, definition.name) != known.end())
-      throw std::invalid_argument("the name " + definition.name + " is used twice");
+    if (known.Find(definition.name) >= 0) throw std::invalid_argument("the name " + definition.name + " is used twice");
     static_cast<void>(ParseExpression(definition.value, known));
-    known.push_back(definition.name);
+    static_cast<void>(known.Add(definition.name));
   }
 }
 
@@ -43,14 +42,14 @@ ExpressionNames NamesFor(const NominalModel& model, const Laws& laws, std::vecto
   std::vector<ModelText::Definition> definitions = std::move(names.definitions);
   definitions.insert(definitions.end(), laws.definitions.begin(), laws.definitions.end());
   names.definitions.clear();
-  std::vector<std::string> known = Given(names);
+  NameList known(Given(names));
   for (ModelText::Definition& definition : definitions) {
     try {
       static_cast<void>(ParseExpression(definition.value, known));
     } catch (const ExpressionError&) {
       continue;
     }
-    known.push_back(definition.name);
+    static_cast<void>(known.Add(definition.name));
     names.definitions.push_back(std::move(definition));
   }
   return names;

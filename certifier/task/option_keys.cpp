@@ -53,8 +53,9 @@ std::vector<Key> GateKeys() {
       Optional(gate.Number("max_clock_error_ms", "ms", Between(0, kHourMs), &GateOptions::max_clock_error_ms,
                            "How far step t of a plan may be from `start_utime` + t `step_us`, on the clock that stamps "
                            "the obstacles. Half of it is for the robot: its guard stops a plan at a step that is "
-                           "further off on the robot's own clock. The other half is for the difference between the "
-                           "clocks of the robot and of the obstacles' sender. Moving obstacles need this key."),
+                           "further off on the robot's own clock, or that comes later than that after the step before. "
+                           "The other half is for the difference between the clocks of the robot and of the obstacles' "
+                           "sender. Moving obstacles need this key."),
                "no obstacle may move"),
       Optional(gate.Word<Source>("obstacles", {{"bus", Source::kBus}, {"task", Source::kTask}}, &GateOptions::obstacles,
                                  "bus: the obstacles are task.obstacles and those of the last OBSTACLES message; "

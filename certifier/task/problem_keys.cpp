@@ -269,7 +269,7 @@ void ReadBody(const Document& file, const std::string& key, TaskDraft& draft) {
 }
 
 void ReadBetween(const Document& file, const std::string& key, TaskDraft& draft) {
-  forereach::Between between{.acceleration = file.Vector(key + ".acceleration"), .period = draft.config.period};
+  forereach::Between between{.acceleration = file.Vector(key + ".acceleration")};
   const bool turns = draft.problem.body.heading >= 0;
   for (const auto& [name, member] :
        {std::pair{".turn_rate", &forereach::Between::turn_rate}, {".turn_acceleration", &Between::turn_acceleration}}) {
@@ -421,7 +421,8 @@ std::vector<Key> TaskKeys() {
                "samples with `certifier.method: paper`"),
       Map("task.between",
           "A certificate holds at all times. These are bounds on the true motion of the robot from one sample to the "
-          "next, model.dt later. `forereach declare --between` proposes them.",
+          "next, at most model.dt and half of gate.max_clock_error_ms later. `forereach declare --between` proposes "
+          "them.",
           ReadBetween),
       Required(Vector("task.between.acceleration", "m/s^2", kNotNegative, Size::kSafety,
                       "The largest absolute second derivative of each safety coordinate, of the robot's frame and of "

@@ -164,6 +164,45 @@ TEST_F(DeclareTest, BetweenTakesLoggedPositionsIfAsked) {
   EXPECT_THAT(isolated.text, HasSubstr("transitions: none begins with the state in which the one before it ends"));
 }
 
+TEST_F(DeclareTest, BetweenProposesInSpaceFromEquationsAndFromPositions) {
+  std::string task = Read(FOREREACH_SOURCE_DIR "/config/drive/double_integrator_3d.yaml");
+  task = Replaced(task, "../models/", FOREREACH_SOURCE_DIR "/config/models/");
+  std::ofstream(task_) << Replaced(task, "transitions: double_integrator_3d.csv", "transitions: steps.csv");
+  std::string line;
+  std::getline(std::ifstream(FOREREACH_SOURCE_DIR "/config/drive/double_integrator_3d.csv") >> std::ws, line);
+  const Config config = LoadConfig(task_, TransitionsFile::kIgnore);
+  const auto row = [&](double from, double to) {  // in z, where nothing else is
+    return "0,0," + std::to_string(from) + ",0,0,0,0,0,0,0,0," + std::to_string(to) + ",0,0,0\n";
+  };
+  scratch_.Write("steps.csv", line + "\n" + row(0, 0.25) + row(0.25, 0.75));
+  const Json proven = Json::parse(Declare("--between --json").text),
+             measured = Json::parse(Declare("--between --from positions --json").text);
+  ASSERT_EQ(proven["entries"].size(), 3u);
+  ASSERT_EQ(measured["entries"].size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(proven["entries"][k]["key"], "acceleration");
+    EXPECT_GT(proven["entries"][k]["upper"], 0);
+    EXPECT_EQ(measured["entries"][k]["name"], proven["entries"][k]["name"]);
+    EXPECT_NEAR(measured["entries"][k]["upper"], k == 2 ? 0.25 / (config.period * config.period) : 0, 1e-9);
+  }
+}
+
+TEST_F(DeclareTest, BetweenProposesForPartsAtExpressions) {
+  std::string task = Read(FOREREACH_SOURCE_DIR "/config/arm.yaml");
+  task = Replaced(task, "models/two_link_arm.yaml", FOREREACH_SOURCE_DIR "/config/models/two_link_arm.yaml");
+  std::ofstream(task_) << Replaced(task, "data/arm_transitions.csv",
+                                   FOREREACH_SOURCE_DIR "/config/data/arm_transitions.csv");
+  const Json document = Json::parse(Declare("--between --max-boxes 2000 --json").text);
+  EXPECT_FALSE(document["reached"]);
+  ASSERT_EQ(document["entries"].size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Json& entry = document["entries"][k];
+    EXPECT_EQ(entry["name"], "places''[" + std::to_string(k) + "]");
+    EXPECT_GT(entry["upper"], entry["lower"]);
+    EXPECT_GT(entry["upper"], 80) << "the first link's w1^2, and (w1 + w2)^2 of the second";
+  }
+}
+
 TEST_F(DeclareTest, BetweenExcludesWhatBelongsToTheResidual) {
   for (const char* options : {"--between --cover cover.json", "--between --check cover.json", "--from positions"})
     EXPECT_EQ(Forereach("declare --config config/demo.yaml " + std::string(options) + " 2>&1").code, 2) << options;

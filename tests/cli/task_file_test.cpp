@@ -233,6 +233,8 @@ TEST_F(InitTest, HeadersThatAreNoTransitionsAreRefused) {
   refused("x,x_next,sin", "'sin' cannot be the name");
   refused("x,x_next,a b", "'a b' cannot be the name");
   refused("x,x_next,dt", "'dt' cannot be the name");
+  refused("x,x_next,null", "'null' cannot be the name");
+  refused("x,x_next," + std::string(65, 'u'), "uuu' cannot be the name");
   refused("x,x_next,u,u", "duplicate column");
   refused("x,x_next,", "a column has no name");
   refused("", "a column has no name");
@@ -247,6 +249,9 @@ TEST_F(InitTest, HeadersThatAreNoTransitionsAreRefused) {
   EXPECT_THAT(Init("--transitions " + (scratch_ / "log.csv")).text, HasSubstr("needs --dt"));
   EXPECT_EQ(Init("--dt 61 --transitions " + (scratch_ / "log.csv")).code, 2);
   EXPECT_EQ(Init("").code, 2);
+  scratch_.Write("a\nb: [.csv", "x,x_next,u\n1,1,1\n");
+  EXPECT_THAT(Init("--dt 0.1 --transitions '" + (scratch_ / "a\nb: [.csv") + "'").text,
+              HasSubstr("--transitions: the path has a control character"));
   EXPECT_EQ(Init("--dt 0.1 --model unicycle --transitions " + (scratch_ / "log.csv")).code, 2);
 }
 

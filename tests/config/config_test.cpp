@@ -171,6 +171,14 @@ TEST(LoadConfig, WhoCertifiesHasToSayWhenItHoldsUnlessTheMethodIsThePapers) {
   ASSERT_TRUE(bounds.problem->between);
   EXPECT_EQ(bounds.problem->between->acceleration, Numbers({3.5, 0}));
   EXPECT_EQ(bounds.problem->between->period, 0.15);
+  for (const auto& [error_ms, period] : {std::pair{"0.001", 0.15}, {"20", 0.16}}) {  // half of it is the robot's
+    const double longer = files
+                              .Load(Replaced(Replaced(task, "samples", "{acceleration: [3.5, 0]}"), "obstacles: task",
+                                             std::string("obstacles: task, max_clock_error_ms: ") + error_ms))
+                              .problem->between->period;
+    EXPECT_GE(longer, period);
+    EXPECT_LE(longer, period * (1 + 0x1p-51));
+  }
   EXPECT_EQ(bounds.problem->between->turn_rate, 0);
   EXPECT_EQ(bounds.problem->between->turn_acceleration, 0);
 }

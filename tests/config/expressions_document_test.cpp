@@ -76,12 +76,13 @@ TEST(ExpressionsDocument, ErrorsAreThoseOfTheTable) {
 
 TEST(ExpressionsDocument, LimitsAreThoseOfTheCode) {
   const auto rows = Rows("| what | at most |");
-  ASSERT_EQ(rows.size(), 8u);
+  ASSERT_EQ(rows.size(), 9u);
   EXPECT_EQ(rows[0][1], std::to_string(kMaxStates) + ", at least 1");
   EXPECT_EQ(rows[1][1], std::to_string(kMaxInputs) + ", at least 1");
   EXPECT_EQ(rows[4][1], std::to_string(kLargestExpression));
-  EXPECT_EQ(rows[5][1], std::to_string(kDeepestExpression));
-  EXPECT_EQ(rows[7][1], std::to_string(ProgramDraft::kMaxOperations));
+  EXPECT_EQ(rows[5][1], std::to_string(kLargestExpressions));
+  EXPECT_EQ(rows[6][1], std::to_string(kDeepestExpression));
+  EXPECT_EQ(rows[8][1], std::to_string(ProgramDraft::kMaxOperations));
   EXPECT_THAT(Document(), testing::HasSubstr("from -" + std::to_string(kLargestWholePower) + " to " +
                                              std::to_string(kLargestWholePower)));
 }

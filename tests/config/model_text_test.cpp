@@ -9,7 +9,9 @@
 namespace forereach {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 // In the place of the first line of the good task. Errors are asserted by line and column.
 constexpr const char* kModel =
@@ -113,6 +115,19 @@ TEST_F(ModelTextTest, ErrorsInExpressionsNameLineAndColumn) {
             "drag, mass, pi");
 }
 
+// A hostile file costs neither minutes nor a message of its own size.
+TEST_F(ModelTextTest, AnUnknownNameAmongManyIsAnsweredInShort) {
+  std::string parameters = "drag: 0.5";
+  for (int i = 0; i < 900; ++i) parameters += ", " + std::string(60, 'p') + std::to_string(i) + ": 1";
+  const std::string model = Replaced(kModel, "drag: 0.5", parameters);
+  const std::string error = Error(Replaced(model, "dt*dt/2", std::string(60000, 'z')));
+  EXPECT_THAT(error, AllOf(StartsWith("task.yaml:6:11: " + std::string(60, 'z') + "... is not a name that is known"),
+                           HasSubstr("known here: px, py, vx, vy, ax, ay, dt, drag, "), HasSubstr(" more")));
+  EXPECT_LT(error.size(), 8000u);
+  EXPECT_THAT(Error(Replaced(model, "dt*dt/2", std::string(61, 'p') + "17")),
+              HasSubstr("did you mean " + std::string(60, 'p') + "17?"));
+}
+
 TEST_F(ModelTextTest, PlacesAreRightHoweverYamlWritesAText) {
   const std::string line = "    vx: vx + dt*(ax - loss*vx)\n";
   const auto error = [&](const std::string& other) { return ErrorWith(line, other); };
@@ -173,6 +188,21 @@ TEST_F(ModelTextTest, UnitsAreOneShortLine) {
   EXPECT_EQ(ErrorWith("px: m,", "px: " + std::string(65, 'm') + ","), error);
   EXPECT_EQ(ErrorWith("px: m,", "px: " + std::string(64, 'm') + ","), "");
   EXPECT_EQ(ErrorWith("px: m,", "px: \"\u00b0/s\","), "");
+}
+
+// Each is read again for every law and limit that may use it.
+TEST_F(ModelTextTest, ExpressionsAreBoundedInAll) {
+  const auto with = [&](std::size_t definitions) {
+    std::string one = "px", text = "    half: dt*dt/2\n";
+    while (one.size() + 3 <= kLargestExpression) one += "+px";
+    for (std::size_t i = 0; i < definitions; ++i) text += "    d" + std::to_string(i) + ": " + one + "\n";
+    return ErrorWith("    half: dt*dt/2\n", text);
+  };
+  constexpr std::size_t kMost = kLargestExpressions / kLargestExpression;
+  EXPECT_EQ(with(kMost - 1), "");
+  EXPECT_THAT(with(kMost + 1),
+              AllOf(StartsWith("task.yaml:23: model.let.d16: the expressions of this file, up to this one, have "),
+                    HasSubstr(" bytes, at most 1048576 are allowed")));
 }
 
 TEST_F(ModelTextTest, EachStateHasItsEquation) {
@@ -354,6 +384,18 @@ TEST_F(AnglesTest, ALimitIsTheSameAfterATurn) {
   EXPECT_EQ(Error(with("v*cos(theta)")), "");
   EXPECT_THAT(Error(with("x + theta")), HasSubstr("limits: wall is not seen to be the same after a turn of the angle "
                                                   "theta by 2 pi: write it with sin, cos or tan of it"));
+}
+
+TEST_F(AnglesTest, APlaceOfTheBodyIsTheSameAfterATurn) {
+  const auto with = [](const std::string& place) {
+    return Replaced(Turning("  angles: [theta]\n"), "  projection: [x, y]\n",
+                    "  body: {parts: [{disc: {place: [x, \"" + place + "\"], radius: 0.1}}]}\n");
+  };
+  EXPECT_EQ(Error(with("y + sin(theta)")), "");
+  EXPECT_EQ(
+      Error(with("y + theta")),
+      "task.yaml:13: task: body: the place y + theta is not seen to be the same after a turn of the angle theta by "
+      "2 pi: write it with sin, cos or tan of it");
 }
 
 TEST_F(AnglesTest, ATransitionWhoseTurnsCannotBeToldIsRefusedWithItsLine) {

@@ -255,11 +255,50 @@ TEST(MeasureMotion, KnowsAnAngleThatIsRecordedWrapped) {
   transitions.z = Eigen::MatrixXd{{0, 2.5, 2.8}, {0, 4 - kTurn, 4.2}, {0, 6 - kTurn, 8.8}};
   transitions.x_next = Eigen::MatrixXd{{0, 4 - kTurn}, {0, 6}, {0, 10.5 - 2 * kTurn}};  // the second is not wrapped
   const Eigen::MatrixXd projection{{1, 0}};
-  const MeasuredMotion measured = MeasureMotion(*Turning({"theta"}), transitions, projection, 1, 0.5);
+  const MeasuredMotion measured = MeasureMotion(*Turning({"theta"}), transitions, projection, Body{.heading = 1}, 0.5);
   EXPECT_EQ(measured.triples, 2);
   EXPECT_NEAR(measured.turn_rate, 4.5 / 0.5, 1e-13);
   EXPECT_NEAR(measured.turn_acceleration, 2.5 / 0.25, 1e-12);
-  EXPECT_GT(MeasureMotion(*Turning({}), transitions, projection, 1, 0.5).turn_rate, 9) << "no angle is unwrapped";
+  EXPECT_GT(MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5).turn_rate, 9)
+      << "no angle is unwrapped";
+}
+
+// A point that turns with q on a circle of 1 m: q' = w, w' = u. Its acceleration has the length of w^2 and u together,
+// and some q turns that into any direction.
+class OnACircle : public testing::Test {
+ protected:
+  static std::shared_ptr<const NominalModel> Model() {
+    return MakeTextModel(
+        TextModel({{"q", "w"}, {"w", "u"}}, {"u"}, {{"dt", 0.01, 0.01}}, {}, ModelText::Integrator::kRk4));
+  }
+  Body body_{-1, {BodyPart{{}, 0, {{{"0", 1, 1}, {"0", 1, 1}}, {{"cos(q)", 1, 1}, {"sin(q)", 1, 1}}}}}};
+  const Eigen::MatrixXd none_ = Eigen::MatrixXd::Zero(2, 2);
+};
+
+TEST_F(OnACircle, TheAccelerationOfAPlaceIsBounded) {
+  const auto model = Model();
+  const auto flow = MakeFlow(*model, body_.Coordinates());
+  ASSERT_EQ(flow->num_places(), 4u);
+  const Domain domain = DomainOf(Eigen::Vector2d(-4, -2), Eigen::Vector2d(4, 2), Eigen::VectorXd::Constant(1, 3));
+  const MotionBounds bounds = BoundMotion({*flow, domain, 0.01, none_, -1, NoRest(2)}, {.gap = 0.01});
+  const double least = std::hypot(2.03 * 2.03, 3), most = 1.01 * std::hypot(2.032 * 2.032, 3);  // in the last step
+  for (const MotionBound& bound : bounds.acceleration) {
+    EXPECT_TRUE(bound.reached);
+    EXPECT_GE(bound.upper, least);
+    EXPECT_LE(bound.upper, most);
+    EXPECT_LE(bound.lower, bound.upper);
+    EXPECT_GE(bound.lower, 5 * 0.99);
+  }
+}
+
+TEST_F(OnACircle, TheAccelerationOfAPlaceIsMeasured) {
+  Transitions transitions;
+  transitions.z = Eigen::MatrixXd{{0, 1, 0}, {0.5, 2, 0}};
+  transitions.x_next = Eigen::MatrixXd{{0.5, 2}, {1.5, 2}};
+  const MeasuredMotion measured = MeasureMotion(*Model(), transitions, none_, body_, 0.5);
+  EXPECT_EQ(measured.triples, 1);
+  EXPECT_NEAR(measured.acceleration[0], std::abs(std::cos(1.5) - 2 * std::cos(0.5) + 1) / 0.25, 1e-12);
+  EXPECT_NEAR(measured.acceleration[1], std::abs(std::sin(1.5) - 2 * std::sin(0.5)) / 0.25, 1e-12);
 }
 
 TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {
@@ -268,14 +307,14 @@ TEST(MeasureMotion, TakesSecondDifferencesOfTransitionsThatFollowOneAnother) {
   transitions.z = Eigen::MatrixXd{{0, 0, 0}, {1, 0.5, 0}, {5, 0.25, 0}, {7, 1, 0}};
   transitions.x_next = Eigen::MatrixXd{{1, 0.5}, {5, 0.25}, {14, 0}, {8, 3}};
   const Eigen::MatrixXd projection{{1, 0}};
-  const MeasuredMotion measured = MeasureMotion(*Turning({}), transitions, projection, 1, 0.5);
+  const MeasuredMotion measured = MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5);
   EXPECT_EQ(measured.triples, 2);
   EXPECT_EQ(measured.acceleration[0], (14 - 2 * 5 + 1) / 0.25);
   EXPECT_EQ(measured.turn_rate, 1);
   EXPECT_EQ(measured.turn_acceleration, 0.75 / 0.25);
-  EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, -1, 0.5).turn_rate, 0);
+  EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, Body(), 0.5).turn_rate, 0);
   transitions.z(1, 0) = std::nextafter(1.0, 2.0);
-  EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, 1, 0.5).triples, 1);
+  EXPECT_EQ(MeasureMotion(*Turning({}), transitions, projection, Body{.heading = 1}, 0.5).triples, 1);
 }
 
 }  // namespace

@@ -83,6 +83,14 @@ TEST(JointTest, TakesRowsThatAreNearOneByOneAsFarTogether) {
                         "p = 0.0012; 9 rows below the paper, 1 above, sign test p = 0.0215."));
 }
 
+TEST(JointTest, NoProbabilityIsPrintedAsZero) {
+  Table table{"T", "About.", {}};
+  for (int i = 0; i < 20; ++i) table.rows.push_back(RowOf(kWithSeeds, {0.9, 0.001, 10}));
+  const std::string text = ToMarkdown(table);
+  EXPECT_THAT(text, HasSubstr("with a standard error, p < 0.0001; 0 rows below the paper, 20 above, "
+                              "sign test p < 0.0001."));
+}
+
 TEST(Statistics, AreThoseOfTheTables) {
   EXPECT_NEAR(ChiSquareTail(3.841459, 1), 0.05, 1e-7);
   EXPECT_NEAR(ChiSquareTail(5.991465, 2), 0.05, 1e-7);

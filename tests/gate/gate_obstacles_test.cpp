@@ -10,6 +10,7 @@
 
 #include "certifier/gate/gate.h"
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/task/step_time.h"
 #include "forereach/transition_t.hpp"
 #include "tests/gate/small_task.h"
 
@@ -526,6 +527,24 @@ TEST(GateMovingTest, AScheduleOutOfItsBoundsIsRejected) {
     const decision_t decision = gate.Decide(Encode(candidate), kNow).decision;
     EXPECT_EQ(decision.outcome, decision_t::REJECTED);
     EXPECT_EQ(decision.cause, start > 0 ? decision_t::CAUSE_FUTURE : decision_t::CAUSE_TOO_LATE);
+  }
+}
+
+// The guard lets a step last longer by half of the clock error: the bounds between the samples have to be for so long.
+TEST(GateMovingTest, AStepThatMayLastLongerThanItsMotionIsBoundedIsRejected) {
+  Config config = SmallTaskWithAClock();
+  const std::int64_t longer = MaxJitterUs(config.gate).value();
+  ASSERT_GT(longer, 0);
+  for (const bool is_enough : {true, false}) {
+    Problem problem = *config.problem;
+    problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, 0.15 + 1e-6 * static_cast<double>(longer - !is_enough)};
+    config.problem = std::make_shared<const Problem>(problem);
+    Gate gate(config);
+    ASSERT_EQ(gate.UpdateObstacles(MovingMessage(0), kNow), "");
+    const decision_t decision = gate.Decide(Encode(Candidate(1)), kNow).decision;
+    EXPECT_EQ(decision.outcome, is_enough ? decision_t::CERTIFIED : decision_t::REJECTED);
+    if (is_enough) continue;
+    EXPECT_THAT(GetText(decision.message), HasSubstr("step_us is 150000, longer than model.dt, 149999 us"));
   }
 }
 

@@ -143,6 +143,40 @@ TEST_F(PlansInForceTest, BetweenTheSamplesTheStepThatMayTouchIsTheFirstToFall) {
   }
 }
 
+// The robot goes on in the steps of the plan, and neither model nor bounds of the new task are about these.
+TEST_F(PlansInForceTest, UnderATaskOfAShorterStepNothingStands) {
+  for (const bool is_bounded : {true, false}) {
+    const auto with_period = [&](double period) {
+      Config config = config_;
+      Problem problem = *config_.problem;
+      problem.model = MakePointMass(period);
+      if (is_bounded) problem.between = Between{Eigen::Vector2d(1, 1), 0, 0, period};
+      if (!is_bounded) config.gate.max_clock_error_ms = 10;
+      config.gate.longest_step_ms = period * 1e3;
+      config.problem = std::make_shared<const Problem>(problem);
+      config.grounds.config = DigestOf("a period of " + std::to_string(period));
+      return config;
+    };
+    Gate gate(with_period(0.15));
+    PlansInForce plans(config_.gate);
+    obstacles_t message = ToMessage({});
+    message.utime = now_;
+    message.sequence = sequence_++;
+    ASSERT_EQ(gate.UpdateObstacles(Encode(message), now_), "");
+    plans.Judge(gate, now_);
+    const auto certified = gate.Decide(Encode(Candidate(1, kAccelerationThatCertifies, now_)), now_).certified;
+    ASSERT_TRUE(certified);
+    plans.Add(*certified, now_);
+    Gate reloaded(with_period(0.1));
+    reloaded.Inherit(gate);
+    plans.Judge(reloaded, now_);
+    const auto due = plans.TakeDue(now_, now_);
+    ASSERT_TRUE(due);
+    EXPECT_EQ(due->message.cause, withdrawal_t::NOT_JUDGED);
+    EXPECT_EQ(due->message.valid_steps, 0);
+  }
+}
+
 TEST_F(PlansInForceTest, AWithdrawalNamesThePlanTheWitnessAndWhatItRestsOn) {
   const certified_plan_v2_t plan = Certify(3);
   now_ += 1000;

@@ -58,6 +58,13 @@ class ImportTest : public testing::Test {
   LogTable table_;
 };
 
+// Beside a first stamp of another clock all others would be one moment.
+TEST_F(ImportTest, AFirstStampFarAwayMovesNoOther) {
+  EXPECT_EQ(From({{1e300}, {0}, {0.05}, {0.09}, {0.3}}).transitions.size(), 0);
+  EXPECT_EQ(From({{1e300}, {0}, {0.05}, {0.1}, {0.3}}).transitions.size(), 1);
+  EXPECT_LE(Again().largest_offset, options_.tolerance);
+}
+
 TEST_F(ImportTest, AStepGoesFromAStampToTheOneThatIsDtLater) {
   const ImportedLog log = From({{0, 1}, {0.05, 2}, {0.1, 3}, {0.15, 4}, {0.2, 5}, {0.25, 6}});
   EXPECT_THAT(log.lines, ElementsAre(2, 4));

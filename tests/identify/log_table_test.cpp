@@ -73,6 +73,17 @@ TEST_F(LogTableTest, ARowWithOtherFieldsThanTheHeaderIsLostAndSaid) {
   EXPECT_THAT(table.after_loss, ElementsAre(false, true, true, false));
 }
 
+// A row that was cut off and the next one, whose line ends are others, are not one row.
+TEST_F(LogTableTest, ACarriageReturnInsideARowEndsIt) {
+  const LogTable table = Table("t,pos x\r\n1\r2\n3,4\r\n\r\n5\r,6\r\n\"7\r\",8\n9,10\r");
+  EXPECT_THAT(table.lines, ElementsAre(3, 6, 7));
+  EXPECT_EQ(table.lost.count, 2);
+  EXPECT_EQ(table.lost.first_line, 2);
+  EXPECT_EQ(table.lost.first, "a carriage return inside a row");
+  EXPECT_EQ(Error("t,pos x\r1,2\r3,4\r"), "log.csv:1: the names of the columns: a carriage return inside a row");
+  EXPECT_EQ(Error("t,\"pos\"x\n1,2\n"), "log.csv:1: the names of the columns: quotes inside a field");
+}
+
 TEST_F(LogTableTest, WhatIsNotClearIsRefused) {
   EXPECT_EQ(Error("t,pos y\n1,2\n"), "log.csv:1: no column 'pos x'; did you mean pos y?");
   EXPECT_EQ(Error("\n1,2\n3,4\n"),

@@ -215,6 +215,7 @@ struct Counts {
   long calls = 0, certified = 0, confirmed = 0, refuted = 0, cannot_verify = 0, problems = 0, refused = 0;
   long contacts = 0, contacts_refuted = 0, contacts_confirmed = 0;
   long inside = 0, inside_refuted = 0;
+  long withdrawn = 0, withdrawn_confirmed = 0;
 
   void Add(const Counts& other) {
     calls += other.calls;
@@ -229,6 +230,8 @@ struct Counts {
     contacts_confirmed += other.contacts_confirmed;
     inside += other.inside;
     inside_refuted += other.inside_refuted;
+    withdrawn += other.withdrawn;
+    withdrawn_confirmed += other.withdrawn_confirmed;
   }
 };
 
@@ -251,8 +254,20 @@ void Count(const Options& options, long number, int call, const verifier::Verdic
             << options.seed << " --problem " << number << ", call " << call << ": " << Describe(verdict) << std::endl;
 }
 
+// The certificate with another obstacle, without its slices: only whether it is safe is the claim.
+verifier::Certificate Among(verifier::Certificate certificate, const Obstacle& obstacle) {
+  certificate.obstacles = {obstacle};
+  certificate.slices.clear();
+  return certificate;
+}
+
+struct Meeting {
+  Obstacle obstacle;
+  int most_standing;  ///< So many controls of the plan do not lead to it.
+};
+
 // An obstacle that a motion within all declared bounds just meets, in a step of the plan.
-std::optional<Obstacle> Met(Random& random, const Problem& problem, const Query& query, const Tube& tube) {
+std::optional<Meeting> Met(Random& random, const Problem& problem, const Query& query, const Tube& tube) {
   const bool bicycle = problem.model->num_states() == 6;
   const MotionJudge judge(problem, query.schedule);
   const AdmissibleResidual residual(random, problem);
@@ -284,19 +299,36 @@ std::optional<Obstacle> Met(Random& random, const Problem& problem, const Query&
   Obstacle met = approach->At(*away - 1e-9);
   const auto exactly = judge.Place<exact::Real>(chord, path ? &*path : nullptr, s);
   if (!judge.Meet(exactly, met, t, s, error, 0, 1e-60)) return std::nullopt;
-  return met;
+  return Meeting{std::move(met), problem.between ? t : std::max(t + static_cast<int>(s) - 1, 0)};
 }
 
-// The certificate with another obstacle, without its slices: only whether it is safe is the claim.
-verifier::Certificate Among(verifier::Certificate certificate, const Obstacle& obstacle) {
-  certificate.obstacles = {obstacle};
-  certificate.slices.clear();
+// An obstacle that appears while the robot is at some step of a certified plan, so that just a part of the plan stands:
+// the verifier has to derive that part. Nothing if none is found.
+std::optional<verifier::Certificate> Remainder(Random& random, const Certifier& certifier, const Query& query,
+                                               const verifier::Certificate& whole, Tube& tube) {
+  const Problem& problem = certifier.problem();
+  const int steps = query.plan().num_steps, first = random.Below(steps), kept = random.Integer(first, steps - 1);
+  const auto approach = AnyApproach(random, problem, tube, query.schedule);
+  if (!approach) return std::nullopt;
+  const auto away = JustAccepted([&](double far) {
+    const std::vector<Obstacle> alone{approach->At(far)};
+    const Decision decision = certifier.safety().Judge(alone, query.schedule, tube, first);
+    return decision.outcome == Outcome::kCertified || decision.step - (problem.between ? 0 : 1) >= kept;
+  });
+  if (!away) return std::nullopt;
+  verifier::Certificate certificate = Among(whole, approach->At(*away));
+  const Standing standing = JudgeAgain(certifier, query.plan(), query.initial_set, certificate.obstacles, tube, first);
+  if (standing.steps <= first || standing.steps == steps) return std::nullopt;
+  certificate.controls.conservativeResize(Eigen::NoChange, standing.steps);
+  certificate.is_remainder = true;
+  certificate.first_step = first;
   return certificate;
 }
 
-// Obstacles that the certifier just accepts; the same a micrometre further in, where no body turns (what a turn sweeps
-// the verifier encloses more tightly); and obstacles that are met. Of very wide tubes the verifier's remainder is now
-// and then tighter, too, so that a few of those further in are clear of its own tube.
+// Obstacles that the certifier just accepts, in the whole plan and in a part of it; the same a micrometre further in,
+// where no body turns (what a turn sweeps the verifier encloses more tightly); and obstacles that are met. Of very wide
+// tubes the verifier's remainder is now and then tighter, too, so that a few of those further in are clear of its own
+// tube.
 Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& output) {
   const std::uint64_t start = options.seed * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(number);
   Random random(start);
@@ -306,6 +338,7 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
   const auto problem = AnyWorld(random, bicycle);
   Random winds(~start);
   if (winds.Coin(0.4)) Disturb(winds, *problem);
+  if (problem->between && winds.Coin()) problem->between->period += winds.Uniform(0, 0.05);
   problem->method = options.method;
   const Certifier certifier(problem);
   const verifier::Verifier judge(problem, verifier::MethodOf(*problem));
@@ -345,16 +378,27 @@ Counts RunWorld(const Options& options, long number, Tube& tube, std::mutex& out
                 << ", p = " << problem->projection.rows() << ", obstacle of kind " << static_cast<int>(obstacle.kind())
                 << ": " << Describe(verdict) << std::endl;
     }
+    if (const auto remainder = Remainder(winds, certifier, query, certificate, tube)) {
+      ++counts.withdrawn;
+      const verifier::Verdict verdict = judge.Verify(*remainder);
+      if (verdict.status == verifier::Status::kConfirmed)
+        ++counts.withdrawn_confirmed;
+      else
+        Count(options, number, i, verdict, output, counts);
+    }
     const auto met = Met(random, *problem, query, tube);
     if (!met) continue;
     ++counts.contacts;
-    const verifier::Verdict verdict = judge.Verify(Among(certificate, *met));
+    const verifier::Certificate claim = Among(certificate, met->obstacle);
+    const verifier::Verdict verdict = judge.Verify(claim);
+    const Standing standing = JudgeAgain(certifier, query.plan(), query.initial_set, claim.obstacles, tube, 0);
+    const bool is_wrong = verdict.status == verifier::Status::kConfirmed || standing.steps > met->most_standing;
     counts.contacts_refuted += verdict.status == verifier::Status::kRefuted;
-    counts.contacts_confirmed += verdict.status == verifier::Status::kConfirmed;
-    if (verdict.status != verifier::Status::kConfirmed) continue;
+    counts.contacts_confirmed += is_wrong;
+    if (!is_wrong) continue;
     const std::lock_guard lock(output);
-    std::cerr << "CONFIRMED A CONTACT: --seed " << options.seed << " --problem " << number << ", call " << i
-              << std::endl;
+    std::cerr << "CONFIRMED A CONTACT: --seed " << options.seed << " --problem " << number << ", call " << i << ", "
+              << standing.steps << " controls stand, " << met->most_standing << " at most" << std::endl;
   }
   return counts;
 }
@@ -562,7 +606,8 @@ int main(int argc, char** argv) {
   if (options.worlds || options.limits)
     std::cout << total.inside << " obstacles a micrometre further in, " << total.inside_refuted << " refuted; "
               << total.contacts << " that are met, " << total.contacts_refuted << " refuted, "
-              << total.contacts_confirmed << " confirmed" << std::endl;
+              << total.contacts_confirmed << " confirmed; " << total.withdrawn << " plans withdrawn in part, "
+              << total.withdrawn_confirmed << " remainders confirmed" << std::endl;
   const bool enough = only >= 0 || total.certified * 20 >= total.calls;  // a fuzz that certifies nothing tests nothing
   // Of wide sets the reduction's choices are now and then too close for the verifier to follow: it then says so.
   const bool is_wide = options.wide || options.worlds || options.texts || options.kinks;

@@ -15,6 +15,7 @@ TEST(ContinuousMotion, NeverMeetsAnObstacleUnderACertificate) {
   for (std::uint64_t number = 0; number < 60; ++number) total.Add(MotionTrial(9000 + number).Run(5));
   RecordProperty("tally", total.Text());
   EXPECT_GT(total.certified, 100) << total.Text();
+  EXPECT_GT(total.withdrawn, 20) << total.Text();
   EXPECT_GT(total.motions, 4000) << total.Text();
   EXPECT_GT(total.decided_exactly, 10) << total.Text();
 }
@@ -33,13 +34,14 @@ TEST_P(WithoutOnePart, MeetsObstacles) {
 }
 
 std::string NameOf(const testing::TestParamInfo<Untold>& tested) {
-  static constexpr std::array kNames{"Nothing", "Acceleration", "Turn", "Body", "Velocity", "Growth", "ClockError"};
+  static constexpr std::array kNames{"Nothing",  "Acceleration", "Turn",       "Body",
+                                     "Velocity", "Growth",       "ClockError", "Lateness"};
   return kNames[static_cast<std::size_t>(tested.param)];
 }
 
 INSTANTIATE_TEST_SUITE_P(OfTheDeclaration, WithoutOnePart,
                          testing::Values(Untold::kAcceleration, Untold::kTurn, Untold::kBody, Untold::kVelocity,
-                                         Untold::kGrowth, Untold::kClockError),
+                                         Untold::kGrowth, Untold::kClockError, Untold::kLateness),
                          NameOf);
 
 TEST(Bulge, KeepsBothEndsAndUsesItsBound) {

@@ -4,7 +4,8 @@ A trial makes one random problem (worlds.h) and plans of it, and places obstacle
 each certificate it follows admissible residuals from sample to sample. Between two samples it follows motions whose
 second derivatives are piecewise constant, within the declared bounds and often equal to them, and that keep the
 samples. Moving obstacles have any clock error, and are anywhere in their declared sets. A contact is a broken promise.
-*/
+Then an obstacle appears that the certifier just accepts up to some step of the plan: what it says still stands is
+followed in the same way. */
 #pragma once
 
 #include <algorithm>
@@ -18,6 +19,7 @@ samples. Moving obstacles have any clock error, and are anywhere in their declar
 #include <vector>
 
 #include "certifier/certify/certifier.h"
+#include "certifier/certify/standing.h"
 #include "certifier/numerics/size.h"
 #include "tests/oracle/admissible.h"
 #include "tests/oracle/exact.h"
@@ -29,15 +31,17 @@ namespace forereach {
 
 /** A part of the declaration that the certifier of a trial is not told, which shows that the trial would find its
 absence. */
-enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, kClockError };
+enum class Untold { kNothing, kAcceleration, kTurn, kBody, kVelocity, kGrowth, kClockError, kLateness };
 
 struct Tally {
-  long problems = 0, plans = 0, certified = 0, motions = 0, moments = 0, decided_exactly = 0, inadmissible = 0;
+  long problems = 0, plans = 0, certified = 0, withdrawn = 0, motions = 0, moments = 0, decided_exactly = 0,
+       inadmissible = 0;
 
   void Add(const Tally& other) {
     problems += other.problems;
     plans += other.plans;
     certified += other.certified;
+    withdrawn += other.withdrawn;
     motions += other.motions;
     moments += other.moments;
     decided_exactly += other.decided_exactly;
@@ -45,8 +49,9 @@ struct Tally {
   }
   [[nodiscard]] std::string Text() const {
     std::ostringstream text;
-    text << problems << " problems, " << plans << " plans, " << certified << " certified; " << motions << " motions, "
-         << moments << " moments, " << decided_exactly << " of them decided in 256 bits";
+    text << problems << " problems, " << plans << " plans, " << certified << " certified, " << withdrawn
+         << " withdrawn in part; " << motions << " motions, " << moments << " moments, " << decided_exactly
+         << " of them decided in 256 bits";
     return text.str();
   }
 };
@@ -240,10 +245,14 @@ class MotionTrial {
     const bool bicycle = random_.Coin();
     const auto problem = AnyWorld(random_, bicycle);
     if (winds_.Coin(0.4)) Disturb(winds_, *problem);
+    const double period = problem->between ? problem->between->period : 0;
+    if (problem->between && (untold_ == Untold::kLateness || winds_.Coin()))
+      problem->between->period += winds_.Uniform(0, 0.05);  // what a step may last longer
     const auto told = std::make_shared<Problem>(*problem);
     if (untold_ == Untold::kAcceleration && told->between) told->between->acceleration.setZero();
     if (untold_ == Untold::kTurn && told->between) told->between->turn_rate = told->between->turn_acceleration = 0;
     if (untold_ == Untold::kBody) told->body = Body();
+    if (untold_ == Untold::kLateness && told->between) told->between->period = period;
     const Certifier certifier(told);
     tally_.problems = 1;
     for (int i = 0; i < plans; ++i) RunPlan(certifier, *problem, bicycle);
@@ -276,12 +285,27 @@ class MotionTrial {
       throw std::logic_error("a tube that is judged alone is certified among the same obstacles");
     ++tally_.certified;
     const MotionJudge judge(problem, query.schedule);
-    for (int r = 0; r < 3; ++r) Rollout(judge, query, obstacles, bicycle);
+    for (int r = 0; r < 3; ++r) Rollout(judge, query, obstacles, bicycle, 0, plan.num_steps);
+    Withdraw(certifier, judge, query, plan, bicycle);
   }
 
-  // An obstacle near the path that the certifier just accepts.
+  // An obstacle that appears while the robot is at some step, and leaves a part of the plan.
+  void Withdraw(const Certifier& certifier, const MotionJudge& judge, const Query& query, const Plan& plan,
+                bool bicycle) {
+    const int first = random_.Below(plan.num_steps), kept = random_.Integer(first, plan.num_steps - 1);
+    const auto neighbour = PlaceNeighbour(certifier, judge.problem(), query.schedule, plan.schedule, first, kept);
+    if (!neighbour) return;
+    const Standing standing =
+        JudgeAgain(certifier, plan, query.initial_set, std::vector<Obstacle>{neighbour->told}, tube_, first);
+    if (standing.steps < kept) throw std::logic_error("what is judged alone stands among the same obstacles");
+    if (standing.steps <= first || standing.steps == plan.num_steps) return;
+    ++tally_.withdrawn;
+    for (int r = 0; r < 3; ++r) Rollout(judge, query, {neighbour->obstacle}, bicycle, first, standing.steps);
+  }
+
+  // An obstacle near the path that the certifier just accepts, from a unit of time on up to control `kept`.
   std::optional<Neighbour> PlaceNeighbour(const Certifier& certifier, const Problem& problem, const Schedule& schedule,
-                                          const Schedule& told_schedule) {
+                                          const Schedule& told_schedule, int first = 0, int kept = kMaxSteps) {
     const std::optional<Approach> approach = AnyApproach(random_, problem, tube_, schedule);
     if (!approach) return std::nullopt;
     Approach told = *approach;
@@ -290,30 +314,32 @@ class MotionTrial {
       told.motion->uncertainty = told.motion->growth = told.motion->growth_rate = 0;
     const auto accepted = [&](double away) {
       const std::vector<Obstacle> alone{told.At(away)};
-      return certifier.safety().Judge(alone, told_schedule, tube_, 0).outcome == Outcome::kCertified;
+      const Decision decision = certifier.safety().Judge(alone, told_schedule, tube_, first);
+      return decision.outcome == Outcome::kCertified || decision.step - (problem.between ? 0 : 1) >= kept;
     };
     const std::optional<double> away = JustAccepted(accepted);
     if (!away) return std::nullopt;
     return Neighbour{approach->At(*away), told.At(*away)};
   }
 
-  void Rollout(const MotionJudge& judge, const Query& query, const std::vector<Obstacle>& obstacles, bool bicycle) {
+  // Under the controls 0 .. standing - 1, looked at from sample `first` on.
+  void Rollout(const MotionJudge& judge, const Query& query, const std::vector<Obstacle>& obstacles, bool bicycle,
+               int first, int standing) {
     const Problem& problem = judge.problem();
     const AdmissibleResidual residual(random_, problem);
     std::vector<exact::Real> x = PointOf(random_, query.initial_set);
-    const int steps = query.plan().num_steps;
-    for (int t = 0; t < steps; ++t) {
+    for (int t = 0; t < standing; ++t) {
       std::vector<exact::Real> z = x;
       for (const double u : query.plan().input(t)) z.emplace_back(u);
       std::vector<exact::Real> next = NominalSuccessor(bicycle, z);
       const std::vector<exact::Real> wind = AnyDisturbance(winds_, problem);
       for (std::size_t k = 0; k < next.size(); ++k) next[k] += residual(z, static_cast<int>(k)) + wind[k];
       const Chord chord = judge.ChordOf(x, next);
-      if (problem.between)
+      if (t >= first && problem.between)
         Follow(judge, chord, obstacles, t);
-      else
+      else if (t >= first)
         Visit(judge, chord, nullptr, obstacles, t, 0);
-      if (t + 1 == steps) Visit(judge, chord, nullptr, obstacles, t, 1);
+      if (t + 1 == standing) Visit(judge, chord, nullptr, obstacles, t, 1);
       x = next;
     }
   }

@@ -144,6 +144,19 @@ TEST(PolicyProposer, LeavesOutBlocksThatExceedALimit) {
   EXPECT_FALSE(proposed("abs(jerk)", 0.1));
 }
 
+// A file has finite weights; their sums may be infinite, or no number.
+TEST(PolicyProposer, ProposesNothingThatIsNotFinite) {
+  const Config config = LoadConfig(kTask);
+  Policy policy = LoadPolicy(config.planner.policy);
+  PlanRequest request;
+  request.state = Vec({0, 0, 0, 5, 0, 0});
+  ASSERT_TRUE(PolicyProposer(config, policy).Propose(request));
+  policy.layers.back().weight.setConstant(1.7e308);
+  EXPECT_FALSE(PolicyProposer(config, policy).Propose(request));
+  for (Eigen::Index j = 0; j < policy.layers.back().weight.cols(); j += 2) policy.layers.back().weight.col(j) *= -1;
+  EXPECT_FALSE(PolicyProposer(config, policy).Propose(request));
+}
+
 TEST(PolicyProposer, RefusesWhatDoesNotFit) {
   const Config config = LoadConfig(kTask);
   const Policy policy = LoadPolicy(config.planner.policy);

@@ -88,7 +88,7 @@ TEST(Summary, CountsAWithdrawalOnceHoweverOftenItIsAnswered) {
   };
   for (const std::int16_t step : {5, 5, 3, 3}) answer(7, execution_event_t::WITHDRAWN, step);
   answer(7, execution_event_t::EMERGENCY_STOP, 3);
-  answer(8, execution_event_t::WITHDRAWN, 3);
+  for (const std::int64_t plan : {8, 7, 8, 7}) answer(plan, execution_event_t::WITHDRAWN, 3);  // repeated in turn
   ASSERT_TRUE(writer.Flush());
   const Summary summary = SummarizeLogs({scratch / "log"}, GoalConfig());
   EXPECT_EQ(summary.withdrawals, 3);

@@ -507,6 +507,32 @@ TEST(GuardSchedule, AStepWithinTheJitterPassesAndOneOutsideEndsThePlan) {
   }
 }
 
+// Early by a part of the jitter and then late by another part: each on time, and too long between them.
+TEST(GuardSchedule, AStepLastsNoLongerThanTheJitterAllows) {
+  for (const std::int64_t too_long : {0, 1}) {
+    Guard guard = OnTime();
+    ASSERT_TRUE(guard.Accept(Sealed(SmallPlan()), kNow).ok());
+    ASSERT_TRUE(guard.TryStart(kStart, kStart - 1000, State{1, -2}).ok());
+    const GuardVerdict first = guard.Check(1, State{0, 0}, kStart + kStep + kJitter - 1000 + too_long);
+    EXPECT_EQ(first.cause, too_long ? GuardCause::kOffSchedule : GuardCause::kNone) << first.message;
+  }
+  for (const std::int64_t too_long : {0, 1}) {
+    Guard guard = ExecutingOnTime();
+    ASSERT_TRUE(guard.Check(1, State{0, 0}, kStart + kStep - kJitter).ok());
+    const GuardVerdict second = guard.Check(2, State{0, 0}, kStart + 2 * kStep + too_long);
+    EXPECT_EQ(second.cause, too_long ? GuardCause::kOffSchedule : GuardCause::kNone);
+    if (!too_long) continue;
+    EXPECT_EQ(second.step, 2);
+    EXPECT_EQ(second.value, static_cast<double>(kJitter + 1));
+    EXPECT_EQ(second.bound, static_cast<double>(kJitter));
+    EXPECT_THAT(second.message,
+                testing::HasSubstr("the step before step 2 lasted " + std::to_string(kStep + kJitter + 1) +
+                                   " us, at most " + std::to_string(kStep + kJitter) + " us are allowed"));
+    EXPECT_EQ(guard.executing(), nullptr);
+    EXPECT_FALSE(guard.halted());
+  }
+}
+
 TEST(GuardSchedule, AStateOutsideItsSliceHaltsOffTheScheduleToo) {
   Guard guard = ExecutingOnTime();
   EXPECT_EQ(guard.Check(1, State{100, 0}, kMost).cause, GuardCause::kOutsideSlice);

@@ -379,6 +379,28 @@ TEST_F(SupervisorWithdrawTest, ANewerPlanThatStartsLaterComesTooLate) {
   EXPECT_EQ(supervisor_->counts().emergency_stops, 1);
 }
 
+// The guard will not start a plan that is further from every boundary than the jitter, so nothing is to be hoped of it.
+TEST_F(SupervisorWithdrawTest, APlanThatStartsBetweenTheBoundariesDoesNotTakeOver) {
+  constexpr std::int64_t kJitter = 3000;
+  for (const std::int64_t off : {-kJitter - 1, -kJitter, kJitter, kJitter + 1}) {
+    brake_.emplace(std::vector<double>{kFarthest, 0});
+    SupervisorOptions options;
+    options.guard = TwoStates();
+    options.guard.max_jitter_us = kJitter;
+    Supervisor::Robot& robot = *this;
+    supervisor_.emplace(options, robot);
+    holds_ = 0;
+    Accept(PlanFrom(0, 7));
+    EXPECT_TRUE(Boundary(0));
+    certified_plan_v2_t next = PlanFrom(2, 8);
+    next.plan.start_utime += off;
+    Accept(next);
+    Withdraw(PlanFrom(0, 7), 2);
+    EXPECT_EQ(Boundary(1), std::abs(off) == kJitter) << off << ": else the stop begins while it fits";
+    EXPECT_EQ(Boundary(2), std::abs(off) == kJitter) << off;
+  }
+}
+
 // A brake of last resort that takes a step begins a step earlier, unless a plan takes over in time.
 TEST_F(SupervisorWithdrawTest, ABrakeThatTakesTimeBeginsBeforeTheEnd) {
   for (const int start_of_next : {2, 3}) {

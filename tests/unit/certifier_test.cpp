@@ -562,9 +562,11 @@ TEST(Certifier, ABodysPlacesAreTheSameAfterATurn) {
   problem.body.parts = {BodyPart{.radius = 0.1, .places = {{{"x + cos(theta)"}, {"y + sin(theta)"}}}}};
   EXPECT_NO_THROW(Certifier(std::make_shared<Problem>(problem)));
   problem.body.parts[0].places[0][1].text = "y + theta";
-  EXPECT_THAT([&] { Certifier(std::make_shared<Problem>(problem)); },
-              ThrowsMessage<std::invalid_argument>(
-                  Eq("body: the place y + theta is not seen to be the same after a turn of the angle theta by 2 pi")));
+  EXPECT_THAT(
+      [&] { Certifier(std::make_shared<Problem>(problem)); },
+      ThrowsMessage<std::invalid_argument>(
+          Eq("body: the place y + theta is not seen to be the same after a turn of the angle theta by 2 pi: write it "
+             "with sin, cos or tan of it")));
 }
 
 TEST(Certifier, RequireNamesWhatItCannotJudge) {

@@ -58,10 +58,20 @@ TEST(EquationsHeader, IsTheOneThatIsCompiledHere) {
 TEST(EquationsHeader, UnitsAndOriginEndNoComment) {
   ModelText text = EveryOperation();
   text.states[0].unit = "m**//\n#error */";
+  text.inputs[0].unit = "/*m/*/s";
   const std::string header = EquationsHeader(text, "robot", "robot.yaml */\rint x; /*/");
   EXPECT_EQ(header.find("*/"), header.find(". */\n#pragma once") + 2);
+  EXPECT_EQ(header.find("/*", 2), header.find("/** The values of the parameters"));
   EXPECT_THAT(header, Not(HasSubstr("\n#error")));
   EXPECT_THAT(header, Not(HasSubstr("\r")));
+}
+
+// Whole numbers too large for an integer of C++, and zero with a sign.
+TEST(EquationsHeader, ParametersAreTheDoublesThatTheyWere) {
+  ModelText text = EveryOperation();
+  text.parameters.push_back({"big", 123456789012345680000.0, 123456789012345680000.0});
+  text.parameters.push_back({"zero", -0.0, -0.0});
+  EXPECT_THAT(EquationsHeader(text, "robot", ""), HasSubstr("values{1.5, 0.1, 123456789012345683968.0, -0.0};"));
 }
 
 TEST(EquationsHeader, HasTheProgramOfTheText) {
@@ -95,6 +105,11 @@ TEST(StructNameTest, IsAWordOfItsOwn) {
   EXPECT_EQ(StructName("robot"), "Robot");
   EXPECT_EQ(StructName("3_wheels"), "Model3Wheels");
   EXPECT_EQ(StructName("_"), "Model");
+  // Words that C++ or a library has taken.
+  EXPECT_EQ(StructName("NAN"), "ModelNAN");
+  EXPECT_EQ(StructName("e_o_f"), "ModelEOF");
+  EXPECT_EQ(StructName("eigen"), "ModelEigen");
+  EXPECT_EQ(StructName("class"), "Class");
 }
 
 void ExpectRefused(const ModelText& text, const std::string& why) {
