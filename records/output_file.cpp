@@ -22,8 +22,12 @@ int OpenPart(const std::string& path, std::string& part) {
   part = path + ".part-XXXXXX";
   const int descriptor = ::mkostemp(part.data(), O_CLOEXEC);
   if (descriptor < 0) return descriptor;
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
+  // Once: threads that asked at the same time would leave the process without a mask.
+  static const mode_t mask = [] {
+    const mode_t given = ::umask(0);
+    ::umask(given);
+    return given;
+  }();
   static_cast<void>(::fchmod(descriptor, 0666 & ~mask));
   return descriptor;
 }
