@@ -134,10 +134,18 @@ TEST_F(ExportTest, LinesSayWhatTheTablesSay) {
     for (std::size_t i = 0; i < table[0].size(); ++i) {
       const json& value = line.at(table[0][i]);
       const std::string& cell = table[row][i];
-      if (value.is_null()) EXPECT_EQ(cell, "") << table[0][i];
-      if (value.is_string()) EXPECT_EQ(cell, value.get<std::string>());
-      if (value.is_number()) EXPECT_EQ(std::stod(cell), value.get<double>()) << table[0][i];
-      if (value.is_array()) EXPECT_EQ(std::ranges::count(cell, ' ') + 1, std::ssize(value)) << table[0][i];
+      if (value.is_null()) {
+        EXPECT_EQ(cell, "") << table[0][i];
+      }
+      if (value.is_string()) {
+        EXPECT_EQ(cell, value.get<std::string>());
+      }
+      if (value.is_number()) {
+        EXPECT_EQ(std::stod(cell), value.get<double>()) << table[0][i];
+      }
+      if (value.is_array()) {
+        EXPECT_EQ(std::ranges::count(cell, ' ') + 1, std::ssize(value)) << table[0][i];
+      }
     }
     EXPECT_EQ(line["controls"].size(), line["num_steps"]);
     EXPECT_EQ(line["controls"][0].size(), line["num_inputs"]);

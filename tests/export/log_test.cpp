@@ -52,7 +52,9 @@ TEST_F(LogTest, ListsAsJson) {
   for (std::string text; std::getline(lines, text);) {
     const auto line = nlohmann::json::parse(text);
     decisions += line["type"] == "decision_t";
-    if (line["type"] == "decision_t") EXPECT_EQ(line["what"], "certified");
+    if (line["type"] == "decision_t") {
+      EXPECT_EQ(line["what"], "certified");
+    }
     others += line["type"] != "decision_t" && line["type"] != "candidate_plan_t" &&
               line["type"] != "certified_plan_t" && line["type"] != "certified_plan_v2_t";
   }

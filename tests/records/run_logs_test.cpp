@@ -95,7 +95,9 @@ TEST_F(RunLogsTest, ADatabaseKnowsItsRunsAndItsRobot) {
     EXPECT_THAT(named.runs[0].logs, ElementsAre(one));
     EXPECT_EQ(named.runs[1].robot, scratch_ / "log");
     EXPECT_THAT(named.missing, ElementsAre("events-0.lcmlog: the log was deleted for the quota"));
-    if (input != database) EXPECT_THAT(named.runs[2].logs, ElementsAre(other)) << "no database lists it";
+    if (input != database) {
+      EXPECT_THAT(named.runs[2].logs, ElementsAre(other)) << "no database lists it";
+    }
   }
 }
 
