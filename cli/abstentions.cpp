@@ -57,8 +57,23 @@ Abstentions FromDecision(const std::string& path, const std::string& config_path
 // Collects what was not certified. Problems with learned transitions are made at the end, when all of them are known.
 class AbstentionReader final : public TimelineUser {
  public:
+  explicit AbstentionReader(const BusOptions& channels) : channels_(channels) {}
+
+  void OnEvent(const LogEvent& event) override {
+    if (event.channel == channels_.candidate) ++waiting_;
+    if (event.channel != channels_.obstacles) return;
+    const Bytes message = event.message();
+    last_obstacles_ = std::make_shared<const Message>(std::vector(message.begin(), message.end()), event.utime);
+  }
+
+  void OnStart(const Config&) override {
+    waiting_ = 0;
+    last_obstacles_.reset();
+  }
+
   void OnDecision(const RecordedDecision& recorded) override {
     const decision_t& decision = recorded.decision;
+    const std::size_t waiting = recorded.candidate && waiting_ > 0 ? waiting_-- : 0;
     if (decision.outcome == decision_t::CERTIFIED) {
       ++certified_;
       return;
@@ -71,6 +86,8 @@ class AbstentionReader final : public TimelineUser {
     abstention.cause = decision.cause;
     abstention.task = recorded.basis.task;
     abstention.decision = decision;
+    abstention.waiting = waiting;
+    abstention.last_obstacles = last_obstacles_;
     if (!recorded.candidate) {
       abstention.missing = "its candidate is not in the log";
       return;
@@ -107,6 +124,7 @@ class AbstentionReader final : public TimelineUser {
     for (int t = 0; t < plan.num_steps; ++t)
       judged.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.input(t).data(), plan.num_inputs);
     judged.obstacles = *recorded.basis.obstacles;
+    judged.progress_steps = candidate->progress_steps;
   }
 
   Abstentions Finish(const Timeline& timeline, std::vector<std::shared_ptr<const Config>> tasks) {
@@ -125,6 +143,11 @@ class AbstentionReader final : public TimelineUser {
   }
 
  private:
+  using Message = std::pair<std::vector<std::uint8_t>, std::int64_t>;
+
+  const BusOptions channels_;
+  std::size_t waiting_ = 0;
+  std::shared_ptr<const Message> last_obstacles_;
   std::vector<RecordedAbstention> all_;
   std::vector<Basis> bases_;  // of each
   std::int64_t certified_ = 0;
@@ -140,7 +163,7 @@ Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::st
     tasks.push_back(std::make_shared<const Config>(std::move(task)));
     pointers.push_back(tasks.back().get());
   }
-  AbstentionReader reader;
+  AbstentionReader reader(tasks.front()->bus);
   Timeline timeline(pointers, reader);
   timeline.Read(files, files.size() > 1);
   return reader.Finish(timeline, std::move(tasks));

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "advise/case.h"
@@ -22,6 +23,10 @@ struct RecordedAbstention {
   /** What it was judged by. No problem: it was answered without a judgement. */
   Case judged;
   std::string missing;           ///< Why it cannot be judged again; empty if it can, or was never judged.
+  /** How many candidates of the log waited when it was answered, with itself. */
+  std::size_t waiting = 0;
+  /** The last message on the channel of obstacles before the answer, and when it arrived; null if there was none. */
+  std::shared_ptr<const std::pair<std::vector<std::uint8_t>, std::int64_t>> last_obstacles;
   decision_t decision{};         ///< Zeros if it was read from a decision's document.
   candidate_plan_t candidate{};  ///< Zeros likewise.
 };

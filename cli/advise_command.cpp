@@ -9,17 +9,18 @@
 
 #include "advise/advice.h"
 #include "certifier/certify/explain.h"
-#include "certifier/gate/gate.h"
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/json_text.h"
 #include "cli/abstentions.h"
 #include "cli/commands.h"
+#include "cli/gate_advice.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
+#include "planner_bridge/motion.h"
 
 namespace forereach {
 namespace {
@@ -32,62 +33,6 @@ struct Options {
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
-constexpr double kHourMs = 3'600'000;  // the most that these keys take
-
-// The key of the gate that would have let a candidate in, and the value that it needs at least or at most.
-struct Setting {
-  std::string key;
-  double value;  // ms
-  std::string what;
-  bool turns;  // a gate with this value gives another answer
-};
-
-std::optional<Setting> SettingFor(const RecordedAbstention& abstention) {
-  const decision_t& decision = abstention.decision;
-  const candidate_plan_t& candidate = abstention.candidate;
-  if (!abstention.task || decision.utime == 0) return std::nullopt;
-  // In doubles: a log may hold any stamps, and those of this age are exact.
-  const auto ms = [](std::int64_t from, std::int64_t to) {
-    return (static_cast<double>(to) - static_cast<double>(from)) / 1e3;
-  };
-  const auto checked = [&](const std::string& key, double GateOptions::*member, double value,
-                           const std::string& what) -> std::optional<Setting> {
-    if (!(0 < value && value <= kHourMs)) return std::nullopt;
-    Config changed = *abstention.task;
-    changed.gate.*member = value;
-    const std::int16_t cause = Gate(changed).Decide(Encode(candidate), decision.utime).decision.cause;
-    return Setting{key, value, what, cause != decision.cause};
-  };
-  const double until_start = ms(decision.utime, candidate.start_utime);
-  switch (decision.cause) {
-    case decision_t::CAUSE_STALE: {
-      const double age = ms(candidate.utime, decision.utime);
-      return checked("gate.max_age_ms", &GateOptions::max_age_ms, age,
-                     "with gate.max_age_ms of at least " + RoundedUp(age));
-    }
-    case decision_t::CAUSE_FUTURE:
-      if (candidate.utime > decision.utime) {
-        const double ahead = ms(decision.utime, candidate.utime);
-        return checked("gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
-                       "with gate.max_ahead_ms of at least " + RoundedUp(ahead) +
-                           ", if the sender's clock is right and not this one");
-      }
-      return checked("gate.certificate_lifetime_ms", &GateOptions::certificate_lifetime_ms, until_start,
-                     "with gate.certificate_lifetime_ms of at least " + RoundedUp(until_start));
-    case decision_t::CAUSE_DEADLINE:
-      return checked("gate.decision_budget_ms", &GateOptions::decision_budget_ms, until_start,
-                     "with gate.decision_budget_ms of at most " + RoundedDown(until_start) + ", or sent " +
-                         RoundedUp(abstention.task->gate.decision_budget_ms - until_start) + " ms earlier");
-    case decision_t::CAUSE_OVERRUN: {
-      const double taken = decision.elapsed_us / 1e3;
-      return Setting{"gate.decision_budget_ms", taken,
-                     "with gate.decision_budget_ms of at least " + RoundedUp(taken) + ", if it takes no longer then",
-                     false};
-    }
-    default: return std::nullopt;
-  }
-}
-
 struct Advised {
   std::vector<Advice> advices;
   std::optional<Setting> setting;
@@ -98,13 +43,30 @@ struct Advised {
   }
 };
 
-Advised AdviceFor(const RecordedAbstention& abstention) {
+// Those of the task's planner; none if the task does not say how its robot brakes.
+BrakingTails TailsOf(const Config& task) {
+  std::shared_ptr<const RobotMotion> motion;
+  try {
+    motion = MakeMotion(task, Braking::kPlanned);
+  } catch (const ConfigError&) {
+    return {};
+  }
+  return [motion, steps = task.planner.tail_steps](const Eigen::VectorXd& state) {
+    std::vector<Eigen::MatrixXd> tails;
+    Eigen::MatrixXd controls;
+    for (int tail = 0; tail < motion->num_tails(); ++tail)
+      if (motion->Brake({state.data(), ToSize(state.size())}, tail, steps, controls)) tails.push_back(controls);
+    return tails;
+  };
+}
+
+Advised AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails) {
   if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
   if (!abstention.judged.problem) return {{}, SettingFor(abstention), {}};
   try {
     const Certifier certifier(abstention.judged.problem);
     const Case& judged = abstention.judged;
-    Advised advised{Advise(judged, certifier), {}, {}};
+    Advised advised{Advise(judged, certifier, {.tails = tails}), {}, {}};
     Tube tube;
     const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
     if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
@@ -217,10 +179,12 @@ void PrintJson(const Abstentions& read, const std::vector<Advised>& advised) {
 int RunAdvise(const Options& options) {
   const Abstentions read = ReadAbstentions(options.files, options.config, options.key);
   std::vector<Advised> advised(read.all.size());
+  std::map<const Config*, BrakingTails> tails;
+  for (const auto& task : read.tasks) tails[task.get()] = TailsOf(*task);
   {
     Progress progress("abstentions examined", read.all.size());
     ForEachInParallel(read.all.size(), options.jobs, [&](std::size_t i, std::size_t) {
-      advised[i] = AdviceFor(read.all[i]);
+      advised[i] = AdviceFor(read.all[i], tails.at(read.all[i].task));
       progress.Advance();
     });
   }

@@ -1,6 +1,9 @@
 #include "planner_bridge/lessons.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "certifier/numerics/size.h"
 
 namespace forereach {
 
@@ -14,10 +17,39 @@ void Lessons::Learn(const Decision& decision) {
     limit_margin_[limit] += beyond;
 }
 
+bool Lessons::Heed(const advice_t& advice) {
+  bool changed = false;
+  const int count = std::clamp<int>(advice.num_changes, 0, static_cast<int>(std::size(advice.change)));
+  for (int i = 0; i < count; ++i) changed = HeedChange(advice.change[i]) || changed;
+  return changed;
+}
+
+bool Lessons::HeedChange(const advice_change_t& change) {
+  const auto is_distance = [](double value) { return std::isfinite(value) && value > 0; };
+  if (change.index < 0 || !is_distance(change.value)) return false;
+  const std::size_t index = ToSize(change.index);
+  switch (change.kind) {
+    case advice_change_t::OBSTACLE: {
+      if (obstacle_clearance_.size() <= index) obstacle_clearance_.resize(index + 1);
+      double& own = obstacle_clearance_[index];
+      own = std::max(own, clearance_) + change.value;
+      return true;
+    }
+    case advice_change_t::LIMIT:
+      if (index >= limit_margin_.size()) return false;
+      limit_margin_[index] += change.value;
+      return true;
+    case advice_change_t::DOMAIN: state_margin_[change.index] += change.value; return true;
+    default: return false;
+  }
+}
+
 Eigen::VectorXd Lessons::DomainMargin(const Eigen::VectorXd& half_width, const Eigen::MatrixXd& projection) const {
   Eigen::VectorXd margin = domain_exits_ * 2 * half_width;
   for (Eigen::Index k = 0; k < margin.size(); ++k)
     if (projection.col(k).any()) margin(k) = domain_exits_ * step_;
+  for (const auto& [k, more] : state_margin_)
+    if (k < margin.size()) margin(k) += more;
   return margin;
 }
 

@@ -289,12 +289,14 @@ class Planner::Search {
       for (const BodyPart& part : planner.problem_->body.parts)
         deviation_.push_back(Deviation(*planner.problem_->between, part));
     const Sweep::Parts body = BodyAt(x);
-    for (const Obstacle& obstacle : planner.obstacles_) {
+    for (std::size_t o = 0; o < planner.obstacles_.size(); ++o) {
+      const Obstacle& obstacle = planner.obstacles_[o];
       double distance = kInfinity;
       for (std::size_t i = 0; i < body.size(); ++i)
         distance = std::min(distance, ApproximateDistance(obstacle, body[i], body[i], schedule_, 0, 0) -
                                           (deviation_.empty() ? 0 : deviation_[i]));
-      clearances_.push_back(std::clamp(distance - kTouch, 0.0, request.clearance));
+      const double own = o < request.obstacle_clearance.size() ? request.obstacle_clearance[o] : 0;
+      clearances_.push_back(std::clamp(distance - kTouch, 0.0, std::max(request.clearance, own)));
     }
     limit_margin_ = LimitMargin(request);
     start_distance_ = field.DistanceToGo(Position(x));

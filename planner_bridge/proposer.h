@@ -26,6 +26,8 @@ struct PlanRequest {
   /** Distance to keep from the bounds of each limit of the task, in its unit, or empty for none; less if the start is
   nearer to them. */
   std::vector<double> limit_margin;
+  /** As `clearance` for single obstacles, by their index, where it is more; obstacles beyond its end have none. */
+  std::vector<double> obstacle_clearance = {};
 };
 
 struct Proposal {
