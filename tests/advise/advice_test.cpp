@@ -6,6 +6,7 @@
 #include <string>
 
 #include "certifier/certify/explain.h"
+#include "certifier/numerics/size.h"
 #include "tests/oracle/problems.h"
 #include "tests/tries.h"
 
@@ -40,6 +41,28 @@ Case AnyCase(Random& random) {
   return {problem, query.controls, query.schedule, query.initial_set, query.obstacles};
 }
 
+// Twelve steps against the speed, hard and gently.
+BrakingTails AnyTails(const Case& abstained) {
+  return [problem = abstained.problem](const Eigen::VectorXd& state) {
+    const bool bicycle = state.size() == 6;
+    const Box& input = problem->domain.input;
+    std::vector<Eigen::MatrixXd> tails;
+    for (const double gain : {1.0, 0.3}) {
+      Eigen::MatrixXd& tail = tails.emplace_back(input.dim(), 12);
+      Eigen::VectorXd x = state, z(problem->model->num_variables()), next(state.size());
+      for (Eigen::Index t = 0; t < tail.cols(); ++t) {
+        const Eigen::Vector2d wanted =
+            bicycle ? Eigen::Vector2d(-4 * (x[4] + gain * x[3]), 0) : Eigen::Vector2d(-gain / 0.15 * x.tail(2));
+        tail.col(t) = wanted.cwiseMax(input.lower()).cwiseMin(input.upper());
+        z << x, tail.col(t);
+        problem->model->Evaluate({z.data(), ToSize(z.size())}, {next.data(), ToSize(next.size())});
+        x = next;
+      }
+    }
+    return tails;
+  };
+}
+
 Decision Fresh(const Case& judged, std::string* sentence = nullptr) {
   const Certifier certifier(judged.problem);
   Tube tube;
@@ -52,8 +75,13 @@ Decision Fresh(const Case& judged, std::string* sentence = nullptr) {
 // That nothing else was changed.
 void ExpectOnly(Change change, const Case& before, const Case& after) {
   const Problem &was = *before.problem, &is = *after.problem;
-  EXPECT_EQ(before.controls.cols() == after.controls.cols(), change != Change::kHorizon);
-  EXPECT_EQ(after.controls, before.controls.leftCols(after.controls.cols()));
+  if (change == Change::kTail) {
+    EXPECT_LT(after.progress_steps, before.progress_steps < 0 ? before.controls.cols() : before.progress_steps);
+    EXPECT_EQ(after.controls.leftCols(after.progress_steps), before.controls.leftCols(after.progress_steps));
+  } else {
+    EXPECT_EQ(before.controls.cols() == after.controls.cols(), change != Change::kHorizon);
+    EXPECT_EQ(after.controls, before.controls.leftCols(after.controls.cols()));
+  }
   EXPECT_EQ(after.initial_set.CenterVector(), before.initial_set.CenterVector());
   if (change != Change::kInitialSet)
     EXPECT_EQ(after.initial_set.GeneratorMatrix(), before.initial_set.GeneratorMatrix());
@@ -91,11 +119,13 @@ TEST(Advise, EveryAdviceDoesWhatItSays) {
   const int wanted = Tries(1000);
   std::map<std::string, int> abstentions, turned;
   int count = 0, advices = 0;
+  std::ptrdiff_t tails = 0;
   for (int trial = 0; count < wanted; ++trial) {
     SCOPED_TRACE(trial);
     const Case abstained = AnyCase(random);
     const Decision decision = Fresh(abstained);
-    const std::vector<Advice> given = Advise(abstained, Certifier(abstained.problem), 4);
+    const std::vector<Advice> given = Advise(
+        abstained, Certifier(abstained.problem), {.most_observations = 4, .tails = AnyTails(abstained)});
     if (decision.outcome == Outcome::kCertified) {
       EXPECT_TRUE(given.empty());
       continue;
@@ -118,11 +148,13 @@ TEST(Advise, EveryAdviceDoesWhatItSays) {
     }
     EXPECT_TRUE(std::ranges::is_partitioned(given, &Advice::turns));
     turned[CauseOf(decision)] += std::ranges::any_of(given, &Advice::turns);
+    tails += std::ranges::count(given, Change::kTail, &Advice::change);
     if (testing::Test::HasFailure()) return;
   }
   for (const auto& [cause, number] : abstentions)
     std::cout << cause << ": " << number << " abstentions, " << turned[cause] << " with a change that turns them\n";
-  std::cout << advices << " advices\n";
+  std::cout << advices << " advices, " << tails << " of them tails\n";
+  EXPECT_GT(tails, wanted / 50);
   for (const char* cause : {"F", "domain", "obstacle", "rest", "limit"})
     EXPECT_GT(abstentions[cause], wanted / 50) << cause;
   for (const char* cause : {"domain", "obstacle", "rest", "limit"})
