@@ -123,7 +123,8 @@ class Widening {
   [[nodiscard]] std::string HowMuch(double more, int index) const {
     const bool has_slopes =
         index < declaration_.lipschitz.cols() && (declaration_.lipschitz.col(index).array() != 0).any();
-    return " (by " + RoundedUp(more, 4) + (has_slopes ? ", with the slopes in it" : ", still without a slope in it") + ")";
+    return " (by " + RoundedUp(more, 4) + (has_slopes ? ", with the slopes in it" : ", still without a slope in it") +
+           ")";
   }
 
   void SetRange(int index, bool is_lower, double value) {
@@ -260,8 +261,8 @@ class Adviser {
       const double distance = way.shift.norm();
       farthest = std::max(farthest, distance);
       what += (what.empty() ? "" : ", ") + ("obstacle " + std::to_string(way.obstacle)) + " by " +
-              RoundedUp(distance, 4) + " m, to the side of " + Text(way.shift / distance) +
-              " (first touched at step " + std::to_string(way.step) + ")";
+              RoundedUp(distance, 4) + " m, to the side of " + Text(way.shift / distance) + " (first touched at step " +
+              std::to_string(way.step) + ")";
     }
     Add({.change = Change::kObstacles,
          .what = "if it passed farther away, or these stood farther away: " + what,
@@ -379,7 +380,8 @@ class Adviser {
   // The progress part cut off earlier and earlier, each time with the tails that its nominal end asks for.
   void AdviseTail(const BrakingTails& tails) {
     const Eigen::Index most = kMaxSteps, steps = case_.controls.cols();
-    const Eigen::Index progress = case_.progress_steps < 0 ? steps : std::min<Eigen::Index>(case_.progress_steps, steps);
+    const Eigen::Index progress =
+        case_.progress_steps < 0 ? steps : std::min<Eigen::Index>(case_.progress_steps, steps);
     if (progress == 0) return;
     const std::vector<Eigen::VectorXd> nominal = NominalStates(progress - 1);
     for (Eigen::Index begin = std::ssize(nominal) - 1; begin >= 0; --begin)

@@ -39,8 +39,9 @@ struct Advice {
   it stays true. */
   std::string what;
   /** The size of the change. kObstacles: the largest distance, m. kInitialSet, kSlopes: the factor. kHorizon: the
-  number of steps. kTail: the step at which it begins. kObservation: the number of outcomes that were tried. kDomain, kRest, kLimits: the number of bounds.
-  kLargerSlopes: the largest factor. kNoise: the largest addition, in the state's unit. kOutlier: the observation. */
+  number of steps. kTail: the step at which it begins. kObservation: the number of outcomes that were tried. kDomain,
+  kRest, kLimits: the number of bounds. kLargerSlopes: the largest factor. kNoise: the largest addition, in the state's
+  unit. kOutlier: the observation. */
   double amount = 0;
   int row = -1, column = -1;   ///< kSlopes: the entry of L; -1: all of them.
   Eigen::VectorXd place = {};  ///< kObservation: z.

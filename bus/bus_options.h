@@ -31,10 +31,10 @@ struct BusOptions {
 
   /** The role that speaks on each channel where there are keys. */
   [[nodiscard]] Speakers speakers() const {
-    return {{decision, Role::kCertifier},   {certified, Role::kCertifier}, {status, Role::kCertifier},
-            {fault, Role::kCertifier},      {withdrawn, Role::kCertifier}, {advice, Role::kCertifier},
-            {candidate, Role::kPlanner},    {obstacles, Role::kPerception}, {robot_state, Role::kRobot},
-            {transition, Role::kRobot},     {event, Role::kRobot},         {command, Role::kOperator},
+    return {{decision, Role::kCertifier},  {certified, Role::kCertifier},  {status, Role::kCertifier},
+            {fault, Role::kCertifier},     {withdrawn, Role::kCertifier},  {advice, Role::kCertifier},
+            {candidate, Role::kPlanner},   {obstacles, Role::kPerception}, {robot_state, Role::kRobot},
+            {transition, Role::kRobot},    {event, Role::kRobot},          {command, Role::kOperator},
             {logger_status, Role::kLogger}};
   }
 

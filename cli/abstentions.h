@@ -22,7 +22,7 @@ struct RecordedAbstention {
   const Config* task = nullptr;
   /** What it was judged by. No problem: it was answered without a judgement. */
   Case judged;
-  std::string missing;           ///< Why it cannot be judged again; empty if it can, or was never judged.
+  std::string missing;  ///< Why it cannot be judged again; empty if it can, or was never judged.
   /** How many candidates of the log waited when it was answered, with itself. */
   std::size_t waiting = 0;
   /** The last message on the channel of obstacles before the answer, and when it arrived; null if there was none. */

@@ -58,9 +58,9 @@ class TimeAdvice final {
 
   [[nodiscard]] std::optional<Setting> Ahead() const {
     const double ahead = Ms(decision().utime, candidate().utime);
-    return Tried("gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
-                 "with gate.max_ahead_ms of at least " + RoundedUp(ahead) +
-                     ", if the sender's clock is right and not this one");
+    return Tried(
+        "gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
+        "with gate.max_ahead_ms of at least " + RoundedUp(ahead) + ", if the sender's clock is right and not this one");
   }
 
   [[nodiscard]] std::optional<Setting> StartsLate() const {
@@ -78,9 +78,8 @@ class TimeAdvice final {
     candidate_plan_t later = candidate();
     later.start_utime += static_cast<std::int64_t>(std::ceil(steps * period * 1e3));
     return Setting{"planner.lead_steps", abstention_.task->planner.lead_steps + steps,
-                   "with planner.lead_steps of at least " +
-                       RoundedUp(abstention_.task->planner.lead_steps + steps) + ", or sent " + RoundedUp(needs) +
-                       " ms earlier",
+                   "with planner.lead_steps of at least " + RoundedUp(abstention_.task->planner.lead_steps + steps) +
+                       ", or sent " + RoundedUp(needs) + " ms earlier",
                    IsAnsweredOtherwise(*abstention_.task, later)};
   }
 
@@ -103,7 +102,8 @@ class TimeAdvice final {
     const std::size_t waiting = abstention_.waiting;
     if (waiting <= static_cast<std::size_t>(gate().queue) || waiting > kLongestQueue) return std::nullopt;
     return Setting{"gate.queue", static_cast<double>(waiting),
-                   "with gate.queue of at least " + std::to_string(waiting) + ", if the log has every candidate", false};
+                   "with gate.queue of at least " + std::to_string(waiting) + ", if the log has every candidate",
+                   false};
   }
 
   // Tried with the rules of the obstacles in force, and the last message before.

@@ -41,8 +41,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
-  if (config_.gate.advises)
-    bus.Subscribe(config_.bus.advice, [this](const Received& received) { OnAdvice(received); });
+  if (config_.gate.advises) bus.Subscribe(config_.bus.advice, [this](const Received& received) { OnAdvice(received); });
   bus.Subscribe(config_.bus.withdrawn, [this](const Received& received) { OnWithdrawn(received); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
 }

@@ -10,8 +10,8 @@ start. A round sends one candidate at a time and waits for its decision:
  - abstention D: the next candidate keeps further inside the domain's bounds (a policy's candidate follows another
    reference instead, policy_proposer.h);
  - abstention F: the round ends, because no candidate can be certified;
- - With gate.advice, after an abstention S or D, it waits twice gate.decision_budget_ms for the certifier's advice on this
-   candidate. If it comes, the next candidate gives way as it says, and not by the rules above;
+ - With gate.advice, after an abstention S or D, it waits twice gate.decision_budget_ms for the certifier's advice on
+this candidate. If it comes, the next candidate gives way as it says, and not by the rules above;
  - rejected: the next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has
    latched a fault;
  - abstained, no time: the next candidate.
@@ -78,7 +78,7 @@ class PlannerNode final : public Node {
     Lessons lessons;
     bool stops = false;  // a stopping round
     int searches = 0;
-    std::int64_t awaited_plan = -1;  // the plan whose decision is outstanding, -1 if none
+    std::int64_t awaited_plan = -1;            // the plan whose decision is outstanding, -1 if none
     std::optional<decision_t> unadvised = {};  // the abstention whose advice is outstanding
     std::int64_t advice_until = 0;
   };

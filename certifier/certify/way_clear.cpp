@@ -29,10 +29,9 @@ class Search final {
     std::optional<double> least;
     Eigen::VectorXd shift;
     for (const Eigen::VectorXd& direction : DirectionsAway(obstacle, touch.step)) {
-      const auto amount =
-          LeastFrom(depth, least.value_or(kFarthest * depth), effort_.halvings, [&](double distance) {
-            return GoesOn() && !Touch(Shifted(obstacle, distance * direction));
-          });
+      const auto amount = LeastFrom(depth, least.value_or(kFarthest * depth), effort_.halvings, [&](double distance) {
+        return GoesOn() && !Touch(Shifted(obstacle, distance * direction));
+      });
       if (!goes_on_) return std::nullopt;
       if (!amount || (least && *amount >= *least)) continue;
       least = amount;

@@ -27,8 +27,8 @@ struct SearchEffort {
   std::function<bool()> goes_on = [] { return true; };
 };
 
-/** For each obstacle that a tube may touch, moved by itself: the least shift away from the body, along an axis or, for a
-half-space, along its normal. Nothing if one of them has none, or if the search was ended.
+/** For each obstacle that a tube may touch, moved by itself: the least shift away from the body, along an axis or, for
+a half-space, along its normal. Nothing if one of them has none, or if the search was ended.
 @param tube that `certifier` has made of this plan; its scratch memory is used. Cost: some dozen calls of JudgeSafety
 with one obstacle, for each obstacle that is touched. */
 [[nodiscard]] std::optional<std::vector<GivingWay>> FindWayClear(const Certifier& certifier, const Plan& plan,

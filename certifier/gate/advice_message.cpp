@@ -42,8 +42,7 @@ std::vector<advice_change_t> ChangesForObstacles(const Abstained& abstained, Tub
   std::vector<advice_change_t> changes;
   for (const GivingWay& way : *ways) {
     const double distance = way.shift.norm();
-    advice_change_t& change =
-        changes.emplace_back(Change(advice_change_t::OBSTACLE, way.step, way.obstacle, distance));
+    advice_change_t& change = changes.emplace_back(Change(advice_change_t::OBSTACLE, way.step, way.obstacle, distance));
     const double middle = DistanceOfMiddle(abstained, tube, abstained.obstacles[ToSize(way.obstacle)], way.step);
     if (std::isfinite(middle)) change.clearance = middle + distance;
     for (Eigen::Index k = 0; k < way.shift.size(); ++k) change.direction[k] = -way.shift[k] / distance;

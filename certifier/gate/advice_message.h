@@ -25,9 +25,9 @@ struct Abstained {
 inline constexpr std::size_t kMaxAdviceChanges = std::extent_v<decltype(advice_t::change)>;
 
 /** The changes, kMaxAdviceChanges at most:
-- S by obstacles: one OBSTACLE for each of the first of them that the tube may touch, in the order of the steps, each with
-  the least distance to give way. They are verified by certifying the candidate once more with all these obstacles
-  farther away.
+- S by obstacles: one OBSTACLE for each of the first of them that the tube may touch, in the order of the steps, each
+with the least distance to give way. They are verified by certifying the candidate once more with all these obstacles
+farther away.
 - S by limits: one LIMIT for each limit that the tube may exceed at some sample, with the most that it may exceed it.
 - D by a state or an input that leaves its range: one DOMAIN, with how far the slice reaches beyond it.
 Limits and domain are not verified: that the room is there is necessary, and the plan's later steps may need more.

@@ -26,8 +26,8 @@ class AdviceGiver final {
   [[nodiscard]] bool has_work() const { return abstained_.has_value(); }
 
   /** The advice, complete but for its utime; nothing if the search ended without one. Then there is no work any more.
-  It takes as long as two decisions and a test of one obstacle after `is_wanted_elsewhere` became true, at most, and else
-  not longer than that after gate.decision_budget_ms. */
+  It takes as long as two decisions and a test of one obstacle after `is_wanted_elsewhere` became true, at most, and
+  else not longer than that after gate.decision_budget_ms. */
   [[nodiscard]] std::optional<advice_t> Give(Gate& gate, const std::function<bool()>& is_wanted_elsewhere);
 
  private:

@@ -124,8 +124,8 @@ TEST(Advise, EveryAdviceDoesWhatItSays) {
     SCOPED_TRACE(trial);
     const Case abstained = AnyCase(random);
     const Decision decision = Fresh(abstained);
-    const std::vector<Advice> given = Advise(
-        abstained, Certifier(abstained.problem), {.most_observations = 4, .tails = AnyTails(abstained)});
+    const std::vector<Advice> given =
+        Advise(abstained, Certifier(abstained.problem), {.most_observations = 4, .tails = AnyTails(abstained)});
     if (decision.outcome == Outcome::kCertified) {
       EXPECT_TRUE(given.empty());
       continue;

@@ -136,13 +136,11 @@ class SignedChannelsTest : public testing::TestWithParam<std::string> {
 };
 
 const std::map<std::string, Role> kSpeakers{
-    {"PLAN_CANDIDATE", Role::kPlanner},   {"PLAN_DECISION", Role::kCertifier},
-    {"PLAN_CERTIFIED", Role::kCertifier}, {"PLAN_WITHDRAWN", Role::kCertifier},
-    {"PLAN_ADVICE", Role::kCertifier},
-    {"ROBOT_STATE", Role::kRobot},        {"OBSTACLES", Role::kPerception},
-    {"TRANSITION", Role::kRobot},         {"CERTIFIER_STATUS", Role::kCertifier},
-    {"EXECUTION_EVENT", Role::kRobot},    {"LOGGER_STATUS", Role::kLogger},
-    {"FAULT", Role::kCertifier},          {"COMMAND", Role::kOperator}};
+    {"PLAN_CANDIDATE", Role::kPlanner},   {"PLAN_DECISION", Role::kCertifier}, {"PLAN_CERTIFIED", Role::kCertifier},
+    {"PLAN_WITHDRAWN", Role::kCertifier}, {"PLAN_ADVICE", Role::kCertifier},   {"ROBOT_STATE", Role::kRobot},
+    {"OBSTACLES", Role::kPerception},     {"TRANSITION", Role::kRobot},        {"CERTIFIER_STATUS", Role::kCertifier},
+    {"EXECUTION_EVENT", Role::kRobot},    {"LOGGER_STATUS", Role::kLogger},    {"FAULT", Role::kCertifier},
+    {"COMMAND", Role::kOperator}};
 
 Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
   if (channel == "PLAN_CANDIDATE")
