@@ -1,5 +1,8 @@
 #include "cli/abstentions.h"
 
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
 #include <map>
 #include <span>
 #include <stdexcept>
@@ -12,8 +15,10 @@
 #include "certifier/task/json_field.h"
 #include "certifier/task/json_text.h"
 #include "lcmtypes/names.h"
+#include "records/database.h"
 #include "records/decision_json.h"
 #include "records/decision_record.h"
+#include "records/log_directory.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/timeline.h"
@@ -87,7 +92,7 @@ class AbstentionReader final : public TimelineUser {
     abstention.task = recorded.basis.task;
     abstention.decision = decision;
     abstention.waiting = waiting;
-    abstention.last_obstacles = last_obstacles_;
+    if (decision.cause == decision_t::CAUSE_NO_OBSTACLES) abstention.last_obstacles = last_obstacles_;
     if (!recorded.candidate) {
       abstention.missing = "its candidate is not in the log";
       return;
@@ -127,7 +132,8 @@ class AbstentionReader final : public TimelineUser {
     judged.progress_steps = candidate->progress_steps;
   }
 
-  Abstentions Finish(const Timeline& timeline, std::vector<std::shared_ptr<const Config>> tasks) {
+  // Adds what was collected.
+  void Finish(const Timeline& timeline, Abstentions& all) {
     std::map<std::tuple<const Config*, std::size_t, std::size_t>, std::shared_ptr<const Problem>> problems;
     for (std::size_t i = 0; i < all_.size(); ++i) {
       const Basis& basis = bases_[i];
@@ -139,7 +145,10 @@ class AbstentionReader final : public TimelineUser {
                                   .subspan(basis.learned_begin, basis.learned_end - basis.learned_begin));
       all_[i].judged.problem = problem;
     }
-    return {std::move(tasks), std::move(all_), certified_, timeline.passed_over()};
+    std::ranges::move(all_, std::back_inserter(all.all));
+    all.certified += certified_;
+    all.passed_over.undecodable += timeline.passed_over().undecodable;
+    all.passed_over.not_authentic += timeline.passed_over().not_authentic;
   }
 
  private:
@@ -153,20 +162,83 @@ class AbstentionReader final : public TimelineUser {
   std::int64_t certified_ = 0;
 };
 
+using Logs = std::vector<std::string>;
+
+// The logs of each run that a database lists, beside it. Notes those that are missing.
+std::vector<Logs> RunsOf(const std::string& database, std::vector<std::string>& missing) {
+  std::vector<Logs> runs;
+  std::string before;
+  for (const RunRow& row : Database(database).Runs()) {
+    if (row.continues.empty() || row.continues != before || runs.empty()) runs.emplace_back();
+    before = row.log_file;
+    const std::string log = (std::filesystem::path(database).parent_path() / row.log_file).string();
+    if (std::filesystem::exists(log))
+      runs.back().push_back(log);
+    else
+      missing.push_back(row.log_file +
+                        (row.log_deleted_utime ? " was deleted for the quota" : " is not in the database's directory"));
+  }
+  std::erase_if(runs, [](const Logs& logs) { return logs.empty(); });
+  return runs;
+}
+
+// Of logs, a database, or the directory of either.
+std::vector<Logs> RunsOf(const std::vector<std::string>& files, std::vector<std::string>& missing) {
+  if (files.size() != 1) return {files};
+  const FileKind kind = KindOf(files[0]);
+  if (kind == FileKind::kDatabase) return RunsOf(files[0], missing);
+  if (kind != FileKind::kDirectory) return {files};
+  const LogDirectory directory(files[0]);
+  const std::string database = directory.PathOf(LogDirectory::kDatabase);
+  if (std::filesystem::exists(database)) return RunsOf(database, missing);
+  Logs logs;
+  for (const std::string& log : directory.Logs()) logs.push_back(directory.PathOf(log));
+  if (logs.empty()) throw ConfigError(files[0] + ": neither a decision database nor logs in this directory");
+  return {logs};
+}
+
+// Adds what a run has. Runs of the same task share it.
+void AddRun(const Logs& logs, std::vector<Config> tasks, bool names_files, Abstentions& all) {
+  std::vector<const Config*> pointers;
+  for (Config& task : tasks) {
+    auto known = std::ranges::find_if(all.tasks, [&](const auto& each) { return each->grounds == task.grounds; });
+    if (known == all.tasks.end()) {
+      all.tasks.push_back(std::make_shared<const Config>(std::move(task)));
+      known = std::prev(all.tasks.end());
+    }
+    pointers.push_back(known->get());
+  }
+  AbstentionReader reader(pointers.front()->bus);
+  Timeline timeline(pointers, reader);
+  timeline.Read(logs, names_files);
+  reader.Finish(timeline, all);
+}
+
 }  // namespace
 
 Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config, const LogKey& key) {
   if (files.size() == 1 && KindOf(files[0]) == FileKind::kJson) return FromDecision(files[0], config);
-  std::vector<std::shared_ptr<const Config>> tasks;
-  std::vector<const Config*> pointers;
-  for (Config& task : TasksOf(files, config, key)) {
-    tasks.push_back(std::make_shared<const Config>(std::move(task)));
-    pointers.push_back(tasks.back().get());
+  Abstentions all;
+  const std::vector<Logs> runs = RunsOf(files, all.missing);
+  const bool is_many = runs.size() > 1 || runs != std::vector{files};
+  for (const Logs& logs : runs) {
+    if (!is_many) {
+      AddRun(logs, TasksOf(logs, config, key), logs.size() > 1, all);
+      continue;
+    }
+    try {  // what one run lacks does not stop the others
+      const LogSurvey survey = Survey(logs, LogOrder::kAny);
+      if (survey.order.empty()) continue;
+      std::vector<Config> tasks =
+          TasksOf(survey, logs.front(), std::filesystem::path(logs.front()).parent_path().string(), config);
+      key.Override(tasks, config);
+      AddRun(logs, std::move(tasks), true, all);
+    } catch (const BadInput& error) {
+      all.missing.emplace_back(error.what());
+    }
   }
-  AbstentionReader reader(tasks.front()->bus);
-  Timeline timeline(pointers, reader);
-  timeline.Read(files, files.size() > 1);
-  return reader.Finish(timeline, std::move(tasks));
+  if (all.tasks.empty()) throw ConfigError(files[0] + ": " + (all.missing.empty() ? "no decisions" : all.missing[0]));
+  return all;
 }
 
 }  // namespace forereach

@@ -36,9 +36,11 @@ struct Abstentions {
   std::vector<RecordedAbstention> all;  ///< Abstentions and rejections, in the order of the log.
   std::int64_t certified = 0;
   PassedOver passed_over{};
+  std::vector<std::string> missing{};  ///< Logs and runs that could not be read, with the reason.
 };
 
-/** Reads a decision's document, or consecutive event logs of one run.
+/** Reads a decision's document; consecutive event logs of one run; a decision database, with the logs beside it; or the
+directory of a logger. Of a database, what one run lacks does not stop the others.
 @param config the task file; empty: the one that the document names, or that the logger kept next to the logs.
 @throws BadInput as ReadAllCertificates does; ConfigError with file and field for a document that is no decision. */
 [[nodiscard]] Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config,

@@ -132,6 +132,7 @@ void PrintForPeople(const Abstentions& read, const std::vector<Advised>& advised
       if (advice.turns) kinds.insert(advice.change);
     for (const Change change : kinds) ++by_change[Name(change)];
   }
+  for (const std::string& missing : read.missing) std::cout << Printable(missing) << "\n";
   std::cout << "advise: " << read.all.size() << " abstentions and rejections, " << turned
             << " have a change that turns them, verified by certifying again; " << read.certified << " were certified"
             << DescribePassedOver(read.passed_over) << "\n";
@@ -172,6 +173,7 @@ void PrintJson(const Abstentions& read, const std::vector<Advised>& advised) {
   std::cout << JsonText({{"abstentions", all},
                          {"certified", read.certified},
                          {"places", places},
+                         {"missing", read.missing},
                          {"passed_over", ToJson(read.passed_over)}})
             << std::endl;
 }
@@ -189,7 +191,7 @@ int RunAdvise(const Options& options) {
     });
   }
   options.json ? PrintJson(read, advised) : PrintForPeople(read, advised);
-  return std::ranges::all_of(advised, &Advised::turned) ? 0 : 1;
+  return read.missing.empty() && std::ranges::all_of(advised, &Advised::turned) ? 0 : 1;
 }
 
 }  // namespace
@@ -207,11 +209,12 @@ Command AdviseCommand() {
           "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_safety.csv > "
           "decision.json\n"
           "  forereach advise decision.json\n"
-          "  forereach advise run/log/events-20260101-120000-000000.lcmlog",
+          "  forereach advise run/log/events-20260101-120000-000000.lcmlog\n"
+          "  forereach advise run/log",
       .options = {Required(
-                      {"files", &options->files, "DECISION|LOG",
-                       "The abstentions: a decision (the output of certify --json), or the event logs of a run, in "
-                       "their order"}),
+                      {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
+                       "The abstentions: a decision (the output of certify --json); the event logs of a run, in their "
+                       "order; a decision database with the logs beside it; or the directory of both"}),
                   {"--config", &options->config, "FILE", kTaskOfRecords},
                   JobsOption(options->jobs),
                   JsonFlag(options->json)},

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "certifier/gate/advice_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/task/json_text.h"
@@ -289,9 +290,7 @@ void PlannerNode::Learn(const decision_t& decision, std::int64_t now_us) {
     return EndRound(false);
   round_->unadvised = decision;
   round_->advice_until = now_us;
-  const bool is_advised =
-      decision.outcome == decision_t::ABSTAIN_SAFETY || decision.outcome == decision_t::ABSTAIN_DOMAIN;
-  if (config_.gate.advises && is_advised && !round_->stops)
+  if (config_.gate.advises && IsAdvisedOn(decision.cause) && !round_->stops)
     round_->advice_until += 2 * Microseconds(config_.gate.decision_budget_ms);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -23,6 +24,12 @@ struct Abstained {
 
 /** The most changes in one message. */
 inline constexpr std::size_t kMaxAdviceChanges = std::extent_v<decltype(advice_t::change)>;
+
+/** Whether there may be advice on a decision of this cause, as in decision_t. */
+[[nodiscard]] constexpr bool IsAdvisedOn(std::int16_t cause) {
+  return cause == static_cast<int>(Cause::kObstacle) || cause == static_cast<int>(Cause::kLimit) ||
+         cause == static_cast<int>(Cause::kDomainExit);
+}
 
 /** The changes, kMaxAdviceChanges at most:
 - S by obstacles: one OBSTACLE for each of the first of them that the tube may touch, in the order of the steps, each

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "certifier/gate/advice_message.h"
 #include "certifier/gate/stamp.h"
 
 namespace forereach {
@@ -13,8 +14,7 @@ constexpr int kHalvings = 4;  // a plan that gives way by a sixteenth too much i
 
 void AdviceGiver::Note(Bytes candidate, const decision_t& decision, const GateOptions& options) {
   abstained_.reset();
-  if (!options.advises) return;
-  if (decision.outcome != decision_t::ABSTAIN_SAFETY && decision.outcome != decision_t::ABSTAIN_DOMAIN) return;
+  if (!options.advises || !IsAdvisedOn(decision.cause)) return;
   if (auto decoded = Decoded<candidate_plan_t>(candidate)) abstained_ = {*decoded, decision};
 }
 
