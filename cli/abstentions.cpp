@@ -220,7 +220,7 @@ Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::st
   if (files.size() == 1 && KindOf(files[0]) == FileKind::kJson) return FromDecision(files[0], config);
   Abstentions all;
   const std::vector<Logs> runs = RunsOf(files, all.missing);
-  const bool is_many = runs.size() > 1 || runs != std::vector{files};
+  const bool is_many = runs.size() != 1 || runs.front() != files;
   for (const Logs& logs : runs) {
     if (!is_many) {
       AddRun(logs, TasksOf(logs, config, key), logs.size() > 1, all);
