@@ -13,6 +13,7 @@
 #include "certifier/sets/zonogon.h"
 #include "certifier/task/json_text.h"
 #include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/execution_event_t.hpp"
 #include "forereach/fault_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "lcmtypes/names.h"
@@ -372,12 +373,13 @@ Json Watcher::DecisionJson(const Decided& decided, bool is_drawn) {
     detail.missing = IsJudged(decided.decision) ? "more was decided at this time than this page draws"
                                                 : "it was answered without a tube";
   if (decided.decision.outcome == decision_t::CERTIFIED && !detail.missing.empty()) DrawBoxes(decided, detail);
-  if (detail.sketch.points.size() > kNumbersOfATube) {
-    detail.sketch = {};
+  if (detail.sketch.points.size() + detail.bodies.points.size() > kNumbersOfATube) {
+    detail.sketch = detail.bodies = {};
     detail.missing = "its tube has too many corners for this page";
   }
   json["detail"] = ToJson(detail);
   json["detail"].update(SketchJson(detail.sketch));
+  json["detail"]["body"] = SketchJson(detail.bodies);
   json["detail"]["set"] = is_drawn && !detail.sketch.parts.empty() ? ToJson(*decided.obstacles) : Json::array();
   return json;
 }

@@ -53,6 +53,10 @@ Json ToJson(const PageDetail& detail) {
           {"hull", {detail.hull_lower, detail.hull_upper}},
           {"envelope", {detail.envelope_lower, detail.envelope_upper}},
           {"executed", std::move(executed)},
+          {"nearest", detail.nearest},
+          {"nearest_distance", detail.nearest_distance},
+          {"body_units", detail.bodies.parts.size()},
+          {"body_grid", {detail.bodies.x, detail.bodies.y, detail.bodies.quantum}},
           {"units", detail.sketch.parts.size()},
           {"grid", {detail.sketch.x, detail.sketch.y, detail.sketch.quantum}}};
 }

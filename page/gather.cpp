@@ -223,8 +223,8 @@ class DetailMaker final : public TimelineUser {
     static_cast<void>(CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads, describe));
     for (const Pending* each : asked) {
       PageDetail& detail = run_.details[each->place];
-      if (TakeRoom(detail.sketch.points.size())) continue;
-      detail.sketch = {};
+      if (TakeRoom(detail.sketch.points.size() + detail.bodies.points.size())) continue;
+      detail.sketch = detail.bodies = {};
       detail.missing = kFull;
     }
     pending_.clear();

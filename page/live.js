@@ -117,6 +117,8 @@ const showOthers = () => {
 
 // ---- The drawing: around the robot now, or a decision that was chosen.
 const unitsOfDecision = ({detail}) => unitsOf(detail, {...detail, at: {part: 0, polygon: 0, point: 0}});
+const bodiesOfDecision = ({detail}) =>
+  unitsOf(detail.body, {units: detail.body_units, grid: detail.body_grid, at: {part: 0, polygon: 0, point: 0}});
 const hasTube = (decision) => decision?.detail.units > 0;
 const newest = (passes) => state.decisions.findLast((decision) => hasTube(decision) && passes(decision));
 
@@ -135,7 +137,7 @@ const choose = (decision) => {
   byId('shows').textContent = `Decision of ${clockText(decision.utime)}: ${decision.message}`;
   if (decision.detail.missing) byId('missing').textContent = `${hasTube(decision) ? 'Drawn are' : 'No drawing'}: ${decision.detail.missing}.`;
   if (!hasTube(decision)) return;
-  drawTube({units: unitsOfDecision(decision), detail: decision.detail, outcome: decision.outcome, set: decision.detail.set,
+  drawTube({units: unitsOfDecision(decision), bodies: bodiesOfDecision(decision), detail: decision.detail, outcome: decision.outcome, set: decision.detail.set,
     binding: decision.outcome === 'rejected' ? -1 : decision.obstacle});
   showLegend(outcomeColor(decision.outcome), decision.detail);
 };

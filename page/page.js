@@ -259,7 +259,7 @@ const showTrend = (run) => {
   });
 };
 
-const showCauses = (run) => {
+const causesOf = (run) => {
   const d = run.decisions, counts = new Map();
   for (let k = 0; k < run.size; ++k) {
     const i = run.rows[k], outcome = nameAt(d.outcome, i), cause = nameAt(d.cause, i);
@@ -268,13 +268,22 @@ const showCauses = (run) => {
     ++entry.count;
     counts.set(cause, entry);
   }
+  return counts;
+};
+// Beside a run before, shares: the runs differ in length.
+const showCauses = (run, before) => {
+  const counts = causesOf(run), old = before ? causesOf(before) : new Map();
+  for (const entry of old.values()) if (!counts.has(entry.cause)) counts.set(entry.cause, {...entry, count: 0});
   const entries = [...counts.values()].sort((a, b) => b.count - a.count).slice(0, 12);
+  const value = (count, whole) => (before ? 100 * count / Math.max(whole, 1) : count);
+  const sets = [{label: 'this run', data: entries.map((e) => value(e.count, run.size)), backgroundColor: entries.map((e) => outcomeColor(e.outcome)), maxBarThickness: 22}];
+  if (before) sets.push({label: 'before', data: entries.map((e) => value(old.get(e.cause)?.count ?? 0, before.size)), backgroundColor: '#c3c8cf', maxBarThickness: 22});
   drawChart('causes', `Causes: ${entries.map((e) => `${e.cause} ${e.count}`).join(', ') || 'none'}`, {
     type: 'bar',
     data: {labels: entries.map((e) => e.cause.replaceAll('_', ' ')),
-      datasets: [{data: entries.map((e) => e.count), backgroundColor: entries.map((e) => outcomeColor(e.outcome)), maxBarThickness: 22}]},
-    options: {indexAxis: 'y', plugins: {legend: legend(false)},
-      scales: {x: axis('decisions', {beginAtZero: true}), y: axis('', {title: {display: false}, grid: {display: false}})},
+      datasets: sets},
+    options: {indexAxis: 'y', plugins: {legend: legend(Boolean(before))},
+      scales: {x: axis(before ? '% of the decisions' : 'decisions', {beginAtZero: true}), y: axis('', {title: {display: false}, grid: {display: false}})},
       onClick: (event, items) => { if (items.length) setChoice('cause', entries[items[0].index].cause); }},
   });
 };
@@ -329,7 +338,8 @@ const showTimes = (run) => {
 };
 
 const MOST_GROUPS = 8;
-const showGroups = (run, id, caption, name, label) => {
+// By text, so that groups of two runs are the same.
+const groupsOf = (run, name) => {
   const d = run.decisions, groups = new Map();
   for (let k = 0; k < run.size; ++k) {
     const i = run.rows[k], value = d[name].values[i];
@@ -338,19 +348,24 @@ const showGroups = (run, id, caption, name, label) => {
     if (nameAt(d.outcome, i) === 'certified') ++group.certified;
     groups.set(value, group);
   }
-  const key = (value) => (d[name].names ? d[name].names[value] : String(value));
+  return new Map([...groups].map(([value, group]) => [d[name].names ? d[name].names[value] : String(value), group]));
+};
+const showGroups = (run, before, id, caption, name, label) => {
+  const old = before ? groupsOf(before, name) : null, groups = groupsOf(run, name);
+  for (const key of old?.keys() ?? []) if (!groups.has(key)) groups.set(key, {count: 0, certified: 0});
   const all = [...groups].sort((a, b) => b[1].count - a[1].count);
-  const rows = all.slice(0, MOST_GROUPS).map(([value, {count, certified}]) => {
-    const button = make('button', label(key(value)));
+  const rows = all.slice(0, MOST_GROUPS).map(([key, {count, certified}]) => {
+    const button = make('button', label(key));
     button.type = 'button';
-    button.addEventListener('click', () => setChoice(name, key(value)));
+    button.addEventListener('click', () => setChoice(name, key));
     const bar = make('span', undefined, 'bar'), filled = make('i');
-    filled.style.width = `${100 * certified / count}%`;
+    filled.style.width = `${count > 0 ? 100 * certified / count : 0}%`;
     bar.append(filled);
-    return [button, counted(count), percent(certified, count), bar];
+    const then = old?.get(key);
+    return [button, counted(count), percent(certified, count), bar, ...(old ? [then ? `${percent(then.certified, then.count)} of ${counted(then.count)}` : '–'] : [])];
   });
-  if (all.length > MOST_GROUPS) rows.push([`and ${counted(all.length - MOST_GROUPS)} others`, '', '', '']);
-  fillTable(byId(id), caption, ['', 'decisions', 'certified', ''], rows, [1, 2]);
+  if (all.length > MOST_GROUPS) rows.push([`and ${counted(all.length - MOST_GROUPS)} others`, '', '', '', ...(old ? [''] : [])]);
+  fillTable(byId(id), caption, ['', 'decisions', 'certified', '', ...(old ? ['certified before'] : [])], rows, [1, 2, 4]);
 };
 
 const MOST_OTHERS = 100;
@@ -532,18 +547,25 @@ const startGrid = (run) => {
 // ---- Drawings.
 const loadDrawings = async (raw) => {
   const texts = JSON.parse(decoder.decode(await unpack(raw.texts)));
-  const {parts, corners, points} = await unpackTable({parts: raw.parts, corners: raw.corners, points: raw.points});
-  const ofRow = new Map();
-  let part = 0, polygon = 0, point = 0;
+  const [tubes, bodies] = await Promise.all([unpackTable(raw.tubes), unpackTable(raw.bodies)]);
+  const ofRow = new Map(), atTube = {part: 0, polygon: 0, point: 0}, atBody = {part: 0, polygon: 0, point: 0};
+  const skip = ({parts, corners}, at, units) => {
+    for (let u = 0; u < units; ++u)
+      for (let k = parts.values[at.part++]; k > 0; --k) at.point += 2 * corners.values[at.polygon++];
+  };
   for (const detail of texts.details) {  // where its numbers begin
-    detail.at = {part, polygon, point};
+    detail.at = {...atTube};
+    detail.body_at = {...atBody};
     detail.executed = detail.executed.filter(([, x, y]) => canBeDrawn(x, y));
-    for (let u = 0; u < detail.units; ++u)
-      for (let k = parts.values[part++]; k > 0; --k) point += 2 * corners.values[polygon++];
+    skip(tubes, atTube, detail.units);
+    skip(bodies, atBody, detail.body_units);
     ofRow.set(detail.row, detail);
   }
-  return {ofRow, sets: texts.obstacle_sets, parts: parts.values, corners: corners.values, points: points.values};
+  const valuesOf = ({parts, corners, points}) => ({parts: parts.values, corners: corners.values, points: points.values});
+  return {ofRow, sets: texts.obstacle_sets, tubes: valuesOf(tubes), bodies: valuesOf(bodies)};
 };
+const bodiesOf = (drawings, detail) =>
+  unitsOf(drawings.bodies, {units: detail.body_units, grid: detail.body_grid, at: detail.body_at});
 
 // ---- The detail of a decision.
 // The name of the coordinate that an abstention is about.
@@ -559,8 +581,9 @@ const showEnvelope = (detail, task) => {
   byId('envelope').hidden = lower.length === 0;
   if (lower.length === 0) return;
   const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 4)} … ${number(b ?? NaN, 4)}`);
-  fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual'],
-    lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k])]));
+  const nearest = (k) => (detail.nearest[k] >= 0 ? `${detail.nearest[k]}, ±${number(detail.nearest_distance[k] ?? NaN, 3)} by its distance` : '');
+  fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual', 'nearest observation'],
+    lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k]), nearest(k)]));
 };
 
 const showDetail = (run, i) => {
@@ -596,7 +619,7 @@ const showDetail = (run, i) => {
   view.scene = view.whole = null;
   if (!hasDrawing) return;
   showLegend(outcomeColor(outcome), detail);
-  drawTube({units: unitsOf(run.drawings, detail), detail, outcome, binding: outcome === 'rejected' ? -1 : d.obstacle.values[i],
+  drawTube({units: unitsOf(run.drawings.tubes, detail), bodies: bodiesOf(run.drawings, detail), detail, outcome, binding: outcome === 'rejected' ? -1 : d.obstacle.values[i],
     set: run.drawings.sets[detail.obstacles] ?? []});
 };
 
@@ -658,12 +681,12 @@ const start = async () => {
     byId('shown').textContent = `${counted(run.size)} of ${counted(run.count)} decisions`;
     showFigures(run, before);
     showTrend(run);
-    showCauses(run);
+    showCauses(run, before);
     showSteps(run);
     showTimes(run);
-    showGroups(run, 'by-source', 'By source', 'source', (name) => name || '(no name)');
-    showGroups(run, 'by-config', 'By task, with its config digest', 'config', (digest) => taskLabel(run, digest));
-    showGroups(run, 'by-obstacle', 'By the obstacle that decided', 'obstacle', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`));
+    showGroups(run, before, 'by-source', 'By source', 'source', (name) => name || '(no name)');
+    showGroups(run, before, 'by-config', 'By task, with its config digest', 'config', (digest) => taskLabel(run, digest));
+    showGroups(run, before, 'by-obstacle', 'By the obstacle that decided', 'obstacle', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`));
     showOthers(run);
     sortRows(run);
     byId('grid').scrollTop = 0;

@@ -220,7 +220,7 @@ const extentOf = (units, executed, place) => {
 
 // What the step slider changes is in groups of its own.
 // @param binding the index of the obstacle that decides in `set`, or -1.
-const drawTube = ({units, detail, outcome, binding, set}) => {
+const drawTube = ({units, bodies = [], detail, outcome, binding, set}) => {
   const color = outcomeColor(outcome);
   const executed = new Set(detail.executed.map(([step]) => step));
   view.whole = extentOf(units, detail.executed, placeOf(set[binding], detail.start + Math.max(detail.binding, 0) * detail.step_us));
@@ -237,7 +237,7 @@ const drawTube = ({units, detail, outcome, binding, set}) => {
     path.append(dot);
   }
   byId('svg').replaceChildren(obstacles, tube, path, now, labels);
-  view.scene = {units, detail, color, binding, obstacles, now, path, labels, set};
+  view.scene = {units, bodies, detail, color, binding, obstacles, now, path, labels, set};
   const slider = byId('step');
   slider.max = String(Math.max(0, units.length - 1));
   slider.value = String(Math.max(0, Math.min(detail.binding, units.length - 1)));
@@ -252,6 +252,7 @@ const showStep = () => {
   byId('step-name').textContent = `Step ${step} of ${detail.steps}${step === detail.binding ? ', binding' : ''}`;
   byId('step').setAttribute('aria-valuetext', byId('step-name').textContent);
   scene.now.replaceChildren(...(units[step] ?? []).map((polygon) => outline(polygon, {fill: scene.color, 'fill-opacity': .35, stroke: INK, 'stroke-width': 1.6})));
+  for (const polygon of scene.bodies[step] ?? []) scene.now.append(outline(polygon, {class: 'body', fill: INK, 'fill-opacity': .3, stroke: INK, 'stroke-width': 1.4}));
   for (const dot of scene.path.querySelectorAll('.dot')) dot.isNow = dot.step === step;
   scene.obstacles.replaceChildren();
   scene.labels.replaceChildren();
@@ -270,6 +271,7 @@ const showStep = () => {
 
 const showLegend = (color, detail) => {
   const entries = [[color, 'tube'], ['#6b7280', 'obstacles, by their numbers'], [WRONG, 'binding step and obstacle']];
+  if (detail.body_units > 0) entries.splice(1, 0, [INK, 'the body, at the center of its slice']);
   if (detail.executed.length) entries.splice(1, 0, [EXECUTED, 'executed slices'], [INK, 'measured states']);
   byId('legend').replaceChildren(...entries.map(([background, text]) => {
     const item = make('li'), chip = make('i', undefined, 'chip');

@@ -145,11 +145,17 @@ Json TasksJson(const std::vector<PageTask>& tasks) {
 // ---- Drawings.
 
 template <class Number>
-Json Joined(const std::vector<PageDetail>& details, std::vector<Number> Sketch::*member) {
+Json Joined(const std::vector<PageDetail>& details, Sketch PageDetail::*sketch, std::vector<Number> Sketch::*member) {
   std::vector<Number> all;
   for (const PageDetail& detail : details)
-    all.insert(all.end(), (detail.sketch.*member).begin(), (detail.sketch.*member).end());
+    all.insert(all.end(), (detail.*sketch.*member).begin(), (detail.*sketch.*member).end());
   return Column(all);
+}
+
+Json SketchesJson(const std::vector<PageDetail>& details, Sketch PageDetail::*sketch) {
+  return {{"parts", Joined(details, sketch, &Sketch::parts)},
+          {"corners", Joined(details, sketch, &Sketch::corners)},
+          {"points", Joined(details, sketch, &Sketch::points)}};
 }
 
 Json DrawingsJson(const PageRun& run) {
@@ -159,9 +165,8 @@ Json DrawingsJson(const PageRun& run) {
   for (const std::vector<Obstacle>& set : run.obstacle_sets) sets.push_back(ToJson(set));
   const Json texts{{"details", std::move(details)}, {"obstacle_sets", std::move(sets)}};
   return {{"texts", Packed(JsonText(texts))},
-          {"parts", Joined(run.details, &Sketch::parts)},
-          {"corners", Joined(run.details, &Sketch::corners)},
-          {"points", Joined(run.details, &Sketch::points)}};
+          {"tubes", SketchesJson(run.details, &PageDetail::sketch)},
+          {"bodies", SketchesJson(run.details, &PageDetail::bodies)}};
 }
 
 Json RunJson(const PageRun& run, bool only_figures) {
