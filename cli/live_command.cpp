@@ -86,16 +86,18 @@ Command LiveCommand() {
   const auto options = std::make_shared<Options>();
   return {.name = kLive.name,
           .purpose = kLive.purpose,
-          .footer = "It listens to the bus and sends nothing. The page is for browsers of this machine alone; from another "
-                    "one, forward its port: ssh -L 8080:127.0.0.1:8080 ROBOT. It prints its address, and ends with "
-                    "Ctrl-C. See docs/live.md.\n\n"
-                    "Example:\n  forereach live --config config/demo.yaml --key keys/verify.pub",
+          .footer =
+              "It listens to the bus and sends nothing. The page is for browsers of this machine alone; from another "
+              "one, forward its port: ssh -L 8080:127.0.0.1:8080 ROBOT. It prints its address, and ends with "
+              "Ctrl-C. See docs/live.md.\n\n"
+              "Example:\n  forereach live --config config/demo.yaml --key keys/verify.pub",
           .options = {ConfigOption(options->config, "The task file of the certifier"),
                       {"--lcm-url", &options->bus.url, "URL", "The bus; by default the task file's bus.url"},
                       {"--key", &options->bus.key, "PATH",
                        "verify.pub, a directory of keys or any key file, of which only public keys are read: messages "
                        "that their roles did not sign are counted and not shown; by default the task file's bus.key"},
-                      {"--port", &options->port, "", "Port on 127.0.0.1; 0: a free one; by default 8080, or a free one if it is taken",
+                      {"--port", &options->port, "",
+                       "Port on 127.0.0.1; 0: a free one; by default 8080, or a free one if it is taken",
                        NumberRange{0, 65535}}},
           .run = [options] { return RunLive(*options); }};
 }

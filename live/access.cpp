@@ -29,8 +29,7 @@ bool IsHere(std::string_view host) {
   if (name != "127.0.0.1" && !EqualNames(name, "localhost")) return false;
   if (colon == std::string_view::npos) return true;
   const std::string_view port = host.substr(colon + 1);
-  return !port.empty() && port.size() <= 5 &&
-         std::ranges::all_of(port, [](char c) { return '0' <= c && c <= '9'; });
+  return !port.empty() && port.size() <= 5 && std::ranges::all_of(port, [](char c) { return '0' <= c && c <= '9'; });
 }
 
 }  // namespace

@@ -200,8 +200,7 @@ bool Watcher::TakeState(const LogEvent& event) {
   if (task_.problem->projection.rows() != 2) return true;
   const Eigen::Vector2d at =
       task_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
-  if (at.allFinite())
-    Add(kPlaceFeed, {at.x(), at.y(), Text(state->executing_plan_id), state->executing_step});
+  if (at.allFinite()) Add(kPlaceFeed, {at.x(), at.y(), Text(state->executing_plan_id), state->executing_step});
   return true;
 }
 
@@ -353,18 +352,10 @@ void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
 
 Json Watcher::DecisionJson(const Decided& decided, bool is_drawn) {
   const DecisionRow& row = decided.row;
-  Json json{{"utime", row.utime},
-            {"plan", Text(row.plan_id)},
-            {"source", row.source},
-            {"outcome", row.outcome},
-            {"cause", row.cause},
-            {"step", row.step},
-            {"obstacle", row.obstacle},
-            {"margin", row.margin},
-            {"threshold", row.threshold},
-            {"elapsed", row.elapsed_us},
-            {"latency", row.latency_us},
-            {"message", row.message},
+  Json json{{"utime", row.utime},        {"plan", Text(row.plan_id)}, {"source", row.source},
+            {"outcome", row.outcome},    {"cause", row.cause},        {"step", row.step},
+            {"obstacle", row.obstacle},  {"margin", row.margin},      {"threshold", row.threshold},
+            {"elapsed", row.elapsed_us}, {"latency", row.latency_us}, {"message", row.message},
             {"digest", row.plan_digest}};
   PageDetail detail;
   if (is_drawn)

@@ -32,9 +32,8 @@ PageDocument LivePage() {
 
 HttpRequest RequestOf(const mg_request_info& info) {
   const auto text = [](const char* bytes) { return bytes ? std::string_view(bytes) : std::string_view(); };
-  HttpRequest request{.method = text(info.request_method),
-                      .target = text(info.request_uri),
-                      .query = text(info.query_string)};
+  HttpRequest request{
+      .method = text(info.request_method), .target = text(info.request_uri), .query = text(info.query_string)};
   for (int i = 0; i < info.num_headers; ++i)
     request.headers.emplace_back(text(info.http_headers[i].name), text(info.http_headers[i].value));
   return request;
@@ -64,11 +63,23 @@ class WebServer::Content {
     };
     const std::string address = "127.0.0.1:" + std::to_string(port), threads = std::to_string(kMostReaders + 4),
                       patience = std::to_string(kWriteMs);
-    const std::array<const char*, 17> options{"listening_ports", address.c_str(), "num_threads", threads.c_str(),
-                                             "request_timeout_ms", patience.c_str(), "enable_keep_alive", "no",
-                                             "max_request_size", "8192", "access_control_allow_origin", "",
-                                             "access_control_allow_methods", "", "enable_directory_listing", "no",
-                                             nullptr};
+    const std::array<const char*, 17> options{"listening_ports",
+                                              address.c_str(),
+                                              "num_threads",
+                                              threads.c_str(),
+                                              "request_timeout_ms",
+                                              patience.c_str(),
+                                              "enable_keep_alive",
+                                              "no",
+                                              "max_request_size",
+                                              "8192",
+                                              "access_control_allow_origin",
+                                              "",
+                                              "access_control_allow_methods",
+                                              "",
+                                              "enable_directory_listing",
+                                              "no",
+                                              nullptr};
     context_ = mg_start(&callbacks, this, const_cast<const char**>(options.data()));
     if (!context_) throw ServerError(address + ": the page cannot be served there: " + problem_);
     mg_server_port used{};

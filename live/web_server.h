@@ -22,8 +22,8 @@ class ServerError : public BadInput {
 class WebServer final {
  public:
   static constexpr int kMostReaders = 8;
-  static constexpr int kWriteMs = 5000;   ///< Also for a request to arrive.
-  static constexpr int kUpdateMs = 200;   ///< Between two events for a reader.
+  static constexpr int kWriteMs = 5000;  ///< Also for a request to arrive.
+  static constexpr int kUpdateMs = 200;  ///< Between two events for a reader.
 
   /** Listens on 127.0.0.1. @param port 0: one that is free. @param watcher must outlive the server.
   @throws ServerError. */

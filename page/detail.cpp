@@ -86,7 +86,8 @@ void Describe(const Certifier& certifier, const JudgedCandidate& judged, const D
   detail.step_us = judged.candidate.step_us;
   detail.steps = judged.candidate.num_steps;
   const bool is_same = static_cast<int>(again.outcome) == judged.outcome && again.step == judged.step;
-  detail.missing = is_same ? AddTube(certifier, judged, again, tube, detail) : "this program decides it otherwise: replay it";
+  detail.missing =
+      is_same ? AddTube(certifier, judged, again, tube, detail) : "this program decides it otherwise: replay it";
 }
 
 }  // namespace forereach

@@ -144,9 +144,8 @@ class DetailMaker final : public TimelineUser {
     detail.obstacles = ObstaclesIndex(recorded.basis);
     if (recorded.decision.outcome == decision_t::CERTIFIED) executing_[candidate->plan_id] = {place, &task};
     obstacles_ = recorded.basis.obstacles;
-    pending_.push_back({{*candidate, ScheduleOf(*candidate, task.gate), recorded.decision.outcome,
-                         recorded.decision.step},
-                        place});
+    pending_.push_back(
+        {{*candidate, ScheduleOf(*candidate, task.gate), recorded.decision.outcome, recorded.decision.step}, place});
     if (pending_.size() >= kBatch) CertifyAgain();
   }
 

@@ -25,9 +25,9 @@ TEST(AccessTest, AnswersUnderTheNamesOfThisMachineAlone) {
   for (const char* host : {"127.0.0.1", "127.0.0.1:8080", "localhost", "LocalHost:1", "localhost:65535"})
     EXPECT_EQ(Get("/", {{"hOST", host}}), Answer::kPage) << host;
   for (const char* host :
-       {"", "evil.example", "evil.example:8080", "127.0.0.1.evil.example", "localhost.evil.example", "127.0.0.1:",
-        "127.0.0.1:8080:1", "127.0.0.1:123456", "127.0.0.1:8x", "127.0.0.1@evil.example", "[::1]:8080", "127.0.0.2",
-        "0.0.0.0:8080", " 127.0.0.1", "127.0.0.1 "})
+       {"", "evil.example", "evil.example:8080", "127.0.0.1.evil.example", "localhost.evil.example",
+        "127.0.0.1:", "127.0.0.1:8080:1", "127.0.0.1:123456", "127.0.0.1:8x", "127.0.0.1@evil.example", "[::1]:8080",
+        "127.0.0.2", "0.0.0.0:8080", " 127.0.0.1", "127.0.0.1 "})
     EXPECT_EQ(Get("/", {{"Host", host}}), Answer::kForbidden) << host;
   EXPECT_EQ(Get("/", {}), Answer::kBadRequest);
   EXPECT_EQ(Get("/", {{"Host", "127.0.0.1"}, {"host", "127.0.0.1"}}), Answer::kForbidden) << "two are none";

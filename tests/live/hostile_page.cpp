@@ -1,5 +1,5 @@
-/** forereach_hostile_page: serves a live page of messages whose texts try to become elements and scripts, and whose numbers
-are the largest there are. Prints its address, and ends with its standard input. */
+/** forereach_hostile_page: serves a live page of messages whose texts try to become elements and scripts, and whose
+numbers are the largest there are. Prints its address, and ends with its standard input. */
 #include <iostream>
 #include <limits>
 #include <string>

@@ -33,8 +33,12 @@ struct Reader {
     const auto news = nlohmann::json::parse(text);
     now = news.at("now");
     if (news.contains("obstacles")) obstacles = news.at("obstacles");
-    for (const auto& [name, all] : {std::pair{"decisions", &decisions}, {"faults", &faults}, {"events", &events},
-                                    {"withdrawals", &withdrawals}, {"gaps", &gaps}, {"places", &places}})
+    for (const auto& [name, all] : {std::pair{"decisions", &decisions},
+                                    {"faults", &faults},
+                                    {"events", &events},
+                                    {"withdrawals", &withdrawals},
+                                    {"gaps", &gaps},
+                                    {"places", &places}})
       if (news.contains(name))
         for (const auto& each : news.at(name)) all->push_back(each);
     return text.size();

@@ -109,13 +109,15 @@ TEST_F(WebServerTest, RefusesWhatIsNotForIt) {
     EXPECT_THAT(Get(target), Not(HasSubstr("root:"))) << target;
   }
   for (const char* method : {"POST", "PUT", "DELETE", "PATCH", "OPTIONS", "HEAD", "TRACE", "PROPFIND", "MKCOL"}) {
-    const std::string answer = Ask(std::string(method) + " / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
+    const std::string answer = Ask(std::string(method) +
+                                   " / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
                                    "Access-Control-Request-Method: POST\r\nContent-Length: 0\r\n\r\n");
     EXPECT_THAT(answer, Not(StartsWith("HTTP/1.1 2"))) << method;
     EXPECT_THAT(answer, Not(HasSubstr("Access-Control-Allow"))) << method;
   }
-  EXPECT_THAT(Get("/events", "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-                             "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"),
+  EXPECT_THAT(Get("/events",
+                  "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                  "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"),
               StartsWith("HTTP/1.1 400"));
 }
 
@@ -124,12 +126,15 @@ TEST_F(WebServerTest, HostileBytesEndNothing) {
   std::mt19937_64 random(11);
   const std::string good = "GET / HTTP/1.1\r\nHost: localhost\r\nAccept: */*\r\nOrigin: http://localhost\r\n\r\n";
   std::vector<std::string> requests{
-      "GET / HTTP/9.9\r\n\r\n", "GET http://[::1/ HTTP/1.1\r\nHost: localhost\r\n\r\n", std::string(3, '\0'),
+      "GET / HTTP/9.9\r\n\r\n",
+      "GET http://[::1/ HTTP/1.1\r\nHost: localhost\r\n\r\n",
+      std::string(3, '\0'),
       "GET /" + std::string(20'000, 'a') + " HTTP/1.1\r\nHost: localhost\r\n\r\n",
       "GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n",
       "GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999\r\n\r\n",
       "GET / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nffffffffffffffff\r\n",
-      "GET /%ff%00%zz HTTP/1.1\r\nHost: localhost\r\nHost: evil\r\n\r\n", "\r\n\r\n\r\n"};
+      "GET /%ff%00%zz HTTP/1.1\r\nHost: localhost\r\nHost: evil\r\n\r\n",
+      "\r\n\r\n\r\n"};
   std::string many = "GET / HTTP/1.1\r\nHost: localhost\r\n";
   for (int i = 0; i < 200; ++i) many += "X" + std::to_string(i) + ": y\r\n";
   requests.push_back(many + "\r\n");
