@@ -13,10 +13,9 @@ namespace {
 // @throws ConfigError if the task does not say how the robot brakes.
 const Config& WithLaws(const Config& config) {
   if (config.laws.stop.empty())
-    throw ConfigError(config.path +
-                      ": planner.stop: missing: how the robot brakes, an expression for each input, for example {" +
-                      config.problem->model->input_names()[0] +
-                      ": ...}; `forereach init` writes it for the models of the library");
+    throw ConfigError(
+        config.path + ": planner.stop: missing: how the robot brakes, an expression for each input, for example {" +
+        config.problem->model->input_names()[0] + ": ...}; `forereach init` writes it for the models of the library");
   if (!config.laws.at_rest)
     throw ConfigError(
         config.path +
@@ -34,8 +33,7 @@ RobotMotion::RobotMotion(const Config& config, Braking braking)
       at_rest_(*config.laws.at_rest) {
   const Laws& laws = config.laws;
   const NominalModel& model = *problem_->model;
-  for (const Law& law :
-       braking == Braking::kHardest && !laws.emergency_stop.empty() ? laws.emergency_stop : laws.stop)
+  for (const Law& law : braking == Braking::kHardest && !laws.emergency_stop.empty() ? laws.emergency_stop : laws.stop)
     stops_.push_back(MakeStopLaw(model, laws, law));
   if (!laws.hints.empty()) hints_.emplace(MakeHints(model, laws));
   if (laws.speed) speed_.emplace(MakeSpeed(model, laws));
@@ -79,7 +77,7 @@ void RobotMotion::Pursue(std::span<const double> x, const DesiredMotion& desired
 // Between the one that was drawn and the hint, or the control that stops the robot: either keeps upright one that
 // would fall.
 void RobotMotion::Explore(std::span<const double> x, const DesiredMotion& desired, double share,
-             std::span<double> u) const {
+                          std::span<double> u) const {
   std::array<double, kMaxInputs> base;
   if (has_hints())
     Pursue(x, desired, {base.data(), u.size()});
@@ -109,7 +107,6 @@ bool RobotMotion::Brake(std::span<const double> x, int tail, int max_steps, Eige
                                                std::ssize(steps) / static_cast<Eigen::Index>(inputs()));
   return controls.allFinite();
 }
-
 
 std::size_t RobotMotion::inputs() const { return ToSize(problem_->model->num_inputs()); }
 

@@ -1,5 +1,5 @@
-/** Driving and braking of a nominal model: what planning needs in addition to its equations. The laws of the task say it
-(planner.stop and the keys beside it). */
+/** Driving and braking of a nominal model: what planning needs in addition to its equations. The laws of the task say
+it (planner.stop and the keys beside it). */
 #pragma once
 
 #include <memory>
@@ -31,8 +31,8 @@ class RobotMotion final {
   /** Duration of one step, s. */
   [[nodiscard]] double dt() const { return dt_; }
 
-  /** Speed in state x, m/s: planner.speed, or else along the way of one step. It may be negative in reverse, which plans
-  then do not use. */
+  /** Speed in state x, m/s: planner.speed, or else along the way of one step. It may be negative in reverse, which
+  plans then do not use. */
   [[nodiscard]] double Speed(std::span<const double> x) const;
 
   [[nodiscard]] bool IsAtRest(std::span<const double> x) const;
