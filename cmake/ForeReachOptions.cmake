@@ -10,9 +10,9 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 
 find_program(CCACHE ccache)
-if(CCACHE)  # without this, it keeps no file that was compiled with a precompiled header
+if(CCACHE)  # it keeps what was compiled with a precompiled header too, and finds it again from a clone in another directory
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros
-    CCACHE_IGNOREOPTIONS=--param=* ${CCACHE})
+    CCACHE_IGNOREOPTIONS=--param=* CCACHE_BASEDIR=${CMAKE_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
 endif()
 
 # Precompiled headers, of g++ alone: clang's do not survive a cache. They hold no header of ours.
