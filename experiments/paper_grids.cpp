@@ -37,22 +37,29 @@ PointMassGrid PaperPointMassGrid(const VelocityKnee& r, double largest_speed, in
   return {r.dt * r.dt / 2 * diagonal, r.dt * r.dt / 2 * cross, r.dt * diagonal, r.dt * cross};
 }
 
-BicycleGrid PaperBicycleGrid(const HeadingSaturation& r, double largest_speed, double largest_steering, int speed_cells,
-                             int steering_cells) {
-  const double c = r.dt * r.understeer / r.wheelbase, beta = r.gate_temperature;
+BicycleGrid PaperBicycleGrid(const HeadingSaturation& low, const HeadingSaturation& high, double largest_speed,
+                             double largest_steering, int speed_cells, int steering_cells) {
+  const double c = high.dt * high.understeer / low.wheelbase;
+  const double beta = high.gate_temperature, bend_of = beta / low.wheelbase;
   std::vector<double> tangent(static_cast<std::size_t>(steering_cells) + 1);
   for (std::size_t j = 0; j < tangent.size(); ++j)
     tangent[j] = std::tan(largest_steering * static_cast<double>(j) / steering_cells);
-  const auto argument = [&](double v, double t) { return beta * (v * v * t / r.wheelbase - r.friction * r.gravity); };
+  // E, the largest over the parameters where it is positive, and the least where that is.
+  const auto largest_argument = [&](double v, double t) {
+    return beta * (v * v * t / low.wheelbase - low.friction * low.gravity);
+  };
+  const auto least_argument = [&](double v, double t) {
+    return low.gate_temperature * (v * v * t / high.wheelbase - high.friction * high.gravity);
+  };
   BicycleGrid largest{0, 0};
   for (int i = 0; i < speed_cells; ++i) {
     const double v_low = largest_speed * i / speed_cells, v = largest_speed * (i + 1) / speed_cells;
     for (std::size_t j = 0; j + 1 < tangent.size(); ++j) {
-      const double t = tangent[j + 1], e = argument(v, t);
+      const double t = tangent[j + 1], e = largest_argument(v, t);
       if (!(e > 0)) continue;
-      const double gate = std::exp(-1 / e), e_low = argument(v_low, tangent[j]);
+      const double gate = std::exp(-1 / e), e_low = least_argument(v_low, tangent[j]);
       const double psi = e <= 0.5 ? Psi(e, gate) : e_low >= 0.5 ? Psi(e_low, SmoothGate(e_low)) : kLargestPsi;
-      const double bend = beta / r.wheelbase * v * v * t * psi;
+      const double bend = bend_of * v * v * t * psi;
       largest.by_speed = std::max(largest.by_speed, c * t * (gate + 2 * bend));
       largest.by_steering = std::max(largest.by_steering, c * v * (1 + t * t) * (gate + bend));
     }

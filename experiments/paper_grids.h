@@ -22,9 +22,16 @@ struct BicycleGrid {
 };
 
 /** Maxima of Eq. (bicycle-certified-partials) over cells of [0, largest_speed] x [0, largest_steering]. Cost: an
-exponential for every cell, some seconds. */
-[[nodiscard]] BicycleGrid PaperBicycleGrid(const HeadingSaturation& residual, double largest_speed = 25,
-                                           double largest_steering = 0.48, int speed_cells = 16000,
-                                           int steering_cells = 8000);
+exponential for every cell, some seconds.
+@param low, high each parameter of the residual lies between its two: each factor is at its worst parameters by itself,
+as it is at its worst point of a cell. @pre no parameter of `low` exceeds that of `high`, all are positive */
+[[nodiscard]] BicycleGrid PaperBicycleGrid(const HeadingSaturation& low, const HeadingSaturation& high,
+                                           double largest_speed = 25, double largest_steering = 0.48,
+                                           int speed_cells = 16000, int steering_cells = 8000);
+
+/** Of one residual. */
+[[nodiscard]] inline BicycleGrid PaperBicycleGrid(const HeadingSaturation& residual) {
+  return PaperBicycleGrid(residual, residual);
+}
 
 }  // namespace forereach::experiments
