@@ -2,6 +2,7 @@
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -10,6 +11,7 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
+#include "cli/log_commands.h"
 #include "cli/offline.h"
 
 namespace forereach {
@@ -35,12 +37,13 @@ int RunOffline(char** argv) {
 int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands{CertifyCommand()};
-  for (const OfflineCommand& each : kOfflineCommands) {
-    if (argc > 1 && std::string(argv[1]) == each.name) return RunOffline(argv);
-    commands.push_back({.name = each.name, .purpose = each.purpose, .run = [argv] { return RunOffline(argv); }});
-  }
-  for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), ResetCommand(),
-                                   ReloadCommand(), KeygenCommand()})
+  for (const std::span<const OfflineCommand> offline : {std::span(kOfflineCommands), std::span(kLogCommands)})
+    for (const OfflineCommand& each : offline) {
+      if (argc > 1 && std::string(argv[1]) == each.name) return RunOffline(argv);
+      commands.push_back({.name = each.name, .purpose = each.purpose, .run = [argv] { return RunOffline(argv); }});
+    }
+  for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),
+                                   ResetCommand(), ReloadCommand(), KeygenCommand()})
     commands.push_back(std::move(each));
   return RunCommands(std::move(commands), argc, argv);
 }
