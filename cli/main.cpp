@@ -37,7 +37,8 @@ int RunOffline(char** argv) {
 int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands{CertifyCommand()};
-  for (const std::span<const OfflineCommand> offline : {std::span(kOfflineCommands), std::span(kLogCommands)})
+  using Offline = std::span<const OfflineCommand>;
+  for (const Offline offline : {Offline(kOfflineCommands), Offline(kLogCommands)})
     for (const OfflineCommand& each : offline) {
       if (argc > 1 && std::string(argv[1]) == each.name) return RunOffline(argv);
       commands.push_back({.name = each.name, .purpose = each.purpose, .run = [argv] { return RunOffline(argv); }});
