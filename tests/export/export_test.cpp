@@ -21,6 +21,7 @@
 #include "records/export.h"
 #include "records/export_table.h"
 #include "records/mcap.h"
+#include "records/message_json.h"
 #include "records/npz.h"
 #include "records/output_file.h"
 #include "tests/cli/program.h"
@@ -272,8 +273,8 @@ TEST_F(ExportTest, AnMcapFileMayHaveManyChunksOrNone) {
   McapWriter many{OutputFile(scratch_ / "many.mcap")};
   const auto schema = many.AddSchema("t", R"({"type":"object","properties":{"text":{"type":"string"}}})");
   const auto a = many.AddChannel(schema, "A"), b = many.AddChannel(schema, "B");
-  const std::string json = "{\"text\":\"" + std::string(100'000, 'x') + "\"}";
-  for (int i = 0; i < 30; ++i) many.Write(i % 3 ? a : b, 1, 1000 - i, INT64_MAX, json);  // the clock goes backwards
+  const std::string object = "{\"text\":\"" + std::string(100'000, 'x') + "\"}";
+  for (int i = 0; i < 30; ++i) many.Write(i % 3 ? a : b, 1, 1000 - i, INT64_MAX, object);  // the clock goes backwards
   many.Finish();
   const auto found = ReadBack("read_mcap", "many.mcap");
   EXPECT_EQ(found["messages"], 30);
@@ -390,7 +391,7 @@ TEST_F(ExportTest, AnyLogIsExportedOrRefused) {
          {ExportFormat::kCsv, ExportFormat::kJsonLines, ExportFormat::kNpz, ExportFormat::kMcap}) {
       std::vector<std::string> files;
       for (const std::string& name : ExportFiles(format)) files.push_back(scratch_ / ("any." + name));
-      const ExportResult result = ExportRun(run, {.format = format, .config = kConfig}, files);
+      const ExportResult result = ExportRun(run, {.format = format, .config = kConfig, .key = {}}, files);
       EXPECT_GT(result.damage.places + result.left_out + result.decisions, 0);
     }
     for (const json& line : ParseLines(Read(scratch_ / "any.jsonl"))) EXPECT_EQ(line["robot"], "r");
