@@ -25,6 +25,7 @@
 #include "records/npz.h"
 #include "records/output_file.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 #include "tests/scratch.h"
@@ -165,8 +166,7 @@ TEST_F(ExportTest, EveryColumnIsInTheDocument) {
     const std::size_t end = std::min(page.find("\n**", begin + 1), page.find("\n## ", begin + 1));
     const std::string section = page.substr(begin, end - begin);
     const auto rows = ParseCsv(Read(scratch_ / ("tables/" + std::string(file))));
-    for (const std::string& column : rows.front())
-      EXPECT_THAT(section, HasSubstr("`" + column + "`")) << file;
+    for (const std::string& column : rows.front()) EXPECT_THAT(section, HasSubstr("`" + column + "`")) << file;
   }
   ASSERT_EQ(ExportTo("npz", "tubes.npz").code, 0);
   const json arrays = ReadBack("read_npz", "tubes.npz");

@@ -9,6 +9,7 @@
 
 #include "records/log_edit.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 
