@@ -39,8 +39,8 @@ struct Abstentions {
   std::vector<std::string> missing{};  ///< Logs and runs that could not be read, with the reason.
 };
 
-/** Reads a decision's document, or the runs that the files name (RunsNamedBy), with the robot's name in the name of each
-abstention if there are several.
+/** Reads a decision's document, or the runs that the files name (RunsNamedBy), with the robot's name in the name of
+each abstention if there are several.
 @param config the task file; empty: the one that the document names, or that the logger kept next to the logs.
 @throws BadInput as ReadAllCertificates does; ConfigError with file and field for a document that is no decision. */
 [[nodiscard]] Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config,
