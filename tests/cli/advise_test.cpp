@@ -131,7 +131,10 @@ TEST_F(AdviseTest, ADatabaseAndADirectoryAreReadAsTheirLogs) {
     EXPECT_EQ(by_log["abstentions"][i]["advice"], by_directory["abstentions"][i]["advice"]);
   std::filesystem::remove(directory + "/decisions.sqlite");
   EXPECT_EQ(of(directory)["certified"], by_log["certified"]);
-  EXPECT_EQ(Forereach("advise " + (scratch_ / "") + " 2>&1").code, 2) << "no logs";
+  EXPECT_EQ(of(scratch_ / "")["certified"], by_log["certified"]) << "a directory in a directory";
+  const std::string empty = scratch_ / "empty";
+  std::filesystem::create_directory(empty);
+  EXPECT_EQ(Forereach("advise " + empty + " 2>&1").code, 2) << "no logs";
 }
 
 TEST_F(AdviseTest, NamesTheQueueAndTheSilenceThatWouldHaveHeld) {
