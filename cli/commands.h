@@ -10,6 +10,9 @@ namespace forereach {
 
 /** The help text for LOG arguments. */
 inline constexpr const char* kLogs = "LCM event log; several if the run was recorded in several, in their order";
+/** The same where several runs may be read. */
+inline constexpr const char* kRuns =
+    "LCM event logs, decision databases, or directories of logs or of a database, with their subdirectories";
 /** The help text for --config. */
 inline constexpr const char* kTaskOfLogs =
     "The task file of the recording; by default the one that the logger kept next to the log, in tasks/";

@@ -2,6 +2,7 @@
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -11,6 +12,7 @@
 
 #include "cli/commands.h"
 #include "cli/live.h"
+#include "cli/log_commands.h"
 #include "cli/offline.h"
 
 namespace forereach {
@@ -36,16 +38,17 @@ int Become(const char* path, char** argv) {
 int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands{CertifyCommand()};
-  for (const OfflineCommand& each : kOfflineCommands) {
-    if (argc > 1 && std::string(argv[1]) == each.name) return Become(FOREREACH_OFFLINE, argv);
-    commands.push_back(
-        {.name = each.name, .purpose = each.purpose, .run = [argv] { return Become(FOREREACH_OFFLINE, argv); }});
-  }
+  for (const std::span<const OfflineCommand> offline : {std::span(kOfflineCommands), std::span(kLogCommands)})
+    for (const OfflineCommand& each : offline) {
+      if (argc > 1 && std::string(argv[1]) == each.name) return Become(FOREREACH_OFFLINE, argv);
+      commands.push_back(
+          {.name = each.name, .purpose = each.purpose, .run = [argv] { return Become(FOREREACH_OFFLINE, argv); }});
+    }
   if (argc > 1 && std::string(argv[1]) == kLive.name) return Become(FOREREACH_LIVE, argv);
   commands.push_back(
       {.name = kLive.name, .purpose = kLive.purpose, .run = [argv] { return Become(FOREREACH_LIVE, argv); }});
-  for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), ResetCommand(),
-                                   ReloadCommand(), KeygenCommand()})
+  for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),
+                                   ResetCommand(), ReloadCommand(), KeygenCommand()})
     commands.push_back(std::move(each));
   return RunCommands(std::move(commands), argc, argv);
 }

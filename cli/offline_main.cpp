@@ -1,10 +1,11 @@
 /** forereach-offline: started by `forereach` with the same arguments. */
 #include "cli/commands.h"
+#include "cli/log_commands.h"
 
 int main(int argc, char** argv) {
   using namespace forereach;
   return RunCommands({InitCommand(), ImportCommand(), CheckCommand(), FitCommand(), ExportModelCommand(), PlanCommand(),
                       DeclareCommand(), VerifyCommand(), ReplayCommand(), AdviseCommand(), ReportCommand(),
-                      CheckLogCommand(), RunCommand()},
+                      ExportCommand(), LogCommand(), CheckLogCommand(), RunCommand()},
                      argc, argv);
 }

@@ -23,9 +23,9 @@ Progress::~Progress() {
   if (shown_at_ > 0) std::cerr << "\r\x1b[K" << std::flush;
 }
 
-void Progress::Advance() {
+void Progress::Advance(std::size_t count) {
   const std::lock_guard lock(mutex_);
-  ++done_;
+  done_ += count;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   if (!terminal_ || seconds < kPatience || seconds < shown_at_ + kBetween) return;
   shown_at_ = seconds;

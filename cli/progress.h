@@ -17,8 +17,8 @@ class Progress final {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /** One more is done. */
-  void Advance();
+  /** One or more are done. */
+  void Advance(std::size_t count = 1);
 
   /** The bar, without its carriage return: "[#####.....] 5 of 10 plans, 3 s left". */
   [[nodiscard]] static std::string Line(const std::string& what, std::size_t done, std::size_t total, double seconds);

@@ -1,14 +1,23 @@
+#include <algorithm>
 #include <iostream>
+#include <map>
+#include <optional>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
 #include "certifier/task/json_text.h"
 #include "cli/commands.h"
+#include "cli/each_run.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
+#include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
+#include "records/compare.h"
+#include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/replay.h"
+#include "records/result_json.h"
 
 namespace forereach {
 namespace {
@@ -17,42 +26,214 @@ struct Options {
   std::vector<std::string> logs;
   std::string config, plan_digest;
   LogKey key;
-  bool json = false, other_task = false;
+  bool json = false, other_task = false, compare = false;
+  EachRunOptions each_run;
 };
 
+// Of several runs, those with nothing to replay are passed over.
+bool HasPlans(const RunLogs& run) {
+  if (run.logs.empty()) return false;
+  const LogSurvey survey = Survey(run.logs, LogOrder::kAny);
+  return survey.candidates > 0 || survey.decisions > 0 || !survey.configs.empty();
+}
+
+Config OtherTask(const Options& options) {
+  std::vector<Config> task;
+  task.push_back(LoadConfig(options.config));
+  options.key.Override(task, options.config);
+  return std::move(task.front());
+}
+
+// Lines about a run, with its robot's name if there are several runs.
+void NameRobot(const NamedRuns& named, const RunLogs& run, std::vector<std::string>& lines) {
+  if (!named.is_many) return;
+  for (std::string& line : lines) line = run.robot + ": " + line;
+}
+
+void PrintMissing(const NamedRuns& named) {
+  for (const std::string& missing : named.missing) std::cout << Printable(missing) << "\n";
+}
+
+void PrintJson(const ReplayResult& result, const NamedRuns& named) {
+  nlohmann::json document{{"candidates", result.candidates},
+                          {"agreed", result.agreed},
+                          {"withdrawals", result.withdrawals},
+                          {"circumstances", result.circumstances},
+                          {"corruptions", result.corruptions},
+                          {"passed_over", ToJson(result.passed_over)},
+                          {"shown", result.shown},
+                          {"differences", result.differences}};
+  if (named.is_many) {
+    document["runs"] = named.runs.size();
+    document["missing"] = named.missing;
+  }
+  std::cout << JsonText(document) << std::endl;
+}
+
+void PrintForPeople(const ReplayResult& result, const NamedRuns& named) {
+  PrintMissing(named);
+  for (const std::string& line : result.shown) std::cout << Printable(line) << "\n";
+  for (const std::string& difference : result.differences) std::cout << Printable(difference) << "\n";
+  std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
+            << result.differences.size() << " differ";
+  if (result.withdrawals > 0) std::cout << ", " << result.withdrawals << " withdrawals agree";
+  if (result.circumstances > 0)
+    std::cout << ", " << result.circumstances
+              << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";
+  if (result.corruptions > 0) std::cout << "; the log is damaged in " << result.corruptions << " places";
+  if (named.is_many) std::cout << "; " << named.runs.size() << " runs";
+  if (!named.missing.empty()) std::cout << "; " << named.missing.size() << " logs or runs could not be replayed";
+  std::cout << DescribePassedOver(result.passed_over) << std::endl;
+}
+
 int RunReplay(const Options& options) {
-  std::vector<Config> tasks;
-  if (options.other_task) {
-    static_cast<void>(SurveyRun(options.logs));
-    tasks.push_back(LoadConfig(options.config));
-    options.key.Override(tasks, options.config);
-  } else {
-    tasks = TasksOf(options.logs, options.config, options.key);
+  NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
+  const std::optional<Config> other = options.other_task ? std::optional(OtherTask(options)) : std::nullopt;
+  const RunTasks own(other ? "" : options.config, options.key, named.is_many);
+  const auto finished =
+      ResultsOf(options.each_run, std::string("replay ") + (other ? "other " : "") + options.plan_digest,
+                options.config, options.key);
+  const auto replay = [&](const RunLogs& run, RunWork&) -> ReplayResult {
+    if (named.is_many && !HasPlans(run)) return {};
+    if (other) static_cast<void>(SurveyRun(run.logs));
+    const std::vector<Config> tasks = other ? std::vector{*other} : own.Of(run.logs);
+    return Replay(run.logs, tasks, options.plan_digest, named.is_many || run.logs.size() > 1);
+  };
+  ReplayResult sum;
+  auto results = ForEachRun<ReplayResult>(named, options.each_run, "replayed", finished.get(), replay);
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (!results[i]) continue;
+    NameRobot(named, named.runs[i], results[i]->differences);
+    NameRobot(named, named.runs[i], results[i]->shown);
+    sum += std::move(*results[i]);
   }
-  const ReplayResult result = Replay(options.logs, tasks, options.plan_digest);
-  if (options.json) {
-    std::cout << JsonText({{"candidates", result.candidates},
-                           {"agreed", result.agreed},
-                           {"withdrawals", result.withdrawals},
-                           {"circumstances", result.circumstances},
-                           {"corruptions", result.corruptions},
-                           {"passed_over", ToJson(result.passed_over)},
-                           {"shown", result.shown},
-                           {"differences", result.differences}})
-              << std::endl;
-  } else {
-    for (const std::string& line : result.shown) std::cout << Printable(line) << "\n";
-    for (const std::string& difference : result.differences) std::cout << Printable(difference) << "\n";
-    std::cout << "replay: " << result.candidates << " candidates, " << result.agreed << " decisions agree, "
-              << result.differences.size() << " differ";
-    if (result.withdrawals > 0) std::cout << ", " << result.withdrawals << " withdrawals agree";
-    if (result.circumstances > 0)
-      std::cout << ", " << result.circumstances
-                << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";
-    if (result.corruptions > 0) std::cout << "; the log is damaged in " << result.corruptions << " places";
-    std::cout << DescribePassedOver(result.passed_over) << std::endl;
+  options.json ? PrintJson(sum, named) : PrintForPeople(sum, named);
+  return sum.differences.empty() && sum.corruptions == 0 && sum.candidates > 0 && named.missing.empty() ? 0 : 1;
+}
+
+// ---- --compare.
+
+using ByRobot = std::map<std::string, Comparison>;
+
+std::string Describe(const WhyNot& why) {
+  std::string text = std::string(OutcomeName(why.outcome)) + ", " + std::string(CauseName(why.cause));
+  if (why.obstacle >= 0) text += ", obstacle " + std::to_string(why.obstacle);
+  if (why.step >= 0) text += ", step " + std::to_string(why.step);
+  return text;
+}
+
+// The most frequent first.
+template <class Key>
+std::vector<std::pair<Key, std::int64_t>> ByCount(const std::map<Key, std::int64_t>& counts) {
+  std::vector<std::pair<Key, std::int64_t>> sorted(counts.begin(), counts.end());
+  std::ranges::stable_sort(sorted, std::ranges::greater{}, [](const auto& entry) { return entry.second; });
+  return sorted;
+}
+
+std::string GainsAndLosses(const Comparison& compared) {
+  const std::int64_t lost = compared.num_lost();
+  return std::to_string(compared.num_gained()) + " of " + std::to_string(compared.candidates - compared.certificates) +
+         " abstentions and rejections would have been certificates, " +
+         (lost == 0 ? "and none" : "and " + std::to_string(lost)) + " of the " + std::to_string(compared.certificates) +
+         " certificates lost";
+}
+
+void PrintForPeople(const Comparison& compared, const ByRobot& robots, const NamedRuns& named,
+                    const std::string& config) {
+  PrintMissing(named);
+  if (!compared.gained.empty()) std::cout << "abstentions that would have been certificates, by what was recorded\n";
+  for (const auto& [why, count] : ByCount(compared.gained)) std::cout << "  " << count << ": " << Describe(why) << "\n";
+  if (!compared.lost.empty()) std::cout << "certificates that would have been lost, by why\n";
+  for (const auto& [why, count] : ByCount(compared.lost)) std::cout << "  " << count << ": " << Describe(why) << "\n";
+  for (const std::string& plan : compared.lost_plans) std::cout << "    " << Printable(plan) << "\n";
+  if (!compared.otherwise.empty()) std::cout << "refused in both, for another reason\n";
+  for (const auto& [whys, count] : ByCount(compared.otherwise))
+    std::cout << "  " << count << ": " << Describe(whys.first) << "; then " << Describe(whys.second) << "\n";
+  if (robots.size() > 1)
+    for (const auto& [robot, of_robot] : robots)
+      std::cout << Printable(robot) << ": " << GainsAndLosses(of_robot) << "\n";
+  std::cout << "compare: had " << config << " been declared, " << GainsAndLosses(compared);
+  if (compared.circumstances > 0)
+    std::cout << "; " << compared.circumstances
+              << " were refused for what no replay gives again (queue, time, not armed, no obstacles, fault)";
+  if (const std::int64_t unpaired = compared.without_candidate + compared.undecided; unpaired > 0)
+    std::cout << "; " << unpaired << " candidates or decisions are alone in the log";
+  if (compared.corruptions > 0) std::cout << "; the log is damaged in " << compared.corruptions << " places";
+  if (!named.missing.empty()) std::cout << "; " << named.missing.size() << " logs or runs could not be compared";
+  std::cout << DescribePassedOver(compared.passed_over) << std::endl;
+}
+
+using OrderedJson = nlohmann::ordered_json;
+
+OrderedJson ToJson(const WhyNot& why) {
+  const auto index = [](int value) { return value < 0 ? OrderedJson(nullptr) : OrderedJson(value); };
+  return {{"outcome", OutcomeName(why.outcome)},
+          {"cause", CauseName(why.cause)},
+          {"obstacle", index(why.obstacle)},
+          {"step", index(why.step)}};
+}
+
+OrderedJson ToJson(const std::map<WhyNot, std::int64_t>& counts) {
+  OrderedJson all = OrderedJson::array();
+  for (const auto& [why, count] : ByCount(counts)) {
+    OrderedJson entry = ToJson(why);
+    entry["count"] = count;
+    all.push_back(std::move(entry));
   }
-  return result.differences.empty() && result.corruptions == 0 && result.candidates > 0 ? 0 : 1;
+  return all;
+}
+
+void PrintJson(const Comparison& compared, const ByRobot& robots, const NamedRuns& named, const std::string& config) {
+  OrderedJson otherwise = OrderedJson::array(), by_robot = OrderedJson::array();
+  for (const auto& [whys, count] : ByCount(compared.otherwise))
+    otherwise.push_back({{"recorded", ToJson(whys.first)}, {"then", ToJson(whys.second)}, {"count", count}});
+  for (const auto& [robot, of_robot] : robots)
+    by_robot.push_back({{"robot", robot},
+                        {"candidates", of_robot.candidates},
+                        {"certificates", of_robot.certificates},
+                        {"gained", of_robot.num_gained()},
+                        {"lost", of_robot.num_lost()}});
+  std::cout << JsonText(OrderedJson{{"config", config},
+                                    {"candidates", compared.candidates},
+                                    {"certificates", compared.certificates},
+                                    {"gained", compared.num_gained()},
+                                    {"lost", compared.num_lost()},
+                                    {"gained_by", ToJson(compared.gained)},
+                                    {"lost_by", ToJson(compared.lost)},
+                                    {"lost_plans", compared.lost_plans},
+                                    {"refused_alike", compared.refused_alike},
+                                    {"refused_otherwise", otherwise},
+                                    {"by_robot", by_robot},
+                                    {"circumstances", compared.circumstances},
+                                    {"without_candidate", compared.without_candidate},
+                                    {"undecided", compared.undecided},
+                                    {"corruptions", compared.corruptions},
+                                    {"runs", named.runs.size()},
+                                    {"missing", named.missing},
+                                    {"passed_over", ParseJson<OrderedJson>(JsonText(ToJson(compared.passed_over)))}})
+            << std::endl;
+}
+
+int RunCompare(const Options& options) {
+  NamedRuns named = RunsNamedBy(options.logs, options.each_run.jobs);
+  const Config task = OtherTask(options);
+  const auto finished = ResultsOf(options.each_run, "compare", options.config, options.key);
+  const auto compare = [&](const RunLogs& run, RunWork&) -> Comparison {
+    if (named.is_many && !HasPlans(run)) return {};
+    static_cast<void>(SurveyRun(run.logs));
+    return Compare(run.logs, task, named.is_many || run.logs.size() > 1);
+  };
+  Comparison sum;
+  ByRobot robots;
+  auto results = ForEachRun<Comparison>(named, options.each_run, "compared", finished.get(), compare);
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (!results[i]) continue;
+    NameRobot(named, named.runs[i], results[i]->lost_plans);
+    robots[named.runs[i].robot] += *results[i];
+    sum += *results[i];
+  }
+  options.json ? PrintJson(sum, robots, named, options.config) : PrintForPeople(sum, robots, named, options.config);
+  return sum.num_lost() == 0 && sum.candidates > 0 && sum.corruptions == 0 && named.missing.empty() ? 0 : 1;
 }
 
 }  // namespace
@@ -63,19 +244,30 @@ Command ReplayCommand() {
       .name = kReplay.name,
       .purpose = kReplay.purpose,
       .footer =
+          "With --compare: exit 0 if no certificate would have been lost, otherwise 1.\n\n"
           "Examples:\n  forereach replay run/log/events-20260101-120000-000000.lcmlog\n"
+          "  forereach replay run/log --resume night.replayed\n"
           "  forereach replay run/log/events-20260101-120000-000000.lcmlog --other-task --config "
-          "config/demo.yaml",
-      .options = {Required({"logs", &options->logs, "LOG", kLogs}),
+          "config/demo.yaml\n"
+          "  forereach replay run/log --compare --config config/demo.yaml",
+      .options = {Required({"logs", &options->logs, "LOG|DATABASE|DIRECTORY", kRuns}),
                   {"--config", &options->config, "FILE", kTaskOfLogs},
                   {.name = "--other-task",
                    .variable = &options->other_task,
                    .help = "Replay it through the gate of another task, given by --config, and show its decisions",
                    .needs = "--config"},
+                  {.name = "--compare",
+                   .variable = &options->compare,
+                   .help =
+                       "Replay it through the gate of another task, given by --config, and count what it would have "
+                       "changed: certificates gained and lost, by cause, obstacle and step",
+                   .needs = "--config",
+                   .excludes = "--other-task"},
                   {"--plan-digest", &options->plan_digest, "HEX",
                    "Also print what was recorded and what is decided again on the candidates whose digest begins so"},
                   JsonFlag(options->json)},
-      .run = [options] { return RunReplay(*options); }};
+      .run = [options] { return options->compare ? RunCompare(*options) : RunReplay(*options); }};
+  options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;
 }

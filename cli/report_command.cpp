@@ -4,11 +4,13 @@
 
 #include "certifier/task/config_error.h"
 #include "cli/commands.h"
+#include "cli/each_run.h"
 #include "cli/key_options.h"
 #include "cli/new_file.h"
 #include "cli/offline.h"
 #include "lcmtypes/printable.h"
 #include "page/gather.h"
+#include "page/rows_json.h"
 #include "page/write.h"
 #include "records/report.h"
 
@@ -17,19 +19,52 @@ namespace {
 
 struct Options {
   ReportOptions report;
+  EachRunOptions each_run;
   std::string out, before;
   bool force = false;
 };
 
+// Rows of finished runs are kept; the drawings, of which there is a bounded number, are made anew.
+PageRun GatherRuns(const Options& options) {
+  const ReportOptions& report = options.report;
+  NamedRuns named = RunsNamedBy(report.logs, options.each_run.jobs);
+  const PageTasks tasks{report.config, report.key, RunTasks(report.config, report.key, named.is_many)};
+  const auto finished = ResultsOf(options.each_run, "report", report.config, report.key);
+  auto rows = ForEachRun<PageRun>(named, options.each_run, "read", finished.get(),
+                                  [&](const RunLogs& run, RunWork&) { return GatherRows(run, tasks); });
+  PageRun page = EmptyPage(report.logs);
+  NamedRuns read{{}, {}, named.is_many};
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (!rows[k]) continue;
+    AddRows(page, std::move(*rows[k]));
+    read.runs.push_back(named.runs[k]);
+  }
+  AddMissing(page, named);
+  const DetailBounds bounds;
+  std::size_t numbers = bounds.numbers;
+  const auto chosen = ChooseDetails(page, bounds);
+  const RunLogs* const first = read.runs.data();
+  auto drawn = ForEachRun<PageRun>(read, options.each_run, "drawn", nullptr, [&](const RunLogs& run, RunWork& work) {
+    const std::vector<std::size_t>& decisions = chosen[static_cast<std::size_t>(&run - first)];
+    return GatherDetails(run, tasks, page, decisions, numbers, work.threads);
+  });
+  for (auto& drawings : drawn)
+    if (drawings) AddDetails(page, std::move(*drawings), numbers);
+  AddMissing(page, {{}, read.missing, true});
+  return page;
+}
+
 int WritePage(const Options& options) {
   RequireNewFile(options.out, options.force);  // before the logs are read
   const ReportOptions& report = options.report;
-  const PageRun run = GatherPage(report.logs, report.config, report.key, {});
+  const PageRun run = GatherRuns(options);
   std::optional<PageRun> before;
   if (!options.before.empty()) before = GatherPage({options.before}, report.config, report.key, {0, 0, 0});
   WriteNewFile(options.out, PageHtml(run, before ? &*before : nullptr), options.force);
   std::cout << options.out << ": " << run.decisions.size() << " decisions, " << run.details.size()
-            << " with their tube or why there is none\n";
+            << " with their tube or why there is none";
+  if (run.parts.size() > 1) std::cout << ", " << run.parts.size() << " runs";
+  std::cout << "\n";
   for (const std::string& note : run.notes) std::cout << Printable(note) << "\n";
   return 0;
 }
@@ -46,9 +81,10 @@ Command ReportCommand() {
           "With --out it writes a page for a browser: one HTML file that needs no network. See docs/analysis.md.\n\n"
           "Examples:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo\n"
           "  forereach report run/log --out report.html\n"
+          "  forereach report night --out night.html --resume night.read\n"
           "  forereach report run/log --before old/log/decisions.sqlite --out both.html",
       .options = {Required({"logs", &report.logs, "LOG|DATABASE|DIRECTORY",
-                            std::string(kLogs) + "; with --out also a decision database, or the directory of both"}),
+                            std::string(kLogs) + "; with --out also databases, directories and logs of several runs"}),
                   {"--config", &report.config, "FILE", kTaskOfLogs},
                   {.name = "--picture",
                    .variable = &report.picture,
@@ -73,6 +109,7 @@ Command ReportCommand() {
         Report(options->report, std::cout);
         return 0;
       }};
+  options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, report.key);
   return command;
 }

@@ -2,7 +2,6 @@
 #include <iostream>
 #include <iterator>
 #include <sstream>
-#include <thread>
 
 #include <nlohmann/json.hpp>
 
@@ -10,11 +9,15 @@
 #include "certifier/numerics/parallel.h"
 #include "certifier/task/json_text.h"
 #include "cli/commands.h"
+#include "cli/each_run.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
 #include "lcmtypes/printable.h"
 #include "records/certificate_files.h"
+#include "records/log_survey.h"
+#include "records/log_tasks.h"
+#include "records/result_json.h"
 
 namespace forereach {
 namespace {
@@ -27,8 +30,33 @@ struct Options {
   std::string config;
   LogKey key;
   bool json = false;
-  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+  EachRunOptions each_run;
 };
+
+// What was found in one run, or in several.
+struct Verified {
+  std::int64_t certificates = 0, confirmed = 0, refuted = 0, cannot_verify = 0, not_certificates = 0, remainders = 0;
+  bool of_decision = false;
+  PassedOver passed_over;
+  std::string first_failure;  // for people
+  nlohmann::json failures = nlohmann::json::array();
+
+  Verified& operator+=(Verified&& other) {
+    certificates += other.certificates;
+    confirmed += other.confirmed;
+    refuted += other.refuted;
+    cannot_verify += other.cannot_verify;
+    not_certificates += other.not_certificates;
+    remainders += other.remainders;
+    of_decision |= other.of_decision;
+    passed_over += other.passed_over;
+    if (first_failure.empty()) first_failure = std::move(other.first_failure);
+    std::ranges::move(other.failures, std::back_inserter(failures));
+    return *this;
+  }
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Verified, certificates, confirmed, refuted, cannot_verify, not_certificates,
+                                   remainders, of_decision, passed_over, first_failure, failures)
 
 // What the verifier relies on: the certifier accepts no other problem.
 void RequireAcceptable(const Config& config) {
@@ -39,22 +67,19 @@ void RequireAcceptable(const Config& config) {
   }
 }
 
-std::vector<Verdict> VerifyAll(const CertificateFile& file, unsigned jobs) {
+// @param shows_progress of its certificates; otherwise it is one of many.
+std::vector<Verdict> VerifyAll(const CertificateFile& file, unsigned threads, bool shows_progress) {
   const verifier::Verifier verifier(file.config.problem, verifier::MethodOf(*file.config.problem));
   std::vector<Verdict> verdicts(file.certificates.size());
   Progress progress("certificates verified", verdicts.size());
-  ForEachInParallel(verdicts.size(), jobs, [&](std::size_t i, std::size_t) {
+  ForEachInParallel(verdicts.size(), threads, [&](std::size_t i, std::size_t) {
     const RecordedCertificate& recorded = file.certificates[i];
     verdicts[i] = recorded.missing.empty() ? verifier.Verify(recorded.certificate)
                                            : Verdict{Status::kCannotVerify, {-1, recorded.missing, "", ""}};
     if (!recorded.mismatches.empty() && verdicts[i].status == Status::kConfirmed) verdicts[i].status = Status::kRefuted;
-    progress.Advance();
+    if (shows_progress) progress.Advance();
   });
   return verdicts;
-}
-
-std::ptrdiff_t Count(const std::vector<Verdict>& verdicts, Status status) {
-  return std::ranges::count(verdicts, status, &Verdict::status);
 }
 
 std::string DescribeVerdict(const RecordedCertificate& recorded, const Verdict& verdict) {
@@ -91,24 +116,50 @@ nlohmann::json ToJson(const RecordedCertificate& recorded, const Verdict& verdic
   return document;
 }
 
-void PrintJson(const CertificateFile& file, const std::vector<Verdict>& verdicts) {
-  nlohmann::json failures = nlohmann::json::array();
-  for (std::size_t i = 0; i < verdicts.size(); ++i)
-    if (verdicts[i].status != Status::kConfirmed) failures.push_back(ToJson(file.certificates[i], verdicts[i]));
-  std::cout << JsonText({{"certificates", verdicts.size()},
-                         {"confirmed", Count(verdicts, Status::kConfirmed)},
-                         {"refuted", Count(verdicts, Status::kRefuted)},
-                         {"cannot_verify", Count(verdicts, Status::kCannotVerify)},
-                         {"not_certificates", file.not_certificates},
-                         {"passed_over", ToJson(file.passed_over)},
-                         {"failures", failures}})
-            << std::endl;
+// @param robot whose certificates they are, if there are several runs.
+Verified Sum(const std::vector<CertificateFile>& files, unsigned threads, const std::string* robot) {
+  Verified sum;
+  for (const CertificateFile& file : files) {
+    RequireAcceptable(file.config);
+    const std::vector<Verdict> verdicts = VerifyAll(file, threads, robot == nullptr);
+    for (std::size_t i = 0; i < verdicts.size(); ++i) {
+      const RecordedCertificate& recorded = file.certificates[i];
+      const Status status = verdicts[i].status;
+      ++sum.certificates;
+      ++(status == Status::kConfirmed ? sum.confirmed : status == Status::kRefuted ? sum.refuted : sum.cannot_verify);
+      sum.remainders += recorded.certificate.is_remainder;
+      if (status == Status::kConfirmed) continue;
+      sum.failures.push_back(ToJson(recorded, verdicts[i]));
+      if (robot) sum.failures.back()["robot"] = *robot;
+      if (sum.first_failure.empty())
+        sum.first_failure = (robot ? *robot + ": " : "") + DescribeVerdict(recorded, verdicts[i]);
+    }
+    sum.not_certificates += static_cast<std::int64_t>(file.not_certificates);
+    sum.of_decision |= file.of_decision;
+    sum.passed_over += file.passed_over;
+  }
+  return sum;
+}
+
+void PrintJson(const Verified& sum, const NamedRuns& named) {
+  nlohmann::json document{{"certificates", sum.certificates},
+                          {"confirmed", sum.confirmed},
+                          {"refuted", sum.refuted},
+                          {"cannot_verify", sum.cannot_verify},
+                          {"not_certificates", sum.not_certificates},
+                          {"passed_over", ToJson(sum.passed_over)},
+                          {"failures", sum.failures}};
+  if (named.is_many) {
+    document["runs"] = named.runs.size();
+    document["missing"] = named.missing;
+  }
+  std::cout << JsonText(document) << std::endl;
 }
 
 // The meaning of "confirmed".
-std::string Extent(const CertificateFile& file) {
-  if (file.certificates.empty()) return "  checked: nothing, because there are no certificates";
-  if (file.of_decision)
+std::string Extent(const Verified& sum) {
+  if (sum.certificates == 0) return "  checked: nothing, because there are no certificates";
+  if (sum.of_decision)
     return "  checked: every field of the decision except elapsed_us and capped: digests against the task and its "
            "data; "
            "hull,\n"
@@ -122,42 +173,43 @@ std::string Extent(const CertificateFile& file) {
          "  witness, margin and sentence. Not checked: times, sequence numbers, elapsed_us, which step is the closest";
 }
 
-void PrintForPeople(const CertificateFile& file, const std::vector<Verdict>& verdicts) {
-  for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    if (verdicts[i].status == Status::kConfirmed) continue;
-    std::cout << PrintableLines(DescribeVerdict(file.certificates[i], verdicts[i]));
-    break;
-  }
-  std::cout << "verify: " << verdicts.size() << " certificates, " << Count(verdicts, Status::kConfirmed)
-            << " confirmed, " << Count(verdicts, Status::kRefuted) << " refuted, "
-            << Count(verdicts, Status::kCannotVerify) << " cannot be verified";
-  if (file.not_certificates > 0)
-    std::cout << "; " << file.not_certificates << " abstentions and rejections are not certificates";
-  const auto remainders = std::ranges::count_if(
-      file.certificates, [](const RecordedCertificate& recorded) { return recorded.certificate.is_remainder; });
-  if (remainders > 0) std::cout << "; " << remainders << " of the certificates: what a withdrawal leaves";
-  std::cout << DescribePassedOver(file.passed_over) << "\n" << Extent(file) << std::endl;
+void PrintForPeople(const Verified& sum, const NamedRuns& named) {
+  for (const std::string& missing : named.missing) std::cout << Printable(missing) << "\n";
+  std::cout << PrintableLines(sum.first_failure);
+  std::cout << "verify: " << sum.certificates << " certificates, " << sum.confirmed << " confirmed, " << sum.refuted
+            << " refuted, " << sum.cannot_verify << " cannot be verified";
+  if (sum.not_certificates > 0)
+    std::cout << "; " << sum.not_certificates << " abstentions and rejections are not certificates";
+  if (sum.remainders > 0) std::cout << "; " << sum.remainders << " of the certificates: what a withdrawal leaves";
+  if (named.is_many) std::cout << "; " << named.runs.size() << " runs";
+  if (!named.missing.empty()) std::cout << "; " << named.missing.size() << " logs or runs could not be read";
+  std::cout << DescribePassedOver(sum.passed_over) << "\n" << Extent(sum) << std::endl;
+}
+
+// Not logs: a decision, or what ReadAllCertificates refuses.
+bool IsDocument(const std::vector<std::string>& files) {
+  if (files.size() != 1) return false;
+  const FileKind kind = KindOf(files[0]);
+  return kind != FileKind::kDirectory && kind != FileKind::kDatabase && kind != FileKind::kEventLog;
 }
 
 int Verify(const Options& options) {
-  std::vector<CertificateFile> files = options.files.size() == 1
-                                           ? ReadAllCertificates(options.files[0], options.config, options.key)
-                                           : ReadAllLogs(options.files, options.config, options.key);
-  for (const CertificateFile& each : files) RequireAcceptable(each.config);
-  CertificateFile file;  // all of them
-  std::vector<Verdict> verdicts;
-  for (CertificateFile& each : files) {
-    std::ranges::move(VerifyAll(each, options.jobs), std::back_inserter(verdicts));
-    std::ranges::move(each.certificates, std::back_inserter(file.certificates));
-    file.not_certificates += each.not_certificates;
-    file.passed_over.not_authentic += each.passed_over.not_authentic;
-    file.passed_over.undecodable += each.passed_over.undecodable;
+  NamedRuns named;
+  Verified sum;
+  if (IsDocument(options.files)) {
+    sum = Sum(ReadAllCertificates(options.files[0], options.config, options.key), options.each_run.jobs, nullptr);
+  } else {
+    named = RunsNamedBy(options.files, options.each_run.jobs);
+    const RunTasks tasks(options.config, options.key, named.is_many);
+    const auto finished = ResultsOf(options.each_run, "verify", options.config, options.key);
+    const auto verify = [&](const RunLogs& run, RunWork& work) {
+      return Sum(ReadRun(run, tasks, named.is_many), work.threads, named.is_many ? &run.robot : nullptr);
+    };
+    for (auto& each : ForEachRun<Verified>(named, options.each_run, "verified", finished.get(), verify))
+      if (each) sum += std::move(*each);
   }
-  if (options.json)
-    PrintJson(file, verdicts);
-  else
-    PrintForPeople(file, verdicts);
-  return Count(verdicts, Status::kConfirmed) == std::ssize(verdicts) && !verdicts.empty() ? 0 : 1;
+  options.json ? PrintJson(sum, named) : PrintForPeople(sum, named);
+  return sum.confirmed == sum.certificates && sum.certificates > 0 && named.missing.empty() ? 0 : 1;
 }
 
 }  // namespace
@@ -177,15 +229,12 @@ Command VerifyCommand() {
           "  forereach verify decision.json\n"
           "  forereach verify run/log/events-20260101-120000-000000.lcmlog\n"
           "  forereach verify run/log",
-      .options =
-          {Required(
-               {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
-                "The certificates: a decision (the output of certify --json), an LCM event log (all logs of the run, "
-                "in their order), a decision database with its logs in the same directory, or the directory of both"}),
-           {"--config", &options->config, "FILE", kTaskOfRecords},
-           JobsOption(options->jobs),
-           JsonFlag(options->json)},
+      .options = {Required({"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
+                            std::string("The certificates: a decision (the output of certify --json), or ") + kRuns}),
+                  {"--config", &options->config, "FILE", kTaskOfRecords},
+                  JsonFlag(options->json)},
       .run = [options] { return Verify(*options); }};
+  options->each_run.AddTo(command.options);
   AddKeyOptions(command.options, options->key);
   return command;
 }

@@ -124,7 +124,7 @@ void Recorder::AdoptLogs() {
       if (found.events == 0 && found.cut_bytes == 0 && found.damage.places == 0)
         directory_.Remove(log);
       else
-        database_->BeginRun(log, found.first_utime);
+        database_->BeginRun(log, found.first_utime, "", robot());
     } catch (const BadInput& error) {
       logging::Warn("no run knows {}, and it is left alone: {}", log, error.what());
     }
@@ -213,7 +213,7 @@ void Recorder::Open(std::int64_t now_us, const std::string& continues) {
   });
   auto log = std::make_unique<EventLogWriter>(directory_.PathOf(file));
   try {
-    database().BeginRun(file, now_us, continues);
+    database().BeginRun(file, now_us, continues, robot());
   } catch (const DatabaseError&) {
     directory_.Remove(file);  // it is empty and belongs to no run
     throw;
@@ -465,7 +465,7 @@ void Recorder::OpenDatabaseAnew() {
   const std::vector<RunRow> runs = database->Runs();
   const auto run = std::ranges::find(runs, log_file_, &RunRow::log_file);
   const bool lacks_rows = run == runs.end() || run->events < told_events_;
-  if (run == runs.end()) database->BeginRun(log_file_, begun_us_, continues_);
+  if (run == runs.end()) database->BeginRun(log_file_, begun_us_, continues_, robot());
   database_ = std::move(database);
   if (!lacks_rows) return;
   gone_ = displaced_ + ", with the gaps that only it held";

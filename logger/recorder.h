@@ -121,6 +121,8 @@ class Recorder final {
   [[nodiscard]] double TakeWorstFlushUs() { return std::exchange(worst_flush_us_, 0); }
 
  private:
+  /** Its name in the keys; empty without keys. */
+  [[nodiscard]] std::string robot() const { return keys_ ? keys_->robot() : ""; }
   struct Loss {
     std::int64_t lost = 0, first_utime = 0;
   };

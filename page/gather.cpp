@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
+#include <map>
 #include <memory>
+#include <numeric>
+#include <ranges>
 #include <set>
 #include <thread>
 #include <utility>
@@ -14,7 +18,6 @@
 #include "page/detail.h"
 #include "records/database.h"
 #include "records/interpreter.h"
-#include "records/log_directory.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/timeline.h"
@@ -100,22 +103,11 @@ bool IsJudged(const DecisionRow& row) {
          row.outcome == OutcomeName(decision_t::ABSTAIN_SAFETY);
 }
 
-Wanted Choose(const std::vector<DecisionRow>& decisions, const DetailBounds& bounds) {
-  Wanted wanted;
-  std::size_t certified = 0, abstained = 0;
-  for (std::size_t i = decisions.size(); i-- > 0;) {
-    const bool is_certified = decisions[i].outcome == OutcomeName(decision_t::CERTIFIED);
-    if (is_certified ? certified++ < bounds.certified : IsJudged(decisions[i]) && abstained++ < bounds.abstained)
-      wanted.emplace(EventName(decisions[i].event), i);
-  }
-  return wanted;
-}
-
 // Certifies the wanted candidates of logs again.
 class DetailMaker final : public TimelineUser {
  public:
-  DetailMaker(const Wanted& wanted, const BusOptions& channels, std::size_t numbers, PageRun& run)
-      : wanted_(wanted), channels_(channels), numbers_(numbers), run_(run) {}
+  DetailMaker(const Wanted& wanted, const BusOptions& channels, std::size_t numbers, unsigned threads, PageRun& run)
+      : wanted_(wanted), channels_(channels), numbers_(numbers), threads_(threads), run_(run) {}
 
   void OnStart(const Config& task) override {
     CertifyAgain();
@@ -218,8 +210,7 @@ class DetailMaker final : public TimelineUser {
     const auto describe = [&](std::size_t i, const Decision& again, const Tube& tube) {
       Describe(*certifier_, *asked[i], again, tube, run_.details[asked[i]->place]);
     };
-    const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
-    static_cast<void>(CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads, describe));
+    static_cast<void>(CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads_, describe));
     for (const Pending* each : asked) {
       PageDetail& detail = run_.details[each->place];
       if (TakeRoom(detail.sketch.points.size() + detail.bodies.points.size())) continue;
@@ -232,6 +223,7 @@ class DetailMaker final : public TimelineUser {
   const Wanted& wanted_;
   const BusOptions channels_;
   std::size_t numbers_;  // for which there is room
+  const unsigned threads_;
   PageRun& run_;
   std::unique_ptr<Certifier> certifier_;  // as the one of the log was when it decided on those below
   std::vector<Pending> pending_;          // under the obstacles below, and not yet certified again
@@ -253,6 +245,7 @@ void AddTasks(const std::vector<Config>& tasks, PageRun& run) {
   }
 }
 
+// @param makes_rows false: they are known already.
 void ReadRows(const Logs& logs, const std::vector<Config>& tasks, bool makes_rows, PageRun& run) {
   RowReader reader(tasks.front().bus, makes_rows, run);
   Timeline timeline(PointersTo(tasks), reader);
@@ -265,95 +258,162 @@ void ReadRows(const Logs& logs, const std::vector<Config>& tasks, bool makes_row
     run.notes.push_back("Messages were passed over" + passed_over + ".");
 }
 
-void AddDetails(const Logs& logs, const std::vector<Config>& tasks, const Wanted& wanted, std::size_t& numbers,
-                PageRun& run) {
-  if (wanted.empty()) return;
-  DetailMaker maker(wanted, tasks.front().bus, numbers, run);
-  Timeline timeline(PointersTo(tasks), maker);
-  for (const std::string& log : logs) timeline.Read({log}, true);
-  maker.Finish();
-}
-
-void AddReplays(const Logs& logs, const std::string& config, const LogKey& key, PageRun& run) {
-  for (const std::string& log : logs) run.replays[FileName(log)] = ReplayCommandOf(logs, config, key);
-}
-
-PageRun FromLogs(const Logs& logs, const std::string& config, const LogKey& key, const DetailBounds& bounds) {
-  const std::vector<Config> tasks = TasksOf(logs, config, key);
-  PageRun run;
-  run.name =
-      logs.size() == 1 ? FileName(logs[0]) : FileName(logs[0]) + " and " + std::to_string(logs.size() - 1) + " more";
-  run.files = logs;
-  AddTasks(tasks, run);
-  ReadRows(logs, tasks, true, run);
-  AddReplays(logs, config, key, run);
-  std::size_t numbers = bounds.numbers;
-  AddDetails(logs, tasks, Choose(run.decisions, bounds), numbers, run);
-  return run;
-}
-
-// The logs beside a database, those of a run together. Notes those that are missing.
-std::vector<Logs> LogsOf(Database& database, PageRun& run) {
-  std::vector<Logs> runs;
-  std::string before;
-  for (const RunRow& row : database.Runs()) {
-    if (row.continues.empty() || row.continues != before || runs.empty()) runs.emplace_back();
-    before = row.log_file;
-    const std::string log = (std::filesystem::path(database.path()).parent_path() / row.log_file).string();
-    if (std::filesystem::exists(log))
-      runs.back().push_back(log);
-    else
-      run.notes.push_back(row.log_file + (row.log_deleted_utime
-                                              ? " was deleted for the quota: its decisions are shown without tubes."
-                                              : " is not beside the database: its decisions are shown without tubes."));
+void ReadDatabase(const RunLogs& run, PageRun& page) {
+  Database database(run.database);
+  std::vector<std::string> files;
+  for (const RunRow& row : run.missing) files.push_back(row.log_file);
+  for (const std::string& log : run.logs) files.push_back(FileName(log));
+  for (const std::string& file : files) {
+    Rows rows = database.Read(file);
+    std::ranges::move(rows.decisions, std::back_inserter(page.decisions));
+    std::ranges::move(rows.events, std::back_inserter(page.events));
+    std::ranges::move(rows.gaps, std::back_inserter(page.gaps));
   }
-  std::erase_if(runs, [](const Logs& logs) { return logs.empty(); });
-  return runs;
 }
 
-PageRun FromDatabase(const std::string& path, const std::string& config, const LogKey& key,
-                     const DetailBounds& bounds) {
-  Database database(path);
-  Rows rows = database.Read();
-  PageRun run;
-  run.name = path;
-  run.files = {path};
-  run.decisions = std::move(rows.decisions);
-  run.events = std::move(rows.events);
-  run.gaps = std::move(rows.gaps);
-  const Wanted wanted = Choose(run.decisions, bounds);
-  std::size_t numbers = bounds.numbers;
-  for (const Logs& logs : LogsOf(database, run)) try {
-      const LogSurvey survey = Survey(logs, LogOrder::kAny);
-      if (survey.order.empty()) continue;
-      std::vector<Config> tasks =
-          TasksOf(survey, logs.front(), std::filesystem::path(path).parent_path().string(), config);
-      key.Override(tasks, config);
-      AddTasks(tasks, run);
-      ReadRows(logs, tasks, false, run);
-      AddReplays(logs, config, key, run);
-      AddDetails(logs, tasks, wanted, numbers, run);
-    } catch (const BadInput& error) {
-      run.notes.push_back(std::string("No tubes, faults and withdrawals: ") + error.what());
-    }
-  return run;
+// The numbers of new rows are noted when all of them are there.
+void AddPart(const RunLogs& run, const PageTasks& tasks, PageRun& page) {
+  PagePart& part = page.parts.emplace_back();
+  part.robot = run.robot;
+  for (const std::string& log : run.logs)
+    part.replays[FileName(log)] = ReplayCommandOf(run.logs, tasks.config, tasks.key);
+  part.decisions = page.decisions.size();
+  part.events = page.events.size();
+  part.gaps = page.gaps.size();
+  part.faults = page.faults.size();
+  part.withdrawals = page.withdrawals.size();
 }
 
 }  // namespace
 
-PageRun GatherPage(const Logs& inputs, const std::string& config, const LogKey& key, const DetailBounds& bounds) {
-  if (inputs.size() != 1) return FromLogs(inputs, config, key, bounds);
-  const std::string& input = inputs.front();
-  const FileKind kind = KindOf(input);
-  if (kind == FileKind::kDatabase) return FromDatabase(input, config, key, bounds);
-  if (kind != FileKind::kDirectory) return FromLogs(inputs, config, key, bounds);
-  const std::string database = (std::filesystem::path(input) / LogDirectory::kDatabase).string();
-  if (std::filesystem::exists(database)) return FromDatabase(database, config, key, bounds);
-  const LogDirectory directory(input);
-  Logs logs;
-  for (const std::string& log : directory.Logs()) logs.push_back(directory.PathOf(log));
-  if (logs.empty()) throw ConfigError(input + ": neither a decision database nor logs in this directory");
-  return FromLogs(logs, config, key, bounds);
+PageRun GatherRows(const RunLogs& run, const PageTasks& tasks) {
+  PageRun page;
+  const bool has_database = !run.database.empty();
+  if (has_database) ReadDatabase(run, page);
+  try {
+    if (!run.logs.empty() && !(has_database && Survey(run.logs, LogOrder::kAny).order.empty())) {
+      const std::vector<Config> of_run = tasks.of_run.Of(run.logs);
+      AddTasks(of_run, page);
+      ReadRows(run.logs, of_run, !has_database, page);
+    }
+  } catch (const BadInput& error) {
+    if (!has_database) throw;
+    page.notes.push_back(std::string("No tubes, faults and withdrawals: ") + error.what());
+  }
+  AddPart(run, tasks, page);
+  return page;
+}
+
+void AddRows(PageRun& page, PageRun&& run) {
+  const auto move = [](auto& from, auto& to) { std::ranges::move(from, std::back_inserter(to)); };
+  move(run.decisions, page.decisions);
+  move(run.events, page.events);
+  move(run.gaps, page.gaps);
+  move(run.faults, page.faults);
+  move(run.withdrawals, page.withdrawals);
+  move(run.parts, page.parts);
+  move(run.notes, page.notes);
+  for (PageTask& task : run.tasks)
+    if (std::ranges::find(page.tasks, task.config_digest, &PageTask::config_digest) == page.tasks.end())
+      page.tasks.push_back(std::move(task));
+  page.damage += run.damage;
+}
+
+std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const DetailBounds& bounds) {
+  std::vector<std::size_t> part_of, places(page.decisions.size());
+  for (std::size_t k = 0; k < page.parts.size(); ++k) part_of.insert(part_of.end(), page.parts[k].decisions, k);
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  if (page.parts.size() > 1)
+    std::ranges::stable_sort(places, {}, [&](std::size_t i) { return page.decisions[i].utime; });
+  std::vector<std::vector<std::size_t>> chosen(page.parts.size());
+  std::size_t certified = 0, abstained = 0;
+  for (const std::size_t i : places | std::views::reverse) {
+    const DecisionRow& row = page.decisions[i];
+    const bool is_certified = row.outcome == OutcomeName(decision_t::CERTIFIED);
+    if (is_certified ? certified++ < bounds.certified : IsJudged(row) && abstained++ < bounds.abstained)
+      chosen[part_of.at(i)].push_back(i);
+  }
+  return chosen;
+}
+
+PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun& page,
+                      const std::vector<std::size_t>& decisions, std::size_t numbers, unsigned threads) {
+  PageRun made;
+  made.tasks = page.tasks;  // so that their places are the page's
+  Wanted wanted;
+  for (const std::size_t i : decisions) wanted.emplace(EventName(page.decisions[i].event), i);
+  if (wanted.empty() || run.logs.empty()) return made;
+  std::vector<Config> of_run;
+  try {
+    of_run = tasks.of_run.Of(run.logs);
+  } catch (const BadInput&) {  // noted when the rows were read
+    return made;
+  }
+  DetailMaker maker(wanted, of_run.front().bus, numbers, threads, made);
+  Timeline timeline(PointersTo(of_run), maker);
+  for (const std::string& log : run.logs) timeline.Read({log}, true);
+  maker.Finish();
+  return made;
+}
+
+void AddDetails(PageRun& page, PageRun&& details, std::size_t& numbers) {
+  std::map<std::size_t, int> place_of;  // of a set of obstacles, in the page
+  for (PageDetail& detail : details.details) {
+    if (detail.obstacles >= 0) {
+      const auto old = static_cast<std::size_t>(detail.obstacles);
+      const auto [place, is_new] = place_of.try_emplace(old, -1);
+      const std::size_t size = kNumbersOfObstacle * details.obstacle_sets[old].size();
+      if (is_new && size <= numbers) {
+        numbers -= size;
+        place->second = static_cast<int>(page.obstacle_sets.size());
+        page.obstacle_sets.push_back(details.obstacle_sets[old]);
+      }
+      detail.obstacles = place->second;
+    }
+    if (detail.sketch.points.size() <= numbers) {
+      numbers -= detail.sketch.points.size();
+    } else {
+      detail.sketch = {};
+      detail.missing = kFull;
+    }
+    page.details.push_back(std::move(detail));
+  }
+}
+
+void AddMissing(PageRun& page, const NamedRuns& named) {
+  for (const std::string& missing : named.missing) page.notes.push_back("Not read: " + missing + ".");
+}
+
+PageRun EmptyPage(const std::vector<std::string>& inputs) {
+  PageRun page;
+  const FileKind kind = KindOf(inputs[0]);
+  const bool is_log = kind != FileKind::kDirectory && kind != FileKind::kDatabase;
+  const std::string name = is_log ? FileName(inputs[0]) : inputs[0];
+  page.name = inputs.size() == 1 ? name : name + " and " + std::to_string(inputs.size() - 1) + " more";
+  page.files = inputs;
+  return page;
+}
+
+PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& config, const LogKey& key,
+                   const DetailBounds& bounds) {
+  const unsigned threads = std::max(1u, std::thread::hardware_concurrency());
+  NamedRuns named = RunsNamedBy(inputs, threads);
+  const PageTasks tasks{config, key, RunTasks(config, key, named.is_many)};
+  PageRun page = EmptyPage(inputs);
+  std::vector<RunLogs> read;
+  for (const RunLogs& run : named.runs) try {
+      AddRows(page, GatherRows(run, tasks));
+      read.push_back(run);
+    } catch (const BadInput& error) {
+      if (!named.is_many) throw;
+      named.missing.emplace_back(error.what());
+    }
+  AddMissing(page, named);
+  std::size_t numbers = bounds.numbers;
+  const auto chosen = ChooseDetails(page, bounds);
+  for (std::size_t k = 0; k < chosen.size(); ++k)
+    AddDetails(page, GatherDetails(read[k], tasks, page, chosen[k], numbers, threads), numbers);
+  return page;
 }
 
 }  // namespace forereach

@@ -1,11 +1,13 @@
-/** Gathers what a page shows, from event logs, a decision database or a logger's directory. */
+/** Gathers what a page shows, from event logs and decision databases. */
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "page/page_data.h"
+#include "records/log_tasks.h"
 #include "records/log_trust.h"
+#include "records/run_logs.h"
 
 namespace forereach {
 
@@ -17,13 +19,44 @@ struct DetailBounds {
   std::size_t numbers = 12'000'000;
 };
 
-/** Reads consecutive event logs of one run, or one database, or one directory with a database or with logs. Rows of a
-database need no log; tubes, faults and withdrawals come from the logs beside it. Tubes are of candidates that this
+/** What the command line says of the tasks of all runs. */
+struct PageTasks {
+  std::string config;  ///< The task file; empty: the tasks that the logger kept next to the logs.
+  LogKey key;
+  RunTasks of_run;
+};
+
+/** The rows of one run, without drawings. Rows of a database need no log; faults and withdrawals come from the logs
+beside it, and what keeps these from being read is a note. @throws BadInput if a run without a database cannot be read.
+*/
+[[nodiscard]] PageRun GatherRows(const RunLogs& run, const PageTasks& tasks);
+
+/** Puts the rows of one run behind those of others. */
+void AddRows(PageRun& page, PageRun&& run);
+
+/** The tubes of some decisions of a run.
+@param decisions their places in `page`. @param part the place of the run. @param threads that it may use.
+@return only details, tasks and obstacle sets. @throws BadInput if a log cannot be read. */
+[[nodiscard]] PageRun GatherDetails(const RunLogs& run, const PageTasks& tasks, const PageRun& page,
+                                    const std::vector<std::size_t>& decisions, std::size_t numbers, unsigned threads);
+
+/** Puts the tubes of one run into a page, as far as there is room. @param numbers for which there is room. */
+void AddDetails(PageRun& page, PageRun&& details, std::size_t& numbers);
+
+/** The decisions whose tubes a page has: of each part their places, the last ones by time. */
+[[nodiscard]] std::vector<std::vector<std::size_t>> ChooseDetails(const PageRun& page, const DetailBounds& bounds);
+
+/** All of it for the runs that `inputs` name (RunsNamedBy), one after the other. Tubes are of candidates that this
 program decides again as the record has it.
-@param config the task file; empty: the tasks that the logger kept next to the logs.
 @param bounds of the drawings; zeros for none.
 @throws BadInput if nothing can be read, or for logs without their task. */
 [[nodiscard]] PageRun GatherPage(const std::vector<std::string>& inputs, const std::string& config, const LogKey& key,
                                  const DetailBounds& bounds);
+
+/** Notes what could not be read. */
+void AddMissing(PageRun& page, const NamedRuns& named);
+
+/** The page's name and inputs, before rows are added. */
+[[nodiscard]] PageRun EmptyPage(const std::vector<std::string>& inputs);
 
 }  // namespace forereach

@@ -51,16 +51,19 @@ const loadRun = async (raw) => {
   for (const name of OTHERS) run[name] = await unpackTable(raw[name]);
   const d = run.decisions;
   run.time = toNumbers(d.utime.values);
-  const plans = toNumbers(d.plan.values), rowOfPlan = new Map();
-  for (let i = 0; i < run.count; ++i)
-    if (!rowOfPlan.has(plans[i]) || nameAt(d.outcome, i) === 'certified') rowOfPlan.set(plans[i], i);
+  const plans = toNumbers(d.plan.values), rowsOfRun = raw.runs.map(() => new Map());
+  const rowOfPlan = (part) => (rowsOfRun[part] ??= new Map());
+  for (let i = 0; i < run.count; ++i) {
+    const rows = rowOfPlan(d.run.values[i]);
+    if (!rows.has(plans[i]) || nameAt(d.outcome, i) === 'certified') rows.set(plans[i], i);
+  }
   for (const name of OTHERS) {
     const table = run[name];
     table.time = toNumbers(table.utime.values);
     table.shown = new Uint8Array(table.time.length);
     if (!table.plan) continue;
     table.row = new Int32Array(table.time.length);
-    for (let i = 0; i < table.row.length; ++i) table.row[i] = rowOfPlan.get(Number(table.plan.values[i])) ?? -1;
+    for (let i = 0; i < table.row.length; ++i) table.row[i] = rowOfPlan(table.run.values[i]).get(Number(table.plan.values[i])) ?? -1;
   }
   run.shown = new Uint8Array(run.count);
   run.rows = new Uint32Array(run.count);  // those that are shown, in the order of the log
@@ -97,7 +100,7 @@ const search = (run, query, found) => {
     for (let i = 0; i < run.count; ++i) if (!found[i] && hexAt(d.digest.values, i).startsWith(digest)) found[i] = 1;
 };
 
-const CHOICES = ['outcome', 'cause', 'source', 'config', 'obstacle'];
+const CHOICES = ['outcome', 'cause', 'robot', 'source', 'config', 'obstacle'];
 
 // Decides what of a run passes the filters. Choices are texts, so that they mean the same in two runs.
 const select = (run, filters, {withTime = true} = {}) => {
@@ -117,12 +120,14 @@ const select = (run, filters, {withTime = true} = {}) => {
   }
   const chosen = CHOICES.filter((name) => filters[name] !== null);
   const isOpen = chosen.length === 0 && !filters.search;
+  const isOfRobot = chosen.length === 1 && filters.robot !== null && !filters.search;
   const isOfSource = chosen.length === 1 && filters.source !== null && !filters.search;
   for (const name of OTHERS) {
     const table = run[name];
     for (let i = 0; i < table.shown.length; ++i) {
       const isNow = from <= table.time[i] && table.time[i] <= to;
       if (table.row && table.row[i] >= 0) table.shown[i] = isNow && shown[table.row[i]] ? 1 : 0;
+      else if (isOfRobot) table.shown[i] = isNow && run.raw.runs[table.run.values[i]]?.robot === filters.robot ? 1 : 0;
       else if (isOfSource && name === 'gaps') table.shown[i] = isNow && nameAt(table.source, i) === filters.source ? 1 : 0;
       else table.shown[i] = isNow && isOpen ? 1 : 0;
     }
@@ -596,6 +601,7 @@ const showDetail = (run, i) => {
   byId('sentence').textContent = textAt(d.message, i) || '(no sentence)';
   fillList('facts', [
     ['Outcome', outcomeLabel(outcome) + (cause === 'none' ? '' : `: ${cause.replaceAll('_', ' ')}`)],
+    ['Robot', run.raw.runs.length > 1 ? nameAt(d.robot, i) : ''],
     ['Plan', `${d.plan.values[i]} of ${nameAt(d.source, i)}`],
     ['Received', `${timeText(run.time[i])} UTC`],
     ['Sequence', String(d.sequence.values[i])],
@@ -610,7 +616,7 @@ const showDetail = (run, i) => {
     ['Log', `${nameAt(d.log, i)} event ${d.event.values[i]}`],
   ]);
   showEnvelope(detail, task);
-  const replay = run.raw.replays?.[nameAt(d.log, i)];
+  const replay = run.raw.runs[d.run.values[i]]?.replays?.[nameAt(d.log, i)];
   byId('command').textContent = replay ? `${replay} --plan-digest ${digest}` : 'Its log was not read.';
   fillList('digests', [['candidate', digest], ['task', config], ...['model', 'declaration', 'observations', 'obstacles'].map((name) => [name, nameAt(d[name], i)])]);
   byId('stage').hidden = byId('step').closest('.steer').hidden = byId('legend').hidden = !hasDrawing;
@@ -635,7 +641,7 @@ const readFilters = () => {
   return filters;
 };
 const fillChoices = (run) => {
-  const labels = {outcome: outcomeLabel, cause: (name) => name.replaceAll('_', ' '), source: (name) => name || '(no name)',
+  const labels = {outcome: outcomeLabel, cause: (name) => name.replaceAll('_', ' '), robot: (name) => name || '(no name)', source: (name) => name || '(no name)',
     config: (digest) => taskLabel(run, digest), obstacle: (index) => (index < 0 ? 'none' : String(index))};
   const fill = (name, values) => byId(`f-${name}`).replaceChildren(make('option', 'all'), ...values.map((value) => {
     const option = make('option', labels[name](value));
@@ -684,6 +690,7 @@ const start = async () => {
     showCauses(run, before);
     showSteps(run);
     showTimes(run);
+    showGroups(run, before, 'by-robot', 'By robot', 'robot', (name) => name || '(no name)');
     showGroups(run, before, 'by-source', 'By source', 'source', (name) => name || '(no name)');
     showGroups(run, before, 'by-config', 'By task, with its config digest', 'config', (digest) => taskLabel(run, digest));
     showGroups(run, before, 'by-obstacle', 'By the obstacle that decided', 'obstacle', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`));

@@ -61,7 +61,15 @@ struct PageDetail {
   std::vector<PageState> executed;
 };
 
-/** One side of a page: a run, or several that a database has. */
+/** The rows of one run among several. */
+struct PagePart {
+  std::string robot;  ///< As in RunLogs.
+  /** By log file: the start of a command that decides again, "forereach replay run/log/a.lcmlog". */
+  std::map<std::string, std::string> replays;
+  std::size_t decisions = 0, events = 0, gaps = 0, faults = 0, withdrawals = 0;  ///< Numbers of rows.
+};
+
+/** One side of a page: a run, or several. */
 struct PageRun {
   std::string name;
   std::vector<std::string> files;  ///< What it was read from.
@@ -73,8 +81,7 @@ struct PageRun {
   std::vector<PageTask> tasks;
   std::vector<std::vector<Obstacle>> obstacle_sets;
   std::vector<PageDetail> details;
-  /** By log file: the start of a command that decides again, "forereach replay run/log/a.lcmlog". */
-  std::map<std::string, std::string> replays;
+  std::vector<PagePart> parts;  ///< The rows of each run, one behind the other.
   LogDamage damage;
   std::vector<std::string> notes;  ///< What is not on the page, as sentences.
 };

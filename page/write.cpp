@@ -56,10 +56,34 @@ Json DigestColumn(const std::vector<Row>& rows, const Of& of) {
   return {{"type", "u8"}, {"data", Packed(bytes)}};
 }
 
-Json DecisionsJson(const std::vector<DecisionRow>& rows) {
+// Of each row the place of its run. Rows behind those that are counted are the last run's.
+Json RunColumn(const PageRun& run, std::size_t PagePart::*count, std::size_t rows) {
+  std::vector<std::uint32_t> places;
+  for (std::size_t k = 0; k < run.parts.size(); ++k)
+    places.insert(places.end(), run.parts[k].*count, static_cast<std::uint32_t>(k));
+  places.resize(rows, places.empty() ? 0 : places.back());
+  return Column(places);
+}
+
+// The robot of each decision by its number, and the names.
+Json RobotColumn(const PageRun& run) {
+  Dictionary dictionary;
+  std::vector<std::uint32_t> robots;
+  for (const PagePart& part : run.parts) robots.insert(robots.end(), part.decisions, dictionary(part.robot));
+  if (run.parts.empty()) static_cast<void>(dictionary(""));
+  robots.resize(run.decisions.size(), robots.empty() ? 0 : robots.back());
+  Json column = Column(robots);
+  column["names"] = dictionary.texts();
+  return column;
+}
+
+Json DecisionsJson(const PageRun& run) {
+  const std::vector<DecisionRow>& rows = run.decisions;
   const auto of = [](auto member) { return [member](const DecisionRow& row) { return row.*member; }; };
   const auto ground = [](std::size_t i) { return [i](const DecisionRow& row) { return row.grounds[i]; }; };
-  return {{"utime", ColumnOf<std::int64_t>(rows, of(&DecisionRow::utime))},
+  return {{"run", RunColumn(run, &PagePart::decisions, rows.size())},
+          {"robot", RobotColumn(run)},
+          {"utime", ColumnOf<std::int64_t>(rows, of(&DecisionRow::utime))},
           {"plan", ColumnOf<std::int64_t>(rows, of(&DecisionRow::plan_id))},
           {"sequence", ColumnOf<std::int64_t>(rows, of(&DecisionRow::sequence))},
           {"source", NamesColumn(rows, of(&DecisionRow::source))},
@@ -86,8 +110,8 @@ Json DecisionsJson(const std::vector<DecisionRow>& rows) {
 }
 
 // What the figures need.
-Json FiguresJson(const std::vector<DecisionRow>& rows) {
-  Json all = DecisionsJson(rows);
+Json FiguresJson(const PageRun& run) {
+  Json all = DecisionsJson(run);
   for (const char* name : {"sequence", "coordinate", "first", "second", "message", "digest", "log", "event", "model",
                            "declaration", "observations", "obstacles"})
     all.erase(name);
@@ -169,6 +193,17 @@ Json DrawingsJson(const PageRun& run) {
           {"bodies", SketchesJson(run.details, &PageDetail::bodies)}};
 }
 
+Json RunsJson(const PageRun& run, bool only_figures) {
+  Json all = Json::array();
+  for (const PagePart& part : run.parts) {
+    Json json{{"robot", Printable(part.robot)}};
+    if (!only_figures)
+      for (const auto& [log, command] : part.replays) json["replays"][Printable(log)] = Printable(command);
+    all.push_back(std::move(json));
+  }
+  return all;
+}
+
 Json RunJson(const PageRun& run, bool only_figures) {
   Json json{{"name", Printable(run.name)},
             {"files", TextsJson(run.files)},
@@ -176,14 +211,17 @@ Json RunJson(const PageRun& run, bool only_figures) {
             {"tasks", TasksJson(run.tasks)},
             {"damaged_places", run.damage.places},
             {"count", run.decisions.size()},
-            {"decisions", only_figures ? FiguresJson(run.decisions) : DecisionsJson(run.decisions)},
+            {"decisions", only_figures ? FiguresJson(run) : DecisionsJson(run)},
             {"events", EventsJson(run.events)},
             {"gaps", GapsJson(run.gaps)},
             {"faults", FaultsJson(run.faults)},
             {"withdrawals", WithdrawalsJson(run.withdrawals)}};
-  if (only_figures) return json;
-  json["drawings"] = DrawingsJson(run);
-  for (const auto& [log, command] : run.replays) json["replays"][Printable(log)] = Printable(command);
+  json["events"]["run"] = RunColumn(run, &PagePart::events, run.events.size());
+  json["gaps"]["run"] = RunColumn(run, &PagePart::gaps, run.gaps.size());
+  json["faults"]["run"] = RunColumn(run, &PagePart::faults, run.faults.size());
+  json["withdrawals"]["run"] = RunColumn(run, &PagePart::withdrawals, run.withdrawals.size());
+  json["runs"] = RunsJson(run, only_figures);
+  if (!only_figures) json["drawings"] = DrawingsJson(run);
   return json;
 }
 

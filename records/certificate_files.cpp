@@ -22,7 +22,6 @@
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "records/database.h"
-#include "records/log_directory.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
 #include "records/timeline.h"
@@ -329,117 +328,58 @@ class CertificateReader final : public TimelineUser {
   std::multimap<Digest, Plan> of_plan_;
 };
 
-// ---- A decision database: its logs lie beside it, and its rows have to say what they say.
+// ---- Runs.
 
-// The files of each run: what a file does not know, the one before does.
-std::vector<std::vector<RunRow>> Chains(Database& database) {
-  std::vector<std::vector<RunRow>> chains;
-  for (RunRow& run : database.Runs()) {
-    if (run.continues.empty() || chains.empty() || chains.back().back().log_file != run.continues)
-      chains.emplace_back();
-    chains.back().push_back(std::move(run));
-  }
-  return chains;
+std::vector<CertificateFile> ReadLogs(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
+                                      bool names_files, const std::vector<DecisionRow>* rows) {
+  CertificateReader reader;
+  for (const Config& task : tasks) reader.AddTask(task);
+  Timeline timeline(PointersTo(tasks), reader);
+  timeline.Read(logs, names_files);
+  reader.EndRun(tasks.front(), rows);
+  std::vector<CertificateFile> files = reader.Finish(timeline);
+  if (timeline.damage().places > 0)
+    files.front().certificates.push_back(DamagedLog(logs.front(), timeline.damage().places));
+  return files;
 }
 
-// The logs of a run that are beside the database, and their rows.
-struct RunOnDisk {
-  std::vector<std::string> logs;
-  std::vector<DecisionRow> rows;
-};
-
-class DatabaseReading {
- public:
-  DatabaseReading(const std::string& path, const std::string& config_path, const LogKey& key)
-      : path_(path), config_path_(config_path), key_(key), why_none_(path + ": no run in it has a log with decisions") {
-    if (!config_path.empty()) given_ = LoadConfig(config_path).grounds.config;
-    Database database(path);
-    for (const std::vector<RunRow>& chain : Chains(database)) ReadRun(Find(database, chain));
-  }
-
-  std::vector<CertificateFile> Finish() {
-    if (!timeline_) throw ConfigError(why_none_);
-    std::vector<CertificateFile> files = reader_.Finish(*timeline_);
-    std::ranges::move(without_task_, std::back_inserter(files.front().certificates));
-    return files;
-  }
-
- private:
-  RunOnDisk Find(Database& database, const std::vector<RunRow>& chain) {
-    RunOnDisk found;
-    for (const RunRow& run : chain) {
-      const std::string log = (std::filesystem::path(path_).parent_path() / run.log_file).string();
-      if (std::filesystem::exists(log)) {
-        found.logs.push_back(log);
-        std::ranges::move(database.Read(run.log_file).decisions, std::back_inserter(found.rows));
-      } else {
-        const char* why =
-            run.log_deleted_utime ? "the log was deleted for the quota" : "the log is not in the database's directory";
-        without_task_.push_back({run.log_file, {}, why, {}});
-        why_none_ = path_ + ": " + run.log_file + ": " + why;
-      }
-    }
-    return found;
-  }
-
-  void ReadRun(const RunOnDisk& run) {
-    const LogSurvey survey = Survey(run.logs, LogOrder::kAny);  // what is amiss in one is for the reading to say
-    if (survey.order.empty() && run.rows.empty()) return;
-    std::vector<const Config*> tasks;
-    try {
-      tasks = TasksOfRun(survey, run.logs.front());
+// What cannot be read is a certificate that cannot be verified.
+std::vector<CertificateFile> ReadRuns(const std::string& path, const std::string& config_path, const LogKey& key) {
+  NamedRuns named = RunsNamedBy({path}, 1);
+  const RunTasks tasks(config_path, key, named.is_many);
+  std::vector<CertificateFile> files;
+  for (const RunLogs& run : named.runs) try {
+      std::ranges::move(ReadRun(run, tasks, true), std::back_inserter(files));
     } catch (const ConfigError& error) {
-      without_task_.push_back({run.logs.front(), {}, why_none_ = error.what(), {}});
-      return;
+      named.missing.emplace_back(error.what());
     }
-    if (timeline_)
-      timeline_->SetTasks(tasks);
-    else
-      timeline_.emplace(tasks, reader_);
-    for (const Config* task : tasks) reader_.AddTask(*task);
-    const std::int64_t damage = timeline_->damage().places;
-    timeline_->Read(run.logs, true);
-    reader_.EndRun(*tasks.front(), &run.rows);
-    if (timeline_->damage().places > damage)
-      without_task_.push_back(DamagedLog(run.logs.front(), timeline_->damage().places - damage));
-  }
-
-  // The same task of several runs is kept once.
-  std::vector<const Config*> TasksOfRun(const LogSurvey& survey, const std::string& log) {
-    std::vector<Config> found = TasksOf(survey, log, std::filesystem::path(path_).parent_path().string(),
-                                        given_ && survey.configs.contains(*given_) ? config_path_ : "");
-    key_.Override(found, config_path_);
-    std::vector<const Config*> tasks;
-    for (Config& task : found) {
-      const auto same =
-          std::ranges::find_if(tasks_, [&](const Config& known) { return known.grounds == task.grounds; });
-      tasks.push_back(same != tasks_.end() ? &*same : &tasks_.emplace_back(std::move(task)));
-    }
-    return tasks;
-  }
-
-  const std::string path_, config_path_;
-  const LogKey key_;
-  std::optional<Digest> given_;
-  std::string why_none_;  // for an error where no run can be read
-  std::deque<Config> tasks_;
-  CertificateReader reader_;
-  std::optional<Timeline> timeline_;
-  std::vector<RecordedCertificate> without_task_;
-};
+  if (files.empty())
+    throw ConfigError(path + ": " +
+                      (named.missing.empty() ? "no run in it has a log with decisions" : named.missing.back()));
+  for (const std::string& missing : named.missing) files.front().certificates.push_back({missing, {}, missing, {}});
+  return files;
+}
 
 }  // namespace
 
-std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const std::string& config_path,
-                                                 const LogKey& key) {
-  std::string path = given;
-  if (KindOf(path) == FileKind::kDirectory) {
-    path = (std::filesystem::path(path) / LogDirectory::kDatabase).string();
-    if (!std::filesystem::is_regular_file(path)) throw ConfigError(given + ": no decision database in this directory");
+std::vector<CertificateFile> ReadRun(const RunLogs& run, const RunTasks& tasks, bool is_many) {
+  std::vector<DecisionRow> rows;
+  if (!run.database.empty()) {
+    Database database(run.database);
+    for (const std::string& log : run.logs)
+      std::ranges::move(database.Read(std::filesystem::path(log).filename().string()).decisions,
+                        std::back_inserter(rows));
   }
+  if (is_many && (run.logs.empty() || (Survey(run.logs, LogOrder::kAny).order.empty() && rows.empty()))) return {};
+  return ReadLogs(run.logs, tasks.Of(run.logs), is_many || run.logs.size() > 1, run.database.empty() ? nullptr : &rows);
+}
+
+std::vector<CertificateFile> ReadAllCertificates(const std::string& path, const std::string& config_path,
+                                                 const LogKey& key) {
   try {
     switch (KindOf(path)) {
-      case FileKind::kDatabase: return DatabaseReading(path, config_path, key).Finish();
+      case FileKind::kDirectory:
+      case FileKind::kDatabase: return ReadRuns(path, config_path, key);
       case FileKind::kJson: return {FromDecision(path, ParseJson(ReadWhole(path, kLargestJsonFile)), config_path)};
       case FileKind::kOther:
         if (Survey({path}).events == 0) break;
@@ -456,16 +396,7 @@ std::vector<CertificateFile> ReadAllCertificates(const std::string& given, const
 
 std::vector<CertificateFile> ReadAllLogs(const std::vector<std::string>& logs, const std::string& config_path,
                                          const LogKey& key) {
-  const std::vector<Config> tasks = TasksOf(logs, config_path, key);
-  CertificateReader reader;
-  for (const Config& task : tasks) reader.AddTask(task);
-  Timeline timeline(PointersTo(tasks), reader);
-  timeline.Read(logs, logs.size() > 1);
-  reader.EndRun(tasks.front(), nullptr);
-  std::vector<CertificateFile> files = reader.Finish(timeline);
-  if (timeline.damage().places > 0)
-    files.front().certificates.push_back(DamagedLog(logs.front(), timeline.damage().places));
-  return files;
+  return ReadLogs(logs, TasksOf(logs, config_path, key), logs.size() > 1, nullptr);
 }
 
 }  // namespace forereach

@@ -8,7 +8,9 @@ decision database. It compares digests with the inputs; the verifier checks the 
 
 #include "certifier/task/config.h"
 #include "records/decision_record.h"
+#include "records/log_tasks.h"
 #include "records/log_trust.h"
+#include "records/run_logs.h"
 
 namespace forereach {
 
@@ -20,8 +22,8 @@ struct CertificateFile {
   PassedOver passed_over;            ///< In logs.
 };
 
-/** Reads a document, a log or a database; the first bytes determine which. For a directory it reads the database in it.
-Certificates of logs and databases are grouped by their tasks.
+/** Reads a document, a log, a database or a directory (RunsNamedBy); the first bytes determine which. Certificates of a
+run are grouped by their tasks.
 @param config_path the task file. It may be empty for a decision, which names its task, and for logs beside which the
 logger kept the task (records/log_tasks.h).
 @param key for logs: with a key, only authentic messages count.
@@ -29,6 +31,11 @@ logger kept the task (records/log_tasks.h).
 @throws BadInput if the file is none of the three, no task is found, or the file or the key cannot be read. */
 [[nodiscard]] std::vector<CertificateFile> ReadAllCertificates(const std::string& path, const std::string& config_path,
                                                                const LogKey& key = {});
+
+/** The same for one of several runs: nothing if nothing was decided in it. Rows of its database have to say what the
+logs say. @param is_many whether events are named with their log, and a run without decisions is none to speak of.
+@throws BadInput as above. */
+[[nodiscard]] std::vector<CertificateFile> ReadRun(const RunLogs& run, const RunTasks& tasks, bool is_many);
 
 /** The same for consecutive event logs, the files of one run. @throws BadInput as above. */
 [[nodiscard]] std::vector<CertificateFile> ReadAllLogs(const std::vector<std::string>& logs,

@@ -1,6 +1,7 @@
 #include "records/database.h"
 
 #include <array>
+#include <bit>
 #include <cerrno>
 #include <string_view>
 #include <tuple>
@@ -50,6 +51,9 @@ constexpr std::array<const char*, Database::kSchemaVersion> kMigrations{R"sql(
   ALTER TABLE decisions ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
   ALTER TABLE execution_events ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
   ALTER TABLE gaps ADD COLUMN event_digest TEXT NOT NULL DEFAULT '';
+)sql",
+                                                                        R"sql(
+  ALTER TABLE runs ADD COLUMN robot TEXT NOT NULL DEFAULT '';
 )sql"};
 
 // A column that is NULL where the number is -1.
@@ -77,7 +81,7 @@ auto ColumnsOf(auto& row) {
                           std::tie(row.lost, row.utime, row.reason, row.event.digest));
   else if constexpr (std::is_same_v<Row, RunRow>)
     return std::tie(row.log_file, row.start_utime, row.end_utime, row.events, row.schema, row.recovered, row.continues,
-                    row.log_deleted_utime);
+                    row.log_deleted_utime, row.robot);
   else if constexpr (std::is_same_v<Row, LogReference>)
     return std::tie(row.log_file, row.event_number, row.digest);
   else if constexpr (std::is_same_v<Row, std::pair<std::string, std::int64_t>>)
@@ -115,6 +119,22 @@ class Database::Statement final {
     if (result != SQLITE_ROW) sqlite3_reset(statement_);
     if (result != SQLITE_ROW && result != SQLITE_DONE) throw DatabaseError(sqlite3_errmsg(handle_));
     return result == SQLITE_ROW;
+  }
+
+  /** All columns of the row with their types and lengths. Reals have all their digits. */
+  [[nodiscard]] std::string Text() const {
+    std::string text;
+    for (int i = 0; i < sqlite3_column_count(statement_); ++i) {
+      const int type = sqlite3_column_type(statement_, i);
+      const double real = type == SQLITE_FLOAT ? sqlite3_column_double(statement_, i) : 0;
+      const auto* bytes = static_cast<const char*>(sqlite3_column_blob(statement_, i));
+      const std::string value =
+          type == SQLITE_FLOAT
+              ? std::to_string(std::bit_cast<std::int64_t>(real))
+              : std::string(bytes ? bytes : "", static_cast<std::size_t>(sqlite3_column_bytes(statement_, i)));
+      text += std::to_string(type) + " " + std::to_string(value.size()) + " " + value;
+    }
+    return text;
   }
 
   /** Runs it to its end and returns how many rows it changed. */
@@ -295,9 +315,10 @@ void Database::RunDurably(const char* sql, const Values&... values) {
   Execute(kLazily);
 }
 
-void Database::BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues) {
-  RunDurably("INSERT INTO runs (log_file, start_utime, schema, continues) VALUES (?, ?, ?, ?)", log_file, start_utime,
-             kSchemaVersion, continues);
+void Database::BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues,
+                        const std::string& robot) {
+  RunDurably("INSERT INTO runs (log_file, start_utime, schema, continues, robot) VALUES (?, ?, ?, ?, ?)", log_file,
+             start_utime, kSchemaVersion, continues, robot);
 }
 
 void Database::EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered) {
@@ -310,12 +331,25 @@ void Database::MarkLogDeleted(const std::string& log_file, std::int64_t utime) {
 
 std::vector<RunRow> Database::Runs() {
   const std::vector<RunRow> runs = Select<RunRow>(R"sql(SELECT log_file, start_utime, end_utime, events, schema,
-      recovered, continues, log_deleted_utime FROM runs ORDER BY rowid)sql");
+      recovered, continues, log_deleted_utime, robot FROM runs ORDER BY rowid)sql");
   for (const RunRow& run : runs)
     for (const std::string& file : {run.log_file, run.continues})
       if (file.find_first_of(std::string_view("/\0", 2)) != std::string::npos || file == "." || file == "..")
         throw DatabaseError("database: " + path_ + ": a run names a log that is not in its directory: " + file);
   return runs;
+}
+
+Digest Database::DigestOfRows(const std::string& log_file) {
+  Digest digest{};
+  for (const char* table : {"runs", "decisions", "execution_events", "gaps"}) {
+    Statement rows(handle_.get(),
+                   (std::string("SELECT * FROM ") + table + " WHERE log_file = ? ORDER BY rowid").c_str());
+    for (rows.Bind(log_file); rows.Step();) {
+      const std::string row = table + rows.Text();
+      digest = ChainedDigest(digest, Bytes(reinterpret_cast<const std::uint8_t*>(row.data()), row.size()));
+    }
+  }
+  return digest;
 }
 
 std::vector<LogReference> Database::References(const std::string& log_file) {

@@ -38,11 +38,12 @@ struct RunRow {
   std::string recovered;                  ///< The repairs by a later start; empty after a clean end.
   std::string continues;                  ///< The log file of the same run before this one; empty for the first.
   std::optional<std::int64_t> log_deleted_utime;  ///< When the log was deleted for the quota; its rows stay.
+  std::string robot;  ///< The name in the logger's keys; empty without keys, and in rows of schema versions 1 and 2.
 };
 
 class Database final {
  public:
-  static constexpr int kSchemaVersion = 2;  ///< PRAGMA user_version
+  static constexpr int kSchemaVersion = 3;  ///< PRAGMA user_version
 
   /** Creates the file, or opens it and migrates an older schema.
   @throws DatabaseError if it cannot be opened, belongs to another program or has a newer schema. */
@@ -57,7 +58,8 @@ class Database final {
   [[nodiscard]] std::optional<int> Write(const Rows& rows, const std::string& log_file, std::int64_t events);
 
   /** Each of these is a transaction that the disk has confirmed when the call returns. @throws DatabaseError. */
-  void BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues = "");
+  void BeginRun(const std::string& log_file, std::int64_t start_utime, const std::string& continues = "",
+                const std::string& robot = "");
   void EndRun(const std::string& log_file, std::int64_t end_utime, const std::string& recovered = "");
   void MarkLogDeleted(const std::string& log_file, std::int64_t utime);
   /** All runs in the order in which they began. @throws DatabaseError, also if a log's name is not a plain file name:
@@ -66,6 +68,9 @@ class Database final {
 
   /** The rows of one log file in the order of its events; of all files for an empty name. @throws DatabaseError. */
   [[nodiscard]] Rows Read(const std::string& log_file = "");
+
+  /** A digest of everything that the database has of one log file. @throws DatabaseError. */
+  [[nodiscard]] Digest DigestOfRows(const std::string& log_file);
 
   /** The events from which rows of one log file were made, by number. An event appears twice if two of its rows have
   different digests. @throws DatabaseError. */

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "certifier/task/files.h"
+#include "records/event_record.h"
 
 namespace forereach {
 namespace {
@@ -21,6 +22,12 @@ namespace {
 constexpr std::array<std::uint8_t, 4> kSync{0xED, 0xA1, 0xDA, 0x01};
 constexpr std::int64_t kHeaderBytes = 28;
 constexpr std::int64_t kMaxNumber = std::int64_t{1} << 62;
+
+std::string Reason(const std::string& what, const std::string& path) {
+  return what + path + ": " + std::strerror(errno);
+}
+
+}  // namespace
 
 void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t utime, const std::string& channel,
                Bytes data) {
@@ -33,12 +40,6 @@ void PutRecord(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t
   put(channel);
   put(data);
 }
-
-std::string Reason(const std::string& what, const std::string& path) {
-  return what + path + ": " + std::strerror(errno);
-}
-
-}  // namespace
 
 Digest DigestOf(const LogEvent& event) {
   std::vector<std::uint8_t> record;

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "certifier/task/files.h"
 #include "forereach/candidate_plan_t.hpp"
@@ -43,34 +44,22 @@ class Surveyor final {
   void Read(const std::string& log, LogOrder order) {
     const FileKind kind = KindOf(log);
     if (kind != FileKind::kEventLog && kind != FileKind::kEmpty && kind != FileKind::kOther) RefuseAsLog(log, kind);
-    const std::int64_t before = survey_.events;
-    certifier_.Begin();
-    logger_.Begin();
+    const std::int64_t events = survey_.events;
+    before_.Extend(std::exchange(log_, {}));
     EventLogReader reader(log);
-    ForEachEvent(reader, [this](const LogEvent& event) { Take(event.message()); });
-    if (kind == FileKind::kOther && survey_.events == before) RefuseAsLog(log, kind);  // else its beginning is damaged
+    ForEachEvent(reader, [this](const LogEvent& event) {
+      log_.utime.Take(event.utime);
+      Take(event.message());
+    });
+    if (kind == FileKind::kOther && survey_.events == events) RefuseAsLog(log, kind);  // else its beginning is damaged
     if (order == LogOrder::kOneRun) RequireSameRun(log);
     last_log_ = log;
   }
 
   LogSurvey Finish() { return std::move(survey_); }
+  [[nodiscard]] const LogEnds& ends() const { return log_; }
 
  private:
-  // The sequence of one kind of heartbeats, in this file and in those before.
-  struct Heartbeats {
-    std::optional<std::int64_t> before, first, last;
-    void Begin() {
-      if (last) before = last;
-      first.reset();
-    }
-    void Take(std::int64_t sequence) {
-      if (!first) first = sequence;
-      last = sequence;
-    }
-    [[nodiscard]] bool known() const { return before && first; }
-    [[nodiscard]] bool go_on() const { return known() && *first > *before; }
-  };
-
   void Take(Bytes message) {
     ++survey_.events;
     if (const auto decision = Decoded<decision_t>(message)) {
@@ -83,9 +72,9 @@ class Surveyor final {
     } else if (Decoded<candidate_plan_t>(message)) {
       ++survey_.candidates;
     } else if (const auto heartbeat = ReadHeartbeat(message)) {
-      if (heartbeat->in_charge) certifier_.Take(heartbeat->sequence);
+      if (heartbeat->in_charge) log_.certifier.Take(heartbeat->sequence);
     } else if (const auto logger = Decoded<logger_status_t>(message)) {
-      logger_.Take(logger->sequence);
+      log_.logger.Take(logger->sequence);
     }
   }
 
@@ -99,7 +88,7 @@ class Surveyor final {
   }
 
   void RequireSameRun(const std::string& log) const {
-    if ((!certifier_.known() && !logger_.known()) || certifier_.go_on() || logger_.go_on()) return;
+    if (Continues(before_, log_).value_or(true)) return;
     throw LogError(
         log + ": does not follow " + last_log_ +
         ": neither the certifier's nor the logger's heartbeats go on from one to the other; name the files of "
@@ -107,11 +96,38 @@ class Surveyor final {
   }
 
   LogSurvey survey_;
-  Heartbeats certifier_, logger_;
+  LogEnds before_, log_;  // of the logs before, and of the last one
   std::string last_log_;
 };
 
 }  // namespace
+
+void LogEnds::Range::Take(std::int64_t value) {
+  if (!first) first = value;
+  last = value;
+}
+
+void LogEnds::Extend(const LogEnds& behind) {
+  for (Range LogEnds::*range : {&LogEnds::utime, &LogEnds::certifier, &LogEnds::logger}) {
+    if (!(behind.*range).first) continue;
+    (this->*range).Take(*(behind.*range).first);
+    (this->*range).Take(*(behind.*range).last);
+  }
+}
+
+LogEnds EndsOf(const std::string& log) {
+  Surveyor surveyor;
+  surveyor.Read(log, LogOrder::kAny);
+  return surveyor.ends();
+}
+
+std::optional<bool> Continues(const LogEnds& before, const LogEnds& log) {
+  std::optional<bool> continues;
+  for (const LogEnds::Range LogEnds::*range : {&LogEnds::certifier, &LogEnds::logger})
+    if ((before.*range).last && (log.*range).first)
+      continues = continues.value_or(false) || *(log.*range).first > *(before.*range).last;
+  return continues;
+}
 
 FileKind KindOf(const std::string& path) {
   std::error_code error;

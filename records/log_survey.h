@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -27,6 +28,25 @@ struct LogSurvey {
       configs;                ///< By the config digest of decisions and certified plans; the first kMaxConfigs.
   std::vector<Digest> order;  ///< The keys of `configs` in the order of their first appearance.
 };
+
+/** What tells whether one log continues another: sequence numbers of heartbeats. */
+struct LogEnds {
+  struct Range {
+    std::optional<std::int64_t> first, last;
+    void Take(std::int64_t value);
+  };
+  Range utime;              ///< Of all events.
+  Range certifier, logger;  ///< Sequence numbers of heartbeats.
+
+  /** These ends, extended by those of the log behind. */
+  void Extend(const LogEnds& behind);
+};
+
+/** Reads a log. Cost: one pass. @throws BadInput if the file is not an event log. */
+[[nodiscard]] LogEnds EndsOf(const std::string& log);
+
+/** Whether the heartbeats of certifier or logger go on from one to the other. Nothing if no heartbeats tell. */
+[[nodiscard]] std::optional<bool> Continues(const LogEnds& before, const LogEnds& log);
 
 /** kOneRun: the logs must be consecutive files of one run. */
 enum class LogOrder { kOneRun, kAny };

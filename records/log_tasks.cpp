@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "records/kept_tasks.h"
 
@@ -56,6 +57,21 @@ std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::str
   const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
   std::vector<Config> tasks = TasksOf(SurveyRun(logs), logs.front(), directory, given);
   key.Override(tasks, given);
+  return tasks;
+}
+
+RunTasks::RunTasks(std::string given, LogKey key, bool is_many)
+    : given_(std::move(given)), key_(std::move(key)), is_many_(is_many) {
+  if (is_many && !given_.empty()) digest_ = LoadConfig(given_).grounds.config;
+}
+
+std::vector<Config> RunTasks::Of(const std::vector<std::string>& logs) const {
+  if (!is_many_) return TasksOf(logs, given_, key_);
+  const LogSurvey survey = Survey(logs, LogOrder::kAny);
+  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
+  const bool is_given = digest_ && (survey.order.empty() || survey.configs.contains(*digest_));
+  std::vector<Config> tasks = TasksOf(survey, logs.front(), directory, is_given ? given_ : "");
+  key_.Override(tasks, given_);
   return tasks;
 }
 

@@ -1,6 +1,7 @@
 /** The tasks under which logs were recorded: the given one, or the copies that the logger kept next to the logs. */
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,5 +23,22 @@ kept. The text has the config digest with which the log was made, and the place 
 The tasks have the key that `key` selects. @throws ConfigError also as LogKey::Override. */
 [[nodiscard]] std::vector<Config> TasksOf(const std::vector<std::string>& logs, const std::string& given,
                                           const LogKey& key);
+
+/** Finds the tasks of one run after another. */
+class RunTasks final {
+ public:
+  /** @param given the path of a task file, or empty. @param is_many whether there are several runs: then the given task
+  is that of some, and the others have their own. @throws ConfigError if it cannot be read. */
+  RunTasks(std::string given, LogKey key, bool is_many);
+
+  /** @throws BadInput as TasksOf. */
+  [[nodiscard]] std::vector<Config> Of(const std::vector<std::string>& logs) const;
+
+ private:
+  const std::string given_;
+  const LogKey key_;
+  std::optional<Digest> digest_;  // of the given task, if there are several runs
+  const bool is_many_;
+};
 
 }  // namespace forereach

@@ -27,6 +27,12 @@ struct LogKey {
 struct PassedOver {
   Refusals not_authentic;        ///< Zero without a key (records/log_authenticator.h).
   std::int64_t undecodable = 0;  ///< Messages on the channel of certified plans that are not certified plans.
+
+  PassedOver& operator+=(const PassedOver& more) {
+    not_authentic += more.not_authentic;
+    undecodable += more.undecodable;
+    return *this;
+  }
 };
 
 /** The numbers as the end of a sentence; empty if nothing was skipped. */

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <iterator>
 #include <memory>
 #include <utility>
 
@@ -31,21 +32,6 @@ std::string Difference(const decision_t& recorded, const decision_t& replayed) {
       return (digest == &Grounds::observations || digest == &Grounds::obstacles ? "other " : "another ") +
              std::string(name);
   return {};
-}
-
-// What no replay can give again.
-bool IsCircumstance(const decision_t& decision) {
-  switch (decision.cause) {
-    case decision_t::CAUSE_PAIRWISE:  // by what the certifier was told by its latch file: no pair of its own
-      return decision.step < 0 && decision.first_observation < 0;
-    case decision_t::CAUSE_QUEUE_FULL:
-    case decision_t::CAUSE_OVERRUN:
-    case decision_t::CAUSE_NOT_ARMED:
-    case decision_t::CAUSE_FAULT:
-    case decision_t::CAUSE_LATCH_UNWRITABLE:
-    case decision_t::CAUSE_NO_OBSTACLES: return true;
-    default: return false;
-  }
 }
 
 class Replayer final : public TimelineUser {
@@ -168,12 +154,38 @@ class Replayer final : public TimelineUser {
 
 }  // namespace
 
+bool IsCircumstance(const decision_t& decision) {
+  switch (decision.cause) {
+    case decision_t::CAUSE_PAIRWISE:  // by what the certifier was told by its latch file: no pair of its own
+      return decision.step < 0 && decision.first_observation < 0;
+    case decision_t::CAUSE_QUEUE_FULL:
+    case decision_t::CAUSE_OVERRUN:
+    case decision_t::CAUSE_NOT_ARMED:
+    case decision_t::CAUSE_FAULT:
+    case decision_t::CAUSE_LATCH_UNWRITABLE:
+    case decision_t::CAUSE_NO_OBSTACLES: return true;
+    default: return false;
+  }
+}
+
 ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
-                    const std::string& plan_digest) {
+                    const std::string& plan_digest, bool names_files) {
   Replayer replayer(plan_digest);
   Timeline timeline(PointersTo(tasks), replayer);
-  timeline.Read(logs, logs.size() > 1);
+  timeline.Read(logs, names_files);
   return replayer.Finish(timeline);
+}
+
+ReplayResult& ReplayResult::operator+=(ReplayResult&& other) {
+  candidates += other.candidates;
+  agreed += other.agreed;
+  withdrawals += other.withdrawals;
+  circumstances += other.circumstances;
+  corruptions += other.corruptions;
+  passed_over += other.passed_over;
+  std::ranges::move(other.differences, std::back_inserter(differences));
+  std::ranges::move(other.shown, std::back_inserter(shown));
+  return *this;
 }
 
 }  // namespace forereach

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "certifier/task/config.h"
+#include "forereach/decision_t.hpp"
 #include "records/log_trust.h"
 
 namespace forereach {
@@ -24,6 +25,9 @@ struct ReplayResult {
   std::vector<std::string> differences;
   /** What was recorded and what was decided again on the candidates that were asked for, a line each. */
   std::vector<std::string> shown;
+
+  /** Adds the result of another run. */
+  ReplayResult& operator+=(ReplayResult&& other);
 };
 
 /** Gives the candidates of consecutive logs to a new gate, each at the time of its recorded decision and with the
@@ -35,8 +39,16 @@ With a single task, every decision is compared under that task.
 @param tasks at least one; channels and key are those of the first.
 @param plan_digest the beginning of a candidate's digest, in hexadecimal: ReplayResult::shown has the decisions on such
 candidates. Empty: on none.
+@param names_files whether events are named with their log.
 @throws LogError if a log cannot be read, KeyError if the key cannot, std::invalid_argument as Certifier does. */
 [[nodiscard]] ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
-                                  const std::string& plan_digest = "");
+                                  const std::string& plan_digest, bool names_files);
+[[nodiscard]] inline ReplayResult Replay(const std::vector<std::string>& logs, const std::vector<Config>& tasks,
+                                         const std::string& plan_digest = "") {
+  return Replay(logs, tasks, plan_digest, logs.size() > 1);
+}
+
+/** Whether a decision depends on the moment and not on the plan, so that no replay can give it again. */
+[[nodiscard]] bool IsCircumstance(const decision_t& decision);
 
 }  // namespace forereach

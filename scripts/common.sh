@@ -39,11 +39,13 @@ as_root() {
 
 # install_packages [NAME...]: those of scripts/packages.txt and of scripts/packages-NAME.txt.
 install_packages() {
-  local wanted missing=() files=("${@/#/scripts/packages-}")
+  local wanted present missing=() files=("${@/#/scripts/packages-}")
   files=("${files[@]/%/.txt}")
   mapfile -t wanted < <(sed -s '/^#/d' scripts/packages.txt "${files[@]}" | sort -u)
+  # Installed, or provided by one that is, as npm by other packagers' nodejs.
+  present=" $(dpkg-query -W -f '${db:Status-Status} ${Package} ${Provides}\n' | sed -n 's/ ([^)]*)//g; s/,//g; s/^installed //p' | tr '\n' ' ') "
   for package in "${wanted[@]}"; do
-    [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || missing+=("$package")
+    [[ $present == *" $package "* ]] || missing+=("$package")
   done
   ((${#missing[@]} == 0)) && return
   say "Installing ${#missing[@]} Debian packages"

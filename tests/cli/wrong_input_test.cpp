@@ -136,10 +136,11 @@ TEST_F(KeptTaskTest, AnotherTaskIsRefusedAndItsOwnIsNamed) {
 
 TEST_F(KeptTaskTest, UnrelatedRunsAreRefused) {
   const std::string both = logs_->at(0) + " " + logs_->at(1);
-  for (const char* command : {"replay ", "report ", "verify "}) {
-    ExpectRefused(command + both, {logs_->at(1), "does not follow", logs_->at(0)});
+  ExpectRefused("report " + both, {logs_->at(1), "does not follow", logs_->at(0)});
+  for (const char* command : {"replay ", "report ", "verify "})
     ExpectRefused(command + logs_->at(0) + " " + logs_->at(0), {"is named twice"});
-  }
+  for (const char* command : {"replay ", "verify "})
+    EXPECT_THAT(Forereach(command + both + " 2>&1").text, HasSubstr("; 2 runs"));
 }
 
 TEST_F(KeptTaskTest, ADamagedTaskIsNotUsed) {
@@ -218,16 +219,20 @@ TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
   for (const std::string& config : {std::string(), " --config " + TaskOf("one")}) {
     for (const char* command : {"replay ", "report "}) {
       for (const auto& [input, sentence] : no_logs) ExpectRefused(command + input + config, {sentence, input});
-      ExpectRefused(command + database + config, {"is an SQLite database"});
-      ExpectRefused(command + foreign + config, {"is an SQLite database"});
-      ExpectRefused(command + directory + config, {"is a directory"});
-      ExpectRefused(command + logs_->front() + " " + database + config, {"is an SQLite database"});
       ExpectRefused(command + logs_->front() + " " + text + config, {"no LCM event log"});
+      ExpectRefused(command + own.path() + config, {"director"});
     }
+    ExpectRefused("report " + database + config, {"is an SQLite database"});
+    ExpectRefused("report " + foreign + config, {"is an SQLite database"});
+    ExpectRefused("report " + directory + config, {"is a directory"});
+    ExpectRefused("report " + logs_->front() + " " + database + config, {"is an SQLite database"});
+    ExpectRefused("replay " + foreign + config, {"not a decision database"});
+    ExpectRefused("replay " + logs_->front() + " " + database + config, {"is named twice"});
+    ExpectRefused("replay " + logs_->front() + " " + directory + config, {"is named twice"});
     for (const auto& [input, sentence] : no_logs) ExpectRefused("verify " + input + config, {input});
     ExpectRefused("verify " + foreign + config, {"not a decision database"});
-    ExpectRefused("verify " + own.path() + config, {"no decision database"});
-    ExpectRefused("verify " + logs_->front() + " " + database + config, {"is an SQLite database"});
+    ExpectRefused("verify " + own.path() + config, {"neither a decision database"});
+    ExpectRefused("verify " + logs_->front() + " " + database + config, {"is named twice"});
     ExpectRefused("verify " + logs_->front() + " " + text + config, {"no LCM event log"});
   }
   for (const std::string& input : {empty, text, json, noise, alien, logs_->front(), database, foreign, TaskOf("one")})

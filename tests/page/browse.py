@@ -4,6 +4,7 @@
 Prints how long a page of many decisions takes; times are not judged. With DIRECTORY it leaves the pages and pictures of
 them there. Exits 1 with a sentence at the first thing that is not as it should be, also if Chromium is missing."""
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -139,6 +140,20 @@ def use_hostile(browser, path):
     is_quiet(browser, path)
 
 
+# Two robots with the same plans.
+def use_robots(browser, path):
+    browser.open(path)
+    equal(shown(browser), 134, "every decision of both robots is shown")
+    check("/b" in text(browser, "#by-robot"), "robots have a table")
+    events = text(browser, "#events")
+    choose(browser, "robot", browser.run("document.getElementById('f-robot').options[2].value"))
+    equal(shown(browser), 67, "a robot is chosen")
+    check("/b" in text(browser, "#facts"), "a decision names its robot")
+    check("/b/one.lcmlog" in text(browser, "#command"), "the command is that of the robot's log")
+    check(text(browser, "#events") != events, "the robot's events are its own")
+    is_quiet(browser, path)
+
+
 def use_many(browser, path):
     seconds = browser.open(path)
     equal(shown(browser), MANY, "every decision is shown")
@@ -171,12 +186,16 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         directory = sys.argv[3] if len(sys.argv) > 3 else scratch
         page = lambda name: os.path.join(directory, name + ".html")
-        for name in ("course", "before", "hostile", "many", "empty"):
+        for name in ("course", "before", "robots", "hostile", "many", "empty"):
             if os.path.exists(page(name)):
                 os.remove(page(name))
         log = ["tests/data/course.lcmlog", "--config", "tests/data/course.yaml"]
         subprocess.run([forereach, "report", *log, "--out", page("course")], cwd=ROOT, check=True)
         subprocess.run([forereach, "report", *log, "--before", log[0], "--out", page("before")], cwd=ROOT, check=True)
+        for robot in ("a", "b"):
+            os.makedirs(os.path.join(scratch, "night", robot))
+            shutil.copy(os.path.join(ROOT, log[0]), os.path.join(scratch, "night", robot, "one.lcmlog"))
+        subprocess.run([forereach, "report", os.path.join(scratch, "night"), *log[1:], "--out", page("robots")], cwd=ROOT, check=True)
         subprocess.run([samples, "hostile", page("hostile")], check=True)
         subprocess.run([samples, "many", page("many"), str(MANY)], check=True)
         subprocess.run([samples, "empty", page("empty")], check=True)
@@ -192,6 +211,7 @@ def main():
             browser.open(page("empty"))
             equal(shown(browser), 0, "a run without decisions has a page")
             is_quiet(browser, page("empty"))
+            use_robots(browser, page("robots"))
             use_hostile(browser, page("hostile"))
             use_many(browser, page("many"))
         # The command that a page names decides again.

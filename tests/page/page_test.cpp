@@ -2,9 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include "certifier/task/json_text.h"
 #include "page/columns.h"
 #include "page/gather.h"
+#include "page/rows_json.h"
 #include "page/sketch.h"
 #include "page/write.h"
 #include "records/database.h"
@@ -104,7 +107,7 @@ TEST(GatherTest, EachDecisionOfTheCourseHasItsTube) {
   }
   EXPECT_GT(executed, 50u);
   EXPECT_EQ(run.tasks.size(), 1u);
-  EXPECT_THAT(run.replays.at("course.lcmlog"), HasSubstr("--config"));
+  EXPECT_THAT(run.parts.at(0).replays.at("course.lcmlog"), HasSubstr("--config"));
 }
 
 TEST(GatherTest, DrawsNoMoreThanItsBounds) {
@@ -153,7 +156,7 @@ TEST_F(DirectoryTest, WithoutTheLogItHasTheRowsAlone) {
   const PageRun run = GatherPage({directory_ / "decisions.sqlite"}, "", {}, {});
   EXPECT_EQ(run.decisions.size(), 67u);
   EXPECT_TRUE(run.details.empty());
-  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("is not beside the database")));
+  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("the log is not in the database's directory")));
 }
 
 TEST_F(DirectoryTest, WithoutTheTaskItSaysWhyThereAreNoTubes) {
@@ -168,6 +171,93 @@ TEST_F(DirectoryTest, WithoutADatabaseItHasItsLogs) {
   EXPECT_EQ(GatherPage({directory_.path()}, kTask, {}, {0, 0, 0}).decisions.size(), 67u);
   std::filesystem::remove(log_);
   EXPECT_THROW(static_cast<void>(GatherPage({directory_.path()}, kTask, {}, {})), BadInput);
+}
+
+// Two robots with the same plans at the same times, and a file that is no log.
+class ManyRunsTest : public testing::Test {
+ protected:
+  ManyRunsTest() {
+    for (const char* robot : {"a", "b"}) {
+      std::filesystem::create_directories(directory_ / ("night/" + std::string(robot)));
+      std::filesystem::copy(kLog, directory_ / ("night/" + std::string(robot) + "/one.lcmlog"));
+    }
+    directory_.Write("night/b/two.lcmlog", "no log");
+  }
+  Output Report(const std::string& page, const std::string& options) const {
+    return Forereach("report '" + (directory_ / "night") + "' --config '" + kTask + "' --out '" + (directory_ / page) +
+                     "' " + options + " 2>&1");
+  }
+
+  const ScratchDirectory directory_;
+};
+
+TEST_F(ManyRunsTest, EachRunHasItsRobotItsRowsAndItsTubes) {
+  const PageRun run = GatherPage({directory_ / "night"}, kTask, {}, {});
+  const PageRun one = GatherPage({kLog}, kTask, {}, {});
+  ASSERT_EQ(run.parts.size(), 2u);
+  EXPECT_EQ(run.parts[0].robot, directory_ / "night/a");
+  EXPECT_EQ(run.parts[1].robot, directory_ / "night/b");
+  EXPECT_THAT(run.parts[1].replays.at("one.lcmlog"), HasSubstr(directory_ / "night/b/one.lcmlog"));
+  EXPECT_EQ(run.parts[1].decisions, 67u);
+  EXPECT_EQ(run.decisions.size(), 134u);
+  EXPECT_THAT(run.notes, testing::ElementsAre(HasSubstr("two.lcmlog: is no LCM event log")));
+  ASSERT_EQ(run.details.size(), 2 * one.details.size());
+  EXPECT_EQ(run.obstacle_sets.size(), 2 * one.obstacle_sets.size());
+  for (std::size_t i = 0; i < one.details.size(); ++i) {
+    const PageDetail &a = one.details[i], &b = run.details[one.details.size() + i];
+    EXPECT_EQ(a.sketch.points, b.sketch.points);
+    EXPECT_EQ(run.decisions[b.decision].plan_digest, one.decisions[a.decision].plan_digest);
+    EXPECT_GE(b.decision, 67u);
+    EXPECT_EQ(b.obstacles, a.obstacles + static_cast<int>(one.obstacle_sets.size()));
+    EXPECT_EQ(b.missing, "");
+  }
+  const PageRun few = GatherPage({directory_ / "night"}, kTask, {}, {.certified = 3, .abstained = 2});
+  EXPECT_EQ(few.details.size(), 5u) << "of the page, not of each run";
+}
+
+TEST_F(ManyRunsTest, APageThatWasInterruptedIsTheSame) {
+  const std::string resume = "--resume '" + (directory_ / "kept") + "'";
+  const Output first = Report("first.html", resume);
+  EXPECT_EQ(first.code, 0) << first.text;
+  EXPECT_THAT(first.text, HasSubstr("134 decisions"));
+  EXPECT_THAT(first.text, HasSubstr(", 2 runs"));
+  EXPECT_THAT(first.text, HasSubstr("two.lcmlog: is no LCM event log"));
+  const auto files =
+      std::distance(std::filesystem::directory_iterator(directory_ / "kept"), std::filesystem::directory_iterator());
+  EXPECT_EQ(files, 2);
+  EXPECT_EQ(Report("second.html", resume).code, 0);
+  EXPECT_EQ(Report("fresh.html", "--jobs 1").code, 0);
+  EXPECT_EQ(Read(directory_ / "first.html"), Read(directory_ / "second.html"));
+  EXPECT_EQ(Read(directory_ / "first.html"), Read(directory_ / "fresh.html"));
+}
+
+// What is kept of a run comes back with every bit.
+TEST(RowsJsonTest, NumbersAndTextsComeBack) {
+  PageRun run;
+  DecisionRow row;
+  row.event = {"a", 7, "digest"};
+  row.margin = kInfinity;
+  row.threshold = std::nextafter(0.1, 1);
+  row.message = "a \x80 \x1b[2J \"<";
+  row.utime = std::numeric_limits<std::int64_t>::min();
+  row.grounds[4] = "os";
+  run.decisions = {row};
+  EventRow event;
+  event.state = {std::nan(""), -0.0, 1e-320};
+  run.events = {event};
+  run.gaps = {{{"a", -1, ""}, "C\xff", "s", 1, 3, 1, 9, "bus"}};
+  run.faults = {{1, 2, "c", "m"}};
+  run.withdrawals = {{1, 2, "s", "c", "m", 3}};
+  run.parts = {{"r", {{"a", "forereach replay a"}}, 1, 1, 1, 1, 1}};
+  run.tasks = {{"d", "n", {"x"}, {"u"}, "all_times", 2}};
+  run.damage = {1, 2};
+  const PageRun back = ParseJson(JsonText(nlohmann::json(run))).get<PageRun>();
+  EXPECT_EQ(PageHtml(back), PageHtml(run)) << "it shows the same";
+  EXPECT_EQ(back.decisions[0].threshold, row.threshold);
+  EXPECT_TRUE(std::isnan(back.decisions[0].elapsed_us));
+  EXPECT_TRUE(std::signbit(back.events[0].state[1]));
+  EXPECT_EQ(back.parts[0].replays, run.parts[0].replays);
+  EXPECT_EQ(back.damage.bytes, 2);
 }
 
 TEST(ReportCommandTest, WritesAPageWholeOrNotAtAll) {

@@ -84,7 +84,7 @@ PageRun Hostile() {
   run.gaps = {{{evil, 1, evil}, evil, evil, 0, 9, std::numeric_limits<std::int64_t>::max(), -1, evil}};
   run.events = {{{evil, 2, evil}, 5, 6, 7, evil, evil, -1, -1, {}, infinity}};
   run.tasks = {{at(0).grounds[0], evil, {evil}, {evil}, evil, 2}};
-  run.replays[evil] = evil;
+  run.parts = {{evil, {{evil, evil}}, run.decisions.size()}};
   run.obstacle_sets = {
       {Obstacle::Circle(Eigen::Vector2d(1e300, 0), 1e300), Obstacle::HalfSpace(Eigen::Vector2d(1e-300, 1), 1e300)}};
   PageDetail detail;

@@ -200,6 +200,7 @@ TEST(Database, BringsVersion1UpToDate) {
   EXPECT_EQ(run.schema, 1);
   EXPECT_EQ(run.continues, "");
   EXPECT_EQ(run.log_deleted_utime, std::nullopt);
+  EXPECT_EQ(run.robot, "");
   const Rows rows = database.Read();
   ASSERT_EQ(rows.decisions.size(), 1u);
   EXPECT_EQ(rows.decisions[0].plan_id, 5);

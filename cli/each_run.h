@@ -1,0 +1,131 @@
+/** Commands that go through many runs: on all cores, with a progress bar, and going on after an interruption. */
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/numerics/parallel.h"
+#include "certifier/task/config.h"
+#include "cli/commands.h"
+#include "cli/progress.h"
+#include "lcmtypes/bad_input.h"
+#include "records/finished_runs.h"
+#include "records/log_trust.h"
+#include "records/output_file.h"
+#include "records/run_logs.h"
+
+namespace forereach {
+
+/** The options of such a command. */
+struct EachRunOptions {
+  unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
+  std::string resume;  ///< The directory of FinishedRuns; empty for none.
+
+  void AddTo(std::vector<Option>& options) {
+    options.push_back(JobsOption(jobs));
+    options.push_back({"--resume", &resume, "DIR",
+                       "Keep the results of finished runs in this directory, and take those that are there: a command "
+                       "that was interrupted goes on where it was"});
+  }
+};
+
+/** What the work on one run is given. */
+class RunWork final {
+ public:
+  RunWork(unsigned most, Progress& progress, const FinishedRuns* finished, std::string key)
+      : threads(most), progress_(progress), finished_(finished), key_(std::move(key)) {}
+
+  /** Tells that these bytes of its logs were read. Not necessary. */
+  void Read(std::int64_t bytes) {
+    for (pending_ += bytes; pending_ >= kUnit; pending_ -= kUnit, ++told_) progress_.Advance();
+  }
+  /** The run is finished. */
+  void Finish(std::size_t units) {
+    if (units > told_) progress_.Advance(units - told_);
+  }
+  /** The path of a file of its result. @pre FinishedRuns are not null. */
+  [[nodiscard]] std::string NewFile(const std::string& name) {
+    files_.push_back(finished_->PathOf(key_, name));
+    return files_.back();
+  }
+  [[nodiscard]] const std::vector<std::string>& files() const { return files_; }
+
+  static constexpr std::int64_t kUnit = 1 << 20;
+  static std::size_t UnitsOf(const RunLogs& run) { return static_cast<std::size_t>(BytesOf(run) / kUnit + 1); }
+
+  const unsigned threads;  ///< That it may use.
+
+ private:
+  Progress& progress_;
+  const FinishedRuns* const finished_;
+  const std::string key_;
+  std::int64_t pending_ = 0;
+  std::size_t told_ = 0;
+  std::vector<std::string> files_;
+};
+
+/** Calls one(run, work) for each run, on `options.jobs` threads in all, and returns the results in the order of the
+runs. A run that cannot be read has none: its reason is added to `named.missing` if several runs were named, and is
+thrown otherwise. An error of the output ends everything.
+@tparam Result has to_json and from_json (nlohmann). @tparam One Result(const RunLogs&, RunWork&).
+@param done what is done with the logs, for the progress bar: "replayed". @param finished may be null.
+@throws BadInput. */
+template <class Result, class One>
+std::vector<std::optional<Result>> ForEachRun(NamedRuns& named, const EachRunOptions& options, const std::string& done,
+                                              const FinishedRuns* finished, const One& one) {
+  const std::size_t count = named.runs.size();
+  std::vector<std::optional<Result>> results(count);
+  std::vector<std::string> reasons(count);
+  const auto threads = static_cast<unsigned>(std::max<std::size_t>(options.jobs / std::max<std::size_t>(count, 1), 1));
+  std::size_t units = 0;
+  for (const RunLogs& run : named.runs) units += RunWork::UnitsOf(run);
+  Progress progress("MB of logs " + done, units);
+  const auto make = [&](const RunLogs& run) -> Result {
+    const std::string key = finished ? finished->KeyOf(run) : "";
+    RunWork work(threads, progress, finished, key);
+    if (finished)
+      if (const auto kept = finished->Find(key)) try {
+          Result result = kept->template get<Result>();
+          work.Finish(RunWork::UnitsOf(run));
+          return result;
+        } catch (const nlohmann::json::exception&) {  // not what this program writes
+        }
+    Result result = one(run, work);
+    if (finished) finished->Keep(key, result, work.files());
+    work.Finish(RunWork::UnitsOf(run));
+    return result;
+  };
+  ForEachInParallel(count, options.jobs, [&](std::size_t i, std::size_t) {
+    try {
+      results[i] = make(named.runs[i]);
+    } catch (const OutputError&) {
+      throw;
+    } catch (const BadInput& error) {
+      if (!named.is_many) throw;
+      reasons[i] = error.what();
+    } catch (const std::invalid_argument& error) {  // a task that no certifier accepts
+      if (!named.is_many) throw;
+      reasons[i] = NameOf(named.runs[i]) + ": " + error.what();
+    }
+  });
+  for (std::string& reason : reasons)
+    if (!reason.empty()) named.missing.push_back(std::move(reason));
+  return results;
+}
+
+/** The results of finished runs of one command, or null without --resume.
+@param command its name and every option that changes a result; task file and key are added to it.
+@param transitions whether results depend on those that the task file names. @throws BadInput if one cannot be read. */
+[[nodiscard]] std::unique_ptr<FinishedRuns> ResultsOf(const EachRunOptions& options, std::string command,
+                                                      const std::string& config, const LogKey& key,
+                                                      TransitionsFile transitions = TransitionsFile::kRead);
+
+}  // namespace forereach

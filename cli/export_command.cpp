@@ -1,0 +1,175 @@
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <iostream>
+
+#include "cli/commands.h"
+#include "cli/each_run.h"
+#include "cli/key_options.h"
+#include "cli/log_commands.h"
+#include "cli/new_file.h"
+#include "lcmtypes/printable.h"
+#include "records/export.h"
+#include "records/result_json.h"
+
+namespace forereach {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::vector<std::string> inputs;
+  std::string format, output;
+  ExportOptions what;
+  EachRunOptions each_run;
+
+  [[nodiscard]] bool is_table() const {
+    return what.format == ExportFormat::kCsv || what.format == ExportFormat::kJsonLines;
+  }
+};
+
+// The name of a log, of characters that no program minds.
+std::string PlainStem(const std::string& path) {
+  std::string stem = fs::path(path).stem().string();
+  for (char& c : stem)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.') c = '_';
+  return stem;
+}
+
+// The names of what is written, beside each other: a file of each run, or those of all runs together.
+std::vector<std::string> NamesOf(const Options& options, const NamedRuns& named) {
+  if (options.what.format == ExportFormat::kCsv) return ExportFiles(options.what.format);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < named.runs.size(); ++i) {
+    std::string number = std::to_string(i + 1);
+    number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
+    names.push_back(number + "-" + PlainStem(NameOf(named.runs[i])) + "." + options.format);
+  }
+  return names;
+}
+
+// For csv, and for npz and mcap of several runs.
+bool IsDirectory(const Options& options, const NamedRuns& named) {
+  return options.what.format == ExportFormat::kCsv || (!options.is_table() && named.is_many);
+}
+
+void RequireNoOutput(const Options& options, const NamedRuns& named) {
+  std::error_code error;
+  if (!IsDirectory(options, named) || !fs::is_directory(options.output, error) || fs::is_symlink(options.output, error))
+    return RequireNewFile(options.output, false);
+  if (!fs::is_empty(options.output, error))
+    throw OutputError(options.output + ": the directory is not empty, and is not changed; choose another name");
+}
+
+void WriteTable(const Options& options, const std::vector<std::optional<ExportResult>>& results, std::size_t k,
+                const std::string& path) {
+  std::vector<std::string> parts;
+  for (const auto& result : results)
+    if (result) parts.push_back(result->files[k]);
+  JoinTables(options.what.format, parts, path);
+}
+
+void Write(const Options& options, const NamedRuns& named, const std::vector<std::optional<ExportResult>>& results) {
+  if (!IsDirectory(options, named)) {
+    if (options.is_table()) return WriteTable(options, results, 0, options.output);
+    return GiveName(results.front()->files.front(), options.output);
+  }
+  const fs::path made = options.output + ".part-out";  // it gets its name when it is whole
+  std::error_code error;
+  fs::create_directory(made, error);
+  if (error) throw OutputError(made.string() + ": cannot be made: " + error.message());
+  const std::vector<std::string> names = NamesOf(options, named);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    fs::remove(made / names[k], error);  // of a command that was killed
+    if (options.is_table())
+      WriteTable(options, results, k, (made / names[k]).string());
+    else if (results[k])
+      GiveName(results[k]->files.front(), (made / names[k]).string());
+  }
+  fs::rename(made, options.output, error);
+  if (error) throw OutputError(options.output + ": cannot be written: " + error.message());
+}
+
+void Describe(const Options& options, const ExportResult& result, const NamedRuns& named) {
+  for (const std::string& missing : named.missing) std::cerr << "forereach: " << Printable(missing) << std::endl;
+  if (result.damage.places > 0)
+    std::cerr << "forereach: damaged in " << result.damage.places << " places, " << result.damage.bytes
+              << " bytes; everything else was exported" << std::endl;
+  std::cout << "export: ";
+  if (options.what.format == ExportFormat::kNpz) {
+    std::cout << result.tubes << " tubes of certified plans";
+  } else if (options.what.format == ExportFormat::kMcap) {
+    std::cout << result.messages << " messages";
+  } else {
+    std::cout << result.decisions << " decisions, " << result.executions << " execution events, " << result.withdrawals
+              << " withdrawals, " << result.gaps << " gaps";
+    if (result.without_candidate > 0) std::cout << "; the candidates of " << result.without_candidate << " are missing";
+  }
+  if (result.left_out > 0)
+    std::cout << "; " << result.left_out
+              << (options.what.format == ExportFormat::kMcap ? " messages of other types left out"
+                                                             : " with impossible counts left out");
+  if (named.is_many) std::cout << "; " << named.runs.size() << " runs";
+  std::cout << DescribePassedOver(result.passed_over) << "; written to " << options.output << std::endl;
+}
+
+int RunExport(Options options) {
+  options.what.format =
+      static_cast<ExportFormat>(std::ranges::find(kExportFormats, options.format) - kExportFormats.begin());
+  if (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
+  NamedRuns named = RunsNamedBy(options.inputs, options.each_run.jobs);
+  options.what.names_robot = named.is_many;
+  RequireNoOutput(options, named);  // before the logs are read
+  const bool is_own = options.each_run.resume.empty();
+  if (is_own) options.each_run.resume = options.output + ".part";
+  const std::string command = "export " + options.format + (named.is_many ? " many " : " ");
+  const auto finished =
+      ResultsOf(options.each_run, command, options.what.config, options.what.key, TransitionsFile::kIgnore);
+  const auto results = ForEachRun<ExportResult>(
+      named, options.each_run, "exported", finished.get(), [&](const RunLogs& run, RunWork& work) {
+        std::vector<std::string> files;
+        for (const std::string& name : ExportFiles(options.what.format)) files.push_back(work.NewFile(name));
+        return ExportRun(run, options.what, files, [&](std::int64_t bytes) { work.Read(bytes); });
+      });
+  Write(options, named, results);
+  if (is_own) finished->Clear();
+  ExportResult sum;
+  for (const auto& result : results)
+    if (result) sum += *result;
+  Describe(options, sum, named);
+  return sum.damage.places == 0 && named.missing.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+Command ExportCommand() {
+  const auto options = std::make_shared<Options>();
+  Command command{
+      .name = kExport.name,
+      .purpose = kExport.purpose,
+      .footer =
+          "csv     a directory: decisions.csv, controls.csv, executions.csv, withdrawals.csv, gaps.csv\n"
+          "jsonl   the same records, one JSON object a line, in the order of the log\n"
+          "npz     the tubes and controls of certified plans as NumPy arrays\n"
+          "mcap    every message as JSON with its schema, for PlotJuggler and Foxglove\n"
+          "For a directory, a database or logs of several runs, npz and mcap write a directory with a file for each "
+          "run.\nFinished runs wait in OUT.part until all are written: the same command goes on there.\n\n"
+          "Examples:\n  forereach export run/log --format csv -o tables\n"
+          "  forereach export run/log/events-20260101-120000-000000.lcmlog --format mcap -o run.mcap",
+      .options = {Required({"inputs", &options->inputs, "LOG|DATABASE|DIRECTORY", kRuns}),
+                  Required({.name = "--format",
+                            .variable = &options->format,
+                            .help = "What is written",
+                            .one_of = kExportFormats}),
+                  Required({"-o,--out", &options->output, "FILE|DIR",
+                            "A new file, or a directory; files that exist are not changed"}),
+                  {"--config", &options->what.config, "FILE",
+                   "The task file of the recording, for its channels and its key; by default the one that the logger "
+                   "kept next to the log, in tasks/, otherwise the usual channels"}},
+      .run = [options] { return RunExport(*options); }};
+  options->each_run.AddTo(command.options);
+  AddKeyOptions(command.options, options->what.key);
+  return command;
+}
+
+}  // namespace forereach

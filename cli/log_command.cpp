@@ -1,0 +1,163 @@
+#include <ctime>
+#include <iostream>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/task/json_text.h"
+#include "cli/log_commands.h"
+#include "lcmtypes/names.h"
+#include "lcmtypes/printable.h"
+#include "records/log_edit.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kPlacesShown = 20;
+
+struct Options {
+  std::string action, output;
+  std::vector<std::string> logs;
+  LogSelection selection;
+  bool json = false;
+};
+
+// In UTC, with microseconds. The clock of a hostile log may be anywhere.
+std::string Date(std::int64_t utime) {
+  const std::time_t seconds = utime / 1'000'000;
+  std::tm date{};
+  char text[32], fraction[16];
+  if (!::gmtime_r(&seconds, &date) || std::strftime(text, sizeof text, "%FT%T", &date) == 0)
+    return std::to_string(utime);
+  std::snprintf(fraction, sizeof fraction, ".%06d", static_cast<int>(utime % 1'000'000));
+  return std::string(text) + fraction;
+}
+
+// Says where a log is damaged, the first times, and counts in any case.
+class DamageReport final {
+ public:
+  void operator()(const DamagedPlace& place) {
+    if (++places_ > kPlacesShown) return;
+    std::cerr << "forereach: " << Printable(place.log) << ": "
+              << (place.is_cut ? "ends within a record: the last " : "damaged: ") << place.bytes << " bytes "
+              << (place.is_cut ? "" : "are no record, ") << "from byte " << place.offset << " on" << std::endl;
+  }
+  ~DamageReport() {
+    if (places_ > kPlacesShown) std::cerr << "forereach: and " << places_ - kPlacesShown << " places more" << std::endl;
+  }
+
+ private:
+  std::int64_t places_ = 0;
+};
+
+int Finish(const LogEditResult& result, const std::string& what, std::ostream& out) {
+  out << what << result.chosen << " of " << result.events << " events";
+  if (result.damage.places > 0)
+    out << "; " << result.damage.bytes << " bytes in " << result.damage.places << " damaged places are left out";
+  if (result.cut_ends > 0) out << "; " << result.cut_ends << " logs end within a record";
+  out << std::endl;
+  return result.damage.places == 0 && result.cut_ends == 0 ? 0 : 1;
+}
+
+int List(const Options& options) {
+  LogUser user;
+  DamageReport report;
+  user.on_damage = [&](const DamagedPlace& place) { report(place); };
+  if (!options.json)
+    std::cout << "time                        event  channel           type                  plan  what\n";
+  user.on_event = [&](const LogEvent& event, const std::optional<MessageSummary>& summary, const std::string& log) {
+    const std::string type(summary ? summary->type : std::string_view("unknown"));
+    if (options.json) {
+      nlohmann::ordered_json line;
+      line["log"] = Printable(log);
+      line["event_number"] = event.number;
+      line["utime"] = event.utime;
+      line["channel"] = Printable(event.channel);
+      line["type"] = nullptr;
+      line["plan_id"] = nullptr;
+      line["what"] = nullptr;
+      line["bytes"] = event.data.size();
+      if (summary) line["type"] = summary->type;
+      if (summary && summary->plan_id) line["plan_id"] = *summary->plan_id;
+      if (summary && !summary->what.empty()) line["what"] = summary->what;
+      std::cout << JsonText(line) << '\n';
+      return;
+    }
+    const auto padded = [](std::string text, std::size_t width) {
+      if (text.size() < width) text.resize(width, ' ');
+      return text;
+    };
+    const std::string number = std::to_string(event.number);
+    const std::string plan = summary && summary->plan_id ? std::to_string(*summary->plan_id) : "-";
+    std::cout << Date(event.utime) << std::string(number.size() < 7 ? 7 - number.size() : 1, ' ') << number << "  "
+              << padded(Printable(event.channel), 17) << ' ' << padded(type, 21)
+              << std::string(plan.size() < 4 ? 4 - plan.size() : 0, ' ') << plan << "  "
+              << (summary ? summary->what : "") << '\n';
+  };
+  const LogEditResult result = ReadLogs(options.logs, options.selection, LogSequence::kAsNamed, user);
+  return Finish(result, "log: ", options.json ? std::cerr : std::cout);
+}
+
+int Write(const Options& options) {
+  DamageReport report;
+  const LogEditResult result = WriteLog(options.logs, options.selection,
+                                        options.action == "merge" ? LogSequence::kByTime : LogSequence::kAsNamed,
+                                        options.output, [&](const DamagedPlace& place) { report(place); });
+  return Finish(result, "log: wrote " + options.output + ": ", std::cout);
+}
+
+int RunLog(Options options) {
+  const bool writes = options.action != "list";
+  if (writes == options.output.empty())
+    throw LogError(writes ? "log " + options.action + ": name the new log with --out FILE"
+                          : "log list: writes no --out");
+  if (writes && options.json) throw LogError("log " + options.action + ": --json is for log list");
+  options.selection.drops_others = options.action == "list" || options.action == "filter";
+  return writes ? Write(options) : List(options);
+}
+
+std::vector<std::string> OutcomeNames() {
+  std::vector<std::string> names;
+  for (std::int16_t outcome = 1; OutcomeName(outcome) != OutcomeName(0); ++outcome)
+    names.emplace_back(OutcomeName(outcome));
+  return names;
+}
+
+}  // namespace
+
+Command LogCommand() {
+  const auto options = std::make_shared<Options>();
+  return {
+      .name = kLog.name,
+      .purpose = kLog.purpose,
+      .footer =
+          "list    a line for each event: time (UTC), number, channel, type, plan, and its outcome, kind or cause\n"
+          "filter  the chosen events, in the order of the logs named, into a new log\n"
+          "cut     the same; with --outcome it keeps what is not about a plan, so that the new log can be replayed\n"
+          "merge   as cut, by time; events of one log keep their order\n\n"
+          "Times, bytes and signatures stay as they are. Event numbers stay if one log is cut; those of several are "
+          "counted anew.\nA TIME is microseconds since the Unix epoch, 2026-01-01T12:00:00 (UTC), or +SECONDS after "
+          "the first event.\n\n"
+          "Examples:\n"
+          "  forereach log list run/log/events-*.lcmlog --channel PLAN_DECISION\n"
+          "  forereach log filter run/log/events-*.lcmlog --outcome abstain_safety -o refused.lcmlog\n"
+          "  forereach log cut run/log/events-20260101-120000-000000.lcmlog --from +10 --to +20 -o part.lcmlog\n"
+          "  forereach log merge robot.lcmlog camera.lcmlog -o both.lcmlog",
+      .options = {Required({.name = "action",
+                            .variable = &options->action,
+                            .help = "What to do",
+                            .one_of = {"list", "filter", "cut", "merge"}}),
+                  Required({"logs", &options->logs, "LOG", "LCM event logs"}),
+                  {"--from", &options->selection.from, "TIME", "Events from this time on"},
+                  {"--to", &options->selection.to, "TIME", "Events before this time"},
+                  {"--channel", &options->selection.channels, "NAME", "Events of this channel; may be repeated"},
+                  {.name = "--outcome",
+                   .variable = &options->selection.outcome,
+                   .help = "Candidates, decisions and certified plans of plans with this outcome only; cut and merge "
+                           "keep all other messages",
+                   .one_of = OutcomeNames()},
+                  {"-o,--out", &options->output, "FILE", "The new log; list has none"},
+                  JsonFlag(options->json, "For list: a JSON object a line")},
+      .run = [options] { return RunLog(*options); }};
+}
+
+}  // namespace forereach

@@ -1,0 +1,115 @@
+#include "records/compare.h"
+
+#include <memory>
+#include <numeric>
+#include <utility>
+
+#include "certifier/gate/gate.h"
+#include "forereach/decision_t.hpp"
+#include "lcmtypes/codec.h"
+#include "records/replay.h"
+#include "records/timeline.h"
+
+namespace forereach {
+namespace {
+
+WhyNot WhyNotOf(const decision_t& decision) {
+  return {decision.outcome, decision.cause, decision.obstacle, decision.step};
+}
+
+template <class Key>
+std::int64_t Sum(const std::map<Key, std::int64_t>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), std::int64_t{0},
+                         [](std::int64_t sum, const auto& entry) { return sum + entry.second; });
+}
+
+class Comparer final : public TimelineUser {
+ public:
+  void OnStart(const Config& task) override { gate_ = std::make_unique<Gate>(task); }
+  void OnReload(const Config& task) override {
+    const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(task));
+    gate_->Inherit(*before);
+  }
+  void OnObstacles(Bytes message, std::int64_t utime) override {
+    static_cast<void>(gate_->UpdateObstacles(message, utime));
+  }
+  void OnTransition(const ExecutedTransition&, Bytes message) override { static_cast<void>(gate_->Learn(message)); }
+
+  void OnDecision(const RecordedDecision& recorded) override {
+    const decision_t& before = recorded.decision;
+    if (!recorded.candidate) {
+      ++result_.without_candidate;
+      return;
+    }
+    const std::vector<std::uint8_t>& bytes = recorded.candidate->bytes;
+    if (IsCircumstance(before)) {
+      static_cast<void>(gate_->Refuse(bytes, before.utime, before.cause, ""));
+      ++result_.circumstances;
+      return;
+    }
+    const decision_t after = gate_->Decide(bytes, before.utime).decision;
+    const bool was = before.outcome == decision_t::CERTIFIED, is = after.outcome == decision_t::CERTIFIED;
+    ++result_.candidates;
+    result_.certificates += was;
+    if (!was && is) ++result_.gained[WhyNotOf(before)];
+    if (was && !is) Lose(recorded, after);
+    if (!was && !is) Refuse(before, after);
+  }
+
+  Comparison Finish(const Timeline& timeline) {
+    timeline.undecided().ForEach([this](const RecordedCandidate&) { ++result_.undecided; });
+    result_.corruptions = timeline.damage().places;
+    result_.passed_over = timeline.passed_over();
+    return std::move(result_);
+  }
+
+ private:
+  void Lose(const RecordedDecision& recorded, const decision_t& after) {
+    ++result_.lost[WhyNotOf(after)];
+    if (result_.lost_plans.size() < Comparison::kLostPlans)
+      result_.lost_plans.push_back(recorded.event + ", plan " + std::to_string(after.plan_id) + " of " +
+                                   GetText(after.source) + ": " + GetText(after.message));
+  }
+  void Refuse(const decision_t& before, const decision_t& after) {
+    WhyNot then = WhyNotOf(before), now = WhyNotOf(after);
+    then.step = now.step = -1;
+    if (then == now)
+      ++result_.refused_alike;
+    else
+      ++result_.otherwise[{then, now}];
+  }
+
+  std::unique_ptr<Gate> gate_;
+  Comparison result_;
+};
+
+}  // namespace
+
+std::int64_t Comparison::num_gained() const { return Sum(gained); }
+std::int64_t Comparison::num_lost() const { return Sum(lost); }
+
+Comparison Compare(const std::vector<std::string>& logs, const Config& task, bool names_files) {
+  Comparer comparer;
+  Timeline timeline({&task}, comparer);
+  timeline.Read(logs, names_files);
+  return comparer.Finish(timeline);
+}
+
+Comparison& operator+=(Comparison& sum, const Comparison& other) {
+  sum.candidates += other.candidates;
+  sum.certificates += other.certificates;
+  sum.circumstances += other.circumstances;
+  sum.without_candidate += other.without_candidate;
+  sum.undecided += other.undecided;
+  for (const auto& [why, count] : other.gained) sum.gained[why] += count;
+  for (const auto& [why, count] : other.lost) sum.lost[why] += count;
+  for (const auto& [whys, count] : other.otherwise) sum.otherwise[whys] += count;
+  sum.refused_alike += other.refused_alike;
+  for (const std::string& plan : other.lost_plans)
+    if (sum.lost_plans.size() < Comparison::kLostPlans) sum.lost_plans.push_back(plan);
+  sum.corruptions += other.corruptions;
+  sum.passed_over += other.passed_over;
+  return sum;
+}
+
+}  // namespace forereach

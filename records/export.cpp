@@ -1,0 +1,293 @@
+#include "records/export.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+#include "lcmtypes/printable.h"
+#include "records/database.h"
+#include "records/export_table.h"
+#include "records/log_survey.h"
+#include "records/mcap.h"
+#include "records/message_json.h"
+#include "records/npz.h"
+#include "records/output_file.h"
+#include "records/record_reader.h"
+
+namespace forereach {
+namespace {
+
+// A format. It counts what it writes.
+class Sink : public RecordUser {
+ public:
+  explicit Sink(std::string name) : robot(std::move(name)) {}
+  virtual void Finish() = 0;
+
+  const std::string robot;
+  ExportResult result;
+};
+
+OutputFile FileOf(const std::string& path) { return OutputFile(path, OutputFile::Existing::kReplaced); }
+
+// ---- Tables.
+
+class JsonLinesSink final : public Sink {
+ public:
+  JsonLinesSink(const std::string& name, const std::string& path) : Sink(name), file_(FileOf(path)) {}
+
+  void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
+    ++result.decisions;
+    result.without_candidate += candidate == nullptr;
+    file_.Write(JsonLine("decision", CellsOf(robot, row, candidate), candidate));
+  }
+  void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) override {
+    ++result.withdrawals;
+    file_.Write(JsonLine("withdrawal", CellsOf(robot, withdrawal, event)));
+  }
+  void OnExecution(const EventRow& row) override {
+    ++result.executions;
+    file_.Write(JsonLine("execution_event", CellsOf(robot, row)));
+  }
+  void OnGap(const GapRow& row) override {
+    ++result.gaps;
+    file_.Write(JsonLine("gap", CellsOf(robot, row)));
+  }
+  void Finish() override { file_.Close(); }
+
+ private:
+  OutputFile file_;
+};
+
+class CsvSink final : public Sink {
+ public:
+  CsvSink(const std::string& name, const std::vector<std::string>& files)
+      : Sink(name),
+        decisions_(FileOf(files[0])),
+        controls_(FileOf(files[1])),
+        executions_(FileOf(files[2])),
+        withdrawals_(FileOf(files[3])),
+        gaps_(FileOf(files[4])) {
+    static const candidate_plan_t none{};
+    decisions_.Write(CsvHeader(CellsOf("", DecisionRow{}, nullptr)));
+    controls_.Write(CsvHeader(CellsOfControl("", DecisionRow{}, none, 0)));
+    executions_.Write(CsvHeader(CellsOf("", EventRow{})));
+    withdrawals_.Write(CsvHeader(CellsOf("", withdrawal_t{}, LogReference{})));
+    gaps_.Write(CsvHeader(CellsOf("", GapRow{})));
+  }
+
+  void OnDecision(const DecisionRow& row, const candidate_plan_t* candidate) override {
+    ++result.decisions;
+    result.without_candidate += candidate == nullptr;
+    decisions_.Write(CsvLine(CellsOf(robot, row, candidate)));
+    if (!candidate || !HasCounts(*candidate)) return;
+    for (int t = 0; t < candidate->num_steps; ++t) controls_.Write(CsvLine(CellsOfControl(robot, row, *candidate, t)));
+  }
+  void OnWithdrawn(const withdrawal_t& withdrawal, const LogReference& event) override {
+    ++result.withdrawals;
+    withdrawals_.Write(CsvLine(CellsOf(robot, withdrawal, event)));
+  }
+  void OnExecution(const EventRow& row) override {
+    ++result.executions;
+    executions_.Write(CsvLine(CellsOf(robot, row)));
+  }
+  void OnGap(const GapRow& row) override {
+    ++result.gaps;
+    gaps_.Write(CsvLine(CellsOf(robot, row)));
+  }
+  void Finish() override {
+    for (OutputFile* file : {&decisions_, &controls_, &executions_, &withdrawals_, &gaps_}) file->Close();
+  }
+
+ private:
+  OutputFile decisions_, controls_, executions_, withdrawals_, gaps_;
+};
+
+// ---- Tubes.
+
+class NpzSink final : public Sink {
+ public:
+  NpzSink(const std::string& of, const std::string& path) : Sink(of), arrays_(FileOf(path)) {
+    for (const char* name : {"plan_id", "utime", "start_utime", "step_us", "expires_utime", "event_number",
+                             "num_states", "num_inputs", "num_steps"})
+      arrays_.Declare(name, 'i');
+    for (const char* name : {"robot", "source", "log_file", "plan_digest"}) arrays_.Declare(name, 'S');
+    for (const char* name : {"slice_lower", "slice_upper", "controls", "initial_center", "initial_half_width"})
+      arrays_.Declare(name, 'f');
+    AddBegins();
+  }
+
+  void OnCertified(const certified_plan_v2_t& certified, const LogReference& event) override {
+    const candidate_plan_t& plan = certified.plan;
+    if (!HasCounts(plan)) {
+      ++result.left_out;
+      return;
+    }
+    ++result.tubes;
+    const auto n = static_cast<std::size_t>(plan.num_states), m = static_cast<std::size_t>(plan.num_inputs);
+    for (int t = 0; t <= plan.num_steps; ++t) {
+      arrays_.AddRow("slice_lower", std::span(certified.slice_lower[t], n));
+      arrays_.AddRow("slice_upper", std::span(certified.slice_upper[t], n));
+    }
+    for (int t = 0; t < plan.num_steps; ++t) arrays_.AddRow("controls", std::span(plan.control[t], m));
+    arrays_.AddRow("initial_center", std::span(plan.initial_center, n));
+    arrays_.AddRow("initial_half_width", std::span(plan.initial_half_width, n));
+    for (const auto& [name, value] : {std::pair{"plan_id", plan.plan_id},
+                                      {"utime", certified.utime},
+                                      {"start_utime", plan.start_utime},
+                                      {"step_us", plan.step_us},
+                                      {"expires_utime", certified.expires_utime},
+                                      {"event_number", event.event_number}})
+      arrays_.Add(name, value);
+    arrays_.Add("num_states", std::int64_t{plan.num_states});
+    arrays_.Add("num_inputs", std::int64_t{plan.num_inputs});
+    arrays_.Add("num_steps", std::int64_t{plan.num_steps});
+    arrays_.Add("robot", Printable(robot));
+    arrays_.Add("source", GetText(plan.source));
+    arrays_.Add("log_file", Printable(event.log_file));
+    arrays_.Add("plan_digest", ToHex(GetDigest(certified.plan_digest)));
+    slices_ += plan.num_steps + 1;
+    controls_ += plan.num_steps;
+    AddBegins();
+  }
+  void Finish() override { arrays_.Finish(); }
+
+ private:
+  // Where the next plan's rows begin: one entry more than there are plans.
+  void AddBegins() {
+    arrays_.Add("slice_begin", slices_);
+    arrays_.Add("control_begin", controls_);
+  }
+
+  NpzWriter arrays_;
+  std::int64_t slices_ = 0, controls_ = 0;
+};
+
+// ---- MCAP.
+
+class McapSink final : public Sink {
+ public:
+  McapSink(const std::string& name, bool names_robot, const std::string& path)
+      : Sink(name), prefix_(names_robot ? Printable(name) + "/" : ""), file_(FileOf(path)) {}
+
+  void OnMessage(const LogEvent& event) override {
+    const auto message = ToJsonMessage(event.message());
+    const auto channel = message ? ChannelOf(event.channel, message->type) : std::nullopt;
+    if (!channel) {
+      ++result.left_out;
+      return;
+    }
+    ++result.messages;
+    file_.Write(*channel, static_cast<std::uint32_t>(message->sequence), event.utime,
+                message->utime > 0 ? message->utime : event.utime, message->json);
+  }
+  void Finish() override { file_.Finish(); }
+
+ private:
+  static constexpr std::size_t kChannels = 256;  // invented names must not fill the memory
+
+  // A channel of the log with messages of several types is as many channels of the file.
+  std::optional<std::uint16_t> ChannelOf(const std::string& name, std::string_view type) {
+    const auto found = channels_.find({name, type});
+    if (found != channels_.end()) return found->second;
+    if (channels_.size() == kChannels) return std::nullopt;
+    auto schema = schemas_.find(type);
+    if (schema == schemas_.end())
+      schema = schemas_.emplace(type, file_.AddSchema("forereach." + std::string(type), SchemaOf(type))).first;
+    std::string topic = prefix_ + Printable(name);
+    if (!topics_.insert(topic).second) topics_.insert(topic += " (" + std::string(type) + ")");
+    return channels_
+        .emplace(std::pair(name, type), file_.AddChannel(schema->second, topic, {{"robot", Printable(robot)}}))
+        .first->second;
+  }
+
+  const std::string prefix_;  // of all channels
+  McapWriter file_;
+  std::map<std::string_view, std::uint16_t> schemas_;
+  std::map<std::pair<std::string, std::string_view>, std::uint16_t> channels_;
+  std::set<std::string> topics_;
+};
+
+std::unique_ptr<Sink> SinkOf(const std::string& robot, const ExportOptions& options,
+                             const std::vector<std::string>& files) {
+  switch (options.format) {
+    case ExportFormat::kCsv: return std::make_unique<CsvSink>(robot, files);
+    case ExportFormat::kJsonLines: return std::make_unique<JsonLinesSink>(robot, files.at(0));
+    case ExportFormat::kNpz: return std::make_unique<NpzSink>(robot, files.at(0));
+    case ExportFormat::kMcap: return std::make_unique<McapSink>(robot, options.names_robot, files.at(0));
+  }
+  throw std::invalid_argument("no format of an export");
+}
+
+// All that is left of a log that is gone.
+void TakeRows(const Rows& rows, Sink& sink) {
+  for (const DecisionRow& row : rows.decisions) sink.OnDecision(row, nullptr);
+  for (const EventRow& row : rows.events) sink.OnExecution(row);
+  for (const GapRow& row : rows.gaps) sink.OnGap(row);
+}
+
+void ReadLogs(const std::vector<std::string>& logs, const ExportOptions& options,
+              const std::function<void(std::int64_t)>& on_bytes, Sink& sink) {
+  const LogSurvey survey = Survey(logs, LogOrder::kAny);
+  const std::string directory = std::filesystem::path(logs.front()).parent_path().string();
+  RecordReader reader(ChannelsOf(survey, directory, options.config, options.key), sink, on_bytes);
+  reader.Read(logs);
+  sink.result.damage = reader.damage();
+  sink.result.passed_over = reader.passed_over();
+}
+
+}  // namespace
+
+const std::vector<std::string>& ExportFiles(ExportFormat format) {
+  static const std::vector<std::string> csv{"decisions.csv", "controls.csv", "executions.csv", "withdrawals.csv",
+                                            "gaps.csv"},
+      jsonl{"jsonl"}, npz{"npz"}, mcap{"mcap"};
+  switch (format) {
+    case ExportFormat::kCsv: return csv;
+    case ExportFormat::kJsonLines: return jsonl;
+    case ExportFormat::kNpz: return npz;
+    default: return mcap;
+  }
+}
+
+ExportResult& ExportResult::operator+=(const ExportResult& other) {
+  decisions += other.decisions;
+  without_candidate += other.without_candidate;
+  executions += other.executions;
+  withdrawals += other.withdrawals;
+  gaps += other.gaps;
+  tubes += other.tubes;
+  messages += other.messages;
+  left_out += other.left_out;
+  damage += other.damage;
+  passed_over += other.passed_over;
+  return *this;
+}
+
+ExportResult ExportRun(const RunLogs& run, const ExportOptions& options, const std::vector<std::string>& files,
+                       const std::function<void(std::int64_t)>& on_bytes) {
+  const std::unique_ptr<Sink> sink = SinkOf(run.robot, options, files);
+  if (!run.missing.empty()) {
+    Database database(run.database);
+    for (const RunRow& missing : run.missing) TakeRows(database.Read(missing.log_file), *sink);
+  }
+  if (!run.logs.empty()) ReadLogs(run.logs, options, on_bytes, *sink);
+  sink->Finish();
+  sink->result.files = files;
+  return std::move(sink->result);
+}
+
+void JoinTables(ExportFormat format, const std::vector<std::string>& parts, const std::string& path) {
+  OutputFile joined(path);
+  bool is_first = true;
+  for (const std::string& part : parts)
+    joined.WriteContentOf(part, format == ExportFormat::kCsv && !std::exchange(is_first, false));
+  joined.Close();
+}
+
+}  // namespace forereach

@@ -1,0 +1,59 @@
+/** Writes recorded runs for other programs: tables, arrays of tubes, and MCAP files. docs/export.md describes the
+formats.
+
+Memory does not grow with the logs. Nothing in a log names a file that is written. */
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "records/event_log.h"
+#include "records/log_trust.h"
+#include "records/run_logs.h"
+
+namespace forereach {
+
+enum class ExportFormat { kCsv, kJsonLines, kNpz, kMcap };
+
+/** Their names, in the order of ExportFormat. */
+inline const std::vector<std::string> kExportFormats{"csv", "jsonl", "npz", "mcap"};
+
+/** The names of the files that a run's export consists of. */
+[[nodiscard]] const std::vector<std::string>& ExportFiles(ExportFormat format);
+
+struct ExportOptions {
+  ExportFormat format = ExportFormat::kCsv;
+  std::string config;  ///< The task file; empty: the one that the logger kept next to the logs, or none.
+  LogKey key;
+  bool names_robot = false;  ///< The channels of an MCAP file are "ROBOT/CHANNEL". Rows have it in any case.
+};
+
+struct ExportResult {
+  std::int64_t decisions = 0, without_candidate = 0, executions = 0, withdrawals = 0, gaps = 0;
+  std::int64_t tubes = 0;     ///< Of certified plans; npz.
+  std::int64_t messages = 0;  ///< mcap.
+  /** Certified plans whose counts are beyond their type's bounds; messages that are no messages of ForeReach's. */
+  std::int64_t left_out = 0;
+  LogDamage damage;
+  PassedOver passed_over;
+  std::vector<std::string> files;  ///< That were written, in the order of ExportFiles.
+
+  /** Adds the counts of another run. */
+  ExportResult& operator+=(const ExportResult& other);
+};
+
+/** Writes the files of one run. Of a log that is gone its database has the rows.
+@param files where to, in the order of ExportFiles; existing ones are replaced.
+@param on_bytes is told of the bytes that have been read; may be empty.
+@throws BadInput if a log cannot be read or a file cannot be written. */
+[[nodiscard]] ExportResult ExportRun(const RunLogs& run, const ExportOptions& options,
+                                     const std::vector<std::string>& files,
+                                     const std::function<void(std::int64_t)>& on_bytes = {});
+
+/** Joins the files of several runs, in their order, to a new one: tables have one line of names, the first one's.
+@pre format is kCsv or kJsonLines. @throws OutputError if the file exists or cannot be written. */
+void JoinTables(ExportFormat format, const std::vector<std::string>& parts, const std::string& path);
+
+}  // namespace forereach

@@ -1,0 +1,219 @@
+#include "records/export_table.h"
+
+#include <cmath>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/numerics/text.h"
+#include "certifier/task/json_text.h"
+#include "lcmtypes/codec.h"
+#include "lcmtypes/grounds.h"
+#include "lcmtypes/names.h"
+#include "lcmtypes/printable.h"
+
+namespace forereach {
+namespace {
+
+constexpr int kInputs = 8;
+constexpr const char* kInputNames[kInputs] = {"u0", "u1", "u2", "u3", "u4", "u5", "u6", "u7"};
+constexpr const char* kGroundNames[] = {"config_digest", "model_digest", "declaration_digest", "observations_digest",
+                                        "obstacles_digest"};
+
+// Numbers that count from 0, and are -1 where none applies.
+Cell Index(std::int64_t value) { return value < 0 ? Cell() : Cell(value); }
+Cell TextOrNone(const std::string& text) { return text.empty() ? Cell() : Cell(text); }
+
+void AddReference(Cells& cells, const std::string& robot, const LogReference& event) {
+  cells.emplace_back("robot", robot);
+  cells.emplace_back("log_file", event.log_file);
+  cells.emplace_back("event_number", Index(event.event_number));
+}
+
+void AddCandidate(Cells& cells, const candidate_plan_t* candidate) {
+  const auto number = [&](std::int64_t value) { return candidate ? Cell(value) : Cell(); };
+  const auto numbers = [&](const double(&values)[16]) {
+    return candidate && HasCounts(*candidate) ? Cell(std::vector(values, values + candidate->num_states)) : Cell();
+  };
+  static const candidate_plan_t none{};
+  const candidate_plan_t& given = candidate ? *candidate : none;
+  cells.emplace_back("start_utime", number(given.start_utime));
+  cells.emplace_back("step_us", number(given.step_us));
+  cells.emplace_back("num_states", number(given.num_states));
+  cells.emplace_back("num_inputs", number(given.num_inputs));
+  cells.emplace_back("num_steps", number(given.num_steps));
+  cells.emplace_back("progress_steps", number(given.progress_steps));
+  cells.emplace_back("initial_center", numbers(given.initial_center));
+  cells.emplace_back("initial_half_width", numbers(given.initial_half_width));
+}
+
+// What a text of a recording may not begin with in a spreadsheet: it would be computed.
+bool IsFormula(std::string_view text) { return text.find_first_of("=+-@") == 0; }
+
+std::string Quoted(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted(1, '"');
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  return quoted + '"';
+}
+
+struct AsCsv {
+  std::string operator()(std::monostate) const { return ""; }
+  std::string operator()(std::int64_t value) const { return std::to_string(value); }
+  std::string operator()(double value) const { return std::isfinite(value) ? ToText(value) : ""; }
+  std::string operator()(const std::string& any) const {
+    const std::string text = Printable(any);
+    return Quoted(IsFormula(text) ? "'" + text : text);
+  }
+  std::string operator()(const std::vector<double>& values) const {
+    std::string text;
+    for (const double value : values) {
+      if (!text.empty()) text += ' ';
+      text += ToText(value);
+    }
+    return text;
+  }
+};
+
+struct AsJson {
+  using Json = nlohmann::ordered_json;
+  Json operator()(std::monostate) const { return nullptr; }
+  Json operator()(double value) const { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+  Json operator()(const std::string& text) const { return Printable(text); }
+  Json operator()(const auto& value) const { return value; }
+};
+
+}  // namespace
+
+bool HasCounts(const candidate_plan_t& candidate) {
+  return 1 <= candidate.num_states && candidate.num_states <= 16 && 1 <= candidate.num_inputs &&
+         candidate.num_inputs <= 8 && 1 <= candidate.num_steps && candidate.num_steps <= 128;
+}
+
+Cells CellsOf(const std::string& robot, const DecisionRow& row, const candidate_plan_t* candidate) {
+  Cells cells;
+  AddReference(cells, robot, row.event);
+  cells.emplace_back("utime", row.utime);
+  cells.emplace_back("candidate_utime", row.candidate_utime);
+  cells.emplace_back("sequence", row.sequence);
+  cells.emplace_back("source", row.source);
+  cells.emplace_back("plan_id", row.plan_id);
+  cells.emplace_back("outcome", row.outcome);
+  cells.emplace_back("cause", row.cause);
+  cells.emplace_back("step", Index(row.step));
+  cells.emplace_back("coordinate", Index(row.coordinate));
+  cells.emplace_back("obstacle", Index(row.obstacle));
+  cells.emplace_back("first_observation", Index(row.first_observation));
+  cells.emplace_back("second_observation", Index(row.second_observation));
+  cells.emplace_back("margin", row.margin);
+  cells.emplace_back("threshold", row.threshold);
+  cells.emplace_back("elapsed_us", row.elapsed_us);
+  cells.emplace_back("latency_us", row.latency_us);
+  AddCandidate(cells, candidate);
+  cells.emplace_back("message", row.message);
+  cells.emplace_back("plan_digest", row.plan_digest);
+  for (std::size_t i = 0; i < row.grounds.size(); ++i) cells.emplace_back(kGroundNames[i], row.grounds[i]);
+  cells.emplace_back("event_digest", TextOrNone(row.event.digest));
+  return cells;
+}
+
+Cells CellsOfControl(const std::string& robot, const DecisionRow& row, const candidate_plan_t& candidate, int step) {
+  Cells cells;
+  AddReference(cells, robot, row.event);
+  cells.emplace_back("source", row.source);
+  cells.emplace_back("plan_id", row.plan_id);
+  cells.emplace_back("step", step);
+  for (int i = 0; i < kInputs; ++i) {
+    Cell& cell = cells.emplace_back(kInputNames[i], std::monostate()).second;
+    if (i < candidate.num_inputs) cell = candidate.control[step][i];
+  }
+  return cells;
+}
+
+Cells CellsOf(const std::string& robot, const withdrawal_t& withdrawal, const LogReference& event) {
+  Cells cells;
+  AddReference(cells, robot, event);
+  cells.emplace_back("utime", withdrawal.utime);
+  cells.emplace_back("sequence", withdrawal.sequence);
+  cells.emplace_back("source", GetText(withdrawal.source));
+  cells.emplace_back("plan_id", withdrawal.plan_id);
+  cells.emplace_back("cause", std::string(WithdrawalName(withdrawal.cause)));
+  cells.emplace_back("first_step", Index(withdrawal.first_step));
+  cells.emplace_back("valid_steps", withdrawal.valid_steps);
+  cells.emplace_back("step", Index(withdrawal.step));
+  cells.emplace_back("obstacle", Index(withdrawal.obstacle));
+  cells.emplace_back("margin", withdrawal.margin);
+  cells.emplace_back("threshold", withdrawal.threshold);
+  cells.emplace_back("message", GetText(withdrawal.message));
+  cells.emplace_back("plan_digest", ToHex(GetDigest(withdrawal.plan_digest)));
+  cells.emplace_back("certificate_digest", ToHex(GetDigest(withdrawal.certificate_digest)));
+  const Grounds grounds = GroundsOf(withdrawal);
+  for (std::size_t i = 0; i < kGrounds.size(); ++i)
+    cells.emplace_back(kGroundNames[i], ToHex(grounds.*kGrounds[i].member));
+  cells.emplace_back("event_digest", TextOrNone(event.digest));
+  return cells;
+}
+
+Cells CellsOf(const std::string& robot, const EventRow& row) {
+  Cells cells;
+  AddReference(cells, robot, row.event);
+  cells.emplace_back("utime", row.utime);
+  cells.emplace_back("sequence", row.sequence);
+  cells.emplace_back("plan_id", Index(row.plan_id));
+  cells.emplace_back("kind", row.kind);
+  cells.emplace_back("step", Index(row.step));
+  cells.emplace_back("coordinate", Index(row.coordinate));
+  cells.emplace_back("state", row.state);
+  cells.emplace_back("value", row.value);
+  cells.emplace_back("message", row.message);
+  cells.emplace_back("event_digest", TextOrNone(row.event.digest));
+  return cells;
+}
+
+Cells CellsOf(const std::string& robot, const GapRow& row) {
+  Cells cells;
+  AddReference(cells, robot, row.event);
+  cells.emplace_back("channel", row.channel);
+  cells.emplace_back("source", TextOrNone(row.source));
+  cells.emplace_back("expected", Index(row.expected));
+  cells.emplace_back("got", Index(row.got));
+  cells.emplace_back("lost", row.lost);
+  cells.emplace_back("utime", row.utime);
+  cells.emplace_back("reason", row.reason);
+  cells.emplace_back("event_digest", TextOrNone(row.event.digest));
+  return cells;
+}
+
+std::string CsvHeader(const Cells& cells) {
+  std::string line;
+  for (const auto& [name, cell] : cells) {
+    if (!line.empty()) line += ',';
+    line += name;
+  }
+  line += '\n';
+  return line;
+}
+
+std::string CsvLine(const Cells& cells) {
+  std::string line;
+  bool is_first = true;
+  for (const auto& [name, cell] : cells) {
+    if (!std::exchange(is_first, false)) line += ',';
+    line += std::visit(AsCsv(), cell);
+  }
+  line += '\n';
+  return line;
+}
+
+std::string JsonLine(std::string_view record, const Cells& cells, const candidate_plan_t* controls) {
+  nlohmann::ordered_json object{{"record", record}};
+  for (const auto& [name, cell] : cells) object[name] = std::visit(AsJson(), cell);
+  if (controls && HasCounts(*controls)) {
+    auto& steps = object["controls"] = nlohmann::ordered_json::array();
+    for (int t = 0; t < controls->num_steps; ++t)
+      steps.push_back(std::vector(controls->control[t], controls->control[t] + controls->num_inputs));
+  }
+  return JsonText(object) + '\n';
+}
+
+}  // namespace forereach

@@ -1,0 +1,50 @@
+/** The results of runs that a command has finished, in a directory, so that an interrupted command goes on there.
+
+A result belongs to what it was made of: the names and bytes of the run's logs, its rows in a database, the tasks that
+are kept beside them, the command with its options, and the program itself. When any of these changes, the run is read
+again. A file appears whole or not at all, and a damaged one counts as none. The directory may be deleted at any time.
+*/
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "records/run_logs.h"
+
+namespace forereach {
+
+class FinishedRuns final {
+ public:
+  /** @param directory made if necessary. @param job the command, and the content of everything else on which a result
+  depends. @throws OutputError if the directory cannot be made. */
+  FinishedRuns(std::string directory, const std::string& job);
+  /** Removes the directory if nothing was kept. */
+  ~FinishedRuns();
+  FinishedRuns(const FinishedRuns&) = delete;
+  FinishedRuns& operator=(const FinishedRuns&) = delete;
+
+  /** Names the run's results, in hexadecimal digits. Cost: one pass over its logs. @throws BadInput if one cannot be
+  read. */
+  [[nodiscard]] std::string KeyOf(const RunLogs& run) const;
+
+  /** The result that was kept last under this key, if there is one and its files are still there. */
+  [[nodiscard]] std::optional<nlohmann::json> Find(const std::string& key) const;
+  /** Keeps a result. Any number of threads may keep, each another key.
+  @param files paths that belong to it, of PathOf; they are written before. @throws OutputError. */
+  void Keep(const std::string& key, const nlohmann::json& result, const std::vector<std::string>& files) const;
+
+  /** The path of a file that belongs to a run's result. */
+  [[nodiscard]] std::string PathOf(const std::string& key, const std::string& name) const;
+
+  /** Deletes all results, and the directory if nothing else is in it. */
+  void Clear() const;
+
+ private:
+  const std::string directory_;
+  std::string job_;
+};
+
+}  // namespace forereach

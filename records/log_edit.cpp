@@ -1,0 +1,197 @@
+#include "records/log_edit.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include "records/event_record.h"
+#include "records/log_survey.h"
+#include "records/output_file.h"
+
+namespace forereach {
+namespace {
+
+constexpr double kLongestSeconds = 1e9;
+
+// A whole text as a number.
+template <class Number>
+std::optional<Number> Parse(std::string_view text) {
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+std::optional<std::int64_t> ParseDate(std::string_view text) {
+  if (text.ends_with('Z')) text.remove_suffix(1);
+  constexpr std::string_view form = "0000-00-00T00:00:00";
+  if (text.size() < form.size()) return std::nullopt;
+  for (std::size_t i = 0; i < form.size(); ++i)
+    if (form[i] == '0' ? text[i] < '0' || text[i] > '9' : text[i] != form[i]) return std::nullopt;
+  const auto part = [&](std::size_t from, std::size_t length) { return *Parse<int>(text.substr(from, length)); };
+  std::tm date{};
+  date.tm_year = part(0, 4) - 1900;
+  date.tm_mon = part(5, 2) - 1;
+  date.tm_mday = part(8, 2);
+  date.tm_hour = part(11, 2);
+  date.tm_min = part(14, 2);
+  date.tm_sec = part(17, 2);
+  const std::tm given = date;
+  const std::time_t seconds = ::timegm(&date);
+  // timegm makes the first of March of the thirtieth of February.
+  if (date.tm_mon != given.tm_mon || date.tm_mday != given.tm_mday || date.tm_hour != given.tm_hour ||
+      date.tm_min != given.tm_min || date.tm_sec != given.tm_sec || seconds < 0)
+    return std::nullopt;
+  double fraction = 0;
+  if (text.size() > form.size()) {
+    const auto parsed =
+        text[form.size()] == '.' ? Parse<double>("0" + std::string(text.substr(form.size()))) : std::nullopt;
+    if (!parsed || !(*parsed >= 0 && *parsed < 1)) return std::nullopt;
+    fraction = *parsed;
+  }
+  return static_cast<std::int64_t>(seconds) * 1'000'000 + std::llround(fraction * 1e6);
+}
+
+// A log that is being read: the next event, and what was damaged before it.
+class Source final {
+ public:
+  explicit Source(const std::string& path) : path_(path), reader_(path) {}
+
+  // False at the end.
+  bool Next(const std::function<void(const DamagedPlace&)>& on_damage, LogEditResult& result) {
+    while (true) {
+      const std::int64_t offset = reader_.offset();
+      switch (reader_.Next(event_)) {
+        case LogStatus::kEvent: ++result.events; return true;
+        case LogStatus::kEnd: return false;
+        case LogStatus::kCutTail:
+          ++result.cut_ends;
+          if (on_damage) on_damage({path_, offset, reader_.size() - offset, true});
+          return false;
+        case LogStatus::kCorrupt:
+          result.damage += {1, reader_.offset() - offset};
+          if (on_damage) on_damage({path_, offset, reader_.offset() - offset, false});
+          break;
+      }
+    }
+  }
+  [[nodiscard]] const LogEvent& event() const { return event_; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  const std::string path_;
+  EventLogReader reader_;
+  LogEvent event_;
+};
+
+void ForEachInOrder(const std::vector<std::string>& logs, const std::function<void(const DamagedPlace&)>& on_damage,
+                    LogEditResult& result, const std::function<void(const Source&)>& visit) {
+  for (const std::string& log : logs)
+    for (Source source(log); source.Next(on_damage, result);) visit(source);
+}
+
+void ForEachByTime(const std::vector<std::string>& logs, const std::function<void(const DamagedPlace&)>& on_damage,
+                   LogEditResult& result, const std::function<void(const Source&)>& visit) {
+  std::vector<std::unique_ptr<Source>> sources;
+  for (const std::string& log : logs) {
+    auto source = std::make_unique<Source>(log);
+    if (source->Next(on_damage, result)) sources.push_back(std::move(source));
+  }
+  while (!sources.empty()) {
+    const auto first = std::ranges::min_element(sources, {}, [](const auto& source) { return source->event().utime; });
+    visit(**first);
+    if (!(*first)->Next(on_damage, result)) sources.erase(first);
+  }
+}
+
+std::int64_t FirstUtime(const std::vector<std::string>& logs) {
+  LogEditResult ignored;
+  for (const std::string& log : logs)
+    if (Source source(log); source.Next({}, ignored)) return source.event().utime;
+  return 0;
+}
+
+class Selector final {
+ public:
+  Selector(const LogSelection& selection, const std::vector<std::string>& logs) : selection_(selection) {
+    const std::int64_t first = selection.from.empty() && selection.to.empty() ? 0 : FirstUtime(logs);
+    if (!selection.from.empty()) from_ = ParseLogTime(selection.from, first);
+    if (!selection.to.empty()) to_ = ParseLogTime(selection.to, first);
+    if (selection.outcome.empty()) return;
+    LogEditResult ignored;
+    ForEachInOrder(logs, {}, ignored, [this](const Source& source) {
+      const auto summary = Summarize(source.event().message());
+      if (summary && summary->type == "decision_t" && summary->what == selection_.outcome) plans_.insert(summary->plan);
+    });
+  }
+
+  [[nodiscard]] bool Takes(const LogEvent& event, const std::optional<MessageSummary>& summary) const {
+    if ((from_ && event.utime < *from_) || (to_ && event.utime >= *to_)) return false;
+    if (!selection_.channels.empty() &&
+        std::ranges::find(selection_.channels, event.channel) == selection_.channels.end())
+      return false;
+    if (selection_.outcome.empty()) return true;
+    if (!summary || !summary->is_of_plan) return !selection_.drops_others;
+    // Of a candidate that came twice, each decision has an outcome of its own.
+    if (summary->type == "decision_t" && summary->what != selection_.outcome) return false;
+    return plans_.contains(summary->plan);
+  }
+
+ private:
+  const LogSelection& selection_;
+  std::optional<std::int64_t> from_, to_;
+  std::set<Digest> plans_;
+};
+
+}  // namespace
+
+std::int64_t ParseLogTime(const std::string& text, std::int64_t first_utime) {
+  if (text.starts_with('+')) {
+    const auto seconds = Parse<double>(std::string_view(text).substr(1));
+    if (seconds && *seconds >= 0 && *seconds <= kLongestSeconds)
+      return first_utime + std::min(std::llround(*seconds * 1e6), INT64_MAX - std::max<long long>(first_utime, 0));
+  } else if (const auto utime = Parse<std::int64_t>(text); utime && *utime >= 0) {
+    return *utime;
+  } else if (const auto date = ParseDate(text)) {
+    return *date;
+  }
+  throw LogError(text +
+                 ": is no time; write microseconds since the Unix epoch, a time in UTC as 2026-01-01T12:00:00, or "
+                 "+SECONDS after the first event");
+}
+
+LogEditResult ReadLogs(const std::vector<std::string>& logs, const LogSelection& selection, LogSequence sequence,
+                       const LogUser& user) {
+  static_cast<void>(Survey(logs, LogOrder::kAny));  // refuses files of other kinds
+  const Selector selector(selection, logs);
+  LogEditResult result;
+  const auto visit = [&](const Source& source) {
+    const auto summary = Summarize(source.event().message());
+    if (!selector.Takes(source.event(), summary)) return;
+    ++result.chosen;
+    user.on_event(source.event(), summary, source.path());
+  };
+  (sequence == LogSequence::kByTime ? ForEachByTime : ForEachInOrder)(logs, user.on_damage, result, visit);
+  return result;
+}
+
+LogEditResult WriteLog(const std::vector<std::string>& logs, const LogSelection& selection, LogSequence sequence,
+                       const std::string& output, const std::function<void(const DamagedPlace&)>& on_damage) {
+  OutputFile file(output);
+  std::int64_t next = 0;
+  std::vector<std::uint8_t> record;
+  const auto write = [&](const LogEvent& event, const std::optional<MessageSummary>&, const std::string&) {
+    record.clear();
+    PutRecord(record, logs.size() == 1 ? event.number : next++, event.utime, event.channel, event.data);
+    file.Write({reinterpret_cast<const char*>(record.data()), record.size()});
+  };
+  const LogEditResult result = ReadLogs(logs, selection, sequence, {write, on_damage});
+  file.Close();
+  return result;
+}
+
+}  // namespace forereach

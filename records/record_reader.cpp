@@ -1,0 +1,89 @@
+#include "records/record_reader.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "forereach/decision_t.hpp"
+#include "records/certified_message.h"
+#include "records/kept_tasks.h"
+
+namespace forereach {
+
+BusOptions ChannelsOf(const LogSurvey& survey, const std::string& directory, const std::string& given,
+                      const LogKey& key) {
+  std::vector<Config> task;
+  if (!given.empty()) {
+    task.push_back(LoadConfig(given, TransitionsFile::kIgnore));
+  } else {
+    const KeptTasks kept(directory);
+    for (auto digest = survey.order.begin(); digest != survey.order.end() && task.empty(); ++digest)
+      if (auto found = kept.Find(*digest, survey.configs.at(*digest).observations)) task.push_back(std::move(*found));
+  }
+  if (task.empty()) task.emplace_back();
+  key.Override(task, given);
+  return task.front().bus;
+}
+
+RecordReader::RecordReader(const BusOptions& channels, RecordUser& user, std::function<void(std::int64_t)> on_bytes)
+    : channels_(channels),
+      user_(user),
+      on_bytes_(std::move(on_bytes)),
+      authenticator_(channels_, PublicKeysOf(channels_)) {}
+
+void RecordReader::Read(const std::vector<std::string>& logs) {
+  for (const std::string& log : logs) {
+    const std::string log_file = std::filesystem::path(log).filename().string();
+    if (interpreter_)
+      interpreter_->Continue(log_file);
+    else
+      interpreter_.emplace(channels_, log_file);
+    EventLogReader reader(log);
+    ForEachEvent(reader, [&](const LogEvent& event) {
+      Take(event, log_file);
+      if (on_bytes_) on_bytes_(RecordBytes(event));
+    });
+    damage_ += reader.damage();
+  }
+}
+
+void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
+  if (!authenticator_.IsAuthentic(event)) return;
+  user_.OnMessage(event);
+  const auto reference = [&] { return LogReference{log_file, event.number, ToHex(DigestOf(event))}; };
+  if (event.channel == channels_.candidate) {
+    std::unique_ptr<candidate_plan_t> candidate;
+    if (const auto decoded = Decoded<candidate_plan_t>(event.message()))
+      candidate = std::make_unique<candidate_plan_t>(*decoded);
+    candidates_.Add(DigestOf(event.message()), std::move(candidate));
+  } else if (event.channel == channels_.certified) {
+    if (const auto certified = ReadCertified(event.message()))
+      user_.OnCertified(certified->plan, reference());
+    else
+      ++undecodable_;
+  } else if (event.channel == channels_.withdrawn) {
+    TakeWithdrawal(event, log_file);
+  }
+  Rows rows;
+  interpreter_->Observe(event, rows);
+  for (const GapRow& gap : rows.gaps) user_.OnGap(gap);
+  for (const EventRow& execution : rows.events) user_.OnExecution(execution);
+  if (rows.decisions.empty()) return;
+  const auto decision = Decoded<decision_t>(event.message());
+  const auto candidate = candidates_.Take(GetDigest(decision->plan_digest));
+  user_.OnDecision(rows.decisions.front(), candidate ? candidate->get() : nullptr);
+}
+
+void RecordReader::TakeWithdrawal(const LogEvent& event, const std::string& log_file) {
+  const auto withdrawal = Decoded<withdrawal_t>(event.message());
+  if (!withdrawal) return;
+  withdrawal_t repeated = *withdrawal;
+  repeated.utime = repeated.sequence = 0;
+  const Digest digest = DigestOf(Encode(repeated));
+  if (std::ranges::find(withdrawals_, digest) != withdrawals_.end()) return;
+  if (withdrawals_.size() == kWithdrawals) withdrawals_.pop_front();
+  withdrawals_.push_back(digest);
+  user_.OnWithdrawn(*withdrawal, {log_file, event.number, ToHex(DigestOf(event))});
+}
+
+}  // namespace forereach

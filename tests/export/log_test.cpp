@@ -1,0 +1,180 @@
+// `forereach log`: listing, cutting and merging logs, damaged ones too.
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "records/log_edit.h"
+#include "tests/cli/program.h"
+#include "tests/records/logs.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kCourse = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+
+class LogTest : public testing::Test {
+ protected:
+  Output Log(const std::string& what) const { return Forereach("log " + what + " 2>&1"); }
+  // Three events a second apart, numbered from 0.
+  std::string Small(const std::string& name, std::int64_t begin, const std::string& channel) const {
+    EventLogWriter writer(scratch_ / name);
+    for (int i = 0; i < 3; ++i)
+      writer.Append(begin + i * 1'000'000, channel, std::vector<std::uint8_t>{std::uint8_t(i)});
+    EXPECT_TRUE(writer.Flush());
+    return scratch_ / name;
+  }
+
+  const ScratchDirectory scratch_;
+};
+
+TEST_F(LogTest, ListsEveryEvent) {
+  const Output output = Log("list '" + kCourse + "'");
+  EXPECT_EQ(output.code, 0);
+  const auto events = ReadLog(kCourse).events;
+  EXPECT_EQ(std::ranges::count(output.text, '\n'), std::ssize(events) + 2);
+  const std::string count = std::to_string(events.size());
+  EXPECT_THAT(output.text, HasSubstr("log: " + count + " of " + count + " events"));
+  EXPECT_THAT(output.text, HasSubstr("PLAN_DECISION     decision_t"));
+}
+
+TEST_F(LogTest, ListsAsJson) {
+  const Output output = Forereach("log list '" + kCourse + "' --json --outcome certified 2>/dev/null");
+  std::istringstream lines(output.text);
+  int decisions = 0, others = 0;
+  for (std::string text; std::getline(lines, text);) {
+    const auto line = nlohmann::json::parse(text);
+    decisions += line["type"] == "decision_t";
+    if (line["type"] == "decision_t") {
+      EXPECT_EQ(line["what"], "certified");
+    }
+    others += line["type"] != "decision_t" && line["type"] != "candidate_plan_t" &&
+              line["type"] != "certified_plan_t" && line["type"] != "certified_plan_v2_t";
+  }
+  EXPECT_EQ(decisions, 20);
+  EXPECT_EQ(others, 0);
+}
+
+TEST_F(LogTest, ACutKeepsNumbersStampsAndBytes) {
+  const std::string out = scratch_ / "out.lcmlog";
+  const auto events = ReadLog(kCourse).events;
+  const Output output = Log("cut '" + kCourse + "' --channel PLAN_DECISION --from " + std::to_string(events[20].utime) +
+                            " --to " + std::to_string(events[90].utime) + " -o '" + out + "'");
+  EXPECT_EQ(output.code, 0) << output.text;
+  std::vector<LogEvent> expected;
+  for (const LogEvent& event : events)
+    if (event.channel == "PLAN_DECISION" && event.utime >= events[20].utime && event.utime < events[90].utime)
+      expected.push_back(event);
+  const LogContents cut = ReadLog(out);
+  ASSERT_EQ(cut.events.size(), expected.size());
+  ASSERT_GT(expected.size(), 3u);
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(DigestOf(cut.events[i]), DigestOf(expected[i]));
+  EXPECT_EQ(cut.damage.places, 0);
+}
+
+// What is left is still a log that the other commands read.
+TEST_F(LogTest, ACutByOutcomeKeepsTheRest) {
+  const std::string out = scratch_ / "out.lcmlog";
+  EXPECT_EQ(Log("cut '" + kCourse + "' --outcome certified -o '" + out + "'").code, 0);
+  const Output replay = Forereach("replay '" + out + "' --config tests/data/course.yaml 2>&1");
+  EXPECT_THAT(replay.text, HasSubstr("20 candidates"));
+  const auto is_other = [](const LogEvent& event) {
+    const auto summary = Summarize(event.message());
+    return !summary || !summary->is_of_plan;
+  };
+  EXPECT_EQ(std::ranges::count_if(ReadLog(out).events, is_other),
+            std::ranges::count_if(ReadLog(kCourse).events, is_other));
+}
+
+TEST_F(LogTest, AFilterKeepsTheChosenAlone) {
+  const std::string out = scratch_ / "out.lcmlog";
+  EXPECT_EQ(Log("filter '" + kCourse + "' --outcome certified -o '" + out + "'").code, 0);
+  int decisions = 0;
+  for (const LogEvent& event : ReadLog(out).events) {
+    const auto summary = Summarize(event.message());
+    ASSERT_TRUE(summary && summary->is_of_plan);
+    decisions += summary->type == "decision_t";
+  }
+  EXPECT_EQ(decisions, 20);
+}
+
+TEST_F(LogTest, MergesByTime) {
+  const std::string a = Small("a", 1'000'000, "A"), b = Small("b", 1'500'000, "B"), out = scratch_ / "out";
+  EXPECT_EQ(Log("merge '" + b + "' '" + a + "' -o '" + out + "'").code, 0);
+  std::string channels;
+  std::int64_t number = 0;
+  for (const LogEvent& event : ReadLog(out).events) {
+    channels += event.channel;
+    EXPECT_EQ(event.number, number++);
+  }
+  EXPECT_EQ(channels, "ABABAB");
+  EXPECT_EQ(Log("cut '" + b + "' '" + a + "' -o '" + (scratch_ / "behind") + "'").code, 0);
+  EXPECT_EQ(ReadLog(scratch_ / "behind").events[3].channel, "A");
+}
+
+TEST_F(LogTest, TimesMayBeOfSeveralKinds) {
+  EXPECT_EQ(ParseLogTime("1767268800000000", 5), 1767268800000000);
+  EXPECT_EQ(ParseLogTime("+1.5", 5), 1500005);
+  EXPECT_EQ(ParseLogTime("2026-01-01T12:00:00", 0), 1767268800000000);
+  EXPECT_EQ(ParseLogTime("2026-01-01T12:00:00.25Z", 0), 1767268800250000);
+  EXPECT_EQ(ParseLogTime("+1000000000", INT64_MAX - 1), INT64_MAX);
+  for (const char* text : {"", "+", "-1", "+-1", "+nan", "+inf", "1e3x", "2026-02-30T12:00:00", "2026-01-01", "noon",
+                           "2026-01-01T24:00:00", "2026-01-01T12:00:00.5.5", "99999999999999999999"})
+    EXPECT_THROW(static_cast<void>(ParseLogTime(text, 0)), LogError) << text;
+  const std::string a = Small("a", 1'000'000, "A");
+  EXPECT_THAT(Log("list '" + a + "' --from +1 --to +2").text, HasSubstr("log: 1 of 3 events"));
+}
+
+TEST_F(LogTest, DamageIsSaidWithItsPlace) {
+  auto bytes = ReadBytes(kCourse);
+  std::fill_n(bytes.begin() + 50'000, 300, std::uint8_t{0});
+  bytes.resize(bytes.size() - 10);
+  WriteBytes(scratch_ / "damaged", bytes);
+  const std::string out = scratch_ / "out";
+  const Output output = Log("cut '" + (scratch_ / "damaged") + "' -o '" + out + "'");
+  EXPECT_EQ(output.code, 1);
+  const LogContents damaged = ReadLog(scratch_ / "damaged");
+  EXPECT_THAT(output.text,
+              HasSubstr("damaged: " + std::to_string(damaged.damage.bytes) + " bytes are no record, from byte "));
+  EXPECT_THAT(output.text, HasSubstr("ends within a record: the last "));
+  const LogContents cut = ReadLog(out);
+  EXPECT_EQ(cut.end, LogStatus::kEnd);
+  EXPECT_EQ(cut.damage.places, 0);
+  ASSERT_EQ(cut.events.size(), damaged.events.size());
+  for (std::size_t i = 0; i < cut.events.size(); ++i) EXPECT_EQ(DigestOf(cut.events[i]), DigestOf(damaged.events[i]));
+}
+
+TEST_F(LogTest, NamesOfAHostileLogDoNotReachTheTerminal) {
+  {
+    EventLogWriter writer(scratch_ / "hostile");
+    writer.Append(INT64_MAX, "\x1b[2J", std::vector<std::uint8_t>{1});
+    ASSERT_TRUE(writer.Flush());
+  }
+  const Output output = Log("list '" + (scratch_ / "hostile") + "'");
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_THAT(output.text, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(output.text, HasSubstr("\\x1b[2J"));
+}
+
+TEST_F(LogTest, WhatCannotBeDoneIsSaid) {
+  const std::string a = Small("a", 0, "A");
+  const auto before = ReadBytes(a);
+  EXPECT_THAT(Log("cut '" + a + "' -o '" + a + "'").text, HasSubstr("the file exists, and is not changed"));
+  EXPECT_EQ(ReadBytes(a), before);
+  for (const std::string& wrong :
+       {"cut '" + a + "'", "list '" + a + "' -o x", "merge '" + a + "' '" + a + "' -o '" + (scratch_ / "x") + "'",
+        "cut README.md -o '" + (scratch_ / "x") + "'", "list '" + a + "' --from noon",
+        "list '" + a + "' --outcome good", "melt '" + a + "'", "cut '" + a + "' --json -o '" + (scratch_ / "x") + "'"})
+    EXPECT_EQ(Log(wrong).code, 2) << wrong;
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "x"));
+}
+
+}  // namespace
+}  // namespace forereach

@@ -1,0 +1,161 @@
+// Every field of every message type is in its JSON, and counts in a message are not believed.
+#include "records/message_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <random>
+#include <regex>
+#include <set>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "forereach/candidate_plan_t.hpp"
+#include "forereach/certified_plan_t.hpp"
+#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/fault_t.hpp"
+#include "forereach/logger_status_t.hpp"
+#include "forereach/obstacles_t.hpp"
+#include "forereach/obstacles_v2_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "forereach/transition_t.hpp"
+#include "forereach/withdrawal_t.hpp"
+#include "tests/cli/program.h"
+#include "tests/tries.h"
+
+namespace forereach {
+namespace {
+
+using nlohmann::json;
+
+TEST(MessageJson, EveryFieldOfEveryTypeIsThere) {
+  std::set<std::string> types;
+  for (const std::string_view type : MessageTypes()) types.insert(std::string(type));
+  for (const auto& file : std::filesystem::directory_iterator(FOREREACH_SOURCE_DIR "/lcmtypes")) {
+    if (file.path().extension() != ".lcm") continue;
+    const std::string type = file.path().stem();
+    json properties;
+    if (type == "obstacle_t" || type == "obstacle_v2_t")  // parts of a message
+      properties = json::parse(SchemaOf(
+          type == "obstacle_t" ? "obstacles_t" : "obstacles_v2_t"))["properties"]["obstacle"]["items"]["properties"];
+    else
+      properties = json::parse(SchemaOf(type))["properties"];
+    types.erase(type);
+    std::string text = std::regex_replace(Read(file.path()), std::regex("//[^\n]*"), "");
+    text = std::regex_replace(text.substr(text.find('{') + 1), std::regex("const [^;]*;"), "");
+    static const std::regex field("\\w+\\s+(\\w+)[^;]*;");
+    int fields = 0;
+    for (std::sregex_iterator match(text.begin(), text.end(), field), end; match != end; ++match, ++fields)
+      EXPECT_TRUE(properties.contains((*match)[1].str())) << type << "." << (*match)[1];
+    EXPECT_GE(fields, 4) << type;
+  }
+  EXPECT_TRUE(types.empty()) << *types.begin() << " has no .lcm file";
+}
+
+TEST(MessageJson, OnlyEntriesInUseAreWritten) {
+  certified_plan_t certified{};
+  certified.plan.num_states = 2;
+  certified.plan.num_inputs = 1;
+  certified.plan.num_steps = 3;
+  certified.slice_upper[3][1] = 0.1;
+  const auto made = ToJsonMessage(Encode(certified));
+  ASSERT_TRUE(made.has_value());
+  EXPECT_EQ(made->type, "certified_plan_t");
+  const json object = json::parse(made->json);
+  EXPECT_EQ(object["plan"]["control"], json::parse("[[0.0],[0.0],[0.0]]"));
+  EXPECT_EQ(object["slice_upper"], json::parse("[[0.0,0.0],[0.0,0.0],[0.0,0.0],[0.0,0.1]]"));
+}
+
+TEST(MessageJson, CountsOfAMessageAreBounded) {
+  certified_plan_t certified{};
+  certified.plan.num_states = certified.plan.num_inputs = certified.plan.num_steps = 32767;
+  const json object = json::parse(ToJsonMessage(Encode(certified))->json);
+  EXPECT_EQ(object["slice_lower"].size(), 129u);
+  EXPECT_EQ(object["slice_lower"][0].size(), 16u);
+  EXPECT_EQ(object["plan"]["control"].size(), 128u);
+  certified.plan.num_states = certified.plan.num_inputs = certified.plan.num_steps = -32768;
+  EXPECT_EQ(json::parse(ToJsonMessage(Encode(certified))->json)["slice_lower"].size(), 0u);
+  obstacles_t obstacles{};
+  obstacles.num_obstacles = 32767;
+  EXPECT_EQ(json::parse(ToJsonMessage(Encode(obstacles))->json)["obstacle"].size(), 64u);
+}
+
+TEST(MessageJson, NumbersThatAreNotFiniteAreLeftOut) {
+  decision_t decision{};
+  decision.outcome = decision_t::CERTIFIED;
+  decision.margin = std::numeric_limits<double>::infinity();
+  decision.threshold = std::nan("");
+  const json object = json::parse(ToJsonMessage(Encode(decision))->json);
+  EXPECT_FALSE(object.contains("margin"));
+  EXPECT_FALSE(object.contains("threshold"));
+  EXPECT_EQ(object["outcome"], 1);
+  EXPECT_EQ(object["outcome_name"], "certified");
+}
+
+TEST(MessageJson, OtherBytesAreNoMessage) {
+  auto bytes = Encode(decision_t{});
+  EXPECT_TRUE(Summarize(bytes).has_value());
+  bytes.push_back(0);
+  EXPECT_FALSE(ToJsonMessage(bytes).has_value()) << "a trailing byte";
+  bytes.resize(20);
+  EXPECT_FALSE(Summarize(bytes).has_value()) << "cut";
+  EXPECT_FALSE(Summarize({}).has_value());
+  EXPECT_THROW(static_cast<void>(SchemaOf("hovercraft_t")), std::invalid_argument);
+}
+
+bool Fits(const json& value, const json& schema) {
+  const std::string type = schema["type"];
+  if (type == "string") return value.is_string();
+  if (type == "integer") return value.is_number_integer();
+  if (type == "number") return value.is_number();
+  if (type == "object" ? !value.is_object() : !value.is_array()) return false;
+  for (const auto& [name, each] : value.items()) {
+    if (type == "object" && !(schema["properties"].contains(name) && Fits(each, schema["properties"][name])))
+      return false;
+    if (type == "array" && !each.is_null() && !Fits(each, schema["items"])) return false;
+  }
+  return true;
+}
+
+// Any bytes behind a genuine fingerprint: numbers of any kind, counts without sense, texts without an end.
+template <class Message>
+void TryAnyBytes(std::mt19937_64& random) {
+  const json schema = json::parse(SchemaOf(Message::getTypeName()));
+  for (int i = 0; i < Tries(300); ++i) {
+    auto bytes = Encode(Message{});
+    const std::size_t changes = i % 2 == 0 ? bytes.size() : 1 + random() % 20;
+    for (std::size_t k = 0; k < changes; ++k)
+      bytes[8 + random() % (bytes.size() - 8)] = static_cast<std::uint8_t>(random() % 3 == 0 ? 0xff : random());
+    const auto made = ToJsonMessage(bytes);
+    ASSERT_TRUE(made.has_value());
+    EXPECT_TRUE(Fits(json::parse(made->json), schema)) << made->json;
+    EXPECT_TRUE(Summarize(bytes).has_value());
+  }
+}
+
+TEST(MessageJson, AnyMessageFitsItsSchema) {
+  const std::uint64_t seed = 20261124;
+  std::mt19937_64 random(seed);
+  SCOPED_TRACE(seed);
+  TryAnyBytes<candidate_plan_t>(random);
+  TryAnyBytes<certified_plan_v2_t>(random);
+  TryAnyBytes<certifier_status_v3_t>(random);
+  TryAnyBytes<decision_t>(random);
+  TryAnyBytes<execution_event_t>(random);
+  TryAnyBytes<fault_t>(random);
+  TryAnyBytes<logger_status_t>(random);
+  TryAnyBytes<obstacles_v2_t>(random);
+  TryAnyBytes<robot_state_t>(random);
+  TryAnyBytes<transition_t>(random);
+  TryAnyBytes<withdrawal_t>(random);
+}
+
+}  // namespace
+}  // namespace forereach

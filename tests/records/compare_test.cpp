@@ -1,0 +1,150 @@
+// `forereach replay --compare`: what another task would have changed.
+#include "records/compare.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "records/database.h"
+#include "records/timeline.h"
+#include "tests/cli/program.h"
+#include "tests/records/logs.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kLog = FOREREACH_SOURCE_DIR "/tests/data/course.lcmlog";
+const std::string kConfig = FOREREACH_SOURCE_DIR "/tests/data/course.yaml";
+
+class CompareTest : public testing::Test {
+ protected:
+  Output CompareUnder(const std::string& config, const std::string& logs = kLog, const std::string& more = "") const {
+    return Forereach("replay '" + logs + "' --compare --config '" + config + "' " + more + " 2>&1");
+  }
+
+  const ScratchDirectory scratch_;
+};
+
+TEST_F(CompareTest, TheSameTaskChangesNothing) {
+  const Output output = CompareUnder(kConfig);
+  EXPECT_EQ(output.code, 0) << output.text;
+  EXPECT_EQ(output.text,
+            "compare: had " + kConfig +
+                " been declared, 0 of 47 abstentions and rejections would have been certificates, and none of "
+                "the 20 certificates lost\n");
+}
+
+TEST_F(CompareTest, CountsWhatIsGainedAndLost) {
+  const Config task = LoadConfig(kConfig);
+  Config free = task;
+  free.obstacles.clear();
+  const Comparison none = Compare({kLog}, free);
+  EXPECT_EQ(none.candidates, 67);
+  EXPECT_EQ(none.certificates, 20);
+  EXPECT_EQ(none.num_lost(), 0) << "without obstacles every certificate stands";
+  std::int64_t safety = 0;
+  class Counter final : public TimelineUser {
+   public:
+    explicit Counter(std::int64_t& count) : count_(count) {}
+    void OnDecision(const RecordedDecision& recorded) override {
+      count_ += recorded.decision.outcome == decision_t::ABSTAIN_SAFETY;
+    }
+
+   private:
+    std::int64_t& count_;
+  } counter(safety);
+  Timeline timeline({&task}, counter);
+  timeline.Read({kLog}, false);
+  EXPECT_GT(safety, 0);
+  std::int64_t gained_of_safety = 0;
+  for (const auto& [why, count] : none.gained) {
+    EXPECT_EQ(why.outcome, decision_t::ABSTAIN_SAFETY) << "only obstacles are gone";
+    EXPECT_GE(why.step, 0);
+    gained_of_safety += count;
+  }
+  EXPECT_EQ(gained_of_safety, none.num_gained());
+  std::int64_t otherwise = none.refused_alike;
+  for (const auto& [whys, count] : none.otherwise) otherwise += count;
+  EXPECT_EQ(none.num_gained() + otherwise, 47);
+}
+
+TEST_F(CompareTest, ACertificateThatIsLostIsNamed) {
+  Config task = LoadConfig(kConfig);
+  auto problem = std::make_shared<Problem>(*task.problem);
+  problem->declaration.noise_bound *= 100;
+  problem->declaration.noise_bound.array() += 0.5;
+  task.problem = problem;
+  const Comparison compared = Compare({kLog}, task);
+  EXPECT_EQ(compared.num_gained(), 0);
+  EXPECT_GT(compared.num_lost(), 0);
+  ASSERT_FALSE(compared.lost_plans.empty());
+  EXPECT_LE(compared.lost_plans.size(), Comparison::kLostPlans);
+  EXPECT_THAT(compared.lost_plans[0], HasSubstr("event "));
+  Comparison twice = compared;
+  twice += compared;
+  EXPECT_EQ(twice.num_lost(), 2 * compared.num_lost());
+  EXPECT_EQ(twice.candidates, 134);
+}
+
+TEST_F(CompareTest, SaysItAsJsonToo) {
+  const Output output = CompareUnder(kConfig, kLog, "--json");
+  EXPECT_EQ(output.code, 0) << output.text;
+  const auto document = nlohmann::json::parse(output.text);
+  EXPECT_EQ(document["candidates"], 67);
+  EXPECT_EQ(document["gained"], 0);
+  EXPECT_EQ(document["refused_alike"], 47);
+  EXPECT_TRUE(document["lost_by"].empty());
+}
+
+TEST_F(CompareTest, ADirectoryIsReplayedAndCompared) {
+  const std::string directory = scratch_ / "log";
+  std::filesystem::create_directory(directory);
+  {
+    Database database(directory + "/decisions.sqlite");
+    for (const char* name : {"events-1.lcmlog", "events-2.lcmlog"}) {
+      std::filesystem::copy_file(kLog, directory + "/" + name);
+      database.BeginRun(name, 3);
+    }
+  }
+  const Output replay = Forereach("replay '" + directory + "' --config '" + kConfig + "' 2>&1");
+  EXPECT_EQ(replay.code, 0) << replay.text;
+  EXPECT_THAT(replay.text, HasSubstr("replay: 134 candidates, 134 decisions agree, 0 differ"));
+  EXPECT_THAT(CompareUnder(kConfig, directory).text, HasSubstr("none of the 40 certificates lost"));
+  std::filesystem::remove(directory + "/events-1.lcmlog");
+  const Output missing = Forereach("replay '" + directory + "' --config '" + kConfig + "' 2>&1");
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_THAT(missing.text, HasSubstr("events-1.lcmlog: the log is not in the database's directory"));
+  EXPECT_EQ(Forereach("replay '" + directory + "' '" + directory + "' --config '" + kConfig + "' 2>&1").code, 2);
+}
+
+// Every line about a plan names its robot.
+TEST_F(CompareTest, ManyRobotsAreToldApart) {
+  for (const char* robot : {"a", "b"}) {
+    std::filesystem::create_directories(scratch_ / ("night/" + std::string(robot)));
+    std::filesystem::copy_file(kLog, scratch_ / ("night/" + std::string(robot) + "/one.lcmlog"));
+  }
+  const Output output = CompareUnder(kConfig, scratch_ / "night", "--json");
+  const auto document = nlohmann::json::parse(output.text);
+  ASSERT_EQ(document["by_robot"].size(), 2u) << output.text;
+  EXPECT_EQ(document["by_robot"][0]["robot"], scratch_ / "night/a");
+  EXPECT_EQ(document["by_robot"][1]["certificates"], 20);
+  EXPECT_EQ(document["candidates"], 134);
+  const std::string options = "--resume '" + (scratch_ / "kept") + "'";
+  const Output first = CompareUnder(kConfig, scratch_ / "night", options);
+  const Output second = CompareUnder(kConfig, scratch_ / "night", options);
+  EXPECT_EQ(first.text, second.text);
+  EXPECT_THAT(first.text, HasSubstr((scratch_ / "night/a") + ": 0 of 47 abstentions"));
+}
+
+TEST_F(CompareTest, NeedsATask) {
+  EXPECT_EQ(Forereach("replay '" + kLog + "' --compare 2>&1").code, 2);
+  EXPECT_EQ(Forereach("replay '" + kLog + "' --compare --other-task --config '" + kConfig + "' 2>&1").code, 2);
+}
+
+}  // namespace
+}  // namespace forereach

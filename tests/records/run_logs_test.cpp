@@ -1,0 +1,219 @@
+// Which logs belong together, whose they are, and what is kept of finished runs.
+#include "records/run_logs.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "forereach/logger_status_t.hpp"
+#include "records/finished_runs.h"
+#include "records/output_file.h"
+#include "tests/cli/program.h"
+#include "tests/records/logs.h"
+#include "tests/scratch.h"
+
+namespace forereach {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class RunLogsTest : public testing::Test {
+ protected:
+  // A log with the logger's heartbeats [first, last], a second apart.
+  std::string Log(const std::string& name, std::int64_t first, std::int64_t last) const {
+    const std::string path = scratch_ / name;
+    std::filesystem::create_directories(std::filesystem::path(path).parent_path());
+    EventLogWriter writer(path);
+    for (std::int64_t sequence = first; sequence <= last; ++sequence) {
+      logger_status_t status{};
+      status.sequence = sequence;
+      writer.Append(1'000'000 * sequence, "LOGGER_STATUS", Encode(status));
+    }
+    EXPECT_TRUE(writer.Flush());
+    return path;
+  }
+  static std::vector<std::vector<std::string>> LogsOf(const NamedRuns& named) {
+    std::vector<std::vector<std::string>> logs;
+    for (const RunLogs& run : named.runs) logs.push_back(run.logs);
+    return logs;
+  }
+
+  const ScratchDirectory scratch_;
+};
+
+TEST_F(RunLogsTest, LogsThatGoOnAreOneRun) {
+  const std::string a = Log("a", 0, 3), b = Log("b", 4, 6), c = Log("c", 2, 9);
+  const NamedRuns one = RunsNamedBy({a, b}, 2);
+  EXPECT_THAT(LogsOf(one), ElementsAre(ElementsAre(a, b)));
+  EXPECT_FALSE(one.is_many);
+  const NamedRuns two = RunsNamedBy({a, b, c}, 2);
+  EXPECT_THAT(LogsOf(two), ElementsAre(ElementsAre(a, b), ElementsAre(c)));
+  EXPECT_TRUE(two.is_many);
+  try {
+    static_cast<void>(RunsNamedBy({b, a}, 1));
+    FAIL() << "the wrong order";
+  } catch (const BadInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr("go on from it"));
+  }
+}
+
+TEST_F(RunLogsTest, ADirectoryIsReadWithItsSubdirectories) {
+  const std::string a = Log("night/a/1.lcmlog", 0, 3), b = Log("night/a/2.lcmlog", 4, 6),
+                    c = Log("night/b/log/1.lcmlog", 7, 9), unknown = Log("night/b/log/2.lcmlog", 5, 4);
+  scratch_.Write("night/a/notes.txt", "no log");
+  std::filesystem::create_symlink(a, scratch_ / "night/b/log/0.lcmlog");
+  std::filesystem::create_directory_symlink(scratch_.path(), scratch_ / "night/loop");
+  std::filesystem::create_symlink("/dev/zero", scratch_ / "night/zero.lcmlog");
+  const NamedRuns named = RunsNamedBy({scratch_ / "night"}, 2);
+  EXPECT_THAT(named.missing, IsEmpty());
+  EXPECT_THAT(LogsOf(named), ElementsAre(ElementsAre(a, b), ElementsAre(c), ElementsAre(unknown)))
+      << "a log without heartbeats continues none, and that of another directory neither";
+  EXPECT_EQ(named.runs[0].robot, scratch_ / "night/a");
+  EXPECT_EQ(named.runs[1].robot, scratch_ / "night/b/log");
+  EXPECT_TRUE(named.is_many);
+}
+
+TEST_F(RunLogsTest, ADatabaseKnowsItsRunsAndItsRobot) {
+  const std::string one = Log("log/events-1.lcmlog", 0, 3), two = Log("log/events-2.lcmlog", 0, 3),
+                    other = Log("log/other.lcmlog", 4, 6), database = scratch_ / "log/decisions.sqlite";
+  {
+    Database rows(database);
+    rows.BeginRun("events-0.lcmlog", 1, "", "rover");
+    rows.MarkLogDeleted("events-0.lcmlog", 2);
+    rows.BeginRun("events-1.lcmlog", 3, "events-0.lcmlog", "rover");
+    rows.BeginRun("events-2.lcmlog", 4);
+  }
+  for (const std::string& input : {database, scratch_ / "log"}) {
+    const NamedRuns named = RunsNamedBy({input}, 1);
+    ASSERT_EQ(named.runs.size(), input == database ? 2u : 3u);
+    EXPECT_EQ(named.runs[0].robot, "rover");
+    EXPECT_EQ(named.runs[0].missing.at(0).log_file, "events-0.lcmlog");
+    EXPECT_THAT(named.runs[0].logs, ElementsAre(one));
+    EXPECT_EQ(named.runs[1].robot, scratch_ / "log");
+    EXPECT_THAT(named.missing, ElementsAre("events-0.lcmlog: the log was deleted for the quota"));
+    if (input != database) {
+      EXPECT_THAT(named.runs[2].logs, ElementsAre(other)) << "no database lists it";
+    }
+  }
+}
+
+TEST_F(RunLogsTest, WhatIsNamedTwiceIsAnError) {
+  const std::string a = Log("log/a.lcmlog", 0, 3);
+  std::filesystem::create_symlink(a, scratch_ / "link");
+  std::filesystem::create_hard_link(a, scratch_ / "hard");
+  const std::string log = scratch_ / "log";
+  const std::vector<std::vector<std::string>> wrong{
+      {a, a}, {a, scratch_ / "link"}, {a, scratch_ / "hard"}, {log, a}, {a, log}, {log, log}, {log, log + "/../log"}};
+  for (const std::vector<std::string>& inputs : wrong) try {
+      static_cast<void>(RunsNamedBy(inputs, 1));
+      FAIL() << inputs[1];
+    } catch (const BadInput& error) {
+      EXPECT_THAT(error.what(), HasSubstr("named twice"));
+    }
+  std::filesystem::create_directory(scratch_ / "empty");
+  EXPECT_THROW(static_cast<void>(RunsNamedBy({scratch_ / "empty"}, 1)), BadInput);
+  EXPECT_THROW(static_cast<void>(RunsNamedBy({scratch_ / "none"}, 1)), BadInput);
+}
+
+class FinishedRunsTest : public RunLogsTest {
+ protected:
+  const std::string directory_ = scratch_ / "kept";
+};
+
+TEST_F(FinishedRunsTest, AResultBelongsToWhatItWasMadeOf) {
+  const RunLogs run{"r", {Log("log/a.lcmlog", 0, 3)}, "", {}};
+  std::string key;
+  {
+    const FinishedRuns finished(directory_, "replay");
+    key = finished.KeyOf(run);
+    EXPECT_FALSE(finished.Find(key));
+    finished.Keep(key, {{"n", 7}}, {});
+  }
+  const FinishedRuns finished(directory_, "replay");
+  EXPECT_EQ(finished.KeyOf(run), key);
+  EXPECT_EQ(finished.Find(key), nlohmann::json({{"n", 7}}));
+  EXPECT_NE(FinishedRuns(directory_, "verify").KeyOf(run), key) << "another command";
+  RunLogs other = run;
+  other.robot = "s";
+  EXPECT_NE(finished.KeyOf(other), key);
+  std::filesystem::create_directories(scratch_ / "log/tasks/ab");
+  scratch_.Write("log/tasks/ab/task.yaml", "x");
+  EXPECT_NE(finished.KeyOf(run), key) << "a task is kept now";
+  std::filesystem::remove_all(scratch_ / "log/tasks");
+  EXPECT_EQ(finished.KeyOf(run), key);
+  auto bytes = ReadBytes(run.logs[0]);
+  bytes.back() ^= 1;
+  WriteBytes(run.logs[0], bytes);
+  EXPECT_NE(finished.KeyOf(run), key) << "another byte";
+}
+
+TEST_F(FinishedRunsTest, WhatIsDamagedCountsAsNone) {
+  const std::string key(64, 'a');
+  const FinishedRuns finished(directory_, "export");
+  const std::string part = finished.PathOf(key, "csv");
+  scratch_.Write("kept/" + std::filesystem::path(part).filename().string(), "a,b\n");
+  finished.Keep(key, {{"n", 7}}, {part});
+  ASSERT_TRUE(finished.Find(key));
+  const std::string file = finished.PathOf(key, "json"), whole = Read(file);
+  for (std::size_t i = 0; i < whole.size(); i += 3) {
+    std::string damaged = whole;
+    damaged[i] ^= 1;
+    WriteBytes(file, {damaged.begin(), damaged.end()});
+    EXPECT_FALSE(finished.Find(key)) << i;
+    WriteBytes(file, {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(i)});
+    EXPECT_FALSE(finished.Find(key)) << "cut at " << i;
+  }
+  WriteBytes(file, {whole.begin(), whole.end()});
+  ASSERT_TRUE(finished.Find(key));
+  WriteBytes(part, {1});
+  EXPECT_FALSE(finished.Find(key)) << "its file is another";
+  finished.Clear();
+  EXPECT_FALSE(std::filesystem::exists(directory_));
+}
+
+TEST_F(FinishedRunsTest, OtherFilesOfTheDirectoryStay) {
+  const FinishedRuns finished(directory_, "export");
+  finished.Keep(std::string(64, 'a'), 1, {});
+  scratch_.Write("kept/mine", "x");
+  scratch_.Write("kept/" + std::string(32, 'a') + "b.json", "x");
+  finished.Clear();
+  EXPECT_TRUE(std::filesystem::exists(scratch_ / "kept/mine"));
+  EXPECT_FALSE(std::filesystem::exists(finished.PathOf(std::string(64, 'a'), "json")));
+  scratch_.Write("file", "x");
+  EXPECT_THROW(FinishedRuns(scratch_ / "file", ""), BadInput);
+}
+
+TEST(OutputFile, HasItsNameWhenItIsWhole) {
+  const ScratchDirectory scratch;
+  const auto files = [&] {
+    return std::distance(std::filesystem::directory_iterator(scratch.path()), std::filesystem::directory_iterator());
+  };
+  {
+    OutputFile file(scratch / "a");
+    file.Write("text");
+    EXPECT_FALSE(std::filesystem::exists(scratch / "a"));
+  }
+  EXPECT_EQ(files(), 0) << "it was not closed";
+  OutputFile file(scratch / "a"), rival(scratch / "a"), replaces(scratch / "a", OutputFile::Existing::kReplaced);
+  file.Write("text");
+  file.Close();
+  EXPECT_THROW(rival.Close(), OutputError) << "another appeared meanwhile";
+  EXPECT_EQ(Read(scratch / "a"), "text");
+  replaces.Write("new");
+  replaces.Close();
+  EXPECT_EQ(Read(scratch / "a"), "new");
+  EXPECT_THROW(OutputFile(scratch / "a"), OutputError);
+  EXPECT_THROW(OutputFile(scratch / "none/a"), OutputError);
+  GiveName(scratch / "a", scratch / "b");
+  EXPECT_EQ(Read(scratch / "b"), "new");
+  EXPECT_THROW(GiveName(scratch / "a", scratch / "b"), OutputError);
+  EXPECT_EQ(std::filesystem::status(scratch / "a").permissions() & std::filesystem::perms::group_read,
+            std::filesystem::perms::group_read);
+}
+
+}  // namespace
+}  // namespace forereach
