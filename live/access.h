@@ -10,7 +10,8 @@ shows, and of every name that such a site's owner resolves to 127.0.0.1. */
 namespace forereach {
 
 struct HttpRequest {
-  std::string_view method, target;  ///< As they were sent, without a query.
+  std::string_view method;
+  std::string_view target;  ///< Without a query. civetweb has decoded it, and cut it off at "%00".
   std::string_view query{};
   std::vector<std::pair<std::string_view, std::string_view>> headers{};
 };

@@ -14,8 +14,11 @@ const bytesOf = (base64) => {
   for (let i = 0; i < bytes.length; ++i) bytes[i] = text.charCodeAt(i);
   return bytes;
 };
-const unpack = (base64) =>
-  new Response(new Blob([bytesOf(base64)]).stream().pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();
+const unpack = (base64) => {
+  const stream = new DecompressionStream('deflate'), writer = stream.writable.getWriter();
+  for (const done of [writer.write(bytesOf(base64)), writer.close()]) done.catch(() => {});  // the reader is told
+  return new Response(stream.readable).arrayBuffer();
+};
 
 // An object of columns with the same keys: {values, names?} or, of texts, {bytes, ends}.
 const unpackTable = async (columns) => {
@@ -29,9 +32,10 @@ const unpackTable = async (columns) => {
   }));
   return table;
 };
+// Of 64-bit integers, by their halves, since big integers are slow.
 const toNumbers = (bigs) => {
-  const numbers = new Float64Array(bigs.length);
-  for (let i = 0; i < numbers.length; ++i) numbers[i] = Number(bigs[i]);
+  const numbers = new Float64Array(bigs.length), low = new Uint32Array(bigs.buffer), high = new Int32Array(bigs.buffer);
+  for (let i = 0; i < numbers.length; ++i) numbers[i] = 2 ** 32 * high[2 * i + 1] + low[2 * i];
   return numbers;
 };
 const decoder = new TextDecoder();
@@ -68,6 +72,7 @@ const loadRun = async (raw) => {
   run.shown = new Uint8Array(run.count);
   run.rows = new Uint32Array(run.count);  // those that are shown, in the order of the log
   run.size = 0;
+  run.sorted = {};  // their times
   return run;
 };
 
@@ -114,6 +119,7 @@ const select = (run, filters, {withTime = true} = {}) => {
     for (let i = 0; i < run.count; ++i) if (values[i] !== wanted) shown[i] = 0;
   }
   run.size = 0;
+  run.sorted = {};
   for (let i = 0; i < run.count; ++i) {
     if (!(from <= run.time[i] && run.time[i] <= to)) shown[i] = 0;
     if (shown[i]) run.rows[run.size++] = i;
@@ -135,14 +141,15 @@ const select = (run, filters, {withTime = true} = {}) => {
 };
 
 // ---- Figures.
-const sortedOf = (run, values) => {
-  const sorted = new Float64Array(run.size);
+const sortedOf = (run, name) => {
+  if (run.sorted[name]) return run.sorted[name];
+  const {values} = run.decisions[name], sorted = new Float64Array(run.size);
   let count = 0;
   for (let k = 0; k < run.size; ++k) {
     const value = values[run.rows[k]];
     if (value > 0 && value < Infinity) sorted[count++] = value;  // zero: the simulated clock stops during computations
   }
-  return sorted.subarray(0, count).sort();
+  return run.sorted[name] = sorted.subarray(0, count).sort();
 };
 // Nearest rank.
 const quantile = (sorted, q) => (sorted.length ? sorted[Math.max(0, Math.ceil(q * sorted.length) - 1)] : NaN);
@@ -167,7 +174,7 @@ const figuresOf = (run) => {
   const outcomes = countBy(run, run.decisions.outcome);
   const of = (name) => outcomes.get(name) ?? 0;
   const abstained = [...outcomes].filter(([name]) => name.startsWith('abstain')).reduce((sum, [, n]) => sum + n, 0);
-  const latency = sortedOf(run, run.decisions.latency.values), gate = sortedOf(run, run.decisions.elapsed.values);
+  const latency = sortedOf(run, 'latency'), gate = sortedOf(run, 'elapsed');
   const kinds = countKinds(run.events, 'kind'), reasons = new Map();
   const first = [];
   for (let k = 0; k < run.size; ++k) {
@@ -320,8 +327,8 @@ const QUANTILES = [['p50', .5], ['p90', .9], ['p99', .99], ['p99.9', .999], ['mo
 // Of a logarithmic axis, labels at powers of ten alone.
 const powers = {color: SOFT, maxRotation: 0, callback: (value) => (Math.abs(Math.log10(value) % 1) < 1e-9 ? String(value) : '')};
 const showTimes = (run) => {
-  const sides = [['Latency', sortedOf(run, run.decisions.latency.values), '#0072B2'],
-    ['Gate', sortedOf(run, run.decisions.elapsed.values), '#D55E00']];
+  const sides = [['Latency', sortedOf(run, 'latency'), '#0072B2'],
+    ['Gate', sortedOf(run, 'elapsed'), '#D55E00']];
   const points = (sorted) => {
     const all = [];
     for (let k = 0; k <= 160; ++k) {

@@ -104,7 +104,7 @@ TEST_F(WebServerTest, RefusesWhatIsNotForIt) {
   EXPECT_THAT(Get("/events", "Origin: http://evil.example\r\n"), StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(Get("/", "Sec-Fetch-Site: cross-site\r\n"), StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(Get("/?reset=1"), StartsWith("HTTP/1.1 404"));
-  for (const char* target : {"/index.html", "/..", "/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/events%00"}) {
+  for (const char* target : {"/index.html", "/..", "/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/etc/passwd"}) {
     EXPECT_THAT(Get(target), Not(StartsWith("HTTP/1.1 200"))) << target;
     EXPECT_THAT(Get(target), Not(HasSubstr("root:"))) << target;
   }
