@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "certifier/certify/batch.h"
+#include "certifier/certify/explain.h"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
@@ -95,6 +96,15 @@ class RowReader final : public TimelineUser {
 
 // ---- Tubes.
 
+constexpr std::size_t kNumbersOfObstacle = 10;
+
+std::size_t NumbersOf(const PageDetail& detail) { return detail.sketch.points.size() + detail.bodies.points.size(); }
+
+void LeaveOut(PageDetail& detail) {
+  detail.sketch = detail.bodies = {};
+  detail.missing = "the drawings of this page have reached their bound";
+}
+
 using Wanted = std::map<std::string, std::size_t>;  // by the name of a decision's event: its place
 
 bool IsJudged(const DecisionRow& row) {
@@ -161,8 +171,6 @@ class DetailMaker final : public TimelineUser {
 
  private:
   static constexpr std::size_t kBatch = 256;
-  static constexpr std::size_t kNumbersOfObstacle = 10;
-  static constexpr const char* kFull = "the drawings of this page have reached their bound";
 
   struct Pending : JudgedCandidate {
     std::size_t place;  // in PageRun::details
@@ -213,9 +221,7 @@ class DetailMaker final : public TimelineUser {
     static_cast<void>(CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads_, describe));
     for (const Pending* each : asked) {
       PageDetail& detail = run_.details[each->place];
-      if (TakeRoom(detail.sketch.points.size() + detail.bodies.points.size())) continue;
-      detail.sketch = detail.bodies = {};
-      detail.missing = kFull;
+      if (!TakeRoom(NumbersOf(detail))) LeaveOut(detail);
     }
     pending_.clear();
   }
@@ -370,12 +376,10 @@ void AddDetails(PageRun& page, PageRun&& details, std::size_t& numbers) {
       }
       detail.obstacles = place->second;
     }
-    if (detail.sketch.points.size() <= numbers) {
-      numbers -= detail.sketch.points.size();
-    } else {
-      detail.sketch = {};
-      detail.missing = kFull;
-    }
+    if (const std::size_t size = NumbersOf(detail); size <= numbers)
+      numbers -= size;
+    else
+      LeaveOut(detail);
     page.details.push_back(std::move(detail));
   }
 }
