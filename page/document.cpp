@@ -1,6 +1,7 @@
 #include "page/document.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "certifier/task/json_text.h"
 #include "page/columns.h"
@@ -23,6 +24,16 @@ std::string Hashes(const std::vector<const PageAsset*>& assets) {
   return all;
 }
 
+// Moves the numbers of columns into `columns`, and puts their places there.
+void MoveColumns(nlohmann::json& json, std::vector<std::string>& columns) {
+  if (json.is_object() && json.contains("type") && json.contains("data")) {
+    columns.push_back(std::move(json["data"].get_ref<std::string&>()));
+    json["data"] = columns.size() - 1;
+  }
+  if (!json.is_structured()) return;
+  for (nlohmann::json& each : json) MoveColumns(each, columns);
+}
+
 }  // namespace
 
 std::string DigestBytes(std::string_view hex) {
@@ -38,7 +49,9 @@ std::string PageDocument::Policy() const {
          "; style-src" + Hashes(styles) + "; script-src" + Hashes(scripts);
 }
 
-std::string PageDocument::Html(const nlohmann::json& data) const {
+std::string PageDocument::Html(nlohmann::json data) const {
+  std::vector<std::string> columns;
+  MoveColumns(data, columns);
   std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   html += "<meta http-equiv=\"Content-Security-Policy\" content=\"" + Policy() + "\">\n";
   html += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
@@ -46,6 +59,8 @@ std::string PageDocument::Html(const nlohmann::json& data) const {
   for (const PageAsset* style : styles) html.append("<style>").append(style->text).append("</style>\n");
   html.append("</head>\n").append(body.text);
   html += "<script type=\"application/json\" id=\"data\">" + ForPage(data) + "</script>\n";
+  for (const std::string& column : columns)
+    html.append("<script type=\"text/plain\" class=\"column\">").append(column).append("</script>\n");
   for (const PageAsset* script : scripts) html.append("<script>").append(script->text).append("</script>\n");
   return html + "</body>\n</html>\n";
 }

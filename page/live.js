@@ -49,10 +49,10 @@ const showFigures = () => {
     ['Certified', percent(certified, counts.decisions), counted(certified)],
     ['Abstained', counted(abstained), listed(new Map(Object.entries(counts.by_cause ?? {}).map(([name, n]) => [name.replaceAll('_', ' '), n])))],
     ['Rejected', counted(outcomes.rejected ?? 0), ''],
-    ['Gate', certifier ? duration(certifier.elapsed_us.p50) : '–', certifier ? `median; p99 ${duration(certifier.elapsed_us.p99)}` : ''],
+    ['Gate', certifier ? duration(certifier.elapsed_us.p50) : '\u2013', certifier ? `median; p99 ${duration(certifier.elapsed_us.p99)}` : ''],
     ['Messages lost', counted(counts.lost), `${counted(counts.gaps)} gaps; here ${counted(counts.dropped)} dropped`],
     ['Unreadable', counted(counts.undecodable), `messages; ${counted(counts.datagrams_refused)} datagrams`],
-    ['Logger', !logger ? '–' : age(logger.heard) > SILENT_US ? 'silent' : logger.level, logger ? `${counted(logger.lost)} events lost` : 'not heard'],
+    ['Logger', !logger ? '\u2013' : age(logger.heard) > SILENT_US ? 'silent' : logger.level, logger ? `${counted(logger.lost)} events lost` : 'not heard'],
   ];
   byId('figures').replaceChildren(...cards.map(([name, value, note]) => {
     const card = make('div');

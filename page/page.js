@@ -4,9 +4,10 @@
 const {OUTCOMES, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf, timeText, clockText,
   listed, drawChart, axis, legend, fillTable, fillList, unitsOf, view, canBeDrawn, startView, drawTube, showLegend} = ForeReach;
 
-// ---- Columns: base64 of zlib's format.
+// ---- Columns: base64 of zlib's format, each in an element of its own.
 const ARRAYS = {i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array, u32: Uint32Array,
-  i64: BigInt64Array, u64: BigUint64Array, f32: Float32Array, f64: Float64Array};
+  i64: BigInt64Array, f32: Float32Array, f64: Float64Array};
+const packed = document.getElementsByClassName('column');
 
 const bytesOf = (base64) => {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(base64);
@@ -14,26 +15,27 @@ const bytesOf = (base64) => {
   for (let i = 0; i < bytes.length; ++i) bytes[i] = text.charCodeAt(i);
   return bytes;
 };
-const unpack = (base64) => {
+const unpack = (column) => {
   const stream = new DecompressionStream('deflate'), writer = stream.writable.getWriter();
-  for (const done of [writer.write(bytesOf(base64)), writer.close()]) done.catch(() => {});  // the reader is told
+  for (const done of [writer.write(bytesOf(packed[column.data].textContent)), writer.close()]) done.catch(() => {});  // the reader is told
   return new Response(stream.readable).arrayBuffer();
 };
+const numbersIn = async (column) => new ARRAYS[column.type](await unpack(column));
 
 // An object of columns with the same keys: {values, names?} or, of texts, {bytes, ends}.
 const unpackTable = async (columns) => {
   const table = {};
   await Promise.all(Object.entries(columns).map(async ([name, column]) => {
-    const buffer = await unpack(column.data);
     if (column.type === 'text')
-      table[name] = {bytes: new Uint8Array(buffer), ends: new Uint32Array(await unpack(column.ends.data))};
+      table[name] = {bytes: new Uint8Array(await unpack(column)), ends: await numbersIn(column.ends)};
     else
-      table[name] = {values: new ARRAYS[column.type](buffer), names: column.names};
+      table[name] = {values: await numbersIn(column), names: column.names};
   }));
   return table;
 };
 // Of 64-bit integers, by their halves, since big integers are slow.
 const toNumbers = (bigs) => {
+  if (!(bigs instanceof BigInt64Array)) return Float64Array.from(bigs);
   const numbers = new Float64Array(bigs.length), low = new Uint32Array(bigs.buffer), high = new Int32Array(bigs.buffer);
   for (let i = 0; i < numbers.length; ++i) numbers[i] = 2 ** 32 * high[2 * i + 1] + low[2 * i];
   return numbers;
@@ -90,7 +92,7 @@ const search = (run, query, found) => {
   const digest = /^[0-9a-f]{6,64}$/i.test(query) ? query.toLowerCase() : null;
   for (let i = 0; i < run.count; ++i)
     found[i] = sources[d.source.values[i]] || causes[d.cause.values[i]] || outcomes[d.outcome.values[i]] ||
-      (plan !== null && d.plan.values[i] === plan) ? 1 : 0;
+      (plan !== null && d.plan.values[i] == plan) ? 1 : 0;
   if (d.message) {
     const hay = sentencesOf(run), ends = d.message.ends;
     for (let at = hay.indexOf(needle), row = 0; at >= 0; at = hay.indexOf(needle, ends[row])) {
@@ -198,11 +200,11 @@ const figuresOf = (run) => {
     ['Abstained', percent(abstained, run.size),
       [...outcomes].filter(([name]) => name.startsWith('abstain')).map(([name, n]) => `${outcomeLabel(name).replace(/^abstain,? /, '')} ${counted(n)}`).join(', ')],
     ['Rejected', percent(of('rejected'), run.size), counted(of('rejected'))],
-    ['First step that fails', first.length ? `${quantile(first, .5)}` : '–',
+    ['First step that fails', first.length ? `${quantile(first, .5)}` : '\u2013',
       first.length ? `median; from ${first[0]} to ${first.at(-1)}` : 'no abstention names a step'],
     ['Latency', duration(quantile(latency, .5)), `median; ${times(latency)}`],
     ['Gate', duration(quantile(gate, .5)), `median; ${times(gate)}`],
-    ['Steps in their slice', inside + outside > 0 ? percent(inside, inside + outside) : '–',
+    ['Steps in their slice', inside + outside > 0 ? percent(inside, inside + outside) : '\u2013',
       `${counted(inside)} of ${counted(inside + outside)}`],
     ['Withdrawals', counted(total(run.withdrawals.shown)), listed(countKinds(run.withdrawals, 'kind'))],
     ['Faults', counted(total(run.faults.shown)), listed(countKinds(run.faults, 'kind'))],
@@ -374,7 +376,7 @@ const showGroups = (run, before, id, caption, name, label) => {
     filled.style.width = `${count > 0 ? 100 * certified / count : 0}%`;
     bar.append(filled);
     const then = old?.get(key);
-    return [button, counted(count), percent(certified, count), bar, ...(old ? [then ? `${percent(then.certified, then.count)} of ${counted(then.count)}` : '–'] : [])];
+    return [button, counted(count), percent(certified, count), bar, ...(old ? [then ? `${percent(then.certified, then.count)} of ${counted(then.count)}` : '\u2013'] : [])];
   });
   if (all.length > MOST_GROUPS) rows.push([`and ${counted(all.length - MOST_GROUPS)} others`, '', '', '', ...(old ? [''] : [])]);
   fillTable(byId(id), caption, ['', 'decisions', 'certified', '', ...(old ? ['certified before'] : [])], rows, [1, 2, 4]);
@@ -419,7 +421,7 @@ const COLUMNS = [
 ];
 const narrow = matchMedia('(max-width: 46rem)');
 // Of a long number, as a planner makes of the time, the digits that differ.
-const lastDigits = (text) => (text.length > 8 ? `…${text.slice(-7)}` : text);
+const lastDigits = (text) => (text.length > 8 ? `\u2026${text.slice(-7)}` : text);
 const indexText = (index) => (index < 0 ? '' : String(index));
 const rowHeight = () => (narrow.matches ? 40 : 30);
 const MOST_PIXELS = 12e6;  // browsers lay out no more than about 16 million
@@ -436,7 +438,9 @@ const sortKey = (run, column) => {
 // Rows without a value come last, whatever the direction; equal ones in the order of the log.
 const sortRows = (run) => {
   const key = sortKey(run, COLUMNS.find((column) => column.id === grid.sort)), sign = grid.falls ? -1 : 1;
-  grid.order = run.rows.slice(0, run.size).sort((a, b) => {
+  grid.order = run.rows.slice(0, run.size);
+  if (grid.order.every((row, k) => k === 0 || sign * key[grid.order[k - 1]] <= sign * key[row])) return;
+  grid.order.sort((a, b) => {
     const x = key[a], y = key[b];
     return x < y ? -sign : x > y ? sign : x === y ? a - b : Number.isNaN(x) - Number.isNaN(y) || a - b;
   });
@@ -445,7 +449,7 @@ const sortRows = (run) => {
 const showHead = (run) => {
   byId('head').replaceChildren(...COLUMNS.map((column) => {
     const isSorted = grid.sort === column.id, isSortable = column.key || column.names;
-    const cell = make(isSortable ? 'button' : 'span', column.title + (isSorted ? (grid.falls ? ' ▾' : ' ▴') : ''),
+    const cell = make(isSortable ? 'button' : 'span', column.title + (isSorted ? (grid.falls ? ' \u25be' : ' \u25b4') : ''),
       (column.rare ? 'rare ' : '') + (column.number ? 'n' : ''));
     cell.setAttribute('role', 'columnheader');
     if (isSortable) {
@@ -592,8 +596,8 @@ const showEnvelope = (detail, task) => {
   const [lower, upper] = detail?.hull ?? [[], []], [low, up] = detail?.envelope ?? [[], []];
   byId('envelope').hidden = lower.length === 0;
   if (lower.length === 0) return;
-  const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 4)} … ${number(b ?? NaN, 4)}`);
-  const nearest = (k) => (detail.nearest[k] >= 0 ? `${detail.nearest[k]}, ±${number(detail.nearest_distance[k] ?? NaN, 3)} by its distance` : '');
+  const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 4)} \u2026 ${number(b ?? NaN, 4)}`);
+  const nearest = (k) => (detail.nearest[k] >= 0 ? `${detail.nearest[k]}, \u00b1${number(detail.nearest_distance[k] ?? NaN, 3)} by its distance` : '');
   fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual', 'nearest observation'],
     lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k]), nearest(k)]));
 };

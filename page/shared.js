@@ -26,16 +26,16 @@ const make = (tag, text, className) => {
 };
 const counted = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 const number = (x, digits = 6) =>
-  Number.isNaN(x) ? '–' : x === Infinity ? '∞' : x === -Infinity ? '−∞' : String(Number(x.toPrecision(digits)));
-const percent = (part, whole) => (whole > 0 ? `${(100 * part / whole).toFixed(1)} %` : '–');
+  Number.isNaN(x) ? '\u2013' : x === Infinity ? '\u221e' : x === -Infinity ? '\u2212\u221e' : String(Number(x.toPrecision(digits)));
+const percent = (part, whole) => (whole > 0 ? `${(100 * part / whole).toFixed(1)} %` : '\u2013');
 const duration = (us) => {
   if (!Number.isFinite(us)) return number(us);
-  return us < 1000 ? `${number(us, 4)} µs` : us < 1e6 ? `${number(us / 1e3, 4)} ms` : `${number(us / 1e6, 4)} s`;
+  return us < 1000 ? `${number(us, 4)} \u00b5s` : us < 1e6 ? `${number(us / 1e3, 4)} ms` : `${number(us / 1e6, 4)} s`;
 };
 // Microseconds since the epoch. Times beyond a calendar stay numbers.
 const dateOf = (us) => (Math.abs(us) <= 8.64e18 / 1e3 ? new Date(us / 1000) : null);
-const timeText = (us) => dateOf(us)?.toISOString().replace('T', ' ').replace('Z', '') ?? `${us} µs`;
-const clockText = (us) => dateOf(us)?.toISOString().slice(11, 23) ?? `${us} µs`;
+const timeText = (us) => dateOf(us)?.toISOString().replace('T', ' ').replace('Z', '') ?? `${us} \u00b5s`;
+const clockText = (us) => dateOf(us)?.toISOString().slice(11, 23) ?? `${us} \u00b5s`;
 
 const listed = (counts) => [...counts].sort((a, b) => b[1] - a[1]).map(([name, n]) => `${name} ${counted(n)}`).join(', ');
 

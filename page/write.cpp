@@ -188,7 +188,7 @@ Json DrawingsJson(const PageRun& run) {
   Json sets = Json::array();
   for (const std::vector<Obstacle>& set : run.obstacle_sets) sets.push_back(ToJson(set));
   const Json texts{{"details", std::move(details)}, {"obstacle_sets", std::move(sets)}};
-  return {{"texts", Packed(JsonText(texts))},
+  return {{"texts", {{"type", "json"}, {"data", Packed(JsonText(texts))}}},
           {"tubes", SketchesJson(run.details, &PageDetail::sketch)},
           {"bodies", SketchesJson(run.details, &PageDetail::bodies)}};
 }
@@ -234,7 +234,7 @@ std::string PageHtml(const PageRun& run, const PageRun* before) {
                       .body = kPageBody,
                       .styles = {&kPageStyle},
                       .scripts = {&kChartScript, &kSharedScript, &kPageScript}}
-      .Html(data);
+      .Html(std::move(data));
 }
 
 }  // namespace forereach

@@ -34,10 +34,21 @@ TEST(ColumnsTest, Base64IsThatOfTheStandard) {
 }
 
 TEST(ColumnsTest, ColumnNamesItsType) {
-  EXPECT_EQ(Column(std::vector<std::int16_t>{1})["type"], "i16");
   EXPECT_EQ(Column(std::vector<std::uint8_t>{1})["type"], "u8");
   EXPECT_EQ(Column(std::vector<double>{1})["type"], "f64");
   EXPECT_EQ(Column(std::vector<float>{})["type"], "f32");
+}
+
+TEST(ColumnsTest, IntegersAreInTheNarrowestTypeThatHasThem) {
+  using std::int64_t, std::uint32_t;
+  EXPECT_EQ(Column(std::vector<int64_t>{})["type"], "i8");
+  EXPECT_EQ(Column(std::vector<int64_t>{-128, 127})["type"], "i8");
+  EXPECT_EQ(Column(std::vector<int64_t>{0, 128})["type"], "i16");
+  EXPECT_EQ(Column(std::vector<int64_t>{0, -32769})["type"], "i32");
+  EXPECT_EQ(Column(std::vector<int64_t>{0, int64_t{1} << 31})["type"], "i64");
+  EXPECT_EQ(Column(std::vector<uint32_t>{255})["type"], "u8");
+  EXPECT_EQ(Column(std::vector<uint32_t>{256})["type"], "u16");
+  EXPECT_EQ(Column(std::vector<uint32_t>{65536})["type"], "u32");
 }
 
 /** The corners of a sketch's polygon, in metres. */
@@ -295,6 +306,12 @@ TEST(WriteTest, PolicyForbidsRequests) {
   EXPECT_THAT(html, HasSubstr("script-src 'sha256-"));
   EXPECT_THAT(html, Not(HasSubstr("unsafe-inline")));
   EXPECT_THAT(html, Not(HasSubstr(" src=\"http")));
+}
+
+// A browser keeps other characters in texts twice as large, and takes twice as long over what is next to them.
+TEST(WriteTest, APageIsOfAsciiWhereItsTextsAre) {
+  const std::string html = PageHtml(GatherPage({kLog}, kTask, {}, {0, 0, 0}));
+  EXPECT_TRUE(std::ranges::all_of(html, [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
 }
 
 }  // namespace
