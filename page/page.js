@@ -51,9 +51,13 @@ const hexAt = (bytes, i) => {
 
 // ---- One side of the page: decisions and the other records of a run, and which of them are shown.
 const OTHERS = ['events', 'gaps', 'faults', 'withdrawals'];
+// Columns of decisions that choices and figures need. The others follow when these are on the screen.
+const FIRST = ['run', 'robot', 'utime', 'plan', 'source', 'outcome', 'cause', 'step', 'obstacle', 'elapsed', 'latency', 'config'];
+const columnsOf = (raw, isFirst) =>
+  Object.fromEntries(Object.entries(raw.decisions).filter(([name]) => FIRST.includes(name) === isFirst));
 
 const loadRun = async (raw) => {
-  const run = {raw, count: raw.count, decisions: await unpackTable(raw.decisions)};
+  const run = {raw, count: raw.count, decisions: await unpackTable(columnsOf(raw, true))};
   for (const name of OTHERS) run[name] = await unpackTable(raw[name]);
   const d = run.decisions;
   run.time = toNumbers(d.utime.values);
@@ -76,6 +80,11 @@ const loadRun = async (raw) => {
   run.size = 0;
   run.sorted = {};  // their times
   return run;
+};
+
+const loadRest = async (run) => {
+  Object.assign(run.decisions, await unpackTable(columnsOf(run.raw, false)));
+  run.drawings = run.raw.drawings ? await loadDrawings(run.raw.drawings) : null;
 };
 
 // The bytes of all sentences as text of one character a byte, so that a search is one pass over them.
@@ -684,14 +693,13 @@ const setTime = (from, to) => {
 const start = async () => {
   const data = JSON.parse(byId('data').textContent);
   const run = await loadRun(data.run), before = data.before ? await loadRun(data.before) : null;
-  run.drawings = await loadDrawings(data.run.drawings);
   byId('main').hidden = false;
-  const sorted = run.time.slice().sort();
+  const from = run.time.reduce((a, b) => Math.min(a, b), Infinity), to = run.time.reduce((a, b) => Math.max(a, b), -Infinity);
   byId('what').textContent = `${data.run.name}: ${counted(run.count)} decisions` +
-    (run.count ? `, ${timeText(sorted[0])} to ${timeText(sorted.at(-1))} UTC` : '') + (before ? `. Before: ${data.before.name}` : '');
+    (run.count ? `, ${timeText(from)} to ${timeText(to)} UTC` : '') + (before ? `. Before: ${data.before.name}` : '');
   document.title = `ForeReach report: ${data.run.name}`;
   fillChoices(run);
-  show = () => {
+  const showSummary = () => {
     const filters = readFilters();
     select(run, filters);
     if (before) select(before, filters, {withTime: false});
@@ -706,6 +714,8 @@ const start = async () => {
     showGroups(run, before, 'by-config', 'By task, with its config digest', 'config', (digest) => taskLabel(run, digest));
     showGroups(run, before, 'by-obstacle', 'By the obstacle that decided', 'obstacle', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`));
     showOthers(run);
+  };
+  const showDecisions = () => {
     sortRows(run);
     byId('grid').scrollTop = 0;
     if (run.size === 0) grid.chosen = -1;
@@ -713,6 +723,13 @@ const start = async () => {
     byId('detail').hidden = run.size === 0;
     if (run.size > 0) choose(run, Math.max(0, placeOfChosen()), {scroll: placeOfChosen() >= 0});
   };
+  show = () => {
+    showSummary();
+    showDecisions();
+  };
+  showSummary();
+  await new Promise((done) => setTimeout(done, 0));  // on the screen
+  await Promise.all([loadRest(run), before && loadRest(before)]);
   showHead(run);
   startGrid(run);
   startView();
@@ -728,7 +745,8 @@ const start = async () => {
     ...(before ? ['The figures before pass the same filters, except the time.'] : []),
     ...[data.run, data.before].filter((side) => side?.damaged_places).map((side) => `${side.name}: the logs are damaged in ${counted(side.damaged_places)} places.`),
     ...data.run.notes, ...(data.before?.notes ?? [])].map((note) => make('li', note)));
-  show();
+  showDecisions();
+  byId('main').inert = false;
   document.body.dataset.ready = 'yes';
 };
 
