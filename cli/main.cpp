@@ -38,7 +38,8 @@ int Become(const char* path, char** argv) {
 int main(int argc, char** argv) {
   using namespace forereach;
   std::vector<Command> commands{CertifyCommand()};
-  for (const std::span<const OfflineCommand> offline : {std::span(kOfflineCommands), std::span(kLogCommands)})
+  using Offline = std::span<const OfflineCommand>;
+  for (const Offline offline : {Offline(kOfflineCommands), Offline(kLogCommands)})
     for (const OfflineCommand& each : offline) {
       if (argc > 1 && std::string(argv[1]) == each.name) return Become(FOREREACH_OFFLINE, argv);
       commands.push_back(

@@ -73,7 +73,7 @@ class Finder final {
 
   // Returns the number of runs and logs found.
   std::size_t AddDirectory(const fs::path& directory, int depth) {
-    std::vector<std::string> logs, directories;
+    std::vector<std::string> logs, links, directories;
     std::string database;
     std::error_code error;
     for (fs::directory_iterator file(directory, error), end; !error && file != end; file.increment(error)) {
@@ -86,18 +86,18 @@ class Finder final {
       else if (file->path().filename() == LogDirectory::kDatabase)
         database = path;
       else if (file->path().extension() == ".lcmlog")
-        logs.push_back(path);
+        (file->is_symlink(ignored) ? links : logs).push_back(path);
     }
     if (error) named_.missing.push_back(directory.string() + ": " + error.message());
     const std::size_t before = named_.runs.size() + named_.missing.size();
     if (!database.empty() && Claim(database, root_)) AddDatabase(database);
+    const auto is_known = [this](const std::string& log) { return !Claim(log, root_); };
+    std::erase_if(logs, is_known);
+    std::erase_if(links, is_known);  // a log goes by its own name, unless it has it elsewhere
+    logs.insert(logs.end(), links.begin(), links.end());
     std::ranges::sort(logs);
-    std::size_t found = 0;
-    for (const std::string& log : logs)
-      if (Claim(log, root_)) {
-        logs_.push_back({log, false});
-        ++found;
-      }
+    for (const std::string& log : logs) logs_.push_back({log, false});
+    std::size_t found = logs.size();
     std::ranges::sort(directories);
     for (const std::string& each : directories)
       if (depth < kDeepest) found += AddDirectory(each, depth + 1);

@@ -9,6 +9,7 @@
 
 #include "certifier/gate/gate.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 

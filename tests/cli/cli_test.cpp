@@ -17,6 +17,7 @@
 
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
+#include "tests/paths.h"
 #include "tests/scratch.h"
 
 namespace {

@@ -11,6 +11,7 @@
 #include "cli/cover_file.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 
 namespace forereach {

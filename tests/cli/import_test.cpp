@@ -9,6 +9,7 @@
 #include "certifier/task/config.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {

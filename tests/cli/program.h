@@ -5,6 +5,7 @@
 #include <sstream>
 #include <string>
 
+#include "tests/paths.h"
 #include "tests/shell.h"
 
 namespace forereach {

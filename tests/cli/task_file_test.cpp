@@ -13,6 +13,7 @@
 #include "cli/task_template.h"
 #include "tests/cli/program.h"
 #include "tests/config/task_files.h"
+#include "tests/paths.h"
 #include "tests/scratch.h"
 
 namespace forereach {

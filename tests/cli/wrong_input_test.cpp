@@ -16,6 +16,7 @@
 #include "records/kept_tasks.h"
 #include "records/log_directory.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/scratch.h"
 
 namespace forereach {

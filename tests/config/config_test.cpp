@@ -12,6 +12,7 @@
 #include "certifier/dynamics/residuals.h"
 #include "certifier/task/schema.h"
 #include "tests/config/task_files.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {

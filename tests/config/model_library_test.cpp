@@ -11,6 +11,7 @@
 
 #include "certifier/numerics/size.h"
 #include "tests/config/task_files.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {

@@ -13,6 +13,7 @@
 #include "certifier/task/schema.h"
 #include "robot/target.h"
 #include "tests/config/task_files.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {

@@ -20,6 +20,7 @@
 #include "certifier/task/config_error.h"
 #include "experiments/real/recording.h"
 #include "experiments/real/study.h"
+#include "tests/paths.h"
 #include "tests/scratch.h"
 #include "tests/shell.h"
 

@@ -15,6 +15,7 @@
 #include "experiments/plans.h"
 #include "experiments/run_directory.h"
 #include "experiments/sides.h"
+#include "tests/paths.h"
 #include "tests/scratch.h"
 #include "tests/shell.h"
 

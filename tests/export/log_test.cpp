@@ -9,6 +9,7 @@
 
 #include "records/log_edit.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 
@@ -66,11 +67,11 @@ TEST_F(LogTest, ACutKeepsNumbersStampsAndBytes) {
   const std::string out = scratch_ / "out.lcmlog";
   const auto events = ReadLog(kCourse).events;
   const Output output = Log("cut '" + kCourse + "' --channel PLAN_DECISION --from " + std::to_string(events[20].utime) +
-                            " --to " + std::to_string(events[90].utime) + " -o '" + out + "'");
+                            " --to " + std::to_string(events[200].utime) + " -o '" + out + "'");
   EXPECT_EQ(output.code, 0) << output.text;
   std::vector<LogEvent> expected;
   for (const LogEvent& event : events)
-    if (event.channel == "PLAN_DECISION" && event.utime >= events[20].utime && event.utime < events[90].utime)
+    if (event.channel == "PLAN_DECISION" && event.utime >= events[20].utime && event.utime < events[200].utime)
       expected.push_back(event);
   const LogContents cut = ReadLog(out);
   ASSERT_EQ(cut.events.size(), expected.size());
@@ -134,7 +135,7 @@ TEST_F(LogTest, TimesMayBeOfSeveralKinds) {
 
 TEST_F(LogTest, DamageIsSaidWithItsPlace) {
   auto bytes = ReadBytes(kCourse);
-  std::fill_n(bytes.begin() + 50'000, 300, std::uint8_t{0});
+  std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(RecordFrom(bytes, 50'000)), 100, std::uint8_t{0});
   bytes.resize(bytes.size() - 10);
   WriteBytes(scratch_ / "damaged", bytes);
   const std::string out = scratch_ / "out";

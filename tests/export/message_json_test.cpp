@@ -28,6 +28,7 @@
 #include "forereach/transition_t.hpp"
 #include "forereach/withdrawal_t.hpp"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/tries.h"
 
 namespace forereach {

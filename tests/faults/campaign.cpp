@@ -35,6 +35,7 @@
 #include "tests/faults/report.h"
 #include "tests/faults/rig.h"
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/process/raw_datagrams.h"
 
 namespace forereach {

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <string>
 
+#include "tests/paths.h"
+
 namespace forereach {
 
 /** Its files named absolutely. @param more YAML that is added. */

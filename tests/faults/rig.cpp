@@ -13,6 +13,7 @@
 #include "records/check.h"
 #include "records/event_log.h"
 #include "tests/keys.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {

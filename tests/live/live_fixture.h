@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "live/watcher.h"
+#include "tests/paths.h"
 
 namespace forereach {
 

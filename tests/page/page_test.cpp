@@ -13,6 +13,7 @@
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/scratch.h"
 #include "tests/tries.h"
 

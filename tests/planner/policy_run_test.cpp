@@ -13,6 +13,7 @@
 #include "planner_bridge/policy_proposer.h"
 #include "planner_bridge/reference.h"
 #include "robot/sim_node.h"
+#include "tests/paths.h"
 #include "tests/planner/tasks.h"
 
 namespace forereach {

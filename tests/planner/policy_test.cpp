@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "planner_bridge/reference.h"
+#include "tests/paths.h"
 #include "tests/planner/tasks.h"
 #include "tests/scratch.h"
 

@@ -17,6 +17,7 @@
 #include "forereach/robot_state_t.hpp"
 #include "tests/cli/program.h"
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -24,6 +24,7 @@
 #include "robot/sim_node.h"
 #include "tests/gate/small_task.h"
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/reset.h"
 #include "tests/scratch.h"
 

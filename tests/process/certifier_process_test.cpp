@@ -20,6 +20,7 @@
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -16,6 +16,7 @@
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 #include "tests/process/raw_datagrams.h"
 

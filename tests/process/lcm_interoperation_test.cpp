@@ -22,6 +22,7 @@
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "records/event_log.h"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

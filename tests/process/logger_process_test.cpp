@@ -7,6 +7,7 @@
 
 #include "forereach/decision_t.hpp"
 #include "forereach/logger_status_t.hpp"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

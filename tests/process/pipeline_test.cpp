@@ -11,6 +11,7 @@
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

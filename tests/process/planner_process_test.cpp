@@ -8,6 +8,7 @@
 
 #include "certifier/gate/gate.h"
 #include "forereach/robot_state_t.hpp"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "bus/authentic.h"
+#include "tests/paths.h"
 
 namespace forereach {
 

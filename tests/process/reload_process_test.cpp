@@ -12,6 +12,8 @@
 
 #include "tests/process/process_fixture.h"
 
+#include "tests/paths.h"
+
 namespace forereach {
 namespace {
 

@@ -15,6 +15,7 @@
 #include "forereach/execution_event_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "forereach/withdrawal_t.hpp"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -12,6 +12,7 @@
 #include "forereach/robot_state_t.hpp"
 #include "forereach/transition_t.hpp"
 #include "lcmtypes/seal.h"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -11,6 +11,7 @@
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/codec.h"
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/keys.h"
+#include "tests/paths.h"
 #include "tests/process/process_fixture.h"
 
 namespace forereach {

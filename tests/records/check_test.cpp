@@ -10,6 +10,7 @@
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "records/kept_tasks.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 
 namespace forereach {

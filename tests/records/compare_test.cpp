@@ -10,6 +10,7 @@
 #include "records/database.h"
 #include "records/timeline.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 

@@ -10,6 +10,7 @@
 #include <malloc.h>
 
 #include "records/event_log.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 
 // This program counts what it holds on the heap. Inlined, the compiler would see new end in free and warn.

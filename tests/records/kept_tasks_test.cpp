@@ -8,6 +8,7 @@
 #include "forereach/certifier_status_v2_t.hpp"
 #include "tests/config/task_files.h"
 #include "tests/logger/disk_fixture.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {

@@ -1,6 +1,7 @@
 /** What the logger's tests share: files as bytes, logs as lists, and messages. */
 #pragma once
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <string>
@@ -25,6 +26,13 @@ inline std::vector<std::uint8_t> ReadBytes(const std::string& path) {
 inline void WriteBytes(const std::string& path, const std::vector<std::uint8_t>& bytes) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+/** The place of the first record that begins at `from` or after it, by its sync word. */
+inline std::size_t RecordFrom(const std::vector<std::uint8_t>& bytes, std::size_t from) {
+  constexpr std::uint8_t kSync[] = {0xED, 0xA1, 0xDA, 0x01};
+  const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(from);
+  return static_cast<std::size_t>(std::search(begin, bytes.end(), std::begin(kSync), std::end(kSync)) - bytes.begin());
 }
 
 /** All that can be read of a log, and how it ended. */

@@ -11,6 +11,7 @@
 #include "certifier/task/config.h"
 #include "records/database.h"
 #include "records/interpreter.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/scratch.h"
 

@@ -17,6 +17,7 @@
 #include "records/replay.h"
 #include "tests/cli/program.h"
 #include "tests/gate/small_task.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"
 #include "tests/scratch.h"

@@ -10,6 +10,7 @@
 #include "certifier/gate/obstacle_message.h"
 #include "forereach/obstacles_t.hpp"
 #include "forereach/robot_state_t.hpp"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 
 namespace forereach {

@@ -16,6 +16,7 @@
 #include "lcmtypes/names.h"
 #include "records/replay.h"
 #include "records/report.h"
+#include "tests/paths.h"
 #include "tests/records/certificates.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"

@@ -19,6 +19,7 @@
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/certificates.h"
 #include "tests/records/logs.h"
 #include "tests/records/signed_log.h"

@@ -11,6 +11,7 @@
 #include "certifier/gate/gate.h"
 #include "certifier/task/config.h"
 #include "robot/guard.h"
+#include "tests/paths.h"
 
 namespace forereach {
 namespace {

@@ -15,6 +15,7 @@
 #include "certifier/dynamics/kinematic_bicycle.h"
 #include "certifier/dynamics/point_mass.h"
 #include "certifier/dynamics/text_model.h"
+#include "tests/paths.h"
 #include "tests/unit/exported_model.inc"
 
 namespace forereach {

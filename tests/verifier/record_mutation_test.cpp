@@ -14,6 +14,7 @@
 
 #include "records/decision_json.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/certificates.h"
 #include "tests/scratch.h"
 

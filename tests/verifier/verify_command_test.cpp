@@ -12,6 +12,7 @@
 #include "cli/progress.h"
 #include "records/decision_json.h"
 #include "tests/cli/program.h"
+#include "tests/paths.h"
 #include "tests/records/logs.h"
 
 namespace forereach {
