@@ -6,6 +6,7 @@ const {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, m
   drawObstacle, showView, startView, drawTube, showLegend} = ForeReach;
 
 const MOST = {decisions: 120, faults: 60, withdrawals: 60, events: 60, gaps: 60, places: 600};
+const REFUSED_US = 3e6;  // as long is an abstention drawn
 const SILENT_US = 2e6;  // the certifier's heartbeat comes twice a second
 const state = {beginning: null, now: null, obstacles: [], chosen: null, heard: 0};
 for (const name of Object.keys(MOST)) state[name] = [];
@@ -189,17 +190,19 @@ const moveView = ([x, y], size) => {
 const showNow = () => {
   const {robot, utime} = state.now;
   const running = robot && newest((decision) => decision.outcome === 'certified' && decision.plan === robot.plan);
-  const last = state.decisions.findLast(hasTube);
-  const tubes = [...new Set([running, last].filter(Boolean))];
+  const last = newest(() => true);
+  // The planner answers an abstention at once: the newest plan is mostly another one.
+  const refused = newest((decision) => decision.outcome.startsWith('abstain') && utime - decision.utime < REFUSED_US);
+  const tubes = [...new Set([refused, last, running].filter(Boolean))];  // the last is on top
   const center = robot?.at ?? (last ? unitsOfDecision(last)[0][0]?.[0] : null);
   if (!center || !canBeDrawn(...center)) {
     byId('shows').textContent = state.beginning.planar ? 'Neither a robot nor a tube has been heard of yet.' : 'The safety coordinates of this task are not planar: no drawing.';
     return;
   }
   moveView(center, Math.max(extentOfTubes(tubes), 1));
-  const layers = [obstacleGroup(utime, last && last.outcome.startsWith('abstain') ? last.obstacle : -1)];
-  if (last && last !== running) layers.push(tubeGroup(last, {fill: outcomeColor(last.outcome), 'fill-opacity': .12, stroke: outcomeColor(last.outcome)}));
-  if (running) layers.push(tubeGroup(running, {fill: EXECUTED, 'fill-opacity': .15, stroke: EXECUTED}));
+  const colorOf = (tube) => (tube === running ? EXECUTED : outcomeColor(tube.outcome));
+  const layers = [obstacleGroup(utime, refused?.obstacle ?? -1)];
+  for (const tube of tubes) layers.push(tubeGroup(tube, {fill: colorOf(tube), 'fill-opacity': .13, stroke: colorOf(tube)}));
   const places = state.places.filter(([x, y]) => canBeDrawn(x, y));
   layers.push(shape('polyline', {points: pointsText(places), fill: 'none', stroke: INK, 'stroke-width': 1.2, 'vector-effect': 'non-scaling-stroke'}));
   for (const polygon of robot?.body ?? []) layers.push(outline(polygon, {id: 'body', fill: INK, 'fill-opacity': .35, stroke: INK, 'stroke-width': 1.5}));
@@ -212,8 +215,8 @@ const showNow = () => {
   byId('shows').textContent = last ? `The newest decision: ${last.message}` : '';
   showView();
   const entries = [['#6b7280', 'obstacles now, and where they will be'], [INK, 'the robot and its path']];
-  if (running) entries.push([EXECUTED, 'the certified plan that it executes']);
-  if (last && last !== running) entries.push([outcomeColor(last.outcome), `the newest plan: ${outcomeLabel(last.outcome)}`]);
+  for (const tube of tubes.reverse())
+    entries.push([colorOf(tube), tube === running ? 'the certified plan that it executes' : tube === last ? `the newest plan: ${outcomeLabel(tube.outcome)}` : `the newest plan that is not certified: ${outcomeLabel(tube.outcome)}`]);
   byId('legend').replaceChildren(...entries.map(([color, text]) => {
     const item = make('li'), chip = make('i', undefined, 'chip');
     chip.style.background = color;
