@@ -81,13 +81,12 @@ void LiveFeed::Add(std::string text) {
   ++first_;
 }
 
-std::int64_t LiveFeed::AppendSince(std::int64_t from, std::string& out) const {
-  const std::int64_t begin = std::clamp(from, first_, end());
-  for (std::int64_t i = begin; i < end(); ++i) {
+void LiveFeed::Append(std::int64_t from, std::int64_t to, std::string& out) const {
+  const std::int64_t begin = std::max(from, first_);
+  for (std::int64_t i = begin; i < to; ++i) {
     if (i > begin) out += ',';
     out += texts_[static_cast<std::size_t>(i - first_)];
   }
-  return end();
 }
 
 // ---- What is heard.
@@ -384,6 +383,7 @@ void Watcher::Tick(std::int64_t now_us, const LiveLosses& losses) {
   std::string now = JsonText(NowJson(now_us, losses));
   const std::lock_guard lock(mutex_);
   now_ = std::move(now);
+  std::ranges::transform(feeds_, ends_.begin(), &LiveFeed::end);
   ++tick_;
 }
 
@@ -467,9 +467,10 @@ std::string Watcher::Since(Cursor& cursor) const {
   if (cursor.obstacles != obstacles_number_) text += ",\"obstacles\":" + set_;
   cursor.obstacles = obstacles_number_;
   for (std::size_t i = 0; i < kNames.size(); ++i) {
-    if (cursor.of_feed[i] == feeds_[i].end()) continue;
+    if (cursor.of_feed[i] == ends_[i]) continue;
     text.append(",\"").append(kNames[i]).append("\":[");
-    cursor.of_feed[i] = feeds_[i].AppendSince(cursor.of_feed[i], text);
+    feeds_[i].Append(cursor.of_feed[i], ends_[i], text);
+    cursor.of_feed[i] = ends_[i];
     text += ']';
   }
   return text + '}';

@@ -51,8 +51,8 @@ class LiveFeed final {
   explicit LiveFeed(std::size_t most) : most_(most) {}
 
   void Add(std::string text);
-  /** Appends the texts from number `from` on, with commas between them. @return the number after the last. */
-  std::int64_t AppendSince(std::int64_t from, std::string& out) const;
+  /** Appends the texts from number `from` to before `to`, at most end(), with commas between them. */
+  void Append(std::int64_t from, std::int64_t to, std::string& out) const;
   [[nodiscard]] std::int64_t end() const { return first_ + std::ssize(texts_); }
 
  private:
@@ -151,6 +151,7 @@ class Watcher final {
   mutable std::mutex mutex_;  // guards what Since reads
   std::array<LiveFeed, 6> feeds_{LiveFeed{kDecisions}, LiveFeed{kOthers}, LiveFeed{kOthers},
                                  LiveFeed{kOthers},    LiveFeed{kOthers}, LiveFeed{kPlaces}};
+  std::array<std::int64_t, 6> ends_{};  // of the feeds at the last tick, so that all of a reader's news is of one time
   std::string now_, set_;
   std::int64_t obstacles_number_ = 0, tick_ = 0;
 };
