@@ -108,7 +108,7 @@ def watch(browser, demo, picture):
     wait_for(browser, "document.querySelectorAll('#body').length > 0 || document.querySelectorAll('#svg .dot').length > 0", "the robot is drawn")
     wait_for(browser, "document.querySelector('#legend').textContent.includes('executes')", "the plan that it executes is drawn")
     if picture:
-        wait_for(browser, "document.querySelector('#figures .value').textContent > 12 && document.querySelector('#legend').textContent.includes('abstain')",
+        wait_for(browser, "document.querySelector('#figures .value').textContent > 8 && ['executes', 'abstain'].every(word => document.querySelector('#legend').textContent.includes(word))",
                  "an abstention is drawn beside it")
         browser.screenshot(picture)
     choose(browser, "certified")

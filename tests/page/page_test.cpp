@@ -6,6 +6,7 @@
 
 #include "certifier/task/json_text.h"
 #include "page/columns.h"
+#include "page/detail.h"
 #include "page/gather.h"
 #include "page/rows_json.h"
 #include "page/sketch.h"
@@ -129,6 +130,64 @@ TEST(GatherTest, DrawsNoMoreThanItsBounds) {
   for (const PageDetail& detail : none.details) {
     EXPECT_THAT(detail.missing, HasSubstr("reached their bound"));
     EXPECT_TRUE(detail.sketch.points.empty());
+  }
+}
+
+// A car of the demo stands for three steps.
+PageDetail DetailOfStandingCar(const Config& task, const std::vector<Obstacle>& obstacles = {}) {
+  candidate_plan_t candidate{};
+  candidate.num_steps = 3;
+  candidate.num_states = static_cast<std::int16_t>(task.problem->model->num_states());
+  candidate.num_inputs = static_cast<std::int16_t>(task.problem->model->num_inputs());
+  candidate.step_us = 100'000;
+  std::fill_n(candidate.initial_half_width, candidate.num_states, 0.01);
+  EXPECT_EQ(WhyNotJudged(candidate, task), "");
+  const Certifier certifier(task.problem);
+  const Schedule schedule = ScheduleOf(candidate, task.gate);
+  Tube tube;
+  const Decision decision = certifier.Certify(PlanOf(candidate, schedule), InitialSetOf(candidate), obstacles, tube);
+  PageDetail detail;
+  Describe(certifier, {candidate, schedule, static_cast<int>(decision.outcome), decision.step}, decision, tube, detail);
+  return detail;
+}
+
+TEST(DetailTest, ABodyIsDrawnAtEachStep) {
+  const PageDetail detail = DetailOfStandingCar(LoadConfig(FOREREACH_SOURCE_DIR "/config/demo.yaml"));
+  ASSERT_EQ(detail.missing, "");
+  EXPECT_EQ(detail.bodies.parts, (std::vector<std::uint8_t>{1, 1, 1}));
+  EXPECT_EQ(detail.bodies.corners, (std::vector<std::uint8_t>{4, 4, 4}));
+  double left = 1e9, right = -1e9;
+  int x = 0;
+  for (std::size_t i = 0; i < 8; i += 2) {
+    x += detail.bodies.points[i];
+    left = std::min(left, detail.bodies.x + detail.bodies.quantum * x);
+    right = std::max(right, detail.bodies.x + detail.bodies.quantum * x);
+  }
+  EXPECT_NEAR(left, -0.9, 0.01);
+  EXPECT_NEAR(right, 3.4, 0.01);
+}
+
+TEST(DetailTest, NamesTheNearestObservationOfEachState) {
+  const Config task = LoadConfig(FOREREACH_SOURCE_DIR "/config/demo.yaml");
+  const PageDetail detail = DetailOfStandingCar(task, {Obstacle::Circle(Eigen::Vector2d(1, 0), 1)});
+  ASSERT_EQ(detail.binding, 0);
+  const Transitions& known = task.problem->transitions;
+  // The first step begins at the origin, and its input is zero.
+  for (int k = 0; k < 6; ++k) {
+    const Eigen::VectorXd weights = task.problem->declaration.lipschitz.row(k);
+    if (weights.isZero(0)) {
+      EXPECT_EQ(detail.nearest[k], -1) << k;
+      continue;
+    }
+    double least = std::numeric_limits<double>::infinity();
+    int nearest = -1;
+    for (int i = 0; i < known.size(); ++i) {
+      double distance = 0;
+      for (int j = 0; j < weights.size(); ++j) distance += weights[j] * std::abs(known.z(i, j));
+      if (distance < least) least = distance, nearest = i;
+    }
+    EXPECT_EQ(detail.nearest[k], nearest) << k;
+    EXPECT_NEAR(detail.nearest_distance[k], least, 1e-12) << k;
   }
 }
 
