@@ -81,7 +81,7 @@ Command ReportCommand() {
           "With --out it writes a page for a browser: one HTML file that needs no network. See docs/analysis.md.\n\n"
           "Examples:\n  forereach report run/log/events-20260101-120000-000000.lcmlog --picture run/demo\n"
           "  forereach report run/log --out report.html\n"
-          "  forereach report night --out night.html --resume night.read\n"
+          "  forereach report run --out season.html --resume season.read\n"
           "  forereach report run/log --before old/log/decisions.sqlite --out both.html",
       .options = {Required({"logs", &report.logs, "LOG|DATABASE|DIRECTORY",
                             std::string(kLogs) + "; with --out also databases, directories and logs of several runs"}),

@@ -84,6 +84,13 @@ class KeptTaskTest : public testing::Test {
     EXPECT_EQ(std::ranges::count(output.text, '\n'), 1) << command << "\n" << output.text;
   }
 
+  /** Of several inputs those that are none are named, and the others are read. */
+  static void ExpectNamed(const std::string& command, const std::vector<std::string>& sentences) {
+    const Output output = Forereach(command + " 2>&1");
+    EXPECT_EQ(output.code, 1) << command << "\n" << output.text;
+    for (const std::string& sentence : sentences) EXPECT_THAT(output.text, HasSubstr(sentence)) << command;
+  }
+
   static ScratchDirectory* scratch_;
   static std::vector<std::string>* logs_;
   const ScratchDirectory elsewhere_;
@@ -198,6 +205,7 @@ TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
   const std::string json = own.Write("decision.lcmlog", "{\"outcome\": \"certified\"}");
   const std::string noise = own.Write("noise.lcmlog", std::string(5000, '\x07'));
   const std::string cut = own.Write("cut.lcmlog", "\xED\xA1\xDA\x01");
+  fs::create_directory(own / "none");
   const std::string foreign = own / "foreign.sqlite", alien = own / "alien.lcmlog", none = own / "none.lcmlog";
   {
     { const Database ours(foreign); }
@@ -221,8 +229,11 @@ TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
     for (const char* command : {"replay ", "report "}) {
       for (const auto& [input, sentence] : no_logs) ExpectRefused(command + input + config, {sentence, input});
       ExpectRefused(command + logs_->front() + " " + text + config, {"no LCM event log"});
-      ExpectRefused(command + own.path() + config, {"director"});
     }
+    ExpectRefused("report " + own.path() + config, {"director"});
+    for (const char* command : {"replay ", "verify "})
+      ExpectNamed(command + own.path() + config, {json + ": is a JSON document", noise + ": is no LCM event log",
+                                                  text + ": is no LCM event log", "3 logs or runs could not be re"});
     ExpectRefused("report " + database + config, {"is an SQLite database"});
     ExpectRefused("report " + foreign + config, {"is an SQLite database"});
     ExpectRefused("report " + directory + config, {"is a directory"});
@@ -232,7 +243,7 @@ TEST_F(KeptTaskTest, WhatIsNoInputOfACommandIsSaid) {
     ExpectRefused("replay " + logs_->front() + " " + directory + config, {"is named twice"});
     for (const auto& [input, sentence] : no_logs) ExpectRefused("verify " + input + config, {input});
     ExpectRefused("verify " + foreign + config, {"not a decision database"});
-    ExpectRefused("verify " + own.path() + config, {"neither a decision database"});
+    ExpectRefused("verify " + (own / "none") + config, {"neither a decision database"});
     ExpectRefused("verify " + logs_->front() + " " + database + config, {"is named twice"});
     ExpectRefused("verify " + logs_->front() + " " + text + config, {"no LCM event log"});
   }
@@ -269,7 +280,8 @@ TEST_F(KeptTaskTest, ADatabaseDoesNotLeadOutOfItsDirectory) {
   const std::string copy = Copied();
   fs::copy(logs_->front(), elsewhere_ / "outside.lcmlog");
   Database(copy + "/decisions.sqlite").BeginRun("../outside.lcmlog", 0);
-  ExpectRefused("verify " + copy, {"not in its directory", "../outside.lcmlog"});
+  ExpectNamed("verify " + copy, {"not in its directory", "../outside.lcmlog", "; 1 logs or runs could not be read"});
+  ExpectRefused("verify " + copy + "/decisions.sqlite", {"not in its directory", "../outside.lcmlog"});
   ExpectRefused("check-log " + copy, {"not in its directory"});
 }
 

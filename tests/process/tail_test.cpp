@@ -49,7 +49,8 @@ TEST_F(TailTest, PrintsEachDecisionWithCounts) {
   const auto bus = OpenBus(url_);
   bus->Publish("PLAN_DECISION", Decided(0, decision_t::CERTIFIED, "certified: all is clear"));
   bus->Publish("PLAN_DECISION", Decided(1, decision_t::ABSTAIN_SAFETY, "abstain S: a wall"));
-  bus->Publish("PLAN_DECISION", std::vector<std::uint8_t>{1, 2, 3});
+  const std::vector<std::uint8_t> no_decision{1, 2, 3};
+  bus->Publish("PLAN_DECISION", Bytes(no_decision));
   bus->Publish("PLAN_DECISION", Decided(5, decision_t::CERTIFIED, "certified: again"));
   EXPECT_EQ(tail->WaitForExit(), 0) << tail->error();
   EXPECT_THAT(tail->output(),
