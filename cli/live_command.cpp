@@ -35,10 +35,9 @@ class LiveNode final : public Node {
   }
 
   void Tick(std::int64_t now_us) override {
-    if (const std::int64_t now = SteadyClockUs(); now < next_us_)
-      return;
-    else
-      next_us_ = now + Watcher::kTickUs;
+    const std::int64_t steady_us = SteadyClockUs();
+    if (steady_us < next_us_) return;
+    next_us_ = steady_us + Watcher::kTickUs;
     watcher_.Tick(now_us, {bus_.dropped(), bus_.datagrams().refused()});
   }
 

@@ -30,41 +30,28 @@ template <class Number>
   return {{"type", type}, {"data", Packed({reinterpret_cast<const char*>(values.data()), values.size_bytes()})}};
 }
 
-template <class Number>
-struct Narrower {
-  using Type = void;
-};
-template <>
-struct Narrower<std::int64_t> {
-  using Type = std::int32_t;
-};
-template <>
-struct Narrower<std::int32_t> {
-  using Type = std::int16_t;
-};
-template <>
-struct Narrower<std::int16_t> {
-  using Type = std::int8_t;
-};
-template <>
-struct Narrower<std::uint32_t> {
-  using Type = std::uint16_t;
-};
-template <>
-struct Narrower<std::uint16_t> {
-  using Type = std::uint8_t;
-};
+/** A column in the first of these types that has all of the values; the types rise to their own. */
+template <class Narrow, class... Wider, class Number>
+[[nodiscard]] nlohmann::json NarrowColumn(std::span<const Number> values) {
+  if constexpr (sizeof(Narrow) < sizeof(Number)) {
+    if (!std::ranges::all_of(values, [](Number value) { return std::in_range<Narrow>(value); }))
+      return NarrowColumn<Wider...>(values);
+    const std::vector<Narrow> narrow(values.begin(), values.end());
+    return ColumnAsItIs(std::span<const Narrow>(narrow));
+  } else {
+    return ColumnAsItIs(values);
+  }
+}
 
 /** Integers are written in the narrowest type that has all of them: a browser unpacks and reads these sooner. */
 template <class Number>
 [[nodiscard]] nlohmann::json Column(std::span<const Number> values) {
-  using Narrow = typename Narrower<Number>::Type;
-  if constexpr (!std::is_void_v<Narrow>)
-    if (std::ranges::all_of(values, [](Number value) { return std::in_range<Narrow>(value); })) {
-      const std::vector<Narrow> narrow(values.begin(), values.end());
-      return Column(std::span<const Narrow>(narrow));
-    }
-  return ColumnAsItIs(values);
+  if constexpr (std::is_floating_point_v<Number>)
+    return ColumnAsItIs(values);
+  else if constexpr (std::is_signed_v<Number>)
+    return NarrowColumn<std::int8_t, std::int16_t, std::int32_t, std::int64_t>(values);
+  else
+    return NarrowColumn<std::uint8_t, std::uint16_t, std::uint32_t>(values);
 }
 template <class Number>
 [[nodiscard]] nlohmann::json Column(const std::vector<Number>& values) {
