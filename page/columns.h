@@ -18,8 +18,9 @@ namespace forereach {
 /** RFC 4648, with padding. */
 [[nodiscard]] std::string Base64(std::string_view bytes);
 
-/** Base64 of the bytes in zlib's format. @throws std::bad_alloc. */
-[[nodiscard]] std::string Packed(std::string_view bytes);
+/** Base64 of the bytes in zlib's format: a binary value, since a document has it in another place (page/document.h).
+@throws std::bad_alloc. */
+[[nodiscard]] nlohmann::json Packed(std::string_view bytes);
 
 /** A column of a page: {"type": "f64", "data": Packed}. Types are i8, u8, i16, ..., i64, f32 and f64, little-endian. */
 template <class Number>

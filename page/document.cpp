@@ -24,14 +24,15 @@ std::string Hashes(const std::vector<const PageAsset*>& assets) {
   return all;
 }
 
-// Moves the numbers of columns into `columns`, and puts their places there.
+// Moves binary values into `columns`, and puts their places there.
 void MoveColumns(nlohmann::json& json, std::vector<std::string>& columns) {
-  if (json.is_object() && json.contains("type") && json.contains("data")) {
-    columns.push_back(std::move(json["data"].get_ref<std::string&>()));
-    json["data"] = columns.size() - 1;
+  if (json.is_binary()) {
+    const auto& bytes = json.get_binary();
+    columns.emplace_back(bytes.begin(), bytes.end());
+    json = columns.size() - 1;
+  } else if (json.is_structured()) {
+    for (nlohmann::json& each : json) MoveColumns(each, columns);
   }
-  if (!json.is_structured()) return;
-  for (nlohmann::json& each : json) MoveColumns(each, columns);
 }
 
 }  // namespace

@@ -22,9 +22,9 @@ struct PageDocument {
 
   /** Its Content-Security-Policy. */
   [[nodiscard]] std::string Policy() const;
-  /** @param data for the scripts, which find it as JSON in the element "data". No tag begins in it. The packed numbers
-  of each column (page/columns.h) are in an element "column" of their own, and the JSON has its place among these: a
-  browser reads small elements faster than a large one, and a script those that it needs. */
+  /** @param data for the scripts, which find it as JSON in the element "data". No tag begins in it. Each of its
+  binary values (page/columns.h) is in an element "column" of its own, and the JSON has its place among these: a browser
+  reads small elements faster than a large one, and a script those that it needs. */
   [[nodiscard]] std::string Html(nlohmann::json data) const;
 };
 

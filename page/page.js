@@ -84,7 +84,7 @@ const loadRun = async (raw) => {
 
 const loadRest = async (run) => {
   Object.assign(run.decisions, await unpackTable(columnsOf(run.raw, false)));
-  run.drawings = run.raw.drawings ? await loadDrawings(run.raw.drawings) : null;
+  run.drawings = await loadDrawings(run.raw.drawings);
 };
 
 // The bytes of all sentences as text of one character a byte, so that a search is one pass over them.
@@ -729,7 +729,7 @@ const start = async () => {
   };
   showSummary();
   await new Promise((done) => setTimeout(done, 0));  // on the screen
-  await Promise.all([loadRest(run), before && loadRest(before)]);
+  await loadRest(run);
   showHead(run);
   startGrid(run);
   startView();

@@ -112,8 +112,8 @@ Json DecisionsJson(const PageRun& run) {
 // What the figures need.
 Json FiguresJson(const PageRun& run) {
   Json all = DecisionsJson(run);
-  for (const char* name : {"sequence", "coordinate", "first", "second", "message", "digest", "log", "event", "model",
-                           "declaration", "observations", "obstacles"})
+  for (const char* name : {"sequence", "coordinate", "first", "second", "margin", "threshold", "message", "digest",
+                           "log", "event", "model", "declaration", "observations", "obstacles"})
     all.erase(name);
   return all;
 }

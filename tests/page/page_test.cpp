@@ -360,6 +360,12 @@ TEST(WriteTest, TextsOfARunBeginNoTag) {
   EXPECT_THAT(html, Not(HasSubstr("</script><!--")));
 }
 
+TEST(WriteTest, ALogMayHaveTheNameOfAKey) {
+  PageRun run;
+  run.parts = {{"", {{"type", "one"}, {"data", "two"}}}};
+  EXPECT_THAT(PageHtml(run), HasSubstr(R"("replays":{"data":"two","type":"one"})"));
+}
+
 TEST(WriteTest, PolicyForbidsRequests) {
   const std::string html = PageHtml({});
   EXPECT_THAT(html, HasSubstr("default-src 'none'"));
