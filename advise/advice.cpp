@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "certifier/certify/explain.h"
+#include "certifier/certify/way_clear.h"
+#include "certifier/numerics/least.h"
 #include "certifier/numerics/size.h"
 #include "certifier/numerics/text.h"
 #include "certifier/residual/consistency.h"
@@ -15,6 +17,8 @@
 
 namespace forereach {
 namespace {
+
+constexpr int kHalvings = 8;
 
 struct Judgement {
   Decision decision;
@@ -46,47 +50,8 @@ Case WithProblem(Case changed, Edit edit) {
   return changed;
 }
 
-// The least amount in (0, most] that is enough, by halving: an amount that is enough, up to most / 2^halvings too large
-// where what is enough is an interval up to `most`. Nothing if `most` is not enough.
-template <class IsEnough>
-std::optional<double> Least(double most, int halvings, IsEnough is_enough) {
-  if (!is_enough(most)) return std::nullopt;
-  double too_little = 0, enough = most;
-  for (int i = 0; i < halvings; ++i) {
-    const double middle = (too_little + enough) / 2;
-    (is_enough(middle) ? enough : too_little) = middle;
-  }
-  return enough;
-}
-
-// The same where the size is not known: tries first, 2 first, 4 first .. up to `most`.
-template <class IsEnough>
-std::optional<double> LeastFrom(double first, double most, IsEnough is_enough) {
-  for (double amount = first; amount <= most; amount *= 2)
-    if (is_enough(amount)) return Least(amount, 8, is_enough);
-  return std::nullopt;
-}
-
 std::string StateName(const NominalModel& model, int k) { return model.state_names()[ToSize(k)]; }
 std::string VariableName(const NominalModel& model, int l) { return model.variable_names()[ToSize(l)]; }
-
-Obstacle Shifted(const Obstacle& obstacle, const Eigen::VectorXd& by) {
-  const auto make = [&]() -> Obstacle {
-    const auto& points = obstacle.points();
-    switch (obstacle.kind()) {
-      case Obstacle::Kind::kCircle: return Obstacle::Circle(points[0] + by, obstacle.radius());
-      case Obstacle::Kind::kBox: return Obstacle::AxisBox(points[0] + by, points[1] + by);
-      case Obstacle::Kind::kPolygon: {
-        std::vector<Eigen::VectorXd> vertices;
-        for (const Eigen::VectorXd& vertex : points) vertices.push_back(vertex + by);
-        return Obstacle::Polygon(vertices);
-      }
-      case Obstacle::Kind::kHalfSpace: break;
-    }
-    return Obstacle::HalfSpace(points[0], obstacle.offset() + points[0].dot(by));
-  };
-  return obstacle.motion() ? make().Moving(*obstacle.motion()) : make();
-}
 
 std::string Text(const Eigen::VectorXd& direction) {
   std::string text;
@@ -97,7 +62,8 @@ std::string Text(const Eigen::VectorXd& direction) {
 // Bounds of a domain that have to be wider, each with what it has to reach.
 class Widening {
  public:
-  explicit Widening(const Domain& domain) : domain_(domain) {}
+  Widening(const Domain& domain, const Declaration& declaration)
+      : before_(domain), domain_(domain), declaration_(declaration) {}
 
   void Reach(const DomainExit& exit, double value) {
     switch (exit.kind) {
@@ -129,10 +95,12 @@ class Widening {
       const auto [lower, upper] = domain_.Corners();
       switch (kind) {
         case DomainExit::Kind::kLower:
-          text += VariableName(model, index) + " from " + RoundedDown(lower[ToSize(index)]);
+          text += VariableName(model, index) + " from " + RoundedDown(lower[ToSize(index)]) +
+                  HowMuch(before_.Corners().first[ToSize(index)] - lower[ToSize(index)], index);
           break;
         case DomainExit::Kind::kUpper:
-          text += VariableName(model, index) + " to " + RoundedUp(upper[ToSize(index)]);
+          text += VariableName(model, index) + " to " + RoundedUp(upper[ToSize(index)]) +
+                  HowMuch(upper[ToSize(index)] - before_.Corners().second[ToSize(index)], index);
           break;
         case DomainExit::Kind::kInequality:
           text += "inequality " + std::to_string(index) + " to " + RoundedUp(domain_.inequalities[ToSize(index)].bound);
@@ -147,9 +115,18 @@ class Widening {
   }
 
   [[nodiscard]] const Domain& domain() const { return domain_; }
+  void Set(const Domain& domain) { domain_ = domain; }
   [[nodiscard]] std::size_t count() const { return exits_.size(); }
 
  private:
+  // And what the declaration says of the residual along this variable, since it has to be true there, too.
+  [[nodiscard]] std::string HowMuch(double more, int index) const {
+    const bool has_slopes =
+        index < declaration_.lipschitz.cols() && (declaration_.lipschitz.col(index).array() != 0).any();
+    return " (by " + RoundedUp(more, 4) + (has_slopes ? ", with the slopes in it" : ", still without a slope in it") +
+           ")";
+  }
+
   void SetRange(int index, bool is_lower, double value) {
     Box& box = index < domain_.state.dim() ? domain_.state : domain_.input;
     const Eigen::Index l = index < domain_.state.dim() ? index : index - domain_.state.dim();
@@ -158,7 +135,9 @@ class Widening {
     box = Box(lower, upper);
   }
 
+  const Domain before_;
   Domain domain_;
+  const Declaration& declaration_;
   std::set<std::pair<DomainExit::Kind, int>> exits_;
 };
 
@@ -213,7 +192,7 @@ class Adviser {
     judgement_ = JudgeBy(certifier_, case_, tube_);
   }
 
-  std::vector<Advice> Run(int most_observations) {
+  std::vector<Advice> Run(const AdviceOptions& options) {
     const Decision& decision = judgement_.decision;
     switch (decision.outcome) {
       case Outcome::kFalsified:
@@ -227,12 +206,12 @@ class Adviser {
           AdviseObstacles();
         else
           AdviseLimits();
-        AdviseTighterTube(most_observations);
+        AdviseTighterTube(options);
         break;
       case Outcome::kDomain:
         if (decision.cause == Cause::kDomainExit) AdviseDomain();
         if (decision.cause == Cause::kNoStop) AdviseRest();
-        AdviseTighterTube(most_observations);
+        AdviseTighterTube(options);
         break;
       case Outcome::kCertified:
       case Outcome::kNone: break;
@@ -260,63 +239,35 @@ class Adviser {
     advices_.push_back(std::move(advice));
   }
 
-  void AdviseTighterTube(int most_observations) {
+  void AdviseTighterTube(const AdviceOptions& options) {
     AdviseInitialSet();
     AdviseHorizon();
+    if (options.tails) AdviseTail(options.tails);
     AdviseSlopes();
-    if (most_observations > 0) AdviseObservation(most_observations);
+    if (options.most_observations > 0) AdviseObservation(options.most_observations);
   }
 
   // ---- S
 
   // The obstacles are tested one by one against one tube, so each has a least distance of its own.
   void AdviseObstacles() {
+    const auto ways = FindWayClear(certifier_, case_.plan(), case_.obstacles, tube_);
+    if (!ways || ways->empty()) return;
     Case changed = case_;
+    changed.obstacles = Shifted(case_.obstacles, *ways);
     double farthest = 0;
     std::string what;
-    for (std::size_t o = 0; o < case_.obstacles.size(); ++o) {
-      const Decision alone = certifier_.JudgeSafety(case_.plan(), {&case_.obstacles[o], 1}, tube_);
-      if (alone.outcome == Outcome::kCertified || alone.cause != Cause::kObstacle) continue;
-      const auto away = LeastShift(case_.obstacles[o], alone);
-      if (!away) return;
-      changed.obstacles[o] = Shifted(case_.obstacles[o], away->second);
-      farthest = std::max(farthest, away->first);
-      what += (what.empty() ? "" : ", ") + ("obstacle " + std::to_string(o)) + " by " + RoundedUp(away->first, 4) +
-              " m, to the side of " + Text(away->second / away->first) + " (first touched at step " +
-              std::to_string(alone.step) + ")";
+    for (const GivingWay& way : *ways) {
+      const double distance = way.shift.norm();
+      farthest = std::max(farthest, distance);
+      what += (what.empty() ? "" : ", ") + ("obstacle " + std::to_string(way.obstacle)) + " by " +
+              RoundedUp(distance, 4) + " m, to the side of " + Text(way.shift / distance) + " (first touched at step " +
+              std::to_string(way.step) + ")";
     }
-    if (what.empty()) return;
     Add({.change = Change::kObstacles,
          .what = "if it passed farther away, or these stood farther away: " + what,
          .amount = farthest,
          .after = {changed}});
-  }
-
-  // The least shift along one of some directions.
-  std::optional<std::pair<double, Eigen::VectorXd>> LeastShift(const Obstacle& obstacle, const Decision& alone) {
-    const Projection& projection = certifier_.projection();
-    const int p = projection.dim();
-    Zonotope place;
-    projection.Enclose(tube_.slice(alone.step), tube_.half_width(alone.step), place);
-    std::vector<Eigen::VectorXd> directions;
-    if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
-      directions.push_back(obstacle.points()[0].normalized());
-    } else {
-      Eigen::VectorXd outward = (obstacle.lower() + obstacle.upper()).head(p) / 2 - place.CenterVector();
-      if (outward.norm() > 0) directions.push_back(outward.normalized());
-      for (int k = 0; k < p; ++k)
-        for (const double sign : {-1.0, 1.0}) directions.push_back(sign * Eigen::VectorXd::Unit(p, k));
-    }
-    std::optional<std::pair<double, Eigen::VectorXd>> best;
-    for (const Eigen::VectorXd& direction : directions) {
-      const double depth = std::max(alone.threshold - alone.margin, 1e-6);
-      const auto amount = LeastFrom(depth, best ? best->first : 1e6 * depth, [&](double distance) {
-        const Obstacle farther = Shifted(obstacle, distance * direction);
-        return certifier_.JudgeSafety(case_.plan(), {&farther, 1}, tube_).cause != Cause::kObstacle;
-      });
-      if (amount && (!best || *amount < best->first)) best = {*amount, *amount * direction};
-    }
-    return best;
   }
 
   void AdviseLimits() {
@@ -352,7 +303,7 @@ class Adviser {
 
   void AdviseDomain() {
     constexpr int kRounds = 400;
-    Widening wider(case_.problem->domain);
+    Widening wider(case_.problem->domain, case_.problem->declaration);
     const auto changed = [&] { return WithProblem(case_, [&](Problem& problem) { problem.domain = wider.domain(); }); };
     for (int i = 0; i < kRounds; ++i) {
       const Decision decision = Judged(changed()).decision;
@@ -361,9 +312,9 @@ class Adviser {
       wider.Reach(decision.exit, decision.exit.value + beyond);
     }
     if (Turns(changed())) {
-      const Widening loose = wider;
+      const Domain loose = wider.domain();
       wider.TightenTo(scratch_);
-      if (!Turns(changed())) wider = loose;
+      if (!Turns(changed())) wider.Set(loose);
     }
     Add({.change = Change::kDomain,
          .what = "if the domain, and with it the declaration, reached farther: " + wider.Describe(model_),
@@ -405,7 +356,7 @@ class Adviser {
       changed.initial_set = Zonotope(case_.initial_set.CenterVector(), (1 - less) * generators);
       return changed;
     };
-    const auto less = Least(1, 8, [&](double amount) { return Turns(smaller(amount)); });
+    const auto less = Least(1, kHalvings, [&](double amount) { return Turns(smaller(amount)); });
     const double factor = 1 - less.value_or(1);
     Add({.change = Change::kInitialSet,
          .what = factor > 0 ? "from an initial set of " + RoundedDown(factor, 3) + " times its half-widths"
@@ -424,6 +375,43 @@ class Adviser {
                   .amount = static_cast<double>(steps),
                   .after = {changed}});
     }
+  }
+
+  // The progress part cut off earlier and earlier, each time with the tails that its nominal end asks for.
+  void AdviseTail(const BrakingTails& tails) {
+    const Eigen::Index most = kMaxSteps, steps = case_.controls.cols();
+    const Eigen::Index progress =
+        case_.progress_steps < 0 ? steps : std::min<Eigen::Index>(case_.progress_steps, steps);
+    if (progress == 0) return;
+    const std::vector<Eigen::VectorXd> nominal = NominalStates(progress - 1);
+    for (Eigen::Index begin = std::ssize(nominal) - 1; begin >= 0; --begin)
+      for (const Eigen::MatrixXd& tail : tails(nominal[ToSize(begin)])) {
+        if (tail.rows() != case_.controls.rows() || begin + tail.cols() < 1 || begin + tail.cols() > most) continue;
+        Case changed = case_;
+        changed.controls.resize(Eigen::NoChange, begin + tail.cols());
+        changed.controls.leftCols(begin) = case_.controls.leftCols(begin);
+        changed.controls.rightCols(tail.cols()) = tail;
+        changed.progress_steps = static_cast<int>(begin);
+        if (!Turns(changed)) continue;
+        return Add({.change = Change::kTail,
+                    .what = "with a braking tail from step " + std::to_string(begin) + " on, of " +
+                            std::to_string(tail.cols()) + " steps",
+                    .amount = static_cast<double>(begin),
+                    .after = {changed}});
+      }
+  }
+
+  // From the center of X_0, in plain arithmetic, as long as they are finite: 0 .. last.
+  [[nodiscard]] std::vector<Eigen::VectorXd> NominalStates(Eigen::Index last) const {
+    std::vector<Eigen::VectorXd> states{case_.initial_set.CenterVector()};
+    Eigen::VectorXd z(model_.num_variables()), next(model_.num_states());
+    for (Eigen::Index t = 0; t < last; ++t) {
+      z << states.back(), case_.controls.col(t);
+      model_.Evaluate({z.data(), ToSize(model_.num_variables())}, {next.data(), ToSize(model_.num_states())});
+      if (!next.allFinite()) break;
+      states.push_back(next);
+    }
+    return states;
   }
 
   void AdviseSlopes() {
@@ -446,7 +434,7 @@ class Adviser {
         });
       };
       // Below some factor the observations contradict the declaration.
-      const double most = Least(1, 8, [&](double kept) {
+      const double most = Least(1, kHalvings, [&](double kept) {
                             return Judged(smaller(1 - kept)).decision.outcome != Outcome::kFalsified;
                           }).value_or(1);
       const double less = Least(1 - most, 7, [&](double amount) { return Turns(smaller(amount)); }).value_or(1 - most);
@@ -513,7 +501,7 @@ class Adviser {
     while (const auto violation = FindViolation(declaration, known)) {
       const int row = violation->coordinate;
       const Declaration before = declaration;
-      const auto amount = LeastFrom(1e-3 * widen.unit(before, row, *violation), 0x1p40, [&](double tried) {
+      const auto amount = LeastFrom(1e-3 * widen.unit(before, row, *violation), 0x1p40, kHalvings, [&](double tried) {
         declaration = before;
         widen.apply(declaration, row, tried);
         const auto other = FindViolation(declaration, known);
@@ -599,6 +587,7 @@ const char* Name(Change change) {
     case Change::kObstacles: return "obstacles";
     case Change::kInitialSet: return "initial_set";
     case Change::kHorizon: return "horizon";
+    case Change::kTail: return "tail";
     case Change::kSlopes: return "slopes";
     case Change::kObservation: return "observation";
     case Change::kDomain: return "domain";
@@ -620,8 +609,8 @@ std::string DescribePlace(const Problem& problem, const Eigen::VectorXd& z) {
   return text.empty() ? "any place" : text;
 }
 
-std::vector<Advice> Advise(const Case& abstained, const Certifier& certifier, int most_observations) {
-  return Adviser(abstained, certifier).Run(most_observations);
+std::vector<Advice> Advise(const Case& abstained, const Certifier& certifier, const AdviceOptions& options) {
+  return Adviser(abstained, certifier).Run(options);
 }
 
 std::vector<Place> RankPlaces(const std::vector<Case>& cases, const std::vector<Eigen::VectorXd>& places,

@@ -4,6 +4,7 @@ not say that it is: a smaller slope has to be declared by somebody, a wider doma
 declaration, an obstacle has to be elsewhere. */
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,6 +19,7 @@ enum class Change {
   kObstacles,     ///< S: each obstacle that may be touched stands farther away; or the plan passes it so.
   kInitialSet,    ///< S, D: a smaller X_0 around the same center.
   kHorizon,       ///< S, D: the first steps of the plan alone.
+  kTail,          ///< S, D: a braking tail from an earlier step on.
   kSlopes,        ///< S, D: one entry of L, or all, smaller by a factor.
   kObservation,   ///< S, D: one more observation.
   kDomain,        ///< D: bounds of the domain wider.
@@ -37,8 +39,9 @@ struct Advice {
   it stays true. */
   std::string what;
   /** The size of the change. kObstacles: the largest distance, m. kInitialSet, kSlopes: the factor. kHorizon: the
-  number of steps. kObservation: the number of outcomes that were tried. kDomain, kRest, kLimits: the number of bounds.
-  kLargerSlopes: the largest factor. kNoise: the largest addition, in the state's unit. kOutlier: the observation. */
+  number of steps. kTail: the step at which it begins. kObservation: the number of outcomes that were tried. kDomain,
+  kRest, kLimits: the number of bounds. kLargerSlopes: the largest factor. kNoise: the largest addition, in the state's
+  unit. kOutlier: the observation. */
   double amount = 0;
   int row = -1, column = -1;   ///< kSlopes: the entry of L; -1: all of them.
   Eigen::VectorXd place = {};  ///< kObservation: z.
@@ -51,12 +54,22 @@ struct Advice {
   std::vector<Case> after;
 };
 
+/** The ways to brake from a state (n entries) to rest: m-by-K controls each, a column a step; none if there is no way.
+The adviser knows no laws of braking; who asks has the planner's. */
+using BrakingTails = std::function<std::vector<Eigen::MatrixXd>(const Eigen::VectorXd& state)>;
+
+struct AdviceOptions {
+  int most_observations = 8;  ///< How many places kObservation tries; 0: none.
+  BrakingTails tails = {};    ///< Without it there is no kTail.
+};
+
 /** What would have turned the abstention, in the order of Change; of each kind at most one, of kSlopes one for each
 entry and one for all, of kOutlier two. First those that turn it. Empty if the case is certified as it is.
-@param certifier of the case's problem. @param most_observations how many places kObservation tries; 0: none.
+@param certifier of the case's problem.
 @throws std::invalid_argument as Certifier::Require does.
 Cost: some hundred calls of Certify, and some dozen constructions of a Certifier. */
-[[nodiscard]] std::vector<Advice> Advise(const Case& abstained, const Certifier& certifier, int most_observations = 8);
+[[nodiscard]] std::vector<Advice> Advise(const Case& abstained, const Certifier& certifier,
+                                         const AdviceOptions& options = {});
 
 /** The coordinates of z on which the declared residual may depend: "v = 6.657, delta = 0.38". */
 [[nodiscard]] std::string DescribePlace(const Problem& problem, const Eigen::VectorXd& z);

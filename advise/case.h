@@ -17,6 +17,7 @@ struct Case {
   Schedule schedule{};
   Zonotope initial_set;  ///< X_0
   std::vector<Obstacle> obstacles;
+  int progress_steps = -1;  ///< The number of controls before the braking tail; -1 if it is not known.
 
   /** Refers to `controls`. */
   [[nodiscard]] Plan plan() const {

@@ -38,6 +38,7 @@ class InboxBus : public Bus {
     if (timeout_ms > 0) inbox_.GiveBack();
     return calls;
   }
+  bool has_waiting() const override { return inbox_.has_waiting(); }
   std::int64_t dropped() const override { return inbox_.dropped(); }
   std::int64_t refused_dropped() const override { return inbox_.refused_dropped(); }
   Refusals refusals() const override { return screen_ ? screen_->refusals() : Refusals{}; }
@@ -59,6 +60,12 @@ class InboxBus : public Bus {
 class MemoryBus final : public InboxBus {
  public:
   MemoryBus(Clock clock, const std::shared_ptr<Screen>& screen) : InboxBus(screen), clock_(std::move(clock)) {}
+
+  // What was sent waits for this thread, too.
+  bool has_waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return !sent_.empty() || inbox_.has_waiting();
+  }
 
  private:
   struct Sent {
@@ -87,7 +94,7 @@ class MemoryBus final : public InboxBus {
   }
 
   const Clock clock_;
-  std::mutex mutex_;  // guards sent_
+  mutable std::mutex mutex_;  // guards sent_
   std::condition_variable has_sent_;
   std::deque<Sent> sent_;
 };

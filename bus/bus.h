@@ -72,6 +72,9 @@ class Bus {
   and the bus stays usable. */
   virtual int Dispatch(int timeout_ms) = 0;
 
+  /** True if Dispatch would call a handler of an admitted message at once. False also if the bus cannot tell. */
+  [[nodiscard]] virtual bool has_waiting() const { return false; }
+
   /** The number of messages that were discarded because the queue (4096 messages or 32 MiB) was full, plus the number
   of datagrams that the kernel discarded because its receive buffer was full. */
   [[nodiscard]] virtual std::int64_t dropped() const = 0;

@@ -15,6 +15,7 @@ struct BusOptions {
   std::string decision = "PLAN_DECISION";
   std::string certified = "PLAN_CERTIFIED";
   std::string withdrawn = "PLAN_WITHDRAWN";
+  std::string advice = "PLAN_ADVICE";
   std::string robot_state = "ROBOT_STATE";
   std::string obstacles = "OBSTACLES";
   std::string transition = "TRANSITION";
@@ -30,10 +31,11 @@ struct BusOptions {
 
   /** The role that speaks on each channel where there are keys. */
   [[nodiscard]] Speakers speakers() const {
-    return {{decision, Role::kCertifier},   {certified, Role::kCertifier}, {status, Role::kCertifier},
-            {fault, Role::kCertifier},      {withdrawn, Role::kCertifier}, {candidate, Role::kPlanner},
-            {obstacles, Role::kPerception}, {robot_state, Role::kRobot},   {transition, Role::kRobot},
-            {event, Role::kRobot},          {command, Role::kOperator},    {logger_status, Role::kLogger}};
+    return {{decision, Role::kCertifier},  {certified, Role::kCertifier},  {status, Role::kCertifier},
+            {fault, Role::kCertifier},     {withdrawn, Role::kCertifier},  {advice, Role::kCertifier},
+            {candidate, Role::kPlanner},   {obstacles, Role::kPerception}, {robot_state, Role::kRobot},
+            {transition, Role::kRobot},    {event, Role::kRobot},          {command, Role::kOperator},
+            {logger_status, Role::kLogger}};
   }
 
   /** `name`, or address and port of `url`: "239.255.76.67:7667"; "memq" for memq. @throws BusError if `url` is none. */

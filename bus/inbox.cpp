@@ -105,6 +105,11 @@ int Inbox::HandOut(int timeout_ms) {
   return calls;
 }
 
+bool Inbox::has_waiting() const {
+  const std::lock_guard lock(mutex_);
+  return !admitted_.messages.empty();
+}
+
 void Inbox::GiveBack() {
   if (!is_in_burst_ && std::exchange(was_in_burst_, false)) ::malloc_trim(0);
 }

@@ -29,6 +29,9 @@ class Inbox final {
   /** As Bus::Dispatch, for the stored messages. */
   int HandOut(int timeout_ms);
 
+  /** True if an admitted message is stored. Any thread may call it. */
+  [[nodiscard]] bool has_waiting() const;
+
   /** Returns freed heap to the system once a burst has been dispatched. This takes some milliseconds, so call it when
   the process is idle, on the thread that calls HandOut. */
   void GiveBack();
@@ -63,7 +66,7 @@ class Inbox final {
   [[nodiscard]] Subscriptions Wanting(std::string_view channel);
 
   const std::shared_ptr<Screen> screen_;
-  std::mutex mutex_;  // guards subscriptions_, the queues and next_number_
+  mutable std::mutex mutex_;  // guards subscriptions_, the queues and next_number_
   std::condition_variable arrived_;
   std::deque<Subscription> subscriptions_;       // only grows, so pointers into it stay valid
   Queue admitted_{4096, std::size_t{32} << 20};  // 800 certified plans

@@ -1,5 +1,7 @@
 #include "cli/abstentions.h"
 
+#include <algorithm>
+#include <iterator>
 #include <map>
 #include <span>
 #include <stdexcept>
@@ -16,6 +18,7 @@
 #include "records/decision_record.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
+#include "records/run_logs.h"
 #include "records/timeline.h"
 
 namespace forereach {
@@ -57,8 +60,23 @@ Abstentions FromDecision(const std::string& path, const std::string& config_path
 // Collects what was not certified. Problems with learned transitions are made at the end, when all of them are known.
 class AbstentionReader final : public TimelineUser {
  public:
+  explicit AbstentionReader(const BusOptions& channels) : channels_(channels) {}
+
+  void OnEvent(const LogEvent& event) override {
+    if (event.channel == channels_.candidate) ++waiting_;
+    if (event.channel != channels_.obstacles) return;
+    const Bytes message = event.message();
+    last_obstacles_ = std::make_shared<const Message>(std::vector(message.begin(), message.end()), event.utime);
+  }
+
+  void OnStart(const Config&) override {
+    waiting_ = 0;
+    last_obstacles_.reset();
+  }
+
   void OnDecision(const RecordedDecision& recorded) override {
     const decision_t& decision = recorded.decision;
+    const std::size_t waiting = recorded.candidate && waiting_ > 0 ? waiting_-- : 0;
     if (decision.outcome == decision_t::CERTIFIED) {
       ++certified_;
       return;
@@ -71,6 +89,8 @@ class AbstentionReader final : public TimelineUser {
     abstention.cause = decision.cause;
     abstention.task = recorded.basis.task;
     abstention.decision = decision;
+    abstention.waiting = waiting;
+    if (decision.cause == decision_t::CAUSE_NO_OBSTACLES) abstention.last_obstacles = last_obstacles_;
     if (!recorded.candidate) {
       abstention.missing = "its candidate is not in the log";
       return;
@@ -107,9 +127,11 @@ class AbstentionReader final : public TimelineUser {
     for (int t = 0; t < plan.num_steps; ++t)
       judged.controls.col(t) = Eigen::Map<const Eigen::VectorXd>(plan.input(t).data(), plan.num_inputs);
     judged.obstacles = *recorded.basis.obstacles;
+    judged.progress_steps = candidate->progress_steps;
   }
 
-  Abstentions Finish(const Timeline& timeline, std::vector<std::shared_ptr<const Config>> tasks) {
+  // Adds what was collected.
+  void Finish(const Timeline& timeline, Abstentions& all) {
     std::map<std::tuple<const Config*, std::size_t, std::size_t>, std::shared_ptr<const Problem>> problems;
     for (std::size_t i = 0; i < all_.size(); ++i) {
       const Basis& basis = bases_[i];
@@ -121,29 +143,61 @@ class AbstentionReader final : public TimelineUser {
                                   .subspan(basis.learned_begin, basis.learned_end - basis.learned_begin));
       all_[i].judged.problem = problem;
     }
-    return {std::move(tasks), std::move(all_), certified_, timeline.passed_over()};
+    std::ranges::move(all_, std::back_inserter(all.all));
+    all.certified += certified_;
+    all.passed_over.undecodable += timeline.passed_over().undecodable;
+    all.passed_over.not_authentic += timeline.passed_over().not_authentic;
   }
 
  private:
+  using Message = std::pair<std::vector<std::uint8_t>, std::int64_t>;
+
+  const BusOptions channels_;
+  std::size_t waiting_ = 0;
+  std::shared_ptr<const Message> last_obstacles_;
   std::vector<RecordedAbstention> all_;
   std::vector<Basis> bases_;  // of each
   std::int64_t certified_ = 0;
 };
 
+// Adds what a run has. Runs of the same task share it.
+void AddRun(const std::vector<std::string>& logs, std::vector<Config> tasks, bool names_files, Abstentions& all) {
+  std::vector<const Config*> pointers;
+  for (Config& task : tasks) {
+    auto known = std::ranges::find_if(all.tasks, [&](const auto& each) { return each->grounds == task.grounds; });
+    if (known == all.tasks.end()) {
+      all.tasks.push_back(std::make_shared<const Config>(std::move(task)));
+      known = std::prev(all.tasks.end());
+    }
+    pointers.push_back(known->get());
+  }
+  AbstentionReader reader(pointers.front()->bus);
+  Timeline timeline(pointers, reader);
+  timeline.Read(logs, names_files);
+  reader.Finish(timeline, all);
+}
+
 }  // namespace
 
-Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config, const LogKey& key) {
+Abstentions ReadAbstentions(const std::vector<std::string>& files, const std::string& config, const LogKey& key,
+                            unsigned jobs) {
   if (files.size() == 1 && KindOf(files[0]) == FileKind::kJson) return FromDecision(files[0], config);
-  std::vector<std::shared_ptr<const Config>> tasks;
-  std::vector<const Config*> pointers;
-  for (Config& task : TasksOf(files, config, key)) {
-    tasks.push_back(std::make_shared<const Config>(std::move(task)));
-    pointers.push_back(tasks.back().get());
-  }
-  AbstentionReader reader;
-  Timeline timeline(pointers, reader);
-  timeline.Read(files, files.size() > 1);
-  return reader.Finish(timeline, std::move(tasks));
+  NamedRuns named = RunsNamedBy(files, jobs);
+  const RunTasks tasks(config, key, named.is_many);
+  Abstentions all;
+  for (const RunLogs& run : named.runs) try {
+      if (named.is_many && (run.logs.empty() || Survey(run.logs, LogOrder::kAny).decisions == 0)) continue;
+      const std::size_t before = all.all.size();
+      AddRun(run.logs, tasks.Of(run.logs), named.is_many || run.logs.size() > 1, all);
+      for (std::size_t i = before; named.is_many && i < all.all.size(); ++i)
+        all.all[i].name = run.robot + ": " + all.all[i].name;
+    } catch (const BadInput& error) {
+      if (!named.is_many) throw;
+      named.missing.emplace_back(error.what());
+    }
+  all.missing = std::move(named.missing);
+  if (all.tasks.empty()) throw ConfigError(files[0] + ": " + (all.missing.empty() ? "no decisions" : all.missing[0]));
+  return all;
 }
 
 }  // namespace forereach

@@ -9,17 +9,18 @@
 
 #include "advise/advice.h"
 #include "certifier/certify/explain.h"
-#include "certifier/gate/gate.h"
 #include "certifier/numerics/parallel.h"
 #include "certifier/numerics/text.h"
 #include "certifier/task/json_text.h"
 #include "cli/abstentions.h"
 #include "cli/commands.h"
+#include "cli/gate_advice.h"
 #include "cli/key_options.h"
 #include "cli/offline.h"
 #include "cli/progress.h"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
+#include "planner_bridge/motion.h"
 
 namespace forereach {
 namespace {
@@ -32,79 +33,40 @@ struct Options {
   unsigned jobs = std::max(1u, std::thread::hardware_concurrency());
 };
 
-constexpr double kHourMs = 3'600'000;  // the most that these keys take
-
-// The key of the gate that would have let a candidate in, and the value that it needs at least or at most.
-struct Setting {
-  std::string key;
-  double value;  // ms
-  std::string what;
-  bool turns;  // a gate with this value gives another answer
-};
-
-std::optional<Setting> SettingFor(const RecordedAbstention& abstention) {
-  const decision_t& decision = abstention.decision;
-  const candidate_plan_t& candidate = abstention.candidate;
-  if (!abstention.task || decision.utime == 0) return std::nullopt;
-  // In doubles: a log may hold any stamps, and those of this age are exact.
-  const auto ms = [](std::int64_t from, std::int64_t to) {
-    return (static_cast<double>(to) - static_cast<double>(from)) / 1e3;
-  };
-  const auto checked = [&](const std::string& key, double GateOptions::*member, double value,
-                           const std::string& what) -> std::optional<Setting> {
-    if (!(0 < value && value <= kHourMs)) return std::nullopt;
-    Config changed = *abstention.task;
-    changed.gate.*member = value;
-    const std::int16_t cause = Gate(changed).Decide(Encode(candidate), decision.utime).decision.cause;
-    return Setting{key, value, what, cause != decision.cause};
-  };
-  const double until_start = ms(decision.utime, candidate.start_utime);
-  switch (decision.cause) {
-    case decision_t::CAUSE_STALE: {
-      const double age = ms(candidate.utime, decision.utime);
-      return checked("gate.max_age_ms", &GateOptions::max_age_ms, age,
-                     "with gate.max_age_ms of at least " + RoundedUp(age));
-    }
-    case decision_t::CAUSE_FUTURE:
-      if (candidate.utime > decision.utime) {
-        const double ahead = ms(decision.utime, candidate.utime);
-        return checked("gate.max_ahead_ms", &GateOptions::max_ahead_ms, ahead,
-                       "with gate.max_ahead_ms of at least " + RoundedUp(ahead) +
-                           ", if the sender's clock is right and not this one");
-      }
-      return checked("gate.certificate_lifetime_ms", &GateOptions::certificate_lifetime_ms, until_start,
-                     "with gate.certificate_lifetime_ms of at least " + RoundedUp(until_start));
-    case decision_t::CAUSE_DEADLINE:
-      return checked("gate.decision_budget_ms", &GateOptions::decision_budget_ms, until_start,
-                     "with gate.decision_budget_ms of at most " + RoundedDown(until_start) + ", or sent " +
-                         RoundedUp(abstention.task->gate.decision_budget_ms - until_start) + " ms earlier");
-    case decision_t::CAUSE_OVERRUN: {
-      const double taken = decision.elapsed_us / 1e3;
-      return Setting{"gate.decision_budget_ms", taken,
-                     "with gate.decision_budget_ms of at least " + RoundedUp(taken) + ", if it takes no longer then",
-                     false};
-    }
-    default: return std::nullopt;
-  }
-}
-
 struct Advised {
   std::vector<Advice> advices;
-  std::optional<Setting> setting;
+  std::optional<Remedy> remedy;
   std::string missing;
 
   [[nodiscard]] bool turned() const {
-    return std::ranges::any_of(advices, &Advice::turns) || (setting && setting->turns);
+    return std::ranges::any_of(advices, &Advice::turns) || (remedy && remedy->turns);
   }
 };
 
-Advised AdviceFor(const RecordedAbstention& abstention) {
+// Those of the task's planner; none if the task does not say how its robot brakes.
+BrakingTails TailsOf(const Config& task) {
+  std::shared_ptr<const RobotMotion> motion;
+  try {
+    motion = MakeMotion(task, Braking::kPlanned);
+  } catch (const ConfigError&) {
+    return {};
+  }
+  return [motion, steps = task.planner.tail_steps](const Eigen::VectorXd& state) {
+    std::vector<Eigen::MatrixXd> tails;
+    Eigen::MatrixXd controls;
+    for (int tail = 0; tail < motion->num_tails(); ++tail)
+      if (motion->Brake({state.data(), ToSize(state.size())}, tail, steps, controls)) tails.push_back(controls);
+    return tails;
+  };
+}
+
+Advised AdviceFor(const RecordedAbstention& abstention, const BrakingTails& tails) {
   if (!abstention.missing.empty()) return {{}, {}, abstention.missing};
-  if (!abstention.judged.problem) return {{}, SettingFor(abstention), {}};
+  if (!abstention.judged.problem) return {{}, RemedyFor(abstention), {}};
   try {
     const Certifier certifier(abstention.judged.problem);
     const Case& judged = abstention.judged;
-    Advised advised{Advise(judged, certifier), {}, {}};
+    Advised advised{Advise(judged, certifier, {.tails = tails}), {}, {}};
     Tube tube;
     const Decision again = certifier.Certify(judged.plan(), judged.initial_set, judged.obstacles, tube);
     if (static_cast<std::int16_t>(again.outcome) != abstention.outcome)
@@ -141,12 +103,12 @@ std::vector<std::pair<std::string, int>> PlacesOf(const Abstentions& read, const
 void PrintForPeople(const Abstentions& read, const std::vector<Advised>& advised) {
   for (std::size_t i = 0; i < read.all.size(); ++i) {
     const RecordedAbstention& abstention = read.all[i];
-    const auto& [advices, setting, missing] = advised[i];
-    if (advices.empty() && !setting && missing.empty()) continue;
+    const auto& [advices, remedy, missing] = advised[i];
+    if (advices.empty() && !remedy && missing.empty()) continue;
     std::cout << Printable(abstention.name) << "\n  " << Printable(abstention.message) << "\n";
     if (!missing.empty()) std::cout << "  " << Printable(missing) << "\n";
-    if (setting)
-      std::cout << (setting->turns ? "  it would be judged\n    " : "  it might be judged\n    ") << setting->what
+    if (remedy)
+      std::cout << (remedy->turns ? "  it would be judged\n    " : "  it might be judged\n    ") << remedy->what
                 << "\n";
     bool is_first = true;
     for (const Advice& advice : advices) {
@@ -170,6 +132,7 @@ void PrintForPeople(const Abstentions& read, const std::vector<Advised>& advised
       if (advice.turns) kinds.insert(advice.change);
     for (const Change change : kinds) ++by_change[Name(change)];
   }
+  for (const std::string& missing : read.missing) std::cout << Printable(missing) << "\n";
   std::cout << "advise: " << read.all.size() << " abstentions and rejections, " << turned
             << " have a change that turns them, verified by certifying again; " << read.certified << " were certified"
             << DescribePassedOver(read.passed_over) << "\n";
@@ -200,9 +163,10 @@ void PrintJson(const Abstentions& read, const std::vector<Advised>& advised) {
                          {"message", read.all[i].message},
                          {"advice", advices}};
     if (!advised[i].missing.empty()) entry["missing"] = advised[i].missing;
-    if (const auto& setting = advised[i].setting)
-      entry["setting"] = {
-          {"key", setting->key}, {"value", setting->value}, {"what", setting->what}, {"turns", setting->turns}};
+    if (const auto& remedy = advised[i].remedy) {
+      entry["remedy"] = {{"what", remedy->what}, {"turns", remedy->turns}};
+      if (!remedy->key.empty()) entry["remedy"].update({{"key", remedy->key}, {"value", remedy->value}});
+    }
     all.push_back(std::move(entry));
   }
   nlohmann::json places = nlohmann::json::array();
@@ -210,22 +174,25 @@ void PrintJson(const Abstentions& read, const std::vector<Advised>& advised) {
   std::cout << JsonText({{"abstentions", all},
                          {"certified", read.certified},
                          {"places", places},
+                         {"missing", read.missing},
                          {"passed_over", ToJson(read.passed_over)}})
             << std::endl;
 }
 
 int RunAdvise(const Options& options) {
-  const Abstentions read = ReadAbstentions(options.files, options.config, options.key);
+  const Abstentions read = ReadAbstentions(options.files, options.config, options.key, options.jobs);
   std::vector<Advised> advised(read.all.size());
+  std::map<const Config*, BrakingTails> tails;
+  for (const auto& task : read.tasks) tails[task.get()] = TailsOf(*task);
   {
     Progress progress("abstentions examined", read.all.size());
     ForEachInParallel(read.all.size(), options.jobs, [&](std::size_t i, std::size_t) {
-      advised[i] = AdviceFor(read.all[i]);
+      advised[i] = AdviceFor(read.all[i], tails.at(read.all[i].task));
       progress.Advance();
     });
   }
   options.json ? PrintJson(read, advised) : PrintForPeople(read, advised);
-  return std::ranges::all_of(advised, &Advised::turned) ? 0 : 1;
+  return read.missing.empty() && std::ranges::all_of(advised, &Advised::turned) ? 0 : 1;
 }
 
 }  // namespace
@@ -243,14 +210,16 @@ Command AdviseCommand() {
           "  forereach certify --json --config config/bicycle.yaml --plan config/plans/bicycle_safety.csv > "
           "decision.json\n"
           "  forereach advise decision.json\n"
-          "  forereach advise run/log/events-20260101-120000-000000.lcmlog",
-      .options = {Required(
-                      {"files", &options->files, "DECISION|LOG",
-                       "The abstentions: a decision (the output of certify --json), or the event logs of a run, in "
-                       "their order"}),
-                  {"--config", &options->config, "FILE", kTaskOfRecords},
-                  JobsOption(options->jobs),
-                  JsonFlag(options->json)},
+          "  forereach advise run/log/events-20260101-120000-000000.lcmlog\n"
+          "  forereach advise run/log",
+      .options =
+          {Required(
+               {"files", &options->files, "DECISION|LOG|DATABASE|DIRECTORY",
+                "The abstentions: a decision (the output of certify --json), or logs, databases and directories, as in "
+                "forereach replay"}),
+           {"--config", &options->config, "FILE", kTaskOfRecords},
+           JobsOption(options->jobs),
+           JsonFlag(options->json)},
       .run = [options] { return RunAdvise(*options); }};
   AddKeyOptions(command.options, options->key);
   return command;

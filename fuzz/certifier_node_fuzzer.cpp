@@ -1,7 +1,8 @@
 // Every inbound type in any order through the certifier's node: each candidate is answered once, a certified plan goes
 // out right before its decision, and none while a fault is latched or the robot's state or the obstacles are not known.
 // A withdrawal names a plan that was certified, with fewer controls than the withdrawals of it before, unless it
-// repeats the last one; or a plan that the robot says it executes.
+// repeats the last one; or a plan that the robot says it executes. An advice is on a plan that was just abstained on.
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <new>
@@ -67,6 +68,8 @@ class WitnessBus final : public Bus {
       TakeDecision(Decoded<decision_t>(bytes));
     } else if (channel == "PLAN_WITHDRAWN") {
       TakeWithdrawal(Decoded<withdrawal_t>(bytes));
+    } else if (channel == "PLAN_ADVICE") {
+      TakeAdvice(Decoded<advice_t>(bytes));
     }
     return true;
   }
@@ -90,6 +93,18 @@ class WitnessBus final : public Bus {
     Require(!certified_ || GetDigest(certified_->plan_digest) == GetDigest(decision->plan_digest));
     Require(decision->cause != decision_t::CAUSE_INTERNAL_ERROR);
     certified_.reset();
+    abstained_.reset();
+    if (decision->outcome == decision_t::ABSTAIN_SAFETY || decision->outcome == decision_t::ABSTAIN_DOMAIN)
+      abstained_ = GetDigest(decision->plan_digest);
+  }
+
+  void TakeAdvice(const std::optional<advice_t>& advice) {
+    Require(advice.has_value() && advice->sequence == advices_++);
+    Require(abstained_ && GetDigest(advice->plan_digest) == *abstained_);
+    abstained_.reset();
+    Require(1 <= advice->num_changes && advice->num_changes <= 8);
+    for (int i = 0; i < advice->num_changes; ++i)
+      Require(advice->change[i].index >= 0 && advice->change[i].value > 0 && std::isfinite(advice->change[i].value));
   }
 
   void TakeWithdrawal(const std::optional<withdrawal_t>& withdrawal) {
@@ -105,7 +120,8 @@ class WitnessBus final : public Bus {
 
   std::map<std::string, Handler> handlers_;
   std::map<Digest, int> standing_;  // controls, by certificate; of a whole one: one more than it has
-  std::int64_t withdrawals_ = 0;
+  std::int64_t withdrawals_ = 0, advices_ = 0;
+  std::optional<Digest> abstained_;  // the plan of the last decision, if it may be advised on
   std::map<Digest, int> unanswered_;
   std::optional<certified_plan_v2_t> certified_;
 };
@@ -259,7 +275,10 @@ std::vector<Config> Tasks() {
   seeing.gate.needs_robot_state = true;
   Config timed = seeing;
   timed.gate.max_clock_error_ms = 20;
-  return {watchful, SmallTask(), stubborn, seeing, timed};
+  Config advising = timed;
+  advising.gate.needs_robot_state = false;
+  advising.gate.advises = true;
+  return {watchful, SmallTask(), stubborn, seeing, timed, advising};
 }
 
 }  // namespace

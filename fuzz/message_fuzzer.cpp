@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
@@ -58,7 +59,7 @@ bool Try(Bytes data) {
   FuzzedDataProvider input(data.data(), data.size());
   const auto bytes =
       DamagedOneOf<decision_t, candidate_plan_t, certified_plan_v2_t, certifier_status_v3_t, execution_event_t, fault_t,
-                   logger_status_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>(input);
+                   logger_status_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t, advice_t>(input);
   const std::optional<MessageJson> made = ToJsonMessage(bytes);
   const std::optional<MessageSummary> summary = Summarize(bytes);
   Require(made.has_value() == summary.has_value());

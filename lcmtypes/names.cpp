@@ -1,5 +1,6 @@
 #include "lcmtypes/names.h"
 
+#include "forereach/advice_change_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
@@ -117,6 +118,15 @@ std::string_view WithdrawalName(std::int16_t cause) {
     case withdrawal_t::NOT_JUDGED: return "not_judged";
     case withdrawal_t::UNKNOWN_PLAN: return "unknown_plan";
     case withdrawal_t::LIMIT: return "limit";
+    default: return "unknown";
+  }
+}
+
+std::string_view AdviceName(std::int16_t kind) {
+  switch (kind) {
+    case advice_change_t::OBSTACLE: return "obstacle";
+    case advice_change_t::LIMIT: return "limit";
+    case advice_change_t::DOMAIN: return "domain";
     default: return "unknown";
   }
 }

@@ -31,6 +31,9 @@ help. */
 /** "falsified", "obstacle", ... as withdrawal_t's constants; "unknown" for any other number. */
 [[nodiscard]] std::string_view WithdrawalName(std::int16_t cause);
 
+/** "obstacle", "limit", "domain": the kind of advice_change_t; "unknown" for any other number. */
+[[nodiscard]] std::string_view AdviceName(std::int16_t kind);
+
 /** "OK", "STALE", "ERROR": the level of certifier_status_v3_t; "unknown" for any other number. */
 [[nodiscard]] std::string_view LevelName(std::int16_t level);
 

@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "certifier/certify/decision.h"
+#include "forereach/advice_t.hpp"
 #include "planner_bridge/planner_options.h"
+#include "planner_bridge/proposer.h"
 
 namespace forereach {
 
@@ -22,8 +25,20 @@ class Lessons final {
   other outcome changes anything. Neither does the cause kNoStop: it says nothing about bounds and obstacles. */
   void Learn(const Decision& decision);
 
+  /** The same from the certifier's advice, in the place of Learn: from the obstacles that it names the clearance that
+  it gives, from its step on, or `value` more than was kept before if that is more; more room from the limits that it
+  names, and from the bounds of a state's range. An index that is none of them, and a value that is not a finite
+  distance, change nothing. @return whether something changed. */
+  bool Heed(const advice_t& advice);
+
+  /** Half of what advice asked for beyond clearance() and the domain's bounds is taken back: a search that kept it
+  found nothing. */
+  void Ease();
+
   /** The distance that the next candidate keeps from obstacles, metres. */
   [[nodiscard]] double clearance() const { return clearance_; }
+  /** What it keeps from single obstacles, where more, by the obstacle's index. */
+  [[nodiscard]] const std::vector<ObstacleClearance>& obstacle_clearance() const { return obstacle_clearance_; }
   /** The distances that the next candidate keeps from the bounds of the limits, one for each limit in its unit. */
   [[nodiscard]] const std::vector<double>& limit_margin() const { return limit_margin_; }
   /** The distance that the next candidate keeps from the bounds of the state domain, n entries in model units. Each
@@ -34,8 +49,12 @@ class Lessons final {
                                              const Eigen::MatrixXd& projection) const;
 
  private:
+  bool HeedChange(const advice_change_t& change);
+
   double clearance_, step_;
   int domain_exits_ = 0;
+  std::vector<ObstacleClearance> obstacle_clearance_;
+  std::map<int, double> state_margin_;  // beyond that of domain_exits_
   std::vector<double> limit_margin_;
 };
 

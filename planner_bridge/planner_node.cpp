@@ -5,9 +5,11 @@
 #include <cmath>
 #include <numbers>
 #include <ostream>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "certifier/gate/advice_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
 #include "certifier/task/json_text.h"
@@ -40,6 +42,7 @@ PlannerNode::PlannerNode(const Config& config, Bus& bus, std::ostream& out)
       obstacles_(config) {
   bus.Subscribe(config_.bus.robot_state, [this](const Received& received) { OnRobotState(received); });
   bus.Subscribe(config_.bus.decision, [this](const Received& received) { OnDecision(received); });
+  if (config_.gate.advises) bus.Subscribe(config_.bus.advice, [this](const Received& received) { OnAdvice(received); });
   bus.Subscribe(config_.bus.withdrawn, [this](const Received& received) { OnWithdrawn(received); });
   bus.Subscribe(config_.bus.obstacles, [this](const Received& received) { OnObstacles(received); });
 }
@@ -48,6 +51,8 @@ void PlannerNode::Tick(std::int64_t now_us) {
   if (next_plan_id_ == 0) next_plan_id_ = now_us;
   if (!round_ || round_->awaited_plan >= 0) return;
   if (!obstacles_.WhyUnknown(now_us).empty()) return EndRound(false);
+  if (round_->unadvised && now_us < round_->advice_until) return;
+  LearnWithoutAdvice();
   SearchOnce(now_us);
 }
 
@@ -209,6 +214,7 @@ void PlannerNode::SearchOnce(std::int64_t now_us) {
   const std::optional<Proposal> proposal = Propose();
   if (!proposal) {
     ++fruitless_searches_;
+    round_->lessons.Ease();
     return;
   }
   const candidate_plan_t candidate = MakeCandidate(*proposal, *round_, now_us);
@@ -235,7 +241,8 @@ PlanRequest PlannerNode::RequestOf(const Round& round) const {
           static_cast<std::uint32_t>(config_.planner.seed) * kSpread + static_cast<std::uint32_t>(searches_),
           round.searches - 1,
           {round.start_utime, period_us_, Microseconds(config_.gate.max_clock_error_ms.value_or(0))},
-          round.lessons.limit_margin()};
+          round.lessons.limit_margin(),
+          round.lessons.obstacle_clearance()};
 }
 
 candidate_plan_t PlannerNode::MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us) {
@@ -265,10 +272,10 @@ void PlannerNode::OnDecision(const Received& received) {
     return;
   }
   round_->awaited_plan = -1;
-  Learn(*decision);
+  Learn(*decision, received.utime);
 }
 
-void PlannerNode::Learn(const decision_t& decision) {
+void PlannerNode::Learn(const decision_t& decision, std::int64_t now_us) {
   if (decision.outcome == decision_t::CERTIFIED) {
     ++certified_;
     waiting_plan_ = decision.plan_id;
@@ -282,6 +289,28 @@ void PlannerNode::Learn(const decision_t& decision) {
       decision.cause == decision_t::CAUSE_FAULT || decision.cause == decision_t::CAUSE_LATCH_UNWRITABLE ||
       decision.outcome == decision_t::ABSTAIN_FALSIFIED)
     return EndRound(false);
+  round_->unadvised = decision;
+  round_->advice_until = now_us;
+  if (config_.gate.advises && IsAdvisedOn(decision.cause) && !round_->stops)
+    round_->advice_until += 2 * Microseconds(config_.gate.decision_budget_ms);
+}
+
+// Its numbers only say what the next candidate keeps away from: false ones cost time, and can have nothing executed.
+void PlannerNode::OnAdvice(const Received& received) {
+  const auto advice = Decoded<advice_t>(received.bytes);
+  if (!advice || !round_ || !round_->unadvised ||
+      GetDigest(advice->plan_digest) != GetDigest(round_->unadvised->plan_digest) ||
+      GetDigest(advice->obstacles_digest) != obstacles_.digest() || !round_->lessons.Heed(*advice)) {
+    ++ignored_;
+    return;
+  }
+  ++advised_;
+  round_->unadvised.reset();
+}
+
+void PlannerNode::LearnWithoutAdvice() {
+  if (!round_->unadvised) return;
+  const decision_t decision = *std::exchange(round_->unadvised, std::nullopt);
   Decision learned;
   learned.outcome = static_cast<Outcome>(decision.outcome);
   learned.cause = static_cast<Cause>(decision.cause);
@@ -308,6 +337,7 @@ std::string PlannerNode::Summary() const {
                                          {"certified", certified_},
                                          {"abstained", abstained_},
                                          {"rejected", rejected_},
+                                         {"advised", advised_},
                                          {"unanswered", unanswered_},
                                          {"withdrawn", withdrawals_},
                                          {"rounds", rounds_},

@@ -10,6 +10,9 @@ start. A round sends one candidate at a time and waits for its decision:
  - abstention D: the next candidate keeps further inside the domain's bounds (a policy's candidate follows another
    reference instead, policy_proposer.h);
  - abstention F: the round ends, because no candidate can be certified;
+ - With gate.advice, after an abstention S or D, it waits twice gate.decision_budget_ms for the certifier's advice on
+this candidate. If it comes, the next candidate gives way as it says, and not by the rules above; after a search without
+a result, half as far;
  - rejected: the next candidate; the round ends if the certifier is not armed, does not know the obstacles, or has
    latched a fault;
  - abstained, no time: the next candidate.
@@ -26,7 +29,7 @@ waits for its start is withdrawn, or no stop is certified, the next state begins
 
 Some messages are counted and ignored: those that do not decode, that contain a number that is not finite, or that are
 stamped ahead of the clock by more than gate.max_ahead_ms; obstacles that the gate would refuse (obstacles_in_force.h);
-and decisions on candidates of other planners. */
+decisions on candidates of other planners; and advice that is not on the candidate that was just abstained on. */
 #pragma once
 
 #include <iostream>
@@ -39,6 +42,7 @@ and decisions on candidates of other planners. */
 #include "bus/node.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/task/config.h"
+#include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/robot_state_t.hpp"
@@ -63,7 +67,8 @@ class PlannerNode final : public Node {
   /** Prints Summary() on one line. */
   void Stop() override;
 
-  /** One JSON object: proposed, certified, abstained and rejected (counts by cause), unanswered, withdrawn (plans),
+  /** One JSON object: proposed, certified, abstained and rejected (counts by cause), advised (abstentions from which it
+  has learned by the certifier's advice), unanswered, withdrawn (plans),
   rounds, stopping_rounds, rounds_without_certificate, searches_without_result, messages_ignored, messages_not_sent. */
   [[nodiscard]] std::string Summary() const;
 
@@ -74,11 +79,14 @@ class PlannerNode final : public Node {
     Lessons lessons;
     bool stops = false;  // a stopping round
     int searches = 0;
-    std::int64_t awaited_plan = -1;  // the plan whose decision is outstanding, -1 if none
+    std::int64_t awaited_plan = -1;            // the plan whose decision is outstanding, -1 if none
+    std::optional<decision_t> unadvised = {};  // the abstention whose advice is outstanding
+    std::int64_t advice_until = 0;
   };
 
   void OnRobotState(const Received& received);
   void OnDecision(const Received& received);
+  void OnAdvice(const Received& received);
   void OnWithdrawn(const Received& received);
   void OnObstacles(const Received& received);
 
@@ -98,7 +106,8 @@ class PlannerNode final : public Node {
   void SearchOnce(std::int64_t now_us);
   [[nodiscard]] PlanRequest RequestOf(const Round& round) const;
   [[nodiscard]] candidate_plan_t MakeCandidate(const Proposal& proposal, const Round& round, std::int64_t now_us);
-  void Learn(const decision_t& decision);
+  void Learn(const decision_t& decision, std::int64_t now_us);
+  void LearnWithoutAdvice();
 
   const Config config_;
   Sender sender_;
@@ -122,7 +131,7 @@ class PlannerNode final : public Node {
   bool arrived_ = false, finished_ = false;
 
   std::int64_t searches_ = 0, fruitless_searches_ = 0, proposed_ = 0, certified_ = 0, unanswered_ = 0, rounds_ = 0,
-               stopping_rounds_ = 0, withdrawals_ = 0, fruitless_rounds_ = 0, ignored_ = 0;
+               stopping_rounds_ = 0, withdrawals_ = 0, advised_ = 0, fruitless_rounds_ = 0, ignored_ = 0;
   std::map<std::string, std::int64_t> abstained_, rejected_;  // by cause
 };
 

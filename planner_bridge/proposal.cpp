@@ -119,6 +119,7 @@ class Sweep {
     for (std::size_t i = 0; i < from_.size(); ++i) from_[i].radius += deviation[i];
   }
 
+  [[nodiscard]] int first() const { return first_; }
   // Whether it keeps more than `clearance` from the obstacle.
   [[nodiscard]] bool Keeps(double clearance, const Obstacle& obstacle, const Schedule& schedule) const {
     for (std::size_t i = 0; i < from_.size(); ++i)
@@ -289,12 +290,17 @@ class Planner::Search {
       for (const BodyPart& part : planner.problem_->body.parts)
         deviation_.push_back(Deviation(*planner.problem_->between, part));
     const Sweep::Parts body = BodyAt(x);
-    for (const Obstacle& obstacle : planner.obstacles_) {
+    own_ = request.obstacle_clearance;
+    own_.resize(planner.obstacles_.size());
+    for (std::size_t o = 0; o < planner.obstacles_.size(); ++o) {
+      const Obstacle& obstacle = planner.obstacles_[o];
       double distance = kInfinity;
       for (std::size_t i = 0; i < body.size(); ++i)
         distance = std::min(distance, ApproximateDistance(obstacle, body[i], body[i], schedule_, 0, 0) -
                                           (deviation_.empty() ? 0 : deviation_[i]));
-      clearances_.push_back(std::clamp(distance - kTouch, 0.0, request.clearance));
+      const double kept = std::max(distance - kTouch, 0.0);
+      clearances_.push_back(std::min(kept, request.clearance));
+      if (own_[o].first_step <= 0) own_[o].clearance = std::min(kept, own_[o].clearance);
     }
     limit_margin_ = LimitMargin(request);
     start_distance_ = field.DistanceToGo(Position(x));
@@ -392,8 +398,10 @@ class Planner::Search {
   }
 
   [[nodiscard]] bool Clear(const Sweep& sweep) const {
-    for (std::size_t o = 0; o < clearances_.size(); ++o)
-      if (!sweep.Keeps(clearances_[o], planner_.obstacles_[o], schedule_)) return false;
+    for (std::size_t o = 0; o < clearances_.size(); ++o) {
+      const double own = sweep.first() >= own_[o].first_step ? own_[o].clearance : 0;
+      if (!sweep.Keeps(std::max(clearances_[o], own), planner_.obstacles_[o], schedule_)) return false;
+    }
     return true;
   }
 
@@ -591,7 +599,8 @@ class Planner::Search {
   const Eigen::VectorXd start_;
   const Schedule schedule_;
   Eigen::VectorXd lower_, upper_;
-  std::vector<double> clearances_;  // to each obstacle
+  std::vector<double> clearances_;      // to each obstacle
+  std::vector<ObstacleClearance> own_;  // likewise, where it is more
   std::vector<double> limit_margin_;
   std::vector<double> deviation_;  // of each part between two samples; empty: only the samples count
   double start_distance_, gain_, top_speed_, least_speed_;

@@ -15,6 +15,12 @@ guarantee; the certifier decides on it. */
 
 namespace forereach {
 
+/** A distance to keep from one obstacle, from a step of the plan on: later slices are wider. */
+struct ObstacleClearance {
+  double clearance = 0;  ///< Metres.
+  int first_step = 0;
+};
+
 struct PlanRequest {
   Eigen::VectorXd state;  ///< Initial state of the plan: n entries, model units.
   double clearance = 0;   ///< Distance to keep from obstacles, m; less if the start is nearer to an obstacle.
@@ -26,6 +32,9 @@ struct PlanRequest {
   /** Distance to keep from the bounds of each limit of the task, in its unit, or empty for none; less if the start is
   nearer to them. */
   std::vector<double> limit_margin;
+  /** More for single obstacles, by their index; those beyond its end have none. From step 0 on: less if the start is
+  nearer. */
+  std::vector<ObstacleClearance> obstacle_clearance = {};
 };
 
 struct Proposal {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
@@ -85,6 +86,7 @@ std::pair<Stream, std::optional<StreamPosition>> Interpreter::Identify(const std
     return {plain, position ? position : PositionOf<certified_plan_t>(bytes)};
   }
   if (channel == channels_.withdrawn) return {plain, PositionOf<withdrawal_t>(bytes)};
+  if (channel == channels_.advice) return {plain, PositionOf<advice_t>(bytes)};
   if (channel == channels_.robot_state) return {plain, PositionOf<robot_state_t>(bytes)};
   if (channel == channels_.transition) return {plain, PositionOf<transition_t>(bytes)};
   if (channel == channels_.status) {

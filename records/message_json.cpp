@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/task/json_text.h"
+#include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
@@ -118,6 +119,32 @@ void Fields(const withdrawal_t& m, To& to) {
   to.Digest("certificate_digest", m.certificate_digest);
   GroundFields(m, to);
   to.Text("message", m.message);
+}
+
+template <class To>
+void Fields(const advice_change_t& m, To& to) {
+  to.Code("kind", m.kind, AdviceName);
+  to("verified", m.verified);
+  to("step", m.step);
+  to("index", m.index);
+  to("value", m.value);
+  to("clearance", m.clearance);
+  to.Row("direction", m.direction, 3);
+}
+
+template <class To>
+void Fields(const advice_t& m, To& to) {
+  to("utime", m.utime);
+  to("sequence", m.sequence);
+  to("candidate_utime", m.candidate_utime);
+  to("plan_id", m.plan_id);
+  to.Text("source", m.source);
+  to.Digest("plan_digest", m.plan_digest);
+  to.Code("outcome", m.outcome, OutcomeName);
+  to.Code("cause", m.cause, CauseName);
+  to("num_changes", m.num_changes);
+  to.List("change", m.change, m.num_changes);
+  GroundFields(m, to);
 }
 
 template <class To>
@@ -406,7 +433,7 @@ struct Types {
   static std::vector<std::string_view> Names() { return {Messages::getTypeName()...}; }
 };
 
-using AllTypes = Types<candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t,
+using AllTypes = Types<advice_t, candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t,
                        certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t,
                        obstacles_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>;
 

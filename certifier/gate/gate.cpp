@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "certifier/certify/explain.h"
+#include "certifier/gate/advice_message.h"
 #include "certifier/gate/candidate_message.h"
 #include "certifier/gate/robot_messages.h"
 #include "certifier/gate/stamp.h"
@@ -216,6 +217,34 @@ Standing Gate::JudgeAgain(const candidate_plan_t& candidate, int first_step) noe
     return forereach::JudgeAgain(certifier_, plan, initial_set, obstacles_.all(), tube_, first_step);
   } catch (const std::exception&) {
     return {};
+  }
+}
+
+std::optional<advice_t> Gate::Advise(const candidate_plan_t& candidate, const decision_t& decision,
+                                     const SearchEffort& effort) noexcept {
+  try {
+    if (GroundsOf(decision) != grounds() || !effort.goes_on()) return std::nullopt;
+    const Plan plan = PlanOf(candidate, ScheduleOf(candidate, options_));
+    const Zonotope initial_set = InitialSetOf(candidate);
+    certifier_.Require(plan, initial_set, obstacles_.all());
+    const Decision verdict = certifier_.Certify(plan, initial_set, obstacles_.all(), tube_);
+    if (static_cast<int>(verdict.cause) != decision.cause || verdict.step != decision.step) return std::nullopt;
+    const std::vector<advice_change_t> changes =
+        ChangesFor({certifier_, plan, initial_set, obstacles_.all(), verdict}, tube_, effort);
+    if (changes.empty()) return std::nullopt;
+    advice_t advice{};
+    advice.candidate_utime = candidate.utime;
+    advice.plan_id = candidate.plan_id;
+    std::ranges::copy(candidate.source, advice.source);
+    std::ranges::copy(decision.plan_digest, advice.plan_digest);
+    advice.outcome = decision.outcome;
+    advice.cause = decision.cause;
+    advice.num_changes = static_cast<std::int16_t>(changes.size());
+    std::ranges::copy(changes, advice.change);
+    SetGrounds(advice, grounds());
+    return advice;
+  } catch (const std::exception&) {
+    return std::nullopt;
   }
 }
 

@@ -15,9 +15,11 @@ not, the caller calls Refuse. */
 
 #include "certifier/certify/certifier.h"
 #include "certifier/certify/standing.h"
+#include "certifier/certify/way_clear.h"
 #include "certifier/gate/obstacles_in_force.h"
 #include "certifier/gate/sources.h"
 #include "certifier/task/config.h"
+#include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
 #include "forereach/certifier_status_v3_t.hpp"
@@ -62,6 +64,13 @@ class Gate final {
   /** JudgeAgain (standing.h) under what is in force now. Outcome kNone: the plan cannot be judged under this task.
   @param plan a candidate that this gate or one before a reload has certified. @param first_step 0..num_steps. */
   [[nodiscard]] Standing JudgeAgain(const candidate_plan_t& plan, int first_step) noexcept;
+
+  /** What would have helped a candidate that this gate has abstained on (advice_message.h). Nothing if there is nothing
+  to say, if other inputs than the decision's are in force, or if `effort` ended the search. The caller sets utime and
+  sequence. Cost: that of a decision, and then some dozen tests of one obstacle along the tube for each obstacle that it
+  may touch. */
+  [[nodiscard]] std::optional<advice_t> Advise(const candidate_plan_t& candidate, const decision_t& decision,
+                                               const SearchEffort& effort) noexcept;
 
   /** Answers a candidate without certifying it, for a cause outside the candidate. The candidate's own defects take
   precedence over `cause`. */

@@ -67,6 +67,7 @@ CertifierNode::CertifierNode(const Config& config, Bus& bus, Clocks clocks, std:
       has_begun_(is_in_charge()),
       issued_(config.gate, clocks_.steady()),
       plans_(config.gate),
+      advice_(clocks_.steady),
       reload_(config.path, channels_),
       contradictions_(config_),
       latch_(watch_, contradictions_, std::move(latch)),
@@ -328,6 +329,7 @@ void CertifierNode::SendFault() {
 // ---- Candidates.
 
 void CertifierNode::Tick(std::int64_t now_us) {
+  const bool was_idle = queue_.empty() && !withdraws_more_;
   LookAtCharge();
   LookForObstacles(now_us);
   if (reporter_.IsFirst() && is_in_charge()) Heartbeat(now_us);  // reports the state before the first decision
@@ -341,6 +343,7 @@ void CertifierNode::Tick(std::int64_t now_us) {
   AnswerWaiting();
   CompactIfDue();
   if (reporter_.IsDue(clocks_.steady())) Heartbeat(now_us);
+  if (was_idle) GiveAdvice();
 }
 
 void CertifierNode::WithdrawPlans(std::int64_t now_us) {
@@ -413,6 +416,16 @@ void CertifierNode::Answer(Bytes candidate, bool displaced) {
     plans_.Add(*answer.certified, clocks_.steady());
   }
   reporter_.CountDecision(elapsed.count());
+  advice_.Note(candidate, answer.decision, gate_->options());
+}
+
+// Only in a tick that began with nothing to do: a decision is followed by a look at the bus, not by this.
+void CertifierNode::GiveAdvice() {
+  if (!is_in_charge() || !advice_.has_work() || withdraws_more_) return;
+  auto advice = advice_.Give(*gate_, [this] { return bus_.has_waiting(); });
+  if (!advice) return;
+  advice->utime = clocks_.wall();
+  sender_.Send(channels_.advice, *advice);
 }
 
 // ---- Background work.

@@ -10,6 +10,7 @@ The node wires the classes that each answer one question; how they work is said 
     charge.h            which of several certifiers on one bus decides
     task_reload.h       which task is in force
     status_reporter.h   what the heartbeat reports, and when
+    advice_giver.h      what would have helped a candidate, said when there is nothing else to do
 
 Every candidate is answered once. The newest is decided first. The others are answered before their deadline passes, and
 of more than `gate.queue` the oldest are rejected. Obstacles, the robot's state, executed transitions and commands take
@@ -44,6 +45,7 @@ that the plan was handed to the bus before. */
 #include "certifier/gate/issued_plans.h"
 #include "certifier/gate/plans_in_force.h"
 #include "certifier/gate/watch.h"
+#include "certifier/process/advice_giver.h"
 #include "certifier/process/candidate_queue.h"
 #include "certifier/process/contradictions.h"
 #include "certifier/process/fault_latch.h"
@@ -79,7 +81,9 @@ class CertifierNode final : public Node {
   ~CertifierNode() override;
 
   void Tick(std::int64_t now_us) override;
-  [[nodiscard]] bool busy() const override { return (!queue_.empty() || withdraws_more_) && is_in_charge(); }
+  [[nodiscard]] bool busy() const override {
+    return (!queue_.empty() || withdraws_more_ || advice_.has_work()) && is_in_charge();
+  }
   void Reload() override;
   /** Answers what waits still, and prints the counts as one line of JSON on standard output. */
   void Stop() override;
@@ -114,6 +118,7 @@ class CertifierNode final : public Node {
   void AnswerDue();
   [[nodiscard]] GateAnswer Decide(Bytes candidate);
   void Answer(Bytes candidate, bool displaced);
+  void GiveAdvice();
   void CompactIfDue();
   void TakeReload();
   /** Latches and announces, unless a fault as grave is latched already. */
@@ -142,6 +147,7 @@ class CertifierNode final : public Node {
   bool withdraws_more_ = false;  // than one tick sends
 
   CandidateQueue queue_;
+  AdviceGiver advice_;
   robot_state_t last_state_{};
   transition_t last_transition_{};
 

@@ -20,6 +20,7 @@ struct GateOptions {
   double decision_budget_ms = 5;  ///< A candidate that starts sooner is answered ABSTAIN_DEADLINE.
   int queue = 64;
   bool shadow = false;             ///< Decides, but sends no certified plan.
+  bool advises = false;            ///< Says after an abstention what would have helped.
   bool needs_robot_state = true;   ///< Certifies only while the robot's state is heard.
   double robot_timeout_ms = 1000;  ///< The robot's state is lost after this time without a message.
   double max_clock_jump_ms = 200;

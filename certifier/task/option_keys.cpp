@@ -43,6 +43,9 @@ std::vector<Key> GateKeys() {
       gate.Word<bool>("mode", {{"enforce", false}, {"shadow", true}}, &GateOptions::shadow,
                       "shadow: decide and count as usual, but certify nothing. A plan that would be certified is "
                       "rejected with cause shadow."),
+      gate.Word<bool>("advice", {{"none", false}, {"send", true}}, &GateOptions::advises,
+                      "send: after an abstention S or D, when there is nothing else to do, the certifier says on "
+                      "bus.channels.advice what would have helped, and the planner plans by it."),
       gate.Word<bool>("arming", {{"robot_state", true}, {"none", false}}, &GateOptions::needs_robot_state,
                       "robot_state: certify only while the robot's state is received, and latch a fault when it is "
                       "lost. none: for a certifier without a robot."),
@@ -108,6 +111,7 @@ constexpr std::array kChannels{
     ChannelRow{"decision", &BusOptions::decision, "decision_t, one for each candidate."},
     ChannelRow{"certified", &BusOptions::certified, "certified_plan_v2_t, what a robot may execute."},
     ChannelRow{"withdrawn", &BusOptions::withdrawn, "withdrawal_t, what of it a robot may no longer execute."},
+    ChannelRow{"advice", &BusOptions::advice, "advice_t, what would have helped a candidate, if gate.advice is send."},
     ChannelRow{"robot_state", &BusOptions::robot_state, "robot_state_t, from the robot."},
     ChannelRow{"obstacles", &BusOptions::obstacles,
                "obstacles_v2_t or obstacles_t, all perceived obstacles, sent repeatedly."},

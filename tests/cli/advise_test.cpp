@@ -1,6 +1,12 @@
 // `forereach advise`: the shipped abstentions, a recorded course, and answers that are about time.
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <random>
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +14,9 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/gate.h"
+#include "cli/gate_advice.h"
+#include "forereach/obstacles_t.hpp"
+#include "lcmtypes/names.h"
 #include "tests/cli/program.h"
 #include "tests/paths.h"
 #include "tests/records/logs.h"
@@ -104,6 +113,51 @@ TEST_F(AdviseTest, NamesTheTimeThatWouldHaveHeld) {
   EXPECT_THAT(output.text, AllOf(HasSubstr("with gate.max_age_ms of at least 700\n"),
                                  HasSubstr("with gate.max_ahead_ms of at least 60, if"),
                                  HasSubstr("with gate.decision_budget_ms of at most 3, or sent 2 ms earlier")));
+}
+
+TEST_F(AdviseTest, ADatabaseAndADirectoryAreReadAsTheirLogs) {
+  const std::string directory = scratch_ / "log";
+  ASSERT_EQ(Forereach("run --config tests/data/field.yaml --directory " + directory + " > /dev/null 2>&1").code, 0);
+  const std::string logs = "$(ls " + directory + "/*.lcmlog)";
+  const auto of = [](const std::string& files) {
+    return nlohmann::json::parse(Forereach("advise --json " + files + " 2>/dev/null").text);
+  };
+  auto by_log = of(logs), by_database = of(directory + "/decisions.sqlite"), by_directory = of(directory);
+  EXPECT_GT(by_log["abstentions"].size(), 0u);
+  EXPECT_EQ(by_database, by_directory);
+  EXPECT_EQ(by_log["places"], by_directory["places"]);
+  ASSERT_EQ(by_log["abstentions"].size(), by_directory["abstentions"].size());
+  for (std::size_t i = 0; i < by_log["abstentions"].size(); ++i)
+    EXPECT_EQ(by_log["abstentions"][i]["advice"], by_directory["abstentions"][i]["advice"]);
+  std::filesystem::remove(directory + "/decisions.sqlite");
+  EXPECT_EQ(of(directory)["certified"], by_log["certified"]);
+  EXPECT_EQ(Forereach("advise " + (scratch_ / "") + " 2>&1").code, 2) << "no logs";
+}
+
+TEST_F(AdviseTest, NamesTheQueueAndTheSilenceThatWouldHaveHeld) {
+  Config config = LoadConfig(FOREREACH_SOURCE_DIR "/tests/data/course.yaml");
+  config.gate.obstacles = ObstaclesSource::kBus;
+  config.gate.queue = 4;
+  RecordedAbstention abstention;
+  abstention.task = &config;
+  abstention.decision.utime = 1'700'000'000'000'000;
+  abstention.decision.cause = decision_t::CAUSE_QUEUE_FULL;
+  abstention.waiting = 4;
+  EXPECT_EQ(RemedyFor(abstention)->key, "") << "then it was not the queue";
+  abstention.waiting = 9;
+  EXPECT_EQ(RemedyFor(abstention)->what, "with gate.queue of at least 9, if the log has every candidate");
+  EXPECT_EQ(RemedyFor(abstention)->key, "gate.queue");
+  EXPECT_FALSE(RemedyFor(abstention)->turns);
+
+  abstention.decision.cause = decision_t::CAUSE_NO_OBSTACLES;
+  EXPECT_FALSE(RemedyFor(abstention)->turns) << "none was ever heard";
+  obstacles_t seen{};
+  seen.utime = abstention.decision.utime - 1'250'000;
+  abstention.last_obstacles =
+      std::make_shared<std::pair<std::vector<std::uint8_t>, std::int64_t>>(Encode(seen), seen.utime);
+  const Remedy silence = RemedyFor(abstention).value();
+  EXPECT_EQ(silence.what, "with gate.obstacles_timeout_ms of at least 1250");
+  EXPECT_FALSE(silence.turns) << "there is no candidate that could be judged";
 }
 
 // Anyone may have written a log: its numbers need not fit each other.

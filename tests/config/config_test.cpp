@@ -79,11 +79,12 @@ TEST(LoadConfig, ReadsEveryOption) {
       std::string(kTask) +
       "certifier: {method: paper, zonotope_order: 7}\n"
       "gate: {max_age_ms: 1, max_ahead_ms: 0, certificate_lifetime_ms: 3, queue: 4, obstacles: bus,\n"
-      "  obstacles_timeout_ms: 5, state: kept}\n"
+      "  obstacles_timeout_ms: 5, state: kept, advice: send}\n"
       "bus:\n"
       "  url: memq://\n"
       "  channels: {candidate: A, decision: B, certified: C, robot_state: D, obstacles: E, transition: F, status: G, "
-      "event: H, logger_status: I, fault: J, command: K, withdrawn: L}\n"
+      "event: H, logger_status: I, fault: J, command: K, withdrawn: L, "
+      "advice: M}\n"
       "planner: {source: policy, policy: p/own.json, algorithm: rrt, goal: [1, 2], goal_radius: 3, clearance: 4,\n"
       "  clearance_step: 5, progress_steps: 6,\n"
       "  tail_steps: 7, lead_steps: 8, candidates: 9, cruise_speed: 10, braking: 11, time_limit_ms: 12, seed: 13,\n"
@@ -96,13 +97,14 @@ TEST(LoadConfig, ReadsEveryOption) {
   EXPECT_EQ(std::tie(gate.max_age_ms, gate.max_ahead_ms, gate.certificate_lifetime_ms, gate.queue),
             std::make_tuple(1.0, 0.0, 3.0, 4));
   EXPECT_EQ(gate.obstacles, ObstaclesSource::kBus);
+  EXPECT_TRUE(gate.advises);
   EXPECT_EQ(gate.obstacles_timeout_ms, 5);
   EXPECT_EQ(gate.state, files.directory() / "kept");
   const BusOptions& bus = config.bus;
   EXPECT_EQ(bus.url, "memq://");
   EXPECT_EQ(bus.candidate + bus.decision + bus.certified + bus.robot_state + bus.obstacles + bus.transition +
-                bus.status + bus.event + bus.logger_status + bus.fault + bus.command + bus.withdrawn,
-            "ABCDEFGHIJKL");
+                bus.status + bus.event + bus.logger_status + bus.fault + bus.command + bus.withdrawn + bus.advice,
+            "ABCDEFGHIJKLM");
   const PlannerOptions& planner = config.planner;
   EXPECT_EQ(planner.source, "policy");
   EXPECT_EQ(planner.policy, files.directory() / "p/own.json");

@@ -26,7 +26,7 @@ TEST_F(ErrorTest, UnknownKeys) {
   EXPECT_EQ(ErrorAfter("planer: {}\n"), "task.yaml:20: planer: unknown key; did you mean planner?");
   EXPECT_EQ(ErrorAfter("gate: {colour: 3}\n"),
             "task.yaml:20: gate.colour: unknown key; known here: max_age_ms, max_ahead_ms, certificate_lifetime_ms, "
-            "decision_budget_ms, queue, mode, arming, robot_timeout_ms, max_clock_jump_ms, "
+            "decision_budget_ms, queue, mode, advice, arming, robot_timeout_ms, max_clock_jump_ms, "
             "max_clock_error_ms, obstacles, obstacles_timeout_ms, learn, require_stop, state");
   EXPECT_EQ(files_.ErrorWith("    vx: {vx: 0.1,", "    theta: {vx: 0.1,"),
             "task.yaml:9: declaration.lipschitz.theta: unknown key; known here: px, py, vx, vy");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <random>
 #include <regex>
 #include <set>
@@ -36,6 +37,12 @@ namespace {
 
 using nlohmann::json;
 
+// Types that are parts of a message, with that message and its field.
+const std::map<std::string, std::pair<std::string, std::string>> kParts{
+    {"obstacle_t", {"obstacles_t", "obstacle"}},
+    {"obstacle_v2_t", {"obstacles_v2_t", "obstacle"}},
+    {"advice_change_t", {"advice_t", "change"}}};
+
 TEST(MessageJson, EveryFieldOfEveryTypeIsThere) {
   std::set<std::string> types;
   for (const std::string_view type : MessageTypes()) types.insert(std::string(type));
@@ -43,9 +50,8 @@ TEST(MessageJson, EveryFieldOfEveryTypeIsThere) {
     if (file.path().extension() != ".lcm") continue;
     const std::string type = file.path().stem();
     json properties;
-    if (type == "obstacle_t" || type == "obstacle_v2_t")  // parts of a message
-      properties = json::parse(SchemaOf(
-          type == "obstacle_t" ? "obstacles_t" : "obstacles_v2_t"))["properties"]["obstacle"]["items"]["properties"];
+    if (const auto part = kParts.find(type); part != kParts.end())
+      properties = json::parse(SchemaOf(part->second.first))["properties"][part->second.second]["items"]["properties"];
     else
       properties = json::parse(SchemaOf(type))["properties"];
     types.erase(type);

@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "forereach/advice_change_t.hpp"
+#include "forereach/advice_t.hpp"
 #include "forereach/candidate_plan_t.hpp"
 #include "forereach/certified_plan_t.hpp"
 #include "forereach/certified_plan_v2_t.hpp"
@@ -51,6 +53,8 @@ const std::map<std::string, Contract> kContracts = {
     {"obstacles_v2_t", {0xc1a2a66356f23f34, 30746}},
     {"withdrawal_t", {0x143744ac67af3ba6, 482}},
     {"certified_plan_v2_t", {0xef35232fd0f5e514, 41840}},
+    {"advice_change_t", {0x2820254c63772fe1, 56}},
+    {"advice_t", {0xc708fe6c4a3d4e09, 654}},
 };
 
 template <class Message>
@@ -68,10 +72,10 @@ class MessageTest : public testing::Test {
   std::mt19937 random_{seed_};
 };
 
-using Messages =
-    testing::Types<candidate_plan_t, certified_plan_t, certified_plan_v2_t, certifier_status_v2_t,
-                   certifier_status_v3_t, command_t, decision_t, execution_event_t, fault_t, logger_status_t,
-                   obstacle_t, obstacle_v2_t, obstacles_t, obstacles_v2_t, robot_state_t, transition_t, withdrawal_t>;
+using Messages = testing::Types<advice_change_t, advice_t, candidate_plan_t, certified_plan_t, certified_plan_v2_t,
+                                certifier_status_v2_t, certifier_status_v3_t, command_t, decision_t, execution_event_t,
+                                fault_t, logger_status_t, obstacle_t, obstacle_v2_t, obstacles_t, obstacles_v2_t,
+                                robot_state_t, transition_t, withdrawal_t>;
 TYPED_TEST_SUITE(MessageTest, Messages);
 
 TYPED_TEST(MessageTest, FingerprintAndSizeAreThoseOfTheContract) {

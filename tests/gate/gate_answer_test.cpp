@@ -306,6 +306,96 @@ TEST_F(GateAnswerTest, AFlippedBitAnywhereBreaksTheSeal) {
   }
 }
 
+class GateAdviceTest : public GateAnswerTest {
+ protected:
+  std::optional<advice_t> AdviceOn(Gate& gate, const candidate_plan_t& candidate, const SearchEffort& effort = {}) {
+    decision_ = gate.Decide(Encode(candidate), kNow).decision;
+    return gate.Advise(candidate, decision_, effort);
+  }
+
+  decision_t decision_{};
+};
+
+TEST_F(GateAdviceTest, SaysHowFarAPlanHasToGiveWay) {
+  const candidate_plan_t candidate = Candidate(1, kAccelerationIntoTheCircle);
+  const auto advice = AdviceOn(gate_, candidate);
+  ASSERT_TRUE(advice);
+  EXPECT_EQ(advice->plan_id, 1);
+  EXPECT_EQ(advice->candidate_utime, candidate.utime);
+  EXPECT_EQ(GetText(advice->source), "test");
+  EXPECT_EQ(GetDigest(advice->plan_digest), DigestOf(Encode(candidate)));
+  EXPECT_EQ(GroundsOf(*advice), gate_.grounds());
+  EXPECT_EQ(std::tuple(advice->outcome, advice->cause, advice->num_changes),
+            std::tuple(decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE, 1));
+  const advice_change_t& change = advice->change[0];
+  EXPECT_EQ(std::tuple(change.kind, change.index, change.verified, change.step),
+            std::tuple(advice_change_t::OBSTACLE, 0, 1, decision_.step));
+  EXPECT_NEAR(std::hypot(change.direction[0], change.direction[1]), 1, 1e-12);
+  EXPECT_EQ(change.direction[2], 0);
+
+  // The plan gives way as told: it begins so much farther in this direction.
+  candidate_plan_t moved = candidate;
+  moved.plan_id = 2;
+  for (int k = 0; k < 2; ++k) moved.initial_center[k] += change.value * change.direction[k];
+  EXPECT_TRUE(gate_.Decide(Encode(moved), kNow).certified);
+  moved.plan_id = 3;
+  for (int k = 0; k < 2; ++k) moved.initial_center[k] -= 0.1 * change.value * change.direction[k];
+  EXPECT_FALSE(gate_.Decide(Encode(moved), kNow).certified) << "and not farther than it has to";
+}
+
+TEST_F(GateAdviceTest, SaysWhatLeavesTheDomainAndByHowMuch) {
+  const auto advice = AdviceOn(gate_, Candidate(1, kAccelerationOutsideDomain));
+  ASSERT_TRUE(advice);
+  EXPECT_EQ(advice->num_changes, 1);
+  const advice_change_t& change = advice->change[0];
+  EXPECT_EQ(std::tuple(change.kind, change.index, change.verified, change.step),
+            std::tuple(advice_change_t::DOMAIN, 4, 0, 0));
+  EXPECT_EQ(change.value, 1);
+  EXPECT_EQ(change.direction[0], -1);
+}
+
+TEST_F(GateAdviceTest, SaysHowMuchMoreRoomALimitNeeds) {
+  Problem problem = *config_.problem;
+  problem.limits = {{.name = "speed squared", .that = {"vx^2 + vy^2", 1, 1}, .at_most = 1}};
+  config_.problem = std::make_shared<const Problem>(problem);
+  Gate gate(config_);
+  const auto advice = AdviceOn(gate, Candidate(1));
+  ASSERT_TRUE(advice);
+  const advice_change_t& change = advice->change[0];
+  EXPECT_EQ(std::tuple(change.kind, change.index, change.direction[0]), std::tuple(advice_change_t::LIMIT, 0, -1.0));
+  EXPECT_NEAR(change.value, 1.05 * 1.05 + 0.15 * 0.15 - 1, 1e-9);
+}
+
+TEST_F(GateAdviceTest, SaysNothingOfACertificateOrUnderOtherGrounds) {
+  EXPECT_FALSE(AdviceOn(gate_, Candidate(1)));
+  const candidate_plan_t candidate = Candidate(2, kAccelerationIntoTheCircle);
+  ASSERT_TRUE(AdviceOn(gate_, candidate));
+  decision_t other = decision_;
+  other.observations_digest[0] ^= 1;
+  EXPECT_FALSE(gate_.Advise(candidate, other, {}));
+  other = decision_;
+  ++other.step;
+  EXPECT_FALSE(gate_.Advise(candidate, other, {}));
+  candidate_plan_t wrong = candidate;  // that anybody could ask about
+  wrong.num_steps = 129;
+  EXPECT_FALSE(gate_.Advise(wrong, decision_, {}));
+  wrong.num_steps = -1;
+  EXPECT_FALSE(gate_.Advise(wrong, decision_, {}));
+  wrong.num_steps = 10, wrong.initial_half_width[0] = -1;
+  EXPECT_FALSE(gate_.Advise(wrong, decision_, {}));
+}
+
+TEST_F(GateAdviceTest, ASearchEndsWhenItIsToldTo) {
+  const candidate_plan_t candidate = Candidate(1, kAccelerationIntoTheCircle);
+  int asked = 0;
+  ASSERT_TRUE(AdviceOn(gate_, candidate, {4, [&] { return ++asked > 0; }}));
+  for (int most = 0; most < asked; ++most) {
+    int count = 0;
+    EXPECT_FALSE(gate_.Advise(candidate, decision_, {4, [&] { return ++count <= most; }})) << most;
+    EXPECT_EQ(count, most + 1) << "nothing is tried after that";
+  }
+}
+
 TEST(GateTransitionTest, ARefusedOneNamesTheCheckThatRefusedItAndChangesNothing) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   Config config = SmallTask();

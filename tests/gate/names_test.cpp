@@ -74,6 +74,8 @@ TEST(NamesTest, EveryFaultHasItsName) { ExpectNamed(ConstantsOf("fault_t"), Faul
 
 TEST(NamesTest, EveryWithdrawalHasItsName) { ExpectNamed(ConstantsOf("withdrawal_t"), WithdrawalName); }
 
+TEST(NamesTest, EveryKindOfAdviceHasItsName) { ExpectNamed(ConstantsOf("advice_change_t"), AdviceName); }
+
 TEST(NamesTest, EveryFaultHasAnAdvice) {
   for (const auto& [name, number] : ConstantsOf("fault_t")) {
     const std::string advice(FaultAdvice(static_cast<std::int16_t>(number)));

@@ -58,7 +58,7 @@ std::string SectionOn(const std::string& type) {
 
 TEST(BusDocumentTest, ReadsTheMessagesItIsHeldAgainst) {
   const auto types = Types();
-  EXPECT_EQ(types.size(), 17u);
+  EXPECT_EQ(types.size(), 19u);
   EXPECT_THAT(types.at("candidate_plan_t").fields,
               testing::ElementsAre("utime", "sequence", "plan_id", "source", "start_utime", "step_us", "num_states",
                                    "num_inputs", "num_steps", "progress_steps", "initial_center", "initial_half_width",
@@ -89,7 +89,7 @@ TEST(BusDocumentTest, EveryChannelIsListed) {
   const std::string document = TextOf(FOREREACH_SOURCE_DIR "/docs/bus.md");
   for (const char* channel :
        {"PLAN_CANDIDATE", "PLAN_DECISION", "PLAN_CERTIFIED", "ROBOT_STATE", "OBSTACLES", "TRANSITION", "PLAN_WITHDRAWN",
-        "CERTIFIER_STATUS", "EXECUTION_EVENT", "FAULT", "COMMAND", "LOGGER_STATUS"})
+        "PLAN_ADVICE", "CERTIFIER_STATUS", "EXECUTION_EVENT", "FAULT", "COMMAND", "LOGGER_STATUS"})
     EXPECT_TRUE(std::regex_search(document, std::regex("\n\\| `" + std::string(channel) + "` \\|"))) << channel;
 }
 

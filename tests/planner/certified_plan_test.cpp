@@ -93,5 +93,59 @@ TEST(Lessons, OfALimitAreHowFarTheTubeReachesBeyondIt) {
   EXPECT_GT(lessons.clearance(), PlannerOptions{}.clearance);
 }
 
+advice_t Advised(std::int16_t kind, int index, double value, std::int16_t count = 1) {
+  advice_t advice{};
+  advice.num_changes = count;
+  advice.change[0].kind = kind;
+  advice.change[0].index = static_cast<std::int16_t>(index);
+  advice.change[0].value = value;
+  return advice;
+}
+
+TEST(Lessons, AreThoseOfAnAdvice) {
+  PlannerOptions options;
+  options.clearance = 0.5;
+  Lessons lessons(options, 2);
+  const auto to_the_last = [&] {
+    return std::pair(lessons.obstacle_clearance().back().clearance, lessons.obstacle_clearance().back().first_step);
+  };
+  advice_t advice = Advised(advice_change_t::OBSTACLE, 3, 0.25);
+  advice.change[0].step = 20;
+  EXPECT_TRUE(lessons.Heed(advice));
+  EXPECT_EQ(lessons.obstacle_clearance().size(), 4u);
+  EXPECT_EQ(lessons.obstacle_clearance()[2].clearance, 0);
+  EXPECT_EQ(to_the_last(), std::pair(0.75, 20)) << "it does not say where the plan was";
+  advice.change[0].clearance = 1.5;
+  advice.change[0].step = 30;
+  EXPECT_TRUE(lessons.Heed(advice));
+  EXPECT_EQ(to_the_last(), std::pair(1.5, 20));
+  advice.change[0].step = 10;
+  EXPECT_TRUE(lessons.Heed(advice));
+  EXPECT_EQ(to_the_last(), std::pair(1.75, 10)) << "as much was kept before, and was not enough";
+  lessons.Ease();
+  EXPECT_EQ(to_the_last(), std::pair(1.125, 10));
+  EXPECT_EQ(lessons.clearance(), 0.5) << "to the others as before";
+  EXPECT_TRUE(lessons.Heed(Advised(advice_change_t::LIMIT, 1, 0.75)));
+  EXPECT_EQ(lessons.limit_margin(), (std::vector<double>{0, 0.75}));
+  EXPECT_TRUE(lessons.Heed(Advised(advice_change_t::DOMAIN, 2, 0.125)));
+  const Eigen::VectorXd half_width = Eigen::VectorXd::Constant(3, 1);
+  EXPECT_EQ(lessons.DomainMargin(half_width, Eigen::MatrixXd::Identity(1, 3)), Eigen::Vector3d(0, 0, 0.125));
+}
+
+// Where there are no keys anybody may have sent it.
+TEST(Lessons, OfAFalseAdviceAreNone) {
+  Lessons lessons(PlannerOptions{}, 2);
+  for (const int kind : {-1, 0, 1, 2, 3, 4, 32767})
+    for (const int index : {-32768, -1, 0, 2, 32767})
+      for (const double value : {-1.0, 0.0, kInfinity, -kInfinity, std::numeric_limits<double>::quiet_NaN()})
+        EXPECT_FALSE(lessons.Heed(Advised(static_cast<std::int16_t>(kind), index, value)));
+  for (const int count : {-32768, -1, 0})
+    EXPECT_FALSE(lessons.Heed(Advised(advice_change_t::OBSTACLE, 0, 1, static_cast<std::int16_t>(count))));
+  EXPECT_FALSE(lessons.Heed(Advised(advice_change_t::LIMIT, 2, 1)));
+  EXPECT_TRUE(lessons.Heed(Advised(advice_change_t::OBSTACLE, 0, 1, 32767))) << "there are eight changes";
+  EXPECT_TRUE(lessons.Heed(Advised(advice_change_t::DOMAIN, 32767, 1))) << "no such state: nothing keeps away from it";
+  EXPECT_EQ(lessons.DomainMargin(Eigen::Vector2d(1, 1), Eigen::MatrixXd::Identity(1, 2)), Eigen::Vector2d(0, 0));
+}
+
 }  // namespace
 }  // namespace forereach

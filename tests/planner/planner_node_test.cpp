@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "certifier/gate/obstacle_message.h"
+#include "certifier/task/canonical.h"
 #include "forereach/withdrawal_t.hpp"
 #include "tests/planner/tasks.h"
 
@@ -190,6 +191,122 @@ TEST_F(PlannerNodeTest, KeepsFurtherAwayAfterEachAbstentionS) {
     EXPECT_EQ(candidates_.back().initial_center[3], 0);
     AbstainS();
   }
+}
+
+class AdvisedPlannerTest : public PlannerNodeTest {
+ protected:
+  void SetUp() override {
+    config_ = Bicycle();
+    config_.gate.advises = true;
+    config_.planner.lead_steps = 20;
+    config_.planner.clearance_step = 0;
+    Start(config_);
+    robot_state_t state = Standing();
+    state.state[0] = 8;
+    state.state[1] = 3.5;
+    Say(state);
+    Run(3);
+    ASSERT_EQ(candidates_.size(), 1u);
+  }
+
+  // As an answer to the last candidate.
+  void AbstainOn(const candidate_plan_t& candidate) {
+    decision_t decision = Decision(candidate, decision_t::ABSTAIN_SAFETY, decision_t::CAUSE_OBSTACLE);
+    SetDigest(decision.plan_digest, DigestOf(Encode(candidate)));
+    Say(decision);
+  }
+  // Half a metre more to every obstacle.
+  advice_t Advice() {
+    advice_t advice{};
+    SetDigest(advice.plan_digest, DigestOf(Encode(candidates_.back())));
+    SetDigest(advice.obstacles_digest, ObstaclesDigest(config_.obstacles));
+    for (std::size_t o = 0; o < std::min<std::size_t>(config_.obstacles.size(), 8); ++o) {
+      advice_change_t& change = advice.change[advice.num_changes++];
+      change.kind = advice_change_t::OBSTACLE;
+      change.index = static_cast<std::int16_t>(o);
+      change.value = 0.5;
+    }
+    return advice;
+  }
+  void Say(const advice_t& advice) {
+    ASSERT_TRUE(bus_->Publish(config_.bus.advice, advice));
+    Deliver();
+  }
+  using PlannerNodeTest::Say;
+};
+
+TEST_F(AdvisedPlannerTest, GivesWayAsItIsTold) {
+  ASSERT_LE(config_.obstacles.size(), 8u);
+  const double before = Clearance(candidates_[0]);
+  AbstainOn(candidates_[0]);
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 1u) << "it waits for the advice";
+  Say(Advice());
+  Run(3);
+  ASSERT_EQ(candidates_.size(), 2u);
+  EXPECT_GT(Clearance(candidates_[1]), config_.planner.clearance + 0.5) << "before: " << before;
+  EXPECT_EQ(Summary()["advised"], 1);
+}
+
+TEST_F(AdvisedPlannerTest, WaitsNoLongerThanTwiceTheBudgetOfADecision) {
+  AbstainOn(candidates_[0]);
+  const auto wait = static_cast<int>(2 * config_.gate.decision_budget_ms);
+  Run(wait - 1);
+  EXPECT_EQ(candidates_.size(), 1u);
+  Run(3);
+  EXPECT_EQ(candidates_.size(), 2u);
+  EXPECT_EQ(Summary()["advised"], 0);
+}
+
+TEST_F(AdvisedPlannerTest, HeedsNoneThatIsNotOnItsCandidate) {
+  const std::int64_t ignored = Summary()["messages_ignored"];
+  Say(Advice());  // nothing was abstained on
+  AbstainOn(candidates_[0]);
+  advice_t other = Advice();
+  other.plan_digest[31] ^= 1;
+  Say(other);
+  advice_t elsewhere = Advice();
+  elsewhere.obstacles_digest[0] ^= 1;
+  Say(elsewhere);
+  advice_t empty = Advice();
+  empty.num_changes = 0;
+  Say(empty);
+  EXPECT_EQ(Summary()["messages_ignored"], ignored + 4);
+  EXPECT_EQ(Summary()["advised"], 0);
+  Say(Advice());
+  Say(Advice());  // repeated
+  EXPECT_EQ(Summary()["advised"], 1);
+  EXPECT_EQ(Summary()["messages_ignored"], ignored + 5);
+}
+
+// With no keys anybody can say this; with them, a certifier that is wrong.
+TEST_F(AdvisedPlannerTest, FalseAdviceCostsARoundAtMost) {
+  for (int i = 0; i < 40 && Summary()["rounds_without_certificate"] == 0; ++i) {
+    AbstainOn(candidates_.back());
+    advice_t advice = Advice();
+    for (int c = 0; c < advice.num_changes; ++c) advice.change[c].value = 1e300;
+    Say(advice);
+    Run(30);
+  }
+  EXPECT_GE(Summary()["rounds_without_certificate"], 1);
+  const std::size_t before = candidates_.size();
+  robot_state_t state = Standing();
+  state.sequence = 7;
+  state.state[0] = 8;
+  state.state[1] = 3.5;
+  Say(state);
+  Run(3);
+  ASSERT_EQ(candidates_.size(), before + 1) << "the next round begins anew";
+  Certify();
+  EXPECT_EQ(Summary()["certified"], 1);
+}
+
+TEST_F(PlannerNodeTest, WaitsForNoAdviceUnlessItIsSent) {
+  Say(Standing());
+  Run(3);
+  AbstainS();
+  Run(2);
+  EXPECT_EQ(candidates_.size(), 2u);
 }
 
 TEST_F(PlannerNodeTest, GoesOnAfterARejectionAndAfterD) {

@@ -93,6 +93,117 @@ TEST_F(CertifierNodeTest, ACertificateComesBeforeItsDecision) {
   EXPECT_EQ(certified_[0].plan.plan_id, 1);
 }
 
+class AdvisingCertifierTest : public CertifierNodeTest {
+ protected:
+  AdvisingCertifierTest() { Begin(true); }
+
+  void Begin(bool advises) {
+    config_.gate.advises = advises;
+    Restart();
+    bus_->Subscribe("PLAN_ADVICE", [this](const Received& r) {
+      advices_.push_back(Decoded<advice_t>(r.bytes).value());
+      order_ += 'a';
+    });
+  }
+  void Ask(int id, double acceleration) { bus_->Publish("PLAN_CANDIDATE", Candidate(id, acceleration)); }
+
+  std::vector<advice_t> advices_;
+};
+
+TEST_F(AdvisingCertifierTest, AnAdviceComesAfterItsDecisionAndNotInItsTick) {
+  Ask(1, kAccelerationIntoTheCircle);
+  Run();
+  EXPECT_EQ(order_, "d");
+  EXPECT_TRUE(node_->busy());
+  Run();
+  EXPECT_EQ(order_, "da");
+  EXPECT_FALSE(node_->busy());
+  Run();
+  ASSERT_EQ(advices_.size(), 1u);
+  EXPECT_EQ(advices_[0].plan_id, 1);
+  EXPECT_EQ(advices_[0].sequence, 0);
+  EXPECT_EQ(advices_[0].utime, kNow);
+  EXPECT_EQ(GetDigest(advices_[0].plan_digest), GetDigest(decisions_[0].plan_digest));
+  Ask(2, kAccelerationOutsideDomain);
+  Run();
+  Run();
+  ASSERT_EQ(advices_.size(), 2u);
+  EXPECT_EQ(advices_[1].sequence, 1);
+}
+
+TEST_F(AdvisingCertifierTest, ThereIsNoneUnlessTheTaskAsksForIt) {
+  Begin(false);
+  Ask(1, kAccelerationIntoTheCircle);
+  Run();
+  EXPECT_FALSE(node_->busy());
+  Run();
+  EXPECT_EQ(order_, "d");
+}
+
+TEST_F(AdvisingCertifierTest, ACertificateAsksForNone) {
+  Ask(1, kAccelerationThatCertifies);
+  Run();
+  EXPECT_FALSE(node_->busy());
+  Run();
+  EXPECT_EQ(order_, "cd");
+}
+
+// What waits is answered first, and who has asked before has gone on.
+TEST_F(AdvisingCertifierTest, ANewerCandidateDropsIt) {
+  Ask(1, kAccelerationIntoTheCircle);
+  Run();
+  Ask(2, kAccelerationThatCertifies);
+  Run();
+  Run();
+  EXPECT_EQ(order_, "dcd");
+  for (int id = 3; id <= 12; ++id) Ask(id, kAccelerationIntoTheCircle);
+  for (int i = 0; i < 8; ++i) Run();
+  EXPECT_EQ(std::ranges::count(order_, 'a'), 1);
+  EXPECT_EQ(order_.back(), 'a') << "of many that wait, after all of them, and on one";
+}
+
+TEST_F(AdvisingCertifierTest, AMessageThatArrivesMeanwhileDropsIt) {
+  Ask(1, kAccelerationIntoTheCircle);
+  Run();
+  Ask(2, kAccelerationThatCertifies);  // arrives during the search
+  node_->Tick(now_us_);
+  Run();
+  EXPECT_EQ(order_, "dcd");
+  EXPECT_TRUE(advices_.empty());
+}
+
+TEST_F(AdvisingCertifierTest, ASearchTakesNoLongerThanADecisionMay) {
+  const Clock slow = [this] { return now_us_ += 1000; };  // each look at the clock takes a millisecond
+  clocks_ = {slow, slow};
+  Begin(true);
+  Ask(1, kAccelerationIntoTheCircle);
+  Run();
+  const std::int64_t before = now_us_;
+  Run();
+  EXPECT_TRUE(advices_.empty());
+  EXPECT_LT(now_us_, before + 50'000);
+  EXPECT_FALSE(node_->busy()) << "and is not tried again";
+}
+
+TEST_F(AdvisingCertifierTest, OtherObstaclesDropIt) {
+  config_.gate.obstacles = ObstaclesSource::kBus;
+  Begin(true);
+  const auto see = [&](double x, int sequence) {
+    obstacles_t seen = ToMessage({Obstacle::Circle(Eigen::Vector2d(x, 0), 0.5)});
+    seen.utime = now_us_;
+    seen.sequence = sequence;
+    bus_->Publish("OBSTACLES", seen);
+  };
+  see(3.5, 0);
+  Ask(1, kAccelerationIntoTheCircle);
+  Run();
+  ASSERT_EQ(order_, "d");
+  see(4, 1);
+  Run();
+  Run();
+  EXPECT_EQ(order_, "d");
+}
+
 TEST_F(CertifierNodeTest, WhatStillWaitsAtTheEndIsAnswered) {
   for (int id = 1; id <= 20; ++id) bus_->Publish("PLAN_CANDIDATE", Candidate(id));
   bus_->Dispatch(0);

@@ -16,6 +16,7 @@
 #include "bus/process.h"
 #include "certifier/gate/obstacle_message.h"
 #include "certifier/process/certifier_node.h"
+#include "forereach/advice_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/decision_t.hpp"
 #include "forereach/execution_event_t.hpp"
@@ -50,6 +51,7 @@ class SignedChannelsTest : public testing::TestWithParam<std::string> {
     config_.bus.url = PrivateBusUrl();
     config_.bus.key = MakeTestKeys(scratch_ / "keys");
     config_.gate.obstacles = ObstaclesSource::kBus;
+    config_.gate.advises = true;
     config_.logger.directory = scratch_ / "log";
     open_ = OpenBus(config_.bus.url);
     open_->Subscribe("EXECUTION_EVENT", [this](const Received&) { ++events_; });
@@ -134,12 +136,11 @@ class SignedChannelsTest : public testing::TestWithParam<std::string> {
 };
 
 const std::map<std::string, Role> kSpeakers{
-    {"PLAN_CANDIDATE", Role::kPlanner},   {"PLAN_DECISION", Role::kCertifier},
-    {"PLAN_CERTIFIED", Role::kCertifier}, {"PLAN_WITHDRAWN", Role::kCertifier},
-    {"ROBOT_STATE", Role::kRobot},        {"OBSTACLES", Role::kPerception},
-    {"TRANSITION", Role::kRobot},         {"CERTIFIER_STATUS", Role::kCertifier},
-    {"EXECUTION_EVENT", Role::kRobot},    {"LOGGER_STATUS", Role::kLogger},
-    {"FAULT", Role::kCertifier},          {"COMMAND", Role::kOperator}};
+    {"PLAN_CANDIDATE", Role::kPlanner},   {"PLAN_DECISION", Role::kCertifier}, {"PLAN_CERTIFIED", Role::kCertifier},
+    {"PLAN_WITHDRAWN", Role::kCertifier}, {"PLAN_ADVICE", Role::kCertifier},   {"ROBOT_STATE", Role::kRobot},
+    {"OBSTACLES", Role::kPerception},     {"TRANSITION", Role::kRobot},        {"CERTIFIER_STATUS", Role::kCertifier},
+    {"EXECUTION_EVENT", Role::kRobot},    {"LOGGER_STATUS", Role::kLogger},    {"FAULT", Role::kCertifier},
+    {"COMMAND", Role::kOperator}};
 
 Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
   if (channel == "PLAN_CANDIDATE")
@@ -188,6 +189,12 @@ Listener SignedChannelsTest::ListenerOn(const std::string& channel) {
       decision_t decision{};
       decision.sequence = number;
       return Encode(decision);
+    });
+  if (channel == "PLAN_ADVICE")
+    return Planner([](int number) {
+      advice_t advice{};
+      advice.sequence = number;
+      return Encode(advice);
     });
   if (channel == "PLAN_CERTIFIED")
     return Robot([](int number) {

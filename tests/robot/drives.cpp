@@ -20,24 +20,27 @@ namespace {
 struct Options {
   std::vector<std::string> tasks;
   int seeds = 20, first_seed = 1;
+  bool advice = false;
 };
 
 /** What became of one drive, or of several. */
 struct Drives {
   std::int64_t count = 0, goals = 0, contacts = 0, limits = 0, steps = 0, outside = 0, emergency_stops = 0,
-               proposed = 0, certified = 0;
+               proposed = 0, certified = 0, searches = 0, rounds = 0, lost_rounds = 0;
 
   [[nodiscard]] bool good() const { return goals == count && contacts == 0 && limits == 0 && outside == 0; }
   Drives& operator+=(const Drives& other) {
     for (const auto member : {&Drives::count, &Drives::goals, &Drives::contacts, &Drives::limits, &Drives::steps,
-                              &Drives::outside, &Drives::emergency_stops, &Drives::proposed, &Drives::certified})
+                              &Drives::outside, &Drives::emergency_stops, &Drives::proposed, &Drives::certified,
+                              &Drives::searches, &Drives::rounds, &Drives::lost_rounds})
       this->*member += other.*member;
     return *this;
   }
   [[nodiscard]] std::string Text() const {
     const double share = proposed > 0 ? 100.0 * static_cast<double>(certified) / static_cast<double>(proposed) : 0;
-    return fmt::format("{:>3} of {:<3} {:>8} {:>6} {:>4} of {:<6} {:>9} {:>4} of {:<5} {:>3.0f} %", goals, count,
-                       contacts, limits, outside, steps, emergency_stops, certified, proposed, share);
+    return fmt::format("{:>3} of {:<3} {:>8} {:>6} {:>4} of {:<6} {:>9} {:>4} of {:<5} {:>3.0f} % {:>8} {:>4} of {:<5}",
+                       goals, count, contacts, limits, outside, steps, emergency_stops, certified, proposed, share,
+                       searches, lost_rounds, rounds);
   }
 };
 
@@ -60,28 +63,39 @@ Drives Drive(Config config, int seed) {
   drive.emergency_stops = of(robot, "emergency_stops");
   drive.proposed = of(planner, "proposed");
   drive.certified = of(planner, "certified");
+  drive.searches = drive.proposed + of(planner, "searches_without_result");
+  drive.rounds = of(planner, "rounds");
+  drive.lost_rounds = of(planner, "rounds_without_certificate");
   return drive;
+}
+
+// One row: the task with each seed. False if one of them was not good.
+bool DriveAll(const std::string& name, const Config& config, const Options& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  Drives all;
+  std::string bad;
+  for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
+    const Drives drive = Drive(config, seed);
+    if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), drive.Text());
+    all += drive;
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+  std::cout << fmt::format("{:<26} {} {:>5.1f} s\n", name, all.Text(), seconds.count()) << bad << std::flush;
+  return all.good();
 }
 
 int Run(const Options& options) {
   bool all_good = true;
-  std::cout << fmt::format("{:<26} {:^10} {:>8} {:>6} {:^14} {:>9} {:^20} {:>6}\n", "task", "goals", "contacts",
-                           "limits", "steps outside", "emergency", "plans certified", "time");
+  std::cout << fmt::format("{:<26} {:^10} {:>8} {:>6} {:^14} {:>9} {:^20} {:>8} {:^13} {:>6}\n", "task", "goals",
+                           "contacts", "limits", "steps outside", "emergency", "plans certified", "searches",
+                           "rounds lost", "time");
   for (const std::string& task : options.tasks) {
-    const Config config = LoadConfig(task);
-    const auto begin = std::chrono::steady_clock::now();
-    Drives all;
-    std::string bad;
-    for (int seed = options.first_seed; seed < options.first_seed + options.seeds; ++seed) {
-      const Drives drive = Drive(config, seed);
-      if (!drive.good()) bad += fmt::format("{:>26} {}\n", fmt::format("seed {}", seed), drive.Text());
-      all += drive;
-    }
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-    std::cout << fmt::format("{:<26} {} {:>5.1f} s\n", std::filesystem::path(task).stem().string(), all.Text(),
-                             seconds.count())
-              << bad << std::flush;
-    all_good = all_good && all.good();
+    Config config = LoadConfig(task);
+    const std::string name = std::filesystem::path(task).stem().string();
+    all_good = DriveAll(name, config, options) && all_good;
+    if (!options.advice) continue;
+    config.gate.advises = true;
+    all_good = DriveAll(name + ", advised", config, options) && all_good;
   }
   return all_good ? 0 : 1;
 }
@@ -100,7 +114,8 @@ int main(int argc, char** argv) {
       .footer = "Example:\n  forereach_drives config/drive/unicycle.yaml config/drive/reaching_arm.yaml --seeds 20",
       .options = {Required({"tasks", &options.tasks, "TASK", "Task files (YAML)"}),
                   {"--seeds", &options.seeds, "N", "The number of drives of each task", NumberRange{1, 1'000'000}},
-                  {"--first-seed", &options.first_seed, "K", "The first seed", NumberRange{1, 1'000'000'000}}}};
+                  {"--first-seed", &options.first_seed, "K", "The first seed", NumberRange{1, 1'000'000'000}},
+                  {"--advice", &options.advice, "Drives each task once more with gate.advice: send"}}};
   if (const std::optional<int> code = ParseCommandLine(program, argc, argv)) return *code;
   logging::Silence();
   return Guarded("forereach_drives", [&] { return Run(options); });

@@ -1,0 +1,44 @@
+/** Advice on the newest abstention, for when there is nothing else to do (docs/decisions.md).
+
+It keeps one candidate at most: a newer decision displaces it, because its planner has gone on. A search ends without a
+result when `is_wanted_elsewhere` says so or its time is up, and is not tried again. It uses no bus. */
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <utility>
+
+#include "bus/clock.h"
+#include "certifier/gate/gate.h"
+
+namespace forereach {
+
+class AdviceGiver final {
+ public:
+  /** @param steady a monotonic clock, microseconds. */
+  explicit AdviceGiver(Clock steady) : steady_(std::move(steady)) {}
+
+  /** Takes note of a decision. Cost: a copy of the candidate. @param candidate its bytes. */
+  void Note(Bytes candidate, const decision_t& decision, const GateOptions& options);
+
+  /** Whether there is something to say. */
+  [[nodiscard]] bool has_work() const { return abstained_.has_value(); }
+
+  /** The advice, complete but for its utime; nothing if the search ended without one. Then there is no work any more.
+  It takes as long as two decisions and a test of one obstacle after `is_wanted_elsewhere` became true, at most, and
+  else not longer than that after gate.decision_budget_ms. */
+  [[nodiscard]] std::optional<advice_t> Give(Gate& gate, const std::function<bool()>& is_wanted_elsewhere);
+
+ private:
+  struct Abstained {
+    candidate_plan_t candidate;
+    decision_t decision;
+  };
+
+  const Clock steady_;
+  std::optional<Abstained> abstained_;
+  std::int64_t given_ = 0;
+};
+
+}  // namespace forereach
