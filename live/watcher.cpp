@@ -176,7 +176,7 @@ bool Watcher::TakeMessage(const LogEvent& event) {
     if (status) logger_.emplace(event.utime, *status);
     return status.has_value();
   }
-  return true;  // commands are for others
+  return true;  // commands and advice are for others
 }
 
 bool Watcher::TakeDecision(const LogEvent& event) {
