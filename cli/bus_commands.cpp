@@ -7,8 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "bus/authentic.h"
 #include "bus/bus_options.h"
 #include "bus/keys.h"
@@ -20,6 +18,7 @@
 #include "forereach/command_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/printable.h"
+#include "records/status_json.h"
 
 namespace forereach {
 namespace {
@@ -31,10 +30,6 @@ struct Options {
   BusArguments bus;
   bool json = false;
 };
-
-bool IsInCharge(const certifier_status_v3_t& status) {
-  return status.state != certifier_status_v3_t::LISTENING && status.state != certifier_status_v3_t::STANDBY;
-}
 
 // The connection to the certifier: sends commands, receives heartbeats. With a key it accepts only heartbeats that the
 // certifier has signed.
@@ -78,55 +73,6 @@ class CertifierConnection final {
   std::vector<certifier_status_v3_t> heard_;
   bool warned_ = false;
 };
-
-nlohmann::ordered_json ToJson(const certifier_status_v3_t& status, bool is_signed) {
-  nlohmann::ordered_json by_outcome, by_cause;
-  for (std::int16_t i = 0; i < 16; ++i)
-    if (status.by_outcome[i] > 0) by_outcome[std::string(OutcomeName(i))] = status.by_outcome[i];
-  for (std::int16_t i = 1; i < 64; ++i)
-    if (status.by_cause[i] > 0) by_cause[std::string(CauseName(i))] = status.by_cause[i];
-  return {
-      {"level", LevelName(status.level)},
-      {"state", StateName(status.state)},
-      {"fault", status.fault == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(FaultName(status.fault))},
-      {"latch", LatchName(status.latch)},
-      {"message", GetText(status.message)},
-      {"advice",
-       status.fault == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(FaultAdvice(status.fault))},
-      {"signed", is_signed},
-      {"shadow", status.shadow != 0},
-      {"version", status.version},
-      {"failed_reloads", status.failed_reloads},
-      {"candidates", status.candidates},
-      {"by_outcome", by_outcome},
-      {"by_cause", by_cause},
-      {"instance", status.instance},
-      {"started_utime", status.started_utime},
-      {"other_instance",
-       status.other_instance == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(status.other_instance)},
-      {"obstacles",
-       {{"source", ObstaclesSourceName(status.obstacles_source)},
-        {"known", status.obstacles_known != 0},
-        {"in_force", status.obstacles_in_force},
-        {"utime", status.obstacles_utime == 0 ? nlohmann::ordered_json(nullptr)
-                                              : nlohmann::ordered_json(status.obstacles_utime)},
-        {"age_us", status.obstacles_age_us < 0 ? nlohmann::ordered_json(nullptr)
-                                               : nlohmann::ordered_json(status.obstacles_age_us)},
-        {"lost", status.obstacles_lost}}},
-      {"unsigned", status.is_unsigned != 0},
-      {"candidates_lost", status.candidates_lost},
-      {"messages_refused", status.messages_refused},
-      {"refused_unsigned", status.refused_unsigned},
-      {"refused_forged", status.refused_forged},
-      {"refused_replayed", status.refused_replayed},
-      {"refused_foreign", status.refused_foreign},
-      {"datagrams_refused", status.datagrams_refused},
-      {"bus_dropped", status.bus_dropped},
-      {"observations", status.observations},
-      {"learned", status.learned},
-      {"queue_depth", status.queue_depth},
-      {"elapsed_us", {{"p50", status.elapsed_p50_us}, {"p99", status.elapsed_p99_us}, {"max", status.elapsed_max_us}}}};
-}
 
 void Print(const certifier_status_v3_t& status, bool json, bool is_signed) {
   if (json) {

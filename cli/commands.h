@@ -50,6 +50,7 @@ inline constexpr const char* kTaskOfRecords =
 [[nodiscard]] Command ResetCommand();
 [[nodiscard]] Command ReloadCommand();
 [[nodiscard]] Command KeygenCommand();
+[[nodiscard]] Command LiveCommand();
 
 /** Runs the one of the commands that the command line chooses. @return the program's exit code. */
 [[nodiscard]] int RunCommands(std::vector<Command> commands, int argc, char** argv);

@@ -11,21 +11,22 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
+#include "cli/live.h"
 #include "cli/log_commands.h"
 #include "cli/offline.h"
 
 namespace forereach {
 namespace {
 
-// Becomes forereach-offline; returns only if that cannot be started.
-int RunOffline(char** argv) {
+// Becomes another program, by its path from this one's directory; returns only if it cannot be started.
+int Become(const char* path, char** argv) {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   if (error) {
     std::cerr << "forereach: /proc/self/exe: " << error.message() << std::endl;
     return 1;
   }
-  const std::filesystem::path program = self.parent_path() / FOREREACH_OFFLINE;
+  const std::filesystem::path program = self.parent_path() / path;
   execv(program.c_str(), argv);
   std::cerr << "forereach: " << program.lexically_normal().string() << ": " << std::strerror(errno) << std::endl;
   return 1;
@@ -40,9 +41,13 @@ int main(int argc, char** argv) {
   using Offline = std::span<const OfflineCommand>;
   for (const Offline offline : {Offline(kOfflineCommands), Offline(kLogCommands)})
     for (const OfflineCommand& each : offline) {
-      if (argc > 1 && std::string(argv[1]) == each.name) return RunOffline(argv);
-      commands.push_back({.name = each.name, .purpose = each.purpose, .run = [argv] { return RunOffline(argv); }});
+      if (argc > 1 && std::string(argv[1]) == each.name) return Become(FOREREACH_OFFLINE, argv);
+      commands.push_back(
+          {.name = each.name, .purpose = each.purpose, .run = [argv] { return Become(FOREREACH_OFFLINE, argv); }});
     }
+  if (argc > 1 && std::string(argv[1]) == kLive.name) return Become(FOREREACH_LIVE, argv);
+  commands.push_back(
+      {.name = kLive.name, .purpose = kLive.purpose, .run = [argv] { return Become(FOREREACH_LIVE, argv); }});
   for (Command& each : std::vector{ObstaclesCommand(), DoctorCommand(), KeysCommand(), StatusCommand(), TailCommand(),
                                    ResetCommand(), ReloadCommand(), KeygenCommand()})
     commands.push_back(std::move(each));

@@ -3,7 +3,7 @@
 include(CMakePackageConfigHelpers)
 
 install(TARGETS forereach forereach-certifier forereach-planner forereach-logger forereach-robot-sim)
-install(TARGETS forereach-offline DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
+install(TARGETS forereach-live forereach-offline DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/forereach)
 
 set_target_properties(forereach_certifier PROPERTIES EXPORT_NAME certifier)
 set_target_properties(forereach_guard PROPERTIES EXPORT_NAME guard)

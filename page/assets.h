@@ -1,4 +1,4 @@
-/** Files of the page, embedded when the program is built (page/embed.cmake). */
+/** Files of the pages, embedded when the program is built (page/embed.cmake). */
 #pragma once
 
 #include <string_view>
@@ -10,6 +10,8 @@ struct PageAsset {
   std::string_view sha256;  ///< In hexadecimal.
 };
 
-extern const PageAsset kPageBody, kPageStyle, kPageScript, kChartScript;
+/** Of the page of a run, of the live page, and of both. kPageStyle is for both. */
+extern const PageAsset kPageBody, kPageScript, kLiveBody, kLiveStyle, kLiveScript, kPageStyle, kSharedScript,
+    kChartScript;
 
 }  // namespace forereach

@@ -23,14 +23,15 @@ std::string Base64(std::string_view bytes) {
   return text;
 }
 
-std::string Packed(std::string_view bytes) {
+nlohmann::json Packed(std::string_view bytes) {
   uLongf size = compressBound(bytes.size());
   std::string packed(size, '\0');
   const int result = compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
                                reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), Z_DEFAULT_COMPRESSION);
   if (result != Z_OK) throw std::bad_alloc();  // the room is enough, so only memory can be short
   packed.resize(size);
-  return Base64(packed);
+  const std::string text = Base64(packed);
+  return nlohmann::json::binary({text.begin(), text.end()});
 }
 
 }  // namespace forereach

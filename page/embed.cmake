@@ -1,13 +1,18 @@
-# cmake -DOUT=assets.cpp -DDIRECTORY=page -DCHART=chart.min.js -P embed.cmake: the page's files as C++.
+# cmake -DOUT=assets.cpp -DDIRECTORY=page -DASSETS=NAME=FILE;... -P embed.cmake: files of the pages as C++. Where one has
+# <!-- FILE.html -->, the content of that file takes its place.
+cmake_minimum_required(VERSION 3.25)
 set(text "// Made by page/embed.cmake.\n#include \"page/assets.h\"\n\n")
 string(APPEND text "#pragma GCC diagnostic ignored \"-Woverlength-strings\"\n\nnamespace forereach {\n")
-foreach(asset kPageBody=${DIRECTORY}/page.html kPageStyle=${DIRECTORY}/page.css kPageScript=${DIRECTORY}/page.js
-    kChartScript=${CHART})
+foreach(asset ${ASSETS})
   string(REGEX MATCH "^([^=]+)=(.+)$" ignored "${asset}")
   set(name ${CMAKE_MATCH_1})
-  set(file ${CMAKE_MATCH_2})
-  file(READ ${file} content)
-  file(SHA256 ${file} digest)
+  file(READ ${CMAKE_MATCH_2} content)
+  if("${content}" MATCHES "<!-- ([a-z]+\\.html) -->")
+    set(part ${CMAKE_MATCH_1})
+    file(READ ${DIRECTORY}/${part} inserted)
+    string(REPLACE "<!-- ${part} -->" "${inserted}" content "${content}")
+  endif()
+  string(SHA256 digest "${content}")
   string(APPEND text "\nconst PageAsset ${name}{R\"~~~~~~(" "${content}" ")~~~~~~\", \"${digest}\"};\n")
 endforeach()
 file(WRITE ${OUT} "${text}\n}  // namespace forereach\n")

@@ -13,15 +13,14 @@
 
 #include "certifier/certify/batch.h"
 #include "certifier/certify/explain.h"
-#include "certifier/gate/candidate_message.h"
 #include "forereach/fault_t.hpp"
 #include "forereach/robot_state_t.hpp"
 #include "lcmtypes/names.h"
+#include "page/detail.h"
 #include "records/database.h"
 #include "records/interpreter.h"
 #include "records/log_survey.h"
 #include "records/log_tasks.h"
-#include "records/outlines.h"
 #include "records/timeline.h"
 
 namespace forereach {
@@ -98,7 +97,13 @@ class RowReader final : public TimelineUser {
 // ---- Tubes.
 
 constexpr std::size_t kNumbersOfObstacle = 10;
-constexpr const char* kFull = "the drawings of this page have reached their bound";
+
+std::size_t NumbersOf(const PageDetail& detail) { return detail.sketch.points.size() + detail.bodies.points.size(); }
+
+void LeaveOut(PageDetail& detail) {
+  detail.sketch = detail.bodies = {};
+  detail.missing = "the drawings of this page have reached their bound";
+}
 
 using Wanted = std::map<std::string, std::size_t>;  // by the name of a decision's event: its place
 
@@ -136,19 +141,13 @@ class DetailMaker final : public TimelineUser {
     if (!candidate) return Miss(detail, "its candidate cannot be read");
     if (!recorded.is_of_known_task) return Miss(detail, "its task is not kept next to the log");
     const Config& task = *recorded.basis.task;
-    if (!HasSizes(*candidate, *task.problem->model)) return Miss(detail, "its candidate is not of its task's sizes");
-    for (const std::string& why :
-         {WhyNoSchedule(*candidate, task.gate), WhyNotBounded(*candidate, task.problem->between, task.gate)})
-      if (!why.empty()) return Miss(detail, why);
+    if (const std::string why = WhyNotJudged(*candidate, task); !why.empty()) return Miss(detail, why);
     detail.task = TaskIndex(task);
     detail.obstacles = ObstaclesIndex(recorded.basis);
-    detail.start_utime = candidate->start_utime;
-    detail.step_us = candidate->step_us;
-    detail.steps = candidate->num_steps;
     if (recorded.decision.outcome == decision_t::CERTIFIED) executing_[candidate->plan_id] = {place, &task};
     obstacles_ = recorded.basis.obstacles;
     pending_.push_back(
-        {place, *candidate, ScheduleOf(*candidate, task.gate), recorded.decision.outcome, recorded.decision.step});
+        {{*candidate, ScheduleOf(*candidate, task.gate), recorded.decision.outcome, recorded.decision.step}, place});
     if (pending_.size() >= kBatch) CertifyAgain();
   }
 
@@ -173,11 +172,8 @@ class DetailMaker final : public TimelineUser {
  private:
   static constexpr std::size_t kBatch = 256;
 
-  struct Pending {
+  struct Pending : JudgedCandidate {
     std::size_t place;  // in PageRun::details
-    candidate_plan_t candidate;
-    Schedule schedule;
-    int outcome, step;
   };
 
   static void Miss(PageDetail& detail, std::string why) { detail.missing = std::move(why); }
@@ -220,46 +216,14 @@ class DetailMaker final : public TimelineUser {
         run_.details[each.place].missing = std::string("it cannot be judged again: ") + error.what();
       }
     const auto describe = [&](std::size_t i, const Decision& again, const Tube& tube) {
-      Describe(*asked[i], again, tube, run_.details[asked[i]->place]);
+      Describe(*certifier_, *asked[i], again, tube, run_.details[asked[i]->place]);
     };
     static_cast<void>(CertifyAll(*certifier_, plans, initial_sets, *obstacles_, threads_, describe));
     for (const Pending* each : asked) {
       PageDetail& detail = run_.details[each->place];
-      if (TakeRoom(detail.sketch.points.size())) continue;
-      detail.sketch = {};
-      detail.missing = kFull;
+      if (!TakeRoom(NumbersOf(detail))) LeaveOut(detail);
     }
     pending_.clear();
-  }
-
-  void Describe(const Pending& asked, const Decision& again, const Tube& tube, PageDetail& detail) const {
-    if (static_cast<int>(again.outcome) != asked.outcome || again.step != asked.step)
-      return Miss(detail, "this program decides it otherwise than the log: replay it");
-    const bool is_certified = again.outcome == Outcome::kCertified;
-    detail.part = again.part;
-    detail.binding = is_certified ? again.closest_step : again.step;
-    if (again.outcome == Outcome::kFalsified && again.step < 0)
-      return Miss(detail, "the observations contradict the declaration, so there is no tube");
-    AddBinding(tube, detail);
-    if (certifier_->problem().projection.rows() != 2) return Miss(detail, "its safety coordinates are not planar");
-    if (auto sketch = MakeSketch(Sweeps(*certifier_, tube, is_certified ? tube.length() : again.step)))
-      detail.sketch = std::move(*sketch);
-    else
-      Miss(detail, "its tube has no finite outline");
-  }
-
-  static void AddBinding(const Tube& tube, PageDetail& detail) {
-    const int t = detail.binding;
-    if (t < 0 || t > tube.length()) return;
-    for (int k = 0; k < tube.slice(t).dim(); ++k) {
-      const Interval hull = tube.hull(t, k);
-      detail.hull_lower.push_back(hull.lower);
-      detail.hull_upper.push_back(hull.upper);
-      if (t == tube.length()) continue;
-      const ResidualBounds& envelope = tube.step(t).envelope;
-      detail.envelope_lower.push_back(envelope.lower[ToSize(k)]);
-      detail.envelope_upper.push_back(envelope.upper[ToSize(k)]);
-    }
   }
 
   const Wanted& wanted_;
@@ -412,12 +376,10 @@ void AddDetails(PageRun& page, PageRun&& details, std::size_t& numbers) {
       }
       detail.obstacles = place->second;
     }
-    if (detail.sketch.points.size() <= numbers) {
-      numbers -= detail.sketch.points.size();
-    } else {
-      detail.sketch = {};
-      detail.missing = kFull;
-    }
+    if (const std::size_t size = NumbersOf(detail); size <= numbers)
+      numbers -= size;
+    else
+      LeaveOut(detail);
     page.details.push_back(std::move(detail));
   }
 }

@@ -1,45 +1,13 @@
-// The page of a run. Its data are columns of numbers and dictionaries of texts. Texts come from logs, which anyone may have
-// written: they reach the document through textContent only.
+// The page of a run. Its data are columns of numbers and dictionaries of texts.
 'use strict';
 (() => {
+const {OUTCOMES, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf, timeText, clockText,
+  listed, drawChart, axis, legend, fillTable, fillList, unitsOf, view, canBeDrawn, startView, drawTube, showLegend} = ForeReach;
 
-// ---- Words and colours. Okabe and Ito's colours can be told apart with any kind of colour vision.
-const OUTCOMES = {
-  certified: {label: 'certified', color: '#0072B2'},
-  abstain_safety: {label: 'abstain S', color: '#E69F00'},
-  abstain_domain: {label: 'abstain D', color: '#56B4E9'},
-  abstain_falsified: {label: 'abstain F', color: '#CC79A7'},
-  abstain_deadline: {label: 'abstain, late', color: '#F0E442'},
-  abstain_obstacles: {label: 'abstain, no obstacles', color: '#D55E00'},
-  rejected: {label: 'rejected', color: '#8A8F98'},
-};
-const EXECUTED = '#009E73', WRONG = '#D55E00', INK = '#1b1f24', SOFT = '#5b6470', LINE = '#d9dee4';
-const outcomeLabel = (name) => OUTCOMES[name]?.label ?? name;
-const outcomeColor = (name) => OUTCOMES[name]?.color ?? '#000000';
-
-const byId = (id) => document.getElementById(id);
-const make = (tag, text, className) => {
-  const element = document.createElement(tag);
-  if (text !== undefined) element.textContent = text;
-  if (className) element.className = className;
-  return element;
-};
-const counted = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
-const number = (x, digits = 6) =>
-  Number.isNaN(x) ? '–' : x === Infinity ? '∞' : x === -Infinity ? '−∞' : String(Number(x.toPrecision(digits)));
-const percent = (part, whole) => (whole > 0 ? `${(100 * part / whole).toFixed(1)} %` : '–');
-const duration = (us) => {
-  if (!Number.isFinite(us)) return number(us);
-  return us < 1000 ? `${number(us, 4)} µs` : us < 1e6 ? `${number(us / 1e3, 4)} ms` : `${number(us / 1e6, 4)} s`;
-};
-// Microseconds since the epoch. Times beyond a calendar stay numbers.
-const dateOf = (us) => (Math.abs(us) <= 8.64e18 / 1e3 ? new Date(us / 1000) : null);
-const timeText = (us) => dateOf(us)?.toISOString().replace('T', ' ').replace('Z', '') ?? `${us} µs`;
-const clockText = (us) => dateOf(us)?.toISOString().slice(11, 23) ?? `${us} µs`;
-
-// ---- Columns: base64 of zlib's format.
+// ---- Columns: base64 of zlib's format, each in an element of its own.
 const ARRAYS = {i8: Int8Array, u8: Uint8Array, i16: Int16Array, u16: Uint16Array, i32: Int32Array, u32: Uint32Array,
-  i64: BigInt64Array, u64: BigUint64Array, f32: Float32Array, f64: Float64Array};
+  i64: BigInt64Array, f32: Float32Array, f64: Float64Array};
+const packed = document.getElementsByClassName('column');
 
 const bytesOf = (base64) => {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(base64);
@@ -47,24 +15,29 @@ const bytesOf = (base64) => {
   for (let i = 0; i < bytes.length; ++i) bytes[i] = text.charCodeAt(i);
   return bytes;
 };
-const unpack = (base64) =>
-  new Response(new Blob([bytesOf(base64)]).stream().pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();
+const unpack = (column) => {
+  const stream = new DecompressionStream('deflate'), writer = stream.writable.getWriter();
+  for (const done of [writer.write(bytesOf(packed[column.data].textContent)), writer.close()]) done.catch(() => {});  // the reader is told
+  return new Response(stream.readable).arrayBuffer();
+};
+const numbersIn = async (column) => new ARRAYS[column.type](await unpack(column));
 
 // An object of columns with the same keys: {values, names?} or, of texts, {bytes, ends}.
 const unpackTable = async (columns) => {
   const table = {};
   await Promise.all(Object.entries(columns).map(async ([name, column]) => {
-    const buffer = await unpack(column.data);
     if (column.type === 'text')
-      table[name] = {bytes: new Uint8Array(buffer), ends: new Uint32Array(await unpack(column.ends.data))};
+      table[name] = {bytes: new Uint8Array(await unpack(column)), ends: await numbersIn(column.ends)};
     else
-      table[name] = {values: new ARRAYS[column.type](buffer), names: column.names};
+      table[name] = {values: await numbersIn(column), names: column.names};
   }));
   return table;
 };
+// Of 64-bit integers, by their halves, since big integers are slow.
 const toNumbers = (bigs) => {
-  const numbers = new Float64Array(bigs.length);
-  for (let i = 0; i < numbers.length; ++i) numbers[i] = Number(bigs[i]);
+  if (!(bigs instanceof BigInt64Array)) return Float64Array.from(bigs);
+  const numbers = new Float64Array(bigs.length), low = new Uint32Array(bigs.buffer), high = new Int32Array(bigs.buffer);
+  for (let i = 0; i < numbers.length; ++i) numbers[i] = 2 ** 32 * high[2 * i + 1] + low[2 * i];
   return numbers;
 };
 const decoder = new TextDecoder();
@@ -78,9 +51,13 @@ const hexAt = (bytes, i) => {
 
 // ---- One side of the page: decisions and the other records of a run, and which of them are shown.
 const OTHERS = ['events', 'gaps', 'faults', 'withdrawals'];
+// Columns of decisions that choices and figures need. The others follow when these are on the screen.
+const FIRST = ['run', 'robot', 'utime', 'plan', 'source', 'outcome', 'cause', 'step', 'obstacle', 'elapsed', 'latency', 'config'];
+const columnsOf = (raw, isFirst) =>
+  Object.fromEntries(Object.entries(raw.decisions).filter(([name]) => FIRST.includes(name) === isFirst));
 
 const loadRun = async (raw) => {
-  const run = {raw, count: raw.count, decisions: await unpackTable(raw.decisions)};
+  const run = {raw, count: raw.count, decisions: await unpackTable(columnsOf(raw, true))};
   for (const name of OTHERS) run[name] = await unpackTable(raw[name]);
   const d = run.decisions;
   run.time = toNumbers(d.utime.values);
@@ -101,7 +78,13 @@ const loadRun = async (raw) => {
   run.shown = new Uint8Array(run.count);
   run.rows = new Uint32Array(run.count);  // those that are shown, in the order of the log
   run.size = 0;
+  run.sorted = {};  // their times
   return run;
+};
+
+const loadRest = async (run) => {
+  Object.assign(run.decisions, await unpackTable(columnsOf(run.raw, false)));
+  run.drawings = await loadDrawings(run.raw.drawings);
 };
 
 // The bytes of all sentences as text of one character a byte, so that a search is one pass over them.
@@ -118,7 +101,7 @@ const search = (run, query, found) => {
   const digest = /^[0-9a-f]{6,64}$/i.test(query) ? query.toLowerCase() : null;
   for (let i = 0; i < run.count; ++i)
     found[i] = sources[d.source.values[i]] || causes[d.cause.values[i]] || outcomes[d.outcome.values[i]] ||
-      (plan !== null && d.plan.values[i] === plan) ? 1 : 0;
+      (plan !== null && d.plan.values[i] == plan) ? 1 : 0;
   if (d.message) {
     const hay = sentencesOf(run), ends = d.message.ends;
     for (let at = hay.indexOf(needle), row = 0; at >= 0; at = hay.indexOf(needle, ends[row])) {
@@ -147,6 +130,7 @@ const select = (run, filters, {withTime = true} = {}) => {
     for (let i = 0; i < run.count; ++i) if (values[i] !== wanted) shown[i] = 0;
   }
   run.size = 0;
+  run.sorted = {};
   for (let i = 0; i < run.count; ++i) {
     if (!(from <= run.time[i] && run.time[i] <= to)) shown[i] = 0;
     if (shown[i]) run.rows[run.size++] = i;
@@ -168,14 +152,15 @@ const select = (run, filters, {withTime = true} = {}) => {
 };
 
 // ---- Figures.
-const sortedOf = (run, values) => {
-  const sorted = new Float64Array(run.size);
+const sortedOf = (run, name) => {
+  if (run.sorted[name]) return run.sorted[name];
+  const {values} = run.decisions[name], sorted = new Float64Array(run.size);
   let count = 0;
   for (let k = 0; k < run.size; ++k) {
     const value = values[run.rows[k]];
     if (value > 0 && value < Infinity) sorted[count++] = value;  // zero: the simulated clock stops during computations
   }
-  return sorted.subarray(0, count).sort();
+  return run.sorted[name] = sorted.subarray(0, count).sort();
 };
 // Nearest rank.
 const quantile = (sorted, q) => (sorted.length ? sorted[Math.max(0, Math.ceil(q * sorted.length) - 1)] : NaN);
@@ -194,14 +179,13 @@ const countKinds = (table, column) => {
     if (table.shown[i]) counts.set(nameAt(table[column], i), (counts.get(nameAt(table[column], i)) ?? 0) + 1);
   return counts;
 };
-const listed = (counts) => [...counts].sort((a, b) => b[1] - a[1]).map(([name, n]) => `${name} ${counted(n)}`).join(', ');
 const total = (shown) => shown.reduce((sum, x) => sum + x, 0);
 
 const figuresOf = (run) => {
   const outcomes = countBy(run, run.decisions.outcome);
   const of = (name) => outcomes.get(name) ?? 0;
   const abstained = [...outcomes].filter(([name]) => name.startsWith('abstain')).reduce((sum, [, n]) => sum + n, 0);
-  const latency = sortedOf(run, run.decisions.latency.values), gate = sortedOf(run, run.decisions.elapsed.values);
+  const latency = sortedOf(run, 'latency'), gate = sortedOf(run, 'elapsed');
   const kinds = countKinds(run.events, 'kind'), reasons = new Map();
   const first = [];
   for (let k = 0; k < run.size; ++k) {
@@ -225,11 +209,11 @@ const figuresOf = (run) => {
     ['Abstained', percent(abstained, run.size),
       [...outcomes].filter(([name]) => name.startsWith('abstain')).map(([name, n]) => `${outcomeLabel(name).replace(/^abstain,? /, '')} ${counted(n)}`).join(', ')],
     ['Rejected', percent(of('rejected'), run.size), counted(of('rejected'))],
-    ['First step that fails', first.length ? `${quantile(first, .5)}` : '–',
+    ['First step that fails', first.length ? `${quantile(first, .5)}` : '\u2013',
       first.length ? `median; from ${first[0]} to ${first.at(-1)}` : 'no abstention names a step'],
     ['Latency', duration(quantile(latency, .5)), `median; ${times(latency)}`],
     ['Gate', duration(quantile(gate, .5)), `median; ${times(gate)}`],
-    ['Steps in their slice', inside + outside > 0 ? percent(inside, inside + outside) : '–',
+    ['Steps in their slice', inside + outside > 0 ? percent(inside, inside + outside) : '\u2013',
       `${counted(inside)} of ${counted(inside + outside)}`],
     ['Withdrawals', counted(total(run.withdrawals.shown)), listed(countKinds(run.withdrawals, 'kind'))],
     ['Faults', counted(total(run.faults.shown)), listed(countKinds(run.faults, 'kind'))],
@@ -250,22 +234,6 @@ const showFigures = (run, before) => {
     return card;
   }));
 };
-
-// ---- Charts.
-const charts = {};
-const drawChart = (id, label, config) => {
-  const canvas = byId(id);
-  canvas.setAttribute('aria-label', label);
-  if (!charts[id]) {
-    charts[id] = new Chart(canvas, {...config, options: {animation: false, responsive: true, maintainAspectRatio: false, ...config.options}});
-    return;
-  }
-  charts[id].data = config.data;
-  charts[id].options = {animation: false, responsive: true, maintainAspectRatio: false, ...config.options};
-  charts[id].update('none');
-};
-const axis = (title, more = {}) => ({title: {display: true, text: title, color: SOFT}, grid: {color: '#eef1f4'}, ticks: {color: SOFT}, ...more});
-const legend = (display) => ({display, position: 'bottom', labels: {boxWidth: 12, boxHeight: 12, color: INK}});
 
 const BINS = 48;
 const trendOf = (run) => {
@@ -314,7 +282,7 @@ const showTrend = (run) => {
   });
 };
 
-const showCauses = (run) => {
+const causesOf = (run) => {
   const d = run.decisions, counts = new Map();
   for (let k = 0; k < run.size; ++k) {
     const i = run.rows[k], outcome = nameAt(d.outcome, i), cause = nameAt(d.cause, i);
@@ -323,13 +291,22 @@ const showCauses = (run) => {
     ++entry.count;
     counts.set(cause, entry);
   }
+  return counts;
+};
+// Beside a run before, shares: the runs differ in length.
+const showCauses = (run, before) => {
+  const counts = causesOf(run), old = before ? causesOf(before) : new Map();
+  for (const entry of old.values()) if (!counts.has(entry.cause)) counts.set(entry.cause, {...entry, count: 0});
   const entries = [...counts.values()].sort((a, b) => b.count - a.count).slice(0, 12);
+  const value = (count, whole) => (before ? 100 * count / Math.max(whole, 1) : count);
+  const sets = [{label: 'this run', data: entries.map((e) => value(e.count, run.size)), backgroundColor: entries.map((e) => outcomeColor(e.outcome)), maxBarThickness: 22}];
+  if (before) sets.push({label: 'before', data: entries.map((e) => value(old.get(e.cause)?.count ?? 0, before.size)), backgroundColor: '#c3c8cf', maxBarThickness: 22});
   drawChart('causes', `Causes: ${entries.map((e) => `${e.cause} ${e.count}`).join(', ') || 'none'}`, {
     type: 'bar',
     data: {labels: entries.map((e) => e.cause.replaceAll('_', ' ')),
-      datasets: [{data: entries.map((e) => e.count), backgroundColor: entries.map((e) => outcomeColor(e.outcome)), maxBarThickness: 22}]},
-    options: {indexAxis: 'y', plugins: {legend: legend(false)},
-      scales: {x: axis('decisions', {beginAtZero: true}), y: axis('', {title: {display: false}, grid: {display: false}})},
+      datasets: sets},
+    options: {indexAxis: 'y', plugins: {legend: legend(Boolean(before))},
+      scales: {x: axis(before ? '% of the decisions' : 'decisions', {beginAtZero: true}), y: axis('', {title: {display: false}, grid: {display: false}})},
       onClick: (event, items) => { if (items.length) setChoice('cause', entries[items[0].index].cause); }},
   });
 };
@@ -361,8 +338,8 @@ const QUANTILES = [['p50', .5], ['p90', .9], ['p99', .99], ['p99.9', .999], ['mo
 // Of a logarithmic axis, labels at powers of ten alone.
 const powers = {color: SOFT, maxRotation: 0, callback: (value) => (Math.abs(Math.log10(value) % 1) < 1e-9 ? String(value) : '')};
 const showTimes = (run) => {
-  const sides = [['Latency', sortedOf(run, run.decisions.latency.values), '#0072B2'],
-    ['Gate', sortedOf(run, run.decisions.elapsed.values), '#D55E00']];
+  const sides = [['Latency', sortedOf(run, 'latency'), '#0072B2'],
+    ['Gate', sortedOf(run, 'elapsed'), '#D55E00']];
   const points = (sorted) => {
     const all = [];
     for (let k = 0; k <= 160; ++k) {
@@ -383,26 +360,9 @@ const showTimes = (run) => {
       ['measured', ...sides.map(([, sorted]) => counted(sorted.length))]], [1, 2]);
 };
 
-// ---- Small tables. A cell is a text or an element.
-const fillTable = (table, caption, heads, rows, numeric = []) => {
-  const cell = (tag, content, k) => {
-    const td = make(tag, undefined, numeric.includes(k) ? 'n' : '');
-    td.append(content);
-    return td;
-  };
-  const line = (tag, contents) => {
-    const tr = make('tr');
-    tr.append(...contents.map((content, k) => cell(tag, content, k)));
-    return tr;
-  };
-  const head = make('thead'), body = make('tbody');
-  head.append(line('th', heads));
-  body.append(...rows.map((row) => line('td', row)));
-  table.replaceChildren(make('caption', caption), head, body);
-};
-
 const MOST_GROUPS = 8;
-const showGroups = (run, id, caption, name, label) => {
+// By text, so that groups of two runs are the same.
+const groupsOf = (run, name) => {
   const d = run.decisions, groups = new Map();
   for (let k = 0; k < run.size; ++k) {
     const i = run.rows[k], value = d[name].values[i];
@@ -411,19 +371,24 @@ const showGroups = (run, id, caption, name, label) => {
     if (nameAt(d.outcome, i) === 'certified') ++group.certified;
     groups.set(value, group);
   }
-  const key = (value) => (d[name].names ? d[name].names[value] : String(value));
+  return new Map([...groups].map(([value, group]) => [d[name].names ? d[name].names[value] : String(value), group]));
+};
+const showGroups = (run, before, id, caption, name, label) => {
+  const old = before ? groupsOf(before, name) : null, groups = groupsOf(run, name);
+  for (const key of old?.keys() ?? []) if (!groups.has(key)) groups.set(key, {count: 0, certified: 0});
   const all = [...groups].sort((a, b) => b[1].count - a[1].count);
-  const rows = all.slice(0, MOST_GROUPS).map(([value, {count, certified}]) => {
-    const button = make('button', label(key(value)));
+  const rows = all.slice(0, MOST_GROUPS).map(([key, {count, certified}]) => {
+    const button = make('button', label(key));
     button.type = 'button';
-    button.addEventListener('click', () => setChoice(name, key(value)));
+    button.addEventListener('click', () => setChoice(name, key));
     const bar = make('span', undefined, 'bar'), filled = make('i');
-    filled.style.width = `${100 * certified / count}%`;
+    filled.style.width = `${count > 0 ? 100 * certified / count : 0}%`;
     bar.append(filled);
-    return [button, counted(count), percent(certified, count), bar];
+    const then = old?.get(key);
+    return [button, counted(count), percent(certified, count), bar, ...(old ? [then ? `${percent(then.certified, then.count)} of ${counted(then.count)}` : '\u2013'] : [])];
   });
-  if (all.length > MOST_GROUPS) rows.push([`and ${counted(all.length - MOST_GROUPS)} others`, '', '', '']);
-  fillTable(byId(id), caption, ['', 'decisions', 'certified', ''], rows, [1, 2]);
+  if (all.length > MOST_GROUPS) rows.push([`and ${counted(all.length - MOST_GROUPS)} others`, '', '', '', ...(old ? [''] : [])]);
+  fillTable(byId(id), caption, ['', 'decisions', 'certified', '', ...(old ? ['certified before'] : [])], rows, [1, 2, 4]);
 };
 
 const MOST_OTHERS = 100;
@@ -465,7 +430,7 @@ const COLUMNS = [
 ];
 const narrow = matchMedia('(max-width: 46rem)');
 // Of a long number, as a planner makes of the time, the digits that differ.
-const lastDigits = (text) => (text.length > 8 ? `…${text.slice(-7)}` : text);
+const lastDigits = (text) => (text.length > 8 ? `\u2026${text.slice(-7)}` : text);
 const indexText = (index) => (index < 0 ? '' : String(index));
 const rowHeight = () => (narrow.matches ? 40 : 30);
 const MOST_PIXELS = 12e6;  // browsers lay out no more than about 16 million
@@ -482,7 +447,9 @@ const sortKey = (run, column) => {
 // Rows without a value come last, whatever the direction; equal ones in the order of the log.
 const sortRows = (run) => {
   const key = sortKey(run, COLUMNS.find((column) => column.id === grid.sort)), sign = grid.falls ? -1 : 1;
-  grid.order = run.rows.slice(0, run.size).sort((a, b) => {
+  grid.order = run.rows.slice(0, run.size);
+  if (grid.order.every((row, k) => k === 0 || sign * key[grid.order[k - 1]] <= sign * key[row])) return;
+  grid.order.sort((a, b) => {
     const x = key[a], y = key[b];
     return x < y ? -sign : x > y ? sign : x === y ? a - b : Number.isNaN(x) - Number.isNaN(y) || a - b;
   });
@@ -491,7 +458,7 @@ const sortRows = (run) => {
 const showHead = (run) => {
   byId('head').replaceChildren(...COLUMNS.map((column) => {
     const isSorted = grid.sort === column.id, isSortable = column.key || column.names;
-    const cell = make(isSortable ? 'button' : 'span', column.title + (isSorted ? (grid.falls ? ' ▾' : ' ▴') : ''),
+    const cell = make(isSortable ? 'button' : 'span', column.title + (isSorted ? (grid.falls ? ' \u25be' : ' \u25b4') : ''),
       (column.rare ? 'rare ' : '') + (column.number ? 'n' : ''));
     cell.setAttribute('role', 'columnheader');
     if (isSortable) {
@@ -605,213 +572,27 @@ const startGrid = (run) => {
 // ---- Drawings.
 const loadDrawings = async (raw) => {
   const texts = JSON.parse(decoder.decode(await unpack(raw.texts)));
-  const {parts, corners, points} = await unpackTable({parts: raw.parts, corners: raw.corners, points: raw.points});
-  const ofRow = new Map();
-  let part = 0, polygon = 0, point = 0;
+  const [tubes, bodies] = await Promise.all([unpackTable(raw.tubes), unpackTable(raw.bodies)]);
+  const ofRow = new Map(), atTube = {part: 0, polygon: 0, point: 0}, atBody = {part: 0, polygon: 0, point: 0};
+  const skip = ({parts, corners}, at, units) => {
+    for (let u = 0; u < units; ++u)
+      for (let k = parts.values[at.part++]; k > 0; --k) at.point += 2 * corners.values[at.polygon++];
+  };
   for (const detail of texts.details) {  // where its numbers begin
-    detail.at = {part, polygon, point};
+    detail.at = {...atTube};
+    detail.body_at = {...atBody};
     detail.executed = detail.executed.filter(([, x, y]) => canBeDrawn(x, y));
-    for (let u = 0; u < detail.units; ++u)
-      for (let k = parts.values[part++]; k > 0; --k) point += 2 * corners.values[polygon++];
+    skip(tubes, atTube, detail.units);
+    skip(bodies, atBody, detail.body_units);
     ofRow.set(detail.row, detail);
   }
-  return {ofRow, sets: texts.obstacle_sets, parts: parts.values, corners: corners.values, points: points.values};
+  const valuesOf = ({parts, corners, points}) => ({parts: parts.values, corners: corners.values, points: points.values});
+  return {ofRow, sets: texts.obstacle_sets, tubes: valuesOf(tubes), bodies: valuesOf(bodies)};
 };
-
-// The polygons of each unit, as arrays of x and y in metres.
-const unitsOf = (drawings, detail) => {
-  const [x0, y0, quantum] = detail.grid;
-  let {part, polygon, point} = detail.at;
-  return Array.from({length: detail.units}, () => Array.from({length: drawings.parts[part++]}, () => {
-    let x = 0, y = 0;
-    return Array.from({length: drawings.corners[polygon++]}, () => {
-      x += drawings.points[point++];
-      y += drawings.points[point++];
-      return [x0 + quantum * x, y0 + quantum * y];
-    });
-  }));
-};
-
-const SVG = 'http://www.w3.org/2000/svg';
-const shape = (tag, attributes) => {
-  const element = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  return element;
-};
-// y points up.
-const pointsText = (points) => points.map(([x, y]) => `${x},${-y}`).join(' ');
-const outline = (points, attributes) =>
-  shape('polygon', {points: pointsText(points), 'vector-effect': 'non-scaling-stroke', 'stroke-linejoin': 'round', ...attributes});
-
-const view = {x: 0, y: 0, width: 1, height: 1, whole: null, scene: null};
-
-// Beyond this, numbers of a log are no places in a drawing.
-const canBeDrawn = (...numbers) => numbers.every((x) => Math.abs(x) < 1e9);
-
-// Where an obstacle is at a time: its points and its radius, or null.
-const placeOf = (obstacle, time) => {
-  if (!obstacle?.points) return null;
-  const {points, radius, motion} = obstacle;
-  if (!motion) return {points, radius};
-  if (time < motion.from || motion.until < time) return null;
-  const tau = (time - motion.stamp) / 1e6;
-  return {points: points.map(([x, y]) => [x + motion.velocity[0] * tau, y + motion.velocity[1] * tau]),
-    radius: radius + motion.uncertainty + motion.growth * Math.abs(tau) + motion.growth_rate * tau * tau / 2};
-};
-const centerOf = (points) => [0, 1].map((k) => points.reduce((sum, point) => sum + point[k], 0) / points.length);
-
-// A hull of points, each with a disc of this radius, is their polygon with a round border as wide.
-const drawObstacle = (obstacle, place, isBinding) => {
-  const color = isBinding ? WRONG : '#6b7280';
-  if (obstacle.normal) {
-    const [nx, ny] = obstacle.normal, norm = Math.hypot(nx, ny), far = 50 * Math.max(view.whole.width, view.whole.height);
-    const [ux, uy] = [nx / norm, ny / norm], [cx, cy] = [ux * obstacle.offset / norm, uy * obstacle.offset / norm];
-    if (!canBeDrawn(cx, cy)) return shape('g', {});
-    return outline([[cx - far * uy, cy + far * ux], [cx + far * uy, cy - far * ux], [cx + far * (uy + ux), cy + far * (uy - ux)],
-      [cx + far * (ux - uy), cy + far * (uy + ux)]], {fill: color, 'fill-opacity': .28, stroke: color, 'stroke-width': isBinding ? 2 : 1});
-  }
-  const group = shape('g', {opacity: isBinding ? .5 : .38});
-  if (place.points.length === 1)
-    group.append(shape('circle', {cx: place.points[0][0], cy: -place.points[0][1], r: Math.max(place.radius, 0), fill: color}));
-  else
-    group.append(shape('polygon', {points: pointsText(place.points), fill: color, stroke: color, 'stroke-width': 2 * place.radius, 'stroke-linejoin': 'round'}));
-  return group;
-};
-
-const showView = () => {
-  const svg = byId('svg');
-  svg.setAttribute('viewBox', `${view.x} ${view.y} ${view.width} ${view.height}`);
-  const box = svg.getBoundingClientRect();
-  const perPixel = Math.max(view.width / Math.max(box.width, 1), view.height / Math.max(box.height, 1));
-  for (const label of svg.querySelectorAll('text')) label.setAttribute('font-size', 12 * perPixel);
-  for (const dot of svg.querySelectorAll('.dot')) dot.setAttribute('r', (dot.isNow ? 5 : 2.2) * perPixel);
-  const target = 110 * perPixel, base = Math.pow(10, Math.floor(Math.log10(target)));
-  const length = [5, 2, 1].map((k) => k * base).find((l) => l <= target) ?? base;
-  byId('scale').style.width = `${length / perPixel}px`;
-  byId('scale').firstElementChild.textContent = `${number(length)} m`;
-};
-const zoom = (factor, x = .5, y = .5) => {
-  const width = view.width * factor, height = view.height * factor;
-  if (!(width > 1e-6 * view.whole.width && width < 100 * view.whole.width)) return;
-  view.x += (view.width - width) * x;
-  view.y += (view.height - height) * y;
-  view.width = width;
-  view.height = height;
-  showView();
-};
-const pan = (dx, dy) => { view.x += dx * view.width; view.y += dy * view.height; showView(); };
-const showWhole = () => { Object.assign(view, view.whole); showView(); };
-
-const startView = () => {
-  const svg = byId('svg'), fingers = new Map();
-  const shareOf = (event) => {
-    const box = svg.getBoundingClientRect();
-    return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
-  };
-  svg.addEventListener('wheel', (event) => {
-    if (document.activeElement !== svg && !event.ctrlKey) return;  // else the page scrolls
-    event.preventDefault();
-    zoom(Math.pow(1.0015, event.deltaY), ...shareOf(event));
-  }, {passive: false});
-  svg.addEventListener('pointerdown', (event) => { svg.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); });
-  svg.addEventListener('pointermove', (event) => {
-    const last = fingers.get(event.pointerId);
-    if (!last || !view.whole) return;
-    if (fingers.size === 1) {
-      const box = svg.getBoundingClientRect(), perPixel = Math.max(view.width / box.width, view.height / box.height);
-      pan(-(event.clientX - last.clientX) * perPixel / view.width, -(event.clientY - last.clientY) * perPixel / view.height);
-    } else {
-      const other = [...fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
-      const gap = (finger) => Math.max(20, Math.hypot(finger.clientX - other.clientX, finger.clientY - other.clientY));
-      zoom(gap(last) / gap(event), ...shareOf(other));
-    }
-    fingers.set(event.pointerId, event);
-  });
-  for (const end of ['pointerup', 'pointercancel']) svg.addEventListener(end, (event) => fingers.delete(event.pointerId));
-  svg.addEventListener('keydown', (event) => {
-    const act = {ArrowLeft: () => pan(-.1, 0), ArrowRight: () => pan(.1, 0), ArrowUp: () => pan(0, -.1), ArrowDown: () => pan(0, .1),
-      '+': () => zoom(.8), '=': () => zoom(.8), '-': () => zoom(1.25), 0: showWhole}[event.key];
-    if (!act || !view.whole) return;
-    act();
-    event.preventDefault();
-  });
-  byId('closer').addEventListener('click', () => zoom(.7));
-  byId('wider').addEventListener('click', () => zoom(1 / .7));
-  byId('whole').addEventListener('click', showWhole);
-  byId('step').addEventListener('input', showStep);
-  new ResizeObserver(() => { if (view.whole) showView(); }).observe(svg);
-};
-
-// The tube, and the obstacle that decides if it is not much larger.
-const extentOf = (units, executed, place) => {
-  let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
-  const add = ([x, y]) => { left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y); };
-  units.flat(2).forEach(add);
-  executed.forEach(([, x, y]) => add([x, y]));
-  const size = Math.max(right - left, top - bottom, 1e-3);
-  for (const [x, y] of place && place.radius < size && canBeDrawn(...place.points.flat()) ? place.points : [])
-    if (Math.abs(x - (left + right) / 2) < 1.5 * size && Math.abs(y - (top + bottom) / 2) < 1.5 * size)
-      for (const way of [-1, 1]) add([x + way * place.radius, y + way * place.radius]);
-  const border = Math.max(.12 * Math.max(right - left, top - bottom), 1e-3);
-  const width = right - left + 2 * border, height = Math.max(top - bottom + 2 * border, .45 * width);
-  return {x: left - border, y: -(top + bottom) / 2 - height / 2, width, height};
-};
-
-// What the step slider changes is in groups of its own.
-const drawTube = (run, i, detail) => {
-  const units = unitsOf(run.drawings, detail), outcome = nameAt(run.decisions.outcome, i), color = outcomeColor(outcome);
-  const binding = outcome === 'rejected' ? -1 : run.decisions.obstacle.values[i];
-  const executed = new Set(detail.executed.map(([step]) => step));
-  const set = run.drawings.sets[detail.obstacles] ?? [];
-  view.whole = extentOf(units, detail.executed, placeOf(set[binding], detail.start + Math.max(detail.binding, 0) * detail.step_us));
-  const tube = shape('g', {}), path = shape('g', {}), now = shape('g', {}), obstacles = shape('g', {}), labels = shape('g', {});
-  units.forEach((polygons, u) => polygons.forEach((polygon) => tube.append(outline(polygon, {
-    fill: executed.has(u) ? EXECUTED : color, 'fill-opacity': executed.has(u) ? .2 : .13,
-    stroke: executed.has(u) ? EXECUTED : color, 'stroke-opacity': .45, 'stroke-width': .8}))));
-  for (const polygon of units[detail.binding] ?? []) path.append(outline(polygon, {fill: 'none', stroke: WRONG, 'stroke-width': 2}));
-  if (detail.executed.length > 1)
-    path.append(shape('polyline', {points: pointsText(detail.executed.map(([, x, y]) => [x, y])), fill: 'none', stroke: INK, 'stroke-width': 1, 'vector-effect': 'non-scaling-stroke'}));
-  for (const [step, x, y] of detail.executed) {
-    const dot = shape('circle', {class: 'dot', cx: x, cy: -y, fill: INK});
-    dot.step = step;
-    path.append(dot);
-  }
-  byId('svg').replaceChildren(obstacles, tube, path, now, labels);
-  view.scene = {units, detail, color, binding, obstacles, now, path, labels, set};
-  const slider = byId('step');
-  slider.max = String(Math.max(0, units.length - 1));
-  slider.value = String(Math.max(0, Math.min(detail.binding, units.length - 1)));
-  Object.assign(view, view.whole);
-  showStep();
-};
-
-const showStep = () => {
-  const {scene} = view, step = Number(byId('step').value);
-  if (!scene) return;
-  const {detail, units} = scene, time = detail.start + step * detail.step_us;
-  byId('step-name').textContent = `Step ${step} of ${detail.steps}${step === detail.binding ? ', binding' : ''}`;
-  byId('step').setAttribute('aria-valuetext', byId('step-name').textContent);
-  scene.now.replaceChildren(...(units[step] ?? []).map((polygon) => outline(polygon, {fill: scene.color, 'fill-opacity': .35, stroke: INK, 'stroke-width': 1.6})));
-  for (const dot of scene.path.querySelectorAll('.dot')) dot.isNow = dot.step === step;
-  scene.obstacles.replaceChildren();
-  scene.labels.replaceChildren();
-  scene.set.forEach((obstacle, k) => {
-    const place = placeOf(obstacle, time), isBinding = k === scene.binding;
-    if (!obstacle || !(obstacle.normal ? canBeDrawn(...obstacle.normal, obstacle.offset) : place && canBeDrawn(place.radius, ...place.points.flat()))) return;
-    scene.obstacles.append(drawObstacle(obstacle, place, isBinding));
-    if (!place) return;
-    const [x, y] = centerOf(place.points);
-    const label = shape('text', {x, y: -y, 'text-anchor': 'middle', 'dominant-baseline': 'middle', fill: INK, 'pointer-events': 'none'});
-    label.textContent = String(k);
-    scene.labels.append(label);
-  });
-  showView();
-};
+const bodiesOf = (drawings, detail) =>
+  unitsOf(drawings.bodies, {units: detail.body_units, grid: detail.body_grid, at: detail.body_at});
 
 // ---- The detail of a decision.
-const fillList = (id, entries) => byId(id).replaceChildren(...entries.filter(([, value]) => value !== '' && value !== null)
-  .flatMap(([name, value]) => [make('dt', name), make('dd', value)]));
-
 // The name of the coordinate that an abstention is about.
 const coordinateText = (d, i, task) => {
   const k = d.coordinate.values[i], cause = nameAt(d.cause, i);
@@ -820,24 +601,14 @@ const coordinateText = (d, i, task) => {
   return task ? [...task.states, ...task.inputs][k] ?? `row ${k - task.states.length - task.inputs.length}` : String(k);
 };
 
-const showLegend = (color, detail) => {
-  const entries = [[color, 'tube'], ['#6b7280', 'obstacles, by their numbers'], [WRONG, 'binding step and obstacle']];
-  if (detail.executed.length) entries.splice(1, 0, [EXECUTED, 'executed slices'], [INK, 'measured states']);
-  byId('legend').replaceChildren(...entries.map(([background, text]) => {
-    const item = make('li'), chip = make('i', undefined, 'chip');
-    chip.style.background = background;
-    item.append(chip, text);
-    return item;
-  }));
-};
-
 const showEnvelope = (detail, task) => {
   const [lower, upper] = detail?.hull ?? [[], []], [low, up] = detail?.envelope ?? [[], []];
   byId('envelope').hidden = lower.length === 0;
   if (lower.length === 0) return;
-  const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 4)} … ${number(b ?? NaN, 4)}`);
-  fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual'],
-    lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k])]));
+  const range = (a, b) => (a === undefined ? '' : `${number(a ?? NaN, 4)} \u2026 ${number(b ?? NaN, 4)}`);
+  const nearest = (k) => (detail.nearest[k] >= 0 ? `${detail.nearest[k]}, \u00b1${number(detail.nearest_distance[k] ?? NaN, 3)} by its distance` : '');
+  fillTable(byId('envelope'), `At step ${detail.binding}`, ['state', 'slice', 'envelope of the residual', 'nearest observation'],
+    lower.map((_, k) => [task?.states[k] ?? String(k), range(lower[k], upper[k]), range(low[k], up[k]), nearest(k)]));
 };
 
 const showDetail = (run, i) => {
@@ -874,7 +645,8 @@ const showDetail = (run, i) => {
   view.scene = view.whole = null;
   if (!hasDrawing) return;
   showLegend(outcomeColor(outcome), detail);
-  drawTube(run, i, detail);
+  drawTube({units: unitsOf(run.drawings.tubes, detail), bodies: bodiesOf(run.drawings, detail), detail, outcome, binding: outcome === 'rejected' ? -1 : d.obstacle.values[i],
+    set: run.drawings.sets[detail.obstacles] ?? []});
 };
 
 // ---- Filters.
@@ -921,28 +693,29 @@ const setTime = (from, to) => {
 const start = async () => {
   const data = JSON.parse(byId('data').textContent);
   const run = await loadRun(data.run), before = data.before ? await loadRun(data.before) : null;
-  run.drawings = await loadDrawings(data.run.drawings);
   byId('main').hidden = false;
-  const sorted = run.time.slice().sort();
+  const from = run.time.reduce((a, b) => Math.min(a, b), Infinity), to = run.time.reduce((a, b) => Math.max(a, b), -Infinity);
   byId('what').textContent = `${data.run.name}: ${counted(run.count)} decisions` +
-    (run.count ? `, ${timeText(sorted[0])} to ${timeText(sorted.at(-1))} UTC` : '') + (before ? `. Before: ${data.before.name}` : '');
+    (run.count ? `, ${timeText(from)} to ${timeText(to)} UTC` : '') + (before ? `. Before: ${data.before.name}` : '');
   document.title = `ForeReach report: ${data.run.name}`;
   fillChoices(run);
-  show = () => {
+  const showSummary = () => {
     const filters = readFilters();
     select(run, filters);
     if (before) select(before, filters, {withTime: false});
     byId('shown').textContent = `${counted(run.size)} of ${counted(run.count)} decisions`;
     showFigures(run, before);
     showTrend(run);
-    showCauses(run);
+    showCauses(run, before);
     showSteps(run);
     showTimes(run);
-    showGroups(run, 'by-robot', 'By robot', 'robot', (name) => name || '(no name)');
-    showGroups(run, 'by-source', 'By source', 'source', (name) => name || '(no name)');
-    showGroups(run, 'by-config', 'By task, with its config digest', 'config', (digest) => taskLabel(run, digest));
-    showGroups(run, 'by-obstacle', 'By the obstacle that decided', 'obstacle', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`));
+    showGroups(run, before, 'by-robot', 'By robot', 'robot', (name) => name || '(no name)');
+    showGroups(run, before, 'by-source', 'By source', 'source', (name) => name || '(no name)');
+    showGroups(run, before, 'by-config', 'By task, with its config digest', 'config', (digest) => taskLabel(run, digest));
+    showGroups(run, before, 'by-obstacle', 'By the obstacle that decided', 'obstacle', (index) => (Number(index) < 0 ? 'none' : `obstacle ${index}`));
     showOthers(run);
+  };
+  const showDecisions = () => {
     sortRows(run);
     byId('grid').scrollTop = 0;
     if (run.size === 0) grid.chosen = -1;
@@ -950,6 +723,13 @@ const start = async () => {
     byId('detail').hidden = run.size === 0;
     if (run.size > 0) choose(run, Math.max(0, placeOfChosen()), {scroll: placeOfChosen() >= 0});
   };
+  show = () => {
+    showSummary();
+    showDecisions();
+  };
+  showSummary();
+  await new Promise((done) => setTimeout(done, 0));  // on the screen
+  await loadRest(run);
   showHead(run);
   startGrid(run);
   startView();
@@ -965,7 +745,8 @@ const start = async () => {
     ...(before ? ['The figures before pass the same filters, except the time.'] : []),
     ...[data.run, data.before].filter((side) => side?.damaged_places).map((side) => `${side.name}: the logs are damaged in ${counted(side.damaged_places)} places.`),
     ...data.run.notes, ...(data.before?.notes ?? [])].map((note) => make('li', note)));
-  show();
+  showDecisions();
+  byId('main').inert = false;
   document.body.dataset.ready = 'yes';
 };
 

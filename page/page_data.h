@@ -52,6 +52,12 @@ struct PageDetail {
   /** At the binding step, of each state: the hull of the slice, and the envelope of the residual if the step was made.
    */
   std::vector<double> hull_lower, hull_upper, envelope_lower, envelope_upper;
+  /** Of each state at the binding step: the observation of the task's file that is nearest to the slice's center and
+  the step's input by the row of L, and what this distance allows the residual to differ, in the state's unit. -1: its
+  row is zero, or they were not looked for. */
+  std::vector<int> nearest;
+  std::vector<double> nearest_distance;
+  Sketch bodies;  ///< The body at the center of each slice; empty for a point.
   std::vector<PageState> executed;
 };
 

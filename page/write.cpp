@@ -6,9 +6,9 @@
 
 #include "certifier/task/json_text.h"
 #include "lcmtypes/printable.h"
-#include "page/assets.h"
 #include "page/columns.h"
-#include "records/outlines.h"
+#include "page/document.h"
+#include "page/drawing_json.h"
 
 namespace forereach {
 namespace {
@@ -30,15 +30,6 @@ class Dictionary {
   Json texts_ = Json::array();
 };
 
-// For a page, which has data between tags: no tag begins in it.
-std::string ForPage(const Json& json) {
-  const std::string text = JsonText(json);
-  std::string safe;
-  safe.reserve(text.size());
-  for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
-  return safe;
-}
-
 template <class Row, class Of>
 Json NamesColumn(const std::vector<Row>& rows, const Of& of) {
   Dictionary dictionary;
@@ -58,19 +49,10 @@ Json TextColumn(const std::vector<Row>& rows, const Of& of) {
   return {{"type", "text"}, {"data", Packed(bytes)}, {"ends", std::move(ends)}};
 }
 
-// Digests are 64 hexadecimal digits; what is none becomes zeros.
-std::string BytesOf(const std::string& hex) {
-  const auto value = [](char c) { return '0' <= c && c <= '9' ? c - '0' : 'a' <= c && c <= 'f' ? c - 'a' + 10 : -1; };
-  std::string bytes(32, '\0');
-  if (hex.size() != 64 || std::ranges::any_of(hex, [&](char c) { return value(c) < 0; })) return bytes;
-  for (std::size_t i = 0; i < 32; ++i) bytes[i] = static_cast<char>(value(hex[2 * i]) << 4 | value(hex[2 * i + 1]));
-  return bytes;
-}
-
 template <class Row, class Of>
 Json DigestColumn(const std::vector<Row>& rows, const Of& of) {
   std::string bytes;
-  for (const Row& row : rows) bytes += BytesOf(of(row));
+  for (const Row& row : rows) bytes += DigestBytes(of(row));
   return {{"type", "u8"}, {"data", Packed(bytes)}};
 }
 
@@ -130,8 +112,8 @@ Json DecisionsJson(const PageRun& run) {
 // What the figures need.
 Json FiguresJson(const PageRun& run) {
   Json all = DecisionsJson(run);
-  for (const char* name : {"sequence", "coordinate", "first", "second", "message", "digest", "log", "event", "model",
-                           "declaration", "observations", "obstacles"})
+  for (const char* name : {"sequence", "coordinate", "first", "second", "margin", "threshold", "message", "digest",
+                           "log", "event", "model", "declaration", "observations", "obstacles"})
     all.erase(name);
   return all;
 }
@@ -186,71 +168,29 @@ Json TasksJson(const std::vector<PageTask>& tasks) {
 
 // ---- Drawings.
 
-Json ObstacleJson(const Obstacle& obstacle) {
-  Json json{{"radius", obstacle.radius()}};
-  if (obstacle.kind() == Obstacle::Kind::kHalfSpace) {
-    json["normal"] = std::vector(obstacle.points()[0].begin(), obstacle.points()[0].end());
-    json["offset"] = obstacle.offset();
-  } else {
-    std::vector<Eigen::Vector2d> corners;
-    for (const Eigen::Vector3d& corner : obstacle.hull()) corners.push_back(corner.head<2>());
-    Json points = Json::array();
-    for (const Eigen::Vector2d& corner : HullOf(corners)) points.push_back({corner.x(), corner.y()});
-    json["points"] = std::move(points);
-  }
-  if (const auto& motion = obstacle.motion())
-    json["motion"] = {{"stamp", motion->stamp_us},          {"velocity", {motion->velocity.x(), motion->velocity.y()}},
-                      {"uncertainty", motion->uncertainty}, {"growth", motion->growth},
-                      {"growth_rate", motion->growth_rate}, {"from", motion->from_us},
-                      {"until", motion->until_us}};
-  return json;
-}
-
-Json ObstacleSetsJson(const std::vector<std::vector<Obstacle>>& sets) {
-  Json all = Json::array();
-  for (const std::vector<Obstacle>& set : sets) {
-    Json json = Json::array();
-    for (const Obstacle& obstacle : set) json.push_back(obstacle.dim() == 2 ? ObstacleJson(obstacle) : Json());
-    all.push_back(std::move(json));
-  }
-  return all;
-}
-
-Json DetailJson(const PageDetail& detail) {
-  Json executed = Json::array();
-  for (const PageState& state : detail.executed) executed.push_back({state.step, state.x, state.y});
-  return {{"row", detail.decision},
-          {"missing", Printable(detail.missing)},
-          {"task", detail.task},
-          {"obstacles", detail.obstacles},
-          {"start", detail.start_utime},
-          {"step_us", detail.step_us},
-          {"steps", detail.steps},
-          {"binding", detail.binding},
-          {"part", detail.part},
-          {"hull", {detail.hull_lower, detail.hull_upper}},
-          {"envelope", {detail.envelope_lower, detail.envelope_upper}},
-          {"executed", std::move(executed)},
-          {"units", detail.sketch.parts.size()},
-          {"grid", {detail.sketch.x, detail.sketch.y, detail.sketch.quantum}}};
-}
-
 template <class Number>
-Json Joined(const std::vector<PageDetail>& details, std::vector<Number> Sketch::*member) {
+Json Joined(const std::vector<PageDetail>& details, Sketch PageDetail::*sketch, std::vector<Number> Sketch::*member) {
   std::vector<Number> all;
   for (const PageDetail& detail : details)
-    all.insert(all.end(), (detail.sketch.*member).begin(), (detail.sketch.*member).end());
+    all.insert(all.end(), (detail.*sketch.*member).begin(), (detail.*sketch.*member).end());
   return Column(all);
+}
+
+Json SketchesJson(const std::vector<PageDetail>& details, Sketch PageDetail::*sketch) {
+  return {{"parts", Joined(details, sketch, &Sketch::parts)},
+          {"corners", Joined(details, sketch, &Sketch::corners)},
+          {"points", Joined(details, sketch, &Sketch::points)}};
 }
 
 Json DrawingsJson(const PageRun& run) {
   Json details = Json::array();
-  for (const PageDetail& detail : run.details) details.push_back(DetailJson(detail));
-  const Json texts{{"details", std::move(details)}, {"obstacle_sets", ObstacleSetsJson(run.obstacle_sets)}};
-  return {{"texts", Packed(JsonText(texts))},
-          {"parts", Joined(run.details, &Sketch::parts)},
-          {"corners", Joined(run.details, &Sketch::corners)},
-          {"points", Joined(run.details, &Sketch::points)}};
+  for (const PageDetail& detail : run.details) details.push_back(ToJson(detail));
+  Json sets = Json::array();
+  for (const std::vector<Obstacle>& set : run.obstacle_sets) sets.push_back(ToJson(set));
+  const Json texts{{"details", std::move(details)}, {"obstacle_sets", std::move(sets)}};
+  return {{"texts", {{"type", "json"}, {"data", Packed(JsonText(texts))}}},
+          {"tubes", SketchesJson(run.details, &PageDetail::sketch)},
+          {"bodies", SketchesJson(run.details, &PageDetail::bodies)}};
 }
 
 Json RunsJson(const PageRun& run, bool only_figures) {
@@ -285,30 +225,16 @@ Json RunJson(const PageRun& run, bool only_figures) {
   return json;
 }
 
-std::string PolicyHash(const PageAsset& asset) { return "'sha256-" + Base64(BytesOf(std::string(asset.sha256))) + "'"; }
-
 }  // namespace
 
 std::string PageHtml(const PageRun& run, const PageRun* before) {
   Json data{{"run", RunJson(run, false)}};
   if (before) data["before"] = RunJson(*before, true);
-  std::string html =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; form-action 'none'; "
-      "img-src data:; style-src ";
-  html += PolicyHash(kPageStyle) + "; script-src " + PolicyHash(kChartScript) + " " + PolicyHash(kPageScript) + "\">\n";
-  html +=
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>ForeReach "
-      "report</title>\n<style>";
-  html += kPageStyle.text;
-  html += "</style>\n</head>\n";
-  html += kPageBody.text;
-  html += "<script type=\"application/json\" id=\"data\">" + ForPage(data) + "</script>\n<script>";
-  html += kChartScript.text;
-  html += "</script>\n<script>";
-  html += kPageScript.text;
-  html += "</script>\n</body>\n</html>\n";
-  return html;
+  return PageDocument{.title = "ForeReach report",
+                      .body = kPageBody,
+                      .styles = {&kPageStyle},
+                      .scripts = {&kChartScript, &kSharedScript, &kPageScript}}
+      .Html(std::move(data));
 }
 
 }  // namespace forereach

@@ -9,7 +9,6 @@
 
 #include <Eigen/Geometry>
 
-#include "certifier/dynamics/text_program.h"
 #include "certifier/numerics/size.h"
 #include "certifier/sets/zonogon.h"
 
@@ -85,17 +84,24 @@ std::vector<std::vector<Picture::Polygon>> Sweeps(const Certifier& certifier, co
   return sweeps;
 }
 
-std::vector<Picture::Polygon> BodyAt(const Problem& problem, const Eigen::VectorXd& x) {
-  if (problem.body == Body{}) return {};
-  const Vector2d position = problem.projection * x;
-  const Eigen::Rotation2Dd turn(problem.body.heading < 0 ? 0 : x[problem.body.heading]);
-  std::vector<Picture::Polygon> parts;
+BodyOutlines::BodyOutlines(const Problem& problem) : problem_(problem) {
   for (const BodyPart& part : problem.body.parts) {
+    std::vector<TextFunction>& functions = places_.emplace_back();
+    for (const auto& place : part.places) functions.emplace_back(NamesOf(*problem.model), place);
+  }
+}
+
+std::vector<Picture::Polygon> BodyOutlines::At(const Eigen::VectorXd& x) const {
+  if (problem_.body == Body{}) return {};
+  const Vector2d position = problem_.projection * x;
+  const Eigen::Rotation2Dd turn(problem_.body.heading < 0 ? 0 : x[problem_.body.heading]);
+  std::vector<Picture::Polygon> parts;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const BodyPart& part = problem_.body.parts[i];
     std::vector<Vector2d> points;
     if (part.places.empty())
       for (const Eigen::Vector3d& point : part.points) points.push_back(position + turn * point.head<2>());
-    for (const auto& place : part.places) {
-      const TextFunction function(NamesOf(*problem.model), place);
+    for (const TextFunction& function : places_[i]) {
       std::vector<double> z(x.begin(), x.end());
       z.resize(ToSize(function.num_variables()));
       std::array<long double, 2> at;

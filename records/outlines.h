@@ -5,6 +5,7 @@ bounds. */
 #include <vector>
 
 #include "certifier/certify/certifier.h"
+#include "certifier/dynamics/text_program.h"
 #include "records/picture.h"
 
 namespace forereach {
@@ -16,8 +17,24 @@ namespace forereach {
 a point at the samples it is the projected slice. @pre p = 2. */
 [[nodiscard]] std::vector<std::vector<Picture::Polygon>> Sweeps(const Certifier& certifier, const Tube& tube, int last);
 
-/** The parts of the body in the state x. Nothing for a point. @pre p = 2. */
-[[nodiscard]] std::vector<Picture::Polygon> BodyAt(const Problem& problem, const Eigen::VectorXd& x);
+/** The body in many states: what its texts mean is read once. */
+class BodyOutlines final {
+ public:
+  /** @param problem must outlive it. @pre p = 2. */
+  explicit BodyOutlines(const Problem& problem);
+
+  /** The parts of the body in the state x. Nothing for a point. */
+  [[nodiscard]] std::vector<Picture::Polygon> At(const Eigen::VectorXd& x) const;
+
+ private:
+  const Problem& problem_;
+  std::vector<std::vector<TextFunction>> places_;  // of each part
+};
+
+/** The same of one state. */
+[[nodiscard]] inline std::vector<Picture::Polygon> BodyAt(const Problem& problem, const Eigen::VectorXd& x) {
+  return BodyOutlines(problem).At(x);
+}
 
 /** An obstacle that moves, grown, each half second from its stamp for two seconds, as far as it is there. Nothing for
 one that stands and for a half-space. @pre p = 2. */

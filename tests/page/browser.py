@@ -99,12 +99,12 @@ class Browser:
         return answer["result"].get("value")
 
     def open(self, path, width=1280, height=900, phone=False):
-        """Seconds until the page is ready."""
+        """A file, or an address. Seconds until the page is ready."""
         self.errors, self.requests = [], []
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=2 if phone else 1,
                   mobile=phone)
         begin = time.monotonic()
-        self.call("Page.navigate", url="file://" + os.path.abspath(path))
+        self.call("Page.navigate", url=path if path.startswith("http:") else "file://" + os.path.abspath(path))
         while not self.run("document.body?.dataset.ready === 'yes' || document.getElementById('problem')?.hidden === false"):
             if time.monotonic() > begin + 60:
                 raise TimeoutError(f"the page is not ready; {self.errors}")

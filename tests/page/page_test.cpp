@@ -6,6 +6,7 @@
 
 #include "certifier/task/json_text.h"
 #include "page/columns.h"
+#include "page/detail.h"
 #include "page/gather.h"
 #include "page/rows_json.h"
 #include "page/sketch.h"
@@ -35,10 +36,21 @@ TEST(ColumnsTest, Base64IsThatOfTheStandard) {
 }
 
 TEST(ColumnsTest, ColumnNamesItsType) {
-  EXPECT_EQ(Column(std::vector<std::int16_t>{1})["type"], "i16");
   EXPECT_EQ(Column(std::vector<std::uint8_t>{1})["type"], "u8");
   EXPECT_EQ(Column(std::vector<double>{1})["type"], "f64");
   EXPECT_EQ(Column(std::vector<float>{})["type"], "f32");
+}
+
+TEST(ColumnsTest, IntegersAreInTheNarrowestTypeThatHasThem) {
+  using std::int64_t, std::uint32_t;
+  EXPECT_EQ(Column(std::vector<int64_t>{})["type"], "i8");
+  EXPECT_EQ(Column(std::vector<int64_t>{-128, 127})["type"], "i8");
+  EXPECT_EQ(Column(std::vector<int64_t>{0, 128})["type"], "i16");
+  EXPECT_EQ(Column(std::vector<int64_t>{0, -32769})["type"], "i32");
+  EXPECT_EQ(Column(std::vector<int64_t>{0, int64_t{1} << 31})["type"], "i64");
+  EXPECT_EQ(Column(std::vector<uint32_t>{255})["type"], "u8");
+  EXPECT_EQ(Column(std::vector<uint32_t>{256})["type"], "u16");
+  EXPECT_EQ(Column(std::vector<uint32_t>{65536})["type"], "u32");
 }
 
 /** The corners of a sketch's polygon, in metres. */
@@ -118,6 +130,64 @@ TEST(GatherTest, DrawsNoMoreThanItsBounds) {
   for (const PageDetail& detail : none.details) {
     EXPECT_THAT(detail.missing, HasSubstr("reached their bound"));
     EXPECT_TRUE(detail.sketch.points.empty());
+  }
+}
+
+// A car of the demo stands for three steps.
+PageDetail DetailOfStandingCar(const Config& task, const std::vector<Obstacle>& obstacles = {}) {
+  candidate_plan_t candidate{};
+  candidate.num_steps = 3;
+  candidate.num_states = static_cast<std::int16_t>(task.problem->model->num_states());
+  candidate.num_inputs = static_cast<std::int16_t>(task.problem->model->num_inputs());
+  candidate.step_us = 100'000;
+  std::fill_n(candidate.initial_half_width, candidate.num_states, 0.01);
+  EXPECT_EQ(WhyNotJudged(candidate, task), "");
+  const Certifier certifier(task.problem);
+  const Schedule schedule = ScheduleOf(candidate, task.gate);
+  Tube tube;
+  const Decision decision = certifier.Certify(PlanOf(candidate, schedule), InitialSetOf(candidate), obstacles, tube);
+  PageDetail detail;
+  Describe(certifier, {candidate, schedule, static_cast<int>(decision.outcome), decision.step}, decision, tube, detail);
+  return detail;
+}
+
+TEST(DetailTest, ABodyIsDrawnAtEachStep) {
+  const PageDetail detail = DetailOfStandingCar(LoadConfig(FOREREACH_SOURCE_DIR "/config/demo.yaml"));
+  ASSERT_EQ(detail.missing, "");
+  EXPECT_EQ(detail.bodies.parts, (std::vector<std::uint8_t>{1, 1, 1}));
+  EXPECT_EQ(detail.bodies.corners, (std::vector<std::uint8_t>{4, 4, 4}));
+  double left = 1e9, right = -1e9;
+  int x = 0;
+  for (std::size_t i = 0; i < 8; i += 2) {
+    x += detail.bodies.points[i];
+    left = std::min(left, detail.bodies.x + detail.bodies.quantum * x);
+    right = std::max(right, detail.bodies.x + detail.bodies.quantum * x);
+  }
+  EXPECT_NEAR(left, -0.9, 0.01);
+  EXPECT_NEAR(right, 3.4, 0.01);
+}
+
+TEST(DetailTest, NamesTheNearestObservationOfEachState) {
+  const Config task = LoadConfig(FOREREACH_SOURCE_DIR "/config/demo.yaml");
+  const PageDetail detail = DetailOfStandingCar(task, {Obstacle::Circle(Eigen::Vector2d(1, 0), 1)});
+  ASSERT_EQ(detail.binding, 0);
+  const Transitions& known = task.problem->transitions;
+  // The first step begins at the origin, and its input is zero.
+  for (int k = 0; k < 6; ++k) {
+    const Eigen::VectorXd weights = task.problem->declaration.lipschitz.row(k);
+    if (weights.isZero(0)) {
+      EXPECT_EQ(detail.nearest[k], -1) << k;
+      continue;
+    }
+    double least = std::numeric_limits<double>::infinity();
+    int nearest = -1;
+    for (int i = 0; i < known.size(); ++i) {
+      double distance = 0;
+      for (int j = 0; j < weights.size(); ++j) distance += weights[j] * std::abs(known.z(i, j));
+      if (distance < least) least = distance, nearest = i;
+    }
+    EXPECT_EQ(detail.nearest[k], nearest) << k;
+    EXPECT_NEAR(detail.nearest_distance[k], least, 1e-12) << k;
   }
 }
 
@@ -290,12 +360,24 @@ TEST(WriteTest, TextsOfARunBeginNoTag) {
   EXPECT_THAT(html, Not(HasSubstr("</script><!--")));
 }
 
+TEST(WriteTest, ALogMayHaveTheNameOfAKey) {
+  PageRun run;
+  run.parts = {{"", {{"type", "one"}, {"data", "two"}}}};
+  EXPECT_THAT(PageHtml(run), HasSubstr(R"("replays":{"data":"two","type":"one"})"));
+}
+
 TEST(WriteTest, PolicyForbidsRequests) {
   const std::string html = PageHtml({});
   EXPECT_THAT(html, HasSubstr("default-src 'none'"));
   EXPECT_THAT(html, HasSubstr("script-src 'sha256-"));
   EXPECT_THAT(html, Not(HasSubstr("unsafe-inline")));
   EXPECT_THAT(html, Not(HasSubstr(" src=\"http")));
+}
+
+// A browser keeps other characters in texts twice as large, and takes twice as long over what is next to them.
+TEST(WriteTest, APageIsOfAsciiWhereItsTextsAre) {
+  const std::string html = PageHtml(GatherPage({kLog}, kTask, {}, {0, 0, 0}));
+  EXPECT_TRUE(std::ranges::all_of(html, [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
 }
 
 }  // namespace

@@ -1,0 +1,479 @@
+#include "live/watcher.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "certifier/certify/explain.h"
+#include "certifier/gate/candidate_message.h"
+#include "certifier/gate/robot_messages.h"
+#include "certifier/sets/zonogon.h"
+#include "certifier/task/json_text.h"
+#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/fault_t.hpp"
+#include "forereach/withdrawal_t.hpp"
+#include "lcmtypes/names.h"
+#include "lcmtypes/printable.h"
+#include "page/detail.h"
+#include "page/drawing_json.h"
+#include "records/outlines.h"
+#include "records/status_json.h"
+
+namespace forereach {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kNumbersOfATube = 20'000;
+constexpr std::size_t kMostLearned = 200'000;
+constexpr std::int64_t kReadsAgainAfterUs = 2'000'000;
+constexpr std::int64_t kForgetsAfterUs = 3'000'000;  // that a certifier was in charge
+constexpr std::size_t kInATick = 2 * Watcher::kDecisions;
+
+std::vector<std::uint8_t> Copy(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
+
+// What a signature names, if the task gives the bus no name: address and port.
+BusOptions Named(BusOptions options) {
+  options.name = options.bus_name();
+  return options;
+}
+
+// Integers as text: a browser has no exact ones beyond 2^53.
+std::string Text(std::int64_t number) { return std::to_string(number); }
+
+Json SketchJson(const Sketch& sketch) {
+  return {{"parts", sketch.parts}, {"corners", sketch.corners}, {"points", sketch.points}};
+}
+
+Json PolygonsJson(const std::vector<Picture::Polygon>& polygons) {
+  Json all = Json::array();
+  for (const Picture::Polygon& polygon : polygons) {
+    if (!std::ranges::all_of(polygon, [](const Eigen::Vector2d& point) { return point.allFinite(); })) continue;
+    Json& points = all.emplace_back(Json::array());
+    for (const Eigen::Vector2d& point : polygon) points.push_back({point.x(), point.y()});
+  }
+  return all;
+}
+
+bool IsJudged(const decision_t& decision) {
+  return decision.outcome == decision_t::CERTIFIED || decision.outcome == decision_t::ABSTAIN_SAFETY ||
+         decision.outcome == decision_t::ABSTAIN_DOMAIN || decision.outcome == decision_t::ABSTAIN_FALSIFIED;
+}
+
+// Whether one of the last messages was this one: it is repeated until it has been answered.
+bool IsRepeated(std::deque<std::pair<std::int64_t, std::int64_t>>& last, std::int64_t a, std::int64_t b) {
+  if (std::ranges::find(last, std::pair(a, b)) != last.end()) return true;
+  if (last.size() == Watcher::kOthers) last.pop_front();
+  last.emplace_back(a, b);
+  return false;
+}
+
+}  // namespace
+
+void LiveFeed::Add(std::string text) {
+  texts_.push_back(std::move(text));
+  if (texts_.size() <= most_) return;
+  texts_.pop_front();
+  ++first_;
+}
+
+void LiveFeed::Append(std::int64_t from, std::int64_t to, std::string& out) const {
+  const std::int64_t begin = std::max(from, first_);
+  for (std::int64_t i = begin; i < to; ++i) {
+    if (i > begin) out += ',';
+    out += texts_[static_cast<std::size_t>(i - first_)];
+  }
+}
+
+// ---- What is heard.
+
+Watcher::Watcher(Config task, std::optional<KeyRing> keys, ReadAgain read_again)
+    : task_(std::move(task)),
+      keys_(std::move(keys)),
+      read_again_(std::move(read_again)),
+      authenticator_(Named(task_.bus), keys_),
+      interpreter_(task_.bus, ""),
+      tube_(std::make_unique<Tube>()) {
+  UseTask(std::move(task_));
+}
+
+void Watcher::UseTask(Config task) {
+  auto certifier = std::make_unique<Certifier>(task.problem);
+  ObstaclesInForce in_force(task);
+  if (in_force_) in_force.Inherit(*in_force_);
+  certifier_ = std::move(certifier);
+  task_ = std::move(task);
+  in_force_.emplace(std::move(in_force));
+  ShowObstacles();
+  other_task_.clear();
+}
+
+void Watcher::Take(const LogEvent& event) {
+  if (!authenticator_.IsAuthentic(event)) return;
+  ++counts_.messages;
+  TakeRows(event);
+  if (!TakeMessage(event)) ++counts_.undecodable;
+}
+
+void Watcher::TakeRows(const LogEvent& event) {
+  Rows rows;
+  interpreter_.Observe(event, rows);
+  for (DecisionRow& row : rows.decisions) {
+    ++counts_.decisions;
+    ++counts_.by_outcome[row.outcome];
+    if (row.cause != CauseName(decision_t::CAUSE_NONE)) ++counts_.by_cause[row.cause];
+    if (decided_.size() == kInATick) {
+      decided_.erase(decided_.begin());
+      ++skipped_;
+    }
+    decided_.push_back({.decision = {}, .row = std::move(row), .candidate = {}, .certificate = {}, .obstacles = {}});
+  }
+  for (const EventRow& row : rows.events)
+    Add(kEventFeed, {{"utime", row.utime},
+                     {"plan", Text(row.plan_id)},
+                     {"kind", row.kind},
+                     {"step", row.step},
+                     {"message", row.message}});
+  for (const GapRow& row : rows.gaps) {
+    ++counts_.gaps;
+    if (row.lost < INT64_MAX - counts_.lost) counts_.lost += row.lost;
+    Add(kGapFeed, {{"utime", row.utime},
+                   {"channel", Printable(row.channel)},
+                   {"source", row.source},
+                   {"reason", row.reason},
+                   {"lost", Text(row.lost)}});
+  }
+}
+
+// False: no message of its channel's type.
+bool Watcher::TakeMessage(const LogEvent& event) {
+  const BusOptions& channels = task_.bus;
+  if (event.channel == channels.candidate) {
+    if (!Decoded<candidate_plan_t>(event.message())) return false;
+    candidates_.Add(DigestOf(event.message()), Copy(event.message()));
+    return true;
+  }
+  if (event.channel == channels.certified) {
+    const auto certified = Decoded<certified_plan_v2_t>(event.message());
+    if (!certified) return false;
+    certificates_.Add(GetDigest(certified->plan_digest), Copy(event.message()));
+    return true;
+  }
+  if (event.channel == channels.decision) return TakeDecision(event);
+  if (event.channel == channels.robot_state) return TakeState(event);
+  if (event.channel == channels.status) return TakeStatus(event);
+  if (event.channel == channels.obstacles) return TakeObstacles(event);
+  if (event.channel == channels.transition) return TakeTransition(event);
+  if (event.channel == channels.fault) return TakeFault(event);
+  if (event.channel == channels.withdrawn) return TakeWithdrawal(event);
+  if (event.channel == channels.event) return Decoded<execution_event_t>(event.message()).has_value();
+  if (event.channel == channels.logger_status) {
+    const auto status = Decoded<logger_status_t>(event.message());
+    if (status) logger_.emplace(event.utime, *status);
+    return status.has_value();
+  }
+  return true;  // commands and advice are for others
+}
+
+bool Watcher::TakeDecision(const LogEvent& event) {
+  const auto decision = Decoded<decision_t>(event.message());
+  if (!decision) return false;
+  Decided& decided = decided_.back();  // its row was made just now
+  const Digest plan = GetDigest(decision->plan_digest);
+  decided.decision = *decision;
+  decided.candidate = candidates_.Take(plan);
+  decided.certificate = certificates_.Take(plan);
+  decided.obstacles = obstacles_;
+  if (decision->outcome != decision_t::REJECTED) ReadAgainFor(GetDigest(decision->config_digest), event.utime);
+  return true;
+}
+
+bool Watcher::TakeState(const LogEvent& event) {
+  const auto state = Decoded<robot_state_t>(event.message());
+  if (!state || !FaultOf(*state, task_.problem->model->num_states()).empty()) return false;
+  state_.emplace(event.utime, *state);
+  if (task_.problem->projection.rows() != 2) return true;
+  const Eigen::Vector2d at =
+      task_.problem->projection * Eigen::Map<const Eigen::VectorXd>(state->state, state->num_states);
+  if (at.allFinite()) Add(kPlaceFeed, {at.x(), at.y(), Text(state->executing_plan_id), state->executing_step});
+  return true;
+}
+
+bool Watcher::TakeStatus(const LogEvent& event) {
+  const auto status = Decoded<certifier_status_v3_t>(event.message());
+  if (!status) return false;
+  const bool keeps = status_ && IsInCharge(status_->second) && event.utime - status_->first < kForgetsAfterUs;
+  if (!IsInCharge(*status) && keeps) return true;  // another one stands by
+  status_.emplace(event.utime, *status);
+  if (IsInCharge(*status)) ReadAgainFor(GetDigest(status->config_digest), event.utime);
+  return true;
+}
+
+// The certifier runs another task than this: the file may have been reloaded.
+void Watcher::ReadAgainFor(const Digest& config, std::int64_t now_us) {
+  if (config == task_.grounds.config) {
+    other_task_.clear();
+    return;
+  }
+  if (config == tried_ || (tried_us_ != 0 && std::abs(now_us - tried_us_) < kReadsAgainAfterUs)) return;
+  tried_ = config;
+  tried_us_ = now_us;
+  other_task_ = "the certifier's task file is not " + task_.path + " as it is now: tubes and names may be wrong";
+  try {
+    Config again = read_again_();
+    if (again.grounds.config == config && again.bus == task_.bus) UseTask(std::move(again));
+  } catch (const std::exception& error) {
+    other_task_ += std::string(" (") + error.what() + ")";
+  }
+}
+
+void Watcher::ShowObstacles() {
+  obstacles_ = std::make_shared<const std::vector<Obstacle>>(in_force_->all());
+  obstacles_digest_ = in_force_->digest();
+  std::string text = JsonText(ToJson(*obstacles_));
+  const std::lock_guard lock(mutex_);
+  set_ = std::move(text);
+  ++obstacles_number_;
+}
+
+bool Watcher::TakeObstacles(const LogEvent& event) {
+  const std::string refusal = in_force_->Update(event.message(), event.utime);
+  if (!refusal.empty()) return false;
+  if (in_force_->digest() != obstacles_digest_) ShowObstacles();
+  return true;
+}
+
+bool Watcher::TakeTransition(const LogEvent& event) {
+  const auto message = Decoded<transition_t>(event.message());
+  if (!message) return false;
+  if (!task_.gate.learns || certifier_->num_observations() >= kMostLearned) return true;
+  const ExecutedTransition transition = FromMessage(*message, *task_.problem);
+  if (transition.refusal.empty()) static_cast<void>(certifier_->Learn(transition.z, transition.next));
+  return true;
+}
+
+bool Watcher::TakeFault(const LogEvent& event) {
+  const auto fault = Decoded<fault_t>(event.message());
+  if (!fault) return false;
+  if (IsRepeated(faults_, fault->utime, fault->cause)) return true;
+  Add(kFaultFeed, {{"utime", fault->utime},
+                   {"plan", Text(fault->plan_id)},
+                   {"kind", FaultName(fault->cause)},
+                   {"message", GetText(fault->message)}});
+  return true;
+}
+
+bool Watcher::TakeWithdrawal(const LogEvent& event) {
+  const auto withdrawal = Decoded<withdrawal_t>(event.message());
+  if (!withdrawal) return false;
+  if (IsRepeated(withdrawals_, withdrawal->plan_id, withdrawal->valid_steps)) return true;
+  Add(kWithdrawalFeed, {{"utime", withdrawal->utime},
+                        {"plan", Text(withdrawal->plan_id)},
+                        {"kind", WithdrawalName(withdrawal->cause)},
+                        {"steps", withdrawal->valid_steps},
+                        {"message", GetText(withdrawal->message)}});
+  return true;
+}
+
+void Watcher::Add(Feed feed, const Json& record) {
+  std::string text = JsonText(record);
+  const std::lock_guard lock(mutex_);
+  feeds_[feed].Add(std::move(text));
+}
+
+// ---- What is drawn.
+
+// The newest certificates, then the newest abstentions.
+std::vector<bool> Watcher::ChooseDrawn() const {
+  std::vector<bool> chosen(decided_.size());
+  int room = kTubesInATick;
+  for (const bool wants_certified : {true, false})
+    for (std::size_t i = decided_.size(); i-- > 0 && room > 0;) {
+      const decision_t& decision = decided_[i].decision;
+      const bool is_certified = decision.outcome == decision_t::CERTIFIED;
+      if (is_certified != wants_certified || !IsJudged(decision)) continue;
+      chosen[i] = true;
+      --room;
+    }
+  return chosen;
+}
+
+void Watcher::Draw(const Decided& decided, PageDetail& detail) {
+  const decision_t& decision = decided.decision;
+  if (GetDigest(decision.config_digest) != task_.grounds.config) {
+    detail.missing = "it was decided under another task file";
+    return;
+  }
+  const auto candidate = decided.candidate ? Decoded<candidate_plan_t>(*decided.candidate) : std::nullopt;
+  if (!candidate) {
+    detail.missing = "its candidate did not arrive here";
+    return;
+  }
+  detail.missing = WhyNotJudged(*candidate, task_);
+  if (!detail.missing.empty()) return;
+  try {
+    const JudgedCandidate judged{*candidate, ScheduleOf(*candidate, task_.gate), decision.outcome, decision.step};
+    const Plan plan = PlanOf(judged.candidate, judged.schedule);
+    const Zonotope initial_set = InitialSetOf(*candidate);
+    certifier_->Require(plan, initial_set, *decided.obstacles);
+    const Decision again = certifier_->Certify(plan, initial_set, *decided.obstacles, *tube_);
+    Describe(*certifier_, judged, again, *tube_, detail);
+  } catch (const std::invalid_argument& error) {
+    detail.missing = std::string("it cannot be judged again: ") + error.what();
+  }
+}
+
+// The interval hulls of a certificate, in the plane.
+void Watcher::DrawBoxes(const Decided& decided, PageDetail& detail) const {
+  const auto certified = decided.certificate ? Decoded<certified_plan_v2_t>(*decided.certificate) : std::nullopt;
+  const Eigen::MatrixXd& projection = task_.problem->projection;
+  if (!certified || projection.rows() != 2 || !HasSizes(certified->plan, *task_.problem->model)) return;
+  std::vector<std::vector<Picture::Polygon>> units;
+  const Eigen::Index n = projection.cols();
+  for (int t = 0; t <= certified->plan.num_steps; ++t) {
+    const Eigen::Map<const Eigen::VectorXd> lower(certified->slice_lower[t], n), upper(certified->slice_upper[t], n);
+    const Eigen::VectorXd half = (upper - lower) / 2;
+    if (!lower.allFinite() || !upper.allFinite() || half.minCoeff() < 0) return;
+    units.push_back({Outline(Zonotope(projection * (lower + half), projection * half.asDiagonal()))});
+  }
+  auto sketch = MakeSketch(units);
+  if (!sketch) return;
+  detail.sketch = std::move(*sketch);
+  detail.start_utime = certified->plan.start_utime;
+  detail.step_us = certified->plan.step_us;
+  detail.steps = certified->plan.num_steps;
+  detail.missing = "the boxes of its certificate, without the body; " + detail.missing;
+}
+
+Json Watcher::DecisionJson(const Decided& decided, bool is_drawn) {
+  const DecisionRow& row = decided.row;
+  Json json{{"utime", row.utime},        {"plan", Text(row.plan_id)}, {"source", row.source},
+            {"outcome", row.outcome},    {"cause", row.cause},        {"step", row.step},
+            {"obstacle", row.obstacle},  {"margin", row.margin},      {"threshold", row.threshold},
+            {"elapsed", row.elapsed_us}, {"latency", row.latency_us}, {"message", row.message},
+            {"digest", row.plan_digest}};
+  PageDetail detail;
+  if (is_drawn)
+    Draw(decided, detail);
+  else
+    detail.missing = IsJudged(decided.decision) ? "more was decided at this time than this page draws"
+                                                : "it was answered without a tube";
+  if (decided.decision.outcome == decision_t::CERTIFIED && !detail.missing.empty()) DrawBoxes(decided, detail);
+  if (detail.sketch.points.size() + detail.bodies.points.size() > kNumbersOfATube) {
+    detail.sketch = detail.bodies = {};
+    detail.missing = "its tube has too many corners for this page";
+  }
+  json["detail"] = ToJson(detail);
+  json["detail"].update(SketchJson(detail.sketch));
+  json["detail"]["body"] = SketchJson(detail.bodies);
+  json["detail"]["set"] = is_drawn && !detail.sketch.parts.empty() ? ToJson(*decided.obstacles) : Json::array();
+  return json;
+}
+
+// ---- What is told.
+
+void Watcher::Tick(std::int64_t now_us, const LiveLosses& losses) {
+  const std::vector<bool> drawn = ChooseDrawn();
+  for (std::size_t i = 0; i < decided_.size(); ++i) Add(kDecisionFeed, DecisionJson(decided_[i], drawn[i]));
+  decided_.clear();
+  std::string now = JsonText(NowJson(now_us, losses));
+  const std::lock_guard lock(mutex_);
+  now_ = std::move(now);
+  std::ranges::transform(feeds_, ends_.begin(), &LiveFeed::end);
+  ++tick_;
+}
+
+Json Watcher::Beginning() const {
+  const NominalModel& model = *task_.problem->model;
+  return {{"task", Printable(task_.path)},
+          {"model", Printable(model.name())},
+          {"digest", ToHex(task_.grounds.config)},
+          {"url", Printable(task_.bus.url)},
+          {"robot", keys_ ? Json(keys_->robot()) : Json()},
+          {"holds", HoldsName(*task_.problem)},
+          {"states", model.state_names()},
+          {"planar", task_.problem->projection.rows() == 2}};
+}
+
+Json Watcher::RobotJson() const {
+  if (!state_) return {};
+  const robot_state_t& state = state_->second;
+  const Eigen::Map<const Eigen::VectorXd> x(state.state, state.num_states);
+  Json json{{"utime", state.utime},
+            {"heard", state_->first},
+            {"plan", Text(state.executing_plan_id)},
+            {"step", state.executing_step},
+            {"mode", state.mode == robot_state_t::EXECUTING  ? "executing"
+                     : state.mode == robot_state_t::STANDING ? "standing"
+                                                             : "finished"},
+            {"state", std::vector<double>(x.begin(), x.end())}};
+  if (task_.problem->projection.rows() != 2 || x.size() != task_.problem->projection.cols()) return json;
+  const Eigen::Vector2d at = task_.problem->projection * x;
+  if (!at.allFinite()) return json;
+  json["at"] = {at.x(), at.y()};
+  json["body"] = PolygonsJson(BodyAt(*task_.problem, x));
+  return json;
+}
+
+Json Watcher::NowJson(std::int64_t now_us, const LiveLosses& losses) const {
+  const Refusals refused = authenticator_.refusals();
+  Json json{{"utime", now_us},
+            {"signed", keys_.has_value()},
+            {"note", Printable(other_task_)},
+            {"robot", RobotJson()},
+            {"counts",
+             {{"messages", counts_.messages},
+              {"undecodable", counts_.undecodable},
+              {"decisions", counts_.decisions},
+              {"not_shown", skipped_},
+              {"by_outcome", counts_.by_outcome},
+              {"by_cause", counts_.by_cause},
+              {"lost", counts_.lost},
+              {"gaps", counts_.gaps},
+              {"dropped", losses.dropped},
+              {"datagrams_refused", losses.datagrams_refused}}},
+            {"refused",
+             {{"unsigned", refused.unsigned_ones},
+              {"forged", refused.forged},
+              {"replayed", refused.replayed},
+              {"of_another_bus", refused.foreign}}},
+            {"certifier", Json()},
+            {"logger", Json()}};
+  if (status_) {
+    json["certifier"] = Json::parse(JsonText(ToJson(status_->second, keys_.has_value())));
+    json["certifier"]["heard"] = status_->first;
+  }
+  if (logger_) {
+    const logger_status_t& logger = logger_->second;
+    json["logger"] = {{"heard", logger_->first},
+                      {"level", LevelName(logger.state)},
+                      {"lost", logger.events_lost},
+                      {"written", logger.events_written},
+                      {"message", GetText(logger.message)}};
+  }
+  return json;
+}
+
+std::string Watcher::Since(Cursor& cursor) const {
+  static constexpr std::array kNames{"decisions", "faults", "withdrawals", "events", "gaps", "places"};
+  const std::lock_guard lock(mutex_);
+  if (cursor.tick == tick_) return "";
+  cursor.tick = tick_;
+  std::string text = "{\"now\":" + now_;
+  if (cursor.obstacles != obstacles_number_) text += ",\"obstacles\":" + set_;
+  cursor.obstacles = obstacles_number_;
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    if (cursor.of_feed[i] == ends_[i]) continue;
+    text.append(",\"").append(kNames[i]).append("\":[");
+    feeds_[i].Append(cursor.of_feed[i], ends_[i], text);
+    cursor.of_feed[i] = ends_[i];
+    text += ']';
+  }
+  return text + '}';
+}
+
+}  // namespace forereach

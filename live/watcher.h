@@ -1,0 +1,159 @@
+/** What the live page shows, from the messages of the bus. It uses no bus, socket or clock: a test hands it messages.
+
+**Trust.** With keys, messages that their role did not sign are counted and have no other effect
+(records/log_authenticator.h). Without keys every message counts, and the page says so.
+
+**Bounds.** Of each kind of record the last ones are kept, so no sender can make it grow. A few tubes are drawn in each
+tick, those of certificates first; the other decisions are shown without theirs.
+
+**Tubes** are of candidates that this program decides again, as it knows obstacles and observations. Where it decides
+otherwise, as a page that began later than the certifier may, a certified plan is shown by the boxes of its
+certificate. */
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/gate/obstacles_in_force.h"
+#include "certifier/task/config.h"
+#include "forereach/certifier_status_v3_t.hpp"
+#include "forereach/decision_t.hpp"
+#include "forereach/logger_status_t.hpp"
+#include "forereach/robot_state_t.hpp"
+#include "page/page_data.h"
+#include "records/interpreter.h"
+#include "records/log_authenticator.h"
+#include "records/undecided.h"
+
+namespace forereach {
+
+/** Messages that were lost before the watcher. */
+struct LiveLosses {
+  std::int64_t dropped = 0;            ///< Bus::dropped
+  std::int64_t datagrams_refused = 0;  ///< Bus::datagrams
+};
+
+/** Records as texts, of which the last are kept. They are numbered from 0. */
+class LiveFeed final {
+ public:
+  explicit LiveFeed(std::size_t most) : most_(most) {}
+
+  void Add(std::string text);
+  /** Appends the texts from number `from` to before `to`, at most end(), with commas between them. */
+  void Append(std::int64_t from, std::int64_t to, std::string& out) const;
+  [[nodiscard]] std::int64_t end() const { return first_ + std::ssize(texts_); }
+
+ private:
+  std::size_t most_;
+  std::int64_t first_ = 0;
+  std::deque<std::string> texts_;
+};
+
+class Watcher final {
+ public:
+  static constexpr std::int64_t kTickUs = 100'000;  ///< Between two updates of the page.
+  static constexpr int kTubesInATick = 3;
+  static constexpr std::size_t kDecisions = 120, kOthers = 60, kPlaces = 600;
+
+  using ReadAgain = std::function<Config()>;
+
+  /** @param task of the certifier. @param keys public keys suffice.
+  @param read_again reads the task file again, for a certifier that names another one; may throw BadInput. */
+  Watcher(Config task, std::optional<KeyRing> keys, ReadAgain read_again);
+
+  /** The next message of the bus, as it arrived. One thread at a time calls Take and Tick. */
+  void Take(const LogEvent& event);
+
+  /** Draws what was decided since the last call, and updates the page. */
+  void Tick(std::int64_t now_us, const LiveLosses& losses = {});
+
+  /** What never changes: data of the page's document. */
+  [[nodiscard]] nlohmann::json Beginning() const;
+
+  /** How far a reader has read. */
+  struct Cursor {
+    std::array<std::int64_t, 6> of_feed{};
+    std::int64_t obstacles = 0, tick = 0;
+  };
+  /** One line of JSON with everything that is new for a reader, and the state of now; empty if nothing is. Any thread
+  may call it. */
+  [[nodiscard]] std::string Since(Cursor& cursor) const;
+
+ private:
+  struct Decided {
+    decision_t decision;
+    DecisionRow row;
+    std::optional<std::vector<std::uint8_t>> candidate, certificate;  // as they were sent
+    std::shared_ptr<const std::vector<Obstacle>> obstacles;
+  };
+  enum Feed { kDecisionFeed, kFaultFeed, kWithdrawalFeed, kEventFeed, kGapFeed, kPlaceFeed };
+
+  void UseTask(Config task);
+  void ShowObstacles();
+  void TakeRows(const LogEvent& event);
+  [[nodiscard]] bool TakeMessage(const LogEvent& event);
+  [[nodiscard]] bool TakeDecision(const LogEvent& event);
+  [[nodiscard]] bool TakeState(const LogEvent& event);
+  [[nodiscard]] bool TakeStatus(const LogEvent& event);
+  [[nodiscard]] bool TakeObstacles(const LogEvent& event);
+  [[nodiscard]] bool TakeTransition(const LogEvent& event);
+  [[nodiscard]] bool TakeFault(const LogEvent& event);
+  [[nodiscard]] bool TakeWithdrawal(const LogEvent& event);
+  void ReadAgainFor(const Digest& config, std::int64_t now_us);
+
+  [[nodiscard]] std::vector<bool> ChooseDrawn() const;
+  [[nodiscard]] nlohmann::json DecisionJson(const Decided& decided, bool is_drawn);
+  void Draw(const Decided& decided, PageDetail& detail);
+  void DrawBoxes(const Decided& decided, PageDetail& detail) const;
+  [[nodiscard]] nlohmann::json NowJson(std::int64_t now_us, const LiveLosses& losses) const;
+  [[nodiscard]] nlohmann::json RobotJson() const;
+  void Add(Feed feed, const nlohmann::json& record);
+
+  Config task_;
+  const std::optional<KeyRing> keys_;
+  const ReadAgain read_again_;
+  LogAuthenticator authenticator_;
+  Interpreter interpreter_;
+  std::unique_ptr<Certifier> certifier_;
+  std::optional<ObstaclesInForce> in_force_;
+  std::shared_ptr<const std::vector<Obstacle>> obstacles_;
+  Digest obstacles_digest_{};
+  Digest tried_{};  // the config digest for which the file was read again last
+  std::int64_t tried_us_ = 0;
+  std::string other_task_;  // why tubes may be missing
+
+  Undecided<std::vector<std::uint8_t>> candidates_{64}, certificates_{16};
+  std::vector<Decided> decided_;  // since the last tick
+  std::int64_t skipped_ = 0;      // decisions of one tick that were too many to be shown
+  std::deque<std::pair<std::int64_t, std::int64_t>> faults_, withdrawals_;  // which are repeated
+  std::optional<std::pair<std::int64_t, certifier_status_v3_t>> status_;    // and when it arrived
+  std::optional<std::pair<std::int64_t, logger_status_t>> logger_;
+  std::optional<std::pair<std::int64_t, robot_state_t>> state_;
+  std::unique_ptr<Tube> tube_;
+
+  struct Counts {
+    std::int64_t messages = 0, undecodable = 0, decisions = 0, lost = 0, gaps = 0;
+    std::map<std::string, std::int64_t> by_outcome, by_cause;
+  } counts_;
+
+  mutable std::mutex mutex_;  // guards what Since reads
+  std::array<LiveFeed, 6> feeds_{LiveFeed{kDecisions}, LiveFeed{kOthers}, LiveFeed{kOthers},
+                                 LiveFeed{kOthers},    LiveFeed{kOthers}, LiveFeed{kPlaces}};
+  std::array<std::int64_t, 6> ends_{};  // of the feeds at the last tick, so that all of a reader's news is of one time
+  std::string now_, set_;
+  std::int64_t obstacles_number_ = 0, tick_ = 0;
+};
+
+}  // namespace forereach

@@ -1,0 +1,28 @@
+/** What a page shows of one decision: found by certifying its candidate again. */
+#pragma once
+
+#include <string>
+
+#include "certifier/certify/certifier.h"
+#include "certifier/gate/candidate_message.h"
+#include "certifier/task/config.h"
+#include "page/page_data.h"
+
+namespace forereach {
+
+/** A candidate, and what was decided on it. */
+struct JudgedCandidate {
+  candidate_plan_t candidate;
+  Schedule schedule;
+  int outcome, step;  ///< decision_t's.
+};
+
+/** Why a candidate cannot be judged again under this task; empty if it can, as far as Certifier::Require agrees. */
+[[nodiscard]] std::string WhyNotJudged(const candidate_plan_t& candidate, const Config& task);
+
+/** Fills in what the second decision on a candidate found, or why there is no tube: also if it differs from the first.
+@param tube of `again`, which `certifier` has made. */
+void Describe(const Certifier& certifier, const JudgedCandidate& judged, const Decision& again, const Tube& tube,
+              PageDetail& detail);
+
+}  // namespace forereach

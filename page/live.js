@@ -1,0 +1,286 @@
+// The live page: what `forereach live` sends on /events, as it is now.
+'use strict';
+(() => {
+const {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, clockText,
+  listed, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn, placeOf, centerOf,
+  drawObstacle, showView, startView, drawTube, showLegend} = ForeReach;
+
+const MOST = {decisions: 120, faults: 60, withdrawals: 60, events: 60, gaps: 60, places: 600};
+const REFUSED_US = 3e6;  // as long is an abstention drawn
+const SILENT_US = 2e6;  // the certifier's heartbeat comes twice a second
+const state = {beginning: null, now: null, obstacles: [], chosen: null, heard: 0};
+for (const name of Object.keys(MOST)) state[name] = [];
+
+const followed = () => state.chosen === null;
+const age = (heard) => state.now.utime - heard;
+
+// ---- The state of the processes.
+const showState = () => {
+  const {now} = state, {certifier} = now, isSilent = !certifier || age(certifier.heard) > SILENT_US;
+  byId('state').dataset.level = isSilent ? 'silent' : certifier.level;
+  byId('level').textContent = isSilent ? 'No heartbeat' : certifier.level;
+  const words = [];
+  if (!certifier) words.push('no certifier has been heard');
+  else {
+    if (isSilent) words.push(`for ${(age(certifier.heard) / 1e6).toFixed(0)} s; the last was ${certifier.level}`);
+    words.push(certifier.state);
+    if (certifier.fault) words.push(`fault ${certifier.fault.replaceAll('_', ' ')}`, `on disk: ${certifier.latch}`);
+    if (certifier.shadow) words.push('shadow mode: it certifies nothing');
+    words.push(`${counted(certifier.obstacles.in_force)} obstacles in force${certifier.obstacles.known ? '' : ', not all are known'}`);
+    words.push(`${counted(certifier.observations)} observations, version ${certifier.version}`);
+  }
+  byId('certifier').textContent = words.join('; ');
+  byId('certifier-message').textContent = certifier?.message ?? '';
+  byId('advice').textContent = certifier?.advice ? `What to do: ${certifier.advice}` : '';
+  const refused = Object.entries(now.refused).filter(([, n]) => n > 0);
+  const trust = [];
+  if (!now.signed) trust.push('UNSIGNED: anyone on this network can move this robot, and can make this page show what he likes.');
+  if (refused.length) trust.push(`Not authentic and not shown: ${refused.map(([name, n]) => `${counted(n)} ${name.replaceAll('_', ' ')}`).join(', ')}.`);
+  if (now.note) trust.push(`${now.note}.`);
+  byId('trust').textContent = trust.join(' ');
+  byId('trust').hidden = trust.length === 0;
+};
+
+const showFigures = () => {
+  const {counts, certifier, logger} = state.now, outcomes = counts.by_outcome ?? {};
+  const of = (wanted) => Object.entries(outcomes).filter(([name]) => wanted(name)).reduce((sum, [, n]) => sum + n, 0);
+  const abstained = of((name) => name.startsWith('abstain')), certified = outcomes.certified ?? 0;
+  const cards = [
+    ['Decisions', counted(counts.decisions), counts.not_shown > 0 ? `${counted(counts.not_shown)} too fast to be listed` : ''],
+    ['Certified', percent(certified, counts.decisions), counted(certified)],
+    ['Abstained', counted(abstained), listed(new Map(Object.entries(counts.by_cause ?? {}).map(([name, n]) => [name.replaceAll('_', ' '), n])))],
+    ['Rejected', counted(outcomes.rejected ?? 0), ''],
+    ['Gate', certifier ? duration(certifier.elapsed_us.p50) : '\u2013', certifier ? `median; p99 ${duration(certifier.elapsed_us.p99)}` : ''],
+    ['Messages lost', counted(counts.lost), `${counted(counts.gaps)} gaps; here ${counted(counts.dropped)} dropped`],
+    ['Unreadable', counted(counts.undecodable), `messages; ${counted(counts.datagrams_refused)} datagrams`],
+    ['Logger', !logger ? '\u2013' : age(logger.heard) > SILENT_US ? 'silent' : logger.level, logger ? `${counted(logger.lost)} events lost` : 'not heard'],
+  ];
+  byId('figures').replaceChildren(...cards.map(([name, value, note]) => {
+    const card = make('div');
+    card.append(make('dt', name), make('dd', value, 'value'), make('dd', note || '\u00a0'));
+    return card;
+  }));
+  const {robot} = state.now;
+  fillList('facts', robot ? [
+    ['Mode', robot.mode],
+    ['Plan', robot.plan === '-1' ? 'none' : `${robot.plan}, step ${robot.step}`],
+    ['State', robot.state.map((x, k) => `${state.beginning.states[k] ?? k} ${number(x ?? NaN, 4)}`).join(', ')],
+    ['Measured', `${clockText(robot.utime)} UTC${age(robot.heard) > 1e6 ? `, ${(age(robot.heard) / 1e6).toFixed(0)} s ago` : ''}`],
+  ] : [['State', 'not heard']]);
+};
+
+const BIN_US = 4e6, BINS = 30;
+const showTrend = () => {
+  const end = Math.ceil(state.now.utime / BIN_US), counts = new Map();
+  for (const {utime, outcome} of state.trend) {
+    const bin = BINS - 1 - (end - 1 - Math.floor(utime / BIN_US));
+    if (bin < 0 || bin >= BINS) continue;
+    if (!counts.has(outcome)) counts.set(outcome, new Array(BINS).fill(0));
+    ++counts.get(outcome)[bin];
+  }
+  const names = Object.keys(OUTCOMES).filter((name) => counts.has(name));
+  drawChart('trend', `Decisions of the last two minutes: ${names.map((name) => `${outcomeLabel(name)} ${counts.get(name).reduce((a, b) => a + b, 0)}`).join(', ') || 'none'}`, {
+    type: 'bar',
+    data: {labels: Array.from({length: BINS}, (_, k) => `${(k - BINS) * BIN_US / 1e6} s`),
+      datasets: names.map((name) => ({label: outcomeLabel(name), data: counts.get(name), backgroundColor: outcomeColor(name), stack: 'all', barPercentage: 1, categoryPercentage: .94}))},
+    options: {plugins: {legend: legend(true)},
+      scales: {x: axis('', {stacked: true, title: {display: false}, ticks: {color: SOFT, maxRotation: 0, autoSkipPadding: 30}, grid: {display: false}}),
+        y: axis('decisions', {stacked: true, beginAtZero: true, ticks: {color: SOFT, precision: 0}})}},
+  });
+};
+
+// ---- Tables.
+const showDecisions = () => {
+  const rows = state.decisions.slice(-60).reverse();
+  fillTable(byId('decisions'), '', ['Time (UTC)', 'Outcome', 'Cause', 'Step', 'Plan', 'Took', 'Sentence'], rows.map((decision) => {
+    const button = make('button', clockText(decision.utime)), outcome = make('span'), chip = make('i', undefined, 'chip');
+    button.type = 'button';
+    button.dataset.key = decision.key;
+    chip.style.background = outcomeColor(decision.outcome);
+    outcome.append(chip, outcomeLabel(decision.outcome));
+    return [button, outcome, decision.cause === 'none' ? '' : decision.cause.replaceAll('_', ' '), decision.step < 0 ? '' : String(decision.step),
+      `${decision.plan.slice(-7)} ${decision.source}`, duration(decision.elapsed ?? NaN), decision.message];
+  }));
+  markChosen();
+};
+const markChosen = () => {
+  for (const button of byId('decisions').querySelectorAll('button'))
+    button.closest('tr').classList.toggle('chosen', Number(button.dataset.key) === state.chosen?.key);
+};
+const showOthers = () => {
+  const table = (id, caption, heads, line) =>
+    fillTable(byId(id), `${caption}: ${counted(state[id].length)}${state[id].length >= MOST[id] ? ' or more' : ''}`, heads, state[id].slice(-20).reverse().map(line));
+  table('faults', 'Faults', ['Time', 'Fault', 'Sentence'], (row) => [clockText(row.utime), row.kind, row.message]);
+  table('withdrawals', 'Withdrawals', ['Time', 'Plan', 'Cause', 'Sentence'], (row) => [clockText(row.utime), row.plan, row.kind, row.message]);
+  table('gaps', 'Gaps', ['Time', 'Channel', 'Reason', 'Lost'], (row) => [clockText(row.utime), `${row.channel} ${row.source}`, row.reason, row.lost]);
+  table('events', 'What the robot did', ['Time', 'Event', 'Plan', 'Sentence'], (row) => [clockText(row.utime), row.kind.replaceAll('_', ' '), row.plan, row.message]);
+};
+
+// ---- The drawing: around the robot now, or a decision that was chosen.
+const unitsOfDecision = ({detail}) => unitsOf(detail, {...detail, at: {part: 0, polygon: 0, point: 0}});
+const bodiesOfDecision = ({detail}) =>
+  unitsOf(detail.body, {units: detail.body_units, grid: detail.body_grid, at: {part: 0, polygon: 0, point: 0}});
+const hasTube = (decision) => decision?.detail.units > 0;
+const newest = (passes) => state.decisions.findLast((decision) => hasTube(decision) && passes(decision));
+
+const choose = (decision) => {
+  state.chosen = decision;
+  byId('follow').setAttribute('aria-pressed', String(followed()));
+  byId('step').closest('.slider').hidden = followed();
+  byId('missing').textContent = '';
+  view.scene = view.whole = null;
+  byId('svg').replaceChildren();
+  markChosen();
+  if (followed()) {
+    showNow();
+    return;
+  }
+  byId('shows').textContent = `Decision of ${clockText(decision.utime)}: ${decision.message}`;
+  if (decision.detail.missing) byId('missing').textContent = `${hasTube(decision) ? 'Drawn are' : 'No drawing'}: ${decision.detail.missing}.`;
+  if (!hasTube(decision)) return;
+  drawTube({units: unitsOfDecision(decision), bodies: bodiesOfDecision(decision), detail: decision.detail, outcome: decision.outcome, set: decision.detail.set,
+    binding: decision.outcome === 'rejected' ? -1 : decision.obstacle});
+  showLegend(outcomeColor(decision.outcome), decision.detail);
+};
+
+const tubeGroup = (decision, attributes) => {
+  const group = shape('g', {});
+  for (const polygon of unitsOfDecision(decision).flat()) group.append(outline(polygon, {'stroke-width': .8, 'stroke-opacity': .5, ...attributes}));
+  return group;
+};
+
+const obstacleGroup = (time, binding) => {
+  const group = shape('g', {});
+  state.obstacles.forEach((obstacle, k) => {
+    const place = placeOf(obstacle, time);
+    if (!obstacle || !(obstacle.normal ? canBeDrawn(...obstacle.normal, obstacle.offset) : place && canBeDrawn(place.radius, ...place.points.flat()))) return;
+    group.append(drawObstacle(obstacle, place, k === binding));
+    if (!obstacle.motion || !place) return;
+    for (const later of [.5e6, 1e6, 1.5e6, 2e6]) {  // where it will be, grown
+      const then = placeOf(obstacle, time + later);
+      if (!then || !canBeDrawn(then.radius, ...then.points.flat())) continue;
+      group.append(then.points.length === 1
+        ? shape('circle', {class: 'prediction', cx: then.points[0][0], cy: -then.points[0][1], r: Math.max(then.radius, 0), fill: 'none', stroke: '#6b7280', 'stroke-dasharray': '4 4', 'vector-effect': 'non-scaling-stroke'})
+        : outline(then.points, {class: 'prediction', fill: 'none', stroke: '#6b7280', 'stroke-dasharray': '4 4', 'stroke-width': 1}));
+    }
+  });
+  return group;
+};
+
+const extentOfTubes = (tubes) => {
+  let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
+  for (const [x, y] of tubes.flatMap((decision) => unitsOfDecision(decision).flat(2))) {
+    left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y);
+  }
+  return right > left ? Math.max(right - left, top - bottom) : 0;
+};
+const follow = {size: 0};
+const moveView = ([x, y], size) => {
+  if (!(size <= follow.size && follow.size <= 3 * size)) follow.size = 2 * Math.max(size, .5);
+  const whole = {x: x - follow.size, y: -y - .6 * follow.size, width: 2 * follow.size, height: 1.2 * follow.size};
+  if (view.whole && view.whole.width === whole.width) {  // as far as the robot has moved, so that panning and zooming stay
+    view.x += whole.x - view.whole.x;
+    view.y += whole.y - view.whole.y;
+  } else {
+    Object.assign(view, whole);
+  }
+  view.whole = whole;
+};
+
+const showNow = () => {
+  const {robot, utime} = state.now;
+  const running = robot && newest((decision) => decision.outcome === 'certified' && decision.plan === robot.plan);
+  const last = newest(() => true);
+  // The planner answers an abstention at once: the newest plan is mostly another one.
+  const refused = newest((decision) => decision.outcome.startsWith('abstain') && utime - decision.utime < REFUSED_US);
+  const tubes = [...new Set([refused, last, running].filter(Boolean))];  // the last is on top
+  const center = robot?.at ?? (last ? unitsOfDecision(last)[0][0]?.[0] : null);
+  if (!center || !canBeDrawn(...center)) {
+    byId('shows').textContent = state.beginning.planar ? 'Neither a robot nor a tube has been heard of yet.' : 'The safety coordinates of this task are not planar: no drawing.';
+    return;
+  }
+  moveView(center, Math.max(extentOfTubes(tubes), 1));
+  const colorOf = (tube) => (tube === running ? EXECUTED : outcomeColor(tube.outcome));
+  const layers = [obstacleGroup(utime, refused?.obstacle ?? -1)];
+  for (const tube of tubes) layers.push(tubeGroup(tube, {fill: colorOf(tube), 'fill-opacity': .13, stroke: colorOf(tube)}));
+  const places = state.places.filter(([x, y]) => canBeDrawn(x, y));
+  layers.push(shape('polyline', {points: pointsText(places), fill: 'none', stroke: INK, 'stroke-width': 1.2, 'vector-effect': 'non-scaling-stroke'}));
+  for (const polygon of robot?.body ?? []) layers.push(outline(polygon, {id: 'body', fill: INK, 'fill-opacity': .35, stroke: INK, 'stroke-width': 1.5}));
+  if (robot?.at) {
+    const dot = shape('circle', {class: 'dot', cx: robot.at[0], cy: -robot.at[1], fill: INK});
+    dot.isNow = true;
+    layers.push(dot);
+  }
+  byId('svg').replaceChildren(...layers);
+  byId('shows').textContent = last ? `The newest decision: ${last.message}` : '';
+  showView();
+  const entries = [['#6b7280', 'obstacles now, and where they will be'], [INK, 'the robot and its path']];
+  for (const tube of tubes.reverse())
+    entries.push([colorOf(tube), tube === running ? 'the certified plan that it executes' : tube === last ? `the newest plan: ${outcomeLabel(tube.outcome)}` : `the newest plan that is not certified: ${outcomeLabel(tube.outcome)}`]);
+  byId('legend').replaceChildren(...entries.map(([color, text]) => {
+    const item = make('li'), chip = make('i', undefined, 'chip');
+    chip.style.background = color;
+    item.append(chip, text);
+    return item;
+  }));
+};
+
+// ---- News.
+let key = 0;
+const take = (news) => {
+  state.heard = performance.now();
+  state.now = news.now;
+  if (news.obstacles) state.obstacles = news.obstacles;
+  for (const decision of news.decisions ?? []) {
+    decision.key = ++key;
+    state.trend.push({utime: decision.utime, outcome: decision.outcome});
+  }
+  state.trend = state.trend.slice(-5000);
+  for (const [name, most] of Object.entries(MOST)) if (news[name]) state[name] = state[name].concat(news[name]).slice(-most);
+  showState();
+  showFigures();
+  showTrend();
+  if (news.decisions) showDecisions();
+  if (news.faults || news.withdrawals || news.events || news.gaps) showOthers();
+  if (followed()) showNow();
+  document.body.dataset.ready = 'yes';
+};
+
+const problem = (text) => {
+  byId('problem').textContent = text;
+  byId('problem').hidden = !text;
+  document.body.classList.toggle('lost', Boolean(text));
+};
+
+const start = () => {
+  state.beginning = JSON.parse(byId('data').textContent);
+  state.trend = [];
+  byId('what').textContent = `${state.beginning.robot ? `${state.beginning.robot}: ` : ''}${state.beginning.model}, ${state.beginning.task} on ${state.beginning.url}; certificates hold ${state.beginning.holds === 'all_times' ? 'at all times' : 'at the samples'}`;
+  startView();
+  byId('step').closest('.slider').hidden = true;
+  byId('follow').addEventListener('click', () => { if (state.now) choose(null); });
+  byId('decisions').addEventListener('click', (event) => {
+    const button = event.target.closest('button');
+    const decision = button && state.decisions.find((each) => each.key === Number(button.dataset.key));
+    if (decision) choose(decision);
+  });
+  showOthers();
+  const source = new EventSource('/events');
+  source.addEventListener('open', () => {  // everything is sent again
+    for (const name of Object.keys(MOST)) state[name] = [];
+    state.trend = [];
+    problem('');
+  });
+  source.addEventListener('message', (event) => take(JSON.parse(event.data)));
+  // What is not fresh is not shown as if it were.
+  const check = () => {
+    const seconds = (performance.now() - state.heard) / 1000;
+    if (seconds > 2) problem(`The connection to forereach live is lost: what you see is ${state.heard ? `${seconds.toFixed(0)} s old` : 'nothing yet'}.`);
+    else if (!byId('problem').hidden) problem('');
+  };
+  setInterval(check, 500);
+};
+
+start();
+
+})();

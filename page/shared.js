@@ -1,0 +1,287 @@
+// What the page of a run and the live page share: words, colours, charts, small tables, and the drawing. Texts come from
+// messages, which anyone may have written: they reach the document through textContent only.
+'use strict';
+const ForeReach = (() => {
+
+// ---- Words and colours. Okabe and Ito's colours can be told apart with any kind of colour vision.
+const OUTCOMES = {
+  certified: {label: 'certified', color: '#0072B2'},
+  abstain_safety: {label: 'abstain S', color: '#E69F00'},
+  abstain_domain: {label: 'abstain D', color: '#56B4E9'},
+  abstain_falsified: {label: 'abstain F', color: '#CC79A7'},
+  abstain_deadline: {label: 'abstain, late', color: '#F0E442'},
+  abstain_obstacles: {label: 'abstain, no obstacles', color: '#D55E00'},
+  rejected: {label: 'rejected', color: '#8A8F98'},
+};
+const EXECUTED = '#009E73', WRONG = '#D55E00', INK = '#1b1f24', SOFT = '#5b6470';
+const outcomeLabel = (name) => OUTCOMES[name]?.label ?? name;
+const outcomeColor = (name) => OUTCOMES[name]?.color ?? '#000000';
+
+const byId = (id) => document.getElementById(id);
+const make = (tag, text, className) => {
+  const element = document.createElement(tag);
+  if (text !== undefined) element.textContent = text;
+  if (className) element.className = className;
+  return element;
+};
+const counted = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
+const number = (x, digits = 6) =>
+  Number.isNaN(x) ? '\u2013' : x === Infinity ? '\u221e' : x === -Infinity ? '\u2212\u221e' : String(Number(x.toPrecision(digits)));
+const percent = (part, whole) => (whole > 0 ? `${(100 * part / whole).toFixed(1)} %` : '\u2013');
+const duration = (us) => {
+  if (!Number.isFinite(us)) return number(us);
+  return us < 1000 ? `${number(us, 4)} \u00b5s` : us < 1e6 ? `${number(us / 1e3, 4)} ms` : `${number(us / 1e6, 4)} s`;
+};
+// Microseconds since the epoch. Times beyond a calendar stay numbers.
+const dateOf = (us) => (Math.abs(us) <= 8.64e18 / 1e3 ? new Date(us / 1000) : null);
+const timeText = (us) => dateOf(us)?.toISOString().replace('T', ' ').replace('Z', '') ?? `${us} \u00b5s`;
+const clockText = (us) => dateOf(us)?.toISOString().slice(11, 23) ?? `${us} \u00b5s`;
+
+const listed = (counts) => [...counts].sort((a, b) => b[1] - a[1]).map(([name, n]) => `${name} ${counted(n)}`).join(', ');
+
+// ---- Charts.
+const charts = {};
+const drawChart = (id, label, config) => {
+  const canvas = byId(id);
+  canvas.setAttribute('aria-label', label);
+  if (!charts[id]) {
+    charts[id] = new Chart(canvas, {...config, options: {animation: false, responsive: true, maintainAspectRatio: false, ...config.options}});
+    return;
+  }
+  charts[id].data = config.data;
+  charts[id].options = {animation: false, responsive: true, maintainAspectRatio: false, ...config.options};
+  charts[id].update('none');
+};
+const axis = (title, more = {}) => ({title: {display: true, text: title, color: SOFT}, grid: {color: '#eef1f4'}, ticks: {color: SOFT}, ...more});
+const legend = (display) => ({display, position: 'bottom', labels: {boxWidth: 12, boxHeight: 12, color: INK}});
+
+// ---- Small tables. A cell is a text or an element.
+const fillTable = (table, caption, heads, rows, numeric = []) => {
+  const cell = (tag, content, k) => {
+    const td = make(tag, undefined, numeric.includes(k) ? 'n' : '');
+    td.append(content);
+    return td;
+  };
+  const line = (tag, contents) => {
+    const tr = make('tr');
+    tr.append(...contents.map((content, k) => cell(tag, content, k)));
+    return tr;
+  };
+  const head = make('thead'), body = make('tbody');
+  head.append(line('th', heads));
+  body.append(...rows.map((row) => line('td', row)));
+  table.replaceChildren(make('caption', caption), head, body);
+};
+
+// A list of names and values; what is empty is left out.
+const fillList = (id, entries) => byId(id).replaceChildren(...entries.filter(([, value]) => value !== '' && value !== null)
+  .flatMap(([name, value]) => [make('dt', name), make('dd', value)]));
+
+
+// ---- Drawings.
+// The polygons of each unit, as arrays of x and y in metres.
+const unitsOf = (drawings, detail) => {
+  const [x0, y0, quantum] = detail.grid;
+  let {part, polygon, point} = detail.at;
+  return Array.from({length: detail.units}, () => Array.from({length: drawings.parts[part++]}, () => {
+    let x = 0, y = 0;
+    return Array.from({length: drawings.corners[polygon++]}, () => {
+      x += drawings.points[point++];
+      y += drawings.points[point++];
+      return [x0 + quantum * x, y0 + quantum * y];
+    });
+  }));
+};
+
+const SVG = 'http://www.w3.org/2000/svg';
+const shape = (tag, attributes) => {
+  const element = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+};
+// y points up.
+const pointsText = (points) => points.map(([x, y]) => `${x},${-y}`).join(' ');
+const outline = (points, attributes) =>
+  shape('polygon', {points: pointsText(points), 'vector-effect': 'non-scaling-stroke', 'stroke-linejoin': 'round', ...attributes});
+
+const view = {x: 0, y: 0, width: 1, height: 1, whole: null, scene: null};
+
+// Beyond this, numbers of a log are no places in a drawing.
+const canBeDrawn = (...numbers) => numbers.every((x) => Math.abs(x) < 1e9);
+
+// Where an obstacle is at a time: its points and its radius, or null.
+const placeOf = (obstacle, time) => {
+  if (!obstacle?.points) return null;
+  const {points, radius, motion} = obstacle;
+  if (!motion) return {points, radius};
+  if (time < motion.from || motion.until < time) return null;
+  const tau = (time - motion.stamp) / 1e6;
+  return {points: points.map(([x, y]) => [x + motion.velocity[0] * tau, y + motion.velocity[1] * tau]),
+    radius: radius + motion.uncertainty + motion.growth * Math.abs(tau) + motion.growth_rate * tau * tau / 2};
+};
+const centerOf = (points) => [0, 1].map((k) => points.reduce((sum, point) => sum + point[k], 0) / points.length);
+
+// A hull of points, each with a disc of this radius, is their polygon with a round border as wide.
+const drawObstacle = (obstacle, place, isBinding) => {
+  const color = isBinding ? WRONG : '#6b7280';
+  if (obstacle.normal) {
+    const [nx, ny] = obstacle.normal, norm = Math.hypot(nx, ny), far = 50 * Math.max(view.whole.width, view.whole.height);
+    const [ux, uy] = [nx / norm, ny / norm], [cx, cy] = [ux * obstacle.offset / norm, uy * obstacle.offset / norm];
+    if (!canBeDrawn(cx, cy)) return shape('g', {});
+    return outline([[cx - far * uy, cy + far * ux], [cx + far * uy, cy - far * ux], [cx + far * (uy + ux), cy + far * (uy - ux)],
+      [cx + far * (ux - uy), cy + far * (uy + ux)]], {fill: color, 'fill-opacity': .28, stroke: color, 'stroke-width': isBinding ? 2 : 1});
+  }
+  const group = shape('g', {opacity: isBinding ? .5 : .38});
+  if (place.points.length === 1)
+    group.append(shape('circle', {cx: place.points[0][0], cy: -place.points[0][1], r: Math.max(place.radius, 0), fill: color}));
+  else
+    group.append(shape('polygon', {points: pointsText(place.points), fill: color, stroke: color, 'stroke-width': 2 * place.radius, 'stroke-linejoin': 'round'}));
+  return group;
+};
+
+const showView = () => {
+  const svg = byId('svg');
+  svg.setAttribute('viewBox', `${view.x} ${view.y} ${view.width} ${view.height}`);
+  const box = svg.getBoundingClientRect();
+  const perPixel = Math.max(view.width / Math.max(box.width, 1), view.height / Math.max(box.height, 1));
+  for (const label of svg.querySelectorAll('text')) label.setAttribute('font-size', 12 * perPixel);
+  for (const dot of svg.querySelectorAll('.dot')) dot.setAttribute('r', (dot.isNow ? 5 : 2.2) * perPixel);
+  const target = 110 * perPixel, base = Math.pow(10, Math.floor(Math.log10(target)));
+  const length = [5, 2, 1].map((k) => k * base).find((l) => l <= target) ?? base;
+  byId('scale').style.width = `${length / perPixel}px`;
+  byId('scale').firstElementChild.textContent = `${number(length)} m`;
+};
+const zoom = (factor, x = .5, y = .5) => {
+  const width = view.width * factor, height = view.height * factor;
+  if (!(width > 1e-6 * view.whole.width && width < 100 * view.whole.width)) return;
+  view.x += (view.width - width) * x;
+  view.y += (view.height - height) * y;
+  view.width = width;
+  view.height = height;
+  showView();
+};
+const pan = (dx, dy) => { view.x += dx * view.width; view.y += dy * view.height; showView(); };
+const showWhole = () => { Object.assign(view, view.whole); showView(); };
+
+const startView = () => {
+  const svg = byId('svg'), fingers = new Map();
+  const shareOf = (event) => {
+    const box = svg.getBoundingClientRect();
+    return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  };
+  svg.addEventListener('wheel', (event) => {
+    if (document.activeElement !== svg && !event.ctrlKey) return;  // else the page scrolls
+    event.preventDefault();
+    zoom(Math.pow(1.0015, event.deltaY), ...shareOf(event));
+  }, {passive: false});
+  svg.addEventListener('pointerdown', (event) => { svg.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); });
+  svg.addEventListener('pointermove', (event) => {
+    const last = fingers.get(event.pointerId);
+    if (!last || !view.whole) return;
+    if (fingers.size === 1) {
+      const box = svg.getBoundingClientRect(), perPixel = Math.max(view.width / box.width, view.height / box.height);
+      pan(-(event.clientX - last.clientX) * perPixel / view.width, -(event.clientY - last.clientY) * perPixel / view.height);
+    } else {
+      const other = [...fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
+      const gap = (finger) => Math.max(20, Math.hypot(finger.clientX - other.clientX, finger.clientY - other.clientY));
+      zoom(gap(last) / gap(event), ...shareOf(other));
+    }
+    fingers.set(event.pointerId, event);
+  });
+  for (const end of ['pointerup', 'pointercancel']) svg.addEventListener(end, (event) => fingers.delete(event.pointerId));
+  svg.addEventListener('keydown', (event) => {
+    const act = {ArrowLeft: () => pan(-.1, 0), ArrowRight: () => pan(.1, 0), ArrowUp: () => pan(0, -.1), ArrowDown: () => pan(0, .1),
+      '+': () => zoom(.8), '=': () => zoom(.8), '-': () => zoom(1.25), 0: showWhole}[event.key];
+    if (!act || !view.whole) return;
+    act();
+    event.preventDefault();
+  });
+  byId('closer').addEventListener('click', () => zoom(.7));
+  byId('wider').addEventListener('click', () => zoom(1 / .7));
+  byId('whole').addEventListener('click', showWhole);
+  byId('step').addEventListener('input', showStep);
+  new ResizeObserver(() => { if (view.whole) showView(); }).observe(svg);
+};
+
+// The tube, and the obstacle that decides if it is not much larger.
+const extentOf = (units, executed, place) => {
+  let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
+  const add = ([x, y]) => { left = Math.min(left, x); right = Math.max(right, x); bottom = Math.min(bottom, y); top = Math.max(top, y); };
+  units.flat(2).forEach(add);
+  executed.forEach(([, x, y]) => add([x, y]));
+  const size = Math.max(right - left, top - bottom, 1e-3);
+  for (const [x, y] of place && place.radius < size && canBeDrawn(...place.points.flat()) ? place.points : [])
+    if (Math.abs(x - (left + right) / 2) < 1.5 * size && Math.abs(y - (top + bottom) / 2) < 1.5 * size)
+      for (const way of [-1, 1]) add([x + way * place.radius, y + way * place.radius]);
+  const border = Math.max(.12 * Math.max(right - left, top - bottom), 1e-3);
+  const width = right - left + 2 * border, height = Math.max(top - bottom + 2 * border, .45 * width);
+  return {x: left - border, y: -(top + bottom) / 2 - height / 2, width, height};
+};
+
+// What the step slider changes is in groups of its own.
+// @param binding the index of the obstacle that decides in `set`, or -1.
+const drawTube = ({units, bodies = [], detail, outcome, binding, set}) => {
+  const color = outcomeColor(outcome);
+  const executed = new Set(detail.executed.map(([step]) => step));
+  view.whole = extentOf(units, detail.executed, placeOf(set[binding], detail.start + Math.max(detail.binding, 0) * detail.step_us));
+  const tube = shape('g', {}), path = shape('g', {}), now = shape('g', {}), obstacles = shape('g', {}), labels = shape('g', {});
+  units.forEach((polygons, u) => polygons.forEach((polygon) => tube.append(outline(polygon, {
+    fill: executed.has(u) ? EXECUTED : color, 'fill-opacity': executed.has(u) ? .2 : .13,
+    stroke: executed.has(u) ? EXECUTED : color, 'stroke-opacity': .45, 'stroke-width': .8}))));
+  for (const polygon of units[detail.binding] ?? []) path.append(outline(polygon, {fill: 'none', stroke: WRONG, 'stroke-width': 2}));
+  if (detail.executed.length > 1)
+    path.append(shape('polyline', {points: pointsText(detail.executed.map(([, x, y]) => [x, y])), fill: 'none', stroke: INK, 'stroke-width': 1, 'vector-effect': 'non-scaling-stroke'}));
+  for (const [step, x, y] of detail.executed) {
+    const dot = shape('circle', {class: 'dot', cx: x, cy: -y, fill: INK});
+    dot.step = step;
+    path.append(dot);
+  }
+  byId('svg').replaceChildren(obstacles, tube, path, now, labels);
+  view.scene = {units, bodies, detail, color, binding, obstacles, now, path, labels, set};
+  const slider = byId('step');
+  slider.max = String(Math.max(0, units.length - 1));
+  slider.value = String(Math.max(0, Math.min(detail.binding, units.length - 1)));
+  Object.assign(view, view.whole);
+  showStep();
+};
+
+const showStep = () => {
+  const {scene} = view, step = Number(byId('step').value);
+  if (!scene) return;
+  const {detail, units} = scene, time = detail.start + step * detail.step_us;
+  byId('step-name').textContent = `Step ${step} of ${detail.steps}${step === detail.binding ? ', binding' : ''}`;
+  byId('step').setAttribute('aria-valuetext', byId('step-name').textContent);
+  scene.now.replaceChildren(...(units[step] ?? []).map((polygon) => outline(polygon, {fill: scene.color, 'fill-opacity': .35, stroke: INK, 'stroke-width': 1.6})));
+  for (const polygon of scene.bodies[step] ?? []) scene.now.append(outline(polygon, {class: 'body', fill: INK, 'fill-opacity': .3, stroke: INK, 'stroke-width': 1.4}));
+  for (const dot of scene.path.querySelectorAll('.dot')) dot.isNow = dot.step === step;
+  scene.obstacles.replaceChildren();
+  scene.labels.replaceChildren();
+  scene.set.forEach((obstacle, k) => {
+    const place = placeOf(obstacle, time), isBinding = k === scene.binding;
+    if (!obstacle || !(obstacle.normal ? canBeDrawn(...obstacle.normal, obstacle.offset) : place && canBeDrawn(place.radius, ...place.points.flat()))) return;
+    scene.obstacles.append(drawObstacle(obstacle, place, isBinding));
+    if (!place) return;
+    const [x, y] = centerOf(place.points);
+    const label = shape('text', {x, y: -y, 'text-anchor': 'middle', 'dominant-baseline': 'middle', fill: INK, 'pointer-events': 'none'});
+    label.textContent = String(k);
+    scene.labels.append(label);
+  });
+  showView();
+};
+
+const showLegend = (color, detail) => {
+  const entries = [[color, 'tube'], ['#6b7280', 'obstacles, by their numbers'], [WRONG, 'binding step and obstacle']];
+  if (detail.body_units > 0) entries.splice(1, 0, [INK, 'the body, at the center of its slice']);
+  if (detail.executed.length) entries.splice(1, 0, [EXECUTED, 'executed slices'], [INK, 'measured states']);
+  byId('legend').replaceChildren(...entries.map(([background, text]) => {
+    const item = make('li'), chip = make('i', undefined, 'chip');
+    chip.style.background = background;
+    item.append(chip, text);
+    return item;
+  }));
+};
+
+return {OUTCOMES, EXECUTED, WRONG, INK, SOFT, outcomeLabel, outcomeColor, byId, make, counted, number, percent, duration, dateOf,
+  timeText, clockText, listed, drawChart, axis, legend, fillTable, fillList, unitsOf, shape, pointsText, outline, view, canBeDrawn,
+  placeOf, centerOf, drawObstacle, showView, showWhole, startView, drawTube, showLegend};
+})();

@@ -1,0 +1,81 @@
+/** forereach_hostile_page: serves a live page of messages whose texts try to become elements and scripts, and whose
+numbers are the largest there are. Prints its address, and ends with its standard input. */
+#include <iostream>
+#include <limits>
+#include <string>
+
+#include "forereach/certified_plan_v2_t.hpp"
+#include "forereach/execution_event_t.hpp"
+#include "forereach/fault_t.hpp"
+#include "forereach/withdrawal_t.hpp"
+#include "live/web_server.h"
+#include "tests/live/live_fixture.h"
+
+namespace forereach {
+namespace {
+
+constexpr const char* kEvil = "</script><img src=x onerror=window.hacked=1>";
+
+template <class Message>
+LogEvent EventOf(const std::string& channel, const Message& message) {
+  const auto bytes = Encode(message);
+  return {0, 1, channel, {bytes.begin(), bytes.end()}};
+}
+
+void SendHostile(Watcher& watcher) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  decision_t decision{};
+  fault_t fault{};
+  withdrawal_t withdrawal{};
+  execution_event_t event{};
+  candidate_plan_t candidate{};
+  certifier_status_v3_t status{};
+  logger_status_t logger{};
+  SetText(decision.source, kEvil), SetText(decision.message, kEvil), SetText(fault.message, kEvil);
+  SetText(withdrawal.message, kEvil), SetText(event.message, kEvil), SetText(candidate.source, kEvil);
+  SetText(status.message, kEvil), SetText(logger.message, kEvil);
+  status.state = certifier_status_v3_t::ARMED, status.level = certifier_status_v3_t::ERROR;
+  for (std::int64_t sequence : {std::int64_t{0}, std::int64_t{7}, kMost}) {
+    for (std::int16_t outcome : {0, 1, 2, 3, 4, 5, 6, 7, 99}) {
+      decision.utime = decision.plan_id = decision.sequence = sequence;
+      decision.outcome = decision.cause = outcome;
+      decision.step = decision.obstacle = std::numeric_limits<std::int16_t>::max();
+      decision.margin = std::numeric_limits<double>::infinity();
+      decision.elapsed_us = std::numeric_limits<double>::quiet_NaN();
+      watcher.Take(EventOf("PLAN_DECISION", decision));
+    }
+    fault.utime = fault.sequence = withdrawal.utime = withdrawal.sequence = event.utime = event.sequence = sequence;
+    candidate.utime = candidate.sequence = status.utime = status.sequence = sequence;
+    withdrawal.plan_id = sequence;
+    watcher.Take(EventOf("FAULT", fault));
+    watcher.Take(EventOf("PLAN_WITHDRAWN", withdrawal));
+    watcher.Take(EventOf("EXECUTION_EVENT", event));
+    watcher.Take(EventOf("PLAN_CANDIDATE", candidate));
+    watcher.Take(EventOf("CERTIFIER_STATUS", status));
+    watcher.Take(EventOf("LOGGER_STATUS", logger));
+  }
+  for (const double far : {1e308, -1e308, 1e12, 1.0}) {
+    robot_state_t state{};
+    state.num_states = static_cast<std::int16_t>(CourseTask().problem->model->num_states());
+    state.mode = robot_state_t::EXECUTING;
+    state.executing_plan_id = state.sequence = kMost;
+    std::fill_n(state.state, state.num_states, far);
+    watcher.Take(EventOf("ROBOT_STATE", state));
+    watcher.Tick(static_cast<std::int64_t>(far > 0 ? kMost : -kMost));
+  }
+}
+
+}  // namespace
+}  // namespace forereach
+
+int main() {
+  using namespace forereach;
+  Config task = CourseTask();
+  task.path = kEvil;
+  Watcher watcher(task, {}, CourseTask);
+  watcher.Tick(1);
+  const WebServer server(watcher, 0);
+  std::cout << "http://127.0.0.1:" << server.port() << "/" << std::endl;
+  SendHostile(watcher);
+  std::cin.get();
+}
