@@ -200,7 +200,7 @@ TEST_F(BusCommands, OnEachChannelOnlyItsSpeakerIsHeard) {
   const auto channels = static_cast<std::int64_t>(wanted.size());
   for (int i = 0; i < 200 && ear->refusals().foreign < channels; ++i) ear->Dispatch(10);
   ear->Dispatch(10);
-  EXPECT_EQ(channels, 12);
+  EXPECT_EQ(channels, 13);
   EXPECT_EQ(heard, wanted);
   const Refusals refusals = ear->refusals();
   EXPECT_EQ(refusals.unsigned_ones, channels);
