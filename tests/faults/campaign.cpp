@@ -23,6 +23,7 @@
 #include <unistd.h>
 #include "certifier/gate/candidate_message.h"
 #include "cli/progress.h"
+#include "forereach/advice_t.hpp"
 #include "forereach/command_t.hpp"
 #include "forereach/execution_event_t.hpp"
 #include "forereach/obstacles_t.hpp"
@@ -443,6 +444,10 @@ class Campaign final {
     if (const certified_plan_v2_t* certified = rig.witness().last_certified())
       withdrawal.plan_id = certified->plan.plan_id;
     harmful[channels.withdrawn] = Encode(withdrawal);
+    advice_t advice{};  // the task asks for none
+    advice.sequence = kForgedSequence;
+    advice.num_changes = 1;
+    harmful[channels.advice] = Encode(advice);
     obstacles_t nothing_there{};
     nothing_there.utime = WallClockUs();
     nothing_there.sequence = kForgedSequence;
