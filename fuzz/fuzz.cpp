@@ -39,3 +39,9 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
 
 // Freed memory is touched, if it is, within the same execution.
 extern "C" const char* __asan_default_options() { return "malloc_context_size=2:quarantine_size_mb=16"; }
+
+// libFuzzer's thread that watches the memory may still be starting when leaks are looked for. What the C library holds
+// then, the attributes of this thread, is freed a moment later.
+extern "C" const char* __lsan_default_suppressions() {
+  return "leak:__pthread_attr_extension\nleak:pthread_attr_setaffinity_np";
+}
