@@ -1,14 +1,12 @@
 #include "records/compare.h"
 
-#include <memory>
 #include <numeric>
 #include <utility>
 
-#include "certifier/gate/gate.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/codec.h"
+#include "records/gate_follower.h"
 #include "records/replay.h"
-#include "records/timeline.h"
 
 namespace forereach {
 namespace {
@@ -23,18 +21,8 @@ std::int64_t Sum(const std::map<Key, std::int64_t>& counts) {
                          [](std::int64_t sum, const auto& entry) { return sum + entry.second; });
 }
 
-class Comparer final : public TimelineUser {
+class Comparer final : public GateFollower {
  public:
-  void OnStart(const Config& task) override { gate_ = std::make_unique<Gate>(task); }
-  void OnReload(const Config& task) override {
-    const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(task));
-    gate_->Inherit(*before);
-  }
-  void OnObstacles(Bytes message, std::int64_t utime) override {
-    static_cast<void>(gate_->UpdateObstacles(message, utime));
-  }
-  void OnTransition(const ExecutedTransition&, Bytes message) override { static_cast<void>(gate_->Learn(message)); }
-
   void OnDecision(const RecordedDecision& recorded) override {
     const decision_t& before = recorded.decision;
     if (!recorded.candidate) {
@@ -43,11 +31,11 @@ class Comparer final : public TimelineUser {
     }
     const std::vector<std::uint8_t>& bytes = recorded.candidate->bytes;
     if (IsCircumstance(before)) {
-      static_cast<void>(gate_->Refuse(bytes, before.utime, before.cause, ""));
+      static_cast<void>(gate().Refuse(bytes, before.utime, before.cause, ""));
       ++result_.circumstances;
       return;
     }
-    const decision_t after = gate_->Decide(bytes, before.utime).decision;
+    const decision_t after = gate().Decide(bytes, before.utime).decision;
     const bool was = before.outcome == decision_t::CERTIFIED, is = after.outcome == decision_t::CERTIFIED;
     ++result_.candidates;
     result_.certificates += was;
@@ -79,7 +67,6 @@ class Comparer final : public TimelineUser {
       ++result_.otherwise[{then, now}];
   }
 
-  std::unique_ptr<Gate> gate_;
   Comparison result_;
 };
 

@@ -76,13 +76,7 @@ void RecordReader::Take(const LogEvent& event, const std::string& log_file) {
 
 void RecordReader::TakeWithdrawal(const LogEvent& event, const std::string& log_file) {
   const auto withdrawal = Decoded<withdrawal_t>(event.message());
-  if (!withdrawal) return;
-  withdrawal_t repeated = *withdrawal;
-  repeated.utime = repeated.sequence = 0;
-  const Digest digest = DigestOf(Encode(repeated));
-  if (std::ranges::find(withdrawals_, digest) != withdrawals_.end()) return;
-  if (withdrawals_.size() == kWithdrawals) withdrawals_.pop_front();
-  withdrawals_.push_back(digest);
+  if (!withdrawal || !withdrawals_.IsFirst(*withdrawal)) return;
   user_.OnWithdrawn(*withdrawal, {log_file, event.number, ToHex(DigestOf(event))});
 }
 

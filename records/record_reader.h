@@ -3,7 +3,6 @@ candidates without a decision, whatever the length of the logs. */
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -19,6 +18,7 @@ candidates without a decision, whatever the length of the logs. */
 #include "records/log_authenticator.h"
 #include "records/log_survey.h"
 #include "records/log_trust.h"
+#include "records/repeated_withdrawals.h"
 #include "records/rows.h"
 #include "records/undecided.h"
 
@@ -61,8 +61,7 @@ class RecordReader final {
   [[nodiscard]] PassedOver passed_over() const { return {authenticator_.refusals(), undecodable_}; }
 
  private:
-  static constexpr std::size_t kCandidates = 1024;   // undecided
-  static constexpr std::size_t kWithdrawals = 4096;  // which may be repeated at one time
+  static constexpr std::size_t kCandidates = 1024;  // undecided
 
   void Take(const LogEvent& event, const std::string& log_file);
   void TakeWithdrawal(const LogEvent& event, const std::string& log_file);
@@ -73,7 +72,7 @@ class RecordReader final {
   LogAuthenticator authenticator_;
   std::optional<Interpreter> interpreter_;  // given authentic events only
   Undecided<std::unique_ptr<candidate_plan_t>> candidates_{kCandidates};
-  std::deque<Digest> withdrawals_;
+  RepeatedWithdrawals withdrawals_;
   LogDamage damage_;
   std::int64_t undecodable_ = 0;
 };

@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <deque>
 #include <iterator>
-#include <memory>
 #include <utility>
 
 #include "bus/bus_options.h"
-#include "certifier/gate/gate.h"
 #include "forereach/decision_t.hpp"
 #include "lcmtypes/names.h"
 #include "lcmtypes/seal.h"
-#include "records/timeline.h"
+#include "records/gate_follower.h"
 
 namespace forereach {
 namespace {
@@ -34,25 +32,14 @@ std::string Difference(const decision_t& recorded, const decision_t& replayed) {
   return {};
 }
 
-class Replayer final : public TimelineUser {
+class Replayer final : public GateFollower {
  public:
   explicit Replayer(std::string plan_digest) : plan_digest_(std::move(plan_digest)) {}
 
   void OnStart(const Config& task) override {
-    gate_ = std::make_unique<Gate>(task);
+    GateFollower::OnStart(task);
     plans_.clear();
   }
-
-  void OnReload(const Config& task) override {
-    const std::unique_ptr<Gate> before = std::exchange(gate_, std::make_unique<Gate>(task));
-    gate_->Inherit(*before);
-  }
-
-  void OnObstacles(Bytes message, std::int64_t utime) override {
-    static_cast<void>(gate_->UpdateObstacles(message, utime));
-  }
-
-  void OnTransition(const ExecutedTransition&, Bytes message) override { static_cast<void>(gate_->Learn(message)); }
 
   void OnDecision(const RecordedDecision& recorded) override {
     const decision_t& decision = recorded.decision;
@@ -64,12 +51,12 @@ class Replayer final : public TimelineUser {
                     "decided under another task, of config digest " + ToHex(GetDigest(decision.config_digest)) +
                         ", which is not kept next to the log");
     if (IsCircumstance(decision)) {
-      static_cast<void>(gate_->Refuse(bytes, decision.utime, decision.cause, ""));
+      static_cast<void>(gate().Refuse(bytes, decision.utime, decision.cause, ""));
       ++result_.circumstances;
       Show(recorded.event, "recorded", decision, ", which depends on the moment");
       return;
     }
-    const decision_t again = gate_->Decide(bytes, decision.utime).decision;
+    const decision_t again = gate().Decide(bytes, decision.utime).decision;
     const std::string difference = Difference(decision, again);
     Show(recorded.event, "recorded", decision);
     Show(recorded.event, "replayed", again);
@@ -122,7 +109,7 @@ class Replayer final : public TimelineUser {
       if (named.*digest != recorded.basis.grounds.*digest) return "withdrawn under other " + std::string(name);
     const auto plan = std::ranges::find(plans_, GetDigest(withdrawal.certificate_digest), &Plan::first);
     if (plan == plans_.end()) return "withdrawn, but its certified plan is not in the log";
-    const Standing standing = gate_->JudgeAgain(plan->second, withdrawal.first_step);
+    const Standing standing = gate().JudgeAgain(plan->second, withdrawal.first_step);
     const Decision& verdict = standing.verdict;
     if (standing.steps == withdrawal.valid_steps && static_cast<int>(verdict.cause) == withdrawal.cause &&
         verdict.step == withdrawal.step && verdict.obstacle == withdrawal.obstacle)
@@ -147,7 +134,6 @@ class Replayer final : public TimelineUser {
 
   const std::string plan_digest_;
 
-  std::unique_ptr<Gate> gate_;
   std::deque<Plan> plans_;  // the last ones
   ReplayResult result_;
 };

@@ -10,8 +10,6 @@
 namespace forereach {
 namespace {
 
-constexpr std::size_t kWithdrawals = 4096;  // which may be repeated at one time
-
 // How many entries at the front of `ahead` were taken before a decision: see "Grounds".
 template <class Ahead, class DigestOfEntry>
 std::ptrdiff_t CountTaken(const Ahead& ahead, const Digest& now, const Digest& named, std::int64_t candidate_place,
@@ -273,13 +271,7 @@ void Timeline::TakeCertified(const LogEvent& event, const std::string& name) {
 
 void Timeline::TakeWithdrawal(const LogEvent& event, const std::string& name) {
   const auto withdrawal = Decoded<withdrawal_t>(event.message());
-  if (!withdrawal) return;
-  withdrawal_t repeated = *withdrawal;
-  repeated.utime = repeated.sequence = 0;
-  const Digest digest = DigestOf(Encode(repeated));
-  if (std::ranges::find(withdrawals_, digest) != withdrawals_.end()) return;
-  if (withdrawals_.size() == kWithdrawals) withdrawals_.pop_front();
-  withdrawals_.push_back(digest);
+  if (!withdrawal || !withdrawals_.IsFirst(*withdrawal)) return;
   RecordedWithdrawal recorded{*withdrawal, name, true, {}};
   const Grounds named = GroundsOf(*withdrawal);
   const Config* task = TaskOf(named.config);

@@ -38,6 +38,7 @@ before the candidate; then the digests of the basis differ from those that the d
 #include "records/event_log.h"
 #include "records/log_authenticator.h"
 #include "records/log_trust.h"
+#include "records/repeated_withdrawals.h"
 #include "records/undecided.h"
 
 namespace forereach {
@@ -194,7 +195,7 @@ class Timeline final {
   Undecided<RecordedCandidate> undecided_;
   std::map<Digest, Decided> decided_;  // by plan; of several decisions on one plan the last CERTIFIED, if there is one
 
-  std::deque<Digest> withdrawals_;  // of the last ones, without what differs in a repetition
+  RepeatedWithdrawals withdrawals_;
 
   // State at the last decision, and by everything that was logged; what lies between the two.
   std::shared_ptr<const std::vector<Obstacle>> obstacles_;
